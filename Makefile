@@ -1,0 +1,44 @@
+# `make help` lists the targets; everything runs in .venv, which is made on first use
+PYTHON ?= python3
+VENV ?= .venv
+BIN := $(VENV)/bin
+RESULTS ?= results
+
+.DEFAULT_GOAL := help
+.PHONY: help figure test check docs bench clean
+
+help:  ## list the targets
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-8s %s\n", $$1, $$2}'
+
+figure: $(BIN)/impact  ## sweep configs/figure6.toml and draw Figure 6 of the paper
+	@mkdir -p $(RESULTS)
+	$(BIN)/impact sweep configs/figure6.toml -o $(RESULTS)/figure6.h5 --overwrite
+	$(BIN)/impact plot $(RESULTS)/figure6.h5 -o $(RESULTS)/figure6.png
+	@echo "the picture is $(RESULTS)/figure6.png"
+
+test: $(VENV)/dev  ## run the tests
+	$(BIN)/python -m pytest -n auto
+
+check: $(VENV)/dev  ## lint and type-check
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+docs: $(VENV)/dev  ## regenerate docs/schema.md and the README's picture
+	$(BIN)/python scripts/make_docs.py
+
+bench: $(VENV)/dev  ## measure the core against a solve_ivp loop
+	$(BIN)/python scripts/bench_core.py
+
+clean:  ## remove the virtual environment and the results
+	rm -rf $(VENV) $(RESULTS)
+
+$(BIN)/impact: pyproject.toml
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	@touch $@
+
+$(VENV)/dev: pyproject.toml
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@touch $@

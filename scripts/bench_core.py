@@ -1,0 +1,136 @@
+"""How many impacts a second does the core integrate, against a loop of scipy's solve_ivp at matched accuracy?
+
+Every model of the paper that e drives, mixed; e from 0.05 to 0.99, all impacts distinct, nothing collapsed, all
+outputs computed. Both sides have to deliver max |e_out - exact| <= 1e-8: the tolerance of each is the loosest of
+a list that does. Printed is a ratio measured side by side in one run, on one thread.
+
+    python scripts/bench_core.py [--impacts 100000] [--loop 300]
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import time
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+from scipy.integrate import solve_ivp
+
+import impact
+from impact.contact.collide import Contact, collide
+from impact.contact.lanes import Lanes
+from impact.contact.model import ForceModel
+from impact.contact.oracles import delivered_restitution
+from impact.sweeps.plan import BLOCK
+
+ACCURACY = 1e-8
+CORE_TOLERANCES = (1e-7, 5e-8, 2e-8, 1e-8, 5e-9, 2e-9, 1e-9)
+LOOP_TOLERANCES = (1e-7, 1e-8, 3e-9, 1e-9, 3e-10, 1e-10, 5e-11, 3e-11, 2e-11, 1e-11)
+
+
+def table1(e: np.ndarray, model: ForceModel) -> Lanes:
+    """Impacts of the two balls of Table 1."""
+
+    def all_of(value: float) -> np.ndarray:
+        return np.full(e.size, value)
+
+    unknown = all_of(np.nan)
+    n = model.exponent or 1.5
+    return Lanes(
+        e=e, v1=all_of(1.0), v2=all_of(0.0), m1=all_of(1.0), m2=all_of(1.0), K=all_of(6.118486349e9), n=all_of(n),
+        R1=unknown, R2=unknown, E1=unknown, nu1=unknown, yield_strength1=unknown, E2=unknown, nu2=unknown,
+        yield_strength2=unknown,
+    )  # fmt: skip
+
+
+def core(models: list[ForceModel], e: np.ndarray, rtol: float) -> tuple[float, float, int]:
+    """Seconds, worst error and mean steps of the core, in blocks as a sweep runs them."""
+    seconds, worst, steps = 0.0, 0.0, 0
+    for place, model in enumerate(models):
+        mine = e[place :: len(models)]
+        for first in range(0, mine.size, BLOCK):
+            lanes = table1(mine[first : first + BLOCK], model)
+            begun = time.perf_counter()
+            contact: Contact = collide(model, lanes, rtol=rtol, max_steps=10_000, collapse=False)
+            seconds += time.perf_counter() - begun
+            worst = max(worst, float(np.max(np.abs(contact.oracle_error))))
+            steps += int(contact.steps.sum())
+    return seconds, worst, steps // e.size
+
+
+def one_by_solve_ivp(model: ForceModel, e: float, rtol: float) -> float:
+    """The delivered restitution of one impact as one writes it by hand: x, v in scaled units, two phases."""
+    n = model.exponent or 1.5
+    chi = float(np.asarray(model.coefficients["chi"](e))) if "chi" in model.coefficients else 0.0
+
+    def inward(_: float, y: list[float]) -> tuple[float, float]:
+        x = y[0]
+        return y[1], -(x**n if x > 0.0 else 0.0) * (1.0 + chi * y[1])
+
+    def stopped(_: float, y: list[float]) -> float:
+        return y[1]
+
+    stopped.terminal, stopped.direction = True, -1  # type: ignore[attr-defined]
+    first = solve_ivp(inward, (0.0, 1e3), (0.0, 1.0), rtol=rtol, atol=rtol, events=stopped)
+    peak = first.y[0, -1]
+    residual, stiffness = 0.0, 1.0
+    if model.unloading is not None:
+        residual, stiffness = peak * (1.0 - e * e), e ** (-2.0 * n)
+
+    def outward(_: float, y: list[float]) -> tuple[float, float]:
+        x = y[0] - residual
+        return y[1], -stiffness * (x**n if x > 0.0 else 0.0) * (1.0 + chi * y[1])
+
+    def parted(_: float, y: list[float]) -> float:
+        return y[0] - residual
+
+    parted.terminal, parted.direction = True, -1  # type: ignore[attr-defined]
+    last = solve_ivp(outward, (0.0, 1e3), (peak, 0.0), rtol=rtol, atol=rtol, events=parted)
+    return -last.y[1, -1]
+
+
+def loop(models: list[ForceModel], e: np.ndarray, rtol: float) -> tuple[float, float]:
+    """Seconds and worst error of the loop."""
+    worst, begun = 0.0, time.perf_counter()
+    for place, one in enumerate(e.tolist()):
+        model = models[place % len(models)]
+        out = one_by_solve_ivp(model, one, rtol)
+        exact = one
+        if "chi" in model.coefficients:
+            exact = float(delivered_restitution(float(np.asarray(model.coefficients["chi"](one)))))
+        elif model.key == "hertz":
+            exact = 1.0
+        worst = max(worst, abs(out - exact))
+    return time.perf_counter() - begun, worst
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--impacts", type=int, default=100_000)
+    parser.add_argument("--loop", type=int, default=300, help="impacts of the loop")
+    asked = parser.parse_args()
+    models = [model for model in impact.models().values() if not model.parameters]
+    e = np.linspace(0.05, 0.99, asked.impacts)
+    few = np.linspace(0.05, 0.99, asked.loop)
+
+    rtol = next(r for r in CORE_TOLERANCES if core(models, few, r)[1] <= ACCURACY)
+    loop_rtol = next(r for r in LOOP_TOLERANCES if loop(models, few, r)[1] <= ACCURACY)
+    loop_seconds, loop_worst = loop(models, few, loop_rtol)
+    seconds, worst, steps = core(models, e, rtol)
+    if worst > ACCURACY:
+        raise SystemExit(f"the core is off by {worst:.2g}, wants {ACCURACY:g}")
+
+    base = asked.loop / loop_seconds
+    table = Table("engine", "rtol", "max |e_out − exact|", "steps", "impacts/s", "ratio", box=None)
+    table.add_row("solve_ivp RK45, loop", f"{loop_rtol:g}", f"{loop_worst:.2g}", "", f"{base:,.0f}", "1")
+    rate = e.size / seconds
+    table.add_row("impact", f"{rtol:g}", f"{worst:.2g}", str(steps), f"{rate:,.0f}", f"{rate / base:,.0f}")
+    Console().print(f"{len(models)} models, {e.size:,} impacts (loop: {asked.loop}), one thread", table, sep="\n")
+
+
+if __name__ == "__main__":
+    main()

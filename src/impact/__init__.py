@@ -1,0 +1,25 @@
+"""Parameter sweeps of contact force models for the impact of two balls, checked against closed forms."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from .api import ForceModel, ImpactError, hysteresis, load, models, plot, run, save, sweep
+
+__all__ = ["ForceModel", "ImpactError", "hysteresis", "load", "models", "plot", "run", "save", "sweep"]
+
+
+def __getattr__(name: str) -> Any:
+    # the floors below load numpy and more, which `import impact` and `impact --help` do without
+    if name in __all__:
+        from . import api
+
+        return getattr(api, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]

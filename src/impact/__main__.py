@@ -1,0 +1,5 @@
+"""`python -m impact` is `impact`."""
+
+from .cli.main import main
+
+main()

@@ -1,0 +1,272 @@
+"""The program from Python: the one place that joins the floors. The commands are thin faces on it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .contact.collide import Contact, collide
+from .contact.history import follow
+from .contact.model import ForceModel
+from .contact.models import catalogue
+from .contact.models.hysteresis import hysteresis
+from .contact.status import Status
+from .data.history import history_dataset
+from .data.results import assemble
+from .data.store import load, save
+from .errors import ImpactError, UsageError, did_you_mean
+from .sweeps.config import Axis, Config, parse_config, read_config
+from .sweeps.plan import Block, Plan
+from .sweeps.run import run as run_blocks
+from .text import safe_text
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+__all__ = ["ForceModel", "ImpactError", "hysteresis", "load", "models", "plot", "run", "save", "sweep"]
+
+STARTER = files(__package__) / "sweeps" / "starter.toml"
+HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
+
+
+def prepare(
+    source: str | Path | Mapping[str, object],
+    overrides: Sequence[str] = (),
+    plugins: Sequence[ForceModel] = (),
+) -> Plan:
+    """The plan of a config: a TOML file, or a mapping of the same shape."""
+    source = Path(source) if isinstance(source, str) else source
+    return Plan(read_config(source, overrides, plugins), tuple(plugins))
+
+
+def execute(plan: Plan, progress: Callable[[int], None] | None = None) -> xr.Dataset:
+    """The result of a plan; `progress` is told the number of points finished so far."""
+
+    def finished() -> Iterator[tuple[Block, Contact]]:
+        done = 0
+        for block, contact in run_blocks(plan):
+            yield block, contact
+            done += block.stop - block.start
+            if progress is not None:
+                progress(done)
+
+    return assemble(plan, finished())
+
+
+def sweep(
+    source: str | Path | Mapping[str, object],
+    *,
+    overrides: Sequence[str] = (),
+    plugins: Sequence[ForceModel] = (),
+) -> xr.Dataset:
+    """Run a sweep.
+
+    Parameters
+    ----------
+    source : path of a TOML file, or a mapping of the same shape
+    overrides : changes to it, such as `"sweep.e=0.5"`
+    plugins : models of one's own, which the config may then name
+
+    Returns
+    -------
+    xarray.Dataset : see docs/schema.md
+
+    Raises
+    ------
+    ConfigError : with all problems of the config
+
+    >>> import impact
+    >>> result = impact.sweep({
+    ...     "models": ["lankarani-nikravesh-1990"],
+    ...     "sweep": {"e": [0.1, 0.9], "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6e9},
+    ... })
+    >>> result["e_out"].values.round(6).tolist()
+    [[0.665265, 0.913177]]
+    """
+    return execute(prepare(source, overrides, plugins))
+
+
+@dataclass(frozen=True)
+class Impact:
+    """One impact by one model.
+
+    Parameters
+    ----------
+    model : the model
+    point : the inputs by their config names; a name in `first` is an axis of the source at its first value
+    values : the outputs under the names of the result file, in SI
+    damping : damping factor lambda = chi K/v0 [N s/m^(n+1)], NaN where the law has none
+    e_kinetic, e_energetic : restitution from impulses and from works, equations (2) and (3); NaN without history
+    history : the time history as a dataset over t, or None where there is no motion to follow
+    """
+
+    model: ForceModel
+    point: Mapping[str, float | str]
+    first: tuple[str, ...]
+    values: Mapping[str, float]
+    exponent: float
+    closing_speed: float
+    damping: float
+    e_kinetic: float
+    e_energetic: float
+    history: xr.Dataset | None
+
+    @property
+    def status(self) -> Status:
+        return Status(int(self.values["status"]))
+
+
+def run(
+    source: str | Path | Mapping[str, object] | None = None,
+    *,
+    model: str | None = None,
+    at: Mapping[str, float | str] | None = None,
+    overrides: Sequence[str] = (),
+    plugins: Sequence[ForceModel] = (),
+) -> Impact:
+    """Run one impact and follow it through time.
+
+    Parameters
+    ----------
+    source : a TOML file, a mapping, or a result; by default the two balls of Table 1 of the paper
+    model : key of the model; by default the first of the source
+    at : values by config name, such as `{"e": 0.05}`; an axis that is not named takes its first value
+    overrides : changes to the config, such as `"sweep.m2=2"`
+    plugins : models of one's own
+
+    Raises
+    ------
+    ConfigError, UsageError, ResultError : the source, a name or a value is not right
+
+    >>> import impact
+    >>> shot = impact.run(model="gharib-hurmuzlu-2012", at={"e": 0.5})
+    >>> round(shot.values["e_out"], 6), round(shot.e_energetic, 6)
+    (0.41072, 0.41072)
+    """
+    if model is not None:
+        overrides = [*overrides, f"models={json.dumps([model])}"]
+    config = _config_of(source, overrides, plugins)
+    zipped = {name for axis in config.axes if len(axis.columns) > 1 for name in axis.columns}
+    known = [*(name for axis in config.axes for name in axis.columns), *config.scalars]
+    changes = list(overrides)
+    for name, value in (at or {}).items():
+        key, _, parameter = name.rpartition(".")
+        if name not in known and name not in ("e", "alpha", "R1", "R2", "K"):
+            raise UsageError(f'no input "{safe_text(name)}" here; {did_you_mean(name, known)}')
+        if name not in zipped:
+            path = f"model.{key}.{parameter}" if key else f"sweep.{name}"
+            changes.append(f"{path}={json.dumps(value) if isinstance(value, str) else repr(value)}")
+    config = _config_of(source, changes, plugins)
+    config, first = _at_one_point(config, {n: v for n, v in (at or {}).items() if n in zipped})
+
+    plan = Plan(config, tuple(plugins))
+    law = config.models[0]
+    lanes = plan.lanes(law, 0, 1)
+    solver = config.solver
+    contact = collide(law, lanes, rtol=solver.rtol, max_steps=solver.max_steps)
+    values = {field.name: getattr(contact, field.name)[0].item() for field in fields(contact)}
+    going = values["status"] == Status.OK
+    history = follow(law, lanes, rtol=solver.rtol, max_steps=solver.max_steps) if going else None
+    v0 = lanes.v0[0].item()
+    point = {**config.scalars, **({"e": lanes.e[0].item()} if "alpha" in config.scalars else {})}
+    return Impact(
+        model=law,
+        point=point,
+        first=first,
+        values=values,
+        exponent=lanes.n[0].item(),
+        closing_speed=v0,
+        damping=values["damping_ratio"] * values["stiffness"] / v0 if v0 else float("nan"),
+        e_kinetic=history.e_kinetic if history else float("nan"),
+        e_energetic=history.e_energetic if history else float("nan"),
+        history=history_dataset(history, law.key, point) if history else None,
+    )
+
+
+def _config_of(
+    source: str | Path | Mapping[str, object] | None, overrides: Sequence[str], plugins: Sequence[ForceModel]
+) -> Config:
+    """The config of a TOML file, a mapping, the starter, or of the sweep that a result came from."""
+    if source is None:
+        return parse_config(STARTER.read_text(encoding="utf-8"), overrides, plugins, name="starter")
+    if isinstance(source, Mapping):
+        return read_config(source, overrides, plugins)
+    path = Path(source)
+    if path.is_file():
+        with path.open("rb") as file:
+            if file.read(len(HDF5_MAGIC)) == HDF5_MAGIC:
+                attributes = load(path).attrs
+                if "config" not in attributes:
+                    raise UsageError(f"{safe_text(str(path))}: holds no config; it is a time history")
+                stored = json.loads(attributes["config_set"])
+                return parse_config(attributes["config"], [*stored, *overrides], plugins, name=str(path))
+    return read_config(path, overrides, plugins)
+
+
+def _at_one_point(config: Config, at: Mapping[str, float | str]) -> tuple[Config, tuple[str, ...]]:
+    """The config with one value for every axis, and the names of those that took their first."""
+    scalars = dict(config.scalars)
+    first: list[str] = []
+    for axis in config.axes:
+        scalars |= {name: values[_place(axis, at)] for name, values in axis.columns.items()}
+        if axis.size > 1 and not any(name in at for name in axis.columns):
+            first += axis.columns
+    return replace(config, axes=(), scalars=scalars, models=config.models[:1]), tuple(first)
+
+
+def _place(axis: Axis, at: Mapping[str, float | str]) -> int:
+    """The place on a zipped axis where its columns have the values asked for."""
+    for place in range(axis.size):
+        if all(axis.columns[name][place] == value for name, value in at.items() if name in axis.columns):
+            return place
+    asked = ", ".join(f"{name} = {value}" for name, value in at.items() if name in axis.columns)
+    raise UsageError(f"{safe_text(asked)}: not on the zipped axis {axis.name}; these values vary together")
+
+
+def models(plugins: Sequence[ForceModel] = ()) -> Mapping[str, ForceModel]:
+    """The catalogue of contact force models, by key.
+
+    >>> import impact
+    >>> impact.models()["gharib-hurmuzlu-2012"].equation
+    'F = K δⁿ (1 + χ δ̇/v₀),  χ = 1/e  (28)'
+    """
+    return catalogue(plugins)
+
+
+def plot(
+    dataset: xr.Dataset,
+    *,
+    x: str | None = None,
+    sel: Mapping[str, float | str] | None = None,
+    models: Sequence[str] | None = None,
+) -> Figure:
+    """Draw the final-velocity comparison, Figure 6 of the paper.
+
+    Parameters
+    ----------
+    dataset : a result
+    x : what to draw over; by default e, else the first numeric axis
+    sel : values of the other axes, such as `{"m2": 1.0}`; one that is not named shows its first value
+    models : keys of the models to show; by default all
+
+    Returns
+    -------
+    matplotlib.figure.Figure : `figure.savefig("results.png")` writes it
+
+    Raises
+    ------
+    UsageError : the result has not got what is asked for
+
+    >>> import impact
+    >>> figure = impact.plot(impact.sweep("configs/figure6.toml"))
+    >>> figure.axes[0].get_xlabel()
+    'coefficient of restitution, e'
+    """
+    from .views.figures import draw_final_velocities, final_velocities
+
+    return draw_final_velocities(final_velocities(dataset, x, sel, models))

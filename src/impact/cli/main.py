@@ -1,0 +1,263 @@
+"""The command line: each command parses, calls the function of the same name in `impact.api`, and prints."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from .. import __version__
+from ..errors import UsageError
+from ..text import safe_text
+from . import door
+
+app = typer.Typer(
+    name="impact",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+    help="Which contact force model, with which damping, gives the rebound you asked for, and how wrong is it "
+    "where it does not? Sweeps models over restitution, speeds, masses and materials against the "
+    "impulse-momentum solution.",
+    epilog="Start with: impact init, impact sweep config.toml, impact plot results.h5",
+)
+
+Json = Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace the output if it exists.")]
+Sets = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="PATH=VALUE", help="Change the config, such as sweep.m2=2.0; may be repeated."),
+]
+
+
+def _version(show: bool) -> None:
+    if show:
+        print(f"impact {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def common(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an internal error.")] = False,
+) -> None:
+    """Options that stand before the command; `main` reads --debug, this only documents it."""
+
+
+@app.command(epilog="Example: impact sweep configs/figure6.toml -o results.h5 --set sweep.m2=2.0")
+def sweep(
+    config: Annotated[Path, typer.Argument(help="The sweep, a TOML file; `impact init` writes one.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="The result file.")] = Path("results.h5"),
+    sets: Sets = None,
+    overwrite: Overwrite = False,
+    allow_failed: Annotated[bool, typer.Option("--allow-failed", help="Exit 0 even if points failed.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
+    as_json: Json = False,
+) -> None:
+    """Run every model over a sweep and store post-impact velocities and their errors."""
+    from .. import api
+    from ..data import store
+    from . import tables
+
+    plan = api.prepare(config, sets or ())
+    if not overwrite and tables.same_result(output, plan.fingerprint):
+        if not quiet:
+            door.say(f"{safe_text(str(output))}: already holds this sweep; nothing to do")
+        return
+    store.check_output(output, overwrite=overwrite)
+    with tables.progress(plan.points, quiet=quiet) as tell:
+        dataset = api.execute(plan, tell)
+    api.save(dataset, output, overwrite=overwrite)
+    summary = tables.summary(dataset, output)
+    if not quiet:
+        tables.print_summary(dataset, summary)
+    if as_json:
+        print(json.dumps(summary))
+    if summary["failed"] and not allow_failed:
+        raise typer.Exit(door.LANES_FAILED)
+
+
+@app.command(epilog="Example: impact plot results.h5 -o results.png --sel m2=1.0")
+def plot(
+    result: Annotated[Path, typer.Argument(help="A result of `impact sweep`.")],
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="The picture: .png, .svg or .pdf. [default: RESULT.png]"),
+    ] = None,
+    x: Annotated[
+        str | None, typer.Option("--x", help="What to draw over. [default: e, else the first axis]")
+    ] = None,
+    sel: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--sel", metavar="NAME=VALUE", help="Value of another axis; may be repeated. [default: its first]"
+        ),
+    ] = None,
+    model: Annotated[
+        list[str] | None, typer.Option("--model", metavar="KEY", help="A model to show; may be repeated.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Draw the final-velocity comparison (Figure 6 of the paper) from a stored result."""
+    from dataclasses import asdict
+
+    from .. import api
+    from ..views import figures
+
+    numbers = figures.final_velocities(api.load(result), x, _pairs("--sel", sel), model)
+    output = output or result.with_suffix(".png")
+    figures.save_figure(figures.draw_final_velocities(numbers), output)
+    shown = ", ".join(f"{name} = {value}" for name, value in numbers.slice.items())
+    door.say(f"{safe_text(str(output))}: over {numbers.x}" + (f" at {safe_text(shown)}" if shown else ""))
+    if as_json:
+        print(_dump(asdict(numbers)))
+
+
+@app.command(epilog="Example: impact run --model gharib-hurmuzlu-2012 --at e=0.05 --at m2=2.0 --history out.h5")
+def run(
+    source: Annotated[
+        Path | None, typer.Argument(help="A TOML file or a result. [default: Table 1 of the paper]")
+    ] = None,
+    model: Annotated[
+        str | None,
+        typer.Option("--model", metavar="KEY", help="The model. [default: the first of the source]"),
+    ] = None,
+    at: Annotated[
+        list[str] | None,
+        typer.Option("--at", metavar="NAME=VALUE", help="Value of an input, such as e=0.05; may be repeated."),
+    ] = None,
+    sets: Sets = None,
+    history: Annotated[
+        Path | None, typer.Option("--history", metavar="FILE", help="Keep the time history in this file.")
+    ] = None,
+    overwrite: Overwrite = False,
+    as_json: Json = False,
+) -> None:
+    """Run one impact: what goes in, what comes out, and how far it can be trusted."""
+    from .. import api
+    from ..contact.status import FIRST_FAILURE
+    from ..data import store
+    from . import tables
+
+    if history is not None:
+        store.check_output(history, overwrite=overwrite)
+    impact = api.run(source, model=model, at=_pairs("--at", at), overrides=sets or ())
+    if as_json:
+        print(_dump(tables.run_json(impact)))
+    else:
+        tables.print_run(impact)
+    if history is not None:
+        if impact.history is None:
+            raise UsageError(f"no history to keep: {impact.status.meaning}")
+        api.save(impact.history, history, overwrite=overwrite)
+        door.say(f"{safe_text(str(history))}: {impact.history.sizes['t']} points in time")
+    if impact.status >= FIRST_FAILURE:
+        raise typer.Exit(door.LANES_FAILED)
+
+
+@app.command(epilog="Example: impact models gharib-hurmuzlu-2012")
+def models(
+    key: Annotated[str | None, typer.Argument(help="A model to tell all about. [default: list them]")] = None,
+    as_json: Json = False,
+) -> None:
+    """The catalogue of contact force models: equations, references, domains, delivered restitution."""
+    from ..contact.models import catalogue, find
+    from . import tables
+
+    if as_json:
+        chosen = [find(key)] if key else list(catalogue().values())
+        print(_dump([tables.model_json(model) for model in chosen]))
+    elif key:
+        tables.print_model(find(key))
+    else:
+        tables.print_models(list(catalogue().values()))
+
+
+@app.command(epilog="Example: impact info results.h5")
+def info(
+    file: Annotated[Path, typer.Argument(help="A result or a time history.")],
+    as_json: Json = False,
+) -> None:
+    """What is in a file: axes, variables, worst errors, and where it came from."""
+    from .. import api
+    from . import tables
+
+    dataset = api.load(file)
+    if as_json:
+        print(_dump(tables.info_json(dataset)))
+    else:
+        tables.print_info(dataset, file)
+
+
+@app.command(epilog="Example: impact init my_sweep.toml")
+def init(
+    path: Annotated[Path, typer.Argument(help="The file to write.")] = Path("config.toml"),
+    overwrite: Overwrite = False,
+) -> None:
+    """Write a commented starter config, ready to sweep."""
+    from .. import api
+    from ..data import store
+
+    store.write_whole(path, api.STARTER.read_bytes(), overwrite=overwrite)
+    door.say(f"{safe_text(str(path))}: written; next: impact sweep {safe_text(str(path))}")
+
+
+@app.command(epilog="Example: impact schema -o impact.schema.json")
+def schema(
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="The file. [default: stdout]")] = None,
+    overwrite: Overwrite = False,
+) -> None:
+    """The JSON Schema of the config, from which editors complete and check it."""
+    from ..data import store
+    from ..sweeps.config import json_schema
+
+    text = json.dumps(json_schema(), indent=2, ensure_ascii=False) + "\n"
+    if output is None:
+        print(text, end="")
+    else:
+        store.write_whole(output, text.encode(), overwrite=overwrite)
+        door.say(f"{safe_text(str(output))}: written")
+
+
+def _pairs(option: str, words: list[str] | None) -> dict[str, float | str]:
+    """NAME=VALUE options; a value that reads as a number is one."""
+    found: dict[str, float | str] = {}
+    for word in words or ():
+        name, equals, value = word.partition("=")
+        if not equals or not name or not value:
+            raise UsageError(f"{option} {safe_text(word)}: wants NAME=VALUE, such as {option} m2=1.0")
+        if name in found:
+            raise UsageError(f"{option} {safe_text(name)}: given twice")
+        try:
+            found[name] = float(value)
+        except ValueError:
+            found[name] = value
+    return found
+
+
+def _dump(value: Any) -> str:
+    """Strict JSON: what is not a number is null."""
+
+    def plain(one: Any) -> Any:
+        match one:
+            case float():
+                return one if abs(one) < float("inf") else None
+            case dict():
+                return {str(name): plain(inner) for name, inner in one.items()}
+            case list() | tuple():
+                return [plain(inner) for inner in one]
+        return one
+
+    return json.dumps(plain(value), ensure_ascii=False, allow_nan=False)
+
+
+def main() -> None:
+    """Entry point of the console script `impact`."""
+    sys.exit(door.enter(app, debug="--debug" in sys.argv))

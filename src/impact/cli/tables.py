@@ -1,0 +1,317 @@
+"""What the commands print: tables on stdout, progress and summaries on stderr."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.table import Table
+from rich.text import Text
+
+from ..contact.model import ForceModel, wishes
+from ..contact.status import FIRST_FAILURE, Status
+from ..errors import ResultError
+from ..text import safe_text
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from ..api import Impact
+
+# progress is shown when a sweep takes longer than this many seconds
+PATIENCE = 1.0
+# where a table of the catalogue shows the delivered restitution
+ASKED = (0.1, 0.3, 0.5, 0.7, 0.9)
+FAILED_SHOWN = 3
+# width of a table that no terminal limits
+WIDE = 160
+
+
+def _console(stream: Any) -> Console:
+    """A console that prints text as it is: no markup, no guessing, no wrapping at 80 in a pipe."""
+    width = None if stream.isatty() else WIDE
+    return Console(file=stream, markup=False, highlight=False, emoji=False, width=width)
+
+
+def _table(*headings: str, title: str | None = None) -> Table:
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False, header_style="bold")
+    for place, heading in enumerate(headings):
+        table.add_column(heading, justify="left" if place == 0 else "right", overflow="fold")
+    return table
+
+
+def _cell(value: Any) -> Text:
+    """A value as plain text that no markup and no control character can touch."""
+    return Text(f"{value:.6g}" if isinstance(value, float) else safe_text(str(value)))
+
+
+@contextmanager
+def progress(points: int, *, quiet: bool) -> Iterator[Callable[[int], None]]:
+    """A function to tell the number of finished points; a bar appears on a terminal after a second."""
+    if quiet or not sys.stderr.isatty():
+        yield lambda done: None
+        return
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    bar = Progress(*columns, console=_console(sys.stderr), transient=True)
+    task = bar.add_task(f"{points:,} points", total=points)
+    begun = time.monotonic()
+
+    def tell(done: int) -> None:
+        if not bar.live.is_started and time.monotonic() - begun > PATIENCE:
+            bar.start()
+        bar.update(task, completed=done)
+
+    try:
+        yield tell
+    finally:
+        bar.stop()
+
+
+def same_result(path: Path, fingerprint: str) -> bool:
+    """Whether a file is a whole result with this fingerprint."""
+    from ..data.store import load
+
+    if not path.is_file() or path.is_symlink():
+        return False
+    try:
+        return bool(load(path).attrs.get("fingerprint") == fingerprint)
+    except ResultError:
+        return False
+
+
+def summary(dataset: xr.Dataset, output: Path) -> dict[str, Any]:
+    """Points, counts per status, and the first failed points with their coordinates."""
+    counts: dict[str, int] = {}
+    failures: list[dict[str, Any]] = []
+    failed = 0
+    if "status" in dataset:
+        status = dataset["status"]
+        numbers, times = np.unique(status.values, return_counts=True)
+        counts = {Status(int(n)).name.lower(): int(t) for n, t in zip(numbers, times, strict=True)}
+        places = np.flatnonzero(status.values.reshape(-1) >= FIRST_FAILURE)
+        failed = int(places.size)
+        for place in places[:FAILED_SHOWN]:
+            index = np.unravel_index(place, status.shape)
+            point = status.isel(dict(zip(status.dims, index, strict=True)))
+            where = {str(dim): point[dim].values.item() for dim in status.dims}
+            failures.append({"status": Status(int(point)).name.lower(), "at": where})
+    points = int(np.prod(list(dataset.sizes.values())))
+    return {
+        "output": str(output), "points": points, "models": dataset.sizes["model"], "status": counts,
+        "failed": failed, "first_failed": failures, "content_digest": dataset.attrs["content_digest"],
+    }  # fmt: skip
+
+
+def print_summary(dataset: xr.Dataset, found: Mapping[str, Any]) -> None:
+    """What came out of a sweep, on stderr."""
+    out = _console(sys.stderr)
+    out.print(_worst(dataset))
+    counts = ", ".join(f"{count} {name}" for name, count in found["status"].items())
+    out.print(_cell(f"{found['output']}: {found['points']} points ({counts})"))
+    for one in found["first_failed"]:
+        where = ", ".join(f"{name}={value}" for name, value in one["at"].items())
+        out.print(_cell(f"failed: {where}: {Status[one['status'].upper()].meaning}"))
+    more = found["failed"] - len(found["first_failed"])
+    if more > 0:
+        out.print(_cell(f"and {more} more"))
+
+
+def _worst(dataset: xr.Dataset) -> Table:
+    """The largest errors per model, as far as the result has them."""
+    columns = {
+        "e_error": "max |e_out − e|", "v1_error": "max |v1 error|", "v2_error": "max |v2 error|",
+        "oracle_error": "max |e_out − exact|", "residual": "max |residual|",
+    }  # fmt: skip
+    held = [name for name in columns if name in dataset]
+    table = _table("model", *(columns[name] for name in held))
+    for key in dataset["model"].values:
+        one = dataset.sel(model=key)
+        largest = (np.abs(one[name].values) for name in held)
+        cells = [f"{np.nanmax(v):.3g}" if np.isfinite(v).any() else "–" for v in largest]
+        table.add_row(_cell(key), *cells)
+    return table
+
+
+def model_json(model: ForceModel) -> dict[str, Any]:
+    """A model's declaration as plain data."""
+    own = [vars(parameter) for parameter in model.parameters]
+    texts = {
+        n: getattr(model, n)
+        for n in ("key", "title", "year", "family", "equation", "reference", "doi", "evidence")
+    }
+    return {
+        **texts, "domain": {name: list(ends) for name, ends in model.domain.items()}, "parameters": own,
+        "exponent": model.exponent, "release": model.release, "delivered_restitution": delivered(model),
+    }  # fmt: skip
+
+
+def delivered(model: ForceModel) -> dict[str, float] | None:
+    """The exact delivered restitution for some that are asked for, where it depends on nothing else."""
+    if model.oracle is None or not set(wishes(model.oracle)) <= {"e", *model.coefficients}:
+        return None
+    found = {}
+    for e in ASKED:
+        values: dict[str, Any] = {
+            "e": np.array([e]),
+            "K": 1.0,
+            "m": 1.0,
+            "v0": 1.0,
+            "n": model.exponent or 1.5,
+        }
+        for name, formula in model.coefficients.items():
+            if not set(wishes(formula)) <= values.keys():
+                return None
+            values[name] = formula(*(values[wish] for wish in wishes(formula)))
+        exact = model.oracle(*(values[wish] for wish in wishes(model.oracle)))
+        found[f"{e:g}"] = float(np.asarray(exact).reshape(-1)[0])
+    return found
+
+
+def print_models(models: Sequence[ForceModel]) -> None:
+    """The catalogue, a line a model."""
+    table = _table("model", "equation", "claimed for", *(f"e={e:g}" for e in ASKED))
+    for column in table.columns[1:3]:
+        column.justify = "left"
+    for model in models:
+        found = delivered(model) or {}
+        cells = [f"{found[f'{e:g}']:.4f}" if found else "–" for e in ASKED]
+        table.add_row(model.key, Text(model.equation), Text(model.domain_text or "–"), *cells)
+    out = _console(sys.stdout)
+    out.print(table)
+    out.print("\nThe columns e=... show the restitution that a model delivers when it is asked for e.")
+
+
+def print_model(model: ForceModel) -> None:
+    """All about one model."""
+    rows = {
+        "model": model.key, "title": f"{model.title} ({model.year})", "family": model.family,
+        "equation": model.equation, "reference": model.reference, "doi": model.doi, "evidence": model.evidence,
+        "claimed for": model.domain_text or "nothing in particular",
+        "exponent": "the sweep's n" if model.exponent is None else f"n = {model.exponent:g}, its own",
+        "ends at": {"gap": "zero indentation", "force": "zero force"}[model.release],
+    }  # fmt: skip
+    for parameter in model.parameters:
+        default = "required" if parameter.default is None else f"default {parameter.default:g}"
+        unit = "" if parameter.unit == "1" else f" [{parameter.unit}]"
+        limits = f"from {parameter.least:g} to {parameter.most:g}"
+        rows[f"[model.{model.key}]"] = f"{parameter.name}{unit}: {parameter.meaning}; {limits}, {default}"
+    found = delivered(model)
+    if found:
+        rows["delivers"] = ", ".join(f"{out:.4f} for e = {e}" for e, out in found.items())
+    _print_rows(rows)
+
+
+def _print_rows(rows: Mapping[str, Any]) -> None:
+    table = Table.grid(padding=(0, 2))
+    table.add_column(no_wrap=True)
+    table.add_column(overflow="fold")
+    for name, value in rows.items():
+        table.add_row(_cell(name), _cell(value))
+    _console(sys.stdout).print(table)
+
+
+def run_json(impact: Impact) -> dict[str, Any]:
+    """One impact as plain data."""
+    return {
+        "model": impact.model.key, "inputs": dict(impact.point), "first_value_of": list(impact.first),
+        "exponent": impact.exponent, "closing_speed": impact.closing_speed,
+        "outputs": {**impact.values, "status": impact.status.name.lower()},
+        "damping": impact.damping, "e_kinematic": impact.values["e_out"], "e_kinetic": impact.e_kinetic,
+        "e_energetic": impact.e_energetic,
+    }  # fmt: skip
+
+
+def print_run(impact: Impact) -> None:
+    """One impact: inputs, outputs, the three restitutions, and how far they can be trusted."""
+    from ..data.results import SCHEMA
+    from ..sweeps.rules import SWEEP
+
+    n = f"{impact.exponent:g}"
+    rows: dict[str, Any] = {"model": impact.model.key, "equation": impact.model.equation}
+    for name, value in impact.point.items():
+        unit = SWEEP[name].unit if name in SWEEP else "1"
+        note = "  (first value of its axis)" if name in impact.first else ""
+        rows[name] = _quantity(value, unit.replace("^n", f"^{n}")) + note
+    rows["status"] = f"{impact.status.name.lower()}: {impact.status.meaning}"
+    for one in SCHEMA:
+        if one.dtype == "f8":
+            rows[one.name] = _quantity(impact.values[one.name], one.unit.replace("N m-n", f"N/m^{n}"))
+    rows["chi = lambda v0/K"] = _quantity(impact.values["damping_ratio"], "1")
+    rows["lambda"] = _quantity(impact.damping, f"N s/m^{impact.exponent + 1:g}")
+    rows["e kinematic (1)"] = _quantity(impact.values["e_out"], "1", 12) + "  from the velocities"
+    rows["e kinetic (2)"] = _quantity(impact.e_kinetic, "1", 12) + "  from the impulses of the two phases"
+    rows["e energetic (3)"] = _quantity(impact.e_energetic, "1", 12) + "  from their works"
+    rows["in the claimed domain"] = "yes" if impact.values["in_domain"] else f"no: {impact.model.domain_text}"
+    rows["steps"] = impact.values["steps"]
+    _print_rows(rows)
+
+
+def _quantity(value: Any, unit: str, digits: int = 10) -> str:
+    if not isinstance(value, float):
+        return str(value)
+    if value != value:
+        return "–"
+    return f"{value:.{digits}g}" + ("" if unit == "1" else f" {unit.replace('m s-1', 'm/s')}")
+
+
+def info_json(dataset: xr.Dataset) -> dict[str, Any]:
+    """What is in a file as plain data."""
+    return {
+        "dimensions": {str(name): size for name, size in dataset.sizes.items()},
+        "coordinates": [str(name) for name in dataset.coords],
+        "variables": {str(n): {"units": v.attrs.get("units"), "dims": list(v.dims)} for n, v in dataset.items()},
+        "attributes": {
+            str(n): v if isinstance(v, str) else np.asarray(v).tolist() for n, v in dataset.attrs.items()
+        },
+    }
+
+
+def print_info(dataset: xr.Dataset, path: Path) -> None:
+    """What is in a file."""
+    attributes = dataset.attrs
+    sizes = " × ".join(f"{name} {size}" for name, size in dataset.sizes.items())
+    rows: dict[str, Any] = {"file": path, "title": attributes.get("title", ""), "dimensions": sizes}
+    for name, coordinate in dataset.coords.items():
+        if name in ("title", "equation", "reference", "doi", "year"):
+            continue
+        values = coordinate.values.reshape(-1)
+        numeric = values.dtype.kind == "f" and values.size > 4
+        shown = (
+            f"{values[0]:g} … {values[-1]:g}, {values.size} values"
+            if numeric
+            else ", ".join(f"{one:g}" if isinstance(one, float) else str(one) for one in values.tolist())
+        )
+        unit = str(coordinate.attrs.get("units", "1"))
+        rows[str(name)] = shown + ("" if unit == "1" else f" [{unit}]")
+    for name in ("rtol", "impact_version", "schema_version", "fingerprint", "content_digest"):
+        if name in attributes:
+            rows[name] = attributes[name]
+    if json.loads(attributes.get("config_set", "[]")):
+        rows["config_set"] = attributes["config_set"]
+    if "status" in dataset:
+        counts = summary(dataset, path)["status"]
+        rows["status"] = ", ".join(f"{count} {name}" for name, count in counts.items())
+    _print_rows(rows)
+    out = _console(sys.stdout)
+    out.print()
+    table = _table("variable", "unit", "dimensions", "smallest", "largest", "missing")
+    for name, variable in dataset.items():
+        values = variable.values
+        finite = values[np.isfinite(values)]
+        ends = (f"{finite.min():.6g}", f"{finite.max():.6g}") if finite.size else ("–", "–")
+        table.add_row(
+            _cell(name), _cell(variable.attrs.get("units", "")), _cell(", ".join(map(str, variable.dims))), *ends,
+            str(values.size - finite.size),
+        )  # fmt: skip
+    out.print(table)
+    if "model" in dataset.dims:
+        out.print()
+        out.print(_worst(dataset))

@@ -1,0 +1,150 @@
+"""The contract: what physics and the house ask of every contact force model, built in or a user's own."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from .collide import Contact, collide
+from .lanes import Lanes, stiffness
+from .material import effective_mass, hertz_stiffness, sphere_radius
+from .model import ForceModel, Parameter
+from .power import Array
+from .status import FIRST_FAILURE, Status
+
+RTOL, MAX_STEPS = 1e-10, 10_000
+# what rounding leaves of an identity, relative to its largest term
+ROUNDING = 1e-12
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One clause: what it says, how far off the model is at its worst, and how far it may be."""
+
+    clause: str
+    worst: float
+    bound: float
+
+    @property
+    def holds(self) -> bool:
+        return self.worst <= self.bound
+
+
+def sample(model: ForceModel) -> Lanes:
+    """Forty dissimilar impacts: a wall, heavy and light balls, slow and fast, soft and hard, e from 0.05 to 1."""
+    count = 40
+    turn = np.arange(float(count))
+    e = np.linspace(0.05, 1.0, count)
+    v1, v2 = np.power(10.0, turn % 7 - 3.0), -0.3 * np.power(10.0, turn % 5 - 3.0)
+    m1 = np.power(10.0, turn % 9 - 4.0)
+    m2 = np.where(turn % 6 == 5, np.inf, np.power(10.0, turn % 4 - 2.0))
+    E1, E2 = np.where(turn % 2 == 0, 56e9, 210e9), np.where(turn % 3 == 0, 2e6, 70e9)
+    nu1, nu2, rho = np.full(count, 0.3), np.full(count, 0.49), np.full(count, 2712.0)
+    R1, R2 = sphere_radius(m1, rho), sphere_radius(m2, rho)
+    n = np.full(count, 1.5 if model.exponent is None else model.exponent)
+    hertz = hertz_stiffness(E1, nu1, E2, nu2, R1, R2)
+    strength = np.full(count, 3e8)
+    return Lanes(
+        e=e, v1=v1, v2=v2, m1=m1, m2=m2, R1=R1, R2=R2, n=n, E1=E1, nu1=nu1, yield_strength1=strength,
+        E2=E2, nu2=nu2, yield_strength2=strength, K=stiffness(n, hertz, effective_mass(m1, m2), v1 - v2),
+        parameters={one.name: _values(one, count) for one in model.parameters},
+    )  # fmt: skip
+
+
+def _values(parameter: Parameter, count: int) -> Array:
+    """Values of a parameter: its default, or from its least upwards."""
+    if parameter.default is not None:
+        return np.full(count, parameter.default)
+    least = parameter.least if math.isfinite(parameter.least) else min(0.0, parameter.most)
+    return np.linspace(least, min(parameter.most, least + 4.0), count)
+
+
+def contract(model: ForceModel) -> Iterator[Finding]:
+    """Every clause, one after the other.
+
+    Parameters
+    ----------
+    model : the law; its numbers are those of forty impacts at rtol 1e-10
+
+    >>> from impact.contact.models import find
+    >>> all(finding.holds for finding in contract(find("bilinear")))
+    True
+    """
+    lanes = sample(model)
+    base = _collide(model, lanes)
+    ended = base.status < FIRST_FAILURE
+    yield Finding("every impact ends", float(np.count_nonzero(~ended)), 0)
+
+    def worst(values: Array) -> float:
+        return float(np.max(np.abs(values[ended]), initial=0.0))
+
+    # a wall takes up momentum without moving; equation (5) covers it
+    ball = np.isfinite(lanes.m2)
+    m1, m2 = lanes.m1[ball], lanes.m2[ball]
+    before, after = (
+        (m1 * first[ball], m2 * second[ball])
+        for first, second in ((lanes.v1, lanes.v2), (base.v1_post, base.v2_post))
+    )
+    size = np.abs(before[0]) + np.abs(before[1])
+    lost = np.abs(before[0] + before[1] - after[0] - after[1]) / size
+    yield Finding("momentum is conserved (4)", float(np.max(lost)), ROUNDING)
+    rebound = (base.v2_post - base.v1_post) / lanes.v0 - base.e_out
+    scale = 1.0 + (np.abs(lanes.v1) + np.abs(lanes.v2)) / lanes.v0
+    yield Finding("velocities part by e_out v0 (5)", worst(rebound / scale), ROUNDING)
+    yield Finding("no energy is gained", float(np.max(base.e_out[ended]) - 1.0), 10 * RTOL)
+    yield Finding("work balances energy", worst(base.residual), 10 * RTOL)
+    if model.oracle is not None:
+        yield Finding("agrees with its closed form", worst(base.oracle_error), 10 * RTOL)
+
+    other = _collide(model, in_other_units(model, lanes))
+    yield Finding("a change of units changes nothing", worst(other.e_out - base.e_out), 10 * RTOL)
+    swapped = replace(
+        lanes, v1=-lanes.v2, v2=-lanes.v1, m1=lanes.m2, m2=lanes.m1, R1=lanes.R2, R2=lanes.R1, E1=lanes.E2,
+        E2=lanes.E1, nu1=lanes.nu2, nu2=lanes.nu1, yield_strength1=lanes.yield_strength2,
+        yield_strength2=lanes.yield_strength1,
+    )  # fmt: skip
+    other = _collide(model, swapped)
+    yield Finding("swapped balls swap velocities", worst((other.v1_post + base.v2_post) / lanes.v0), ROUNDING)
+    elastic = _collide(model, replace(lanes, e=np.ones(len(lanes))))
+    yield Finding("at e = 1 it is ordinary", float(np.count_nonzero(elastic.status != Status.OK)), 0)
+    tight = _collide(model, lanes, RTOL / 100)
+    yield Finding("a tighter tolerance moves nothing", worst(tight.e_out - base.e_out), 10 * RTOL)
+    yield Finding("a lane alone equals the lane in a crowd", float(_alone_differs(model, lanes, base)), 0)
+
+
+def _collide(model: ForceModel, lanes: Lanes, rtol: float = RTOL) -> Contact:
+    return collide(model, lanes, rtol=rtol, max_steps=MAX_STEPS)
+
+
+def in_other_units(model: ForceModel, lanes: Lanes) -> Lanes:
+    """The same impacts with grams, feet and minutes as units."""
+    from .model import QUANTITIES
+    from .units import dimension
+
+    units = {one.name: one.unit for one in model.parameters} | QUANTITIES
+    units |= {"v1": "m/s", "v2": "m/s", "m1": "kg", "m2": "kg"}
+
+    def changed(name: str, value: Array) -> Array:
+        factors = np.ones(len(lanes))
+        for n in np.unique(lanes.n):
+            mass, length, time = dimension(units[name], float(n))
+            factors[lanes.n == n] = 1e3**mass * (1 / 0.3048) ** length * (1 / 60.0) ** time
+        return value * factors
+
+    plain = {f.name: changed(f.name, getattr(lanes, f.name)) for f in fields(lanes) if f.name != "parameters"}
+    return Lanes(**plain, parameters={name: changed(name, value) for name, value in lanes.parameters.items()})
+
+
+def _alone_differs(model: ForceModel, lanes: Lanes, base: Contact) -> int:
+    """How many impacts have other bits when they are integrated alone."""
+    differ = 0
+    for place in range(0, len(lanes), 7):
+        alone = _collide(model, lanes[np.array([place])])
+        differ += any(
+            getattr(alone, f.name).tobytes() != getattr(base, f.name)[place : place + 1].tobytes()
+            for f in fields(base)
+        )
+    return differ

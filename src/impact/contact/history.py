@@ -1,0 +1,119 @@
+"""One impact in time: its history, and the three restitutions computed from it independently."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..ode.rk45 import Columns, Problem, Step
+from . import motion
+from .collide import own_values, takes_log
+from .lanes import Lanes
+from .model import ForceModel
+from .power import Array
+from .status import Status
+from .strike import strike
+
+# points at which a step is shown, and at which it is integrated again
+SAMPLES, GAUSS = 4, 5
+
+
+@dataclass(frozen=True)
+class History:
+    """The time history of one impact, in SI; arrays of shape (k,).
+
+    `x1`, `x2` are the displacements of the balls since first contact, so that delta = x1 - x2. `e_kinetic` is
+    the ratio of the impulses of the two phases, equation (2), and `e_energetic` the root of that of their
+    works, equation (3).
+    """
+
+    t: Array
+    delta: Array
+    v: Array
+    F: Array
+    x1: Array
+    x2: Array
+    v1: Array
+    v2: Array
+    e_kinetic: float
+    e_energetic: float
+
+
+def follow(model: ForceModel, lanes: Lanes, *, rtol: float, max_steps: int) -> History | None:
+    """Follow a single impact through time.
+
+    Parameters
+    ----------
+    model : the law
+    lanes : one impact
+    rtol, max_steps : see `impact.contact.collide.collide`
+
+    Returns
+    -------
+    History or None : None where there is no motion to follow, because the balls miss or a limit was taken
+    """
+    n = float(lanes.n[0])
+    with np.errstate(all="ignore"):
+        values = {k: np.broadcast_to(np.asarray(v, float), 1) for k, v in own_values(model, lanes, n).items()}
+        log = bool(takes_log(model, values.get("chi", np.array([np.nan])))[0])
+        law = motion.Law.of(model, n, log)
+        columns = tuple(values[name] for name in law.names)
+        struck = strike(law, columns, 1, rtol, max_steps, record=True)
+    if struck.outward is None or struck.rebound.status[0] != Status.OK:
+        return None
+    inward = _phase(law, motion.approach(law), struck.inward.recorded, columns)
+    outward = _phase(law, motion.restitution(law), struck.outward.recorded, struck.columns)
+
+    residual = struck.columns[-1] if model.unloading is not None else np.zeros(1)
+    unit_t = lanes.length / lanes.v0
+    t = np.concatenate([inward.t, struck.inward.state[2] + outward.t]) * unit_t
+    delta = np.concatenate([inward.x, residual + outward.x]) * lanes.length
+    v = np.concatenate([inward.v, outward.v]) * lanes.v0
+    force = np.concatenate([inward.F, outward.F]) * (lanes.m * lanes.v0 / unit_t)
+    share1, share2 = lanes.m / lanes.m1, lanes.m / lanes.m2
+    return History(
+        t=t,
+        delta=delta,
+        v=v,
+        F=force,
+        x1=lanes.v1 * t - share1 * (lanes.v0 * t - delta),
+        x2=lanes.v2 * t + share2 * (lanes.v0 * t - delta),
+        v1=lanes.v1 - share1 * (lanes.v0 - v),
+        v2=lanes.v2 + share2 * (lanes.v0 - v),
+        e_kinetic=outward.impulse / inward.impulse,
+        e_energetic=math.sqrt(-outward.work / inward.work) if outward.work <= 0.0 else math.nan,
+    )
+
+
+@dataclass(frozen=True)
+class _Phase:
+    """A phase in the contact's own units; x above the residual indentation."""
+
+    t: Array
+    x: Array
+    v: Array
+    F: Array
+    impulse: float
+    work: float
+
+
+def _phase(law: motion.Law, problem: Problem, steps: tuple[Step, ...], columns: Columns) -> _Phase:
+    """Sample the interpolant of a phase, and integrate force and power over it by Gauss points."""
+    nodes, weights = np.polynomial.legendre.leggauss(GAUSS)
+    rows: list[Array] = []
+    impulse, work = [], []
+    for place, step in enumerate(steps):
+        last = place == len(steps) - 1
+        for part in range(SAMPLES + last):
+            y = step.at(step.end * part / SAMPLES)
+            rates = problem.rates(y[:2], columns)
+            rows.append(np.array([y[2], motion.indentation(law, y[0]), law.velocity(y[1], columns), rates[4]]))
+        for node, weight in zip(nodes, weights, strict=True):
+            rates = problem.rates(step.at(step.end * 0.5 * (1.0 + node))[:2], columns)
+            share = 0.5 * weight * (step.end * step.length)[0]
+            impulse.append(share * (rates[4] * rates[2])[0])
+            work.append(share * rates[3][0])
+    t, x, v, force = np.array(rows)[:, :, 0].T
+    return _Phase(t, x, v, force, math.fsum(impulse), math.fsum(work))

@@ -1,0 +1,109 @@
+"""The impacts of a block: what goes into a law, in SI, and the contact's own units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .material import effective_mass, hertz_stiffness
+from .model import QUANTITIES, ForceModel
+from .oracles import peak_indentation
+from .power import Array, power
+from .units import dimension
+
+
+@dataclass(frozen=True)
+class Lanes:
+    """Impacts side by side; every field is an array of shape (n,).
+
+    Parameters
+    ----------
+    e : restitution asked for [-]; NaN where none is
+    v1, v2 : velocities before the impact [m/s]
+    m1, m2 : masses [kg]; infinity is a wall
+    R1, R2 : radii [m]; infinity is a plane; NaN where unknown
+    K : contact stiffness [N/m^n]
+    n : compliance exponent [-]
+    E1, nu1, yield_strength1, E2, nu2, yield_strength2 : materials [Pa, -, Pa]; NaN where unknown
+    parameters : the law's own parameters by name, in the units it declares
+    """
+
+    e: Array
+    v1: Array
+    v2: Array
+    m1: Array
+    m2: Array
+    K: Array
+    n: Array
+    R1: Array
+    R2: Array
+    E1: Array
+    nu1: Array
+    yield_strength1: Array
+    E2: Array
+    nu2: Array
+    yield_strength2: Array
+    parameters: Mapping[str, Array] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.e)
+
+    def __getitem__(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> Lanes:
+        arrays = {f.name: getattr(self, f.name)[chosen] for f in fields(self) if f.name != "parameters"}
+        return Lanes(**arrays, parameters={name: a[chosen] for name, a in self.parameters.items()})
+
+    @cached_property
+    def v0(self) -> Array:
+        """Closing speed v1 - v2 [m/s]."""
+        return self.v1 - self.v2
+
+    @cached_property
+    def m(self) -> Array:
+        """Effective mass [kg], equation (17)."""
+        return effective_mass(self.m1, self.m2)
+
+    @cached_property
+    def length(self) -> Array:
+        """The contact's unit of length [m], (m v0^2/K)^(1/(n+1)); its unit of mass is m, of time length/v0."""
+        return np.power(self.m * self.v0 / self.K * self.v0, 1.0 / (self.n + 1.0))
+
+    def quantity(self, name: str) -> Array:
+        """A quantity of the contact or a parameter of the law, in SI."""
+        return np.asarray(self.parameters[name] if name in self.parameters else getattr(self, name))
+
+    def own_units(self, model: ForceModel, name: str, n: float) -> Array | float:
+        """A quantity or parameter in the contact's own units, in which K = m = v0 = 1."""
+        if name in ("K", "m", "v0"):
+            return 1.0
+        if name == "n":
+            return n
+        declared = {parameter.name: parameter.unit for parameter in model.parameters}
+        mass, length, time = dimension(declared.get(name) or QUANTITIES[name], n)
+        value = self.quantity(name)
+        for unit, exponent in ((self.m, mass), (self.length, length), (self.length / self.v0, time)):
+            if exponent:
+                value = value / np.power(unit, exponent)
+        # adding zero turns -0.0 into 0.0, which is the same physics
+        return value + 0.0
+
+
+def stiffness(n: Array, hertz: Array, m: Array, v0: Array) -> Array:
+    """Stiffness K [N/m^n] where none is given: Hertz's for n = 3/2, else K = F_m/delta_m^n of the Hertz peak.
+
+    For n = 1 that is the secant stiffness. It depends on the speed, so that it is NaN where there is none.
+
+    Parameters
+    ----------
+    n : compliance exponent [-], shape (n,)
+    hertz : stiffness of equation (12) [N/m^1.5], shape (n,)
+    m, v0 : effective mass [kg] and closing speed [m/s], shape (n,)
+    """
+    peak = peak_indentation(m, np.where(v0 > 0.0, v0, np.nan), hertz, 1.5)
+    return np.where(n == 1.5, hertz, hertz * power(peak, 1.5) / np.power(peak, n))
+
+
+__all__ = ["Lanes", "hertz_stiffness", "stiffness"]

@@ -1,0 +1,149 @@
+"""A contact force model as data: what a paper says of it, and its formulas as pure functions."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Literal
+
+from ..errors import ModelError, did_you_mean
+from .units import dimension
+
+Formula = Callable[..., object]
+
+# what a law may ask for by name, besides its own parameters and coefficients, and the unit of each
+QUANTITIES = {
+    "e": "1", "n": "1", "K": "N/m^n", "m": "kg", "v0": "m/s", "R1": "m", "R2": "m", "E1": "Pa", "E2": "Pa",
+    "nu1": "1", "nu2": "1", "yield_strength1": "Pa", "yield_strength2": "Pa",
+}  # fmt: skip
+IN_FORCE = {"x": "indentation", "v": "indentation rate", "elastic": "K δⁿ"}
+IN_UNLOADING = {
+    "peak": "peak indentation",
+    "force_at_peak": "force there",
+    "residual": "permanent indentation",
+}
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of a model that the restitution does not set.
+
+    `unit` is an SI unit whose exponents may contain n ("N/m^n"); `least` and `most` are the closed interval
+    of its values; `default` is None where the user has to give it.
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    default: float | None = None
+    least: float = float("-inf")
+    most: float = float("inf")
+
+
+@dataclass(frozen=True)
+class ForceModel:
+    """A contact force model, written as its paper writes it.
+
+    Every formula asks by the names of its arguments for what it needs: `x` (indentation), `v` (its rate),
+    `elastic` (K δⁿ), the quantities of the contact (`K, n, m, v0, e, R1, R2, E1, E2, nu1, nu2,
+    yield_strength1, yield_strength2`), the model's own parameters and coefficients; `unloading` also for
+    `peak`, `force_at_peak` and `residual`. All arrive in the contact's own units as arrays of one shape,
+    (n,), or as numbers where they are the same for all.
+
+    Parameters
+    ----------
+    key : kebab-case name, unique in the catalogue
+    title, year, reference, doi : where the law comes from
+    equation : the law in one line of Unicode
+    evidence : what of the above was seen in a source, and what is from memory
+    domain : closed intervals by the name of an input or derived quantity, where its authors claim it
+    force : contact force of the whole contact, or of the approach phase where `unloading` is given
+    unloading : contact force of the restitution phase
+    residual : permanent indentation, from `peak` and the quantities of the contact
+    coefficients : formulas evaluated once per impact, by name; a later one may ask for an earlier one.
+        `chi` is the dimensionless damping χ = λ v₀/K
+    parameters : what the user gives in `[model.KEY]`
+    oracle : exact delivered restitution, where a closed form exists
+    release : the contact ends at zero indentation ("gap") or at zero force ("force")
+    smooth : p of the smooth coordinate δ = δᵣ + sᵖ: 2 for half-integer powers, 4 for quarters
+    momentum : "log" where F = K δⁿ (1 + χ δ̇/v₀) exactly, which lets large χ be integrated without stiffness
+    exponent : n, where the law fixes it; None takes the sweep's
+    family : the group it is listed under
+
+    Raises
+    ------
+    ModelError : a formula asks for something that is not there, a unit cannot be read, a key is malformed
+    """
+
+    key: str
+    title: str
+    year: int
+    equation: str
+    reference: str
+    force: Formula
+    doi: str = ""
+    evidence: str = ""
+    domain: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    unloading: Formula | None = None
+    residual: Formula | None = None
+    coefficients: Mapping[str, Formula] = field(default_factory=dict)
+    parameters: tuple[Parameter, ...] = ()
+    oracle: Formula | None = None
+    release: Literal["gap", "force"] = "gap"
+    smooth: int = 2
+    momentum: Literal["v", "log"] = "v"
+    exponent: float | None = None
+    family: str = "other"
+
+    def __post_init__(self) -> None:
+        if not re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", self.key):
+            raise ModelError(f'model key "{self.key}": wants kebab-case, such as "hunt-crossley-1975"')
+        if self.momentum == "log" and ("chi" not in self.coefficients or self.unloading is not None):
+            raise ModelError(f'model {self.key}: momentum "log" wants a coefficient chi and one law throughout')
+        for parameter in self.parameters:
+            dimension(parameter.unit, 1.5)
+        once = {*QUANTITIES, *(parameter.name for parameter in self.parameters)}
+        for name, formula in self.coefficients.items():
+            self._check(f"coefficient {name}", formula, once)
+            once.add(name)
+        self._check("force", self.force, {*once, *IN_FORCE})
+        self._check("unloading", self.unloading, {*once, *IN_FORCE, *IN_UNLOADING})
+        self._check("residual", self.residual, {*once, "peak", "force_at_peak"})
+        self._check("oracle", self.oracle, once)
+
+    def _check(self, role: str, formula: Formula | None, known: set[str]) -> None:
+        for wish in wishes(formula):
+            if wish not in known:
+                raise ModelError(
+                    f'model {self.key}: its {role} asks for "{wish}"; {did_you_mean(wish, sorted(known))}'
+                )
+
+    @property
+    def quantities(self) -> frozenset[str]:
+        """The names of the quantities and parameters that the law's motion depends on."""
+        own = {parameter.name for parameter in self.parameters}
+        formulas = (self.force, self.unloading, self.residual, *self.coefficients.values())
+        return frozenset(w for formula in formulas for w in wishes(formula) if w in QUANTITIES or w in own)
+
+    @property
+    def domain_text(self) -> str:
+        """The claimed domain in words.
+
+        >>> from impact.contact.models import catalogue
+        >>> catalogue()["lankarani-nikravesh-1990"].domain_text
+        '0.9 ≤ e ≤ 1'
+        """
+        return ", ".join(f"{low:g} ≤ {name} ≤ {high:g}" for name, (low, high) in self.domain.items())
+
+
+@cache
+def wishes(formula: Formula | None) -> tuple[str, ...]:
+    """The names that a formula asks for.
+
+    >>> wishes(lambda elastic, v, chi: elastic * (1 + chi * v))
+    ('elastic', 'v', 'chi')
+    """
+    return () if formula is None else tuple(inspect.signature(formula).parameters)

@@ -1,0 +1,90 @@
+"""Permanent indentation: one law on approach, a stiffer one on restitution; equations (29) to (43)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..model import ForceModel, Parameter
+from ..power import Array, power
+
+
+def power_law(stiffness: Array, stretch: Array, n: float) -> Array:
+    """k δⁿ."""
+    return stiffness * power(stretch, n)
+
+
+LANKARANI_NIKRAVESH_1994 = ForceModel(
+    key="lankarani-nikravesh-1994",
+    title="Lankarani and Nikravesh, permanent indentation",
+    year=1994,
+    equation="F = K δⁿ, then F = fₘ((δ − δₚ)/(δₘ − δₚ))ⁿ,  δₚ = (n + 1) m v₀² (1 − e²)/(2 fₘ)  (29)-(32)",
+    reference="Lankarani HM, Nikravesh PE (1994) Continuous contact force models for impact analysis in "
+    "multibody systems. Nonlinear Dyn. 5, 193",
+    doi="10.1007/BF00045676",
+    evidence="formula as printed in Gharib and Hurmuzlu (2012); DOI from memory",
+    domain={"e": (0.0, 1.0)},
+    force=lambda elastic: elastic,
+    unloading=lambda x, n, peak, residual, force_at_peak: power_law(
+        force_at_peak, (x - residual) / (peak - residual), n
+    ),
+    # (32), by (31) and fₘ = K δₘⁿ the same as δₘ (1 − e²), which holds for the peak that the integration found
+    residual=lambda e, peak: peak * (1 - e * e),
+    oracle=lambda e: e,
+    family="permanent",
+)
+
+GHARIB_HURMUZLU_2012_ENERGETIC = ForceModel(
+    key="gharib-hurmuzlu-2012-energetic",
+    title="Gharib and Hurmuzlu, energetic",
+    year=2012,
+    equation="F = K δⁿ, then F = Kᵣ(δ − δₚ)ⁿ,  Kᵣ = K/e²ⁿ,  δₚ = δₘ(1 − e²)  (33)-(42)",
+    reference="Gharib M, Hurmuzlu Y (2012) A new contact force model for low coefficient of restitution impact. "
+    "J. Appl. Mech. 79, 064506",
+    doi="10.1115/1.4006494",
+    evidence="formula and DOI seen in the paper; (39) as printed has K in the place of Kᵣ",
+    domain={"e": (0.0, 1.0)},
+    force=lambda elastic: elastic,
+    coefficients={"Kr": lambda K, n, e: K / power(e * e, n)},
+    unloading=lambda x, n, residual, Kr: power_law(Kr, x - residual, n),
+    residual=lambda e, peak: peak * (1 - e * e),
+    oracle=lambda e: e,
+    family="permanent",
+)
+
+BILINEAR = ForceModel(
+    key="bilinear",
+    title="Bilinear",
+    year=1986,
+    equation="F = K δ, then F = Kᵣ(δ − δₚ),  Kᵣ = K/e²  (43)",
+    reference="Walton OR, Braun RL (1986) Viscosity, granular-temperature, and stress calculations for shearing "
+    "assemblies of inelastic, frictional disks. J. Rheol. 30, 949",
+    doi="10.1122/1.549893",
+    evidence="formula as printed in Gharib and Hurmuzlu (2012); DOI from memory",
+    domain={"e": (0.0, 1.0)},
+    exponent=1.0,
+    force=lambda elastic: elastic,
+    coefficients={"Kr": lambda K, e: K / (e * e)},
+    unloading=lambda x, residual, Kr: Kr * (x - residual),
+    residual=lambda K, Kr, peak: peak * (1 - K / Kr),
+    oracle=lambda e: e,
+    family="permanent",
+)
+
+ISMAIL_STRONGE_2008 = ForceModel(
+    key="ismail-stronge-2008",
+    title="Ismail and Stronge",
+    year=2008,
+    equation="F = K δ, then F = Kᵣ(δ − δₚ),  Kᵣ = γ² K,  e = 1/γ  (43)",
+    reference="Ismail KA, Stronge WJ (2008) Impact of viscoplastic bodies: dissipation and restitution. "
+    "J. Appl. Mech. 75, 061011",
+    doi="10.1115/1.2965371",
+    evidence="formula as printed in Gharib and Hurmuzlu (2012); DOI from memory",
+    parameters=(Parameter("gamma", "1", "plastic loss factor γ; delivers e = 1/γ", least=1.0),),
+    exponent=1.0,
+    force=lambda elastic: elastic,
+    coefficients={"Kr": lambda K, gamma: gamma * gamma * K},
+    unloading=lambda x, residual, Kr: Kr * (x - residual),
+    residual=lambda K, Kr, peak: peak * (1 - K / Kr),
+    oracle=lambda gamma: np.divide(1.0, gamma),
+    family="permanent",
+)

@@ -1,0 +1,168 @@
+"""The motion of a contact in its own units, as a problem for the integrator.
+
+A phase is integrated in a smooth coordinate, x = xᵣ + sᵖ with dt = p sᵖ⁻¹ dσ: near contact and separation x^(3/2)
+has no third derivative, and an integrator of order five would lose its order there. With it
+
+    ds/dσ = v,  dv/dσ = −p sᵖ⁻¹ F,  dt/dσ = p sᵖ⁻¹,  dW/dσ = p sᵖ⁻¹ F v,
+
+where W is the work done against the force. In the "log" coordinate u = ln(1 + χ v) a force F = xⁿ (1 + χ v)
+gives du/dσ = −χ p sᵖ⁻¹ xⁿ, which is not stiff for any χ.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import ModelError
+from ..ode.rk45 import Array, Columns, Mask, Problem
+from .model import ForceModel, Formula, wishes
+from .power import integer_power, power
+
+# above this χ a lane takes the log coordinate, if its law has one; below it plain v takes as many steps, and
+# an exponential costs more than the rest of a stage
+LOG_ABOVE = 2.0
+# scaled s beyond which a ball is taken to have passed through: no force stopped it
+FAR = 1e8
+# the velocity is judged against v0, the log coordinate against 1, and s against itself: near s = 0 the motion is
+# so smooth that its relative error stays small there
+FLOOR = (1e-200, 1.0)
+# step of the difference that gives the rate of the force at the release
+DIFFERENCE = 1e-7
+
+
+@dataclass(frozen=True)
+class Law:
+    """A model's law at one exponent n, with the names of the columns that its formulas draw on."""
+
+    model: ForceModel
+    n: float
+    names: tuple[str, ...]
+    log: bool
+
+    @classmethod
+    def of(cls, model: ForceModel, n: float, log: bool) -> Law:
+        """The law of a model, which draws on what the formulas of its motion ask for."""
+        formulas = (model.force, model.unloading, model.residual)
+        asked = {wish for formula in formulas for wish in wishes(formula)}
+        own = {*model.quantities, *model.coefficients} - {"K", "m", "v0", "n"}
+        return cls(model, n, tuple(sorted(asked & own)), log)
+
+    def call(self, formula: Formula, columns: Columns, given: dict[str, Array]) -> Array:
+        """A formula's value from the columns and what else is given; K, m and v0 are 1."""
+        known: dict[str, Array | float] = {"K": 1.0, "m": 1.0, "v0": 1.0, "n": self.n}
+        known.update(zip(self.names, columns, strict=True))
+        known.update(given)
+        return np.asarray(formula(*(known[wish] for wish in wishes(formula))), dtype=float)
+
+    def velocity(self, momentum: Array, columns: Columns) -> Array:
+        """v from the second component."""
+        if not self.log:
+            return momentum
+        return np.asarray(np.expm1(momentum) / columns[self.names.index("chi")])
+
+
+def approach(law: Law) -> Problem:
+    """From contact to the largest indentation: v falls to zero."""
+    return Problem(
+        rates=_rates(law, law.model.force, None),
+        event=lambda y, k, columns: (y[1], k[1]),
+        lost=lambda y: np.asarray(y[0] > FAR),
+        floor=FLOOR,
+        watch=True,
+    )
+
+
+def restitution(law: Law) -> Problem:
+    """From the largest indentation to the release: s, or the force, falls to zero.
+
+    Where the law has an unloading branch, columns of the peak, the force there and the residual indentation
+    follow the law's own.
+    """
+    branch = law.model.unloading
+    rates = _rates(law, branch or law.model.force, branch and ("peak", "force_at_peak", "residual"))
+
+    def force_event(y: Array, k: Array, columns: Columns) -> tuple[Array, Array]:
+        ahead = rates(y + DIFFERENCE * k[:2], columns)
+        return k[4], (ahead[4] - k[4]) / DIFFERENCE
+
+    def gap_event(y: Array, k: Array, columns: Columns) -> tuple[Array, Array]:
+        return y[0], k[0]
+
+    def turned_back(y: Array) -> Mask:
+        return np.asarray(y[1] >= 0.0)
+
+    event = force_event if law.model.release == "force" else gap_event
+    return Problem(rates=rates, event=event, lost=turned_back, floor=FLOOR)
+
+
+def start_of_approach(law: Law, columns: Columns, n: int) -> Array:
+    """s = 0, v = 1."""
+    first = np.log1p(columns[law.names.index("chi")]) if law.log else np.ones(n)
+    return np.array([np.zeros(n), first])
+
+
+def start_of_restitution(law: Law, peak: Array, residual: Array) -> Array:
+    """s at the peak above the residual indentation, v = 0."""
+    return np.array([power(peak - residual, 1.0 / law.model.smooth), np.zeros(peak.size)])
+
+
+def indentation(law: Law, s: Array) -> Array:
+    """x above the residual indentation."""
+    return integer_power(s, law.model.smooth)
+
+
+def force_at_peak(law: Law, s: Array, columns: Columns) -> Array:
+    """The force of the approach where it ends."""
+    return np.asarray(_rates(law, law.model.force, None)(np.array([s, np.zeros(s.size)]), columns)[4])
+
+
+def turn(law: Law, columns: Columns, peak: Array, at_peak: Array) -> tuple[Array, Columns]:
+    """The residual indentation, and the columns of the restitution phase."""
+    model = law.model
+    residual = np.zeros_like(peak)
+    if model.residual is not None:
+        given = {"peak": peak, "force_at_peak": at_peak}
+        residual = residual + law.call(model.residual, columns, given)
+    return residual, columns if model.unloading is None else (*columns, peak, at_peak, residual)
+
+
+def _rates(law: Law, formula: Formula, extra: tuple[str, ...] | None) -> Callable[[Array, Columns], Array]:
+    p = law.model.smooth
+    elastic_power = p * law.n
+    asked = frozenset(wishes(formula))
+    own = len(law.names)
+
+    def rates(y: Array, columns: Columns) -> Array:
+        s = y[0]
+        v = law.velocity(y[1], columns)
+        given = {"v": v}
+        if extra:
+            given.update(zip(extra, columns[own:], strict=True))
+        if "x" in asked or ("elastic" in asked and extra):
+            given["x"] = integer_power(s, p) + given["residual"] if extra else integer_power(s, p)
+        if "elastic" in asked:
+            given["elastic"] = power(given["x"], law.n) if extra else _elastic(s, elastic_power)
+        force = law.call(formula, columns[:own], given)
+        if force.shape not in ((), s.shape):
+            raise ModelError(f"{law.model.key}: the force has the shape {force.shape}, wants {s.shape}")
+        out = np.empty((5, s.size))
+        out[0] = v
+        np.multiply(integer_power(s, p - 1), p, out=out[2])
+        np.multiply(out[2], force, out=out[1])
+        np.multiply(out[1], v, out=out[3])
+        if law.log:
+            np.multiply(out[2], -columns[law.names.index("chi")] * given["elastic"], out=out[1])
+        else:
+            np.negative(out[1], out=out[1])
+        out[4] = force
+        return out
+
+    return rates
+
+
+def _elastic(s: Array, exponent: float) -> Array:
+    """s to the power p n. A whole power is continued through zero, so that a step across the release is smooth."""
+    return integer_power(s, int(exponent)) if float(exponent).is_integer() else power(np.abs(s), exponent)

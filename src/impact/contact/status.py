@@ -1,0 +1,39 @@
+"""The status of a point: 1 to 9 are answers, 10 and up have NaN for their answer."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class Status(IntEnum):
+    """How a point ended; `meaning` says it in a sentence."""
+
+    OK = 1
+    NO_IMPACT = 2
+    LIMIT = 3
+    NOT_SEPARATED = 10
+    MAX_STEPS = 11
+    STEP_UNDERFLOW = 12
+    NOT_FINITE = 13
+    INVALID_PARAMETER = 14
+    OUT_OF_RANGE = 15
+    MODEL_ERROR = 16
+
+    @property
+    def meaning(self) -> str:
+        return MEANINGS[self]
+
+
+MEANINGS = {
+    Status.OK: "integrated to the end of the contact",
+    Status.NO_IMPACT: "the balls do not approach (v1 <= v2): velocities unchanged",
+    Status.LIMIT: "closed-form limit, the balls stay together; what is infinite there is NaN",
+    Status.NOT_SEPARATED: "the balls never part: the force holds them, or is too weak to stop them",
+    Status.MAX_STEPS: "not finished within solver.max_steps",
+    Status.STEP_UNDERFLOW: "the step became too small to advance",
+    Status.NOT_FINITE: "the force is not finite",
+    Status.INVALID_PARAMETER: "a value that arises here is out of its range, such as e = 1 - alpha v0 below 0",
+    Status.OUT_OF_RANGE: "a derived quantity over- or underflows, such as the stiffness of two planes",
+    Status.MODEL_ERROR: "the force raised an error or returned the wrong shape",
+}
+FIRST_FAILURE = Status.NOT_SEPARATED

@@ -1,0 +1,123 @@
+"""Strike: impacts in the contact's own units through approach and restitution, by one law."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..ode.rk45 import Columns, End, Outcome, integrate
+from . import motion
+from .power import Array
+from .status import Status
+
+STATUS_OF_END = {
+    End.LANDED: Status.OK,
+    End.LOST: Status.NOT_SEPARATED,
+    End.MAX_STEPS: Status.MAX_STEPS,
+    End.STEP_UNDERFLOW: Status.STEP_UNDERFLOW,
+    End.NOT_FINITE: Status.NOT_FINITE,
+}
+
+
+@dataclass(frozen=True)
+class Rebound:
+    """What a law does with impacts, in the contact's own units; arrays of shape (n,).
+
+    `work` is twice the work done against the force over both phases, 1 - e_out^2 up to the solver's error.
+    """
+
+    e_out: Array
+    peak: Array
+    permanent: Array
+    force: Array
+    duration: Array
+    work: Array
+    steps: NDArray[np.int32]
+    status: NDArray[np.int8]
+
+    @classmethod
+    def blank(cls, n: int) -> Rebound:
+        """n impacts with nothing known of them."""
+        return cls(
+            e_out=np.full(n, np.nan),
+            peak=np.full(n, np.nan),
+            permanent=np.full(n, np.nan),
+            force=np.full(n, np.nan),
+            duration=np.full(n, np.nan),
+            work=np.full(n, np.nan),
+            steps=np.zeros(n, np.int32),
+            status=np.full(n, Status.OK, np.int8),
+        )
+
+    def put(self, where: NDArray[np.intp] | NDArray[np.bool_], part: Rebound) -> None:
+        """Write a part's arrays at their places."""
+        for field in fields(self):
+            getattr(self, field.name)[where] = getattr(part, field.name)
+
+    def take(self, where: NDArray[np.intp]) -> Rebound:
+        """The impacts at some places."""
+        return Rebound(**{field.name: getattr(self, field.name)[where] for field in fields(self)})
+
+
+@dataclass(frozen=True)
+class Struck:
+    """Impacts integrated through both phases: where they ended, and each phase's outcome.
+
+    `columns` are those of the restitution phase, `parts` the places of the impacts that entered it.
+    """
+
+    rebound: Rebound
+    inward: Outcome
+    outward: Outcome | None
+    columns: Columns
+    parts: NDArray[np.intp]
+
+
+def strike(law: motion.Law, columns: Columns, n: int, rtol: float, max_steps: int, record: bool = False) -> Struck:
+    """Integrate n impacts through approach and restitution.
+
+    Parameters
+    ----------
+    law : the law at one exponent and in one momentum coordinate
+    columns : its values per impact, each of shape (n,)
+    rtol, max_steps, record : see `impact.ode.rk45.integrate`
+    """
+    start = motion.start_of_approach(law, columns, n)
+    inward = integrate(motion.approach(law), start, columns, rtol=rtol, max_steps=max_steps, record=record)
+    peak = motion.indentation(law, inward.state[0])
+    at_peak = motion.force_at_peak(law, inward.state[0], columns)
+    residual, columns = motion.turn(law, columns, peak, at_peak)
+    rebound = replace(
+        Rebound.blank(n), peak=peak, permanent=residual, force=np.maximum(inward.maximum, at_peak),
+        duration=inward.state[2].copy(), work=2.0 * inward.state[3], steps=inward.steps.copy(),
+        status=_status(inward),
+    )  # fmt: skip
+
+    # nothing is given back where the balls stay at their peak
+    stays = (rebound.status == Status.OK) & (residual >= peak)
+    rebound.status[stays] = Status.LIMIT
+    rebound.e_out[stays] = 0.0
+
+    parts = np.flatnonzero(rebound.status == Status.OK)
+    columns = tuple(column[parts] for column in columns)
+    if not parts.size:
+        return Struck(rebound, inward, None, columns, parts)
+    start = motion.start_of_restitution(law, peak[parts], residual[parts])
+    outward = integrate(motion.restitution(law), start, columns, rtol=rtol, max_steps=max_steps, record=record)
+    rebound.e_out[parts] = -law.velocity(outward.state[1], columns)
+    rebound.duration[parts] += outward.state[2]
+    rebound.work[parts] += 2.0 * outward.state[3]
+    rebound.steps[parts] += outward.steps
+    rebound.status[parts] = _status(outward)
+    if law.model.release == "force":
+        rebound.permanent[parts] += motion.indentation(law, outward.state[0])
+    return Struck(rebound, inward, outward, columns, parts)
+
+
+def _status(outcome: Outcome) -> NDArray[np.int8]:
+    table = np.zeros(len(End), np.int8)
+    for end, status in STATUS_OF_END.items():
+        table[end] = status
+    return table[outcome.end]

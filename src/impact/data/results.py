@@ -1,0 +1,224 @@
+"""What is in a result: the one SCHEMA, and how a plan's blocks become a labelled dataset."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass
+from importlib.metadata import version
+from typing import Literal
+
+import numpy as np
+import xarray as xr
+
+from .. import __version__
+from ..contact.collide import Contact
+from ..contact.status import Status
+from ..sweeps.plan import Block, Plan
+from ..sweeps.rules import MATERIALS, SWEEP
+
+SCHEMA_VERSION = 1
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One variable of a result.
+
+    `per` says whether it depends on the model or on the axes alone; `judged` how a comparison judges it: by its
+    difference over a scale, by a bound on itself, exactly, or not at all.
+    """
+
+    name: str
+    unit: str
+    per: Literal["model", "axes"]
+    judged: Literal["scaled by v0", "scaled by 1", "scaled by the peak", "scaled by itself",
+                    "scaled by m v0^2/2", "bounded by 10 rtol", "exact", "reported"]  # fmt: skip
+    meaning: str
+    equation: str
+    dtype: str = "f8"
+
+
+SCHEMA = (
+    Variable("v1_post", "m s-1", "model", "scaled by v0", "velocity of ball 1 after the impact",
+             "v1+ = v1 - (1 + e_out)(m/m1) v0"),
+    Variable("v2_post", "m s-1", "model", "scaled by v0", "velocity of ball 2 after the impact",
+             "v2+ = v2 + (1 + e_out)(m/m2) v0"),
+    Variable("v1_reference", "m s-1", "axes", "scaled by v0", "velocity of ball 1 by impulse and momentum",
+             "v1+ = v1 - (1 + e)(m/m1) v0  (6)"),
+    Variable("v2_reference", "m s-1", "axes", "scaled by v0", "velocity of ball 2 by impulse and momentum",
+             "v2+ = v2 + (1 + e)(m/m2) v0  (7)"),
+    Variable("v1_error", "m s-1", "model", "scaled by v0", "error of the velocity of ball 1",
+             "v1_post - v1_reference"),
+    Variable("v2_error", "m s-1", "model", "scaled by v0", "error of the velocity of ball 2",
+             "v2_post - v2_reference"),
+    Variable("e_out", "1", "model", "scaled by 1", "restitution that the model delivers",
+             "(v2+ - v1+)/(v1 - v2)  (5)"),
+    Variable("e_error", "1", "model", "scaled by 1", "delivered minus asked restitution", "e_out - e"),
+    Variable("peak_indentation", "m", "model", "scaled by the peak", "largest indentation", "δₘ at v = 0"),
+    Variable("permanent_indentation", "m", "model", "scaled by the peak", "indentation at the release",
+             "δₚ at the end of the contact"),
+    Variable("peak_force", "N", "model", "scaled by itself", "largest contact force", "max F over the approach"),
+    Variable("duration", "s", "model", "scaled by itself", "contact time", "from first contact to release"),
+    Variable("energy_loss", "J", "model", "scaled by m v0^2/2", "kinetic energy lost",
+             "m v0²(1 - e_out²)/2"),
+    Variable("stiffness", "N m-n", "model", "scaled by itself",
+             "contact stiffness used; n is the coordinate exponent; where n is not 1.5 and no K is given it is "
+             "F_m/delta_m^n of the Hertz peak", "K  (12)"),
+    Variable("damping_ratio", "1", "model", "scaled by itself", "dimensionless damping, where the law has one",
+             "χ = λ v0/K"),
+    Variable("residual", "1", "model", "bounded by 10 rtol", "residual of the work balance",
+             "[work of the force - m v0²(1 - e_out²)/2]/(m v0²/2)"),
+    Variable("oracle_error", "1", "model", "bounded by 10 rtol", "distance from the closed form, where one exists",
+             "e_out - exact e_out"),
+    Variable("status", "1", "model", "exact", "how the point ended", "", "i1"),
+    Variable("in_domain", "1", "model", "exact", "1 where the authors claim the model", "", "i1"),
+    Variable("steps", "1", "model", "reported", "accepted steps of the integrator", "", "i4"),
+)  # fmt: skip
+
+PACKAGES = ("numpy", "scipy", "h5py", "h5netcdf", "xarray")
+
+
+def assemble(plan: Plan, finished: Iterable[tuple[Block, Contact]]) -> xr.Dataset:
+    """The dataset of a plan from its finished blocks, in any order.
+
+    Raises
+    ------
+    ValueError : the blocks do not cover the plan
+    """
+    chosen = plan.config.variables or tuple(variable.name for variable in SCHEMA)
+    schema = [variable for variable in SCHEMA if variable.name in chosen]
+    rows = {"model": len(plan.models), "axes": 1}
+    arrays = {one.name: np.zeros((rows[one.per], plan.grid), one.dtype) for one in schema}
+    covered = 0
+    for block, contact in finished:
+        covered += block.stop - block.start
+        for one in schema:
+            if one.per == "model" or block.model == 0:
+                arrays[one.name][block.model, block.start : block.stop] = getattr(contact, one.name)
+    if covered != plan.points:
+        raise ValueError(f"blocks of {covered} points, wants {plan.points}")
+
+    axes = tuple(axis.name for axis in plan.config.axes)
+    dataset = xr.Dataset(coords=_coordinates(plan))
+    for one in schema:
+        dims, shape = (axes, plan.shape) if one.per == "axes" else (("model", *axes), (-1, *plan.shape))
+        dataset[one.name] = (dims, arrays[one.name].reshape(shape), _attributes(one))
+    dataset.attrs = _provenance(plan)
+    dataset.attrs["content_digest"] = content_digest(dataset)
+    return dataset
+
+
+def _attributes(variable: Variable) -> dict[str, object]:
+    found: dict[str, object] = {
+        "units": variable.unit, "long_name": variable.meaning, "equation": variable.equation,
+    }  # fmt: skip
+    if variable.name == "status":
+        found["flag_values"] = np.array([int(status) for status in Status], np.int8)
+        found["flag_meanings"] = " ".join(status.name.lower() for status in Status)
+    if variable.name == "in_domain":
+        found["flag_values"] = np.array([0, 1], np.int8)
+        found["flag_meanings"] = "outside_claimed_domain within_claimed_domain"
+    return found
+
+
+def _coordinates(plan: Plan) -> dict[str, object]:
+    models = plan.models
+
+    def texts(field: str) -> tuple[str, list[str]]:
+        return "model", [str(getattr(model, field)) for model in models]
+
+    found: dict[str, object] = {
+        "model": ("model", [model.key for model in models], {"long_name": "contact force model"}),
+        **{field: texts(field) for field in ("title", "equation", "reference", "doi")},
+        "year": ("model", [model.year for model in models]),
+    }
+    for axis in plan.config.axes:
+        for name, values in axis.columns.items():
+            found[name] = (axis.name, list(values), _about(plan, name))
+    for name, value in plan.config.scalars.items():
+        if name != "n":
+            found[name] = ((), value, _about(plan, name))
+    found["exponent"] = _exponent(plan)
+    if "alpha" in plan.names():
+        found["e"] = _restitution(plan)
+    return found
+
+
+def _about(plan: Plan, name: str) -> dict[str, str]:
+    """Units and meaning of a coordinate."""
+    key, _, own = name.rpartition(".")
+    for model in plan.models:
+        for parameter in model.parameters if model.key == key else ():
+            if parameter.name == own:
+                return {"units": parameter.unit, "long_name": parameter.meaning}
+    if name in MATERIALS:
+        return {"long_name": MATERIALS[name]}
+    return {"units": SWEEP[name].unit, "long_name": SWEEP[name].meaning}
+
+
+def _exponent(plan: Plan) -> tuple[tuple[str, ...], object, dict[str, str]]:
+    """The compliance exponent of each model: its own, or the sweep's, which may be an axis."""
+    about = {"units": "1", "long_name": "compliance exponent n"}
+    own = np.array([np.nan if model.exponent is None else model.exponent for model in plan.models])
+    axes = plan.axes_of("n")
+    if not axes:
+        return ("model",), np.where(np.isnan(own), plan.config.scalars["n"], own), about
+    axis = plan.config.axes[axes[0]]
+    values = np.asarray(axis.columns["n"], float)
+    return ("model", axis.name), np.where(np.isnan(own)[:, None], values, own[:, None]), about
+
+
+def _restitution(plan: Plan) -> tuple[tuple[str, ...], object, dict[str, str]]:
+    """e = 1 - alpha (v1 - v2), equation (24), over the axes that it depends on."""
+    config = plan.config
+    places = sorted({place for name in ("alpha", "v1", "v2") for place in plan.axes_of(name)})
+
+    def column(name: str) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+        if name in config.scalars:
+            return np.asarray(config.scalars[name], float)
+        (own,) = plan.axes_of(name)
+        values = np.asarray(config.axes[own].columns[name], float)
+        return values.reshape([-1 if place == own else 1 for place in places])
+
+    e = 1.0 - column("alpha") * (column("v1") - column("v2"))
+    about = {"units": "1", "long_name": "restitution asked for", "equation": "e = 1 - alpha (v1 - v2)  (24)"}
+    return tuple(config.axes[place].name for place in places), e, about
+
+
+def _provenance(plan: Plan) -> dict[str, object]:
+    config = plan.config
+    return {
+        "title": config.title,
+        "schema_version": SCHEMA_VERSION,
+        "config": config.text,
+        "config_set": json.dumps(list(config.overrides)),
+        "fingerprint": plan.fingerprint,
+        "rtol": config.solver.rtol,
+        "max_steps": config.solver.max_steps,
+        "impact_version": __version__,
+        "packages": json.dumps({name: version(name) for name in PACKAGES}),
+        "plugins": json.dumps(plan.plugin_hashes),
+    }
+
+
+def content_digest(dataset: xr.Dataset) -> str:
+    """SHA-256 over names, dimensions and values of all variables and coordinates, in canonical form.
+
+    Numbers as little-endian bytes with one NaN, text as UTF-8; the order of the variables does not count.
+    """
+    total = hashlib.sha256()
+    for name in sorted(str(name) for name in dataset.variables):
+        variable = dataset.variables[name]
+        values = variable.values
+        if values.dtype.kind in "fiub":
+            kind = values.dtype.newbyteorder("<").str
+            if values.dtype.kind == "f":
+                values = np.where(np.isnan(values), np.nan, values)
+            data = np.ascontiguousarray(values, dtype=kind).tobytes()
+        else:
+            kind = "text"
+            data = json.dumps(np.asarray(values, object).tolist()).encode()
+        one = hashlib.sha256(data).hexdigest()
+        total.update(json.dumps([name, list(variable.dims), list(variable.shape), kind, one]).encode())
+    return total.hexdigest()

@@ -1,0 +1,134 @@
+"""Results on disk: written whole or not at all, read only when they are whole."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import stat
+from pathlib import Path
+
+import xarray as xr
+
+from ..errors import ResultError, StoreError, UsageError
+from ..text import safe_text
+from .results import SCHEMA_VERSION, content_digest
+
+
+def check_output(path: Path, *, overwrite: bool) -> None:
+    """Refuse an output that cannot be written, before any work is done.
+
+    Raises
+    ------
+    UsageError : it exists and is not to be overwritten, is no regular file, or its folder cannot be written to
+    """
+    shown = safe_text(str(path))
+    folder = path.parent
+    if not folder.is_dir():
+        raise UsageError(f"{shown}: the folder {safe_text(str(folder))} does not exist")
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise UsageError(f"{shown}: the folder {safe_text(str(folder))} cannot be written to")
+    try:
+        mode = path.lstat().st_mode
+    except FileNotFoundError:
+        return
+    except OSError as error:
+        raise UsageError(f"{shown}: {error.strerror}") from None
+    if not stat.S_ISREG(mode):
+        raise UsageError(f"{shown}: is not a regular file, and is left alone")
+    if not overwrite:
+        raise UsageError(f"{shown}: exists; give another name with -o, or --overwrite")
+
+
+def write_whole(path: Path, content: bytes | memoryview, *, overwrite: bool) -> None:
+    """Write a file so that its name appears only when it is complete, and stays after a power cut.
+
+    Raises
+    ------
+    UsageError : see `check_output`
+    StoreError : the disk is full or failed; nothing is left under the name
+    """
+    check_output(path, overwrite=overwrite)
+    part = path.with_name(f"{path.name}.{os.getpid()}.part")
+    try:
+        try:
+            with part.open("xb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+            if overwrite:
+                part.replace(path)
+            else:
+                # a hard link, unlike a rename, does not replace a file that appeared in the meantime
+                os.link(part, path)
+        finally:
+            with contextlib.suppress(FileNotFoundError):
+                part.unlink()
+        folder = os.open(path.parent, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
+    except FileExistsError:
+        raise UsageError(f"{safe_text(str(path))}: appeared while this ran, and is left alone") from None
+    except OSError as error:
+        raise StoreError(
+            f"{safe_text(str(path))}: not written: {error.strerror} ({len(content)} bytes)"
+        ) from error
+
+
+def save(dataset: xr.Dataset, path: str | Path, *, overwrite: bool = False) -> None:
+    """Store a dataset as netCDF-4 in HDF5.
+
+    The file is made in memory and written by plain system calls, because HDF5 on a full disk may report success.
+
+    Parameters
+    ----------
+    dataset : the dataset
+    path : the file
+    overwrite : replace a file that exists
+
+    Raises
+    ------
+    UsageError : the file exists, or its folder cannot be written to
+    StoreError : the disk is full or failed
+    """
+    path = Path(path)
+    check_output(path, overwrite=overwrite)
+    buffer = io.BytesIO()
+    plain = {name: {"_FillValue": None} for name, v in dataset.variables.items() if v.dtype.kind == "f"}
+    dataset.to_netcdf(buffer, engine="h5netcdf", encoding=plain)
+    write_whole(path, buffer.getbuffer(), overwrite=overwrite)
+
+
+def load(path: str | Path) -> xr.Dataset:
+    """Read a result into memory and verify its content digest.
+
+    Parameters
+    ----------
+    path : a file that `impact sweep` or `impact run --history` wrote
+
+    Raises
+    ------
+    ResultError : it does not exist, is no result, is damaged, or is of another schema version
+    """
+    path = Path(path)
+    shown = safe_text(str(path))
+    try:
+        if not path.is_file():
+            raise ResultError(f"{shown}: {'is not a regular file' if path.exists() else 'does not exist'}")
+        with xr.open_dataset(path, engine="h5netcdf", decode_times=False, decode_timedelta=False) as opened:
+            schema = opened.attrs.get("schema_version")
+            if schema is None or "content_digest" not in opened.attrs:
+                raise ResultError(f"{shown}: is not a result of impact")
+            if schema != SCHEMA_VERSION:
+                raise ResultError(f"{shown}: has schema version {schema}, this program reads {SCHEMA_VERSION}")
+            dataset = opened.load()
+    except ResultError:
+        raise
+    except Exception as error:
+        # h5py and xarray raise almost anything on a damaged file
+        raise ResultError(f"{shown}: is not a readable result ({safe_text(str(error), 80)})") from error
+    if content_digest(dataset) != dataset.attrs["content_digest"]:
+        raise ResultError(f"{shown}: is damaged: its content does not have the digest that it carries")
+    return dataset

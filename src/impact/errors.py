@@ -1,0 +1,57 @@
+"""The exceptions of the program, all under one root.
+
+    ImpactError
+    ├── ConfigError    the sweep asked for cannot be run: every problem, one a line
+    ├── ModelError     a contact force model is declared wrongly
+    ├── UsageError     a request that the data or the file system cannot meet as it was put
+    ├── ResultError    a file is not a readable result
+    └── StoreError     the result could not be stored
+
+They say what is wrong, where, what was got and what is wanted. They become exit codes in one place,
+`impact.cli.main`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from difflib import get_close_matches
+
+
+class ImpactError(Exception):
+    """The root: an error that the program expected, with a message for its user."""
+
+
+class ConfigError(ImpactError):
+    """The config of a sweep has problems; `problems` holds one line for each."""
+
+    def __init__(self, problems: Sequence[str]) -> None:
+        self.problems = tuple(problems)
+        super().__init__("\n".join(self.problems))
+
+
+class ModelError(ImpactError):
+    """A contact force model is declared wrongly, or is not in the catalogue."""
+
+
+class UsageError(ImpactError):
+    """A request that cannot be met as it was put: an unknown coordinate, an output that exists."""
+
+
+class ResultError(ImpactError):
+    """A file is not a readable result: foreign, damaged, or of another schema version."""
+
+
+class StoreError(ImpactError):
+    """The result could not be stored: the disk is full, or the device failed."""
+
+
+def did_you_mean(word: str, known: Sequence[str]) -> str:
+    """The end of a message about an unknown name: the nearest known one, else all of them.
+
+    >>> did_you_mean("hetrz", ["hertz", "bilinear"])
+    'did you mean "hertz"?'
+    >>> did_you_mean("x", ["hertz", "bilinear"])
+    'known: bilinear, hertz'
+    """
+    near = get_close_matches(word, known, n=1, cutoff=0.6)
+    return f'did you mean "{near[0]}"?' if near else f"known: {', '.join(sorted(known))}"

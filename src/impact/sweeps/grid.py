@@ -1,0 +1,135 @@
+"""The grid of a config: its axes and scalars, made from the entries that could be read."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from .ranges import MAX_FAULTS, Entry, written_out
+from .values import Fault, KeyPath, Problem, Quantity, nearest, show
+
+MAX_POINTS = 20_000_000  # of all models together
+
+Values = tuple[float, ...] | tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One dimension of the grid: the columns of a zip group, or one column; the first names it.
+
+    >>> Axis({"m1": (1.0, 2.0), "m2": (2.0, 4.0)}).name
+    'm1'
+    """
+
+    columns: Mapping[str, Values]
+
+    @property
+    def name(self) -> str:
+        return next(iter(self.columns))
+
+    @property
+    def size(self) -> int:
+        return len(self.columns[self.name])
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Scalars by name, axes in config order, and what is wrong with them."""
+
+    scalars: Mapping[str, float | str]
+    axes: tuple[Axis, ...]
+    faults: tuple[Fault, ...]
+
+
+def lay_out(
+    entries: Mapping[str, Entry],
+    quantities: Mapping[str, Quantity],
+    groups: Sequence[Sequence[str]],
+    given: Sequence[str],
+    models: int,
+) -> Grid:
+    """The grid of some entries.
+
+    Parameters
+    ----------
+    entries : by config name, in config order
+    quantities : what each number has to be
+    groups : names that vary together
+    given : the names under [sweep], whether their entries could be read or not
+    models : how many there are
+    """
+    member_of, faults = _zipped(groups, entries, given)
+    scalars = {name: entry.given[0] for name, entry in entries.items() if entry.kind == "scalar"}
+    swept = [name for name in entries if name not in scalars]
+    # a group stands where its first member does
+    leaders = [name for name in swept if member_of.get(name, (name,))[0] == name]
+    points = math.prod(entries[name].size for name in leaders) * models
+    if points > MAX_POINTS:
+        faults.append((("sweep",), f"got {points:,} points (axes times models), wants at most {MAX_POINTS:,}"))
+    columns: dict[str, Values] = {}
+    for name in swept:
+        entry = entries[name]
+        if entry.kind == "list":
+            columns[name] = entry.given
+            # the first column names the points of the axis; the others may repeat themselves
+            if name in leaders:
+                faults += _repeated(name, entry.given)
+        elif points <= MAX_POINTS:
+            try:
+                columns[name] = written_out(entry, quantities[name])
+            except Problem as problem:
+                faults += problem.under(*path_of(name))
+    axes = () if faults else tuple(Axis({m: columns[m] for m in member_of.get(n, (n,))}) for n in leaders)
+    return Grid(scalars, axes, tuple(faults))
+
+
+def path_of(name: str) -> KeyPath:
+    """The path of a config name: of `v1`, or of a model's parameter such as `bilinear.K`.
+
+    >>> path_of("v1"), path_of("bilinear.K")
+    (('sweep', 'v1'), ('model', 'bilinear', 'K'))
+    """
+    return ("model", *name.split(".", 1)) if "." in name else ("sweep", name)
+
+
+def _zipped(
+    groups: Sequence[Sequence[str]], entries: Mapping[str, Entry], given: Sequence[str]
+) -> tuple[dict[str, Sequence[str]], list[Fault]]:
+    """The group of each zipped name, and what is wrong: no axis, named twice, of another length.
+
+    Parameters
+    ----------
+    groups : names that vary together
+    entries : the entries that could be read
+    given : the names that were given, whether they could be read or not
+    """
+    member_of: dict[str, Sequence[str]] = {}
+    faults: list[Fault] = []
+    for place, group in enumerate(groups[:MAX_FAULTS]):
+        sizes: dict[str, int] = {}
+        for member, name in enumerate(group[:MAX_FAULTS]):
+            path = ("sweep", "zip", place, member)
+            if name not in given:
+                faults.append((path, f"got {show(name)}, wants an axis; {nearest(name, list(given))}"))
+            elif name in member_of:
+                faults.append((path, f"got {show(name)} twice, wants each name once"))
+            elif name in entries and entries[name].kind == "scalar":
+                faults.append((path, f"got {show(name)}, which is a scalar, wants an axis: a list or a range"))
+            elif name in entries:
+                sizes[name] = entries[name].size
+            member_of.setdefault(name, group)
+        if len(set(sizes.values())) > 1:
+            lengths = ", ".join(f"{name} of {size}" for name, size in sizes.items())
+            faults.append((("sweep", "zip", place), f"got {lengths} values, wants axes of one length"))
+    return member_of, faults
+
+
+def _repeated(name: str, values: Values) -> list[Fault]:
+    """The first value of a list that comes a second time."""
+    seen: set[object] = set()
+    for place, value in enumerate(values):
+        if value in seen:
+            return [((*path_of(name), place), f"got {show(value)} twice, wants each value once")]
+        seen.add(value)
+    return []

@@ -1,0 +1,148 @@
+"""The keys of every table of a config: how each is read, and what an editor is told of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..contact.model import ForceModel
+from .ranges import Entry, entry_schema, number_schema, read_entry, read_groups, read_names, read_texts
+from .rules import DEFAULTS, MATERIAL, MATERIALS, REQUIRED, SWEEP, expand_models, of_parameter
+from .values import Problem, Quantity, read_number, read_whole, refuse
+
+DEFAULT_TITLE = "Impact sweep"
+RTOL = Quantity("1", "relative tolerance of the integration", least=1e-13, most=1e-3)
+MOST_STEPS = 10**9
+
+Schema = Mapping[str, Any]
+TEXTS: Schema = {"type": "array", "items": {"type": "string"}, "minItems": 1}
+GROUPS: Schema = {"type": "array", "items": {**TEXTS, "minItems": 2}}
+STEPS: Schema = {"type": "integer", "minimum": 1, "maximum": MOST_STEPS}
+
+
+@dataclass(frozen=True)
+class Context:
+    """What values depend on besides themselves, and the entries and zip groups that could be read.
+
+    `n` is the sweep's exponent: None where it is an axis, NaN where it cannot be read.
+    """
+
+    n: float | None
+    materials: tuple[str, ...]
+    known: Mapping[str, ForceModel]
+    entries: dict[str, Entry] = field(default_factory=dict)
+    groups: list[tuple[str, ...]] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Key:
+    """A key whose value is made by `read`, which raises `Problem`; an editor is told the rest."""
+
+    read: Callable[[Any, Context], object]
+    schema: Schema
+    about: str
+    required: bool = False
+
+
+def number_key(name: str, quantity: Quantity) -> Key:
+    """A key that is a number, and cannot be an axis."""
+    schema = number_schema(quantity)
+    return Key(lambda value, _: read_number(value, quantity), schema, quantity.about, name in REQUIRED)
+
+
+def entry_key(name: str, quantity: Quantity, own_n: float | None = None, default: float | None = None) -> Key:
+    """A key that may be an axis; its entry is kept in the context under its config name.
+
+    Parameters
+    ----------
+    name, quantity : what it is
+    own_n : the exponent in its unit, where it is not the sweep's
+    default : its value where it is not given
+    """
+
+    def read(value: object, context: Context) -> Entry:
+        entry = read_entry(value, quantity, context.n if own_n is None else own_n)
+        context.entries[name] = entry
+        return entry
+
+    schema = entry_schema(quantity) | ({} if default is None else {"default": default})
+    return Key(read, schema, quantity.about, name in REQUIRED)
+
+
+def _material_key(name: str, about: str) -> Key:
+    def read(value: object, context: Context) -> Entry:
+        entry = read_names(value, context.materials, "a material of [materials]")
+        context.entries[name] = entry
+        return entry
+
+    return Key(read, {"anyOf": [{"type": "string"}, TEXTS]}, about)
+
+
+def _groups(value: object, context: Context) -> None:
+    context.groups.extend(read_groups(value))
+
+
+def _title(value: object, _: Context) -> str:
+    if not isinstance(value, str):
+        raise refuse(value, "text")
+    return value
+
+
+def _models(value: object, context: Context) -> list[ForceModel]:
+    models, faults = expand_models(value, context.known)
+    if faults:
+        raise Problem(*faults)
+    return models
+
+
+def models_key(known: Mapping[str, ForceModel]) -> Key:
+    """The key `models`, of which an editor is told all names."""
+    names = [*known, "all", *sorted({f"family:{model.family}" for model in known.values()})]
+    name = {"anyOf": [{"enum": names}, {"type": "string", "pattern": r"[*?\[]"}]}
+    schema = {"anyOf": [name, {"type": "array", "items": name, "minItems": 1}]}
+    return Key(_models, schema, 'models by name, "all", "family:NAME" or a pattern', required=True)
+
+
+def parameter_keys(model: ForceModel) -> dict[str, Key]:
+    """The keys of [model.KEY]."""
+    return {
+        one.name: entry_key(f"{model.key}.{one.name}", of_parameter(one), model.exponent, one.default)
+        for one in model.parameters
+    }
+
+
+TITLE = Key(_title, {"type": "string", "default": DEFAULT_TITLE}, "title of the sweep")
+SWEEP_KEYS = {
+    **{name: entry_key(name, quantity, default=DEFAULTS.get(name)) for name, quantity in SWEEP.items()},
+    **{name: _material_key(name, about) for name, about in MATERIALS.items()},
+    "zip": Key(_groups, GROUPS, "groups of axes that vary together"),
+}
+MATERIAL_KEYS = {name: number_key(name, quantity) for name, quantity in MATERIAL.items()}
+SOLVER_KEYS = {
+    "rtol": number_key("rtol", RTOL),
+    "max_steps": Key(lambda value, _: read_whole(value, 1, MOST_STEPS), STEPS, "steps that one impact may take"),
+}
+OUTPUT_KEYS = {"variables": Key(lambda value, _: read_texts(value), TEXTS, "variables of the result, else all")}
+
+
+def read_exponent(sweep: Mapping[str, object]) -> float | None:
+    """The sweep's n, which the unit of K contains: None for an axis, NaN where it cannot be read."""
+    try:
+        entry = read_entry(sweep.get("n", DEFAULTS["n"]), SWEEP["n"])
+    except Problem:
+        return math.nan
+    return float(entry.given[0]) if entry.kind == "scalar" else None
+
+
+def key_tree(known: Mapping[str, ForceModel]) -> dict[str, Any]:
+    """The keys of every table, nested, for the hint beside an unknown one; "*" is any name."""
+    parameters = {key: dict.fromkeys(one.name for one in model.parameters) for key, model in known.items()}
+    tables = {
+        "sweep": SWEEP_KEYS,
+        "materials": {"*": MATERIAL_KEYS},
+        "solver": SOLVER_KEYS,
+        "output": OUTPUT_KEYS,
+    }
+    return {"title": {}, "models": {}, **tables, "model": parameters}

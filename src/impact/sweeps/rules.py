@@ -1,0 +1,175 @@
+"""What the keys of a config mean, and the rules that hold between them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from fnmatch import fnmatchcase
+
+from ..contact.model import ForceModel, Parameter
+from .ranges import MAX_FAULTS
+from .values import MAX_UNIT, Fault, Problem, Quantity, nearest, refuse
+
+DEFAULTS = {"v2": 0.0, "n": 1.5}
+
+SWEEP = {
+    "e": Quantity("1", "coefficient of restitution", least=0, most=1),
+    "alpha": Quantity("s/m", "slope of the restitution over the speed, e = 1 - alpha v0", least=0),
+    "v1": Quantity("m/s", "velocity of the first ball before the impact"),
+    "v2": Quantity("m/s", "velocity of the second ball before the impact, below v1"),
+    "m1": Quantity("kg", "mass of the first ball; inf is a wall", least=0, above=True, infinite=True),
+    "m2": Quantity("kg", "mass of the second ball; inf is a wall", least=0, above=True, infinite=True),
+    "R1": Quantity("m", "radius of the first ball; inf is a plane", least=0, above=True, infinite=True),
+    "R2": Quantity("m", "radius of the second ball; inf is a plane", least=0, above=True, infinite=True),
+    "K": Quantity("N/m^n", "stiffness of the contact, F = K x^n", least=0, above=True),
+    "n": Quantity("1", "exponent of the elastic force", least=1, most=10),
+}
+MATERIALS = {
+    "material": "material of both balls",
+    "material1": "material of the first ball",
+    "material2": "material of the second ball",
+}
+MATERIAL = {
+    "E": Quantity("Pa", "Young's modulus", least=0, above=True),
+    "nu": Quantity("1", "Poisson's ratio", least=-1, most=0.5, above=True),
+    "rho": Quantity("kg/m^3", "density", least=0, above=True),
+    "yield_strength": Quantity("Pa", "yield strength", least=0, above=True),
+}
+REQUIRED = ("v1", "m1", "m2", "E", "nu", "rho")
+
+# what else a key might be called
+WORDS = {
+    "restitution": "e", "cor": "e", "mass1": "m1", "mass2": "m2", "speed1": "v1", "speed2": "v2",
+    "velocity1": "v1", "velocity2": "v2", "radius1": "R1", "radius2": "R2", "stiffness": "K", "exponent": "n",
+    "youngs_modulus": "E", "poisson": "nu", "poissons_ratio": "nu", "density": "rho",
+}  # fmt: skip
+
+
+def of_parameter(parameter: Parameter) -> Quantity:
+    """What a model's parameter has to be."""
+    return Quantity(parameter.unit, parameter.meaning, parameter.least, parameter.most)
+
+
+def expand_models(asked: object, catalogue: Mapping[str, ForceModel]) -> tuple[list[ForceModel], list[Fault]]:
+    """The models of a key, "all", "family:NAME", a glob or a list of those; and what is wrong with it."""
+    if not isinstance(asked, str | list) or not asked:
+        return [], list(refuse(asked, 'a model, or a list of models; "all" are all').faults)
+    found: dict[str, ForceModel] = {}
+    faults: list[Fault] = []
+    for place, word in enumerate([asked] if isinstance(asked, str) else asked):
+        try:
+            found |= _models(word, catalogue)
+        except Problem as problem:
+            faults += problem.faults if isinstance(asked, str) else problem.under(place)
+            if len(faults) >= MAX_FAULTS:
+                break
+    return list(found.values()), faults
+
+
+def _models(word: object, catalogue: Mapping[str, ForceModel]) -> dict[str, ForceModel]:
+    if not isinstance(word, str):
+        raise refuse(word, "the name of a model")
+    if word == "all":
+        return dict(catalogue)
+    if word.startswith("family:"):
+        family = word.removeprefix("family:")
+        members = {key: model for key, model in catalogue.items() if model.family == family}
+        families = sorted({model.family for model in catalogue.values()})
+        if not members:
+            raise refuse(word, f"a family of models; {nearest(family, families)}")
+        return members
+    if any(letter in word for letter in "*?["):
+        matching = {key: model for key, model in catalogue.items() if fnmatchcase(key, word[:MAX_UNIT])}
+        if not matching:
+            raise refuse(word, "a pattern that some model matches")
+        return matching
+    if word not in catalogue:
+        raise refuse(word, f"a model; {nearest(word, list(catalogue))}")
+    return {word: catalogue[word]}
+
+
+def cross_faults(data: Mapping[str, object], models: Sequence[ForceModel], n: float | None) -> Iterable[Fault]:
+    """What is wrong between the keys, judged by which of them are given, so that other faults hide nothing.
+
+    Parameters
+    ----------
+    data : the config as it was read
+    models : the models chosen
+    n : the sweep's exponent; None where it is an axis, NaN where it is not known
+    """
+    given = data.get("sweep")
+    if isinstance(given, dict):
+        yield from _restitution(given, models)
+        yield from _stiffness(given, models, n)
+        yield from _materials(given, models)
+        yield from _yield_strengths(given, data.get("materials"), models)
+    own = data.get("model", {})
+    for model in models:
+        table = own.get(model.key, {}) if isinstance(own, dict) else {}
+        for parameter in model.parameters:
+            if parameter.default is None and isinstance(table, dict) and parameter.name not in table:
+                wants = of_parameter(parameter).wants
+                yield ("model", model.key, parameter.name), f"missing, wants {wants}: {parameter.meaning}"
+
+
+def _asking(models: Sequence[ForceModel], *quantities: str) -> str:
+    """The models that depend on one of the quantities, in words; empty if none does."""
+    keys = [model.key for model in models if not model.quantities.isdisjoint(quantities)]
+    more = f" and {len(keys) - 3} more" if len(keys) > 3 else ""
+    return ", ".join(keys[:3]) + more
+
+
+def _restitution(given: Mapping[str, object], models: Sequence[ForceModel]) -> Iterable[Fault]:
+    if "e" in given and "alpha" in given:
+        yield ("sweep", "alpha"), "given beside e, wants one of the two"
+    asking = _asking(models, "e")
+    if asking and "e" not in given and "alpha" not in given:
+        yield ("sweep", "e"), f"missing, wants e or alpha (asked for by {asking}), or other models"
+
+
+def _stiffness(given: Mapping[str, object], models: Sequence[ForceModel], n: float | None) -> Iterable[Fault]:
+    if "K" not in given or (n is not None and math.isnan(n)):
+        return
+    for model in models:
+        own_K = any(parameter.name == "K" for parameter in model.parameters)
+        if model.exponent is not None and model.exponent != n and not own_K:
+            sweep = "an axis n" if n is None else f"n = {n:g}"
+            yield (
+                ("sweep", "K"),
+                f"got a stiffness for {sweep}, but {model.key} has n = {model.exponent:g} of its own; "
+                "wants no K, or models of one n",
+            )
+
+
+def _materials(given: Mapping[str, object], models: Sequence[ForceModel]) -> Iterable[Fault]:
+    single = [name for name in ("material1", "material2") if name in given]
+    if "material" in given:
+        for name in single:
+            yield ("sweep", name), "given beside material, wants either material, or material1 and material2"
+    elif len(single) == 1:
+        other = "material2" if single == ["material1"] else "material1"
+        yield ("sweep", other), f"missing beside {single[0]}; material is for both balls"
+    elif not single:
+        radii = [name for name in ("R1", "R2") if name not in given]
+        asking = _asking(models, "E1", "E2", "nu1", "nu2", "yield_strength1", "yield_strength2", *radii)
+        if "K" not in given:
+            yield ("sweep", "material"), "missing, wants a material of [materials], or K"
+        elif asking:
+            yield ("sweep", "material"), f"missing, wants a material of [materials] (asked for by {asking})"
+
+
+def _yield_strengths(
+    given: Mapping[str, object], materials: object, models: Sequence[ForceModel]
+) -> Iterable[Fault]:
+    reported: set[str] = set()
+    for ball in ("1", "2"):
+        asking = _asking(models, f"yield_strength{ball}")
+        named = given.get("material", given.get(f"material{ball}", []))
+        for name in named if isinstance(named, list) else [named]:
+            if not asking or not isinstance(name, str) or not isinstance(materials, dict) or name in reported:
+                continue
+            table = materials.get(name)
+            if isinstance(table, dict) and "yield_strength" not in table:
+                reported.add(name)
+                wants = MATERIAL["yield_strength"].wants
+                yield ("materials", name, "yield_strength"), f"missing, wants {wants} (asked for by {asking})"

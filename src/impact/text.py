@@ -1,0 +1,28 @@
+"""Text from files made safe to show."""
+
+from __future__ import annotations
+
+from unicodedata import category
+
+# control, format (bidi marks, zero-width), lone surrogate, private, unassigned, line and paragraph separator
+UNSAFE = frozenset({"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"})
+
+
+def safe_text(text: str, limit: int = 200) -> str:
+    r"""The text with characters that steer a terminal, or are not seen, escaped; at most `limit` characters.
+
+    >>> safe_text("steel\x1b[31m")
+    'steel\\x1b[31m'
+    >>> safe_text("a\u202eb"), safe_text("abcdef", limit=4)
+    ('a\\u202eb', 'abc…')
+    """
+    # an escape is never shorter than its character: what is past the limit need not be looked at
+    shown = "".join(_escaped(letter) if category(letter) in UNSAFE else letter for letter in text[: limit + 1])
+    return shown if len(shown) <= limit else shown[: limit - 1] + "…"
+
+
+def _escaped(letter: str) -> str:
+    code = ord(letter)
+    if code < 0x100:
+        return f"\\x{code:02x}"
+    return f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"

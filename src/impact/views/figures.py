@@ -1,0 +1,213 @@
+"""Pictures of a result. A figure is made in two steps: the numbers that it shows, and their drawing."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..contact.models import catalogue
+from ..data.store import write_whole
+from ..errors import UsageError
+from ..text import safe_text
+from .slices import take_slice
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Okabe and Ito's colours, without the yellow that vanishes on white; a number of markers that shares no factor
+# with theirs, so that neighbours in the catalogue differ in both
+COLOURS = ("#7F4F24", "#009E73", "#56B4E9", "#CC79A7", "#D55E00", "#E69F00", "#0072B2")
+MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*", "p")
+# a legend has two columns where its labels are at most this long, and the figure grows by a line of this height
+# for every row of it
+SHORT_LABEL, LEGEND_ROW = 46, 0.19
+STYLE = files(__package__) / "impact.mplstyle"
+# a picture has the same bytes each time: no dates in it
+METADATA: dict[str, dict[str, None]] = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One curve: its label, the model's key (None for the reference), the ball, and a value per x."""
+
+    label: str
+    model: str | None
+    ball: int
+    values: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class FinalVelocities:
+    """The numbers of a final-velocity comparison: what is drawn over what, where, and the curves."""
+
+    title: str
+    x: str
+    x_label: str
+    x_values: tuple[float, ...]
+    unit: str
+    conditions: str
+    slice: Mapping[str, float | str]
+    curves: tuple[Curve, ...]
+
+
+def final_velocities(
+    dataset: xr.Dataset,
+    x: str | None = None,
+    sel: Mapping[str, float | str] | None = None,
+    models: Sequence[str] | None = None,
+) -> FinalVelocities:
+    """The numbers of Figure 6: post-impact velocities of every model and of the impulse-momentum solution.
+
+    Parameters
+    ----------
+    dataset : a result
+    x, sel, models : see `impact.views.slices.take_slice`
+
+    Raises
+    ------
+    UsageError : the result has not got what is asked for
+    """
+    wanted = ("v1_post", "v2_post", "v1_reference", "v2_reference")
+    missing = [name for name in wanted if name not in dataset]
+    if missing:
+        raise UsageError(f"this result has no {', '.join(missing)}; sweep without [output] variables, or add them")
+    line = take_slice(dataset, x, sel, models)
+    data = line.dataset
+
+    def curve(label: str, model: str | None, ball: int, values: xr.DataArray) -> Curve:
+        return Curve(label, model, ball, tuple(np.broadcast_to(values.values, data[line.x].shape).tolist()))
+
+    curves = [curve("Impulse-momentum (6), (7)", None, ball, data[f"v{ball}_reference"]) for ball in (1, 2)]
+    for key in data["model"].values:
+        one = data.sel(model=key)
+        curves += [curve(_label(one), str(key), ball, one[f"v{ball}_post"]) for ball in (1, 2)]
+    # without a restitution to refer to there is no reference
+    curves = [one for one in curves if one.model is not None or np.isfinite(one.values).any()]
+    return FinalVelocities(
+        title=safe_text(str(dataset.attrs.get("title", "")), 80),
+        x=line.x,
+        x_label=_axis_label(data[line.x]),
+        x_values=tuple(data[line.x].values.tolist()),
+        unit="m/s",
+        conditions=_conditions(data, line.x),
+        slice=line.fixed,
+        curves=tuple(curves),
+    )
+
+
+def _label(one: xr.Dataset) -> str:
+    """Title, year and equation number of a model."""
+    number = re.search(r"\(\d+\)(?:-\(\d+\))?$", str(one["equation"].values))
+    parts = (str(one[name].values) for name in ("title", "year"))
+    return safe_text(" ".join([*parts, *([number[0]] if number else [])]), 80)
+
+
+def _axis_label(coordinate: xr.DataArray) -> str:
+    meaning, unit = (str(coordinate.attrs.get(name, "")) for name in ("long_name", "units"))
+    return safe_text(
+        f"{meaning or coordinate.name}, {coordinate.name}" + (f" [{unit}]" if unit not in ("", "1") else "")
+    )
+
+
+def _conditions(data: xr.Dataset, x: str) -> str:
+    """The values of everything that is not drawn over."""
+    parts = []
+    for name, coordinate in data.coords.items():
+        if coordinate.ndim == 0 and name not in ("model", x):
+            value = coordinate.values.item()
+            unit = str(coordinate.attrs.get("units", "1"))
+            text = f"{value:g}" if isinstance(value, float) else str(value)
+            parts.append(safe_text(f"{name} = {text}" + (f" {unit}" if unit != "1" else ""), 60))
+    return ", ".join(parts)
+
+
+def draw_final_velocities(numbers: FinalVelocities) -> Figure:
+    """Draw a final-velocity comparison."""
+    with matplotlib.rc_context(fname=str(STYLE)):
+        labels = [curve.label for curve in numbers.curves if curve.ball == 1]
+        columns = 2 if max(map(len, labels)) <= SHORT_LABEL else 1
+        width, height = matplotlib.rcParams["figure.figsize"]
+        figure = Figure((width, height + LEGEND_ROW * -(-len(labels) // columns)), layout="constrained")
+        axes = figure.add_subplot()
+        order = [*catalogue(), *(c.model for c in numbers.curves if c.model)]
+        x = np.asarray(numbers.x_values)
+        for curve in numbers.curves:
+            look = _look(curve, order, len(x))
+            first = curve.ball == 1
+            axes.plot(x, curve.values, label=curve.label if first else "_", **look)
+        _name_the_balls(axes, numbers, x)
+        axes.set_xlabel(numbers.x_label, parse_math=False)
+        axes.set_ylabel(f"velocity after the impact [{numbers.unit}]")
+        axes.margins(x=0.02)
+        axes.set_title(numbers.title or "Final velocities comparison", parse_math=False, pad=22)
+        axes.annotate(
+            _wrapped(numbers.conditions), (0, 1), (0, 4), xycoords="axes fraction", textcoords="offset points",
+            fontsize=7.5, color="#555555", parse_math=False, va="bottom",
+        )  # fmt: skip
+        legend = figure.legend(loc="outside lower center", ncols=columns)
+        for text in legend.get_texts():
+            text.set_parse_math(False)
+    return figure
+
+
+def _wrapped(text: str, width: int = 110) -> str:
+    """At most two lines, broken at a comma."""
+    if len(text) <= width:
+        return text
+    cut = text.rfind(", ", 0, width) + 1
+    rest = text[cut + 1 :]
+    return text[:cut] + "\n" + (rest if len(rest) <= width else rest[: width - 1] + "…")
+
+
+def _look(curve: Curve, order: list[str], points: int) -> dict[str, Any]:
+    """Colour and marker of a curve: a model's own, wherever it is drawn; the reference is a plain line."""
+    if curve.model is None:
+        return {"color": "black", "linewidth": 2.2, "zorder": 1.5}
+    place = order.index(curve.model)
+    every = max(1, points // 12)
+    return {
+        "color": COLOURS[place % len(COLOURS)],
+        "marker": MARKERS[place % len(MARKERS)],
+        # the markers of different models stand at different points, so that equal curves show both
+        "markevery": (place * every // len(MARKERS) % every if every > 1 else 0, every),
+        "markerfacecolor": "white",
+        "linewidth": 1.1,
+    }
+
+
+def _name_the_balls(axes: Axes, numbers: FinalVelocities, x: np.ndarray) -> None:
+    """v₁⁺ and v₂⁺ beside the ends of their curves."""
+    for ball, name in ((1, "v₁⁺"), (2, "v₂⁺")):
+        ends = [c.values[-1] for c in numbers.curves if c.ball == ball and np.isfinite(c.values[-1])]
+        if ends:
+            # at the reference's end, where there is one
+            axes.annotate(name, (x[-1], ends[0]), (6, 0), textcoords="offset points", va="center", fontsize=11,
+                          annotation_clip=False)  # fmt: skip
+
+
+def save_figure(figure: Figure, path: str | Path) -> None:
+    """Write a figure; the format follows the file's ending, and the bytes are the same each time.
+
+    Raises
+    ------
+    UsageError : the ending is not .png, .svg or .pdf, or the file cannot be written there
+    StoreError : the disk is full or failed
+    """
+    path = Path(path)
+    kind = path.suffix.lower().removeprefix(".")
+    if kind not in METADATA:
+        raise UsageError(f"{safe_text(str(path))}: wants a name that ends in .png, .svg or .pdf")
+    buffer = io.BytesIO()
+    with matplotlib.rc_context(fname=str(STYLE)):
+        figure.savefig(buffer, format=kind, metadata=METADATA[kind])
+    write_whole(path, buffer.getbuffer(), overwrite=True)

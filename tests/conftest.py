@@ -1,0 +1,82 @@
+"""What several test files share: real child processes, and one small stored result."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import xarray as xr
+
+import impact
+
+ROOT = Path(__file__).parent.parent
+Run = Callable[..., subprocess.CompletedProcess[str]]
+
+WIDE = """
+title = "Four axes"
+models = ["hertz", "lankarani-nikravesh-1990", "bilinear", "ismail-stronge-2008"]
+[sweep]
+e = [0.2, 0.6, 1.0]
+v1 = [1.0, 2.0]
+v2 = -1.0
+m1 = [1.0, 3.0]
+m2 = [1.0, inf]
+zip = [["m1", "m2"]]
+material1 = "soft"
+material2 = ["soft", "hard"]
+[materials.soft]
+E = "2 GPa"
+nu = 0.4
+rho = 1000
+[materials.hard]
+E = 210e9
+nu = 0.3
+rho = 7850
+[model.ismail-stronge-2008]
+gamma = [1.5, 4.0]
+"""
+
+
+@pytest.fixture(scope="session")
+def cli() -> Run:
+    """Run the program as a user does: a process of its own, its output captured."""
+
+    def run(*words: str | Path, cwd: Path | None = None, **environment: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [sys.executable, "-m", "impact", *map(str, words)],
+            cwd=cwd or ROOT,
+            env={**os.environ, **environment},
+            capture_output=True,
+            text=True,
+            encoding="utf-8",
+            timeout=120,
+            check=False,
+        )
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def figure6() -> xr.Dataset:
+    """The result of configs/figure6.toml."""
+    return impact.sweep(ROOT / "configs" / "figure6.toml")
+
+
+@pytest.fixture(scope="session")
+def stored(figure6: xr.Dataset, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same as a file."""
+    path = tmp_path_factory.mktemp("stored") / "figure6.h5"
+    impact.save(figure6, path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def wide(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
+    """A sweep over several axes, a zip group, a wall, two materials and a model's own parameter."""
+    path = tmp_path_factory.mktemp("wide") / "wide.toml"
+    path.write_text(WIDE, encoding="utf-8")
+    return impact.sweep(path)

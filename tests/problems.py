@@ -1,0 +1,121 @@
+"""Problems with known answers: initial value problems for the integrator, and the impact of the paper's Table 1.
+
+Every initial value problem carries the time as its first quadrature, so that a state can be compared with the
+exact solution at its own time.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from impact.contact.lanes import Lanes, stiffness
+from impact.contact.material import effective_mass, hertz_stiffness, sphere_radius
+from impact.ode.rk45 import Problem
+
+
+@dataclass(frozen=True)
+class Known:
+    """An initial value problem of one lane and its answer.
+
+    `exact` gives the two components at a time; `ends` is the time of the event, `quadrature` the second
+    quadrature there, `highest` the largest value of the watched product of the components.
+    """
+
+    name: str
+    problem: Problem
+    start: tuple[float, float]
+    exact: Callable[[float], tuple[float, float]]
+    ends: float
+    quadrature: float
+    highest: float
+
+    def __str__(self) -> str:
+        return self.name
+
+
+def _rates(second, quadrature):
+    """Rates of y0' = y1, y1' = second(y0, y1), time and another quadrature; y0 y1 is watched."""
+
+    def rates(y, columns):
+        one = np.ones_like(y[0])
+        return np.array([y[1], second(*y, *columns), one, quadrature(*y), y[0] * y[1]])
+
+    return rates
+
+
+def _until(level: float):
+    """The end: y1 falls through a level; a lane whose y0 is huge is lost."""
+    return {
+        "event": lambda y, k, columns: (y[1] - level, k[1]),
+        "lost": lambda y: y[0] > 1e6,
+        "floor": (1.0, 1.0),
+        "watch": True,
+    }
+
+
+# y'' = −y from rest length: sin and cos over a quarter of a period
+OSCILLATOR = Known(
+    "oscillator",
+    Problem(_rates(lambda a, b: -a, lambda a, b: a * b), **_until(0.0)),
+    start=(0.0, 1.0),
+    exact=lambda t: (math.sin(t), math.cos(t)),
+    ends=math.pi / 2,
+    quadrature=0.5,
+    highest=0.5,
+)
+# y'' = −2 y y': tanh and sech², until sech² = 1/2
+TANH = Known(
+    "tanh",
+    Problem(_rates(lambda a, b: -2.0 * a * b, lambda a, b: a), **_until(0.5)),
+    start=(0.0, 1.0),
+    exact=lambda t: (math.tanh(t), 1.0 / math.cosh(t) ** 2),
+    ends=math.atanh(math.sqrt(0.5)),
+    quadrature=0.5 * math.log(2.0),
+    highest=2.0 / 27.0**0.5,
+)
+# y'' = −y'²: a logarithm and its derivative, until the derivative is 1/4
+LOGARITHM = Known(
+    "logarithm",
+    Problem(_rates(lambda a, b: -b * b, lambda a, b: b * b), **_until(0.25)),
+    start=(0.0, 1.0),
+    exact=lambda t: (math.log1p(t), 1.0 / (1.0 + t)),
+    ends=3.0,
+    quadrature=0.75,
+    highest=1.0 / math.e,
+)
+PROBLEMS = (OSCILLATOR, TANH, LOGARITHM)
+
+# y'' = −k y − c y' + q y'², with a column for each: a lane can be made to end late (small k), to be lost (k <= 0), to
+# creep without an end (large c), to blow up (q = 1, at time 1) or to have a rate that is not a number
+SPRINGS = Problem(
+    _rates(lambda a, b, k, c, q: -k * a - c * b + q * b * b, lambda a, b: a * b),
+    **_until(0.0),
+)
+
+
+def impacts(n: float = 1.5, **changes: object) -> Lanes:
+    """Impacts of the balls of Table 1 at e = 0.5, with changes by name; what varies is an array.
+
+    The balls are of 1 kg, E = 56 GPa, nu = 0.3 and 2712 kg/m3, the first at 1 m/s and the second at rest.
+    `parameters` are those of the law, by name.
+    """
+    given = {"e": 0.5, "v1": 1.0, "v2": 0.0, "m1": 1.0, "m2": 1.0, "E1": 56e9, "E2": 56e9}
+    parameters = changes.pop("parameters", {})
+    names = [*given, *(name for name in changes if name not in given), *parameters]
+    values = np.broadcast_arrays(*({**given, **changes, **parameters}[name] for name in names))
+    at = {name: np.atleast_1d(np.array(value, float)) for name, value in zip(names, values, strict=True)}
+    poisson, strength, density = (np.full_like(at["e"], value) for value in (0.3, 3e8, 2712.0))
+    for ball in "12":
+        at.setdefault(f"R{ball}", sphere_radius(at[f"m{ball}"], density))
+    exponent = np.full_like(at["e"], n)
+    hertz = hertz_stiffness(at["E1"], poisson, at["E2"], poisson, at["R1"], at["R2"])
+    at.setdefault("K", stiffness(exponent, hertz, effective_mass(at["m1"], at["m2"]), at["v1"] - at["v2"]))
+    own = {name: at.pop(name) for name in parameters}
+    return Lanes(
+        **at, n=exponent, nu1=poisson, nu2=poisson, yield_strength1=strength, yield_strength2=strength,
+        parameters=own,
+    )  # fmt: skip

@@ -1,0 +1,177 @@
+"""At the default tolerance every law delivers its exact restitution to 1e-9, and its other outputs to 1e-8."""
+
+import functools
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+from impact.contact import motion
+from impact.contact.collide import Contact, collide
+from impact.contact.lanes import Lanes
+from impact.contact.models import catalogue, find
+from impact.contact.models.hysteresis import hysteresis
+from impact.contact.oracles import contact_time_ratio, damped_peak_indentation, peak_indentation
+from impact.contact.status import Status
+from impact.contact.strike import Struck, strike
+from impact.sweeps.config import DEFAULT_RTOL
+
+from .problems import impacts
+
+EXPONENTS = (1.0, 1.3, 1.5, 2.0, 3.0)
+E = np.unique([*np.geomspace(0.001, 0.1, 60), *np.linspace(0.05, 1.0, 191)])
+CASES = [(key, n) for key, model in catalogue().items() for n in EXPONENTS if model.exponent in (None, n)]
+PERMANENT = [(key, n) for key, n in CASES if find(key).family == "permanent"]
+UNDAMPED = [(key, n) for key, n in CASES if find(key).family in ("permanent", "elastic")]
+
+# a law of the hysteresis family with any damping ratio: e from 0 to 1 is χ from 0 to 1000
+ANY_CHI = hysteresis("any-chi", title="", year=2026, equation="χ = 1000 e", reference="", chi=lambda e: 1e3 * e)
+CHI = (0.05, 0.3, 1.0, 1.9, motion.LOG_ABOVE, float(np.nextafter(motion.LOG_ABOVE, 3.0)), 2.1, 10.0, 100.0, 1e3)
+
+
+def struck(model, lanes: Lanes) -> Contact:
+    return collide(model, lanes, rtol=DEFAULT_RTOL, max_steps=100_000)
+
+
+@functools.cache
+def over_e(key: str, n: float) -> tuple[Lanes, Contact]:
+    parameters = {"gamma": 1.0 / E} if key == "ismail-stronge-2008" else {}
+    lanes = impacts(n, e=E, parameters=parameters)
+    return lanes, struck(find(key), lanes)
+
+
+def worst(values: np.ndarray) -> float:
+    return float(np.max(np.abs(values)))
+
+
+@pytest.mark.parametrize(("key", "n"), CASES)
+def test_restitution_is_exact_to_1e_9(key, n):
+    _, contact = over_e(key, n)
+    assert np.all(contact.status == Status.OK)
+    assert worst(contact.oracle_error) <= 1e-9
+
+
+@pytest.mark.parametrize(("key", "n"), CASES)
+def test_work_balances_energy(key, n):
+    _, contact = over_e(key, n)
+    assert worst(contact.residual) <= 10 * DEFAULT_RTOL
+    # the residual does not come from the oracle, and is not zero by construction
+    assert worst(contact.residual) > 0.0
+
+
+@pytest.mark.parametrize(("key", "n"), UNDAMPED)
+def test_undamped_approach_has_the_peak_and_force_of_its_closed_form(key, n):
+    lanes, contact = over_e(key, n)
+    peak = peak_indentation(lanes.m, lanes.v0, lanes.K, n)
+    assert worst(contact.peak_indentation / peak - 1.0) <= 1e-8
+    assert worst(contact.peak_force / (lanes.K * peak**n) - 1.0) <= 1e-8
+
+
+@pytest.mark.parametrize(("key", "n"), UNDAMPED)
+def test_undamped_contact_has_the_time_of_its_closed_form(key, n):
+    # unloading is the elastic motion made faster by 1/e and shorter by e², so that it lasts e of the approach
+    lanes, contact = over_e(key, n)
+    elastic = contact_time_ratio(n) * peak_indentation(lanes.m, lanes.v0, lanes.K, n) / lanes.v0
+    share = (1.0 + E) / 2.0 if find(key).family == "permanent" else 1.0
+    assert worst(contact.duration / (share * elastic) - 1.0) <= 1e-8
+
+
+@pytest.mark.parametrize(("key", "n"), PERMANENT)
+def test_permanent_indentation_is_that_of_its_closed_form(key, n):
+    lanes, contact = over_e(key, n)
+    peak = peak_indentation(lanes.m, lanes.v0, lanes.K, n)
+    assert worst(contact.permanent_indentation / peak - (1.0 - E * E)) <= 1e-8
+
+
+def quadratures(chi: float, n: float) -> tuple[float, float, float]:
+    """Restitution, time and peak force of F = xⁿ (1 + χ v) with m = v₀ = 1, to 15 digits.
+
+    With w = ln(1 + χ v)/χ the motion is dw/dt = −xⁿ, so that x^(n+1)/(n+1) = G(w₀) − G(w) with G(w) =
+    (exp(χ w) − 1 − χ w)/χ², where w goes from w₀ = ln(1 + χ)/χ to the other root of G(w) = G(w₀), w₀ − 1 − e.
+    """
+    with mp.workdps(30):
+        chi, n = mp.mpf(chi), mp.mpf(n)
+        a = 1 + chi
+        b = -mp.lambertw(-a * mp.exp(-a)).real
+        e_out = (1 - b) / chi
+
+        # x^(n+1)/(n+1) at a distance from either end, where exp(χ w) is a and b: no digits are lost there
+        def after_start(d):
+            return (-a * mp.expm1(-chi * d) - chi * d) / chi**2
+
+        def before_end(d):
+            return (chi * d - b * mp.expm1(chi * d)) / chi**2
+
+        # dw/xⁿ with w = zⁿ⁺¹ from an end, in which the rate is smooth: half the way from each
+        time, half = mp.mpf(0), ((1 + e_out) / 2) ** (1 / (n + 1))
+        for work in (after_start, before_end):
+
+            def rate(z, work=work):
+                d = z ** (n + 1)
+                return (n + 1) * (d / ((n + 1) * work(d))) ** (n / (n + 1))
+
+            time += mp.quad(rate, [0, half])
+
+        # the force xⁿ exp(χ w) is stationary where n (exp(χ w) − 1) = χ xⁿ⁺¹, and v > 0 there
+        low, high = mp.mpf(0), mp.log(a) / chi
+        for _ in range(100):
+            d = (low + high) / 2
+            early = chi**2 * (n + 1) * after_start(d) < n * (a * mp.exp(-chi * d) - 1)
+            low, high = (d, high) if early else (low, d)
+        force = ((n + 1) * after_start(low)) ** (n / (n + 1)) * a * mp.exp(-chi * low)
+        return float(e_out), float(time), float(force)
+
+
+@functools.cache
+def over_chi(n: float) -> tuple[Lanes, Contact]:
+    lanes = impacts(n, e=np.array(CHI) / 1e3)
+    return lanes, struck(ANY_CHI, lanes)
+
+
+@pytest.mark.parametrize("n", [1.0, 1.5, 2.0])
+@pytest.mark.parametrize("place", range(len(CHI)), ids=map(str, CHI))
+def test_damped_contact_agrees_with_quadrature(place, n):
+    lanes, contact = over_chi(n)
+    chi, length, v0 = contact.damping_ratio[place], lanes.length[place], lanes.v0[place]
+    e_out, time, force = quadratures(chi, n)
+    assert contact.e_out[place] == pytest.approx(e_out, rel=0, abs=1e-9)
+    assert contact.duration[place] * v0 / length == pytest.approx(time, rel=1e-8)
+    assert contact.peak_force[place] * length / (lanes.m[place] * v0**2) == pytest.approx(force, rel=1e-8)
+    peak = float(damped_peak_indentation(chi, n))
+    assert contact.peak_indentation[place] / length == pytest.approx(peak, rel=1e-8)
+
+
+@pytest.mark.parametrize("key", ["gharib-hurmuzlu-2012", "exact-hysteresis"])
+def test_extreme_damping_is_accurate_and_not_stiff(key):
+    contact = struck(find(key), impacts(e=[1e-6, 0.1]))
+    assert np.all(contact.status == Status.OK)
+    assert contact.e_out[0] == pytest.approx(1e-6, rel=1e-9)
+    assert worst(contact.residual) <= 10 * DEFAULT_RTOL
+    assert contact.steps[0] <= 3 * contact.steps[1]
+
+
+@functools.cache
+def in_coordinate(log: bool) -> Struck:
+    chi = np.geomspace(0.05, 50.0, 60)
+    law = motion.Law.of(ANY_CHI, 1.5, log)
+    assert law.names == ("chi",)
+    return strike(law, (chi,), chi.size, DEFAULT_RTOL, 100_000)
+
+
+@pytest.mark.parametrize("name", ["e_out", "peak", "force", "duration", "work"])
+def test_both_momentum_coordinates_agree(name):
+    plain, log = (getattr(in_coordinate(which).rebound, name) for which in (False, True))
+    assert not np.array_equal(plain, log)
+    # the work is in units of the energy before, of which little is lost where the damping is small
+    scale = 1.0 if name == "work" else log
+    assert worst((plain - log) / scale) <= 10 * DEFAULT_RTOL
+
+
+@pytest.mark.parametrize("key", ["hertz", "lankarani-nikravesh-1990", "gharib-hurmuzlu-2012", "bilinear"])
+def test_tighter_tolerance_lowers_the_error(key):
+    lanes = impacts(find(key).exponent or 1.5, e=np.linspace(0.05, 1.0, 40))
+    errors = [
+        worst(collide(find(key), lanes, rtol=rtol, max_steps=100_000).oracle_error)
+        for rtol in (1e-5, 1e-7, 1e-9, 1e-11)
+    ]
+    assert np.all(np.diff(np.log10(errors)) < -1.5), errors

@@ -1,0 +1,115 @@
+"""Every model of the catalogue keeps every clause of the contract, and the contract finds models that do not."""
+
+import functools
+
+import numpy as np
+import pytest
+
+from impact.contact.contract import Finding, contract
+from impact.contact.model import ForceModel
+from impact.contact.models import catalogue
+from impact.contact.models.hysteresis import hysteresis
+from impact.contact.oracles import delivered_restitution
+
+CLAUSES = (
+    "every impact ends",
+    "momentum is conserved (4)",
+    "velocities part by e_out v0 (5)",
+    "no energy is gained",
+    "work balances energy",
+    "agrees with its closed form",
+    "a change of units changes nothing",
+    "swapped balls swap velocities",
+    "at e = 1 it is ordinary",
+    "a tighter tolerance moves nothing",
+    "a lane alone equals the lane in a crowd",
+)
+
+
+@functools.cache
+def findings(key: str) -> dict[str, Finding]:
+    return {finding.clause: finding for finding in contract(catalogue()[key])}
+
+
+@pytest.mark.parametrize("clause", CLAUSES)
+@pytest.mark.parametrize("key", catalogue())
+def test_model_keeps_the_clause(key, clause):
+    # a model without a closed form has no clause about it
+    if clause == "agrees with its closed form" and catalogue()[key].oracle is None:
+        assert clause not in findings(key)
+        return
+    finding = findings(key)[clause]
+    assert finding.holds, f"{finding.worst:.3g} > {finding.bound:.3g}"
+
+
+@pytest.mark.parametrize("key", catalogue())
+def test_there_is_no_other_clause(key):
+    assert set(findings(key)) <= set(CLAUSES)
+
+
+def wrong(force, **given) -> ForceModel:
+    return ForceModel("wrong", "Wrong", 2026, equation="", reference="", force=force, **given)
+
+
+def random_noise(elastic):
+    return elastic * (1.0 + 1e-6 * np.random.default_rng().random(np.shape(elastic)))
+
+
+WRONG = {
+    "a force that holds the balls": (wrong(lambda elastic, v: elastic * (v > 0.0)), "every impact ends"),
+    "a force that raises": (wrong(lambda elastic: elastic[10**6]), "every impact ends"),
+    "a force that is not a number": (wrong(lambda elastic, e: elastic + np.nan * e), "every impact ends"),
+    "a force that drives": (wrong(lambda elastic, v: elastic * (1.0 - 0.01 * v)), "no energy is gained"),
+    "a closed form wrong by 1e-6": (
+        wrong(
+            lambda elastic, v, chi: elastic * (1.0 + chi * v),
+            coefficients={"chi": lambda e: 1.0 - e},
+            oracle=lambda chi: delivered_restitution(chi) + 1e-6,
+        ),
+        "agrees with its closed form",
+    ),
+    "a damping that is not the one of its closed form": (
+        wrong(
+            lambda elastic, v, chi: elastic * (1.0 + (chi + 1e-6) * v),
+            coefficients={"chi": lambda e: 1.0 - e},
+            oracle=lambda chi: delivered_restitution(chi),
+        ),
+        "agrees with its closed form",
+    ),
+    "the log coordinate for another law": (
+        wrong(
+            lambda elastic, v, chi: elastic * (1.0 + chi * v * v),
+            coefficients={"chi": lambda e: 4.0 - e},
+            momentum="log",
+        ),
+        "work balances energy",
+    ),
+    "a force that tells its balls apart": (
+        wrong(
+            lambda elastic, v, share: elastic * (1.0 + share * v),
+            coefficients={"share": lambda R1, R2: 1.0 / (1.0 + R1 / R2)},
+        ),
+        "swapped balls swap velocities",
+    ),
+    "an infinite damping at e = 1": (
+        hysteresis("wrong", title="", year=2026, equation="", reference="", chi=lambda e: np.divide(e, 1.0 - e)),
+        "at e = 1 it is ordinary",
+    ),
+    "a force with noise": (wrong(random_noise), "a tighter tolerance moves nothing"),
+    "a force that sees its neighbours": (
+        wrong(lambda elastic, x: elastic * (1.0 + 1e-12 * x.max())),
+        "a lane alone equals the lane in a crowd",
+    ),
+    "a coefficient that sees its neighbours": (
+        wrong(
+            lambda elastic, v, chi: elastic * (1.0 + chi * v),
+            coefficients={"chi": lambda e: 1.0 - e + 1e-12 * np.mean(e)},
+        ),
+        "a lane alone equals the lane in a crowd",
+    ),
+}
+
+
+@pytest.mark.parametrize(("model", "clause"), WRONG.values(), ids=WRONG)
+def test_contract_finds_what_is_wrong(model, clause):
+    assert clause in {finding.clause for finding in contract(model) if not finding.holds}

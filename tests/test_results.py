@@ -1,0 +1,176 @@
+"""A result is what the SCHEMA says: variables, dimensions, units, attributes, and the right number everywhere."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import impact
+from impact.contact.collide import Contact
+from impact.contact.status import Status
+from impact.data.results import SCHEMA, assemble, content_digest
+from impact.sweeps.config import parse_config
+from impact.sweeps.plan import Plan
+from impact.sweeps.run import run
+
+from .conftest import WIDE
+
+TABLE1 = {"v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6.118486349e9}
+
+
+def test_the_schema_names_what_a_collision_gives() -> None:
+    assert [one.name for one in SCHEMA] == [field.name for field in fields(Contact)]
+
+
+def test_variables_dimensions_and_units(wide: xr.Dataset) -> None:
+    axes = ("e", "v1", "m1", "material2", "ismail-stronge-2008.gamma")
+    assert dict(wide.sizes) == {"model": 4, "e": 3, "v1": 2, "m1": 2, "material2": 2, axes[-1]: 2}
+    assert list(wide.data_vars) == [one.name for one in SCHEMA]
+    for one in SCHEMA:
+        variable = wide[one.name]
+        assert variable.dims == (("model", *axes) if one.per == "model" else axes)
+        assert variable.dtype == np.dtype(one.dtype)
+        assert variable.attrs["units"] == one.unit
+        assert variable.attrs["long_name"]
+        assert "equation" in variable.attrs
+
+
+def test_coordinates(wide: xr.Dataset) -> None:
+    assert wide["m2"].dims == ("m1",)
+    assert wide["m2"].values.tolist() == [1.0, np.inf]
+    assert wide["material2"].values.tolist() == ["soft", "hard"]
+    assert wide["v2"].values == -1.0
+    assert wide["exponent"].values.tolist() == [1.5, 1.5, 1.0, 1.0]
+    for name in ("title", "year", "equation", "reference", "doi"):
+        assert wide[name].dims == ("model",)
+    assert wide["v1"].attrs["units"] == "m/s"
+
+
+def test_cells_are_the_impacts_of_their_coordinates(wide: xr.Dataset) -> None:
+    # impulse and momentum by hand: a wall, v0 = 3 m/s, e = 0.6
+    cell = {"e": 0.6, "v1": 2.0, "m1": 3.0, "material2": "hard"}
+    one = wide.sel(cell).isel({"ismail-stronge-2008.gamma": 0})
+    assert float(one["v1_reference"]) == pytest.approx(-1.0 - 0.6 * 3.0, abs=1e-15)
+    assert float(one["v2_reference"]) == -1.0
+    assert float(one["v1_post"].sel(model="hertz")) == pytest.approx(-4.0, abs=1e-9)
+    assert float(one["e_out"].sel(model="bilinear")) == pytest.approx(0.6, abs=1e-9)
+    # gamma drives one model, e does not; the others are constant along it
+    gamma = wide["e_out"].isel(e=0, v1=0, m1=0, material2=0)
+    assert gamma.sel(model="ismail-stronge-2008").values == pytest.approx([1 / 1.5, 1 / 4.0], abs=1e-9)
+    bilinear = gamma.sel(model="bilinear").values
+    assert bilinear[0] == bilinear[1]
+    # a cell alone is the same impact
+    alone = impact.run(_config(wide), model="lankarani-nikravesh-1990", at=cell)
+    assert alone.values["e_out"] == float(one["e_out"].sel(model="lankarani-nikravesh-1990"))
+
+
+def _config(dataset: xr.Dataset) -> dict[str, object]:
+    import tomllib
+
+    return tomllib.loads(dataset.attrs["config"])
+
+
+def test_where_n_is_not_hertzian_the_stiffness_is_the_secant_of_the_hertz_peak(wide: xr.Dataset) -> None:
+    cell = wide.isel(e=0, v1=0, m1=0, material2=0).isel({"ismail-stronge-2008.gamma": 0})
+    hertz, linear = cell.sel(model="hertz"), cell.sel(model="bilinear")
+    peak = float(hertz["peak_indentation"])
+    assert float(linear["stiffness"]) == pytest.approx(float(hertz["stiffness"]) * peak**0.5, rel=1e-9)
+
+
+def test_alpha_gives_e_from_the_speed() -> None:
+    result = impact.sweep(
+        {
+            "models": ["bilinear", "gharib-hurmuzlu-2012"],
+            "sweep": {"alpha": [0.1, 0.5], "v1": [1.0, 2.0, 4.0], "m1": 1.0, "m2": 1.0, "material": "a"},
+            "materials": {"a": {"E": 56e9, "nu": 0.3, "rho": 2712}},
+        }
+    )
+    assert result["e"].dims == ("alpha", "v1")
+    assert result["e"].values == pytest.approx(np.array([[0.9, 0.8, 0.6], [0.5, 0.0, -1.0]]))
+    status = result["status"].sel(model="bilinear").values
+    assert status.tolist() == [[1, 1, 1], [1, Status.LIMIT, Status.INVALID_PARAMETER]]
+    failed = result.sel(model="bilinear", alpha=0.5, v1=4.0)
+    for name in ("v1_post", "v1_reference", "v1_error", "e_out", "duration", "energy_loss", "oracle_error"):
+        assert np.isnan(failed[name]), name
+
+
+def test_without_e_there_is_no_reference() -> None:
+    result = impact.sweep(
+        {
+            "models": ["hertz", "ismail-stronge-2008"],
+            "sweep": {"v1": [1.0, 2.0], "m1": 1.0, "m2": 1.0, "material": "a"},
+            "materials": {"a": {"E": 56e9, "nu": 0.3, "rho": 2712}},
+            "model": {"ismail-stronge-2008": {"gamma": 2.0}},
+        }
+    )
+    for name in ("v1_reference", "v2_error", "e_error"):
+        assert np.isnan(result[name]).all(), name
+    assert result["e_out"].values == pytest.approx(np.array([[1.0, 1.0], [0.5, 0.5]]), abs=1e-9)
+
+
+def test_balls_that_do_not_approach_keep_their_velocities() -> None:
+    result = impact.sweep({"models": "hertz", "sweep": {"e": 1.0, **TABLE1, "v1": [1.0, 2.0, 3.0], "v2": 2.0}})
+    one = result.isel(model=0)
+    assert one["status"].values.tolist() == [Status.NO_IMPACT, Status.NO_IMPACT, Status.OK]
+    assert one["v1_post"].values[:2].tolist() == [1.0, 2.0]
+    assert one["v2_post"].values[:2].tolist() == [2.0, 2.0]
+    for name in ("peak_indentation", "peak_force", "duration", "energy_loss", "v1_error"):
+        assert one[name].values[:2].tolist() == [0.0, 0.0], name
+    assert np.isnan(one["e_out"].values[:2]).all()
+
+
+def test_an_axis_of_exponents() -> None:
+    result = impact.sweep({"models": "hertz", "sweep": {"e": 1.0, **TABLE1, "n": [1.0, 1.5]}})
+    assert result["exponent"].dims == ("model", "n")
+    assert result["e_out"].values == pytest.approx(np.ones((1, 2)), abs=1e-9)
+
+
+@pytest.mark.parametrize("size", [1, 7, 1000])
+def test_the_block_size_changes_no_bit(wide: xr.Dataset, size: int) -> None:
+    plan = Plan(parse_config(WIDE))
+    assert assemble(plan, run(plan, size)).attrs["content_digest"] == wide.attrs["content_digest"]
+
+
+def test_the_order_of_blocks_changes_no_bit_and_a_missing_one_is_noticed(wide: xr.Dataset) -> None:
+    plan = Plan(parse_config(WIDE))
+    blocks = list(run(plan, 10))
+    assert assemble(plan, blocks[::-1]).attrs["content_digest"] == wide.attrs["content_digest"]
+    with pytest.raises(ValueError, match="blocks of"):
+        assemble(plan, blocks[1:])
+
+
+def test_chosen_variables_only() -> None:
+    config = {"models": "hertz", "sweep": {"e": 1.0, **TABLE1}, "output": {"variables": ["e_out", "status"]}}
+    assert list(impact.sweep(config).data_vars) == ["e_out", "status"]
+
+
+def test_attributes(figure6: xr.Dataset) -> None:
+    text = (Path(__file__).parent.parent / "configs" / "figure6.toml").read_text(encoding="utf-8")
+    assert figure6.attrs["config"] == text
+    assert figure6.attrs["config_set"] == "[]"
+    assert figure6.attrs["schema_version"] == 1
+    assert figure6.attrs["impact_version"] == impact.__version__
+    assert figure6.attrs["rtol"] == 1e-10
+    assert {"title", "fingerprint", "max_steps", "packages", "plugins", "content_digest"} <= figure6.attrs.keys()
+
+
+def test_the_fingerprint_is_over_what_takes_effect() -> None:
+    base = Plan(parse_config(WIDE)).fingerprint
+    assert Plan(parse_config("# a comment\n" + WIDE)).fingerprint == base
+    assert Plan(parse_config(WIDE, ["sweep.v2=-1.5"])).fingerprint != base
+    assert Plan(parse_config(WIDE, ["solver.rtol=1e-9"])).fingerprint != base
+
+
+def test_the_digest_sees_every_number_name_and_dimension(figure6: xr.Dataset) -> None:
+    base = content_digest(figure6)
+    assert base == figure6.attrs["content_digest"] == content_digest(figure6.copy(deep=True))
+    nudged = figure6.copy(deep=True)
+    nudged["v1_post"][0, 50] = np.nextafter(nudged["v1_post"][0, 50], 1)
+    assert content_digest(nudged) != base
+    assert content_digest(figure6.rename(v1_post="v1_pre")) != base
+    assert content_digest(figure6.rename(e="f")) != base
+    assert content_digest(figure6.drop_vars("steps")) != base
