@@ -89,8 +89,8 @@ LOGARITHM = Known(
 )
 PROBLEMS = (OSCILLATOR, TANH, LOGARITHM)
 
-# y'' = −k y − c y' + q y'², with a column for each: a lane can be made to end late (small k), to be lost (k <= 0), to
-# creep without an end (large c), to blow up (q = 1, at time 1) or to have a rate that is not a number
+# y'' = −k y − c y' + q y'², with a column for each: a lane can be made to end late (small k), to be lost (k <= 0),
+# to creep without an end (large c), to blow up (q = 1, at time 1) or to have a rate that is not a number
 SPRINGS = Problem(
     _rates(lambda a, b, k, c, q: -k * a - c * b + q * b * b, lambda a, b: a * b),
     **_until(0.0),
@@ -112,8 +112,10 @@ def impacts(n: float = 1.5, **changes: object) -> Lanes:
     for ball in "12":
         at.setdefault(f"R{ball}", sphere_radius(at[f"m{ball}"], density))
     exponent = np.full_like(at["e"], n)
-    hertz = hertz_stiffness(at["E1"], poisson, at["E2"], poisson, at["R1"], at["R2"])
-    at.setdefault("K", stiffness(exponent, hertz, effective_mass(at["m1"], at["m2"]), at["v1"] - at["v2"]))
+    # of two planes, or at a speed whose square overflows, there is no stiffness
+    with np.errstate(all="ignore"):
+        hertz = hertz_stiffness(at["E1"], poisson, at["E2"], poisson, at["R1"], at["R2"])
+        at.setdefault("K", stiffness(exponent, hertz, effective_mass(at["m1"], at["m2"]), at["v1"] - at["v2"]))
     own = {name: at.pop(name) for name in parameters}
     return Lanes(
         **at, n=exponent, nu1=poisson, nu2=poisson, yield_strength1=strength, yield_strength2=strength,

@@ -239,9 +239,9 @@ BAD = [
     ('"steel"', '"steel"\nmaterial2 = "steel"',
      ["x.toml:9: sweep.material2: given beside material, wants either material, or material1 and material2"]),
     ('["lankarani-nikravesh-1990"]\n[sweep]', '["hertz", "test-linear"]\n[sweep]\nK = 1',
-     ["x.toml:4: sweep.K: got a stiffness for n = 1.5, but test-linear has n = 1 of its own; " "wants no K, or models of one n"]),
+     ["x.toml:4: sweep.K: got a stiffness for n = 1.5, but test-linear has n = 1 of its own; " "wants that law's own K under [model.test-linear], or none"]),
     ('["lankarani-nikravesh-1990"]\n[sweep]', '["test-linear"]\n[sweep]\nK = 1\nn = [1, 2]',
-     ["x.toml:4: sweep.K: got a stiffness for an axis n, but test-linear has n = 1 of its own; " "wants no K, or models of one n"]),
+     ["x.toml:4: sweep.K: got a stiffness for an axis n, but test-linear has n = 1 of its own; " "wants that law's own K under [model.test-linear], or none"]),
     ('["lankarani-nikravesh-1990"]', '["test-plastic"]',
      ["x.toml:9: materials.steel.yield_strength: missing, wants a number above 0 Pa (asked for by test-plastic)"]),
     ('["lankarani-nikravesh-1990"]', '["test-driven"]',
@@ -362,7 +362,7 @@ def test_overrides_replace_what_was_there() -> None:
     )
     assert [(axis.name, axis.columns[axis.name]) for axis in config.axes] == [("e", (0, 0.5)), ("m2", (1, 2))]
     assert (config.title, config.scalars["v1"], config.scalars["m1"]) == ("Of a shell", 2.0, 1.0)
-    assert config.solver == Solver(1e-6, 100_000)
+    assert config.solver == Solver(1e-6, 10_000)
     assert read(GOOD, "sweep.e.linspace=[0,1,11]").axes[0].size == 11
     assert read(GOOD, "sweep.e.linspace=[0,1,11]", "sweep.e=0.1").scalars["e"] == 0.1
 
@@ -406,7 +406,7 @@ def test_every_option_of_the_starter_works() -> None:
         if line.split(" = ")[0] not in (*alone, "material2"):
             rest = rest.replace(f"# {line}\n", f"{line}\n", 1)
     config = read_config_text(rest)
-    assert config.solver == Solver(1e-10, 100_000)
+    assert config.solver == Solver(1e-10, 10_000)
     assert set(config.materials) == {"table1", "steel"}
     assert config.variables == ("v1_post", "v2_post", "e_out", "status")
     one_by_one = [line for line in shown if line.split(" = ")[0] in ("alpha", "m2", "K", "R2")]

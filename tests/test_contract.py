@@ -1,6 +1,7 @@
 """Every model of the catalogue keeps every clause of the contract, and the contract finds models that do not."""
 
 import functools
+import itertools
 
 import numpy as np
 import pytest
@@ -51,8 +52,10 @@ def wrong(force, **given) -> ForceModel:
     return ForceModel("wrong", "Wrong", 2026, equation="", reference="", force=force, **given)
 
 
-def random_noise(elastic):
-    return elastic * (1.0 + 1e-6 * np.random.default_rng().random(np.shape(elastic)))
+def ageing() -> ForceModel:
+    """The right law, stiffer by 1e-9 each time it is asked."""
+    asked = itertools.count()
+    return wrong(lambda elastic: elastic * (1.0 + 1e-9 * next(asked)))
 
 
 WRONG = {
@@ -95,9 +98,9 @@ WRONG = {
         hysteresis("wrong", title="", year=2026, equation="", reference="", chi=lambda e: np.divide(e, 1.0 - e)),
         "at e = 1 it is ordinary",
     ),
-    "a force with noise": (wrong(random_noise), "a tighter tolerance moves nothing"),
+    "a force that changes as it is asked": (ageing(), "a tighter tolerance moves nothing"),
     "a force that sees its neighbours": (
-        wrong(lambda elastic, x: elastic * (1.0 + 1e-12 * x.max())),
+        wrong(lambda elastic, x, v, e: elastic * (1.0 + (1.0 - e) * v + 1e-12 * x.max())),
         "a lane alone equals the lane in a crowd",
     ),
     "a coefficient that sees its neighbours": (

@@ -18,7 +18,7 @@ from .contact.status import Status
 from .data.history import history_dataset
 from .data.results import assemble
 from .data.store import load, save
-from .errors import ImpactError, UsageError, did_you_mean
+from .errors import ConfigError, ImpactError, UsageError, did_you_mean
 from .sweeps.config import Axis, Config, parse_config, read_config
 from .sweeps.plan import Block, Plan
 from .sweeps.run import run as run_blocks
@@ -153,15 +153,20 @@ def run(
     config = _config_of(source, overrides, plugins)
     zipped = {name for axis in config.axes if len(axis.columns) > 1 for name in axis.columns}
     known = [*(name for axis in config.axes for name in axis.columns), *config.scalars]
-    changes = list(overrides)
+    asked: dict[str, str] = {}
     for name, value in (at or {}).items():
         key, _, parameter = name.rpartition(".")
         if name not in known and name not in ("e", "alpha", "R1", "R2", "K"):
             raise UsageError(f'no input "{safe_text(name)}" here; {did_you_mean(name, known)}')
         if name not in zipped:
             path = f"model.{key}.{parameter}" if key else f"sweep.{name}"
-            changes.append(f"{path}={json.dumps(value) if isinstance(value, str) else repr(value)}")
-    config = _config_of(source, changes, plugins)
+            change = f"{path}={json.dumps(value) if isinstance(value, str) else repr(value)}"
+            asked[f"--set {change}:"] = f"--at {name}={value}:"
+    try:
+        config = _config_of(source, [*overrides, *(one[len("--set ") : -1] for one in asked)], plugins)
+    except ConfigError as error:
+        # named as it was asked for, not as the override that it became
+        raise ConfigError([_renamed(line, asked) for line in error.problems]) from None
     config, first = _at_one_point(config, {n: v for n, v in (at or {}).items() if n in zipped})
 
     plan = Plan(config, tuple(plugins))
@@ -206,6 +211,11 @@ def _config_of(
                 stored = json.loads(attributes["config_set"])
                 return parse_config(attributes["config"], [*stored, *overrides], plugins, name=str(path))
     return read_config(path, overrides, plugins)
+
+
+def _renamed(line: str, names: Mapping[str, str]) -> str:
+    """A line that begins with one of the names, beginning with what it stands for."""
+    return next((new + line[len(old) :] for old, new in names.items() if line.startswith(old)), line)
 
 
 def _at_one_point(config: Config, at: Mapping[str, float | str]) -> tuple[Config, tuple[str, ...]]:

@@ -115,7 +115,10 @@ def plot(
     output = output or result.with_suffix(".png")
     figures.save_figure(figures.draw_final_velocities(numbers), output)
     shown = ", ".join(f"{name} = {value}" for name, value in numbers.slice.items())
-    door.say(f"{safe_text(str(output))}: over {numbers.x}" + (f" at {safe_text(shown)}" if shown else ""))
+    left_out = f", without {numbers.x} = inf" if numbers.not_drawn else ""
+    door.say(
+        f"{safe_text(str(output))}: over {numbers.x}" + (f" at {safe_text(shown)}" if shown else "") + left_out
+    )
     if as_json:
         print(_dump(asdict(numbers)))
 

@@ -242,7 +242,7 @@ def print_run(impact: Impact) -> None:
         rows[name] = _quantity(value, unit.replace("^n", f"^{n}")) + note
     rows["status"] = f"{impact.status.name.lower()}: {impact.status.meaning}"
     for one in SCHEMA:
-        if one.dtype == "f8":
+        if one.dtype == "f8" and one.name != "damping_ratio":
             rows[one.name] = _quantity(impact.values[one.name], one.unit.replace("N m-n", f"N/m^{n}"))
     rows["chi = lambda v0/K"] = _quantity(impact.values["damping_ratio"], "1")
     rows["lambda"] = _quantity(impact.damping, f"N s/m^{impact.exponent + 1:g}")

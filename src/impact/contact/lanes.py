@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from .material import effective_mass, hertz_stiffness
+from .material import effective_mass
 from .model import QUANTITIES, ForceModel
 from .oracles import peak_indentation
 from .power import Array, power
@@ -104,6 +104,3 @@ def stiffness(n: Array, hertz: Array, m: Array, v0: Array) -> Array:
     """
     peak = peak_indentation(m, np.where(v0 > 0.0, v0, np.nan), hertz, 1.5)
     return np.where(n == 1.5, hertz, hertz * power(peak, 1.5) / np.power(peak, n))
-
-
-__all__ = ["Lanes", "hertz_stiffness", "stiffness"]

@@ -67,7 +67,7 @@ class ForceModel:
         `chi` is the dimensionless damping χ = λ v₀/K
     parameters : what the user gives in `[model.KEY]`
     oracle : exact delivered restitution, where a closed form exists
-    release : the contact ends at zero indentation ("gap") or at zero force ("force")
+    release : the contact ends at zero indentation ("gap"), or already at zero force ("force")
     smooth : p of the smooth coordinate δ = δᵣ + sᵖ: 2 for half-integer powers, 4 for quarters
     momentum : "log" where F = K δⁿ (1 + χ δ̇/v₀) exactly, which lets large χ be integrated without stiffness
     exponent : n, where the law fixes it; None takes the sweep's

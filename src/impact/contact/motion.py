@@ -85,8 +85,10 @@ def restitution(law: Law) -> Problem:
     rates = _rates(law, branch or law.model.force, branch and ("peak", "force_at_peak", "residual"))
 
     def force_event(y: Array, k: Array, columns: Columns) -> tuple[Array, Array]:
+        # without damping the force vanishes with the indentation, and only touches zero: s then tells the end
         ahead = rates(y + DIFFERENCE * k[:2], columns)
-        return k[4], (ahead[4] - k[4]) / DIFFERENCE
+        by_force = k[4] < y[0]
+        return np.where(by_force, k[4], y[0]), np.where(by_force, (ahead[4] - k[4]) / DIFFERENCE, k[0])
 
     def gap_event(y: Array, k: Array, columns: Columns) -> tuple[Array, Array]:
         return y[0], k[0]

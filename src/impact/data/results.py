@@ -16,7 +16,7 @@ from .. import __version__
 from ..contact.collide import Contact
 from ..contact.status import Status
 from ..sweeps.plan import Block, Plan
-from ..sweeps.rules import MATERIALS, SWEEP
+from ..sweeps.rules import MATERIALS, SWEEP, own_quantities
 
 SCHEMA_VERSION = 1
 
@@ -149,9 +149,9 @@ def _about(plan: Plan, name: str) -> dict[str, str]:
     """Units and meaning of a coordinate."""
     key, _, own = name.rpartition(".")
     for model in plan.models:
-        for parameter in model.parameters if model.key == key else ():
-            if parameter.name == own:
-                return {"units": parameter.unit, "long_name": parameter.meaning}
+        if model.key == key:
+            quantity = own_quantities(model)[own]
+            return {"units": quantity.unit, "long_name": quantity.meaning}
     if name in MATERIALS:
         return {"long_name": MATERIALS[name]}
     return {"units": SWEEP[name].unit, "long_name": SWEEP[name].meaning}

@@ -8,6 +8,8 @@ import os
 import stat
 from pathlib import Path
 
+import h5py
+import numpy as np
 import xarray as xr
 
 from ..errors import ResultError, StoreError, UsageError
@@ -117,12 +119,13 @@ def load(path: str | Path) -> xr.Dataset:
     try:
         if not path.is_file():
             raise ResultError(f"{shown}: {'is not a regular file' if path.exists() else 'does not exist'}")
-        with xr.open_dataset(path, engine="h5netcdf", decode_times=False, decode_timedelta=False) as opened:
-            schema = opened.attrs.get("schema_version")
-            if schema is None or "content_digest" not in opened.attrs:
+        with h5py.File(path, "r") as file:
+            if not {"schema_version", "content_digest"} <= file.attrs.keys():
                 raise ResultError(f"{shown}: is not a result of impact")
-            if schema != SCHEMA_VERSION:
-                raise ResultError(f"{shown}: has schema version {schema}, this program reads {SCHEMA_VERSION}")
+            schema = int(np.ravel(file.attrs["schema_version"])[0])
+        if schema != SCHEMA_VERSION:
+            raise ResultError(f"{shown}: has schema version {schema}, this program reads {SCHEMA_VERSION}")
+        with xr.open_dataset(path, engine="h5netcdf", decode_times=False, decode_timedelta=False) as opened:
             dataset = opened.load()
     except ResultError:
         raise

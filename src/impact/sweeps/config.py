@@ -40,7 +40,7 @@ from .keys import (
 )
 from .places import Places, key_lines
 from .problems import faults_of, lines_of
-from .rules import DEFAULTS, SWEEP, cross_faults, expand_models, of_parameter
+from .rules import DEFAULTS, SWEEP, cross_faults, expand_models, own_quantities
 from .source import apply_overrides, load, plain, read_text
 from .values import Fault
 
@@ -54,7 +54,7 @@ class Solver:
     """How exactly impacts are integrated: the relative tolerance, and the steps that one impact may take."""
 
     rtol: float = DEFAULT_RTOL
-    max_steps: int = 100_000
+    max_steps: int = 10_000
 
 
 @dataclass(frozen=True)
@@ -195,7 +195,7 @@ def _read(
     faults += cross_faults(data, models, context.n)
     swept = [name for name in sweep if name != "zip"]
     # what a model that is not chosen asks for was checked, and is not part of the grid
-    chosen = {f"{model.key}.{one.name}": of_parameter(one) for model in models for one in model.parameters}
+    chosen = {f"{model.key}.{name}": q for model in models for name, q in own_quantities(model).items()}
     names = [
         *swept,
         *(name for key in own for name in (f"{key}.{one}" for one in _dict(own[key])) if name in chosen),

@@ -9,7 +9,7 @@ from typing import Any
 
 from ..contact.model import ForceModel
 from .ranges import Entry, entry_schema, number_schema, read_entry, read_groups, read_names, read_texts
-from .rules import DEFAULTS, MATERIAL, MATERIALS, REQUIRED, SWEEP, expand_models, of_parameter
+from .rules import DEFAULTS, MATERIAL, MATERIALS, REQUIRED, SWEEP, expand_models, own_quantities
 from .values import Problem, Quantity, read_number, read_whole, refuse
 
 DEFAULT_TITLE = "Impact sweep"
@@ -107,9 +107,10 @@ def models_key(known: Mapping[str, ForceModel]) -> Key:
 
 def parameter_keys(model: ForceModel) -> dict[str, Key]:
     """The keys of [model.KEY]."""
+    defaults = {one.name: one.default for one in model.parameters}
     return {
-        one.name: entry_key(f"{model.key}.{one.name}", of_parameter(one), model.exponent, one.default)
-        for one in model.parameters
+        name: entry_key(f"{model.key}.{name}", quantity, model.exponent, defaults.get(name))
+        for name, quantity in own_quantities(model).items()
     }
 
 
@@ -138,7 +139,7 @@ def read_exponent(sweep: Mapping[str, object]) -> float | None:
 
 def key_tree(known: Mapping[str, ForceModel]) -> dict[str, Any]:
     """The keys of every table, nested, for the hint beside an unknown one; "*" is any name."""
-    parameters = {key: dict.fromkeys(one.name for one in model.parameters) for key, model in known.items()}
+    parameters = {key: dict.fromkeys(own_quantities(model)) for key, model in known.items()}
     tables = {
         "sweep": SWEEP_KEYS,
         "materials": {"*": MATERIAL_KEYS},

@@ -111,8 +111,9 @@ class Plan:
         )
         n = value("n") if model.exponent is None else np.full(stop - start, model.exponent)
         with np.errstate(all="ignore"):
-            if "K" in given:
-                K = value("K")
+            own_K = f"{model.key}.K"
+            if own_K in given or "K" in given:
+                K = value(own_K if own_K in given else "K")
             else:
                 K = stiffness(n, hertz_stiffness(E1, nu1, E2, nu2, R1, R2), effective_mass(m1, m2), v1 - v2)
             e = value("e") if "e" in given else 1.0 - value("alpha") * (v1 - v2)

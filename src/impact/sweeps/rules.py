@@ -45,9 +45,18 @@ WORDS = {
 }  # fmt: skip
 
 
+OWN_K = Quantity("N/m^n", "stiffness of this law, in place of the sweep's", least=0, above=True)
+
+
 def of_parameter(parameter: Parameter) -> Quantity:
     """What a model's parameter has to be."""
     return Quantity(parameter.unit, parameter.meaning, parameter.least, parameter.most)
+
+
+def own_quantities(model: ForceModel) -> dict[str, Quantity]:
+    """What [model.KEY] may hold: the parameters, and K of a law that has an exponent of its own."""
+    stiffness = {} if model.exponent is None else {"K": OWN_K}
+    return stiffness | {one.name: of_parameter(one) for one in model.parameters}
 
 
 def expand_models(asked: object, catalogue: Mapping[str, ForceModel]) -> tuple[list[ForceModel], list[Fault]]:
@@ -100,16 +109,20 @@ def cross_faults(data: Mapping[str, object], models: Sequence[ForceModel], n: fl
     given = data.get("sweep")
     if isinstance(given, dict):
         yield from _restitution(given, models)
-        yield from _stiffness(given, models, n)
+        yield from _stiffness(given, _table(data.get("model")), models, n)
         yield from _materials(given, models)
         yield from _yield_strengths(given, data.get("materials"), models)
-    own = data.get("model", {})
+    own = _table(data.get("model"))
     for model in models:
-        table = own.get(model.key, {}) if isinstance(own, dict) else {}
+        table = _table(own.get(model.key))
         for parameter in model.parameters:
-            if parameter.default is None and isinstance(table, dict) and parameter.name not in table:
+            if parameter.default is None and parameter.name not in table:
                 wants = of_parameter(parameter).wants
                 yield ("model", model.key, parameter.name), f"missing, wants {wants}: {parameter.meaning}"
+
+
+def _table(value: object) -> Mapping[str, object]:
+    return value if isinstance(value, dict) else {}
 
 
 def _asking(models: Sequence[ForceModel], *quantities: str) -> str:
@@ -127,17 +140,18 @@ def _restitution(given: Mapping[str, object], models: Sequence[ForceModel]) -> I
         yield ("sweep", "e"), f"missing, wants e or alpha (asked for by {asking}), or other models"
 
 
-def _stiffness(given: Mapping[str, object], models: Sequence[ForceModel], n: float | None) -> Iterable[Fault]:
+def _stiffness(
+    given: Mapping[str, object], own: Mapping[str, object], models: Sequence[ForceModel], n: float | None
+) -> Iterable[Fault]:
     if "K" not in given or (n is not None and math.isnan(n)):
         return
     for model in models:
-        own_K = any(parameter.name == "K" for parameter in model.parameters)
-        if model.exponent is not None and model.exponent != n and not own_K:
+        if model.exponent is not None and model.exponent != n and "K" not in _table(own.get(model.key)):
             sweep = "an axis n" if n is None else f"n = {n:g}"
             yield (
                 ("sweep", "K"),
                 f"got a stiffness for {sweep}, but {model.key} has n = {model.exponent:g} of its own; "
-                "wants no K, or models of one n",
+                f"wants that law's own K under [model.{model.key}], or none",
             )
 
 

@@ -57,6 +57,7 @@ class FinalVelocities:
     unit: str
     conditions: str
     slice: Mapping[str, float | str]
+    not_drawn: tuple[float, ...]
     curves: tuple[Curve, ...]
 
 
@@ -82,7 +83,10 @@ def final_velocities(
     if missing:
         raise UsageError(f"this result has no {', '.join(missing)}; sweep without [output] variables, or add them")
     line = take_slice(dataset, x, sel, models)
-    data = line.dataset
+    # a wall, or a plane, has no place on an axis
+    data = line.dataset.isel({line.dataset[line.x].dims[0]: np.isfinite(line.dataset[line.x].values)})
+    if not data[line.x].size:
+        raise UsageError(f"{safe_text(line.x)} has no finite value to draw over")
 
     def curve(label: str, model: str | None, ball: int, values: xr.DataArray) -> Curve:
         return Curve(label, model, ball, tuple(np.broadcast_to(values.values, data[line.x].shape).tolist()))
@@ -101,6 +105,7 @@ def final_velocities(
         unit="m/s",
         conditions=_conditions(data, line.x),
         slice=line.fixed,
+        not_drawn=tuple(v for v in line.dataset[line.x].values.tolist() if not np.isfinite(v)),
         curves=tuple(curves),
     )
 

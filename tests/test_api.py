@@ -1,0 +1,102 @@
+"""`__all__` is exactly what is public; a model of one's own is run, stored and told apart."""
+
+from __future__ import annotations
+
+import inspect
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import impact
+from impact import api
+
+SWEEP = {"e": [0.2, 0.8], "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6e9}
+
+
+def _mine(chi: object = lambda e: (1 - e * e) / e) -> impact.ForceModel:
+    return impact.hysteresis("mine-2026", title="Mine", year=2026, equation="", reference="", chi=chi)
+
+
+def test_all_is_exactly_what_is_public() -> None:
+    assert impact.__all__ == api.__all__
+    assert sorted(set(dir(impact)) - {"__version__"}) == sorted(impact.__all__)
+    for name in impact.__all__:
+        thing = getattr(impact, name)
+        assert inspect.getdoc(thing), name
+        if inspect.isfunction(thing):
+            hints = inspect.signature(thing)
+            assert hints.return_annotation is not inspect.Signature.empty, name
+            assert all(p.annotation is not p.empty for p in hints.parameters.values()), name
+    with pytest.raises(AttributeError, match="swep"):
+        _ = impact.swep  # type: ignore[attr-defined]
+
+
+def test_importing_loads_no_numpy() -> None:
+    code = "import sys, impact; sys.exit('numpy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_a_model_of_ones_own() -> None:
+    result = impact.sweep({"models": ["mine-2026", "exact-hysteresis"], "sweep": SWEEP}, plugins=[_mine()])
+    assert np.abs(result["oracle_error"]).max() < 1e-9
+    assert "mine-2026" in result.attrs["plugins"]
+    assert impact.run({"models": ["mine-2026"], "sweep": SWEEP}, plugins=[_mine()]).model.title == "Mine"
+    with pytest.raises(impact.ImpactError, match='got "mine-2026", wants a model'):
+        impact.sweep({"models": ["mine-2026"], "sweep": SWEEP})
+
+
+def test_a_changed_model_has_another_fingerprint() -> None:
+    def fingerprint(model: impact.ForceModel) -> str:
+        return impact.sweep({"models": [model.key], "sweep": SWEEP}, plugins=[model]).attrs["fingerprint"]
+
+    assert fingerprint(_mine()) == fingerprint(_mine())
+    assert fingerprint(_mine()) != fingerprint(_mine(chi=lambda e: (1 - e * e) / e / 2))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"force": lambda delta: delta}, 'its force asks for "delta"; known: E1'),
+        ({"force": lambda elastik: elastik}, 'its force asks for "elastik"; did you mean "elastic"?'),
+        ({"residual": lambda x: x}, 'its residual asks for "x"'),
+        ({"coefficients": {"a": lambda b: b, "b": lambda e: e}}, 'its coefficient a asks for "b"'),
+        ({"key": "Mine"}, 'model key "Mine": wants kebab-case'),
+        ({"momentum": "log"}, 'momentum "log" wants a coefficient chi'),
+    ],
+)
+def test_a_wrong_model_is_refused_when_it_is_made(change: dict[str, object], words: str) -> None:
+    fields = {
+        "key": "mine",
+        "title": "",
+        "year": 2026,
+        "equation": "",
+        "reference": "",
+        "force": lambda elastic: elastic,
+    }
+    with pytest.raises(impact.ImpactError) as caught:
+        impact.ForceModel(**(fields | change))  # type: ignore[arg-type]
+    assert words in str(caught.value)
+
+
+def test_two_models_of_one_key_are_refused() -> None:
+    twin = impact.hysteresis("hertz", title="", year=1, equation="", reference="", chi=lambda e: e)
+    with pytest.raises(impact.ImpactError, match="two models of this key"):
+        impact.models([twin])
+
+
+def test_a_stiffness_of_a_laws_own() -> None:
+    result = impact.sweep(
+        {
+            "models": ["hertz", "bilinear"],
+            "sweep": {**SWEEP, "e": 0.5},
+            "model": {"bilinear": {"K": [1e6, 4e6]}},
+        }
+    )
+    linear = result.sel(model="bilinear")
+    assert linear["stiffness"].values.tolist() == [1e6, 4e6]
+    # half the period of a linear oscillator on approach, half of that again, times e, on restitution
+    half = np.pi / 2 * np.sqrt(0.5 / linear["stiffness"].values)
+    np.testing.assert_allclose(linear["duration"].values, half * 1.5, rtol=1e-8)
+    assert result.sel(model="hertz")["stiffness"].values.tolist() == [6e9, 6e9]

@@ -1,0 +1,307 @@
+"""Each command does what its help says, from a process of its own: output, exit code, and nothing lost."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import xarray as xr
+
+import impact
+
+from .conftest import ROOT, WIDE, Run
+
+SMALL = """models = ["hertz", "gharib-hurmuzlu-2012"]
+[sweep]
+e = [0.0, 0.5, 1.0]
+v1 = 1.0
+m1 = 1.0
+m2 = [1.0, 2.0]
+K = 6e9
+"""
+
+
+@pytest.fixture
+def small(tmp_path: Path) -> Path:
+    path = tmp_path / "small.toml"
+    path.write_text(SMALL, encoding="utf-8")
+    return path
+
+
+def test_from_toml_to_picture(cli: Run, small: Path, tmp_path: Path) -> None:
+    swept = cli("sweep", small, cwd=tmp_path)
+    assert (swept.returncode, swept.stdout) == (0, "")
+    assert "results.h5: 12 points (10 ok, 2 limit)" in swept.stderr
+    assert impact.load(tmp_path / "results.h5").sizes == {"model": 2, "e": 3, "m2": 2}
+    drawn = cli("plot", "results.h5", "--sel", "m2=2", cwd=tmp_path)
+    assert (drawn.returncode, drawn.stdout) == (0, "")
+    assert drawn.stderr == "results.png: over e at m2 = 2.0\n"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["results.h5", "results.png", "small.toml"]
+
+
+def test_the_command_and_python_give_the_same(cli: Run, small: Path, tmp_path: Path) -> None:
+    cli("sweep", small, "-o", "out.h5", "--set", "sweep.m2=3.0", cwd=tmp_path)
+    ours = impact.load(tmp_path / "out.h5")
+    assert ours.attrs["config_set"] == '["sweep.m2=3.0"]'
+    xr.testing.assert_identical(ours, impact.sweep(small, overrides=["sweep.m2=3.0"]))
+
+
+def test_the_same_sweep_twice(cli: Run, small: Path, tmp_path: Path) -> None:
+    out = tmp_path / "results.h5"
+    cli("sweep", small, cwd=tmp_path)
+    before = (out.read_bytes(), out.stat().st_mtime_ns)
+    again = cli("sweep", small, cwd=tmp_path)
+    assert (again.returncode, again.stderr) == (0, "results.h5: already holds this sweep; nothing to do\n")
+    other = cli("sweep", small, "--set", "sweep.m2=3.0", cwd=tmp_path)
+    assert (other.returncode, other.stderr) == (
+        2, "results.h5: exists; give another name with -o, or --overwrite\n",
+    )  # fmt: skip
+    assert (out.read_bytes(), out.stat().st_mtime_ns) == before
+    assert cli("sweep", small, "--set", "sweep.m2=3.0", "--overwrite", cwd=tmp_path).returncode == 0
+    assert float(impact.load(out)["m2"]) == 3.0
+
+
+def test_a_bad_config_writes_nothing(cli: Run, small: Path, tmp_path: Path) -> None:
+    small.write_text(SMALL.replace("0.5", "1.5").replace("hertz", "herz"), encoding="utf-8")
+    refused = cli("sweep", "small.toml", cwd=tmp_path)
+    assert (refused.returncode, refused.stdout) == (2, "")
+    assert refused.stderr.splitlines() == [
+        'small.toml:1: models[0]: got "herz", wants a model; did you mean "hertz"?',
+        "small.toml:3: sweep.e[1]: got 1.5, wants a number from 0 to 1",
+    ]
+    assert [p.name for p in tmp_path.iterdir()] == ["small.toml"]
+
+
+@pytest.mark.parametrize("output", ["missing/out.h5", ".", "fifo", "link"])
+def test_an_impossible_output_is_refused_before_the_work(
+    cli: Run, small: Path, tmp_path: Path, output: str
+) -> None:
+    os.mkfifo(tmp_path / "fifo")
+    (tmp_path / "link").symlink_to(small)
+    refused = cli("sweep", small, "-o", output, "--overwrite", cwd=tmp_path)
+    assert refused.returncode == 2
+    assert len(refused.stderr.splitlines()) == 1
+    assert small.read_text(encoding="utf-8") == SMALL
+
+
+def test_failed_points_are_told_and_change_the_exit_code(cli: Run, small: Path, tmp_path: Path) -> None:
+    text = SMALL.replace("e = [0.0, 0.5, 1.0]", "alpha = [0.1, 2.0]")
+    small.write_text(text, encoding="utf-8")
+    failed = cli("sweep", small, "-o", "a.h5", "--json", cwd=tmp_path)
+    assert failed.returncode == 3
+    found = json.loads(failed.stdout)
+    assert found["status"] == {"ok": 6, "invalid_parameter": 2}
+    assert found["failed"] == 2
+    assert found["first_failed"][0] == {
+        "status": "invalid_parameter", "at": {"model": "gharib-hurmuzlu-2012", "alpha": 2.0, "m2": 1.0},
+    }  # fmt: skip
+    assert "failed: model=gharib-hurmuzlu-2012, alpha=2.0, m2=1.0: a value that arises here" in failed.stderr
+    allowed = cli("sweep", small, "-o", "b.h5", "--allow-failed", "--quiet", cwd=tmp_path)
+    assert (allowed.returncode, allowed.stderr) == (0, "")
+
+
+def test_plot_prints_the_plotted_numbers(cli: Run, stored: Path, tmp_path: Path) -> None:
+    drawn = cli("plot", stored, "-o", tmp_path / "a.svg", "--json", "--model", "gharib-hurmuzlu-2012")
+    numbers = json.loads(drawn.stdout)
+    assert numbers["x"] == "e"
+    assert [(c["model"], c["ball"]) for c in numbers["curves"]] == [
+        (None, 1), (None, 2), ("gharib-hurmuzlu-2012", 1), ("gharib-hurmuzlu-2012", 2),
+    ]  # fmt: skip
+    # e = 0.5: by hand from the delivered restitution of PHYSICS (28), 0.410720
+    assert numbers["curves"][2]["values"][50] == pytest.approx(0.5 - 0.41072 / 2, abs=1e-6)
+
+
+def test_run_one_impact(cli: Run, tmp_path: Path) -> None:
+    shot = cli("run", "--model", "gharib-hurmuzlu-2012", "--at", "e=0.05", "--at", "m2=inf",
+               "--history", "out.h5", "--json", cwd=tmp_path)  # fmt: skip
+    assert shot.returncode == 0, shot.stderr
+    found = json.loads(shot.stdout)
+    assert found["outputs"]["status"] == "ok"
+    assert found["outputs"]["damping_ratio"] == 20.0
+    assert found["damping"] == pytest.approx(20.0 * found["outputs"]["stiffness"])
+    three = [found[name] for name in ("e_kinematic", "e_kinetic", "e_energetic")]
+    assert max(three) - min(three) < 1e-9
+    history = impact.load(tmp_path / "out.h5")
+    assert list(history.data_vars) == ["delta", "v", "F", "x1", "x2", "v1", "v2"]
+    assert float(history["t"][-1]) == pytest.approx(found["outputs"]["duration"], rel=1e-12)
+    assert float(history["v1"][-1]) == pytest.approx(found["outputs"]["v1_post"], abs=1e-9)
+    again = cli("run", "--history", "out.h5", cwd=tmp_path)
+    assert (again.returncode, again.stderr) == (2, "out.h5: exists; give another name with -o, or --overwrite\n")
+
+
+def test_run_reads_a_result(cli: Run, tmp_path: Path) -> None:
+    (tmp_path / "wide.toml").write_text(WIDE, encoding="utf-8")
+    cli("sweep", "wide.toml", "--set", "sweep.v2=-2.0", cwd=tmp_path)
+    stored = impact.load(tmp_path / "results.h5")
+    words = ["run", "results.h5", "--model", "bilinear", "--at", "e=0.6", "--at", "m2=inf", "--json"]
+    found = json.loads(cli(*words, cwd=tmp_path).stdout)
+    cell = stored.sel(model="bilinear", e=0.6, m1=3.0).isel(
+        {"v1": 0, "material2": 0, "ismail-stronge-2008.gamma": 0}
+    )
+    assert found["outputs"]["v1_post"] == float(cell["v1_post"])
+    assert found["inputs"]["m1"] == 3.0
+    assert found["inputs"]["v2"] == -2.0
+    assert found["first_value_of"] == ["v1", "material2"]
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        (["run", "--at", "e=1.4"], "--at e=1.4: sweep.e: got 1.4, wants a number from 0 to 1"),
+        (["run", "--at", "speed=1"], 'no input "speed" here; known: e, m1, m2, material, n, v1, v2'),
+        (["run", "--at", "e"], "--at e: wants NAME=VALUE, such as --at m2=1.0"),
+        (["run", "--at", "e=1", "--at", "e=0"], "--at e: given twice"),
+        (["run", "absent.toml"], "absent.toml: cannot be read: No such file or directory"),
+        (["models", "herz"], 'no model "herz"; did you mean "hertz"?'),
+        (["info", "absent.h5"], "absent.h5: does not exist"),
+        (["info", "pyproject.toml"], "pyproject.toml: is not a readable result"),
+        (["plot", "absent.h5"], "absent.h5: does not exist"),
+        (["init", "README.md"], "README.md: exists; give another name with -o, or --overwrite"),
+    ],
+)
+def test_a_mistake_is_one_line(cli: Run, words: list[str], line: str) -> None:
+    refused = cli(*words)
+    assert refused.returncode == 2
+    assert refused.stdout == ""
+    assert refused.stderr.startswith(line)
+    assert len(refused.stderr.splitlines()) == 1
+
+
+def test_the_catalogue(cli: Run) -> None:
+    listed = cli("models").stdout
+    for key in impact.models():
+        assert key in listed
+    one = json.loads(cli("models", "lankarani-nikravesh-1990", "--json").stdout)[0]
+    assert one["domain"] == {"e": [0.9, 1.0]}
+    assert one["delivered_restitution"]["0.5"] == pytest.approx(0.725241, abs=1e-6)
+    told = cli("models", "ismail-stronge-2008").stdout
+    assert "plastic loss factor" in told
+    assert "10.1115/1.2965371" in told
+
+
+def test_info(cli: Run, stored: Path) -> None:
+    told = cli("info", stored).stdout
+    for words in ("model 3 × e 101", "oracle_error", "301 ok, 2 limit", "0 … 1, 101 values"):
+        assert words in told
+    found = json.loads(cli("info", stored, "--json").stdout)
+    assert found["dimensions"] == {"model": 3, "e": 101}
+    assert found["attributes"]["config"].startswith("#:schema")
+
+
+def test_init_and_schema(cli: Run, tmp_path: Path) -> None:
+    import jsonschema
+
+    assert cli("init", cwd=tmp_path).returncode == 0
+    assert cli("sweep", "config.toml", "--set", "sweep.e=0.5", cwd=tmp_path).returncode == 0
+    printed = json.loads(cli("schema").stdout)
+    assert cli("schema", "-o", "impact.schema.json", cwd=tmp_path).returncode == 0
+    assert json.loads((tmp_path / "impact.schema.json").read_text(encoding="utf-8")) == printed
+    import tomllib
+
+    jsonschema.validate(tomllib.loads((tmp_path / "config.toml").read_text(encoding="utf-8")), printed)
+
+
+@pytest.mark.parametrize("command", ["sweep", "plot", "run", "models", "info", "init", "schema"])
+def test_every_command_has_help_with_an_example(cli: Run, command: str) -> None:
+    told = cli(command, "--help")
+    assert told.returncode == 0
+    assert f"Example: impact {command}" in told.stdout
+
+
+@pytest.mark.parametrize("words", [["--help"], ["sweep", "--help"], ["--version"]])
+def test_help_loads_no_numpy(words: list[str]) -> None:
+    code = (
+        "import sys\nfrom impact.cli import main\nsys.argv = ['impact', *sys.argv[1:]]\n"
+        "try:\n    main.main()\nexcept SystemExit as leaving:\n    assert not leaving.code, leaving.code\n"
+        "heavy = {'numpy', 'scipy', 'xarray', 'matplotlib', 'h5py', 'tomllib'} & sys.modules.keys()\n"
+        "sys.exit(f'loaded {heavy}' if heavy else 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_plug_in_named_by_a_file_is_not_imported(cli: Run, small: Path, tmp_path: Path) -> None:
+    (tmp_path / "evil.py").write_text(f"open({str(tmp_path / 'marker')!r}, 'w').close()")
+    for line in ('plugin = "evil.py"\n', 'plugins = ["evil"]\n'):
+        small.write_text(line + SMALL, encoding="utf-8")
+        assert cli("sweep", small, cwd=tmp_path).returncode == 2
+    assert not (tmp_path / "marker").exists()
+
+
+def test_no_control_byte_reaches_the_terminal(cli: Run, tmp_path: Path) -> None:
+    name = "a\x1b[31m\u202e[red][x].toml"
+    title = r'"\u001b[31m \u202e [red] [/x] $\\frac{1$"'
+    (tmp_path / name).write_text(f"title = {title}\n" + SMALL, encoding="utf-8")
+    for words in (
+        ["sweep", name],
+        ["info", "results.h5"],
+        ["plot", "results.h5"],
+        ["sweep", name, "--set", "x=\x1b[2J"],
+    ):
+        done = cli(*words, cwd=tmp_path)
+        assert "Traceback" not in done.stderr
+        assert not re.search("[\x1b\u202e]", done.stdout + done.stderr), words
+    assert (tmp_path / "results.png").exists()
+
+
+def test_narrow_and_ascii_terminals(cli: Run, stored: Path) -> None:
+    for environment in ({"COLUMNS": "20"}, {"PYTHONIOENCODING": "ascii"}, {"NO_COLOR": "1", "LC_ALL": "C"}):
+        for words in (["models"], ["info", stored], ["run", "--at", "e=0.5"]):
+            done = cli(*words, **environment)
+            assert (done.returncode, done.stderr) == (0, ""), (words, environment)
+
+
+def test_a_reader_that_leaves_early_is_no_error(stored: Path) -> None:
+    line = f'"{sys.executable}" -m impact plot "{stored}" -o "{stored.parent}/x.svg" --json | head -c 10'
+    done = subprocess.run(
+        ["bash", "-o", "pipefail", "-c", line], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert "Traceback" not in done.stderr
+    assert "Broken" not in done.stderr
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_leaves_nothing_half_written(tmp_path: Path, number: signal.Signals, code: int) -> None:
+    (tmp_path / "long.toml").write_text(
+        'models = ["exact-hysteresis"]\n[sweep]\ne = { linspace = [0.01, 0.99, 3000000] }\n'
+        "v1 = 1\nm1 = 1\nm2 = 1\nK = 1e9\n",
+        encoding="utf-8",
+    )
+    child = subprocess.Popen(
+        [sys.executable, "-m", "impact", "sweep", "long.toml"], cwd=tmp_path, stderr=subprocess.PIPE, text=True
+    )
+    time.sleep(5.0)
+    assert child.poll() is None
+    child.send_signal(number)
+    _, told = child.communicate(timeout=30)
+    assert child.returncode == code
+    assert "nothing was written" in told
+    assert "Traceback" not in told
+    assert [p.name for p in tmp_path.iterdir()] == ["long.toml"]
+
+
+def test_an_internal_error_is_one_line_and_a_report(tmp_path: Path, stored: Path) -> None:
+    # numbers that the schema does not allow stand for a mistake of the program's own
+    code = (
+        "import sys, impact.api as api\n"
+        "def broken(*a, **k): raise ZeroDivisionError('of our own')\n"
+        "api.load = broken\nfrom impact.cli import main\n"
+        "sys.argv = ['impact', *sys.argv[1:]]\nmain.main()"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, "info", str(stored)], capture_output=True, text=True, check=False,
+        env={**os.environ, "TMPDIR": str(tmp_path)},
+    )  # fmt: skip
+    assert done.returncode == 70
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("internal error: ZeroDivisionError: of our own; report: ")
+    (report,) = tmp_path.iterdir()
+    assert "Traceback" in report.read_text(encoding="utf-8")

@@ -1,0 +1,67 @@
+"""What the documentation shows works as it stands, and what is generated is fresh."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from .conftest import ROOT, Run
+
+sys.path.insert(0, str(ROOT / "scripts"))
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", README, re.DOTALL)
+
+
+def test_the_readme_opens_with_the_picture_and_two_commands() -> None:
+    assert README.index("docs/figure6.png") < README.index("make figure")
+    assert blocks("sh")[0].split("\n")[:2] == ["make figure", "make test"]
+    for target in ("help", "figure", "test", "check"):
+        assert re.search(rf"^{target}:.*##", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
+
+
+def test_the_toml_and_the_commands_of_daily_use(cli: Run, tmp_path: Path) -> None:
+    (toml,) = blocks("toml")
+    (tmp_path / "config.toml").write_text(toml, encoding="utf-8")
+    commands = [line for line in blocks("sh")[1].splitlines() if line]
+    assert len(commands) == 3
+    for line in commands:
+        program, *words = shlex.split(line)
+        assert program == "impact"
+        done = cli(*words, cwd=tmp_path)
+        assert done.returncode == 0, (line, done.stderr)
+    assert {"results.h5", "results.png"} <= {p.name for p in tmp_path.iterdir()}
+
+
+@pytest.mark.parametrize("code", blocks("python"))
+def test_the_python(code: str, tmp_path: Path) -> None:
+    (tmp_path / "configs").symlink_to(ROOT / "configs")
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_generated_pages_are_fresh() -> None:
+    import make_docs
+
+    assert (ROOT / "docs" / "schema.md").read_text(encoding="utf-8") == make_docs.schema_page(), "run `make docs`"
+
+
+def test_links_lead_somewhere() -> None:
+    for page in [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").glob("*.md")]:
+        for target in re.findall(r"\]\((?!https?:)([^)#]+)", page.read_text(encoding="utf-8")):
+            assert (page.parent / target).exists(), f"{page.name}: {target}"
+
+
+def test_the_version_is_one() -> None:
+    import impact
+
+    assert f"version: {impact.__version__}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")

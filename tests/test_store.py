@@ -1,0 +1,141 @@
+"""A file that looks like a result is a whole result, and nothing that was there is lost."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import xarray as xr
+
+import impact
+from impact.data.store import write_whole
+from impact.errors import ResultError, StoreError, UsageError
+
+
+def test_what_was_saved_is_loaded(stored: Path, figure6: xr.Dataset) -> None:
+    loaded = impact.load(stored)
+    xr.testing.assert_identical(loaded, figure6)
+    assert [p.name for p in stored.parent.iterdir()] == [stored.name]
+
+
+def test_a_sweep_of_every_kind_of_axis_comes_back(wide: xr.Dataset, tmp_path: Path) -> None:
+    impact.save(wide, tmp_path / "wide.h5")
+    xr.testing.assert_identical(impact.load(tmp_path / "wide.h5"), wide)
+
+
+def test_xarray_and_h5py_read_it(stored: Path, figure6: xr.Dataset) -> None:
+    with xr.open_dataset(stored, engine="h5netcdf") as opened:
+        assert opened["e_out"].values.tobytes() == figure6["e_out"].values.tobytes()
+        assert opened["status"].attrs["flag_meanings"].startswith("ok no_impact limit")
+    with h5py.File(stored) as file:
+        assert file["e_out"].shape == (3, 101)
+        assert file["e_out"].attrs["units"] == "1"
+        assert [key.decode() for key in file["model"][:]] == figure6["model"].values.tolist()
+        assert file["status"].dtype == np.int8
+        assert file["e_out"].dims[1].keys() == ["e"]
+
+
+@pytest.mark.skipif(shutil.which("ncdump") is None, reason="ncdump (Debian: netcdf-bin) is not installed")
+def test_ncdump_reads_it(stored: Path) -> None:
+    header = subprocess.run(["ncdump", "-h", stored], capture_output=True, text=True, check=True).stdout
+    assert re.search(r"model = 3 ;\s+e = 101 ;", header) or re.search(r"e = 101 ;\s+model = 3 ;", header)
+    assert "double e_out(model, e) ;" in header
+    assert "byte status(model, e) ;" in header
+
+
+def test_equal_inputs_give_equal_bytes(figure6: xr.Dataset, stored: Path, tmp_path: Path) -> None:
+    impact.save(figure6, tmp_path / "again.h5")
+    assert (tmp_path / "again.h5").read_bytes() == stored.read_bytes()
+
+
+def test_an_output_that_exists_is_kept(figure6: xr.Dataset, tmp_path: Path) -> None:
+    path = tmp_path / "precious.h5"
+    path.write_text("precious")
+    with pytest.raises(UsageError, match="--overwrite"):
+        impact.save(figure6, path)
+    assert path.read_text() == "precious"
+    impact.save(figure6, path, overwrite=True)
+    assert impact.load(path).sizes["e"] == 101
+
+
+def test_what_is_no_regular_file_is_left_alone(figure6: xr.Dataset, tmp_path: Path) -> None:
+    target = tmp_path / "target"
+    target.write_text("target")
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "link").symlink_to(target)
+    os.mkfifo(tmp_path / "fifo")
+    for name in ("folder", "link", "fifo"):
+        with pytest.raises(UsageError, match="not a regular file"):
+            impact.save(figure6, tmp_path / name, overwrite=True)
+    with pytest.raises(UsageError, match="does not exist"):
+        impact.save(figure6, tmp_path / "missing" / "out.h5")
+    assert target.read_text() == "target"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["fifo", "folder", "link", "target"]
+
+
+def test_a_file_that_appears_meanwhile_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "out.h5"
+    fsync = os.fsync
+
+    def somebody_else_writes(number: int) -> None:
+        fsync(number)
+        path.write_text("somebody else's")
+
+    monkeypatch.setattr(os, "fsync", somebody_else_writes)
+    with pytest.raises(UsageError, match="appeared"):
+        write_whole(path, b"ours", overwrite=False)
+    assert path.read_text() == "somebody else's"
+    assert [p.name for p in tmp_path.iterdir()] == ["out.h5"]
+
+
+def test_a_disk_that_fails_leaves_nothing_behind(tmp_path: Path) -> None:
+    # a limit of the system on the size of files stands for the full disk
+    import resource
+    import signal
+
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, limits[1]))
+    try:
+        with pytest.raises(StoreError, match="not written"):
+            write_whole(tmp_path / "out.h5", b"x" * 100_000, overwrite=False)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        signal.signal(signal.SIGXFSZ, handler)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_is_no_result_is_refused(stored: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other.h5"
+    with h5py.File(other, "w") as file:
+        file["x"] = [1.0]
+    (tmp_path / "text.h5").write_text("text")
+    (tmp_path / "empty.h5").write_bytes(b"")
+    (tmp_path / "half.h5").write_bytes(stored.read_bytes()[:20_000])
+    newer = tmp_path / "newer.h5"
+    shutil.copy(stored, newer)
+    with h5py.File(newer, "r+") as file:
+        file.attrs["schema_version"] = 99
+    for name, words in {
+        "absent.h5": "does not exist", ".": "not a regular file", "other.h5": "not a result of impact",
+        "text.h5": "not a readable result", "empty.h5": "not a readable result",
+        "half.h5": "not a readable result",
+        "newer.h5": "schema version 99",
+    }.items():  # fmt: skip
+        with pytest.raises(ResultError, match=words):
+            impact.load(tmp_path / name)
+
+
+def test_a_changed_number_is_noticed(stored: Path, tmp_path: Path) -> None:
+    changed = tmp_path / "changed.h5"
+    shutil.copy(stored, changed)
+    with h5py.File(changed, "r+") as file:
+        file["e_out"][1, 50] += 1e-15
+    with pytest.raises(ResultError, match="damaged"):
+        impact.load(changed)
