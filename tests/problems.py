@@ -14,7 +14,7 @@ import numpy as np
 
 from impact.contact.lanes import Lanes, stiffness
 from impact.contact.material import effective_mass, hertz_stiffness, sphere_radius
-from impact.ode.rk45 import Problem
+from impact.ode.problem import Problem
 
 
 @dataclass(frozen=True)

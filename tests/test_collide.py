@@ -243,7 +243,7 @@ def kelvin_voigt(release: str) -> ForceModel:
     return law(force, "zeta", exponent=1.0, release=release)
 
 
-ZETA = np.array([0.0, 1e-3, 0.05, 0.2, 0.5, 0.8, 0.95])
+ZETA = np.array([0.0, 1e-18, 1e-16, 1e-12, 1e-8, 1e-3, 0.05, 0.2, 0.5, 0.8, 0.95])
 ROOT = np.sqrt(1.0 - ZETA * ZETA)
 
 

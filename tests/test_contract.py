@@ -53,9 +53,9 @@ def wrong(force, **given) -> ForceModel:
 
 
 def ageing() -> ForceModel:
-    """The right law, stiffer by 1e-9 each time it is asked."""
+    """Hertz's law with a damping that grows by 1e-9 each time it is asked."""
     asked = itertools.count()
-    return wrong(lambda elastic: elastic * (1.0 + 1e-9 * next(asked)))
+    return wrong(lambda elastic, v: elastic * (1.0 + 1e-9 * next(asked) * v))
 
 
 WRONG = {
@@ -98,7 +98,8 @@ WRONG = {
         hysteresis("wrong", title="", year=2026, equation="", reference="", chi=lambda e: np.divide(e, 1.0 - e)),
         "at e = 1 it is ordinary",
     ),
-    "a force that changes as it is asked": (ageing(), "a tighter tolerance moves nothing"),
+    "a force that ages": (ageing(), "a tighter tolerance moves nothing"),
+    "a force that ages, seen in other units": (ageing(), "a change of units changes nothing"),
     "a force that sees its neighbours": (
         wrong(lambda elastic, x, v, e: elastic * (1.0 + (1.0 - e) * v + 1e-12 * x.max())),
         "a lane alone equals the lane in a crowd",

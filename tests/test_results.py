@@ -143,9 +143,9 @@ def test_the_order_of_blocks_changes_no_bit_and_a_missing_one_is_noticed(wide: x
         assemble(plan, blocks[1:])
 
 
-def test_chosen_variables_only() -> None:
-    config = {"models": "hertz", "sweep": {"e": 1.0, **TABLE1}, "output": {"variables": ["e_out", "status"]}}
-    assert list(impact.sweep(config).data_vars) == ["e_out", "status"]
+def test_chosen_variables_and_always_the_status() -> None:
+    config = {"models": "hertz", "sweep": {"e": 1.0, **TABLE1}, "output": {"variables": ["duration", "e_out"]}}
+    assert list(impact.sweep(config).data_vars) == ["e_out", "duration", "status"]
 
 
 def test_attributes(figure6: xr.Dataset) -> None:

@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from impact.ode import tableau
-from impact.ode.rk45 import End, Outcome, Problem, _attempt, integrate
+from impact.ode.problem import End, Outcome, Problem
+from impact.ode.rk45 import _attempt, integrate
 
 from .problems import OSCILLATOR, PROBLEMS, SPRINGS, TANH, Known
 

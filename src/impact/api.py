@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,9 +18,10 @@ from .contact.status import Status
 from .data.history import history_dataset
 from .data.results import assemble
 from .data.store import load, save
-from .errors import ConfigError, ImpactError, UsageError, did_you_mean
-from .sweeps.config import Axis, Config, parse_config, read_config
+from .errors import ImpactError, UsageError
+from .sweeps.config import Config, parse_config, read_config
 from .sweeps.plan import Block, Plan
+from .sweeps.point import one_point
 from .sweeps.run import run as run_blocks
 from .text import safe_text
 
@@ -148,27 +149,7 @@ def run(
     >>> round(shot.values["e_out"], 6), round(shot.e_energetic, 6)
     (0.41072, 0.41072)
     """
-    if model is not None:
-        overrides = [*overrides, f"models={json.dumps([model])}"]
-    config = _config_of(source, overrides, plugins)
-    zipped = {name for axis in config.axes if len(axis.columns) > 1 for name in axis.columns}
-    known = [*(name for axis in config.axes for name in axis.columns), *config.scalars]
-    asked: dict[str, str] = {}
-    for name, value in (at or {}).items():
-        key, _, parameter = name.rpartition(".")
-        if name not in known and name not in ("e", "alpha", "R1", "R2", "K"):
-            raise UsageError(f'no input "{safe_text(name)}" here; {did_you_mean(name, known)}')
-        if name not in zipped:
-            path = f"model.{key}.{parameter}" if key else f"sweep.{name}"
-            change = f"{path}={json.dumps(value) if isinstance(value, str) else repr(value)}"
-            asked[f"--set {change}:"] = f"--at {name}={value}:"
-    try:
-        config = _config_of(source, [*overrides, *(one[len("--set ") : -1] for one in asked)], plugins)
-    except ConfigError as error:
-        # named as it was asked for, not as the override that it became
-        raise ConfigError([_renamed(line, asked) for line in error.problems]) from None
-    config, first = _at_one_point(config, {n: v for n, v in (at or {}).items() if n in zipped})
-
+    config, first = one_point(lambda more: _config_of(source, [*overrides, *more], plugins), model, at)
     plan = Plan(config, tuple(plugins))
     law = config.models[0]
     lanes = plan.lanes(law, 0, 1)
@@ -211,31 +192,6 @@ def _config_of(
                 stored = json.loads(attributes["config_set"])
                 return parse_config(attributes["config"], [*stored, *overrides], plugins, name=str(path))
     return read_config(path, overrides, plugins)
-
-
-def _renamed(line: str, names: Mapping[str, str]) -> str:
-    """A line that begins with one of the names, beginning with what it stands for."""
-    return next((new + line[len(old) :] for old, new in names.items() if line.startswith(old)), line)
-
-
-def _at_one_point(config: Config, at: Mapping[str, float | str]) -> tuple[Config, tuple[str, ...]]:
-    """The config with one value for every axis, and the names of those that took their first."""
-    scalars = dict(config.scalars)
-    first: list[str] = []
-    for axis in config.axes:
-        scalars |= {name: values[_place(axis, at)] for name, values in axis.columns.items()}
-        if axis.size > 1 and not any(name in at for name in axis.columns):
-            first += axis.columns
-    return replace(config, axes=(), scalars=scalars, models=config.models[:1]), tuple(first)
-
-
-def _place(axis: Axis, at: Mapping[str, float | str]) -> int:
-    """The place on a zipped axis where its columns have the values asked for."""
-    for place in range(axis.size):
-        if all(axis.columns[name][place] == value for name, value in at.items() if name in axis.columns):
-            return place
-    asked = ", ".join(f"{name} = {value}" for name, value in at.items() if name in axis.columns)
-    raise UsageError(f"{safe_text(asked)}: not on the zipped axis {axis.name}; these values vary together")
 
 
 def models(plugins: Sequence[ForceModel] = ()) -> Mapping[str, ForceModel]:

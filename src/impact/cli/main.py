@@ -64,23 +64,23 @@ def sweep(
     """Run every model over a sweep and store post-impact velocities and their errors."""
     from .. import api
     from ..data import store
-    from . import tables
+    from . import summary
 
     plan = api.prepare(config, sets or ())
-    if not overwrite and tables.same_result(output, plan.fingerprint):
+    if not overwrite and store.holds(output, plan.fingerprint):
         if not quiet:
             door.say(f"{safe_text(str(output))}: already holds this sweep; nothing to do")
         return
     store.check_output(output, overwrite=overwrite)
-    with tables.progress(plan.points, quiet=quiet) as tell:
+    with summary.progress(plan.points, quiet=quiet) as tell:
         dataset = api.execute(plan, tell)
     api.save(dataset, output, overwrite=overwrite)
-    summary = tables.summary(dataset, output)
+    found = summary.summary(dataset, output)
     if not quiet:
-        tables.print_summary(dataset, summary)
+        summary.print_summary(dataset, found)
     if as_json:
-        print(json.dumps(summary))
-    if summary["failed"] and not allow_failed:
+        print(json.dumps(found))
+    if found["failed"] and not allow_failed:
         raise typer.Exit(door.LANES_FAILED)
 
 

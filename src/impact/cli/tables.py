@@ -1,143 +1,28 @@
-"""What the commands print: tables on stdout, progress and summaries on stderr."""
+"""What the commands print on stdout: the catalogue, one impact, what is in a file."""
 
 from __future__ import annotations
 
 import json
 import sys
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
 
 from ..contact.model import ForceModel, wishes
-from ..contact.status import FIRST_FAILURE, Status
-from ..errors import ResultError
-from ..text import safe_text
+from .console import cell, console, table
+from .summary import summary, worst_errors
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from ..api import Impact
 
-# progress is shown when a sweep takes longer than this many seconds
-PATIENCE = 1.0
 # where a table of the catalogue shows the delivered restitution
 ASKED = (0.1, 0.3, 0.5, 0.7, 0.9)
-FAILED_SHOWN = 3
-# width of a table that no terminal limits
-WIDE = 160
-
-
-def _console(stream: Any) -> Console:
-    """A console that prints text as it is: no markup, no guessing, no wrapping at 80 in a pipe."""
-    width = None if stream.isatty() else WIDE
-    return Console(file=stream, markup=False, highlight=False, emoji=False, width=width)
-
-
-def _table(*headings: str, title: str | None = None) -> Table:
-    table = Table(title=title, title_justify="left", box=None, pad_edge=False, header_style="bold")
-    for place, heading in enumerate(headings):
-        table.add_column(heading, justify="left" if place == 0 else "right", overflow="fold")
-    return table
-
-
-def _cell(value: Any) -> Text:
-    """A value as plain text that no markup and no control character can touch."""
-    return Text(f"{value:.6g}" if isinstance(value, float) else safe_text(str(value)))
-
-
-@contextmanager
-def progress(points: int, *, quiet: bool) -> Iterator[Callable[[int], None]]:
-    """A function to tell the number of finished points; a bar appears on a terminal after a second."""
-    if quiet or not sys.stderr.isatty():
-        yield lambda done: None
-        return
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
-    bar = Progress(*columns, console=_console(sys.stderr), transient=True)
-    task = bar.add_task(f"{points:,} points", total=points)
-    begun = time.monotonic()
-
-    def tell(done: int) -> None:
-        if not bar.live.is_started and time.monotonic() - begun > PATIENCE:
-            bar.start()
-        bar.update(task, completed=done)
-
-    try:
-        yield tell
-    finally:
-        bar.stop()
-
-
-def same_result(path: Path, fingerprint: str) -> bool:
-    """Whether a file is a whole result with this fingerprint."""
-    from ..data.store import load
-
-    if not path.is_file() or path.is_symlink():
-        return False
-    try:
-        return bool(load(path).attrs.get("fingerprint") == fingerprint)
-    except ResultError:
-        return False
-
-
-def summary(dataset: xr.Dataset, output: Path) -> dict[str, Any]:
-    """Points, counts per status, and the first failed points with their coordinates."""
-    counts: dict[str, int] = {}
-    failures: list[dict[str, Any]] = []
-    failed = 0
-    if "status" in dataset:
-        status = dataset["status"]
-        numbers, times = np.unique(status.values, return_counts=True)
-        counts = {Status(int(n)).name.lower(): int(t) for n, t in zip(numbers, times, strict=True)}
-        places = np.flatnonzero(status.values.reshape(-1) >= FIRST_FAILURE)
-        failed = int(places.size)
-        for place in places[:FAILED_SHOWN]:
-            index = np.unravel_index(place, status.shape)
-            point = status.isel(dict(zip(status.dims, index, strict=True)))
-            where = {str(dim): point[dim].values.item() for dim in status.dims}
-            failures.append({"status": Status(int(point)).name.lower(), "at": where})
-    points = int(np.prod(list(dataset.sizes.values())))
-    return {
-        "output": str(output), "points": points, "models": dataset.sizes["model"], "status": counts,
-        "failed": failed, "first_failed": failures, "content_digest": dataset.attrs["content_digest"],
-    }  # fmt: skip
-
-
-def print_summary(dataset: xr.Dataset, found: Mapping[str, Any]) -> None:
-    """What came out of a sweep, on stderr."""
-    out = _console(sys.stderr)
-    out.print(_worst(dataset))
-    counts = ", ".join(f"{count} {name}" for name, count in found["status"].items())
-    out.print(_cell(f"{found['output']}: {found['points']} points ({counts})"))
-    for one in found["first_failed"]:
-        where = ", ".join(f"{name}={value}" for name, value in one["at"].items())
-        out.print(_cell(f"failed: {where}: {Status[one['status'].upper()].meaning}"))
-    more = found["failed"] - len(found["first_failed"])
-    if more > 0:
-        out.print(_cell(f"and {more} more"))
-
-
-def _worst(dataset: xr.Dataset) -> Table:
-    """The largest errors per model, as far as the result has them."""
-    columns = {
-        "e_error": "max |e_out − e|", "v1_error": "max |v1 error|", "v2_error": "max |v2 error|",
-        "oracle_error": "max |e_out − exact|", "residual": "max |residual|",
-    }  # fmt: skip
-    held = [name for name in columns if name in dataset]
-    table = _table("model", *(columns[name] for name in held))
-    for key in dataset["model"].values:
-        one = dataset.sel(model=key)
-        largest = (np.abs(one[name].values) for name in held)
-        cells = [f"{np.nanmax(v):.3g}" if np.isfinite(v).any() else "–" for v in largest]
-        table.add_row(_cell(key), *cells)
-    return table
 
 
 def model_json(model: ForceModel) -> dict[str, Any]:
@@ -177,15 +62,15 @@ def delivered(model: ForceModel) -> dict[str, float] | None:
 
 def print_models(models: Sequence[ForceModel]) -> None:
     """The catalogue, a line a model."""
-    table = _table("model", "equation", "claimed for", *(f"e={e:g}" for e in ASKED))
-    for column in table.columns[1:3]:
+    rows = table("model", "equation", "claimed for", *(f"e={e:g}" for e in ASKED))
+    for column in rows.columns[1:3]:
         column.justify = "left"
     for model in models:
         found = delivered(model) or {}
         cells = [f"{found[f'{e:g}']:.4f}" if found else "–" for e in ASKED]
-        table.add_row(model.key, Text(model.equation), Text(model.domain_text or "–"), *cells)
-    out = _console(sys.stdout)
-    out.print(table)
+        rows.add_row(model.key, Text(model.equation), Text(model.domain_text or "–"), *cells)
+    out = console(sys.stdout)
+    out.print(rows)
     out.print("\nThe columns e=... show the restitution that a model delivers when it is asked for e.")
 
 
@@ -214,8 +99,8 @@ def _print_rows(rows: Mapping[str, Any]) -> None:
     table.add_column(no_wrap=True)
     table.add_column(overflow="fold")
     for name, value in rows.items():
-        table.add_row(_cell(name), _cell(value))
-    _console(sys.stdout).print(table)
+        table.add_row(cell(name), cell(value))
+    console(sys.stdout).print(table)
 
 
 def run_json(impact: Impact) -> dict[str, Any]:
@@ -300,18 +185,18 @@ def print_info(dataset: xr.Dataset, path: Path) -> None:
         counts = summary(dataset, path)["status"]
         rows["status"] = ", ".join(f"{count} {name}" for name, count in counts.items())
     _print_rows(rows)
-    out = _console(sys.stdout)
+    out = console(sys.stdout)
     out.print()
-    table = _table("variable", "unit", "dimensions", "smallest", "largest", "missing")
+    listed = table("variable", "unit", "dimensions", "smallest", "largest", "missing")
     for name, variable in dataset.items():
         values = variable.values
         finite = values[np.isfinite(values)]
         ends = (f"{finite.min():.6g}", f"{finite.max():.6g}") if finite.size else ("–", "–")
-        table.add_row(
-            _cell(name), _cell(variable.attrs.get("units", "")), _cell(", ".join(map(str, variable.dims))), *ends,
+        listed.add_row(
+            cell(name), cell(variable.attrs.get("units", "")), cell(", ".join(map(str, variable.dims))), *ends,
             str(values.size - finite.size),
         )  # fmt: skip
-    out.print(table)
+    out.print(listed)
     if "model" in dataset.dims:
         out.print()
-        out.print(_worst(dataset))
+        out.print(worst_errors(dataset))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..ode.rk45 import Columns
+from ..ode.problem import Columns
 from . import motion
 from .impulse import velocities_after
 from .lanes import Lanes

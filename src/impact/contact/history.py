@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..ode.rk45 import Columns, Problem, Step
+from ..ode.problem import Columns, Problem, Step
 from . import motion
 from .collide import own_values, takes_log
 from .lanes import Lanes

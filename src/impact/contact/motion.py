@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import ModelError
-from ..ode.rk45 import Array, Columns, Mask, Problem
+from ..ode.problem import Array, Columns, Mask, Problem
 from .model import ForceModel, Formula, wishes
 from .power import integer_power, power
 

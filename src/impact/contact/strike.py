@@ -7,7 +7,8 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..ode.rk45 import Columns, End, Outcome, integrate
+from ..ode.problem import Columns, End, Outcome
+from ..ode.rk45 import integrate
 from . import motion
 from .power import Array
 from .status import Status

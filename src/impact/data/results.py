@@ -86,7 +86,8 @@ def assemble(plan: Plan, finished: Iterable[tuple[Block, Contact]]) -> xr.Datase
     ------
     ValueError : the blocks do not cover the plan
     """
-    chosen = plan.config.variables or tuple(variable.name for variable in SCHEMA)
+    # the status is always there: without it a NaN would have no reason
+    chosen = {"status", *(plan.config.variables or (variable.name for variable in SCHEMA))}
     schema = [variable for variable in SCHEMA if variable.name in chosen]
     rows = {"model": len(plan.models), "axes": 1}
     arrays = {one.name: np.zeros((rows[one.per], plan.grid), one.dtype) for one in schema}

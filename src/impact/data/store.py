@@ -135,3 +135,13 @@ def load(path: str | Path) -> xr.Dataset:
     if content_digest(dataset) != dataset.attrs["content_digest"]:
         raise ResultError(f"{shown}: is damaged: its content does not have the digest that it carries")
     return dataset
+
+
+def holds(path: Path, fingerprint: str) -> bool:
+    """Whether a file is a whole result with this fingerprint."""
+    if path.is_symlink() or not path.is_file():
+        return False
+    try:
+        return bool(load(path).attrs.get("fingerprint") == fingerprint)
+    except ResultError:
+        return False

@@ -8,22 +8,14 @@ same bits alone, in any crowd and in any order.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from enum import IntEnum
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .tableau import DENSE_WEIGHTS, ERROR_WEIGHTS, STAGE_WEIGHTS
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-Columns = tuple[Array, ...]
-
-# rows of a state: two components and two quadratures; rates have one row more, the watched quantity
-COMPONENTS, INTEGRATED, WATCHED = 2, 4, 4
+from .problem import COMPONENTS, INTEGRATED, WATCHED, Array, Columns, End, Mask, Outcome, Problem, Step
+from .tableau import ERROR_WEIGHTS, STAGE_WEIGHTS
 
 # the controller: a step is multiplied by SAFETY/error^(3/16), within bounds. 3/16 is nearly the 1/5 of the
 # theory and takes square roots only, whose bits are the same on every processor
@@ -40,68 +32,6 @@ LANDING, NEAR, SHORT = 1e-8, 1e-12, 1e-2
 COMPACT_ABOVE = 0.125
 # a maximum is flat, so that a crude location of it is enough
 MAXIMUM_ITERATIONS, DIFFERENCE = 3, 1e-6
-
-
-class End(IntEnum):
-    """How a lane ended."""
-
-    RUNNING = 0
-    LANDED = 1
-    LOST = 2
-    MAX_STEPS = 3
-    STEP_UNDERFLOW = 4
-    NOT_FINITE = 5
-
-
-@dataclass(frozen=True)
-class Problem:
-    """What is integrated.
-
-    Parameters
-    ----------
-    rates : (y, columns) -> rates of the two components and the two quadratures, and the watched quantity, of
-        shape (5, n), at components y of shape (2, n)
-    event : (y, k, columns) -> (g, dg): a function that is positive until the lane ends, and its rate along the
-        trajectory, at components y where the rates are k
-    lost : y -> mask of the lanes that can no longer reach the event
-    floor : the local error of each component is judged against rtol max(|y|, floor)
-    watch : locate the maximum of the watched quantity
-    """
-
-    rates: Callable[[Array, Columns], Array]
-    event: Callable[[Array, Array, Columns], tuple[Array, Array]]
-    lost: Callable[[Array], Mask]
-    floor: tuple[float, float]
-    watch: bool = False
-
-
-@dataclass(frozen=True)
-class Step:
-    """One accepted step, for the interpolant: start (4, n), length (n,), stages (7, 5, n), end as a fraction."""
-
-    start: Array
-    length: Array
-    stages: Array
-    end: Array
-
-    def at(self, theta: float | Array) -> Array:
-        """The integrated rows (4, n) at a fraction of the step, by the interpolant of order four."""
-        total = np.zeros_like(self.start)
-        for weights, stage in zip(DENSE_WEIGHTS, self.stages, strict=True):
-            factor = theta * (weights[0] + theta * (weights[1] + theta * (weights[2] + theta * weights[3])))
-            total += factor * stage[:INTEGRATED]
-        return np.asarray(self.start + self.length * total)
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """Where each lane ended: state (4, n), maximum of the watched quantity, accepted steps, how it ended (n,)."""
-
-    state: Array
-    maximum: Array
-    steps: NDArray[np.int32]
-    end: NDArray[np.int8]
-    recorded: tuple[Step, ...] = ()
 
 
 @dataclass

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any
 
+from ..contact.collide import Contact
 from ..contact.model import ForceModel
-from .ranges import Entry, entry_schema, number_schema, read_entry, read_groups, read_names, read_texts
+from .ranges import Entry, entry_schema, number_schema, read_entry, read_groups, read_names
 from .rules import DEFAULTS, MATERIAL, MATERIALS, REQUIRED, SWEEP, expand_models, own_quantities
 from .values import Problem, Quantity, read_number, read_whole, refuse
 
@@ -125,7 +126,14 @@ SOLVER_KEYS = {
     "rtol": number_key("rtol", RTOL),
     "max_steps": Key(lambda value, _: read_whole(value, 1, MOST_STEPS), STEPS, "steps that one impact may take"),
 }
-OUTPUT_KEYS = {"variables": Key(lambda value, _: read_texts(value), TEXTS, "variables of the result, else all")}
+VARIABLES = tuple(one.name for one in fields(Contact))
+OUTPUT_KEYS = {
+    "variables": Key(
+        lambda value, _: read_names(value, VARIABLES, "a variable of the result").given,
+        {"type": "array", "items": {"enum": list(VARIABLES)}, "minItems": 1},
+        "variables of the result, else all; the status is always among them",
+    )
+}
 
 
 def read_exponent(sweep: Mapping[str, object]) -> float | None:
