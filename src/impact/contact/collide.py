@@ -166,8 +166,9 @@ def _in_si(model: ForceModel, lanes: Lanes, rebound: Rebound, chi: Array, exact:
     failed = rebound.status >= FIRST_FAILURE
     missed = rebound.status == Status.NO_IMPACT
     e_out = np.where(failed | missed, np.nan, rebound.e_out)
+    asked = np.where((lanes.e >= 0.0) & (lanes.e <= 1.0), lanes.e, np.nan)
     v1_post, v2_post = velocities_after(lanes, e_out)
-    v1_reference, v2_reference = velocities_after(lanes, lanes.e)
+    v1_reference, v2_reference = velocities_after(lanes, asked)
     energy = 0.5 * lanes.m * lanes.v0 * lanes.v0
 
     def si(value: Array, unit: Array) -> Array:
@@ -185,7 +186,7 @@ def _in_si(model: ForceModel, lanes: Lanes, rebound: Rebound, chi: Array, exact:
         v1_error=v1_post - v1_reference,
         v2_error=v2_post - v2_reference,
         e_out=e_out,
-        e_error=e_out - lanes.e,
+        e_error=e_out - asked,
         peak_indentation=si(rebound.peak, lanes.length),
         permanent_indentation=si(rebound.permanent, lanes.length),
         peak_force=si(rebound.force, 2.0 * energy / lanes.length),

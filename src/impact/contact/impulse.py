@@ -12,8 +12,8 @@ def velocities_after(lanes: Lanes, e: Array) -> tuple[Array, Array]:
     """Velocities v1+, v2+ [m/s] after an impact of restitution e: equations (6) and (7), shape (n,).
 
     Written as v1+ = v1 - (1 + e)(m/m1) v0, v2+ = v2 + (1 + e)(m/m2) v0, which an infinite mass (a wall) does
-    not disturb. Balls that do not approach keep their velocities; e outside [0, 1] gives NaN.
+    not disturb. Balls that do not approach keep their velocities.
     """
-    impulse = (1.0 + np.where((e >= 0.0) & (e <= 1.0), e, np.nan)) * lanes.m * lanes.v0
+    impulse = (1.0 + e) * lanes.m * lanes.v0
     impulse = np.where(lanes.v0 > 0.0, impulse, 0.0)
     return lanes.v1 - impulse / lanes.m1, lanes.v2 + impulse / lanes.m2

@@ -29,7 +29,7 @@ FAR = 1e8
 # the velocity is judged against v0, the log coordinate against 1, and s against itself: near s = 0 the motion is
 # so smooth that its relative error stays small there
 FLOOR = (1e-200, 1.0)
-# step of the difference that gives the rate of the force at the release
+# step of the difference that gives the rate of the force at the release, relative to s, at which it may vanish
 DIFFERENCE = 1e-7
 
 
@@ -86,9 +86,10 @@ def restitution(law: Law) -> Problem:
 
     def force_event(y: Array, k: Array, columns: Columns) -> tuple[Array, Array]:
         # without damping the force vanishes with the indentation, and only touches zero: s then tells the end
-        ahead = rates(y + DIFFERENCE * k[:2], columns)
+        small = DIFFERENCE * np.minimum(np.abs(y[0]), 1.0)
+        slope = (rates(y + small * k[:2], columns)[4] - k[4]) / small
         by_force = k[4] < y[0]
-        return np.where(by_force, k[4], y[0]), np.where(by_force, (ahead[4] - k[4]) / DIFFERENCE, k[0])
+        return np.where(by_force, k[4], y[0]), np.where(by_force, slope, k[0])
 
     def gap_event(y: Array, k: Array, columns: Columns) -> tuple[Array, Array]:
         return y[0], k[0]
