@@ -10,7 +10,7 @@ import pytest
 
 from impact.contact.collide import Contact, collide
 from impact.contact.history import follow
-from impact.contact.impulse import velocities_after
+from impact.contact.impulse import velocities_after, velocities_at
 from impact.contact.lanes import Lanes
 from impact.contact.material import hertz_stiffness, sphere_radius
 from impact.contact.models import find
@@ -125,11 +125,18 @@ def test_impulse_and_momentum(m1, m2, e):
 def test_impulse_velocity_diagram(m1, m2):
     # (8), (9): the lines meet at tau_c = m v0 and end at tau_c (1 + e)
     e, lanes = 0.4, impacts(e=0.4, m1=m1, m2=m2, v2=-0.5)
-    tau = lanes.m[0] * lanes.v0[0]
-    assert lanes.v1[0] - tau / m1 == pytest.approx(lanes.v2[0] + tau / m2, rel=1e-12, abs=1e-12)
+    tau = lanes.m * lanes.v0
+    (stopped1,), (stopped2,) = velocities_at(lanes, tau)
+    common = (m1 * lanes.v1[0] + m2 * lanes.v2[0]) / (m1 + m2)
+    assert (stopped1, stopped2) == pytest.approx((common, common), rel=1e-12, abs=1e-12)
+    # straight lines: halfway along the impulse, halfway between the velocities
+    (half1,), (half2,) = velocities_at(lanes, 0.5 * tau)
+    assert half1 == pytest.approx(0.5 * (lanes.v1[0] + stopped1), rel=1e-12, abs=1e-12)
+    assert half2 == pytest.approx(0.5 * (lanes.v2[0] + stopped2), rel=1e-12, abs=1e-12)
+    (end1,), (end2,) = velocities_at(lanes, tau * (1 + e))
     (after1,), (after2,) = velocities_after(lanes, lanes.e)
-    ends = lanes.v1[0] - tau * (1 + e) / m1, lanes.v2[0] + tau * (1 + e) / m2
-    assert (after1, after2) == pytest.approx(ends, rel=1e-12, abs=1e-12)
+    assert (end1, end2) == pytest.approx((after1, after2), rel=1e-12, abs=1e-12)
+    assert end2 - end1 == pytest.approx(e * lanes.v0[0], rel=1e-12)
 
 
 @pytest.mark.parametrize("key", ["gharib-hurmuzlu-2012", "lankarani-nikravesh-1990", *PERMANENT])

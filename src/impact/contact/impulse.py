@@ -8,12 +8,18 @@ from .lanes import Lanes
 from .power import Array
 
 
+def velocities_at(lanes: Lanes, impulse: Array) -> tuple[Array, Array]:
+    """Velocities v1, v2 [m/s] once an impulse tau [N s] has passed: equations (8) and (9), shape (n,).
+
+    (9) as printed has a minus, an erratum. An infinite mass (a wall) keeps its velocity.
+    """
+    return lanes.v1 - impulse / lanes.m1, lanes.v2 + impulse / lanes.m2
+
+
 def velocities_after(lanes: Lanes, e: Array) -> tuple[Array, Array]:
     """Velocities v1+, v2+ [m/s] after an impact of restitution e: equations (6) and (7), shape (n,).
 
-    Written as v1+ = v1 - (1 + e)(m/m1) v0, v2+ = v2 + (1 + e)(m/m2) v0, which an infinite mass (a wall) does
-    not disturb. Balls that do not approach keep their velocities.
+    They are those at the impulse tau_c (1 + e), where tau_c = m v0 is that of the approach. Balls that do not
+    approach keep their velocities.
     """
-    impulse = (1.0 + e) * lanes.m * lanes.v0
-    impulse = np.where(lanes.v0 > 0.0, impulse, 0.0)
-    return lanes.v1 - impulse / lanes.m1, lanes.v2 + impulse / lanes.m2
+    return velocities_at(lanes, np.where(lanes.v0 > 0.0, (1.0 + e) * lanes.m * lanes.v0, 0.0))

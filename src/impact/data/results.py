@@ -138,8 +138,7 @@ def _coordinates(plan: Plan) -> dict[str, object]:
         for name, values in axis.columns.items():
             found[name] = (axis.name, list(values), _about(plan, name))
     for name, value in plan.config.scalars.items():
-        if name != "n":
-            found[name] = ((), value, _about(plan, name))
+        found[name] = ((), value, _about(plan, name))
     found["exponent"] = _exponent(plan)
     if "alpha" in plan.names():
         found["e"] = _restitution(plan)
