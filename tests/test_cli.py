@@ -258,8 +258,8 @@ def test_narrow_and_ascii_terminals(cli: Run, stored: Path) -> None:
             assert (done.returncode, done.stderr) == (0, ""), (words, environment)
 
 
-def test_a_reader_that_leaves_early_is_no_error(stored: Path) -> None:
-    line = f'"{sys.executable}" -m impact plot "{stored}" -o "{stored.parent}/x.svg" --json | head -c 10'
+def test_a_reader_that_leaves_early_is_no_error(stored: Path, tmp_path: Path) -> None:
+    line = f'"{sys.executable}" -m impact plot "{stored}" -o "{tmp_path}/x.svg" --json | head -c 10'
     done = subprocess.run(
         ["bash", "-o", "pipefail", "-c", line], cwd=ROOT, capture_output=True, text=True, check=False
     )

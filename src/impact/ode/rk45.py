@@ -19,7 +19,7 @@ from .tableau import ERROR_WEIGHTS, STAGE_WEIGHTS
 
 # the controller: a step is multiplied by SAFETY/error^(3/16), within bounds. 3/16 is nearly the 1/5 of the
 # theory and takes square roots only, whose bits are the same on every processor
-SAFETY, SMALLEST, LARGEST = 0.9, 0.2, 5.0
+SAFETY, SMALLEST, LARGEST = 0.9, 0.2, 3.0
 FIRST_STEP, LAST_STEP = 0.05, 1e-16
 # after so many halvings a rate is taken to be not finite for good; they are counted over the whole lane, since
 # towards a point beyond which there is no rate every halved step is accepted
