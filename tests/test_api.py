@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
 import subprocess
 import sys
@@ -11,6 +12,9 @@ import pytest
 
 import impact
 from impact import api
+from impact.contact.status import Status
+from impact.sweeps.config import read_config
+from impact.sweeps.plan import Plan
 
 SWEEP = {"e": [0.2, 0.8], "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6e9}
 
@@ -63,6 +67,13 @@ def test_a_changed_model_has_another_fingerprint() -> None:
         ({"residual": lambda x: x}, 'its residual asks for "x"'),
         ({"coefficients": {"a": lambda b: b, "b": lambda e: e}}, 'its coefficient a asks for "b"'),
         ({"key": "Mine"}, 'model key "Mine": wants kebab-case'),
+        ({"release": "tension"}, 'release: got \'tension\', wants "gap" or "force"'),
+        ({"smooth": 3}, "smooth: got 3, wants 2, 4, 6 or 8"),
+        ({"exponent": -1.0}, "exponent: got -1.0"),
+        ({"domain": {"foo": (0, 1)}}, 'domain of "foo"'),
+        ({"domain": {"e": (1, 0)}}, "domain of e: got (1, 0), wants (least, most)"),
+        ({"parameters": ("c",)}, "wants a tuple of Parameter"),
+        ({"coefficients": {"K": lambda e: e}}, '"K" is the name of a quantity'),
         ({"momentum": "log"}, 'momentum "log" wants a coefficient chi'),
     ],
 )
@@ -100,3 +111,31 @@ def test_a_stiffness_of_a_laws_own() -> None:
     half = np.pi / 2 * np.sqrt(0.5 / linear["stiffness"].values)
     np.testing.assert_allclose(linear["duration"].values, half * 1.5, rtol=1e-8)
     assert result.sel(model="hertz")["stiffness"].values.tolist() == [6e9, 6e9]
+
+
+def test_the_fingerprint_sees_what_a_formula_closes_over() -> None:
+    def scaled(factor: float) -> impact.ForceModel:
+        return _mine(chi=lambda e: factor * (1 - e))
+
+    def fingerprint(model: impact.ForceModel) -> str:
+        return Plan(read_config({"models": model.key, "sweep": SWEEP}, (), [model]), (model,)).fingerprint
+
+    assert fingerprint(scaled(1.0)) == fingerprint(scaled(1.0))
+    assert fingerprint(scaled(1.0)) != fingerprint(scaled(2.0))
+    assert fingerprint(_mine(chi=functools.partial(lambda e, c: c * (1 - e), c=1.0)))
+
+
+def test_a_force_of_the_wrong_shape_is_an_error_of_the_model() -> None:
+    texts = {"key": "short", "title": "", "year": 1, "equation": "", "reference": ""}
+    short = impact.ForceModel(**texts, force=lambda elastic, e: (elastic * e)[:1])  # type: ignore[arg-type]
+    status = impact.sweep({"models": "short", "sweep": SWEEP}, plugins=[short])["status"].values
+    assert status.tolist() == [[Status.MODEL_ERROR, Status.MODEL_ERROR]]
+
+
+def test_a_mistake_of_the_program_is_not_taken_for_one_of_the_model(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: object, **__: object) -> None:
+        raise KeyError("of our own")
+
+    monkeypatch.setattr("impact.contact.collide.strike", broken)
+    with pytest.raises(KeyError, match="of our own"):
+        impact.sweep({"models": "hertz", "sweep": SWEEP})

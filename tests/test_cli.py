@@ -11,6 +11,7 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 import xarray as xr
 
@@ -42,7 +43,7 @@ def test_from_toml_to_picture(cli: Run, small: Path, tmp_path: Path) -> None:
     assert impact.load(tmp_path / "results.h5").sizes == {"model": 2, "e": 3, "m2": 2}
     drawn = cli("plot", "results.h5", "--sel", "m2=2", cwd=tmp_path)
     assert (drawn.returncode, drawn.stdout) == (0, "")
-    assert drawn.stderr == "results.png: over e at m2 = 2.0\n"
+    assert drawn.stderr == "results.png: over e at m2 = 2\n"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["results.h5", "results.png", "small.toml"]
 
 
@@ -61,7 +62,7 @@ def test_the_same_sweep_twice(cli: Run, small: Path, tmp_path: Path) -> None:
     assert (again.returncode, again.stderr) == (0, "results.h5: already holds this sweep; nothing to do\n")
     other = cli("sweep", small, "--set", "sweep.m2=3.0", cwd=tmp_path)
     assert (other.returncode, other.stderr) == (
-        2, "results.h5: exists; give another name with -o, or --overwrite\n",
+        2, "results.h5: exists; give another name, or overwrite it (--overwrite)\n",
     )  # fmt: skip
     assert (out.read_bytes(), out.stat().st_mtime_ns) == before
     assert cli("sweep", small, "--set", "sweep.m2=3.0", "--overwrite", cwd=tmp_path).returncode == 0
@@ -91,6 +92,14 @@ def test_an_impossible_output_is_refused_before_the_work(
     assert small.read_text(encoding="utf-8") == SMALL
 
 
+def test_an_output_is_never_its_own_source(cli: Run, small: Path, tmp_path: Path) -> None:
+    for words in (["sweep", small, "-o", small], ["run", small, "--history", small]):
+        refused = cli(*words, "--overwrite", cwd=tmp_path)
+        assert (refused.returncode, len(refused.stderr.splitlines())) == (2, 1)
+        assert "is what is read from" in refused.stderr
+    assert small.read_text(encoding="utf-8") == SMALL
+
+
 def test_failed_points_are_told_and_change_the_exit_code(cli: Run, small: Path, tmp_path: Path) -> None:
     text = SMALL.replace("e = [0.0, 0.5, 1.0]", "alpha = [0.1, 2.0]")
     small.write_text(text, encoding="utf-8")
@@ -102,7 +111,13 @@ def test_failed_points_are_told_and_change_the_exit_code(cli: Run, small: Path, 
     assert found["first_failed"][0] == {
         "status": "invalid_parameter", "at": {"model": "gharib-hurmuzlu-2012", "alpha": 2.0, "m2": 1.0},
     }  # fmt: skip
-    assert "failed: model=gharib-hurmuzlu-2012, alpha=2.0, m2=1.0: a value that arises here" in failed.stderr
+    assert "failed: model=gharib-hurmuzlu-2012, alpha=2, m2=1: a value that arises here" in failed.stderr
+    # the same sweep again is not done again, but fails again, and tells the same
+    again = cli("sweep", small, "-o", "a.h5", "--json", cwd=tmp_path)
+    assert (again.returncode, again.stdout) == (3, failed.stdout)
+    assert "2 of 8 points failed (2 invalid_parameter)" in again.stderr
+    quiet = cli("sweep", small, "-o", "c.h5", "--quiet", cwd=tmp_path)
+    assert (quiet.returncode, quiet.stderr) == (3, "c.h5: 2 of 8 points failed (2 invalid_parameter)\n")
     allowed = cli("sweep", small, "-o", "b.h5", "--allow-failed", "--quiet", cwd=tmp_path)
     assert (allowed.returncode, allowed.stderr) == (0, "")
 
@@ -132,8 +147,13 @@ def test_run_one_impact(cli: Run, tmp_path: Path) -> None:
     assert list(history.data_vars) == ["delta", "v", "F", "x1", "x2", "v1", "v2"]
     assert float(history["t"][-1]) == pytest.approx(found["outputs"]["duration"], rel=1e-12)
     assert float(history["v1"][-1]) == pytest.approx(found["outputs"]["v1_post"], abs=1e-9)
+    assert np.all(np.diff(history["t"].values) > 0.0)
+    assert float(history["delta"].sel(t=1e-5, method="nearest")) > 0.0
     again = cli("run", "--history", "out.h5", cwd=tmp_path)
-    assert (again.returncode, again.stderr) == (2, "out.h5: exists; give another name with -o, or --overwrite\n")
+    assert (again.returncode, again.stderr) == (
+        2,
+        "out.h5: exists; give another name, or overwrite it (--overwrite)\n",
+    )
 
 
 def test_run_reads_a_result(cli: Run, tmp_path: Path) -> None:
@@ -163,7 +183,7 @@ def test_run_reads_a_result(cli: Run, tmp_path: Path) -> None:
         (["info", "absent.h5"], "absent.h5: does not exist"),
         (["info", "pyproject.toml"], "pyproject.toml: is not a readable result"),
         (["plot", "absent.h5"], "absent.h5: does not exist"),
-        (["init", "README.md"], "README.md: exists; give another name with -o, or --overwrite"),
+        (["init", "README.md"], "README.md: exists; give another name, or overwrite it (--overwrite)"),
     ],
 )
 def test_a_mistake_is_one_line(cli: Run, words: list[str], line: str) -> None:
@@ -172,6 +192,12 @@ def test_a_mistake_is_one_line(cli: Run, words: list[str], line: str) -> None:
     assert refused.stdout == ""
     assert refused.stderr.startswith(line)
     assert len(refused.stderr.splitlines()) == 1
+
+
+def test_a_full_standard_output_is_a_storage_error(cli: Run) -> None:
+    command = f"'{sys.executable}' -m impact models > /dev/full"
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (4, "cannot write: No space left on device\n")
 
 
 def test_the_catalogue(cli: Run) -> None:
@@ -251,11 +277,50 @@ def test_no_control_byte_reaches_the_terminal(cli: Run, tmp_path: Path) -> None:
     assert (tmp_path / "results.png").exists()
 
 
+def test_hostile_names_in_a_file_are_escaped(cli: Run, tmp_path: Path) -> None:
+    name = "\x1b[31mP\x07\u202e"
+    result = impact.sweep(
+        {"models": "hertz", "sweep": {"e": [0.5, 1.0], "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 1e9}}
+    )
+    impact.save(result.rename(e=name).assign_coords(model=[name]), tmp_path / "bad.h5")
+    commands = [["info"], ["plot"], ["plot", "--x", "z"], ["plot", "--sel", "z=1"], ["plot", "--model", "z"]]
+    for command, *words in commands:
+        done = cli(command, "bad.h5", *words, cwd=tmp_path)
+        assert "Traceback" not in done.stderr
+        assert not re.search("[\x1b\x07\u202e]", done.stdout + done.stderr), words
+    done = cli("models", name)
+    assert (done.returncode, "\x1b" in done.stderr) == (2, False)
+
+
+def test_run_of_a_failed_point(cli: Run, tmp_path: Path) -> None:
+    words = ["run", "--at", "m1=inf", "--at", "m2=inf", "--at", "K=1e9", "--at", "R1=1", "--at", "R2=1"]
+    for more in ([], ["--history", "h.h5"]):
+        done = cli(*words, *more, cwd=tmp_path)
+        assert done.returncode == 3
+        assert "out_of_range" in done.stdout
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_picture_never_replaces_its_result(cli: Run, stored: Path, tmp_path: Path) -> None:
+    result = tmp_path / "result.png"
+    result.write_bytes(stored.read_bytes())
+    refused = cli("plot", result)
+    assert (refused.returncode, "is what is read from" in refused.stderr) == (2, True)
+    assert result.read_bytes() == stored.read_bytes()
+
+
 def test_narrow_and_ascii_terminals(cli: Run, stored: Path) -> None:
     for environment in ({"COLUMNS": "20"}, {"PYTHONIOENCODING": "ascii"}, {"NO_COLOR": "1", "LC_ALL": "C"}):
         for words in (["models"], ["info", stored], ["run", "--at", "e=0.5"]):
             done = cli(*words, **environment)
             assert (done.returncode, done.stderr) == (0, ""), (words, environment)
+
+
+def test_closed_streams_are_no_error(stored: Path) -> None:
+    for line in ("models >&-", "models --json >&-", f"info '{stored}' 2>&-", "models | head -n 1"):
+        command = f"set -o pipefail; '{sys.executable}' -m impact {line}"
+        done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False)
+        assert (done.returncode, done.stderr) == (0, ""), line
 
 
 def test_a_reader_that_leaves_early_is_no_error(stored: Path, tmp_path: Path) -> None:
@@ -268,28 +333,62 @@ def test_a_reader_that_leaves_early_is_no_error(stored: Path, tmp_path: Path) ->
     assert "Broken" not in done.stderr
 
 
+LONG = """models = ["exact-hysteresis"]
+[sweep]
+e = { linspace = [0.01, 0.99, 3000000] }
+v1 = 1
+m1 = 1
+m2 = 1
+K = 1e9
+"""
+
+
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_leaves_nothing_half_written(tmp_path: Path, number: signal.Signals, code: int) -> None:
-    (tmp_path / "long.toml").write_text(
-        'models = ["exact-hysteresis"]\n[sweep]\ne = { linspace = [0.01, 0.99, 3000000] }\n'
-        "v1 = 1\nm1 = 1\nm2 = 1\nK = 1e9\n",
-        encoding="utf-8",
-    )
-    child = subprocess.Popen(
-        [sys.executable, "-m", "impact", "sweep", "long.toml"], cwd=tmp_path, stderr=subprocess.PIPE, text=True
-    )
-    time.sleep(5.0)
-    assert child.poll() is None
+    (tmp_path / "long.toml").write_text(LONG, encoding="utf-8")
+    words = [sys.executable, "-m", "impact", "sweep", "long.toml"]
+    child = subprocess.Popen(words, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
+    # three seconds of work: it has long begun, and has not ended
+    ticks = os.sysconf("SC_CLK_TCK")
+    while int(Path(f"/proc/{child.pid}/stat").read_text().rsplit(")", 1)[1].split()[11]) < 3 * ticks:
+        assert child.poll() is None
+        time.sleep(0.05)
     child.send_signal(number)
-    _, told = child.communicate(timeout=30)
+    _, told = child.communicate(timeout=60)
     assert child.returncode == code
-    assert "nothing was written" in told
+    assert told.endswith("; nothing was written\n")
     assert "Traceback" not in told
     assert [p.name for p in tmp_path.iterdir()] == ["long.toml"]
 
 
+SAVING = """
+import os, signal, sys
+from impact.data import store
+whole, number = store.write_whole, getattr(signal, sys.argv[1])
+
+def signalled(*words, **more):
+    os.kill(os.getpid(), number)
+    whole(*words, **more)
+
+store.write_whole = signalled
+sys.argv = ["impact", "sweep", "small.toml"]
+from impact.cli import main
+main.main()
+"""
+
+
+@pytest.mark.parametrize(("name", "code"), [("SIGINT", 130), ("SIGTERM", 143)])
+def test_a_signal_while_storing_is_not_lost(small: Path, tmp_path: Path, name: str, code: int) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", SAVING, name], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == code
+    assert done.stderr.endswith("; results.h5 was stored whole\n")
+    assert impact.load(tmp_path / "results.h5").sizes["e"] == 3
+
+
 def test_an_internal_error_is_one_line_and_a_report(tmp_path: Path, stored: Path) -> None:
-    # numbers that the schema does not allow stand for a mistake of the program's own
+    # a function of the program replaced by one that fails stands for a mistake of its own
     code = (
         "import sys, impact.api as api\n"
         "def broken(*a, **k): raise ZeroDivisionError('of our own')\n"

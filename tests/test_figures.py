@@ -11,7 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import impact
 from impact.errors import UsageError
-from impact.views.figures import draw_final_velocities, final_velocities, save_figure
+from impact.views.figures import FinalVelocities, draw_final_velocities, final_velocities, save_figure
 
 
 def test_figure_6_is_the_stored_numbers(figure6: xr.Dataset) -> None:
@@ -21,9 +21,9 @@ def test_figure_6_is_the_stored_numbers(figure6: xr.Dataset) -> None:
     labels = [curve.label for curve in numbers.curves if curve.ball == 1]
     assert labels == [
         "Impulse-momentum (6), (7)",
-        "Lankarani and Nikravesh, permanent indentation 1994 (29)-(32)",
-        "Lankarani and Nikravesh 1990 (22)",
-        "Gharib and Hurmuzlu 2012 (28)",
+        "Lankarani and Nikravesh, permanent indentation (1994), (29)-(32)",
+        "Lankarani and Nikravesh (1990), (22)",
+        "Gharib and Hurmuzlu (2012), (28)",
     ]
     for curve in numbers.curves:
         expected = (0.5 - figure6["e"] / 2) if curve.ball == 1 else (0.5 + figure6["e"] / 2)
@@ -78,10 +78,31 @@ def test_the_slice_is_chosen_and_named(wide: xr.Dataset) -> None:
     assert values == tuple(expected.isel({"ismail-stronge-2008.gamma": 0}).values)
 
 
+def test_values_that_vary_together_have_to_agree(wide: xr.Dataset) -> None:
+    both = final_velocities(wide, sel={"m1": 3.0, "m2": np.inf})
+    assert both.slice["m1"] == 3.0
+    with pytest.raises(UsageError, match=r"no m2 = 1\.0 in this result"):
+        final_velocities(wide, sel={"m1": 3.0, "m2": 1.0})
+
+
+def test_points_are_drawn_in_order_and_geometric_axes_in_logarithms() -> None:
+    def drawn(values: list[float]) -> FinalVelocities:
+        sweep = {"e": 0.5, "v1": values, "m1": 1.0, "m2": 1.0, "K": 1e9}
+        return final_velocities(impact.sweep({"models": "hertz", "sweep": sweep}))
+
+    unsorted = drawn([5.0, 2.0, 3.3])
+    assert unsorted.x_values == (2.0, 3.3, 5.0)
+    assert unsorted.curves[1].values == pytest.approx((1.5, 2.475, 3.75))
+    assert not unsorted.x_is_geometric
+    geometric = drawn([1000.0, 10.0, 0.1])
+    assert geometric.x_is_geometric
+    assert draw_final_velocities(geometric).axes[0].get_xscale() == "log"
+
+
 def test_over_another_axis(wide: xr.Dataset) -> None:
     numbers = final_velocities(wide, x="v1", sel={"e": 0.6})
     assert numbers.x_values == (1.0, 2.0)
-    assert numbers.x_label == "velocity of the first ball before the impact, v1 [m/s]"
+    assert numbers.x_label == "velocity of ball 1 before the impact, v1 [m/s]"
     walls = final_velocities(wide, x="m2")
     assert walls.x_values == (1.0,)
     assert walls.not_drawn == (np.inf,)
@@ -91,8 +112,8 @@ def test_over_another_axis(wide: xr.Dataset) -> None:
     ("choice", "words"),
     [
         ({"sel": {"m3": 1.0}}, 'no axis "m3" in this result; known: e, ismail'),
-        ({"sel": {"v1": 7.0}}, "no v1 = 7.0 in this result; it has 1, 2"),
-        ({"sel": {"material2": "wood"}}, "no material2 = wood in this result; it has soft, hard"),
+        ({"sel": {"v1": 7.0}}, "no v1 = 7.0 in this result; v1 is 1, 2"),
+        ({"sel": {"material2": "wood"}}, "no material2 = wood in this result; material2 is soft, hard"),
         ({"x": "material2"}, 'cannot draw over "material2"'),
         ({"models": ["herz"]}, 'no model "herz" in this result; did you mean "hertz"?'),
     ],

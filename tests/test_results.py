@@ -36,7 +36,7 @@ def test_variables_dimensions_and_units(wide: xr.Dataset) -> None:
         assert variable.dtype == np.dtype(one.dtype)
         assert variable.attrs["units"] == one.unit
         assert variable.attrs["long_name"]
-        assert "equation" in variable.attrs
+        assert variable.attrs["equation"]
 
 
 def test_coordinates(wide: xr.Dataset) -> None:
@@ -47,7 +47,7 @@ def test_coordinates(wide: xr.Dataset) -> None:
     assert wide["exponent"].values.tolist() == [1.5, 1.5, 1.0, 1.0]
     for name in ("title", "year", "equation", "reference", "doi"):
         assert wide[name].dims == ("model",)
-    assert wide["v1"].attrs["units"] == "m/s"
+    assert wide["v1"].attrs["units"] == "m s-1"
 
 
 def test_cells_are_the_impacts_of_their_coordinates(wide: xr.Dataset) -> None:
@@ -156,6 +156,14 @@ def test_attributes(figure6: xr.Dataset) -> None:
     assert figure6.attrs["impact_version"] == impact.__version__
     assert figure6.attrs["rtol"] == 1e-10
     assert {"title", "fingerprint", "max_steps", "packages", "plugins", "content_digest"} <= figure6.attrs.keys()
+
+
+def test_the_fingerprint_is_blind_to_order_and_to_what_is_not_used() -> None:
+    base = Plan(parse_config(WIDE)).fingerprint
+    reordered = WIDE.replace("v2 = -1.0\n", "").replace('material1 = "soft"', 'material1 = "soft"\nv2 = -1.0')
+    assert reordered != WIDE
+    assert Plan(parse_config(reordered)).fingerprint == base
+    assert Plan(parse_config(WIDE, ["materials.new={E=1e9, nu=0.3, rho=1}"])).fingerprint == base
 
 
 def test_the_fingerprint_is_over_what_takes_effect() -> None:

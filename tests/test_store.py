@@ -139,3 +139,39 @@ def test_a_changed_number_is_noticed(stored: Path, tmp_path: Path) -> None:
         file["e_out"][1, 50] += 1e-15
     with pytest.raises(ResultError, match="damaged"):
         impact.load(changed)
+
+
+def test_a_part_of_a_result_can_be_stored(figure6: xr.Dataset, tmp_path: Path) -> None:
+    part = figure6.sel(model=["gharib-hurmuzlu-2012"]).assign(twice=2 * figure6["e_out"])
+    impact.save(part, tmp_path / "part.h5")
+    assert impact.load(tmp_path / "part.h5")["twice"].dims == ("model", "e")
+    with pytest.raises(UsageError, match="not a result of impact"):
+        impact.save(figure6.drop_attrs(), tmp_path / "bare.h5")
+
+
+@pytest.mark.parametrize(("variable", "name", "value"), [
+    (None, "config", "models = []"), (None, "rtol", 1e-3), (None, "fingerprint", "0"),
+    ("v1_post", "units", "km s-1"), ("e", "long_name", "something else"),
+])  # fmt: skip
+def test_a_changed_attribute_is_noticed(
+    stored: Path, tmp_path: Path, variable: str | None, name: str, value: object
+) -> None:
+    changed = tmp_path / "changed.h5"
+    shutil.copy(stored, changed)
+    with h5py.File(changed, "r+") as file:
+        (file if variable is None else file[variable]).attrs[name] = value
+    with pytest.raises(ResultError, match="damaged"):
+        impact.load(changed)
+
+
+def test_without_hard_links(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # some file systems have none; the machine's own has
+    def no_links(*_: object) -> None:
+        raise PermissionError(1, "Operation not permitted")
+
+    monkeypatch.setattr(os, "link", no_links)
+    write_whole(tmp_path / "out.h5", b"ours", overwrite=False)
+    assert (tmp_path / "out.h5").read_bytes() == b"ours"
+    with pytest.raises(UsageError, match="exists"):
+        write_whole(tmp_path / "out.h5", b"other", overwrite=False)
+    assert [p.name for p in tmp_path.iterdir()] == ["out.h5"]

@@ -7,9 +7,20 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from .api import ForceModel, ImpactError, hysteresis, load, models, plot, run, save, sweep
+    from .api import ForceModel, ImpactError, Parameter, hysteresis, load, models, plot, run, save, sweep
 
-__all__ = ["ForceModel", "ImpactError", "hysteresis", "load", "models", "plot", "run", "save", "sweep"]
+__all__ = [
+    "ForceModel",
+    "ImpactError",
+    "Parameter",
+    "hysteresis",
+    "load",
+    "models",
+    "plot",
+    "run",
+    "save",
+    "sweep",
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from .contact.collide import Contact, collide
 from .contact.history import follow
-from .contact.model import ForceModel
+from .contact.model import ForceModel, Parameter
 from .contact.models import catalogue
 from .contact.models.hysteresis import hysteresis
 from .contact.status import Status
@@ -29,7 +29,18 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-__all__ = ["ForceModel", "ImpactError", "hysteresis", "load", "models", "plot", "run", "save", "sweep"]
+__all__ = [
+    "ForceModel",
+    "ImpactError",
+    "Parameter",
+    "hysteresis",
+    "load",
+    "models",
+    "plot",
+    "run",
+    "save",
+    "sweep",
+]
 
 STARTER = files(__package__) / "sweeps" / "starter.toml"
 HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
@@ -102,7 +113,8 @@ class Impact:
     point : the inputs by their config names; a name in `first` is an axis of the source at its first value
     values : the outputs under the names of the result file, in SI
     damping : damping factor lambda = chi K/v0 [N s/m^(n+1)], NaN where the law has none
-    e_kinetic, e_energetic : restitution from impulses and from works, equations (2) and (3); NaN without history
+    e_kinematic, e_kinetic, e_energetic : restitution from velocities, impulses and works, equations (1) to (3);
+        the last two are NaN without history
     history : the time history as a dataset over t, or None where there is no motion to follow
     """
 
@@ -113,6 +125,7 @@ class Impact:
     exponent: float
     closing_speed: float
     damping: float
+    e_kinematic: float
     e_kinetic: float
     e_energetic: float
     history: xr.Dataset | None
@@ -134,7 +147,7 @@ def run(
 
     Parameters
     ----------
-    source : a TOML file, a mapping, or a result; by default the two balls of Table 1 of the paper
+    source : a TOML file, a mapping, or a result; by default the two balls of Table 1 of the paper, at e = 0.5
     model : key of the model; by default the first of the source
     at : values by config name, such as `{"e": 0.05}`; an axis that is not named takes its first value
     overrides : changes to the config, such as `"sweep.m2=2"`
@@ -168,6 +181,7 @@ def run(
         exponent=lanes.n[0].item(),
         closing_speed=v0,
         damping=values["damping_ratio"] * values["stiffness"] / v0 if v0 else float("nan"),
+        e_kinematic=(values["v2_post"] - values["v1_post"]) / v0 if v0 > 0.0 else float("nan"),
         e_kinetic=history.e_kinetic if history else float("nan"),
         e_energetic=history.e_energetic if history else float("nan"),
         history=history_dataset(history, law.key, point) if history else None,
@@ -179,6 +193,7 @@ def _config_of(
 ) -> Config:
     """The config of a TOML file, a mapping, the starter, or of the sweep that a result came from."""
     if source is None:
+        overrides = ["sweep.e=0.5", *overrides]
         return parse_config(STARTER.read_text(encoding="utf-8"), overrides, plugins, name="starter")
     if isinstance(source, Mapping):
         return read_config(source, overrides, plugins)
@@ -189,6 +204,13 @@ def _config_of(
                 attributes = load(path).attrs
                 if "config" not in attributes:
                     raise UsageError(f"{safe_text(str(path))}: holds no config; it is a time history")
+                own = set(json.loads(attributes["plugins"])) - {model.key for model in plugins}
+                if own:
+                    names = safe_text(", ".join(sorted(own)))
+                    raise UsageError(
+                        f"{safe_text(str(path))}: made with a model of one's own: {names}; run it from "
+                        "Python, impact.run(..., plugins=[...])"
+                    )
                 stored = json.loads(attributes["config_set"])
                 return parse_config(attributes["config"], [*stored, *overrides], plugins, name=str(path))
     return read_config(path, overrides, plugins)

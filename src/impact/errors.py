@@ -8,13 +8,15 @@
     └── StoreError     the result could not be stored
 
 They say what is wrong, where, what was got and what is wanted. They become exit codes in one place,
-`impact.cli.main`.
+`impact.cli.door`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from difflib import get_close_matches
+
+from .text import safe_text
 
 
 class ImpactError(Exception):
@@ -54,4 +56,4 @@ def did_you_mean(word: str, known: Sequence[str]) -> str:
     'known: bilinear, hertz'
     """
     near = get_close_matches(word, known, n=1, cutoff=0.6)
-    return f'did you mean "{near[0]}"?' if near else f"known: {', '.join(sorted(known))}"
+    return safe_text(f'did you mean "{near[0]}"?' if near else f"known: {', '.join(sorted(known))}", 800)

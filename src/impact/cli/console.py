@@ -24,10 +24,15 @@ def table(*headings: str) -> Table:
     """A table without lines; its first column is text, the others are numbers."""
     made = Table(box=None, pad_edge=False, header_style="bold")
     for place, heading in enumerate(headings):
-        made.add_column(heading, justify="left" if place == 0 else "right", overflow="fold")
+        made.add_column(heading, justify="left" if place == 0 else "right", overflow="fold", no_wrap=place == 0)
     return made
 
 
 def cell(value: Any) -> Text:
     """A value as plain text that no markup and no control character can touch."""
     return Text(f"{value:.6g}" if isinstance(value, float) else safe_text(str(value)))
+
+
+def shown(value: Any) -> str:
+    """A coordinate without the digits that rounding left."""
+    return f"{value:.12g}" if isinstance(value, float) else str(value)

@@ -1,20 +1,57 @@
-"""The door: what a command's errors become, as a line on stderr and an exit code."""
+"""The door: what a command's errors and signals become, as a line on stderr and an exit code."""
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import signal
 import sys
 import tempfile
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from types import FrameType
 
 from ..errors import ImpactError, StoreError
+from ..text import safe_text
 
 # the exit codes; a shell sees 130 and 143 for the signals of the same meaning
 OK, USAGE, LANES_FAILED, STORAGE, INTERNAL, INTERRUPTED, TERMINATED = 0, 2, 3, 4, 70, 130, 143
+
+
+class Interrupted(BaseException):
+    """A signal came; the message says what it found done."""
+
+    def __init__(self, number: int, done: str) -> None:
+        by_user = number == signal.SIGINT
+        self.code = INTERRUPTED if by_user else TERMINATED
+        super().__init__(f"{'interrupted' if by_user else 'terminated'}; {done}")
+
+
+@contextlib.contextmanager
+def signals() -> Iterator[Callable[[str], None]]:
+    """Take SIGINT and SIGTERM as flags, and give a function that raises `Interrupted` if one has come.
+
+    An exception raised by a handler can land in a callback of HDF5, where it is lost; a flag cannot. The third
+    signal raises all the same, for a force that never returns.
+    """
+    came: list[int] = []
+
+    def take(number: int, frame: FrameType | None) -> None:
+        came.append(number)
+        if len(came) > 2:
+            raise Interrupted(number, "given up at once")
+
+    def check(done: str) -> None:
+        if came:
+            raise Interrupted(came[0], done)
+
+    before = {number: signal.signal(number, take) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield check
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def say(line: str, *, error: bool = False) -> None:
@@ -25,18 +62,20 @@ def say(line: str, *, error: bool = False) -> None:
 
 def enter(command: Callable[[], object], *, debug: bool) -> int:
     """Run the command line and return its exit code; an error that was expected is told without a traceback."""
+    # a stream that was closed before we began takes what is written, and forgets it
+    sys.stdout = sys.stdout or open(os.devnull, "w")  # noqa: SIM115
+    sys.stderr = sys.stderr or open(os.devnull, "w")  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(AttributeError):
             # a locale that cannot show a formula shows its escapes, not a traceback
             stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
-    signal.signal(signal.SIGTERM, _terminated)
     try:
-        command()
-        return OK
-    except SystemExit as leaving:
-        if leaving.code == INTERRUPTED:
-            say("interrupted; nothing was written", error=True)
-        return _flushed(leaving.code if isinstance(leaving.code, int) else OK)
+        code = _run(command)
+        sys.stdout.flush()
+        return code
+    except Interrupted as signalled:
+        say(str(signalled), error=True)
+        return signalled.code
     except ImpactError as error:
         for line in str(error).splitlines():
             say(line, error=True)
@@ -44,34 +83,35 @@ def enter(command: Callable[[], object], *, debug: bool) -> int:
     except BrokenPipeError:
         return _let_go(OK)
     except Exception as error:
+        if isinstance(error, OSError) and error.errno == errno.ENOSPC:
+            say(f"cannot write: {error.strerror}", error=True)
+            return _let_go(STORAGE)
         if debug:
             traceback.print_exc()
         else:
-            say(
-                f"internal error: {type(error).__name__}: {error}; report: {_report()}; --debug shows it",
-                error=True,
-            )
+            what = safe_text(f"{type(error).__name__}: {error}")
+            say(f"internal error: {what}; report: {_report()}; --debug shows it", error=True)
         return INTERNAL
 
 
-def _flushed(code: int) -> int:
-    """The exit code, with all output written."""
+def _run(command: Callable[[], object]) -> int:
+    """The exit code of a command, which leaves by SystemExit if it has one."""
     try:
-        sys.stdout.flush()
-    except BrokenPipeError:
-        return _let_go(code)
-    return code
+        command()
+    except SystemExit as leaving:
+        if isinstance(leaving.__context__, OSError):
+            # typer leaves by this when the reader of our output has gone
+            raise leaving.__context__ from None
+        if leaving.code == INTERRUPTED:
+            say("interrupted", error=True)
+        return leaving.code if isinstance(leaving.code, int) else OK
+    return OK
 
 
 def _let_go(code: int) -> int:
-    """The exit code where the reader of our output has seen enough: nothing may be written at exit either."""
+    """The exit code where nothing more can be written: not at exit either."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return code
-
-
-def _terminated(number: int, frame: FrameType | None) -> None:
-    say("terminated; nothing was written", error=True)
-    raise SystemExit(TERMINATED)
 
 
 def _report() -> str:

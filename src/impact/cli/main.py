@@ -62,25 +62,37 @@ def sweep(
     as_json: Json = False,
 ) -> None:
     """Run every model over a sweep and store post-impact velocities and their errors."""
-    from .. import api
-    from ..data import store
-    from . import summary
+    with door.signals() as check:
+        from .. import api
+        from ..data import store
+        from . import summary
 
-    plan = api.prepare(config, sets or ())
-    if not overwrite and store.holds(output, plan.fingerprint):
-        if not quiet:
-            door.say(f"{safe_text(str(output))}: already holds this sweep; nothing to do")
-        return
-    store.check_output(output, overwrite=overwrite)
-    with summary.progress(plan.points, quiet=quiet) as tell:
-        dataset = api.execute(plan, tell)
-    api.save(dataset, output, overwrite=overwrite)
+        plan = api.prepare(config, sets or ())
+        dataset = None if overwrite else store.held(output, plan.fingerprint)
+        fresh = dataset is None
+        if dataset is None:
+            store.check_output(output, overwrite=overwrite, source=config)
+            with summary.progress(plan.points, quiet=quiet) as tell:
+
+                def step(done: int) -> None:
+                    check("nothing was written")
+                    tell(done)
+
+                dataset = api.execute(plan, step)
+            check("nothing was written")
+            api.save(dataset, output, overwrite=overwrite)
+            check(f"{safe_text(str(output))} was stored whole")
     found = summary.summary(dataset, output)
     if not quiet:
-        summary.print_summary(dataset, found)
+        if fresh:
+            summary.print_summary(dataset, found)
+        else:
+            door.say(f"{safe_text(str(output))}: already holds this sweep; nothing to do")
     if as_json:
-        print(json.dumps(found))
+        print(_dump(found))
     if found["failed"] and not allow_failed:
+        if quiet or not fresh:
+            door.say(summary.failed_line(found), error=True)
         raise typer.Exit(door.LANES_FAILED)
 
 
@@ -109,16 +121,23 @@ def plot(
     from dataclasses import asdict
 
     from .. import api
+    from ..data import store
     from ..views import figures
+    from . import console
 
     numbers = figures.final_velocities(api.load(result), x, _pairs("--sel", sel), model)
     output = output or result.with_suffix(".png")
+    store.check_output(output, overwrite=True, source=result)
     figures.save_figure(figures.draw_final_velocities(numbers), output)
-    shown = ", ".join(f"{name} = {value}" for name, value in numbers.slice.items())
-    left_out = f", without {numbers.x} = inf" if numbers.not_drawn else ""
-    door.say(
-        f"{safe_text(str(output))}: over {numbers.x}" + (f" at {safe_text(shown)}" if shown else "") + left_out
-    )
+    told = f"{output}: over {numbers.x}"
+    if numbers.slice:
+        told += " at " + ", ".join(f"{name} = {console.shown(value)}" for name, value in numbers.slice.items())
+    if numbers.not_drawn:
+        told += f", without {numbers.x} = inf"
+    empty = {one.model: None for one in numbers.curves if one.model and not any(v == v for v in one.values)}
+    if empty:
+        told += f"; no point to draw of {', '.join(empty)}"
+    door.say(safe_text(told, 1000))
     if as_json:
         print(_dump(asdict(numbers)))
 
@@ -150,19 +169,19 @@ def run(
     from . import tables
 
     if history is not None:
-        store.check_output(history, overwrite=overwrite)
+        store.check_output(history, overwrite=overwrite, source=source)
     impact = api.run(source, model=model, at=_pairs("--at", at), overrides=sets or ())
     if as_json:
         print(_dump(tables.run_json(impact)))
     else:
         tables.print_run(impact)
+    if impact.status >= FIRST_FAILURE:
+        raise typer.Exit(door.LANES_FAILED)
     if history is not None:
         if impact.history is None:
             raise UsageError(f"no history to keep: {impact.status.meaning}")
         api.save(impact.history, history, overwrite=overwrite)
         door.say(f"{safe_text(str(history))}: {impact.history.sizes['t']} points in time")
-    if impact.status >= FIRST_FAILURE:
-        raise typer.Exit(door.LANES_FAILED)
 
 
 @app.command(epilog="Example: impact models gharib-hurmuzlu-2012")

@@ -14,7 +14,8 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from rich.table import Table
 
 from ..contact.status import FIRST_FAILURE, Status
-from .console import cell, console, table
+from ..text import safe_text
+from .console import cell, console, shown, table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -69,6 +70,13 @@ def summary(dataset: xr.Dataset, output: Path) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def failed_line(found: Mapping[str, Any]) -> str:
+    """How many points failed, and why."""
+    reasons = (f"{n} {name}" for name, n in found["status"].items() if Status[name.upper()] >= FIRST_FAILURE)
+    counts = f"{found['failed']} of {found['points']} points failed ({', '.join(reasons)})"
+    return f"{safe_text(found['output'])}: {counts}"
+
+
 def print_summary(dataset: xr.Dataset, found: Mapping[str, Any]) -> None:
     """What came out of a sweep, on stderr."""
     out = console(sys.stderr)
@@ -76,7 +84,7 @@ def print_summary(dataset: xr.Dataset, found: Mapping[str, Any]) -> None:
     counts = ", ".join(f"{count} {name}" for name, count in found["status"].items())
     out.print(cell(f"{found['output']}: {found['points']} points ({counts})"))
     for one in found["first_failed"]:
-        where = ", ".join(f"{name}={value}" for name, value in one["at"].items())
+        where = ", ".join(f"{name}={shown(value)}" for name, value in one["at"].items())
         out.print(cell(f"failed: {where}: {Status[one['status'].upper()].meaning}"))
     more = found["failed"] - len(found["first_failed"])
     if more > 0:

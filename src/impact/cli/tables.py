@@ -12,8 +12,9 @@ import numpy as np
 from rich.table import Table
 from rich.text import Text
 
-from ..contact.model import ForceModel, wishes
-from .console import cell, console, table
+from ..contact.model import ForceModel
+from ..contact.values import delivered
+from .console import cell, console, shown, table
 from .summary import summary, worst_errors
 
 if TYPE_CHECKING:
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 # where a table of the catalogue shows the delivered restitution
 ASKED = (0.1, 0.3, 0.5, 0.7, 0.9)
+NARROW = 130
 
 
 def model_json(model: ForceModel) -> dict[str, Any]:
@@ -34,44 +36,31 @@ def model_json(model: ForceModel) -> dict[str, Any]:
     }
     return {
         **texts, "domain": {name: list(ends) for name, ends in model.domain.items()}, "parameters": own,
-        "exponent": model.exponent, "release": model.release, "delivered_restitution": delivered(model),
+        "exponent": model.exponent, "release": model.release, "delivered_restitution": _delivered(model),
     }  # fmt: skip
 
 
-def delivered(model: ForceModel) -> dict[str, float] | None:
-    """The exact delivered restitution for some that are asked for, where it depends on nothing else."""
-    if model.oracle is None or not set(wishes(model.oracle)) <= {"e", *model.coefficients}:
-        return None
-    found = {}
-    for e in ASKED:
-        values: dict[str, Any] = {
-            "e": np.array([e]),
-            "K": 1.0,
-            "m": 1.0,
-            "v0": 1.0,
-            "n": model.exponent or 1.5,
-        }
-        for name, formula in model.coefficients.items():
-            if not set(wishes(formula)) <= values.keys():
-                return None
-            values[name] = formula(*(values[wish] for wish in wishes(formula)))
-        exact = model.oracle(*(values[wish] for wish in wishes(model.oracle)))
-        found[f"{e:g}"] = float(np.asarray(exact).reshape(-1)[0])
-    return found
+def _delivered(model: ForceModel) -> dict[str, float]:
+    """The exact delivered restitution by the e asked for; empty where there is none."""
+    found = delivered(model, np.array(ASKED))
+    return {} if found is None else {f"{e:g}": out for e, out in zip(ASKED, found.tolist(), strict=True)}
 
 
 def print_models(models: Sequence[ForceModel]) -> None:
     """The catalogue, a line a model."""
-    rows = table("model", "equation", "claimed for", *(f"e={e:g}" for e in ASKED))
+    out = console(sys.stdout)
+    # a narrow terminal has no room for the delivered restitution; `impact models KEY` tells it
+    asked = ASKED if out.width >= NARROW else ()
+    rows = table("model", "equation", "claimed for", *(f"e={e:g}" for e in asked))
     for column in rows.columns[1:3]:
         column.justify = "left"
     for model in models:
-        found = delivered(model) or {}
-        cells = [f"{found[f'{e:g}']:.4f}" if found else "–" for e in ASKED]
+        found = _delivered(model)
+        cells = [f"{found[f'{e:g}']:.4f}" if found else "–" for e in asked]
         rows.add_row(model.key, Text(model.equation), Text(model.domain_text or "–"), *cells)
-    out = console(sys.stdout)
     out.print(rows)
-    out.print("\nThe columns e=... show the restitution that a model delivers when it is asked for e.")
+    if asked:
+        out.print("\nThe columns e=... show the restitution that a model delivers when it is asked for e.")
 
 
 def print_model(model: ForceModel) -> None:
@@ -81,17 +70,22 @@ def print_model(model: ForceModel) -> None:
         "equation": model.equation, "reference": model.reference, "doi": model.doi, "evidence": model.evidence,
         "claimed for": model.domain_text or "nothing in particular",
         "exponent": "the sweep's n" if model.exponent is None else f"n = {model.exponent:g}, its own",
-        "ends at": {"gap": "zero indentation", "force": "zero force"}[model.release],
+        "ends at": _release(model),
     }  # fmt: skip
     for parameter in model.parameters:
         default = "required" if parameter.default is None else f"default {parameter.default:g}"
         unit = "" if parameter.unit == "1" else f" [{parameter.unit}]"
         limits = f"from {parameter.least:g} to {parameter.most:g}"
         rows[f"[model.{model.key}]"] = f"{parameter.name}{unit}: {parameter.meaning}; {limits}, {default}"
-    found = delivered(model)
+    found = _delivered(model)
     if found:
         rows["delivers"] = ", ".join(f"{out:.4f} for e = {e}" for e, out in found.items())
     _print_rows(rows)
+
+
+def _release(model: ForceModel) -> str:
+    gap = "zero indentation" if model.residual is None else "the permanent indentation"
+    return gap if model.release == "gap" else f"zero force, at {gap} at the latest"
 
 
 def _print_rows(rows: Mapping[str, Any]) -> None:
@@ -109,7 +103,7 @@ def run_json(impact: Impact) -> dict[str, Any]:
         "model": impact.model.key, "inputs": dict(impact.point), "first_value_of": list(impact.first),
         "exponent": impact.exponent, "closing_speed": impact.closing_speed,
         "outputs": {**impact.values, "status": impact.status.name.lower()},
-        "damping": impact.damping, "e_kinematic": impact.values["e_out"], "e_kinetic": impact.e_kinetic,
+        "damping": impact.damping, "e_kinematic": impact.e_kinematic, "e_kinetic": impact.e_kinetic,
         "e_energetic": impact.e_energetic,
     }  # fmt: skip
 
@@ -124,14 +118,14 @@ def print_run(impact: Impact) -> None:
     for name, value in impact.point.items():
         unit = SWEEP[name].unit if name in SWEEP else "1"
         note = "  (first value of its axis)" if name in impact.first else ""
-        rows[name] = _quantity(value, unit.replace("^n", f"^{n}")) + note
+        rows[name] = _quantity(value, unit.replace("^n", f"^{impact.point['n']:g}")) + note
     rows["status"] = f"{impact.status.name.lower()}: {impact.status.meaning}"
     for one in SCHEMA:
         if one.dtype == "f8" and one.name != "damping_ratio":
-            rows[one.name] = _quantity(impact.values[one.name], one.unit.replace("N m-n", f"N/m^{n}"))
+            rows[one.name] = _quantity(impact.values[one.name], one.unit.replace("m-n", f"m-{n}"))
     rows["chi = lambda v0/K"] = _quantity(impact.values["damping_ratio"], "1")
     rows["lambda"] = _quantity(impact.damping, f"N s/m^{impact.exponent + 1:g}")
-    rows["e kinematic (1)"] = _quantity(impact.values["e_out"], "1", 12) + "  from the velocities"
+    rows["e kinematic (1)"] = _quantity(impact.e_kinematic, "1", 12) + "  from the velocities"
     rows["e kinetic (2)"] = _quantity(impact.e_kinetic, "1", 12) + "  from the impulses of the two phases"
     rows["e energetic (3)"] = _quantity(impact.e_energetic, "1", 12) + "  from their works"
     rows["in the claimed domain"] = "yes" if impact.values["in_domain"] else f"no: {impact.model.domain_text}"
@@ -140,11 +134,13 @@ def print_run(impact: Impact) -> None:
 
 
 def _quantity(value: Any, unit: str, digits: int = 10) -> str:
+    from ..data.results import plain_unit
+
     if not isinstance(value, float):
         return str(value)
     if value != value:
         return "–"
-    return f"{value:.{digits}g}" + ("" if unit == "1" else f" {unit.replace('m s-1', 'm/s')}")
+    return f"{value:.{digits}g}" + ("" if unit == "1" else f" {plain_unit(unit)}")
 
 
 def info_json(dataset: xr.Dataset) -> dict[str, Any]:
@@ -161,6 +157,8 @@ def info_json(dataset: xr.Dataset) -> dict[str, Any]:
 
 def print_info(dataset: xr.Dataset, path: Path) -> None:
     """What is in a file."""
+    from ..data.results import plain_unit
+
     attributes = dataset.attrs
     sizes = " × ".join(f"{name} {size}" for name, size in dataset.sizes.items())
     rows: dict[str, Any] = {"file": path, "title": attributes.get("title", ""), "dimensions": sizes}
@@ -168,16 +166,15 @@ def print_info(dataset: xr.Dataset, path: Path) -> None:
         if name in ("title", "equation", "reference", "doi", "year"):
             continue
         values = coordinate.values.reshape(-1)
-        numeric = values.dtype.kind == "f" and values.size > 4
-        shown = (
-            f"{values[0]:g} … {values[-1]:g}, {values.size} values"
-            if numeric
-            else ", ".join(f"{one:g}" if isinstance(one, float) else str(one) for one in values.tolist())
-        )
-        unit = str(coordinate.attrs.get("units", "1"))
-        rows[str(name)] = shown + ("" if unit == "1" else f" [{unit}]")
-    for name in ("rtol", "impact_version", "schema_version", "fingerprint", "content_digest"):
-        if name in attributes:
+        distinct = list(dict.fromkeys(values.tolist()))
+        if values.dtype.kind == "f" and len(distinct) > 4:
+            text = f"{values.min():g} … {values.max():g}, {values.size} values"
+        else:
+            text = ", ".join(shown(one) for one in distinct)
+        unit = plain_unit(str(coordinate.attrs.get("units", "1")))
+        rows[str(name)] = text + ("" if unit == "1" else f" [{unit}]")
+    for name in ("rtol", "impact_version", "schema_version", "fingerprint", "content_digest", "plugins"):
+        if attributes.get(name, "{}") != "{}":
             rows[name] = attributes[name]
     if json.loads(attributes.get("config_set", "[]")):
         rows["config_set"] = attributes["config_set"]

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import ModelError
 from ..ode.problem import Columns
 from . import motion
 from .impulse import velocities_after
 from .lanes import Lanes
-from .model import ForceModel, wishes
+from .model import ForceModel
 from .power import Array
 from .status import FIRST_FAILURE, Status
 from .strike import Rebound, strike
+from .values import chi_of, exact_restitution, own_values, takes_log
 
 
 @dataclass(frozen=True)
@@ -58,15 +60,14 @@ def collide(model: ForceModel, lanes: Lanes, *, rtol: float, max_steps: int, col
     -------
     Contact : arrays of shape (n,); an impact that fails has NaN and a status, and disturbs no other
     """
-    rebound, chi, exact = Rebound.blank(len(lanes)), np.full(len(lanes), np.nan), np.full(len(lanes), np.nan)
+    rebound = Rebound.blank(len(lanes))
     with np.errstate(all="ignore"):
         rebound.status[:] = _first_look(model, lanes)
         for n in np.unique(lanes.n):
             where = np.flatnonzero((rebound.status == Status.OK) & (lanes.n == n))
             if where.size:
-                part, chi[where], exact[where] = _strike(model, lanes[where], float(n), rtol, max_steps, collapse)
-                rebound.put(where, part)
-        return _in_si(model, lanes, rebound, chi, exact)
+                rebound.put(where, _strike(model, lanes[where], float(n), rtol, max_steps, collapse))
+        return _in_si(model, lanes, rebound)
 
 
 def _first_look(model: ForceModel, lanes: Lanes) -> NDArray[np.int8]:
@@ -81,41 +82,32 @@ def _first_look(model: ForceModel, lanes: Lanes) -> NDArray[np.int8]:
 
 
 def _strike(
-    model: ForceModel, lanes: Lanes, n: float, rtol: float, max_steps: int, collapse: bool
-) -> tuple[Rebound, Array, Array]:
-    """Rebound, damping ratio and exact restitution of impacts that share n.
+    model: ForceModel, lanes: Lanes, n: float, rtol: float, max_steps: int, collapse: bool, halved: bool = False
+) -> Rebound:
+    """What impacts that share n do.
 
-    A law that raises is tried again on the two halves, so that only the impacts that make it raise fail.
+    A law that raises is tried again on the two halves, so that only the impacts that make it raise fail; one that
+    is left alone is tried beside its double, since a result of the wrong shape does not show at one.
     """
     try:
+        if halved and len(lanes) == 1:
+            both = _struck(model, lanes[np.array([0, 0])], n, rtol, max_steps, collapse=False)
+            return both.take(np.array([0]))
         return _struck(model, lanes, n, rtol, max_steps, collapse)
-    except Exception:
-        rebound, chi, exact = (
-            Rebound.blank(len(lanes)),
-            np.full(len(lanes), np.nan),
-            np.full(len(lanes), np.nan),
-        )
+    except ModelError:
+        rebound = Rebound.blank(len(lanes))
         if len(lanes) == 1:
             rebound.status[:] = Status.MODEL_ERROR
-            return rebound, chi, exact
+            return rebound
         for half in np.array_split(np.arange(len(lanes)), 2):
-            part, chi[half], exact[half] = _strike(model, lanes[half], n, rtol, max_steps, collapse)
-            rebound.put(half, part)
-        return rebound, chi, exact
+            rebound.put(half, _strike(model, lanes[half], n, rtol, max_steps, collapse, halved=True))
+        return rebound
 
 
-def _struck(
-    model: ForceModel, lanes: Lanes, n: float, rtol: float, max_steps: int, collapse: bool
-) -> tuple[Rebound, Array, Array]:
+def _struck(model: ForceModel, lanes: Lanes, n: float, rtol: float, max_steps: int, collapse: bool) -> Rebound:
     values = own_values(model, lanes, n)
-    full = {name: np.broadcast_to(np.asarray(value, float), len(lanes)) for name, value in values.items()}
-    chi = full.get("chi", np.full(len(lanes), np.nan))
-    exact = np.full(len(lanes), np.nan)
-    if model.oracle is not None:
-        exact[:] = model.oracle(*(values[wish] for wish in wishes(model.oracle)))
-
     rebound = Rebound.blank(len(lanes))
-    coefficients = np.array([full[name] for name in model.coefficients]).reshape(-1, len(lanes))
+    coefficients = np.array([values[name] for name in model.coefficients]).reshape(-1, len(lanes))
     infinite = np.isinf(coefficients).any(axis=0)
     plastic = infinite & (lanes.e == 0.0)
     rebound.status[infinite & ~plastic] = Status.OUT_OF_RANGE
@@ -126,30 +118,18 @@ def _struck(
         for known in (rebound.e_out, rebound.peak, rebound.permanent):
             known[plastic] = 0.0
 
+    chi = chi_of(values, len(lanes))
     log = takes_log(model, chi)
     for is_log in (False, True):
         where = np.flatnonzero((rebound.status == Status.OK) & (log == is_log))
         if not where.size:
             continue
         law = motion.Law.of(model, n, is_log)
-        columns = tuple(full[name][where] for name in law.names)
+        columns = tuple(np.asarray(values[name])[where] for name in law.names)
         first, back = _distinct(columns, where.size) if collapse else (np.arange(where.size),) * 2
         struck = strike(law, tuple(c[first] for c in columns), first.size, rtol, max_steps)
         rebound.put(where, struck.rebound.take(back))
-    return rebound, chi, exact
-
-
-def takes_log(model: ForceModel, chi: Array) -> NDArray[np.bool_]:
-    """Which impacts are integrated in the log coordinate: by their own damping ratio, never by their company."""
-    return np.full(chi.shape, model.momentum == "log") & (chi > motion.LOG_ABOVE)
-
-
-def own_values(model: ForceModel, lanes: Lanes, n: float) -> dict[str, Array | float]:
-    """What the formulas of a law may ask for once per impact, in the contact's own units."""
-    values = {name: lanes.own_units(model, name, n) for name in sorted({*model.quantities, "K", "m", "v0", "n"})}
-    for name, formula in model.coefficients.items():
-        values[name] = np.asarray(formula(*(values[wish] for wish in wishes(formula))), float) + 0.0
-    return values
+    return replace(rebound, chi=chi, exact=exact_restitution(model, values, len(lanes)))
 
 
 def _distinct(columns: Columns, n: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -161,7 +141,7 @@ def _distinct(columns: Columns, n: int) -> tuple[NDArray[np.intp], NDArray[np.in
     return first, back.reshape(-1)
 
 
-def _in_si(model: ForceModel, lanes: Lanes, rebound: Rebound, chi: Array, exact: Array) -> Contact:
+def _in_si(model: ForceModel, lanes: Lanes, rebound: Rebound) -> Contact:
     """Back from the contact's own units, against the impulse-momentum solution."""
     failed = rebound.status >= FIRST_FAILURE
     missed = rebound.status == Status.NO_IMPACT
@@ -176,8 +156,9 @@ def _in_si(model: ForceModel, lanes: Lanes, rebound: Rebound, chi: Array, exact:
 
     inside = np.ones(len(lanes), np.int8)
     for name, (low, high) in model.domain.items():
-        value = chi if name == "chi" else lanes.quantity(name)
-        inside[(value < low) | (value > high)] = 0
+        value = rebound.chi if name == "chi" else lanes.quantity(name)
+        # what is not known, such as an e that was not asked for, is not claimed
+        inside[~((value >= low) & (value <= high))] = 0
     return Contact(
         v1_post=v1_post,
         v2_post=v2_post,
@@ -192,10 +173,10 @@ def _in_si(model: ForceModel, lanes: Lanes, rebound: Rebound, chi: Array, exact:
         peak_force=si(rebound.force, 2.0 * energy / lanes.length),
         duration=si(rebound.duration, lanes.length / lanes.v0),
         energy_loss=si(1.0 - rebound.e_out * rebound.e_out, energy),
-        stiffness=lanes.K,
-        damping_ratio=np.where(np.isfinite(chi), chi, np.nan),
+        stiffness=np.where(failed, np.nan, lanes.K),
+        damping_ratio=np.where(np.isfinite(rebound.chi), rebound.chi, np.nan),
         residual=np.where(failed, np.nan, rebound.work - (1.0 - rebound.e_out * rebound.e_out)),
-        oracle_error=e_out - exact,
+        oracle_error=e_out - rebound.exact,
         status=rebound.status,
         in_domain=inside,
         steps=rebound.steps,

@@ -11,9 +11,10 @@ import numpy as np
 from .collide import Contact, collide
 from .lanes import Lanes, stiffness
 from .material import effective_mass, hertz_stiffness, sphere_radius
-from .model import ForceModel, Parameter
+from .model import QUANTITIES, ForceModel, Parameter
 from .power import Array
 from .status import FIRST_FAILURE, Status
+from .units import dimension
 
 RTOL, MAX_STEPS = 1e-10, 10_000
 # what rounding leaves of an identity, relative to its largest term
@@ -121,9 +122,6 @@ def _collide(model: ForceModel, lanes: Lanes, rtol: float = RTOL) -> Contact:
 
 def in_other_units(model: ForceModel, lanes: Lanes) -> Lanes:
     """The same impacts with grams, feet and minutes as units."""
-    from .model import QUANTITIES
-    from .units import dimension
-
     units = {one.name: one.unit for one in model.parameters} | QUANTITIES
     units |= {"v1": "m/s", "v2": "m/s", "m1": "kg", "m2": "kg"}
 

@@ -9,12 +9,12 @@ import numpy as np
 
 from ..ode.problem import Columns, Problem, Step
 from . import motion
-from .collide import own_values, takes_log
 from .lanes import Lanes
 from .model import ForceModel
 from .power import Array
 from .status import Status
 from .strike import strike
+from .values import chi_of, own_values, takes_log
 
 # points at which a step is shown, and at which it is integrated again
 SAMPLES, GAUSS = 4, 5
@@ -56,10 +56,9 @@ def follow(model: ForceModel, lanes: Lanes, *, rtol: float, max_steps: int) -> H
     """
     n = float(lanes.n[0])
     with np.errstate(all="ignore"):
-        values = {k: np.broadcast_to(np.asarray(v, float), 1) for k, v in own_values(model, lanes, n).items()}
-        log = bool(takes_log(model, values.get("chi", np.array([np.nan])))[0])
-        law = motion.Law.of(model, n, log)
-        columns = tuple(values[name] for name in law.names)
+        values = own_values(model, lanes, n)
+        law = motion.Law.of(model, n, bool(takes_log(model, chi_of(values, 1))[0]))
+        columns = tuple(np.asarray(values[name]) for name in law.names)
         struck = strike(law, columns, 1, rtol, max_steps, record=True)
     if struck.outward is None or struck.rebound.status[0] != Status.OK:
         return None
@@ -72,6 +71,9 @@ def follow(model: ForceModel, lanes: Lanes, *, rtol: float, max_steps: int) -> H
     delta = np.concatenate([inward.x, residual + outward.x]) * lanes.length
     v = np.concatenate([inward.v, outward.v]) * lanes.v0
     force = np.concatenate([inward.F, outward.F]) * (lanes.m * lanes.v0 / unit_t)
+    # the phases meet at the peak, and a landing can be shorter than rounding: each moment is told once
+    later = np.append(np.minimum.accumulate(t[::-1])[::-1][1:], np.inf)
+    t, delta, v, force = (row[t < later] for row in (t, delta, v, force))
     share1, share2 = lanes.m / lanes.m1, lanes.m / lanes.m2
     return History(
         t=t,

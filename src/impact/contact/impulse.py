@@ -20,6 +20,7 @@ def velocities_after(lanes: Lanes, e: Array) -> tuple[Array, Array]:
     """Velocities v1+, v2+ [m/s] after an impact of restitution e: equations (6) and (7), shape (n,).
 
     They are those at the impulse tau_c (1 + e), where tau_c = m v0 is that of the approach. Balls that do not
-    approach keep their velocities.
+    approach keep their velocities; an impulse that is too large for a number gives NaN.
     """
-    return velocities_at(lanes, np.where(lanes.v0 > 0.0, (1.0 + e) * lanes.m * lanes.v0, 0.0))
+    impulse = np.where(lanes.v0 > 0.0, (1.0 + e) * lanes.m * lanes.v0, 0.0)
+    return velocities_at(lanes, np.where(np.isfinite(impulse), impulse, np.nan))

@@ -9,7 +9,10 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import Literal
 
+import numpy as np
+
 from ..errors import ModelError, did_you_mean
+from .power import Array
 from .units import dimension
 
 Formula = Callable[..., object]
@@ -19,6 +22,8 @@ QUANTITIES = {
     "e": "1", "n": "1", "K": "N/m^n", "m": "kg", "v0": "m/s", "R1": "m", "R2": "m", "E1": "Pa", "E2": "Pa",
     "nu1": "1", "nu2": "1", "yield_strength1": "Pa", "yield_strength2": "Pa",
 }  # fmt: skip
+# what else a domain may bound
+IN_DOMAIN = ("v1", "v2", "m1", "m2", "length")
 IN_FORCE = {"x": "indentation", "v": "indentation rate", "elastic": "K δⁿ"}
 IN_UNLOADING = {
     "peak": "peak indentation",
@@ -43,15 +48,16 @@ class Parameter:
     most: float = float("inf")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ForceModel:
     """A contact force model, written as its paper writes it.
 
     Every formula asks by the names of its arguments for what it needs: `x` (indentation), `v` (its rate),
     `elastic` (K δⁿ), the quantities of the contact (`K, n, m, v0, e, R1, R2, E1, E2, nu1, nu2,
     yield_strength1, yield_strength2`), the model's own parameters and coefficients; `unloading` also for
-    `peak`, `force_at_peak` and `residual`. All arrive in the contact's own units as arrays of one shape,
-    (n,), or as numbers where they are the same for all.
+    `peak`, `force_at_peak` and `residual`. All arrive in the contact's own units, in which K = m = v0 = 1, as
+    arrays of one shape, (n,), or as numbers where they are the same for all; parameters are converted by their
+    unit, so that the formula does not change. A formula works on arrays: `np.where`, not `if`.
 
     Parameters
     ----------
@@ -75,7 +81,23 @@ class ForceModel:
 
     Raises
     ------
-    ModelError : a formula asks for something that is not there, a unit cannot be read, a key is malformed
+    ModelError : a formula asks for something that is not there, a unit cannot be read, a field is malformed
+
+    A linear spring and dashpot, whose damping constant the user gives, and which ends when the force does:
+
+    >>> import impact
+    >>> dashpot = ForceModel(
+    ...     key="dashpot", title="Spring and dashpot", year=2026, equation="F = K δ + c δ̇", reference="",
+    ...     force=lambda K, x, v, c: K * x + c * v, release="force", exponent=1.0,
+    ...     parameters=(Parameter("c", "N s/m", "damping constant", default=100.0, least=0.0),),
+    ... )
+    >>> result = impact.sweep({
+    ...     "models": "dashpot",
+    ...     "sweep": {"v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 1e6, "n": 1.0},
+    ...     "model": {"dashpot": {"c": [0.0, 100.0]}},
+    ... }, plugins=[dashpot])
+    >>> result["e_out"].values.round(6).tolist()
+    [[1.0, 0.808424]]
     """
 
     key: str
@@ -101,10 +123,12 @@ class ForceModel:
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", self.key):
             raise ModelError(f'model key "{self.key}": wants kebab-case, such as "hunt-crossley-1975"')
-        if self.momentum == "log" and ("chi" not in self.coefficients or self.unloading is not None):
-            raise ModelError(f'model {self.key}: momentum "log" wants a coefficient chi and one law throughout')
-        for parameter in self.parameters:
-            dimension(parameter.unit, 1.5)
+        alone = self.unloading is None and {"elastic", "chi"} <= set(wishes(self.force))
+        if self.momentum == "log" and not ("chi" in self.coefficients and alone):
+            raise ModelError(
+                f'model {self.key}: momentum "log" wants a coefficient chi, and one force of elastic and chi'
+            )
+        self._check_fields()
         once = {*QUANTITIES, *(parameter.name for parameter in self.parameters)}
         for name, formula in self.coefficients.items():
             self._check(f"coefficient {name}", formula, once)
@@ -113,6 +137,39 @@ class ForceModel:
         self._check("unloading", self.unloading, {*once, *IN_FORCE, *IN_UNLOADING})
         self._check("residual", self.residual, {*once, "peak", "force_at_peak"})
         self._check("oracle", self.oracle, once)
+
+    def _check_fields(self) -> None:
+        own = isinstance(self.parameters, tuple) and all(isinstance(one, Parameter) for one in self.parameters)
+        allowed = {
+            "release": (self.release in ("gap", "force"), '"gap" or "force"'),
+            "momentum": (self.momentum in ("v", "log"), '"v" or "log"'),
+            "smooth": (self.smooth in (2, 4, 6, 8), "2, 4, 6 or 8"),
+            "exponent": (self.exponent is None or 1.0 <= self.exponent <= 10.0, "None, or a number from 1 to 10"),
+            "parameters": (own, "a tuple of Parameter"),
+        }
+        for name, (right, wants) in allowed.items():
+            if not right:
+                raise ModelError(f"model {self.key}: {name}: got {getattr(self, name)!r}, wants {wants}")
+        taken = {*QUANTITIES, *IN_FORCE, *IN_UNLOADING}
+        for name in (*(parameter.name for parameter in self.parameters), *self.coefficients):
+            if name in taken:
+                raise ModelError(f'model {self.key}: "{name}" is the name of a quantity, wants another')
+        for parameter in self.parameters:
+            dimension(parameter.unit, 1.5)
+        bounded = {
+            *QUANTITIES,
+            *IN_DOMAIN,
+            *({"chi"} & self.coefficients.keys()),
+            *(one.name for one in self.parameters),
+        }
+        for name, ends in self.domain.items():
+            if name not in bounded:
+                raise ModelError(f'model {self.key}: domain of "{name}"; {did_you_mean(name, sorted(bounded))}')
+            if len(ends) != 2 or not ends[0] <= ends[1]:
+                raise ModelError(f"model {self.key}: domain of {name}: got {ends!r}, wants (least, most)")
+
+    def __repr__(self) -> str:
+        return f"<ForceModel {self.key}>"
 
     def _check(self, role: str, formula: Formula | None, known: set[str]) -> None:
         for wish in wishes(formula):
@@ -141,9 +198,26 @@ class ForceModel:
 
 @cache
 def wishes(formula: Formula | None) -> tuple[str, ...]:
-    """The names that a formula asks for.
+    """The names that a formula asks for; an argument with a default is its own.
 
     >>> wishes(lambda elastic, v, chi: elastic * (1 + chi * v))
     ('elastic', 'v', 'chi')
     """
-    return () if formula is None else tuple(inspect.signature(formula).parameters)
+    if formula is None:
+        return ()
+    arguments = inspect.signature(formula).parameters.values()
+    return tuple(one.name for one in arguments if one.default is inspect.Parameter.empty)
+
+
+def ask(formula: Formula, known: Mapping[str, Array | float]) -> Array:
+    """The value of a formula, given what it asks for by name.
+
+    Raises
+    ------
+    ModelError : the formula raised an error, whatever it was
+    """
+    given = [known[wish] for wish in wishes(formula)]
+    try:
+        return np.asarray(formula(*given), dtype=float)
+    except Exception as error:
+        raise ModelError(f"a formula raised {type(error).__name__}: {error}") from error

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..errors import ModelError
 from ..ode.problem import Array, Columns, Mask, Problem
-from .model import ForceModel, Formula, wishes
+from .model import ForceModel, Formula, ask, wishes
 from .power import integer_power, power
 
 # above this χ a lane takes the log coordinate, if its law has one; below it plain v takes as many steps, and
@@ -55,7 +55,7 @@ class Law:
         known: dict[str, Array | float] = {"K": 1.0, "m": 1.0, "v0": 1.0, "n": self.n}
         known.update(zip(self.names, columns, strict=True))
         known.update(given)
-        return np.asarray(formula(*(known[wish] for wish in wishes(formula))), dtype=float)
+        return ask(formula, known)
 
     def velocity(self, momentum: Array, columns: Columns) -> Array:
         """v from the second component."""
@@ -128,7 +128,10 @@ def turn(law: Law, columns: Columns, peak: Array, at_peak: Array) -> tuple[Array
     residual = np.zeros_like(peak)
     if model.residual is not None:
         given = {"peak": peak, "force_at_peak": at_peak}
-        residual = residual + law.call(model.residual, columns, given)
+        own = law.call(model.residual, columns, given)
+        if own.shape not in ((), peak.shape):
+            raise ModelError(f"{model.key}: the residual has the shape {own.shape}, wants {peak.shape}")
+        residual = residual + own
     return residual, columns if model.unloading is None else (*columns, peak, at_peak, residual)
 
 

@@ -33,7 +33,7 @@ MEANINGS = {
     Status.STEP_UNDERFLOW: "the step became too small to advance",
     Status.NOT_FINITE: "the force is not finite",
     Status.INVALID_PARAMETER: "a value that arises here is out of its range, such as e = 1 - alpha v0 below 0",
-    Status.OUT_OF_RANGE: "a derived quantity over- or underflows, such as the stiffness of two planes",
+    Status.OUT_OF_RANGE: "a derived quantity is not finite, such as K of two planes or m of two walls",
     Status.MODEL_ERROR: "the force raised an error or returned the wrong shape",
 }
 FIRST_FAILURE = Status.NOT_SEPARATED

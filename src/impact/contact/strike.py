@@ -26,7 +26,8 @@ STATUS_OF_END = {
 class Rebound:
     """What a law does with impacts, in the contact's own units; arrays of shape (n,).
 
-    `work` is twice the work done against the force over both phases, 1 - e_out^2 up to the solver's error.
+    `work` is twice the work done against the force over both phases, 1 - e_out^2 up to the solver's error; `chi`
+    is the law's damping ratio and `exact` its restitution in closed form, where it has them.
     """
 
     e_out: Array
@@ -37,6 +38,8 @@ class Rebound:
     work: Array
     steps: NDArray[np.int32]
     status: NDArray[np.int8]
+    chi: Array
+    exact: Array
 
     @classmethod
     def blank(cls, n: int) -> Rebound:
@@ -50,6 +53,8 @@ class Rebound:
             work=np.full(n, np.nan),
             steps=np.zeros(n, np.int32),
             status=np.full(n, Status.OK, np.int8),
+            chi=np.full(n, np.nan),
+            exact=np.full(n, np.nan),
         )
 
     def put(self, where: NDArray[np.intp] | NDArray[np.bool_], part: Rebound) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -71,9 +72,11 @@ SCHEMA = (
              "[work of the force - m v0²(1 - e_out²)/2]/(m v0²/2)"),
     Variable("oracle_error", "1", "model", "bounded by 10 rtol", "distance from the closed form, where one exists",
              "e_out - exact e_out"),
-    Variable("status", "1", "model", "exact", "how the point ended", "", "i1"),
-    Variable("in_domain", "1", "model", "exact", "1 where the authors claim the model", "", "i1"),
-    Variable("steps", "1", "model", "reported", "accepted steps of the integrator", "", "i4"),
+    Variable("status", "1", "model", "exact", "how the point ended", "see flag_meanings", "i1"),
+    Variable("in_domain", "1", "model", "exact", "1 where the authors claim the model",
+             "1 inside every claimed interval", "i1"),
+    Variable("steps", "1", "model", "reported", "accepted steps of the integrator",
+             "approach + restitution", "i4"),
 )  # fmt: skip
 
 PACKAGES = ("numpy", "scipy", "h5py", "h5netcdf", "xarray")
@@ -126,13 +129,13 @@ def _attributes(variable: Variable) -> dict[str, object]:
 def _coordinates(plan: Plan) -> dict[str, object]:
     models = plan.models
 
-    def texts(field: str) -> tuple[str, list[str]]:
-        return "model", [str(getattr(model, field)) for model in models]
+    def texts(field: str) -> tuple[str, list[str], dict[str, str]]:
+        return "model", [str(getattr(model, field)) for model in models], {"long_name": f"{field} of the model"}
 
     found: dict[str, object] = {
         "model": ("model", [model.key for model in models], {"long_name": "contact force model"}),
         **{field: texts(field) for field in ("title", "equation", "reference", "doi")},
-        "year": ("model", [model.year for model in models]),
+        "year": ("model", [model.year for model in models], {"long_name": "year of the model"}),
     }
     for axis in plan.config.axes:
         for name, values in axis.columns.items():
@@ -151,10 +154,28 @@ def _about(plan: Plan, name: str) -> dict[str, str]:
     for model in plan.models:
         if model.key == key:
             quantity = own_quantities(model)[own]
-            return {"units": quantity.unit, "long_name": quantity.meaning}
+            return {"units": udunits(quantity.unit), "long_name": quantity.meaning}
     if name in MATERIALS:
         return {"long_name": MATERIALS[name]}
-    return {"units": SWEEP[name].unit, "long_name": SWEEP[name].meaning}
+    return {"units": udunits(SWEEP[name].unit), "long_name": SWEEP[name].meaning}
+
+
+def udunits(unit: str) -> str:
+    """A unit of the config in the spelling of netCDF.
+
+    >>> udunits("m/s"), udunits("N/m^n"), udunits("kg/m^3"), udunits("1")
+    ('m s-1', 'N m-n', 'kg m-3', '1')
+    """
+    return re.sub(r"/\s*([A-Za-z]+)(?:\^(\S+))?", lambda found: f" {found[1]}-{found[2] or 1}", unit)
+
+
+def plain_unit(unit: str) -> str:
+    """The other way round, as a reader writes it.
+
+    >>> plain_unit("m s-1"), plain_unit("N m-1.5"), plain_unit("kg")
+    ('m/s', 'N/m^1.5', 'kg')
+    """
+    return re.sub(r" ([A-Za-z]+)-(\S+)", lambda found: f"/{found[1]}" + f"^{found[2]}" * (found[2] != "1"), unit)
 
 
 def _exponent(plan: Plan) -> tuple[tuple[str, ...], object, dict[str, str]]:
@@ -202,12 +223,18 @@ def _provenance(plan: Plan) -> dict[str, object]:
     }
 
 
-def content_digest(dataset: xr.Dataset) -> str:
-    """SHA-256 over names, dimensions and values of all variables and coordinates, in canonical form.
+# attributes that may differ between installations that compute the same; the digest cannot contain itself
+NOT_DIGESTED = ("content_digest", "packages")
 
-    Numbers as little-endian bytes with one NaN, text as UTF-8; the order of the variables does not count.
+
+def content_digest(dataset: xr.Dataset) -> str:
+    """SHA-256 over names, dimensions, values and attributes of all variables and coordinates, in canonical form.
+
+    Numbers as little-endian bytes with one NaN, text as UTF-8; the order of the variables does not count, nor do
+    the versions of the packages.
     """
-    total = hashlib.sha256()
+    own = {str(name): value for name, value in dataset.attrs.items() if name not in NOT_DIGESTED}
+    total = hashlib.sha256(_canonical(own))
     for name in sorted(str(name) for name in dataset.variables):
         variable = dataset.variables[name]
         values = variable.values
@@ -220,5 +247,19 @@ def content_digest(dataset: xr.Dataset) -> str:
             kind = "text"
             data = json.dumps(np.asarray(values, object).tolist()).encode()
         one = hashlib.sha256(data).hexdigest()
-        total.update(json.dumps([name, list(variable.dims), list(variable.shape), kind, one]).encode())
+        total.update(_canonical([name, list(variable.dims), list(variable.shape), kind, one]))
+        total.update(_canonical({str(key): value for key, value in variable.attrs.items()}))
     return total.hexdigest()
+
+
+def _canonical(value: object) -> bytes:
+    """JSON in which an array of one is its element, as netCDF has it."""
+
+    def plain(one: object) -> object:
+        if isinstance(one, dict):
+            return {key: plain(inner) for key, inner in one.items()}
+        array = np.asarray(one)
+        return array.item() if array.size == 1 else array.tolist()
+
+    found = value if isinstance(value, list) else plain(value)
+    return json.dumps(found, sort_keys=True).encode()

@@ -7,6 +7,7 @@ import io
 import os
 import stat
 from pathlib import Path
+from secrets import token_hex
 
 import h5py
 import numpy as np
@@ -17,8 +18,8 @@ from ..text import safe_text
 from .results import SCHEMA_VERSION, content_digest
 
 
-def check_output(path: Path, *, overwrite: bool) -> None:
-    """Refuse an output that cannot be written, before any work is done.
+def check_output(path: Path, *, overwrite: bool, source: Path | None = None) -> None:
+    """Refuse an output that cannot be written, before any work is done; and one that is its own source.
 
     Raises
     ------
@@ -38,8 +39,10 @@ def check_output(path: Path, *, overwrite: bool) -> None:
         raise UsageError(f"{shown}: {error.strerror}") from None
     if not stat.S_ISREG(mode):
         raise UsageError(f"{shown}: is not a regular file, and is left alone")
+    if source is not None and source.exists() and path.samefile(source):
+        raise UsageError(f"{shown}: is what is read from, and is left alone")
     if not overwrite:
-        raise UsageError(f"{shown}: exists; give another name with -o, or --overwrite")
+        raise UsageError(f"{shown}: exists; give another name, or overwrite it (--overwrite)")
 
 
 def write_whole(path: Path, content: bytes | memoryview, *, overwrite: bool) -> None:
@@ -51,21 +54,17 @@ def write_whole(path: Path, content: bytes | memoryview, *, overwrite: bool) -> 
     StoreError : the disk is full or failed; nothing is left under the name
     """
     check_output(path, overwrite=overwrite)
-    part = path.with_name(f"{path.name}.{os.getpid()}.part")
+    part = path.with_name(f"{path.name}.{token_hex(4)}.part")
     try:
-        try:
-            with part.open("xb") as file:
+        with part.open("xb") as file:
+            try:
                 file.write(content)
                 file.flush()
                 os.fsync(file.fileno())
-            if overwrite:
-                part.replace(path)
-            else:
-                # a hard link, unlike a rename, does not replace a file that appeared in the meantime
-                os.link(part, path)
-        finally:
-            with contextlib.suppress(FileNotFoundError):
-                part.unlink()
+                _publish(part, path, overwrite=overwrite)
+            finally:
+                with contextlib.suppress(FileNotFoundError):
+                    part.unlink()
         folder = os.open(path.parent, os.O_RDONLY)
         try:
             os.fsync(folder)
@@ -79,6 +78,22 @@ def write_whole(path: Path, content: bytes | memoryview, *, overwrite: bool) -> 
         ) from error
 
 
+def _publish(part: Path, path: Path, *, overwrite: bool) -> None:
+    """Give a complete file its name; without `overwrite` never in the place of a file that appeared meanwhile."""
+    if overwrite:
+        part.replace(path)
+        return
+    try:
+        os.link(part, path)
+    except FileExistsError:
+        raise
+    except OSError:
+        # a file system without hard links: what is left is to look before the rename
+        if path.exists():
+            raise FileExistsError from None
+        part.rename(path)
+
+
 def save(dataset: xr.Dataset, path: str | Path, *, overwrite: bool = False) -> None:
     """Store a dataset as netCDF-4 in HDF5.
 
@@ -86,17 +101,22 @@ def save(dataset: xr.Dataset, path: str | Path, *, overwrite: bool = False) -> N
 
     Parameters
     ----------
-    dataset : the dataset
+    dataset : a result, or a part of one; it is stored with the digest of what it holds
     path : the file
     overwrite : replace a file that exists
 
     Raises
     ------
-    UsageError : the file exists, or its folder cannot be written to
+    UsageError : the file exists, its folder cannot be written to, or the dataset is no result
     StoreError : the disk is full or failed
     """
     path = Path(path)
+    if "schema_version" not in dataset.attrs:
+        raise UsageError(
+            f"{safe_text(str(path))}: this dataset is not a result of impact: it has no schema_version"
+        )
     check_output(path, overwrite=overwrite)
+    dataset = dataset.assign_attrs(content_digest=content_digest(dataset))
     buffer = io.BytesIO()
     plain = {name: {"_FillValue": None} for name, v in dataset.variables.items() if v.dtype.kind == "f"}
     dataset.to_netcdf(buffer, engine="h5netcdf", encoding=plain)
@@ -137,11 +157,12 @@ def load(path: str | Path) -> xr.Dataset:
     return dataset
 
 
-def holds(path: Path, fingerprint: str) -> bool:
-    """Whether a file is a whole result with this fingerprint."""
+def held(path: Path, fingerprint: str) -> xr.Dataset | None:
+    """What a file holds, if it is a whole result with this fingerprint."""
     if path.is_symlink() or not path.is_file():
-        return False
+        return None
     try:
-        return bool(load(path).attrs.get("fingerprint") == fingerprint)
+        dataset = load(path)
     except ResultError:
-        return False
+        return None
+    return dataset if dataset.attrs.get("fingerprint") == fingerprint else None

@@ -14,7 +14,7 @@ from .rules import DEFAULTS, MATERIAL, MATERIALS, REQUIRED, SWEEP, expand_models
 from .values import Problem, Quantity, read_number, read_whole, refuse
 
 DEFAULT_TITLE = "Impact sweep"
-RTOL = Quantity("1", "relative tolerance of the integration", least=1e-13, most=1e-3)
+RTOL = Quantity("1", "relative tolerance of the integration", least=1e-13, most=1e-4)
 MOST_STEPS = 10**9
 
 Schema = Mapping[str, Any]

@@ -6,7 +6,7 @@ import hashlib
 import inspect
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from functools import cached_property
 
@@ -18,6 +18,7 @@ from ..contact.material import effective_mass, hertz_stiffness, sphere_radius
 from ..contact.model import ForceModel
 from ..contact.power import Array
 from .config import Config
+from .rules import MATERIALS
 
 # lanes of a block: enough to pay for the interpreter, few enough to stay in cache
 BLOCK = 8192
@@ -134,14 +135,24 @@ class Plan:
             "version": __version__,
             "title": config.title,
             "models": [model.key for model in config.models],
-            "scalars": dict(config.scalars),
+            "scalars": dict(sorted(config.scalars.items())),
             "axes": [{name: list(values) for name, values in axis.columns.items()} for axis in config.axes],
-            "materials": {name: asdict(material) for name, material in config.materials.items()},
+            "materials": {name: asdict(config.materials[name]) for name in sorted(self._materials_used())},
             "solver": asdict(config.solver),
             "variables": config.variables,
             "plugins": self.plugin_hashes,
         }
         return hashlib.sha256(json.dumps(effective).encode()).hexdigest()
+
+    def _materials_used(self) -> set[str]:
+        """The names of materials that some ball has."""
+        used: set[str] = set()
+        for name in MATERIALS:
+            if name in self.config.scalars:
+                used.add(str(self.config.scalars[name]))
+            for place in self.axes_of(name):
+                used.update(str(one) for one in self.config.axes[place].columns[name])
+        return used
 
     @property
     def plugin_hashes(self) -> dict[str, str]:
@@ -150,13 +161,23 @@ class Plan:
 
 
 def _source_hash(model: ForceModel) -> str:
-    """SHA-256 over a model's declaration: its text fields and the source of its formulas."""
+    """SHA-256 over a model's declaration: its fields, and the source of its formulas with what they close over."""
     parts: list[str] = []
     for name, value in vars(model).items():
         formulas = value.values() if name == "coefficients" else [value]
-        for one in formulas:
-            try:
-                parts.append(inspect.getsource(one) if callable(one) else repr(one))
-            except OSError:
-                parts.append(one.__code__.co_code.hex() + repr(one.__code__.co_consts))
+        parts += (_source(one) if callable(one) else repr(one) for one in formulas)
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
+
+
+def _source(formula: Callable[..., object]) -> str:
+    """What tells a formula from another: its source or code, its defaults, and the values it closes over."""
+    code = getattr(formula, "__code__", None)
+    if code is None:
+        return repr(formula)
+    try:
+        text = inspect.getsource(formula)
+    except (OSError, TypeError):
+        text = repr((code.co_code, code.co_names, code.co_consts))
+    cells = [cell.cell_contents for cell in getattr(formula, "__closure__", None) or ()]
+    closed = [_source(one) if callable(one) and one is not formula else repr(one) for one in cells]
+    return "\n".join([text, repr(getattr(formula, "__defaults__", None)), *closed])

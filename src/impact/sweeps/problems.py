@@ -33,6 +33,8 @@ def faults_of(errors: Iterable[Mapping[str, Any]], known: Mapping[str, object]) 
         elif error["type"] == "extra_forbidden":
             # a file of nothing but strange keys is not worth looking for each of them
             hint = nearest(str(path[-1]), _known(path[:-1], known), WORDS) if count < MAX_LINES else ""
+            if len(path) == 1 and path[0] in _known(("sweep",), known):
+                hint = "it belongs under [sweep]"
             yield path, f"unknown key; {hint}"
         else:
             yield path, f"got {show(error['input'])}, wants a table"

@@ -14,20 +14,20 @@ DEFAULTS = {"v2": 0.0, "n": 1.5}
 
 SWEEP = {
     "e": Quantity("1", "coefficient of restitution", least=0, most=1),
-    "alpha": Quantity("s/m", "slope of the restitution over the speed, e = 1 - alpha v0", least=0),
-    "v1": Quantity("m/s", "velocity of the first ball before the impact"),
-    "v2": Quantity("m/s", "velocity of the second ball before the impact, below v1"),
-    "m1": Quantity("kg", "mass of the first ball; inf is a wall", least=0, above=True, infinite=True),
-    "m2": Quantity("kg", "mass of the second ball; inf is a wall", least=0, above=True, infinite=True),
-    "R1": Quantity("m", "radius of the first ball; inf is a plane", least=0, above=True, infinite=True),
-    "R2": Quantity("m", "radius of the second ball; inf is a plane", least=0, above=True, infinite=True),
+    "alpha": Quantity("s/m", "slope of e = 1 - alpha v0", least=0),
+    "v1": Quantity("m/s", "velocity of ball 1 before the impact"),
+    "v2": Quantity("m/s", "velocity of ball 2 before the impact"),
+    "m1": Quantity("kg", "mass of ball 1", least=0, above=True, infinite=True),
+    "m2": Quantity("kg", "mass of ball 2", least=0, above=True, infinite=True),
+    "R1": Quantity("m", "radius of ball 1", least=0, above=True, infinite=True),
+    "R2": Quantity("m", "radius of ball 2", least=0, above=True, infinite=True),
     "K": Quantity("N/m^n", "stiffness of the contact, F = K x^n", least=0, above=True),
-    "n": Quantity("1", "exponent of the elastic force", least=1, most=10),
+    "n": Quantity("1", "compliance exponent", least=1, most=10),
 }
 MATERIALS = {
     "material": "material of both balls",
-    "material1": "material of the first ball",
-    "material2": "material of the second ball",
+    "material1": "material of ball 1",
+    "material2": "material of ball 2",
 }
 MATERIAL = {
     "E": Quantity("Pa", "Young's modulus", least=0, above=True),

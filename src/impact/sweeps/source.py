@@ -139,7 +139,15 @@ def apply_overrides(
         data, start = overriding(data, path, _value(written, loads), new_range)
         overridden = {old: by for old, by in overridden.items() if old[: len(start)] != start}
         overridden[start] = (which, path)
+        other = "alpha" if path[:2] == ("sweep", "e") else "e" if path[:2] == ("sweep", "alpha") else None
+        if other and ("sweep", other) not in overridden:
+            # each says what the other would: what is set takes the place of what the file gives
+            data = {**data, "sweep": {k: v for k, v in _table(data["sweep"]).items() if k != other}}
     return data, overridden, problems
+
+
+def _table(value: object) -> Mapping[str, object]:
+    return value if isinstance(value, dict) else {}
 
 
 def _value(text: str, loads: Loads) -> object:

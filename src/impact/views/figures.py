@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import matplotlib
@@ -16,6 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..contact.models import catalogue
+from ..data.results import plain_unit
 from ..data.store import write_whole
 from ..errors import UsageError
 from ..text import safe_text
@@ -31,6 +33,8 @@ MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*", "p")
 # a legend has two columns where its labels are at most this long, and the figure grows by a line of this height
 # for every row of it
 SHORT_LABEL, LEGEND_ROW = 46, 0.19
+# characters of a line
+TITLE_WIDE, CONDITIONS_WIDE = 66, 104
 STYLE = files(__package__) / "impact.mplstyle"
 # a picture has the same bytes each time: no dates in it
 METADATA: dict[str, dict[str, None]] = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
@@ -53,6 +57,7 @@ class FinalVelocities:
     title: str
     x: str
     x_label: str
+    x_is_geometric: bool
     x_values: tuple[float, ...]
     unit: str
     conditions: str
@@ -80,11 +85,15 @@ def final_velocities(
     """
     wanted = ("v1_post", "v2_post", "v1_reference", "v2_reference")
     missing = [name for name in wanted if name not in dataset]
+    if "model" not in dataset.dims:
+        raise UsageError("this is a time history; the comparison is drawn from the result of a sweep")
     if missing:
         raise UsageError(f"this result has no {', '.join(missing)}; sweep without [output] variables, or add them")
     line = take_slice(dataset, x, sel, models)
     # a wall, or a plane, has no place on an axis
-    data = line.dataset.isel({line.dataset[line.x].dims[0]: np.isfinite(line.dataset[line.x].values)})
+    along = line.dataset[line.x].values
+    order = np.argsort(along, kind="stable")
+    data = line.dataset.isel({line.dataset[line.x].dims[0]: order[np.isfinite(along[order])]})
     if not data[line.x].size:
         raise UsageError(f"{safe_text(line.x)} has no finite value to draw over")
 
@@ -98,9 +107,10 @@ def final_velocities(
     # without a restitution to refer to there is no reference
     curves = [one for one in curves if one.model is not None or np.isfinite(one.values).any()]
     return FinalVelocities(
-        title=safe_text(str(dataset.attrs.get("title", "")), 80),
+        title=safe_text(str(dataset.attrs.get("title", "")), 140),
         x=line.x,
         x_label=_axis_label(data[line.x]),
+        x_is_geometric=_is_geometric(data[line.x].values),
         x_values=tuple(data[line.x].values.tolist()),
         unit="m/s",
         conditions=_conditions(data, line.x),
@@ -113,12 +123,20 @@ def final_velocities(
 def _label(one: xr.Dataset) -> str:
     """Title, year and equation number of a model."""
     number = re.search(r"\(\d+\)(?:-\(\d+\))?$", str(one["equation"].values))
-    parts = (str(one[name].values) for name in ("title", "year"))
-    return safe_text(" ".join([*parts, *([number[0]] if number else [])]), 80)
+    name = f"{one['title'].values} ({one['year'].values})"
+    return safe_text(f"{name}, {number[0]}" if number else name, 80)
+
+
+def _is_geometric(values: np.ndarray) -> bool:
+    """Whether sorted values are spaced evenly in their logarithm, over a decade or more."""
+    if len(values) < 3 or values[0] <= 0.0 or values[-1] < 10.0 * values[0]:
+        return False
+    return bool(np.allclose(np.diff(np.log(values)), np.log(values[1] / values[0]), rtol=1e-6))
 
 
 def _axis_label(coordinate: xr.DataArray) -> str:
     meaning, unit = (str(coordinate.attrs.get(name, "")) for name in ("long_name", "units"))
+    unit = plain_unit(unit)
     return safe_text(
         f"{meaning or coordinate.name}, {coordinate.name}" + (f" [{unit}]" if unit not in ("", "1") else "")
     )
@@ -130,7 +148,7 @@ def _conditions(data: xr.Dataset, x: str) -> str:
     for name, coordinate in data.coords.items():
         if coordinate.ndim == 0 and name not in ("model", x):
             value = coordinate.values.item()
-            unit = str(coordinate.attrs.get("units", "1"))
+            unit = plain_unit(str(coordinate.attrs.get("units", "1")))
             text = f"{value:g}" if isinstance(value, float) else str(value)
             parts.append(safe_text(f"{name} = {text}" + (f" {unit}" if unit != "1" else ""), 60))
     return ", ".join(parts)
@@ -151,12 +169,16 @@ def draw_final_velocities(numbers: FinalVelocities) -> Figure:
             first = curve.ball == 1
             axes.plot(x, curve.values, label=curve.label if first else "_", **look)
         _name_the_balls(axes, numbers, x)
+        if numbers.x_is_geometric:
+            axes.set_xscale("log")
         axes.set_xlabel(numbers.x_label, parse_math=False)
         axes.set_ylabel(f"velocity after the impact [{numbers.unit}]")
         axes.margins(x=0.02)
-        axes.set_title(numbers.title or "Final velocities comparison", parse_math=False, pad=22)
+        conditions = fill(numbers.conditions, CONDITIONS_WIDE)
+        title = fill(numbers.title or "Final velocities comparison", TITLE_WIDE)
+        axes.set_title(title, parse_math=False, pad=9 + 10 * (conditions.count("\n") + 1))
         axes.annotate(
-            _wrapped(numbers.conditions), (0, 1), (0, 4), xycoords="axes fraction", textcoords="offset points",
+            conditions, (0, 1), (0, 4), xycoords="axes fraction", textcoords="offset points",
             fontsize=7.5, color="#555555", parse_math=False, va="bottom",
         )  # fmt: skip
         legend = figure.legend(loc="outside lower center", ncols=columns)
@@ -165,19 +187,10 @@ def draw_final_velocities(numbers: FinalVelocities) -> Figure:
     return figure
 
 
-def _wrapped(text: str, width: int = 110) -> str:
-    """At most two lines, broken at a comma."""
-    if len(text) <= width:
-        return text
-    cut = text.rfind(", ", 0, width) + 1
-    rest = text[cut + 1 :]
-    return text[:cut] + "\n" + (rest if len(rest) <= width else rest[: width - 1] + "…")
-
-
 def _look(curve: Curve, order: list[str], points: int) -> dict[str, Any]:
     """Colour and marker of a curve: a model's own, wherever it is drawn; the reference is a plain line."""
     if curve.model is None:
-        return {"color": "black", "linewidth": 2.2, "zorder": 1.5}
+        return {"color": "black", "linewidth": 2.2, "zorder": 1.5, "marker": "_" if points == 1 else ""}
     place = order.index(curve.model)
     every = max(1, points // 12)
     return {
@@ -191,12 +204,22 @@ def _look(curve: Curve, order: list[str], points: int) -> dict[str, Any]:
 
 
 def _name_the_balls(axes: Axes, numbers: FinalVelocities, x: np.ndarray) -> None:
-    """v₁⁺ and v₂⁺ beside the ends of their curves."""
+    """v₁⁺ and v₂⁺ beside the last points of their curves: the reference's, or else the first model's."""
+    ends = {}
+    for curve in reversed(numbers.curves):
+        drawn = np.flatnonzero(np.isfinite(curve.values))
+        if drawn.size:
+            ends[curve.ball] = (x[drawn[-1]], curve.values[drawn[-1]])
+    low, high = axes.get_ylim()
+    close = len(ends) == 2 and abs(ends[1][1] - ends[2][1]) < 0.06 * (high - low)
     for ball, name in ((1, "v₁⁺"), (2, "v₂⁺")):
-        ends = [c.values[-1] for c in numbers.curves if c.ball == ball and np.isfinite(c.values[-1])]
-        if ends:
-            # at the reference's end, where there is one
-            axes.annotate(name, (x[-1], ends[0]), (6, 0), textcoords="offset points", va="center", fontsize=11,
+        if ball in ends:
+            # where both end together, one name stands below the point and the other above
+            aside = (
+                6,
+                (-8 if (ends[ball][1], ball) == min((e[1], b) for b, e in ends.items()) else 8) if close else 0,
+            )
+            axes.annotate(name, ends[ball], aside, textcoords="offset points", va="center", fontsize=11,
                           annotation_clip=False)  # fmt: skip
 
 

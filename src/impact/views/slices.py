@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import UsageError, did_you_mean
 from ..text import safe_text
 
 if TYPE_CHECKING:
     import xarray as xr
+
+Mask = NDArray[np.bool_]
 
 # a value given by hand matches one that was computed when it differs by rounding only
 SAME = 1e-9
@@ -51,10 +54,9 @@ def take_slice(
         for key in models:
             if key not in known:
                 raise UsageError(f'no model "{safe_text(key)}" in this result; {did_you_mean(key, known)}')
-        dataset = dataset.sel(model=list(models))
+        dataset = dataset.sel(model=list(dict.fromkeys(models)))
     axes = [str(dim) for dim in dataset.sizes if dim != "model"]
-    for name, value in (sel or {}).items():
-        dataset = _select(dataset, name, value, axes)
+    dataset = _select(dataset, sel or {}, axes)
     x = _x_axis(dataset, x)
     (along,) = dataset[x].dims
     others = [dim for dim in dataset.sizes if dim not in ("model", along)]
@@ -63,26 +65,31 @@ def take_slice(
     return Slice(dataset, x, fixed)
 
 
-def _select(dataset: xr.Dataset, name: str, value: float | str, axes: list[str]) -> xr.Dataset:
-    """The dataset at one value of an axis, or of a coordinate along an axis."""
-    if name not in dataset.coords or len(dataset[name].dims) != 1 or name == "model":
-        if name in axes:
-            raise UsageError(f"{safe_text(name)}: given twice")
-        raise UsageError(f'no axis "{safe_text(name)}" in this result; {did_you_mean(name, axes)}')
-    (dim,) = dataset[name].dims
-    values = dataset[name].values
-    if values.dtype.kind == "f":
-        number = _number(value)
-        same = np.isclose(values, np.nan if number is None else number, rtol=SAME, atol=0.0)
-    else:
-        same = values.astype(str) == str(value)
-    if not same.any():
-        shown = ", ".join(
-            f"{one:g}" if values.dtype.kind == "f" else safe_text(str(one), 40) for one in values[:8]
-        )
-        more = ", ..." if values.size > 8 else ""
-        raise UsageError(f"no {safe_text(name)} = {safe_text(str(value))} in this result; it has {shown}{more}")
-    return dataset.isel({dim: int(np.argmax(same))})
+def _select(dataset: xr.Dataset, sel: Mapping[str, float | str], axes: list[str]) -> xr.Dataset:
+    """The dataset at values of axes, or of coordinates along an axis; several along one have to agree."""
+    masks: dict[Hashable, Mask] = {}
+    for name, value in sel.items():
+        if name not in dataset.coords or len(dataset[name].dims) != 1 or dataset[name].dims == ("model",):
+            raise UsageError(f'no axis "{safe_text(name)}" in this result; {did_you_mean(name, axes)}')
+        (dim,) = dataset[name].dims
+        values = dataset[name].values
+        same = _same(values, value)
+        if dim in masks and same.any():
+            same &= masks[dim]
+        if not same.any():
+            shown = ", ".join(f"{one:g}" if values.dtype.kind == "f" else str(one) for one in values[:8].tolist())
+            has = safe_text(shown + (", ..." if values.size > 8 else ""))
+            raise UsageError(f"no {safe_text(f'{name} = {value}')} in this result; {safe_text(name)} is {has}")
+        masks[dim] = same
+    return dataset.isel({dim: int(np.argmax(same)) for dim, same in masks.items()})
+
+
+def _same(values: np.ndarray, value: float | str) -> Mask:
+    """Which values are the one asked for."""
+    if values.dtype.kind != "f":
+        return np.asarray(values.astype(str) == str(value))
+    number = _number(value)
+    return np.asarray(np.isclose(values, np.nan if number is None else number, rtol=SAME, atol=0.0))
 
 
 def _number(value: float | str) -> float | None:
@@ -99,6 +106,11 @@ def _x_axis(dataset: xr.Dataset, x: str | None) -> str:
     ]  # fmt: skip
     if x is not None:
         if x not in lines:
+            if x in dataset.coords and dataset[x].ndim > 1:
+                dims = ", ".join(str(dim) for dim in dataset[x].dims)
+                raise UsageError(
+                    f"cannot draw over {safe_text(x)}, which varies over {dims}; select one with --sel"
+                )
             raise UsageError(f'cannot draw over "{safe_text(x)}"; {did_you_mean(x, lines)}')
         return x
     for name in ("e", *(dim for dim in dataset.sizes if dim in lines), *lines):

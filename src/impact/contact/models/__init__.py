@@ -9,6 +9,7 @@ from pkgutil import iter_modules
 from types import MappingProxyType
 
 from ...errors import ModelError, did_you_mean
+from ...text import safe_text
 from ..model import ForceModel
 
 # families in the order of the paper; a family that is not named comes after these
@@ -50,5 +51,5 @@ def find(key: str, plugins: Sequence[ForceModel] = ()) -> ForceModel:
     """
     known = catalogue(plugins)
     if key not in known:
-        raise ModelError(f'no model "{key}"; {did_you_mean(key, list(known))}')
+        raise ModelError(f'no model "{safe_text(key)}"; {did_you_mean(key, list(known))}')
     return known[key]

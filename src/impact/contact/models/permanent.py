@@ -79,11 +79,7 @@ ISMAIL_STRONGE_2008 = ForceModel(
     "J. Appl. Mech. 75, 061011",
     doi="10.1115/1.2965371",
     evidence="formula as printed in Gharib and Hurmuzlu (2012); DOI from memory",
-    parameters=(
-        Parameter(
-            "gamma", "1", "plastic loss factor γ, delivers e = 1/γ; the default is not its authors'", 2.0, 1.0
-        ),
-    ),
+    parameters=(Parameter("gamma", "1", "plastic loss factor γ", 2.0, 1.0),),
     exponent=1.0,
     force=lambda elastic: elastic,
     coefficients={"Kr": lambda K, gamma: gamma * gamma * K},
