@@ -146,7 +146,9 @@ def _conditions(data: xr.Dataset, x: str) -> str:
     """The values of everything that is not drawn over."""
     parts = []
     for name, coordinate in data.coords.items():
-        if coordinate.ndim == 0 and name not in ("model", x):
+        model, _, own = str(name).rpartition(".")
+        of_a_model_not_shown = own != name and model not in data["model"].values
+        if coordinate.ndim == 0 and name not in ("model", x) and not of_a_model_not_shown:
             value = coordinate.values.item()
             unit = plain_unit(str(coordinate.attrs.get("units", "1")))
             text = f"{value:g}" if isinstance(value, float) else str(value)
@@ -174,7 +176,7 @@ def draw_final_velocities(numbers: FinalVelocities) -> Figure:
         axes.set_xlabel(numbers.x_label, parse_math=False)
         axes.set_ylabel(f"velocity after the impact [{numbers.unit}]")
         axes.margins(x=0.02)
-        conditions = fill(numbers.conditions, CONDITIONS_WIDE)
+        conditions = fill(numbers.conditions, CONDITIONS_WIDE, break_on_hyphens=False)
         title = fill(numbers.title or "Final velocities comparison", TITLE_WIDE)
         axes.set_title(title, parse_math=False, pad=9 + 10 * (conditions.count("\n") + 1))
         axes.annotate(
