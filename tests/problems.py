@@ -40,7 +40,7 @@ class Known:
 def _rates(second, quadrature):
     """Rates of y0' = y1, y1' = second(y0, y1), time and another quadrature; y0 y1 is watched."""
 
-    def rates(y, columns):
+    def rates(y, columns, out=None):
         one = np.ones_like(y[0])
         return np.array([y[1], second(*y, *columns), one, quadrature(*y), y[0] * y[1]])
 

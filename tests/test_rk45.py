@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from impact.ode import tableau
 from impact.ode.problem import End, Outcome, Problem
-from impact.ode.rk45 import _attempt, integrate
+from impact.ode.rk45 import _attempt, _Space, integrate
 
 from .problems import OSCILLATOR, PROBLEMS, SPRINGS, TANH, Known
 
@@ -38,7 +38,7 @@ def fixed_step_error(known: Known, count: int, embedded: bool) -> float:
     y[:2, 0] = known.start
     k = rates(y[:2], ())
     for _ in range(count):
-        y, stages = _attempt(known.problem, y, k, h, ())
+        y, stages = _attempt(known.problem, y, k, h, (), _Space.of(h.size))
         k = stages[-1]
         if embedded:
             y = y - h * sum(float(e) * stage[:4] for e, stage in zip(tableau.E, stages, strict=True))
@@ -138,7 +138,7 @@ def test_failure_is_told_and_leaves_the_other_lanes_alone(row, end):
 
 @pytest.mark.parametrize("wall", [0.1, 0.3, 0.5, 0.777, 0.99])
 def test_rate_that_becomes_nan_on_the_way_is_not_finite(wall):
-    def rates(y, columns):
+    def rates(y, columns, out=None):
         return OSCILLATOR.problem.rates(y, columns) * np.where(y[0] > wall, np.nan, 1.0)
 
     other = OSCILLATOR.problem

@@ -11,13 +11,12 @@ gives du/dσ = −χ p sᵖ⁻¹ xⁿ, which is not stiff for any χ.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..errors import ModelError
-from ..ode.problem import Array, Columns, Mask, Problem
+from ..ode.problem import Array, Columns, Mask, Problem, Rates
 from .model import ForceModel, Formula, ask, wishes
 from .power import integer_power, power
 
@@ -135,13 +134,13 @@ def turn(law: Law, columns: Columns, peak: Array, at_peak: Array) -> tuple[Array
     return residual, columns if model.unloading is None else (*columns, peak, at_peak, residual)
 
 
-def _rates(law: Law, formula: Formula, extra: tuple[str, ...] | None) -> Callable[[Array, Columns], Array]:
+def _rates(law: Law, formula: Formula, extra: tuple[str, ...] | None) -> Rates:
     p = law.model.smooth
     elastic_power = p * law.n
     asked = frozenset(wishes(formula))
     own = len(law.names)
 
-    def rates(y: Array, columns: Columns) -> Array:
+    def rates(y: Array, columns: Columns, out: Array | None = None) -> Array:
         s = y[0]
         v = law.velocity(y[1], columns)
         given = {"v": v}
@@ -154,7 +153,7 @@ def _rates(law: Law, formula: Formula, extra: tuple[str, ...] | None) -> Callabl
         force = law.call(formula, columns[:own], given)
         if force.shape not in ((), s.shape):
             raise ModelError(f"{law.model.key}: the force has the shape {force.shape}, wants {s.shape}")
-        out = np.empty((5, s.size))
+        out = np.empty((5, s.size)) if out is None else out
         out[0] = v
         np.multiply(integer_power(s, p - 1), p, out=out[2])
         np.multiply(out[2], force, out=out[1])

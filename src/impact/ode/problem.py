@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,14 +31,20 @@ class End(IntEnum):
     NOT_FINITE = 5
 
 
+class Rates(Protocol):
+    """See `Problem`."""
+
+    def __call__(self, y: Array, columns: Columns, out: Array | None = None, /) -> Array: ...
+
+
 @dataclass(frozen=True)
 class Problem:
     """What is integrated.
 
     Parameters
     ----------
-    rates : (y, columns) -> rates of the two components and the two quadratures, and the watched quantity, of
-        shape (5, n), at components y of shape (2, n)
+    rates : (y, columns, out=None) -> rates of the two components and the two quadratures, and the watched
+        quantity, of shape (5, n), at components y of shape (2, n); they may be written into `out`
     event : (y, k, columns) -> (g, dg): a function that is positive until the lane ends, and its rate along the
         trajectory, at components y where the rates are k
     lost : y -> mask of the lanes that can no longer reach the event
@@ -45,7 +52,7 @@ class Problem:
     watch : locate the maximum of the watched quantity
     """
 
-    rates: Callable[[Array, Columns], Array]
+    rates: Rates
     event: Callable[[Array, Array, Columns], tuple[Array, Array]]
     lost: Callable[[Array], Mask]
     floor: tuple[float, float]

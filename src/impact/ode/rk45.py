@@ -51,12 +51,33 @@ class _Lanes:
     before: Array
     span: Array
 
+    # the arrays of one attempt, reused: fresh ones of this size would go back to the system after every step
+    space: _Space
+
     def keep(self, mask: Mask) -> _Lanes:
         kept: dict[str, Any] = {
             name: tuple(column[mask] for column in value) if name == "columns" else value[..., mask]
             for name, value in vars(self).items()
+            if name != "space"
         }
-        return _Lanes(**kept)
+        return _Lanes(**kept, space=_Space.of(kept["h"].size))
+
+
+@dataclass
+class _Space:
+    """Room for one attempt: the later stages, the rows at its end, and sums and terms of components and rows."""
+
+    stages: list[Array]
+    new: Array
+    part: Array
+    term: Array
+    wide: Array
+
+    @classmethod
+    def of(cls, n: int) -> _Space:
+        stages = [np.empty((WATCHED + 1, n)) for _ in STAGE_WEIGHTS[1:]]
+        rows, parts = (np.empty((INTEGRATED, n)) for _ in "ab"), (np.empty((COMPONENTS, n)) for _ in "ab")
+        return cls(stages, next(rows), next(parts), next(parts), next(rows))
 
 
 def integrate(
@@ -108,7 +129,7 @@ def _begin(problem: Problem, start: Array, columns: Columns) -> _Lanes:
     n = start.shape[1]
     y = np.zeros((INTEGRATED, n))
     y[:COMPONENTS] = start
-    k = problem.rates(start, columns)
+    k = problem.rates(start, columns).copy()
     span = np.full(n, FIRST_STEP)
     return _Lanes(
         index=np.arange(n),
@@ -122,24 +143,25 @@ def _begin(problem: Problem, start: Array, columns: Columns) -> _Lanes:
         best=k[WATCHED].copy(),
         before=start.copy(),
         span=span,
+        space=_Space.of(n),
     )
 
 
-def _attempt(problem: Problem, y: Array, k: Array, h: Array, columns: Columns) -> tuple[Array, list[Array]]:
-    """One step of length h from rows y whose rates are k: the rows (as many as y has) and the seven stages."""
+def _attempt(
+    problem: Problem, y: Array, k: Array, h: Array, columns: Columns, space: _Space
+) -> tuple[Array, list[Array]]:
+    """One step of length h from rows y whose rates are k: the rows at its end and the seven stages, in `space`."""
     stages = [k]
-    part = np.empty_like(y[:COMPONENTS])
-    term = np.empty_like(part)
-    for weights in STAGE_WEIGHTS[1:-1]:
-        _weighted(weights, stages, COMPONENTS, part, term)
+    part, new = space.part, space.new
+    for weights, room in zip(STAGE_WEIGHTS[1:-1], space.stages[:-1], strict=True):
+        _weighted(weights, stages, COMPONENTS, part, space.term)
         part *= h
         part += y[:COMPONENTS]
-        stages.append(problem.rates(part, columns))
-    new, term = np.empty_like(y), np.empty_like(y)
-    _weighted(STAGE_WEIGHTS[-1], stages, len(y), new, term)
+        stages.append(problem.rates(part, columns, room))
+    _weighted(STAGE_WEIGHTS[-1], stages, INTEGRATED, new, space.wide)
     new *= h
     new += y
-    stages.append(problem.rates(new[:COMPONENTS], columns))
+    stages.append(problem.rates(new[:COMPONENTS], columns, space.stages[-1]))
     return new, stages
 
 
@@ -157,10 +179,69 @@ def _weighted(
 def _advance(problem: Problem, lanes: _Lanes, rtol: float, record: bool) -> Step | None:
     """Try one step in every running lane; accept, land or shorten it. Returns a step to be recorded."""
     y, h, running = lanes.y, lanes.h, lanes.end == End.RUNNING
-    new, stages = _attempt(problem, y, lanes.k, h, lanes.columns)
+    space = lanes.space
+    new, stages = _attempt(problem, y, lanes.k, h, lanes.columns, space)
     k = stages[-1]
+    worst = _error(problem, stages, y, new, h, space) / rtol
+    accepted = running & (worst <= 1.0)
 
-    error, term = np.empty_like(y[:COMPONENTS]), np.empty_like(y[:COMPONENTS])
+    # the next step by the controller; one with a rate that is not finite is halved
+    eighth = np.sqrt(np.sqrt(np.sqrt(worst)))
+    factor = np.clip(SAFETY / (eighth * np.sqrt(eighth)), SMALLEST, LARGEST)
+    finite = np.isfinite(worst)
+    if not finite.all():
+        factor = np.where(finite, factor, 0.5)
+        lanes.halvings += ~finite
+        lanes.end[running & (lanes.halvings > HALVINGS)] = End.NOT_FINITE
+    following = h * factor
+
+    # a step across the event is not accepted but shortened onto it by Newton's iteration, so that the way to
+    # the event is a true step of order five
+    g, dg = problem.event(new[:COMPONENTS], k, lanes.columns)
+    at = np.flatnonzero(accepted & ((g < 0.0) | (g < SHORT * h * np.abs(dg))))
+    end = 1.0
+    if at.size:
+        beyond = np.where(dg[at] < 0.0, -g[at] / dg[at], np.inf)
+        landed = np.abs(beyond) <= LANDING * h[at] + NEAR
+        crossed = (g[at] < 0.0) & ~landed
+        onto = h[at] + beyond
+        back = np.where((onto > 0.05 * h[at]) & (onto < h[at]), onto, 0.5 * h[at])
+        ahead = (beyond > 0.0) & np.isfinite(beyond)
+        following[at] = np.where(crossed, back, np.where(ahead, beyond, following[at]))
+        accepted[at[crossed]] = False
+        home = at[landed]
+        new[:, home] += beyond[landed] * k[:INTEGRATED, home]
+        lanes.end[home] = End.LANDED
+        end = onto[0] / h[0] if record and home.size else 1.0
+
+    if problem.watch:
+        better = accepted & (k[WATCHED] > lanes.best)
+        np.copyto(lanes.best, k[WATCHED], where=better)
+        np.copyto(lanes.before, y[:COMPONENTS], where=better)
+        np.copyto(lanes.span, h, where=better)
+    lost = accepted & problem.lost(new)
+    if lost.any():
+        lanes.end[lost & (lanes.end == End.RUNNING)] = End.LOST
+    ended = lanes.end != End.RUNNING
+    small = following < LAST_STEP
+    if np.count_nonzero(small) > np.count_nonzero(ended):
+        lanes.end[small & ~ended] = End.STEP_UNDERFLOW
+        ended |= small
+    step = Step(y.copy(), h, np.array(stages), np.array([end])) if record and accepted[0] else None
+    lanes.steps += accepted
+    stay = np.flatnonzero(~accepted)
+    new[:, stay], k[:, stay] = y[:, stay], lanes.k[:, stay]
+    lanes.y, space.new = new, y
+    lanes.k, space.stages[-1] = k, lanes.k
+    # a lane that has ended stands still until it is taken out
+    following[ended] = 0.0
+    lanes.h = following
+    return step
+
+
+def _error(problem: Problem, stages: list[Array], y: Array, new: Array, h: Array, space: _Space) -> Array:
+    """The larger of the local errors of the two components, relative to max(|y|, floor); shape (n,)."""
+    error, term = space.part, space.term
     _weighted(ERROR_WEIGHTS, stages, COMPONENTS, error, term)
     error *= h
     np.abs(error, out=error)
@@ -168,47 +249,7 @@ def _advance(problem: Problem, lanes: _Lanes, rtol: float, record: bool) -> Step
     for row, floor in zip(scale, problem.floor, strict=True):
         np.maximum(row, floor, out=row)
     error /= scale
-    worst = np.maximum(error[0], error[1]) / rtol
-    finite = np.isfinite(worst)
-    accepted = running & (worst <= 1.0)
-
-    # the next step by the controller; one with a rate that is not finite is halved
-    eighth = np.sqrt(np.sqrt(np.sqrt(worst)))
-    factor = np.clip(SAFETY / (eighth * np.sqrt(eighth)), SMALLEST, LARGEST)
-    following = h * np.where(finite, factor, 0.5)
-
-    # a step across the event is not accepted but shortened onto it by Newton's iteration, so that the way to
-    # the event is a true step of order five
-    g, dg = problem.event(new[:COMPONENTS], k, lanes.columns)
-    beyond = np.where(accepted & (dg < 0.0), -g / dg, np.inf)
-    landed = np.abs(beyond) <= LANDING * h + NEAR
-    crossed = accepted & (g < 0.0) & ~landed
-    accepted &= ~crossed
-    onto = h + beyond
-    following = np.where(crossed, np.where((onto > 0.05 * h) & (onto < h), onto, 0.5 * h), following)
-    following = np.where(accepted & (beyond > 0.0) & (beyond < SHORT * h), beyond, following)
-    at = np.flatnonzero(landed)
-    new[:, at] += beyond[at] * k[:INTEGRATED, at]
-
-    if problem.watch:
-        better = accepted & (k[WATCHED] > lanes.best)
-        np.copyto(lanes.best, k[WATCHED], where=better)
-        np.copyto(lanes.before, y[:COMPONENTS], where=better)
-        np.copyto(lanes.span, h, where=better)
-    lanes.halvings += ~finite
-    lanes.end[running & (lanes.halvings > HALVINGS)] = End.NOT_FINITE
-    lanes.end[running & finite & (following < LAST_STEP) & ~landed] = End.STEP_UNDERFLOW
-    lanes.end[accepted & problem.lost(new)] = End.LOST
-    lanes.end[landed] = End.LANDED
-    step = None
-    if record and accepted.all():
-        step = Step(y.copy(), h, np.array(stages), np.where(landed, onto / h, 1.0))
-    lanes.steps += accepted
-    np.copyto(y, new, where=accepted)
-    np.copyto(lanes.k, k, where=accepted)
-    # a lane that has ended stands still until it is taken out
-    lanes.h = np.where(lanes.end == End.RUNNING, following, 0.0)
-    return step
+    return np.asarray(np.maximum(error[0], error[1]))
 
 
 def _maximum(problem: Problem, columns: Columns, seen: Array, before: Array, span: Array) -> Array:
@@ -223,19 +264,22 @@ def _maximum(problem: Problem, columns: Columns, seen: Array, before: Array, spa
     before, span : start (2, n) and length (n,) of that step
     """
     small = DIFFERENCE * span
+    space = _Space.of(span.size)
+    start = np.zeros((INTEGRATED, span.size))
+    start[:COMPONENTS] = before
 
     def slope(y: Array, k: Array) -> Array:
-        ahead = problem.rates(y + small * k[:COMPONENTS], columns)
+        ahead = problem.rates(y[:COMPONENTS] + small * k[:COMPONENTS], columns)
         return np.asarray((ahead[WATCHED] - k[WATCHED]) / small)
 
     def step(y: Array, k: Array, h: Array) -> tuple[Array, Array]:
-        new, stages = _attempt(problem, y, k, h, columns)
+        new, stages = _attempt(problem, y, k, h, columns, space)
         return new, stages[-1]
 
-    k = problem.rates(before, columns)
-    end, k_end = step(before, k, span)
+    k = problem.rates(before, columns).copy()
+    end, k_end = step(start, k, span)
     rising = slope(end, k_end) > 0.0
-    y, k = np.where(rising, end, before), np.where(rising, k_end, k)
+    y, k = np.where(rising, end, start), np.where(rising, k_end, k)
 
     best = np.fmax(seen, k[WATCHED])
     left, right = np.zeros_like(span), span
