@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 
 from impact.ode import tableau
 from impact.ode.problem import End, Outcome, Problem
-from impact.ode.rk45 import _attempt, _Space, integrate
+from impact.ode.rk45 import integrate
+from impact.ode.step import Space, attempt
 
 from .problems import OSCILLATOR, PROBLEMS, SPRINGS, TANH, Known
 
@@ -38,7 +39,7 @@ def fixed_step_error(known: Known, count: int, embedded: bool) -> float:
     y[:2, 0] = known.start
     k = rates(y[:2], ())
     for _ in range(count):
-        y, stages = _attempt(known.problem, y, k, h, (), _Space.of(h.size))
+        y, stages = attempt(known.problem, y, k, h, (), Space.of(h.size))
         k = stages[-1]
         if embedded:
             y = y - h * sum(float(e) * stage[:4] for e, stage in zip(tableau.E, stages, strict=True))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -13,6 +13,7 @@ from .. import __version__
 from ..errors import UsageError
 from ..text import safe_text
 from . import door
+from .words import dump, pairs
 
 app = typer.Typer(
     name="impact",
@@ -89,7 +90,7 @@ def sweep(
         else:
             door.say(f"{safe_text(str(output))}: already holds this sweep; nothing to do")
     if as_json:
-        print(_dump(found))
+        print(dump(found))
     if found["failed"] and not allow_failed:
         if quiet or not fresh:
             door.say(summary.failed_line(found), error=True)
@@ -125,7 +126,7 @@ def plot(
     from ..views import figures
     from . import console
 
-    numbers = figures.final_velocities(api.load(result), x, _pairs("--sel", sel), model)
+    numbers = figures.final_velocities(api.load(result), x, pairs("--sel", sel), model)
     output = output or result.with_suffix(".png")
     store.check_output(output, overwrite=True, source=result)
     figures.save_figure(figures.draw_final_velocities(numbers), output)
@@ -139,7 +140,7 @@ def plot(
         told += f"; no point to draw of {', '.join(empty)}"
     door.say(safe_text(told, 1000))
     if as_json:
-        print(_dump(asdict(numbers)))
+        print(dump(asdict(numbers)))
 
 
 @app.command(epilog="Example: impact run --model gharib-hurmuzlu-2012 --at e=0.05 --at m2=2.0 --history out.h5")
@@ -170,9 +171,9 @@ def run(
 
     if history is not None:
         store.check_output(history, overwrite=overwrite, source=source)
-    impact = api.run(source, model=model, at=_pairs("--at", at), overrides=sets or ())
+    impact = api.run(source, model=model, at=pairs("--at", at), overrides=sets or ())
     if as_json:
-        print(_dump(tables.run_json(impact)))
+        print(dump(tables.run_json(impact)))
     else:
         tables.print_run(impact)
     if impact.status >= FIRST_FAILURE:
@@ -195,7 +196,7 @@ def models(
 
     if as_json:
         chosen = [find(key)] if key else list(catalogue().values())
-        print(_dump([tables.model_json(model) for model in chosen]))
+        print(dump([tables.model_json(model) for model in chosen]))
     elif key:
         tables.print_model(find(key))
     else:
@@ -213,7 +214,7 @@ def info(
 
     dataset = api.load(file)
     if as_json:
-        print(_dump(tables.info_json(dataset)))
+        print(dump(tables.info_json(dataset)))
     else:
         tables.print_info(dataset, file)
 
@@ -246,38 +247,6 @@ def schema(
     else:
         store.write_whole(output, text.encode(), overwrite=overwrite)
         door.say(f"{safe_text(str(output))}: written")
-
-
-def _pairs(option: str, words: list[str] | None) -> dict[str, float | str]:
-    """NAME=VALUE options; a value that reads as a number is one."""
-    found: dict[str, float | str] = {}
-    for word in words or ():
-        name, equals, value = word.partition("=")
-        if not equals or not name or not value:
-            raise UsageError(f"{option} {safe_text(word)}: wants NAME=VALUE, such as {option} m2=1.0")
-        if name in found:
-            raise UsageError(f"{option} {safe_text(name)}: given twice")
-        try:
-            found[name] = float(value)
-        except ValueError:
-            found[name] = value
-    return found
-
-
-def _dump(value: Any) -> str:
-    """Strict JSON: what is not a number is null."""
-
-    def plain(one: Any) -> Any:
-        match one:
-            case float():
-                return one if abs(one) < float("inf") else None
-            case dict():
-                return {str(name): plain(inner) for name, inner in one.items()}
-            case list() | tuple():
-                return [plain(inner) for inner in one]
-        return one
-
-    return json.dumps(plain(value), ensure_ascii=False, allow_nan=False)
 
 
 def main() -> None:

@@ -9,7 +9,8 @@ import xarray as xr
 
 from .. import __version__
 from ..contact.history import History
-from .results import SCHEMA_VERSION, content_digest
+from .digest import content_digest
+from .results import SCHEMA_VERSION
 
 # name, unit, meaning
 HISTORY = (

@@ -15,7 +15,8 @@ import xarray as xr
 
 from ..errors import ResultError, StoreError, UsageError
 from ..text import safe_text
-from .results import SCHEMA_VERSION, content_digest
+from .digest import content_digest
+from .results import SCHEMA_VERSION
 
 
 def check_output(path: Path, *, overwrite: bool, source: Path | None = None) -> None:

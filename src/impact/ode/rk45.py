@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .problem import COMPONENTS, INTEGRATED, WATCHED, Array, Columns, End, Mask, Outcome, Problem, Step
-from .tableau import ERROR_WEIGHTS, STAGE_WEIGHTS
+from .step import Space, attempt, local_error
 
 # the controller: a step is multiplied by SAFETY/error^(3/16), within bounds. 3/16 is nearly the 1/5 of the
 # theory and takes square roots only, whose bits are the same on every processor
@@ -52,7 +52,7 @@ class _Lanes:
     span: Array
 
     # the arrays of one attempt, reused: fresh ones of this size would go back to the system after every step
-    space: _Space
+    space: Space
 
     def keep(self, mask: Mask) -> _Lanes:
         kept: dict[str, Any] = {
@@ -60,24 +60,7 @@ class _Lanes:
             for name, value in vars(self).items()
             if name != "space"
         }
-        return _Lanes(**kept, space=_Space.of(kept["h"].size))
-
-
-@dataclass
-class _Space:
-    """Room for one attempt: the later stages, the rows at its end, and sums and terms of components and rows."""
-
-    stages: list[Array]
-    new: Array
-    part: Array
-    term: Array
-    wide: Array
-
-    @classmethod
-    def of(cls, n: int) -> _Space:
-        stages = [np.empty((WATCHED + 1, n)) for _ in STAGE_WEIGHTS[1:]]
-        rows, parts = (np.empty((INTEGRATED, n)) for _ in "ab"), (np.empty((COMPONENTS, n)) for _ in "ab")
-        return cls(stages, next(rows), next(parts), next(parts), next(rows))
+        return _Lanes(**kept, space=Space.of(kept["h"].size))
 
 
 def integrate(
@@ -105,14 +88,14 @@ def integrate(
     recorded: list[Step] = []
     with np.errstate(all="ignore"):
         lanes = _begin(problem, start, columns)
-        for attempt in range(1, max_steps + 1):
+        for count in range(1, max_steps + 1):
             step = _advance(problem, lanes, rtol, record)
             if step is not None:
                 recorded.append(step)
-            if attempt == max_steps:
+            if count == max_steps:
                 lanes.end[lanes.end == End.RUNNING] = End.MAX_STEPS
             done = lanes.end != End.RUNNING
-            if np.count_nonzero(done) <= COMPACT_ABOVE * done.size and attempt < max_steps:
+            if np.count_nonzero(done) <= COMPACT_ABOVE * done.size and count < max_steps:
                 continue
             ended, lanes = lanes.keep(done), lanes.keep(~done)
             where = ended.index
@@ -143,46 +126,17 @@ def _begin(problem: Problem, start: Array, columns: Columns) -> _Lanes:
         best=k[WATCHED].copy(),
         before=start.copy(),
         span=span,
-        space=_Space.of(n),
+        space=Space.of(n),
     )
-
-
-def _attempt(
-    problem: Problem, y: Array, k: Array, h: Array, columns: Columns, space: _Space
-) -> tuple[Array, list[Array]]:
-    """One step of length h from rows y whose rates are k: the rows at its end and the seven stages, in `space`."""
-    stages = [k]
-    part, new = space.part, space.new
-    for weights, room in zip(STAGE_WEIGHTS[1:-1], space.stages[:-1], strict=True):
-        _weighted(weights, stages, COMPONENTS, part, space.term)
-        part *= h
-        part += y[:COMPONENTS]
-        stages.append(problem.rates(part, columns, room))
-    _weighted(STAGE_WEIGHTS[-1], stages, INTEGRATED, new, space.wide)
-    new *= h
-    new += y
-    stages.append(problem.rates(new[:COMPONENTS], columns, space.stages[-1]))
-    return new, stages
-
-
-def _weighted(
-    weights: tuple[tuple[int, float], ...], stages: list[Array], rows: int, total: Array, term: Array
-) -> None:
-    """The weighted sum of the first rows of the stages, term by term in order, into `total`."""
-    (first, weight), *rest = weights
-    np.multiply(stages[first][:rows], weight, out=total)
-    for stage, weight in rest:
-        np.multiply(stages[stage][:rows], weight, out=term)
-        total += term
 
 
 def _advance(problem: Problem, lanes: _Lanes, rtol: float, record: bool) -> Step | None:
     """Try one step in every running lane; accept, land or shorten it. Returns a step to be recorded."""
     y, h, running = lanes.y, lanes.h, lanes.end == End.RUNNING
     space = lanes.space
-    new, stages = _attempt(problem, y, lanes.k, h, lanes.columns, space)
+    new, stages = attempt(problem, y, lanes.k, h, lanes.columns, space)
     k = stages[-1]
-    worst = _error(problem, stages, y, new, h, space) / rtol
+    worst = local_error(problem, stages, y, new, h, space) / rtol
     accepted = running & (worst <= 1.0)
 
     # the next step by the controller; one with a rate that is not finite is halved
@@ -239,19 +193,6 @@ def _advance(problem: Problem, lanes: _Lanes, rtol: float, record: bool) -> Step
     return step
 
 
-def _error(problem: Problem, stages: list[Array], y: Array, new: Array, h: Array, space: _Space) -> Array:
-    """The larger of the local errors of the two components, relative to max(|y|, floor); shape (n,)."""
-    error, term = space.part, space.term
-    _weighted(ERROR_WEIGHTS, stages, COMPONENTS, error, term)
-    error *= h
-    np.abs(error, out=error)
-    scale = np.maximum(np.abs(y[:COMPONENTS]), np.abs(new[:COMPONENTS]), out=term)
-    for row, floor in zip(scale, problem.floor, strict=True):
-        np.maximum(row, floor, out=row)
-    error /= scale
-    return np.asarray(np.maximum(error[0], error[1]))
-
-
 def _maximum(problem: Problem, columns: Columns, seen: Array, before: Array, span: Array) -> Array:
     """The maximum of the watched quantity, at or beside the largest value seen at the end of a step.
 
@@ -264,7 +205,7 @@ def _maximum(problem: Problem, columns: Columns, seen: Array, before: Array, spa
     before, span : start (2, n) and length (n,) of that step
     """
     small = DIFFERENCE * span
-    space = _Space.of(span.size)
+    space = Space.of(span.size)
     start = np.zeros((INTEGRATED, span.size))
     start[:COMPONENTS] = before
 
@@ -273,7 +214,7 @@ def _maximum(problem: Problem, columns: Columns, seen: Array, before: Array, spa
         return np.asarray((ahead[WATCHED] - k[WATCHED]) / small)
 
     def step(y: Array, k: Array, h: Array) -> tuple[Array, Array]:
-        new, stages = _attempt(problem, y, k, h, columns, space)
+        new, stages = attempt(problem, y, k, h, columns, space)
         return new, stages[-1]
 
     k = problem.rates(before, columns).copy()

@@ -1,0 +1,41 @@
+"""Words in and out of a command: NAME=VALUE options, and JSON."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from ..errors import UsageError
+from ..text import safe_text
+
+
+def pairs(option: str, words: list[str] | None) -> dict[str, float | str]:
+    """NAME=VALUE options; a value that reads as a number is one."""
+    found: dict[str, float | str] = {}
+    for word in words or ():
+        name, equals, value = word.partition("=")
+        if not equals or not name or not value:
+            raise UsageError(f"{option} {safe_text(word)}: wants NAME=VALUE, such as {option} m2=1.0")
+        if name in found:
+            raise UsageError(f"{option} {safe_text(name)}: given twice")
+        try:
+            found[name] = float(value)
+        except ValueError:
+            found[name] = value
+    return found
+
+
+def dump(value: Any) -> str:
+    """Strict JSON: what is not a number is null."""
+
+    def plain(one: Any) -> Any:
+        match one:
+            case float():
+                return one if abs(one) < float("inf") else None
+            case dict():
+                return {str(name): plain(inner) for name, inner in one.items()}
+            case list() | tuple():
+                return [plain(inner) for inner in one]
+        return one
+
+    return json.dumps(plain(value), ensure_ascii=False, allow_nan=False)
