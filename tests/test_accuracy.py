@@ -53,10 +53,11 @@ def test_restitution_is_exact_to_1e_9(key, n):
 
 @pytest.mark.parametrize(("key", "n"), CASES)
 def test_work_balances_energy(key, n):
-    _, contact = over_e(key, n)
+    lanes, contact = over_e(key, n)
     assert worst(contact.residual) <= 10 * DEFAULT_RTOL
-    # the residual does not come from the oracle, and is not zero by construction
-    assert worst(contact.residual) > 0.0
+    # it measures the integration: a tolerance ten thousand times looser shows
+    loose = collide(find(key), lanes, rtol=1e4 * DEFAULT_RTOL, max_steps=10_000)
+    assert worst(loose.residual) > 100 * worst(contact.residual)
 
 
 @pytest.mark.parametrize(("key", "n"), UNDAMPED)

@@ -86,7 +86,7 @@ def test_alpha_gives_e_from_the_speed() -> None:
     result = impact.sweep(
         {
             "models": ["bilinear", "gharib-hurmuzlu-2012"],
-            "sweep": {"alpha": [0.1, 0.5], "v1": [0.0, 1.0, 3.0], "v2": -1.0, "m1": 1.0, "m2": 1.0, "material": "a"},
+            "sweep": {"alpha": [0.1, 0.5], "v1": [0, 1.0, 3.0], "v2": -1.0, "m1": 1, "m2": 1, "material": "a"},
             "materials": {"a": {"E": 56e9, "nu": 0.3, "rho": 2712}},
         }
     )
