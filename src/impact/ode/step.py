@@ -22,9 +22,13 @@ class Space:
 
     @classmethod
     def of(cls, n: int) -> Space:
-        stages = [np.empty((WATCHED + 1, n)) for _ in STAGE_WEIGHTS[1:]]
-        rows, parts = (np.empty((INTEGRATED, n)) for _ in "ab"), (np.empty((COMPONENTS, n)) for _ in "ab")
-        return cls(stages, next(rows), next(parts), next(parts), next(rows))
+        return cls(
+            stages=[np.empty((WATCHED + 1, n)) for _ in STAGE_WEIGHTS[1:]],
+            new=np.empty((INTEGRATED, n)),
+            part=np.empty((COMPONENTS, n)),
+            term=np.empty((COMPONENTS, n)),
+            wide=np.empty((INTEGRATED, n)),
+        )
 
 
 def attempt(
