@@ -28,7 +28,7 @@ def test_all_is_exactly_what_is_public() -> None:
     assert sorted(set(dir(impact)) - {"__version__"}) == sorted(impact.__all__)
     for name in impact.__all__:
         thing = getattr(impact, name)
-        assert inspect.getdoc(thing), name
+        assert ">>> " in (inspect.getdoc(thing) or ""), f"{name} shows no example"
         if inspect.isfunction(thing):
             hints = inspect.signature(thing)
             assert hints.return_annotation is not inspect.Signature.empty, name

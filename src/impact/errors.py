@@ -20,7 +20,15 @@ from .text import safe_text
 
 
 class ImpactError(Exception):
-    """The root: an error that the program expected, with a message for its user."""
+    """The root: an error that the program expected, with a message for its user.
+
+    >>> import impact
+    >>> try:
+    ...     impact.run(at={"e": 1.4})
+    ... except impact.ImpactError as error:
+    ...     print(error)
+    --at e=1.4: sweep.e: got 1.4, wants a number from 0 to 1
+    """
 
 
 class ConfigError(ImpactError):

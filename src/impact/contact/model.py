@@ -38,6 +38,9 @@ class Parameter:
 
     `unit` is an SI unit whose exponents may contain n ("N/m^n"); `least` and `most` are the closed interval
     of its values; `default` is None where the user has to give it.
+
+    >>> Parameter("c", "N s/m", "damping constant", default=100.0, least=0.0).unit
+    'N s/m'
     """
 
     name: str

@@ -110,6 +110,13 @@ def save(dataset: xr.Dataset, path: str | Path, *, overwrite: bool = False) -> N
     ------
     UsageError : the file exists, its folder cannot be written to, or the dataset is no result
     StoreError : the disk is full or failed
+
+    >>> import impact, tempfile
+    >>> result = impact.sweep("configs/figure6.toml")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     impact.save(result.sel(model=["gharib-hurmuzlu-2012"]), f"{folder}/one.h5")
+    ...     impact.load(f"{folder}/one.h5").sizes["model"]
+    1
     """
     path = Path(path)
     if "schema_version" not in dataset.attrs:
@@ -134,6 +141,11 @@ def load(path: str | Path) -> xr.Dataset:
     Raises
     ------
     ResultError : it does not exist, is no result, is damaged, or is of another schema version
+
+    >>> import impact
+    >>> impact.load("README.md")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    impact.errors.ResultError: README.md: is not a readable result ...
     """
     path = Path(path)
     shown = safe_text(str(path))
