@@ -138,7 +138,8 @@ BAD = [
     ("e = 0.5", 'e = 0.5\nK = "1 N/m"',
      ['x.toml:5: sweep.K: got "1 N/m", wants a unit of N/m^n with n = 1.5']),
     ("e = 0.5", 'e = 0.5\nK = "1 N/m^2"\nn = [1.5, 2]',
-     ['x.toml:5: sweep.K: got "1 N/m^2", wants a bare number: its unit N/m^n depends on n, which is an axis']),
+     ['x.toml:5: sweep.K: got "1 N/m^2", wants a bare number: its unit N/m^n depends on n, which is an axis',
+      "x.toml:5: sweep.K: its unit N/m^n depends on n, which is an axis; wants one K for each n, zipped with it"]),
     # lists and ranges
     ("e = 0.5", "e = []",
      [f"x.toml:4: sweep.e: got an empty list, wants a list of at least one: {E_WANTS[6:]}"]),
@@ -243,7 +244,8 @@ BAD = [
     ('["lankarani-nikravesh-1990"]\n[sweep]', '["hertz", "test-linear"]\n[sweep]\nK = 1',
      ["x.toml:4: sweep.K: got a stiffness for n = 1.5, but test-linear has n = 1 of its own; " "wants that law's own K under [model.test-linear], or none"]),
     ('["lankarani-nikravesh-1990"]\n[sweep]', '["test-linear"]\n[sweep]\nK = 1\nn = [1, 2]',
-     ["x.toml:4: sweep.K: got a stiffness for an axis n, but test-linear has n = 1 of its own; " "wants that law's own K under [model.test-linear], or none"]),
+     ["x.toml:4: sweep.K: its unit N/m^n depends on n, which is an axis; wants one K for each n, zipped with it",
+      "x.toml:4: sweep.K: got a stiffness for an axis n, but test-linear has n = 1 of its own; " "wants that law's own K under [model.test-linear], or none"]),
     ('["lankarani-nikravesh-1990"]', '["test-plastic"]',
      ["x.toml:9: materials.steel.yield_strength: missing, wants a number above 0 Pa (asked for by test-plastic)"]),
     ('["lankarani-nikravesh-1990"]', '["test-driven"]',
@@ -744,7 +746,8 @@ NUMBERS = {
 def sweeps(draw: st.DrawFn) -> dict[str, object]:
     names = draw(st.permutations(list(NUMBERS)))
     unique = {name: st.lists(values, min_size=1, max_size=3, unique=True) for name, values in NUMBERS.items()}
-    return {name: draw(NUMBERS[name] | unique[name]) for name in names}
+    # a K beside an axis of n would have to be zipped with it
+    return {name: draw(NUMBERS[name] if name == "n" else NUMBERS[name] | unique[name]) for name in names}
 
 
 @settings(deadline=None)

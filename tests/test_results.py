@@ -125,7 +125,8 @@ def test_balls_that_do_not_approach_keep_their_velocities() -> None:
 
 
 def test_an_axis_of_exponents() -> None:
-    result = impact.sweep({"models": "hertz", "sweep": {"e": 1.0, **TABLE1, "n": [1.0, 1.5]}})
+    both = {"n": [1.0, 1.5], "K": [1e6, 6e9], "zip": [["n", "K"]]}
+    result = impact.sweep({"models": "hertz", "sweep": {"e": 1.0, **TABLE1, **both}})
     assert result["exponent"].dims == ("model", "n")
     assert result["e_out"].values == pytest.approx(np.ones((1, 2)), abs=1e-9)
 

@@ -145,6 +145,13 @@ def _stiffness(
 ) -> Iterable[Fault]:
     if "K" not in given or (n is not None and math.isnan(n)):
         return
+    groups = given.get("zip")
+    together = [group for group in groups if isinstance(group, list)] if isinstance(groups, list) else []
+    if n is None and not any("K" in group and "n" in group for group in together):
+        yield (
+            ("sweep", "K"),
+            "its unit N/m^n depends on n, which is an axis; wants one K for each n, zipped with it",
+        )
     for model in models:
         if model.exponent is not None and model.exponent != n and "K" not in _table(own.get(model.key)):
             sweep = "an axis n" if n is None else f"n = {n:g}"
