@@ -7,7 +7,10 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from .api import ForceModel, ImpactError, Parameter, hysteresis, load, models, plot, run, save, sweep
+    from .api import load, models, plot, run, save, sweep
+    from .contact.model import ForceModel, Parameter
+    from .contact.models.hysteresis import hysteresis
+    from .errors import ImpactError
 
 __all__ = [
     "ForceModel",

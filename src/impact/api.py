@@ -2,48 +2,33 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
-from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+# a name imported "as itself" is public: `impact.__all__` hands it on
 from .contact.collide import Contact, collide
 from .contact.history import follow
-from .contact.model import ForceModel, Parameter
+from .contact.model import ForceModel as ForceModel
+from .contact.model import Parameter as Parameter
 from .contact.models import catalogue
-from .contact.models.hysteresis import hysteresis
+from .contact.models.hysteresis import hysteresis as hysteresis
 from .contact.status import Status
 from .data.history import history_dataset
+from .data.origin import config_of
 from .data.results import assemble
-from .data.store import load, save
-from .errors import ImpactError, UsageError
-from .sweeps.config import Config, parse_config, read_config
+from .data.store import load as load
+from .data.store import save as save
+from .errors import ImpactError as ImpactError
+from .sweeps.config import read_config
 from .sweeps.plan import Block, Plan
 from .sweeps.point import one_point
 from .sweeps.run import run as run_blocks
-from .text import safe_text
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
-
-__all__ = [
-    "ForceModel",
-    "ImpactError",
-    "Parameter",
-    "hysteresis",
-    "load",
-    "models",
-    "plot",
-    "run",
-    "save",
-    "sweep",
-]
-
-STARTER = files(__package__) / "sweeps" / "starter.toml"
-HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 
 
 def prepare(
@@ -162,7 +147,7 @@ def run(
     >>> round(shot.values["e_out"], 6), round(shot.e_energetic, 6)
     (0.41072, 0.41072)
     """
-    config, first = one_point(lambda more: _config_of(source, [*overrides, *more], plugins), model, at)
+    config, first = one_point(lambda more: config_of(source, [*overrides, *more], plugins), model, at)
     plan = Plan(config, tuple(plugins))
     law = config.models[0]
     lanes = plan.lanes(law, 0, 1)
@@ -186,34 +171,6 @@ def run(
         e_energetic=history.e_energetic if history else float("nan"),
         history=history_dataset(history, law.key, point) if history else None,
     )
-
-
-def _config_of(
-    source: str | Path | Mapping[str, object] | None, overrides: Sequence[str], plugins: Sequence[ForceModel]
-) -> Config:
-    """The config of a TOML file, a mapping, the starter, or of the sweep that a result came from."""
-    if source is None:
-        overrides = ["sweep.e=0.5", *overrides]
-        return parse_config(STARTER.read_text(encoding="utf-8"), overrides, plugins, name="starter")
-    if isinstance(source, Mapping):
-        return read_config(source, overrides, plugins)
-    path = Path(source)
-    if path.is_file():
-        with path.open("rb") as file:
-            if file.read(len(HDF5_MAGIC)) == HDF5_MAGIC:
-                attributes = load(path).attrs
-                if "config" not in attributes:
-                    raise UsageError(f"{safe_text(str(path))}: holds no config; it is a time history")
-                own = set(json.loads(attributes["plugins"])) - {model.key for model in plugins}
-                if own:
-                    names = safe_text(", ".join(sorted(own)))
-                    raise UsageError(
-                        f"{safe_text(str(path))}: made with a model of one's own: {names}; run it from "
-                        "Python, impact.run(..., plugins=[...])"
-                    )
-                stored = json.loads(attributes["config_set"])
-                return parse_config(attributes["config"], [*stored, *overrides], plugins, name=str(path))
-    return read_config(path, overrides, plugins)
 
 
 def models(plugins: Sequence[ForceModel] = ()) -> Mapping[str, ForceModel]:

@@ -225,10 +225,9 @@ def init(
     overwrite: Overwrite = False,
 ) -> None:
     """Write a commented starter config, ready to sweep."""
-    from .. import api
-    from ..data import store
+    from ..data import origin, store
 
-    store.write_whole(path, api.STARTER.read_bytes(), overwrite=overwrite)
+    store.write_whole(path, origin.STARTER.read_bytes(), overwrite=overwrite)
     door.say(f"{safe_text(str(path))}: written; next: impact sweep {safe_text(str(path))}")
 
 

@@ -192,7 +192,9 @@ def draw_final_velocities(numbers: FinalVelocities) -> Figure:
 def _look(curve: Curve, order: list[str], points: int) -> dict[str, Any]:
     """Colour and marker of a curve: a model's own, wherever it is drawn; the reference is a plain line."""
     if curve.model is None:
-        return {"color": "black", "linewidth": 2.2, "zorder": 1.5, "marker": "_" if points == 1 else ""}
+        # a single point has no line: a disc that shows around the models' markers
+        disc = {"marker": "o", "markersize": 10} if points == 1 else {}
+        return {"color": "black", "linewidth": 2.2, "zorder": 1.5, **disc}
     place = order.index(curve.model)
     every = max(1, points // 12)
     return {
