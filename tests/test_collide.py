@@ -1,5 +1,6 @@
 """An impact ends with the right status, and its numbers depend on nothing but itself: no company, no units."""
 
+import sys
 from dataclasses import fields, replace
 
 import numpy as np
@@ -140,6 +141,12 @@ def _raises(elastic, v, chi):
     return _refuses(elastic, chi) * (1.0 + chi * v)
 
 
+def _ends_the_program(elastic, v, chi):
+    if np.any(chi == POISON):
+        sys.exit(0)
+    return elastic * (1.0 + chi * v)
+
+
 def _wrong_shape(elastic, v, chi):
     whole = elastic * (1.0 + chi * v)
     return whole[..., None] if np.any(chi == POISON) else whole
@@ -157,6 +164,7 @@ POISONS = {
     "the force is too weak": (_lets_through, {Status.NOT_SEPARATED}),
     "the force pulls ever harder": (_pulls_ever_harder, {Status.NOT_SEPARATED, Status.STEP_UNDERFLOW}),
     "the force raises": (_raises, {Status.MODEL_ERROR}),
+    "the force ends the program": (_ends_the_program, {Status.MODEL_ERROR}),
     "the force has one axis too many": (_wrong_shape, {Status.MODEL_ERROR}),
     "the force has one value too few": (_too_short, {Status.MODEL_ERROR}),
 }

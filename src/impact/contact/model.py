@@ -222,5 +222,6 @@ def ask(formula: Formula, known: Mapping[str, Array | float]) -> Array:
     given = [known[wish] for wish in wishes(formula)]
     try:
         return np.asarray(formula(*given), dtype=float)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
+        # a formula that ends the program would take the other impacts with it
         raise ModelError(f"a formula raised {type(error).__name__}: {error}") from error
