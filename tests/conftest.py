@@ -5,13 +5,20 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 import xarray as xr
+from hypothesis import settings
 
 import impact
+
+from .forked import Forked, forking
+
+# no test is about time
+settings.register_profile("untimed", deadline=None)
+settings.load_profile("untimed")
 
 ROOT = Path(__file__).parent.parent
 Run = Callable[..., subprocess.CompletedProcess[str]]
@@ -58,6 +65,13 @@ def cli() -> Run:
         )
 
     return run
+
+
+@pytest.fixture(scope="session")
+def forked() -> Iterator[Forked]:
+    """The same, hundreds of times: processes of a server that has imported what they need."""
+    with forking() as run:
+        yield run
 
 
 @pytest.fixture(scope="session")

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import functools
 import inspect
+import json
+import re
 import subprocess
 import sys
 
@@ -14,6 +16,7 @@ import impact
 from impact.contact.status import Status
 from impact.sweeps.config import read_config
 from impact.sweeps.plan import Plan
+from impact.sweeps.plugins import read_plugins
 
 SWEEP = {"e": [0.2, 0.8], "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6e9}
 
@@ -43,7 +46,9 @@ def test_importing_loads_no_numpy() -> None:
 def test_a_model_of_ones_own() -> None:
     result = impact.sweep({"models": ["mine-2026", "exact-hysteresis"], "sweep": SWEEP}, plugins=[_mine()])
     assert np.abs(result["oracle_error"]).max() < 1e-9
-    assert "mine-2026" in result.attrs["plugins"]
+    recorded = json.loads(result.attrs["plugins"])["mine-2026"]
+    assert recorded["file"] is None
+    assert re.fullmatch("[0-9a-f]{64}", recorded["sha256"])
     assert impact.run({"models": ["mine-2026"], "sweep": SWEEP}, plugins=[_mine()]).model.title == "Mine"
     with pytest.raises(impact.ImpactError, match='got "mine-2026", wants a model'):
         impact.sweep({"models": ["mine-2026"], "sweep": SWEEP})
@@ -116,11 +121,15 @@ def test_the_fingerprint_sees_what_a_formula_closes_over() -> None:
         return _mine(chi=lambda e: factor * (1 - e))
 
     def fingerprint(model: impact.ForceModel) -> str:
-        return Plan(read_config({"models": model.key, "sweep": SWEEP}, (), [model]), (model,)).fingerprint
+        return Plan(
+            read_config({"models": model.key, "sweep": SWEEP}, (), [model]), read_plugins([model])
+        ).fingerprint
 
     assert fingerprint(scaled(1.0)) == fingerprint(scaled(1.0))
     assert fingerprint(scaled(1.0)) != fingerprint(scaled(2.0))
-    assert fingerprint(_mine(chi=functools.partial(lambda e, c: c * (1 - e), c=1.0)))
+    partly = [_mine(chi=functools.partial(lambda e, c: c * (1 - e), c=c)) for c in (1.0, 1.0, 2.0)]
+    assert fingerprint(partly[0]) == fingerprint(partly[1])
+    assert fingerprint(partly[0]) != fingerprint(partly[2])
 
 
 def test_a_force_of_the_wrong_shape_is_an_error_of_the_model() -> None:

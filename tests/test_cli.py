@@ -279,10 +279,12 @@ def test_no_control_byte_reaches_the_terminal(cli: Run, tmp_path: Path) -> None:
 
 def test_hostile_names_in_a_file_are_escaped(cli: Run, tmp_path: Path) -> None:
     name = "\x1b[31mP\x07\u202e"
-    result = impact.sweep(
-        {"models": "hertz", "sweep": {"e": [0.5, 1.0], "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 1e9}}
-    )
-    impact.save(result.rename(e=name).assign_coords(model=[name]), tmp_path / "bad.h5")
+    balls = {"e": [0.5, 1.0], "v1": 1.0, "m1": 1.0, "m2": 1.0, "material": [name, "steel"]}
+    materials = {key: {"E": "210 GPa", "nu": 0.3, "rho": 7850} for key in (name, "steel")}
+    result = impact.sweep({"title": name, "models": "hertz", "sweep": balls, "materials": materials})
+    hostile = result.assign_coords(model=[name], title=("model", [name]))
+    hostile["e"].attrs["units"] = name
+    impact.save(hostile, tmp_path / "bad.h5")
     commands = [["info"], ["plot"], ["plot", "--x", "z"], ["plot", "--sel", "z=1"], ["plot", "--model", "z"]]
     for command, *words in commands:
         done = cli(command, "bad.h5", *words, cwd=tmp_path)

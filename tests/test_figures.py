@@ -11,7 +11,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import impact
 from impact.errors import UsageError
-from impact.views.figures import FinalVelocities, draw_final_velocities, final_velocities, save_figure
+from impact.views.figures import FinalVelocities, draw_final_velocities, final_velocities
+from impact.views.look import save_figure
 
 
 def test_figure_6_is_the_stored_numbers(figure6: xr.Dataset) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import fields
 from pathlib import Path
 
@@ -157,7 +158,21 @@ def test_attributes(figure6: xr.Dataset) -> None:
     assert figure6.attrs["schema_version"] == 1
     assert figure6.attrs["impact_version"] == impact.__version__
     assert figure6.attrs["rtol"] == 1e-10
-    assert {"title", "fingerprint", "max_steps", "packages", "plugins", "content_digest"} <= figure6.attrs.keys()
+    assert {"title", "fingerprint", "max_steps", "packages", "content_digest"} <= figure6.attrs.keys()
+    assert figure6.attrs["plugins"] == "{}"
+
+
+def test_the_materials_that_a_ball_has_are_attributes(wide: xr.Dataset, figure6: xr.Dataset) -> None:
+    soft = {"E": 2e9, "nu": 0.4, "rho": 1000.0, "yield_strength": None}
+    hard = {"E": 210e9, "nu": 0.3, "rho": 7850.0, "yield_strength": None}
+    assert json.loads(wide.attrs["materials"]) == {"hard": hard, "soft": soft}
+    more = ["materials.idle={E=1e9, nu=0.3, rho=1}", 'materials.hard.yield_strength="250 MPa"']
+    plan = Plan(parse_config(WIDE, more))
+    found = json.loads(assemble(plan, run(plan)).attrs["materials"])
+    assert found == {"hard": {**hard, "yield_strength": 250e6}, "soft": soft}
+    assert list(json.loads(figure6.attrs["materials"])) == ["table1"]
+    without = impact.sweep({"models": "hertz", "sweep": {"e": 1.0, **TABLE1}})
+    assert without.attrs["materials"] == "{}"
 
 
 def test_the_fingerprint_is_blind_to_order_and_to_what_is_not_used() -> None:

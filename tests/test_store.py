@@ -35,7 +35,7 @@ def test_xarray_and_h5py_read_it(stored: Path, figure6: xr.Dataset) -> None:
         assert opened["status"].attrs["flag_meanings"].startswith("ok no_impact limit")
     with h5py.File(stored) as file:
         assert file["e_out"].shape == (3, 101)
-        assert file["e_out"].attrs["units"] == "1"
+        assert file["e_out"].attrs["units"] == b"1"
         assert [key.decode() for key in file["model"][:]] == figure6["model"].values.tolist()
         assert file["status"].dtype == np.int8
         assert file["e_out"].dims[1].keys() == ["e"]
@@ -142,16 +142,18 @@ def test_a_changed_number_is_noticed(stored: Path, tmp_path: Path) -> None:
 
 
 def test_a_part_of_a_result_can_be_stored(figure6: xr.Dataset, tmp_path: Path) -> None:
-    part = figure6.sel(model=["gharib-hurmuzlu-2012"]).assign(twice=2 * figure6["e_out"])
+    part = figure6.sel(model=["gharib-hurmuzlu-2012"])[["e_out", "status"]]
     impact.save(part, tmp_path / "part.h5")
-    assert impact.load(tmp_path / "part.h5")["twice"].dims == ("model", "e")
+    xr.testing.assert_identical(impact.load(tmp_path / "part.h5").drop_attrs(), part.drop_attrs())
+    impact.save(impact.load(tmp_path / "part.h5"), tmp_path / "same.h5")
+    assert (tmp_path / "same.h5").read_bytes() == (tmp_path / "part.h5").read_bytes()
     with pytest.raises(UsageError, match="not a result of impact"):
         impact.save(figure6.drop_attrs(), tmp_path / "bare.h5")
 
 
 @pytest.mark.parametrize(("variable", "name", "value"), [
-    (None, "config", "models = []"), (None, "rtol", 1e-3), (None, "fingerprint", "0"),
-    ("v1_post", "units", "km s-1"), ("e", "long_name", "something else"),
+    (None, "config", b"models = []"), (None, "rtol", 1e-3), (None, "fingerprint", b"0"),
+    ("v1_post", "units", b"km s-1"), ("e", "long_name", b"something else"),
 ])  # fmt: skip
 def test_a_changed_attribute_is_noticed(
     stored: Path, tmp_path: Path, variable: str | None, name: str, value: object
@@ -159,7 +161,7 @@ def test_a_changed_attribute_is_noticed(
     changed = tmp_path / "changed.h5"
     shutil.copy(stored, changed)
     with h5py.File(changed, "r+") as file:
-        (file if variable is None else file[variable]).attrs[name] = value
+        (file if variable is None else file[variable]).attrs[name] = np.array(value)
     with pytest.raises(ResultError, match="damaged"):
         impact.load(changed)
 

@@ -7,19 +7,24 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from .api import load, models, plot, run, save, sweep
+    from .api import bless, compare, load, models, plot, rerun, run, save, sweep
     from .contact.model import ForceModel, Parameter
     from .contact.models.hysteresis import hysteresis
+    from .data.verdict import Verdict
     from .errors import ImpactError
 
 __all__ = [
     "ForceModel",
     "ImpactError",
     "Parameter",
+    "Verdict",
+    "bless",
+    "compare",
     "hysteresis",
     "load",
     "models",
     "plot",
+    "rerun",
     "run",
     "save",
     "sweep",

@@ -2,27 +2,33 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 # a name imported "as itself" is public: `impact.__all__` hands it on
-from .contact.collide import Contact, collide
-from .contact.history import follow
+from .contact.collide import Contact
 from .contact.model import ForceModel as ForceModel
 from .contact.model import Parameter as Parameter
 from .contact.models import catalogue
 from .contact.models.hysteresis import hysteresis as hysteresis
-from .contact.status import Status
-from .data.history import history_dataset
-from .data.origin import config_of
+from .data.bless import bless as bless
+from .data.compare import compare as compare
+from .data.compare import repeats
+from .data.impact import Impact as Impact
+from .data.impact import impact_of
+from .data.origin import config_of, stored_config
 from .data.results import assemble
 from .data.store import load as load
 from .data.store import save as save
+from .data.tolerances import Tolerances
+from .data.verdict import Verdict as Verdict
 from .errors import ImpactError as ImpactError
 from .sweeps.config import read_config
 from .sweeps.plan import Block, Plan
+from .sweeps.plugins import read_plugins
 from .sweeps.point import one_point
 from .sweeps.run import run as run_blocks
 
@@ -34,11 +40,12 @@ if TYPE_CHECKING:
 def prepare(
     source: str | Path | Mapping[str, object],
     overrides: Sequence[str] = (),
-    plugins: Sequence[ForceModel] = (),
+    plugins: Sequence[ForceModel | str | Path] = (),
 ) -> Plan:
     """The plan of a config: a TOML file, or a mapping of the same shape."""
     source = Path(source) if isinstance(source, str) else source
-    return Plan(read_config(source, overrides, plugins), tuple(plugins))
+    own = read_plugins(plugins)
+    return Plan(read_config(source, overrides, own.models), own)
 
 
 def execute(plan: Plan, progress: Callable[[int], None] | None = None) -> xr.Dataset:
@@ -59,7 +66,7 @@ def sweep(
     source: str | Path | Mapping[str, object],
     *,
     overrides: Sequence[str] = (),
-    plugins: Sequence[ForceModel] = (),
+    plugins: Sequence[ForceModel | str | Path] = (),
 ) -> xr.Dataset:
     """Run a sweep.
 
@@ -67,7 +74,8 @@ def sweep(
     ----------
     source : path of a TOML file, or a mapping of the same shape
     overrides : changes to it, such as `"sweep.e=0.5"`
-    plugins : models of one's own, which the config may then name
+    plugins : models of one's own, which the config may then name, and paths of Python files that hold such;
+        the files are executed
 
     Returns
     -------
@@ -76,6 +84,7 @@ def sweep(
     Raises
     ------
     ConfigError : with all problems of the config
+    UsageError, ModelError : a plug-in cannot be read, or is not right
 
     >>> import impact
     >>> result = impact.sweep({
@@ -88,45 +97,13 @@ def sweep(
     return execute(prepare(source, overrides, plugins))
 
 
-@dataclass(frozen=True)
-class Impact:
-    """One impact by one model.
-
-    Parameters
-    ----------
-    model : the model
-    point : the inputs by their config names; a name in `first` is an axis of the source at its first value
-    values : the outputs under the names of the result file, in SI
-    damping : damping factor lambda = chi K/v0 [N s/m^(n+1)], NaN where the law has none
-    e_kinematic, e_kinetic, e_energetic : restitution from velocities, impulses and works, equations (1) to (3);
-        the last two are NaN without history
-    history : the time history as a dataset over t, or None where there is no motion to follow
-    """
-
-    model: ForceModel
-    point: Mapping[str, float | str]
-    first: tuple[str, ...]
-    values: Mapping[str, float]
-    exponent: float
-    closing_speed: float
-    damping: float
-    e_kinematic: float
-    e_kinetic: float
-    e_energetic: float
-    history: xr.Dataset | None
-
-    @property
-    def status(self) -> Status:
-        return Status(int(self.values["status"]))
-
-
 def run(
     source: str | Path | Mapping[str, object] | None = None,
     *,
     model: str | None = None,
     at: Mapping[str, float | str] | None = None,
     overrides: Sequence[str] = (),
-    plugins: Sequence[ForceModel] = (),
+    plugins: Sequence[ForceModel | str | Path] = (),
 ) -> Impact:
     """Run one impact and follow it through time.
 
@@ -136,51 +113,69 @@ def run(
     model : key of the model; by default the first of the source
     at : values by config name, such as `{"e": 0.05}`; an axis that is not named takes its first value
     overrides : changes to the config, such as `"sweep.m2=2"`
-    plugins : models of one's own
+    plugins : models of one's own, and paths of Python files; a result made with such wants them again
 
     Raises
     ------
-    ConfigError, UsageError, ResultError : the source, a name or a value is not right
+    ConfigError, UsageError, ModelError, ResultError : the source, a plug-in, a name or a value is not right
 
     >>> import impact
     >>> shot = impact.run(model="gharib-hurmuzlu-2012", at={"e": 0.5})
     >>> round(shot.values["e_out"], 6), round(shot.e_energetic, 6)
     (0.41072, 0.41072)
     """
-    config, first = one_point(lambda more: config_of(source, [*overrides, *more], plugins), model, at)
-    plan = Plan(config, tuple(plugins))
-    law = config.models[0]
-    lanes = plan.lanes(law, 0, 1)
-    solver = config.solver
-    contact = collide(law, lanes, rtol=solver.rtol, max_steps=solver.max_steps)
-    values = {field.name: getattr(contact, field.name)[0].item() for field in fields(contact)}
-    going = values["status"] == Status.OK
-    history = follow(law, lanes, rtol=solver.rtol, max_steps=solver.max_steps) if going else None
-    v0 = lanes.v0[0].item()
-    point = {**config.scalars, **({"e": lanes.e[0].item()} if "alpha" in config.scalars else {})}
-    return Impact(
-        model=law,
-        point=point,
-        first=first,
-        values=values,
-        exponent=lanes.n[0].item(),
-        closing_speed=v0,
-        damping=values["damping_ratio"] * values["stiffness"] / v0 if v0 else float("nan"),
-        e_kinematic=(values["v2_post"] - values["v1_post"]) / v0 if v0 > 0.0 else float("nan"),
-        e_kinetic=history.e_kinetic if history else float("nan"),
-        e_energetic=history.e_energetic if history else float("nan"),
-        history=history_dataset(history, law.key, point) if history else None,
-    )
+    own = read_plugins(plugins)
+    config, first = one_point(lambda more: config_of(source, [*overrides, *more], own), model, at)
+    return impact_of(Plan(config, own), first)
 
 
-def models(plugins: Sequence[ForceModel] = ()) -> Mapping[str, ForceModel]:
+def rerun(
+    result: str | Path,
+    *,
+    plugins: Sequence[ForceModel | str | Path] = (),
+    tol: float | Tolerances | None = None,
+    subset: bool = False,
+    execute: Callable[[Plan], xr.Dataset] = execute,
+) -> Verdict:
+    """Repeat the sweep of a result from its file alone, and judge what comes out by what is in it.
+
+    Parameters
+    ----------
+    result : the file
+    plugins : the models of one's own that it was made with, the same to the byte
+    tol, subset : see `compare`
+    execute : runs a plan
+
+    Raises
+    ------
+    ResultError : the file is not a readable result
+    UsageError : it is no result of a sweep, or a plug-in is missing or another
+    ConfigError : this version has no such model, or does not read such a config
+
+    >>> import impact, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     impact.save(impact.sweep("configs/figure6.toml"), f"{folder}/stored.h5")
+    ...     print(impact.rerun(f"{folder}/stored.h5"))
+    equal: 19 variables, 5,353 values, none differs
+    """
+    stored = load(result)
+    own = read_plugins(plugins)
+    # the models by their keys, because "all" is more models now than it was; the tolerances that took effect
+    keys = stored["model"].values.tolist() if "model" in stored.dims else []
+    solver = (f"solver.{name}={stored.attrs.get(name)}" for name in ("rtol", "max_steps"))
+    config = stored_config(stored.attrs, [f"models={json.dumps(keys)}", *solver], own, str(result))
+    verdict = compare(execute(Plan(config, own)), stored, tol=tol, subset=subset)
+    return replace(verdict, new="the rerun", baseline=str(result), repeats=repeats(str(result), stored))
+
+
+def models(plugins: Sequence[ForceModel | str | Path] = ()) -> Mapping[str, ForceModel]:
     """The catalogue of contact force models, by key.
 
     >>> import impact
     >>> impact.models()["gharib-hurmuzlu-2012"].equation
     'F = K δⁿ (1 + χ δ̇/v₀),  χ = 1/e  (28)'
     """
-    return catalogue(plugins)
+    return catalogue(read_plugins(plugins).models)
 
 
 def plot(

@@ -9,6 +9,7 @@ import signal
 import sys
 import tempfile
 import traceback
+import warnings
 from collections.abc import Callable, Iterator
 from types import FrameType
 
@@ -16,7 +17,7 @@ from ..errors import ImpactError, StoreError
 from ..text import safe_text
 
 # the exit codes; a shell sees 130 and 143 for the signals of the same meaning
-OK, USAGE, LANES_FAILED, STORAGE, INTERNAL, INTERRUPTED, TERMINATED = 0, 2, 3, 4, 70, 130, 143
+OK, NOT_EQUAL, USAGE, LANES_FAILED, STORAGE, INTERNAL, INTERRUPTED, TERMINATED = 0, 1, 2, 3, 4, 70, 130, 143
 
 
 class Interrupted(BaseException):
@@ -69,6 +70,7 @@ def enter(command: Callable[[], object], *, debug: bool) -> int:
         with contextlib.suppress(AttributeError):
             # a locale that cannot show a formula shows its escapes, not a traceback
             stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
+    warnings.showwarning = _note
     try:
         code = _run(command)
         sys.stdout.flush()
@@ -92,6 +94,11 @@ def enter(command: Callable[[], object], *, debug: bool) -> int:
             what = safe_text(f"{type(error).__name__}: {error}")
             say(f"internal error: {what}; report: {_report()}; --debug shows it", error=True)
         return INTERNAL
+
+
+def _note(message: Warning | str, *_: object, **__: object) -> None:
+    """A warning, of ours or of a library, is a line on stderr too."""
+    say(f"note: {safe_text(str(message), 1000)}")
 
 
 def _run(command: Callable[[], object]) -> int:

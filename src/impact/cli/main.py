@@ -12,7 +12,8 @@ import typer
 from .. import __version__
 from ..errors import UsageError
 from ..text import safe_text
-from . import door
+from . import door, regression
+from .options import Json, Overwrite, Plugins, Quiet, Sets
 from .words import dump, pairs
 
 app = typer.Typer(
@@ -27,13 +28,6 @@ app = typer.Typer(
     "impulse-momentum solution.",
     epilog="Start with: impact init, impact sweep config.toml, impact plot results.h5",
 )
-
-Json = Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")]
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace the output if it exists.")]
-Sets = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="PATH=VALUE", help="Change the config, such as sweep.m2=2.0; may be repeated."),
-]
 
 
 def _version(show: bool) -> None:
@@ -57,9 +51,10 @@ def sweep(
     config: Annotated[Path, typer.Argument(help="The sweep, a TOML file; `impact init` writes one.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="The result file.")] = Path("results.h5"),
     sets: Sets = None,
+    plugins: Plugins = None,
     overwrite: Overwrite = False,
     allow_failed: Annotated[bool, typer.Option("--allow-failed", help="Exit 0 even if points failed.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
+    quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
     """Run every model over a sweep and store post-impact velocities and their errors."""
@@ -68,19 +63,13 @@ def sweep(
         from ..data import store
         from . import summary
 
-        plan = api.prepare(config, sets or ())
+        plan = api.prepare(config, sets or (), plugins or ())
         dataset = None if overwrite else store.held(output, plan.fingerprint)
         fresh = dataset is None
         if dataset is None:
-            store.check_output(output, overwrite=overwrite, source=config)
-            with summary.progress(plan.points, quiet=quiet) as tell:
-
-                def step(done: int) -> None:
-                    check("nothing was written")
-                    tell(done)
-
-                dataset = api.execute(plan, step)
-            check("nothing was written")
+            for source in (config, *(plugins or ())):
+                store.check_output(output, overwrite=overwrite, source=source)
+            dataset = summary.execute(plan, check, quiet=quiet)
             api.save(dataset, output, overwrite=overwrite)
             check(f"{safe_text(str(output))} was stored whole")
     found = summary.summary(dataset, output)
@@ -123,13 +112,13 @@ def plot(
 
     from .. import api
     from ..data import store
-    from ..views import figures
+    from ..views import figures, look
     from . import console
 
     numbers = figures.final_velocities(api.load(result), x, pairs("--sel", sel), model)
     output = output or result.with_suffix(".png")
     store.check_output(output, overwrite=True, source=result)
-    figures.save_figure(figures.draw_final_velocities(numbers), output)
+    look.save_figure(figures.draw_final_velocities(numbers), output)
     told = f"{output}: over {numbers.x}"
     if numbers.slice:
         told += " at " + ", ".join(f"{name} = {console.shown(value)}" for name, value in numbers.slice.items())
@@ -157,6 +146,7 @@ def run(
         typer.Option("--at", metavar="NAME=VALUE", help="Value of an input, such as e=0.05; may be repeated."),
     ] = None,
     sets: Sets = None,
+    plugins: Plugins = None,
     history: Annotated[
         Path | None, typer.Option("--history", metavar="FILE", help="Keep the time history in this file.")
     ] = None,
@@ -170,8 +160,9 @@ def run(
     from . import tables
 
     if history is not None:
-        store.check_output(history, overwrite=overwrite, source=source)
-    impact = api.run(source, model=model, at=pairs("--at", at), overrides=sets or ())
+        for one in (source, *(plugins or ())):
+            store.check_output(history, overwrite=overwrite, source=one)
+    impact = api.run(source, model=model, at=pairs("--at", at), overrides=sets or (), plugins=plugins or ())
     if as_json:
         print(dump(tables.run_json(impact)))
     else:
@@ -183,6 +174,11 @@ def run(
             raise UsageError(f"no history to keep: {impact.status.meaning}")
         api.save(impact.history, history, overwrite=overwrite)
         door.say(f"{safe_text(str(history))}: {impact.history.sizes['t']} points in time")
+
+
+app.command(epilog="Example: impact compare results.h5 baseline.h5 --plot differences.png")(regression.compare)
+app.command(epilog='Example: impact bless results.h5 baseline.h5 --reason "finer tolerance"')(regression.bless)
+app.command(epilog="Example: impact rerun baseline.h5")(regression.rerun)
 
 
 @app.command(epilog="Example: impact models gharib-hurmuzlu-2012")

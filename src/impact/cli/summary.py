@@ -20,6 +20,8 @@ from .console import cell, console, shown, table
 if TYPE_CHECKING:
     import xarray as xr
 
+    from ..sweeps.plan import Plan
+
 # progress is shown when a sweep takes longer than this many seconds
 PATIENCE = 1.0
 FAILED_SHOWN = 3
@@ -45,6 +47,21 @@ def progress(points: int, *, quiet: bool) -> Iterator[Callable[[int], None]]:
         yield tell
     finally:
         bar.stop()
+
+
+def execute(plan: Plan, check: Callable[[str], None], *, quiet: bool) -> xr.Dataset:
+    """The result of a plan, with progress; between blocks a signal ends it."""
+    from .. import api
+
+    with progress(plan.points, quiet=quiet) as tell:
+
+        def step(done: int) -> None:
+            check("nothing was written")
+            tell(done)
+
+        dataset = api.execute(plan, step)
+    check("nothing was written")
+    return dataset
 
 
 def summary(dataset: xr.Dataset, output: Path) -> dict[str, Any]:

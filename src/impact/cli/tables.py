@@ -173,7 +173,10 @@ def print_info(dataset: xr.Dataset, path: Path) -> None:
             text = ", ".join(shown(one) for one in distinct)
         unit = plain_unit(str(coordinate.attrs.get("units", "1")))
         rows[str(name)] = text + ("" if unit == "1" else f" [{unit}]")
-    for name in ("rtol", "impact_version", "schema_version", "fingerprint", "content_digest", "plugins"):
+    for name in (
+        "rtol", "materials", "impact_version", "schema_version", "fingerprint", "content_digest", "plugins",
+        "tolerances", "reason",
+    ):  # fmt: skip
         if attributes.get(name, "{}") != "{}":
             rows[name] = attributes[name]
     if json.loads(attributes.get("config_set", "[]")):

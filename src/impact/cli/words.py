@@ -25,17 +25,28 @@ def pairs(option: str, words: list[str] | None) -> dict[str, float | str]:
     return found
 
 
+def tolerances(words: list[str] | None) -> dict[str, float] | None:
+    """VALUE for all variables, NAME=VALUE for one; nothing where none is given."""
+    named = [word if "=" in word else f"all={word}" for word in words or ()]
+    found: dict[str, float] = {}
+    for name, value in pairs("--tol", named).items():
+        if not isinstance(value, float):
+            raise UsageError(f"--tol {safe_text(str(value))}: wants a number from 0 up, such as --tol 1e-8")
+        found[name] = value
+    return found or None
+
+
 def dump(value: Any) -> str:
-    """Strict JSON: what is not a number is null."""
+    """Strict JSON in ASCII: what is not a number is null, and a wall's mass is "inf"."""
 
     def plain(one: Any) -> Any:
         match one:
             case float():
-                return one if abs(one) < float("inf") else None
+                return one if abs(one) < float("inf") else None if one != one else str(one)
             case dict():
                 return {str(name): plain(inner) for name, inner in one.items()}
             case list() | tuple():
                 return [plain(inner) for inner in one]
         return one
 
-    return json.dumps(plain(value), ensure_ascii=False, allow_nan=False)
+    return json.dumps(plain(value), allow_nan=False)

@@ -6,10 +6,11 @@ import json
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
-from ..contact.model import ForceModel
-from ..errors import UsageError
+from ..errors import ResultError, UsageError
 from ..sweeps.config import Config, parse_config, read_config
+from ..sweeps.plugins import Plugins
 from ..text import safe_text
 from .store import load
 
@@ -18,28 +19,114 @@ HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 
 
 def config_of(
-    source: str | Path | Mapping[str, object] | None, overrides: Sequence[str], plugins: Sequence[ForceModel]
+    source: str | Path | Mapping[str, object] | None, overrides: Sequence[str], plugins: Plugins
 ) -> Config:
     """The config of a TOML file, a mapping, the starter, or of the sweep that a result came from."""
     if source is None:
         overrides = ["sweep.e=0.5", *overrides]
-        return parse_config(STARTER.read_text(encoding="utf-8"), overrides, plugins, name="starter")
+        return parse_config(STARTER.read_text(encoding="utf-8"), overrides, plugins.models, name="starter")
     if isinstance(source, Mapping):
-        return read_config(source, overrides, plugins)
+        return read_config(source, overrides, plugins.models)
     path = Path(source)
     if path.is_file():
         with path.open("rb") as file:
             if file.read(len(HDF5_MAGIC)) == HDF5_MAGIC:
-                attributes = load(path).attrs
-                if "config" not in attributes:
-                    raise UsageError(f"{safe_text(str(path))}: holds no config; it is a time history")
-                own = set(json.loads(attributes["plugins"])) - {model.key for model in plugins}
-                if own:
-                    names = safe_text(", ".join(sorted(own)))
-                    raise UsageError(
-                        f"{safe_text(str(path))}: made with a model of one's own: {names}; run it from "
-                        "Python, impact.run(..., plugins=[...])"
-                    )
-                stored = json.loads(attributes["config_set"])
-                return parse_config(attributes["config"], [*stored, *overrides], plugins, name=str(path))
-    return read_config(path, overrides, plugins)
+                return stored_config(load(path).attrs, overrides, plugins, str(path))
+    return read_config(path, overrides, plugins.models)
+
+
+def stored_config(
+    attributes: Mapping[str, object], overrides: Sequence[str], plugins: Plugins, name: str
+) -> Config:
+    """The config of the sweep that a result came from.
+
+    Parameters
+    ----------
+    attributes : of the result
+    overrides : changes to its config, after those that it was made with
+    plugins : models that are not built in, those that it was made with among them
+    name : of the result, for messages
+
+    Raises
+    ------
+    UsageError : it is a time history, or was made with a model that is not given
+    ResultError, ConfigError : what it carries cannot be read, or is no config here
+    """
+    text = attributes.get("config")
+    if text is None:
+        raise UsageError(f"{safe_text(name)}: holds no config; it is a time history")
+    check_plugins(attributes, plugins, name)
+    stored = _json(attributes, "config_set", name)
+    if not (isinstance(text, str) and isinstance(stored, list) and all(isinstance(one, str) for one in stored)):
+        raise ResultError(f"{safe_text(name)}: its attributes config and config_set are not those of a result")
+    return parse_config(text, [*stored, *overrides], plugins.models, name=name)
+
+
+def check_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str) -> None:
+    """Refuse if a model of one's own that a result was made with is not given again, the same to the byte.
+
+    Nothing is imported because a result names it: what it names is compared with what is given, and told.
+
+    Parameters
+    ----------
+    attributes : of the result
+    plugins : what is given now; more than the result was made with is no fault
+    name : of the result, for messages
+
+    Raises
+    ------
+    UsageError : one is missing, or is another version
+    ResultError : the attribute cannot be read
+
+    >>> check_plugins({"plugins": '{"mine": {"file": "my.py", "sha256": "12ab"}}'}, Plugins(), "results.h5")
+    Traceback (most recent call last):
+    impact.errors.UsageError: results.h5: made with mine of my.py; give it again with --plugin FILE
+    """
+    made = _made_with(attributes, name)
+    shown = safe_text(name)
+    given = plugins.record
+    # the hash of a file is not that of a value: given in the other way, a model cannot be known to be the same
+    missing = [
+        key
+        for key, one in made.items()
+        if key not in given or (given[key]["file"] is None) != (one["file"] is None)
+    ]
+    if missing:
+        told = ", ".join(f"{key} of {made[key]['file'] or 'a Python value'}" for key in missing)
+        ways = {"plugins=[...]" if made[key]["file"] is None else "--plugin FILE" for key in missing}
+        again = "it" if len(missing) == 1 else "them"
+        raise UsageError(
+            f"{shown}: made with {safe_text(told)}; give {again} again with {' and '.join(sorted(ways))}"
+        )
+    for key, one in made.items():
+        if one["sha256"] != given[key]["sha256"]:
+            raise UsageError(
+                f"{shown}: was made with another version of {safe_text(one['file'] or f'the model {key}')}: its "
+                f"SHA-256 is {safe_text(str(one['sha256']), 64)}, this one's is {given[key]['sha256']}"
+            )
+
+
+def _made_with(attributes: Mapping[str, object], name: str) -> dict[str, dict[str, str | None]]:
+    """What a result says of the models that are not built in, in the shape of `Plugins.record`."""
+    made = _json(attributes, "plugins", name)
+    right = isinstance(made, dict) and all(
+        isinstance(one, dict)
+        and one.keys() == {"file", "sha256"}
+        and isinstance(one["sha256"], str)
+        and isinstance(one["file"], str | None)
+        for one in made.values()
+    )
+    if not right:
+        raise ResultError(
+            f"{safe_text(name)}: its attribute plugins is not that of a result, wants a file and a sha256 by key"
+        )
+    found: dict[str, dict[str, str | None]] = made
+    return found
+
+
+def _json(attributes: Mapping[str, object], attribute: str, name: str) -> Any:
+    """What an attribute of a result holds as JSON; it may come from anywhere."""
+    try:
+        return json.loads(str(attributes[attribute]))
+    except (KeyError, ValueError, RecursionError):
+        raise ResultError(f"{safe_text(name)}: its attribute {attribute} is missing, or is not JSON") from None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from typing import Literal
 
@@ -20,6 +20,8 @@ from ..sweeps.rules import MATERIALS, SWEEP, own_quantities
 from .digest import content_digest
 
 SCHEMA_VERSION = 1
+# coordinates along `model` that are texts about it
+ABOUT_A_MODEL = ("title", "year", "equation", "reference", "doi")
 
 
 @dataclass(frozen=True)
@@ -219,5 +221,6 @@ def _provenance(plan: Plan) -> dict[str, object]:
         "max_steps": config.solver.max_steps,
         "impact_version": __version__,
         "packages": json.dumps({name: version(name) for name in PACKAGES}),
-        "plugins": json.dumps(plan.plugin_hashes),
+        "plugins": json.dumps(plan.plugins.record),
+        "materials": json.dumps({name: asdict(material) for name, material in plan.materials_used.items()}),
     }

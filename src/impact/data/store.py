@@ -6,6 +6,7 @@ import contextlib
 import io
 import os
 import stat
+import warnings
 from pathlib import Path
 from secrets import token_hex
 
@@ -15,8 +16,10 @@ import xarray as xr
 
 from ..errors import ResultError, StoreError, UsageError
 from ..text import safe_text
+from . import guard
 from .digest import content_digest
-from .results import SCHEMA_VERSION
+from .form import misfit
+from .reader import read
 
 
 def check_output(path: Path, *, overwrite: bool, source: Path | None = None) -> None:
@@ -123,12 +126,37 @@ def save(dataset: xr.Dataset, path: str | Path, *, overwrite: bool = False) -> N
         raise UsageError(
             f"{safe_text(str(path))}: this dataset is not a result of impact: it has no schema_version"
         )
+    odd = misfit(dataset)
+    if odd:
+        raise UsageError(f"{safe_text(str(path))}: {odd}; dataset.to_netcdf(path) stores anything")
     check_output(path, overwrite=overwrite)
-    dataset = dataset.assign_attrs(content_digest=content_digest(dataset))
+    # how a file that the dataset came from was packed is not how a result is stored
+    dataset = dataset.drop_encoding()
+    dataset = _fixed(dataset.assign_attrs(content_digest=content_digest(dataset)))
     buffer = io.BytesIO()
     plain = {name: {"_FillValue": None} for name, v in dataset.variables.items() if v.dtype.kind == "f"}
     dataset.to_netcdf(buffer, engine="h5netcdf", encoding=plain)
+    try:
+        with h5py.File(buffer, "r") as file:
+            guard.vet(file, buffer)
+    except ResultError as error:
+        raise UsageError(f"{safe_text(str(path))}: would not be read again: {error}") from None
     write_whole(path, buffer.getbuffer(), overwrite=overwrite)
+
+
+def _fixed(dataset: xr.Dataset) -> xr.Dataset:
+    """The dataset with its attributes of text as so many bytes, a number that a reader knows beforehand."""
+
+    def fixed(value: object) -> object:
+        if not isinstance(value, str):
+            return value
+        written = value.encode()
+        return np.array(written, h5py.string_dtype("utf-8", max(len(written), 1)))
+
+    made = dataset.copy()
+    for holder in (made, *(made[name] for name in made.variables)):
+        holder.attrs = {name: fixed(value) for name, value in holder.attrs.items()}
+    return made
 
 
 def load(path: str | Path) -> xr.Dataset:
@@ -142,6 +170,10 @@ def load(path: str | Path) -> xr.Dataset:
     ------
     ResultError : it does not exist, is no result, is damaged, or is of another schema version
 
+    Warns
+    -----
+    UserWarning : it holds more than a result does, which is passed over
+
     >>> import impact
     >>> impact.load("README.md")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
@@ -150,23 +182,24 @@ def load(path: str | Path) -> xr.Dataset:
     path = Path(path)
     shown = safe_text(str(path))
     try:
-        if not path.is_file():
-            raise ResultError(f"{shown}: {'is not a regular file' if path.exists() else 'does not exist'}")
-        with h5py.File(path, "r") as file:
-            if not {"schema_version", "content_digest"} <= file.attrs.keys():
-                raise ResultError(f"{shown}: is not a result of impact")
-            schema = int(np.ravel(file.attrs["schema_version"])[0])
-        if schema != SCHEMA_VERSION:
-            raise ResultError(f"{shown}: has schema version {schema}, this program reads {SCHEMA_VERSION}")
-        with xr.open_dataset(path, engine="h5netcdf", decode_times=False, decode_timedelta=False) as opened:
-            dataset = opened.load()
-    except ResultError:
-        raise
+        # by its path: a signal that comes while h5py calls a Python stream is lost
+        with guard.opened(path) as stream, h5py.File(path, "r", driver="sec2") as file:
+            contents = guard.vet(file, stream)
+            dataset = read(file, stream, contents.axes)
+        digest = content_digest(dataset)
+        odd = misfit(dataset)
+    except ResultError as error:
+        raise ResultError(f"{shown}: {error}") from None
     except Exception as error:
         # h5py and xarray raise almost anything on a damaged file
         raise ResultError(f"{shown}: is not a readable result ({safe_text(str(error), 80)})") from error
-    if content_digest(dataset) != dataset.attrs["content_digest"]:
+    if digest != str(dataset.attrs["content_digest"]):
         raise ResultError(f"{shown}: is damaged: its content does not have the digest that it carries")
+    if odd:
+        raise ResultError(f"{shown}: is not a readable result ({odd})")
+    if contents.unknown:
+        names = safe_text(", ".join(contents.unknown))
+        warnings.warn(f"{shown}: passed over what is no part of a result: {names}", stacklevel=2)
     return dataset
 
 

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import hashlib
-import inspect
 import json
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..contact.lanes import Lanes, stiffness
-from ..contact.material import effective_mass, hertz_stiffness, sphere_radius
+from ..contact.material import Material, effective_mass, hertz_stiffness, sphere_radius
 from ..contact.model import ForceModel
 from ..contact.power import Array
 from .config import Config
+from .plugins import Plugins
 from .rules import MATERIALS
 
 # lanes of a block: enough to pay for the interpreter, few enough to stay in cache
@@ -44,7 +44,7 @@ class Plan:
     """
 
     config: Config
-    plugins: tuple[ForceModel, ...] = ()
+    plugins: Plugins = field(default_factory=Plugins)
 
     @property
     def models(self) -> tuple[ForceModel, ...]:
@@ -137,47 +137,20 @@ class Plan:
             "models": [model.key for model in config.models],
             "scalars": dict(sorted(config.scalars.items())),
             "axes": [{name: list(values) for name, values in axis.columns.items()} for axis in config.axes],
-            "materials": {name: asdict(config.materials[name]) for name in sorted(self._materials_used())},
+            "materials": {name: asdict(material) for name, material in self.materials_used.items()},
             "solver": asdict(config.solver),
             "variables": config.variables,
-            "plugins": self.plugin_hashes,
+            "plugins": self.plugins.hashes,
         }
         return hashlib.sha256(json.dumps(effective).encode()).hexdigest()
 
-    def _materials_used(self) -> set[str]:
-        """The names of materials that some ball has."""
+    @property
+    def materials_used(self) -> dict[str, Material]:
+        """The materials that some ball has, by name."""
         used: set[str] = set()
         for name in MATERIALS:
             if name in self.config.scalars:
                 used.add(str(self.config.scalars[name]))
             for place in self.axes_of(name):
                 used.update(str(one) for one in self.config.axes[place].columns[name])
-        return used
-
-    @property
-    def plugin_hashes(self) -> dict[str, str]:
-        """SHA-256 of the source of each model that is not built in, by key."""
-        return {model.key: _source_hash(model) for model in self.plugins}
-
-
-def _source_hash(model: ForceModel) -> str:
-    """SHA-256 over a model's declaration: its fields, and the source of its formulas with what they close over."""
-    parts: list[str] = []
-    for name, value in vars(model).items():
-        formulas = value.values() if name == "coefficients" else [value]
-        parts += (_source(one) if callable(one) else repr(one) for one in formulas)
-    return hashlib.sha256("\n".join(parts).encode()).hexdigest()
-
-
-def _source(formula: Callable[..., object]) -> str:
-    """What tells a formula from another: its source or code, its defaults, and the values it closes over."""
-    code = getattr(formula, "__code__", None)
-    if code is None:
-        return repr(formula)
-    try:
-        text = inspect.getsource(formula)
-    except (OSError, TypeError):
-        text = repr((code.co_code, code.co_names, code.co_consts))
-    cells = [cell.cell_contents for cell in getattr(formula, "__closure__", None) or ()]
-    closed = [_source(one) if callable(one) and one is not formula else repr(one) for one in cells]
-    return "\n".join([text, repr(getattr(formula, "__defaults__", None)), *closed])
+        return {name: self.config.materials[name] for name in sorted(used)}

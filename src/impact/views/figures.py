@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import io
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib.resources import files
-from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
@@ -18,26 +15,19 @@ from matplotlib.figure import Figure
 
 from ..contact.models import catalogue
 from ..data.results import plain_unit
-from ..data.store import write_whole
 from ..errors import UsageError
 from ..text import safe_text
+from .look import COLOURS, MARKERS, STYLE, axis_label, is_geometric
 from .slices import take_slice
 
 if TYPE_CHECKING:
     import xarray as xr
 
-# Okabe and Ito's colours, without the yellow that vanishes on white; a number of markers that shares no factor
-# with theirs, so that neighbours in the catalogue differ in both
-COLOURS = ("#7F4F24", "#009E73", "#56B4E9", "#CC79A7", "#D55E00", "#E69F00", "#0072B2")
-MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*", "p")
 # a legend has two columns where its labels are at most this long, and the figure grows by a line of this height
 # for every row of it
 SHORT_LABEL, LEGEND_ROW = 46, 0.19
 # characters of a line
 TITLE_WIDE, CONDITIONS_WIDE = 66, 104
-STYLE = files(__package__) / "impact.mplstyle"
-# a picture has the same bytes each time: no dates in it
-METADATA: dict[str, dict[str, None]] = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
 
 
 @dataclass(frozen=True)
@@ -109,8 +99,8 @@ def final_velocities(
     return FinalVelocities(
         title=safe_text(str(dataset.attrs.get("title", "")), 140),
         x=line.x,
-        x_label=_axis_label(data[line.x]),
-        x_is_geometric=_is_geometric(data[line.x].values),
+        x_label=axis_label(data[line.x]),
+        x_is_geometric=is_geometric(data[line.x].values),
         x_values=tuple(data[line.x].values.tolist()),
         unit="m/s",
         conditions=_conditions(data, line.x),
@@ -125,21 +115,6 @@ def _label(one: xr.Dataset) -> str:
     number = re.search(r"\(\d+\)(?:-\(\d+\))?$", str(one["equation"].values))
     name = f"{one['title'].values} ({one['year'].values})"
     return safe_text(f"{name}, {number[0]}" if number else name, 80)
-
-
-def _is_geometric(values: np.ndarray) -> bool:
-    """Whether sorted values are spaced evenly in their logarithm, over a decade or more."""
-    if len(values) < 3 or values[0] <= 0.0 or values[-1] < 10.0 * values[0]:
-        return False
-    return bool(np.allclose(np.diff(np.log(values)), np.log(values[1] / values[0]), rtol=1e-6))
-
-
-def _axis_label(coordinate: xr.DataArray) -> str:
-    meaning, unit = (str(coordinate.attrs.get(name, "")) for name in ("long_name", "units"))
-    unit = plain_unit(unit)
-    return safe_text(
-        f"{meaning or coordinate.name}, {coordinate.name}" + (f" [{unit}]" if unit not in ("", "1") else "")
-    )
 
 
 def _conditions(data: xr.Dataset, x: str) -> str:
@@ -225,21 +200,3 @@ def _name_the_balls(axes: Axes, numbers: FinalVelocities, x: np.ndarray) -> None
             )
             axes.annotate(name, ends[ball], aside, textcoords="offset points", va="center", fontsize=11,
                           annotation_clip=False)  # fmt: skip
-
-
-def save_figure(figure: Figure, path: str | Path) -> None:
-    """Write a figure; the format follows the file's ending, and the bytes are the same each time.
-
-    Raises
-    ------
-    UsageError : the ending is not .png, .svg or .pdf, or the file cannot be written there
-    StoreError : the disk is full or failed
-    """
-    path = Path(path)
-    kind = path.suffix.lower().removeprefix(".")
-    if kind not in METADATA:
-        raise UsageError(f"{safe_text(str(path))}: wants a name that ends in .png, .svg or .pdf")
-    buffer = io.BytesIO()
-    with matplotlib.rc_context(fname=str(STYLE)):
-        figure.savefig(buffer, format=kind, metadata=METADATA[kind])
-    write_whole(path, buffer.getbuffer(), overwrite=True)

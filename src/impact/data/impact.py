@@ -1,0 +1,74 @@
+"""One impact by one model, followed through time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+
+import xarray as xr
+
+from ..contact.collide import collide
+from ..contact.history import follow
+from ..contact.model import ForceModel
+from ..contact.status import Status
+from ..sweeps.plan import Plan
+from .history import history_dataset
+
+
+@dataclass(frozen=True)
+class Impact:
+    """One impact by one model.
+
+    Parameters
+    ----------
+    model : the model
+    point : the inputs by their config names; a name in `first` is an axis of the source at its first value
+    values : the outputs under the names of the result file, in SI
+    damping : damping factor lambda = chi K/v0 [N s/m^(n+1)], NaN where the law has none
+    e_kinematic, e_kinetic, e_energetic : restitution from velocities, impulses and works, equations (1) to (3);
+        the last two are NaN without history
+    history : the time history as a dataset over t, or None where there is no motion to follow
+    """
+
+    model: ForceModel
+    point: Mapping[str, float | str]
+    first: tuple[str, ...]
+    values: Mapping[str, float]
+    exponent: float
+    closing_speed: float
+    damping: float
+    e_kinematic: float
+    e_kinetic: float
+    e_energetic: float
+    history: xr.Dataset | None
+
+    @property
+    def status(self) -> Status:
+        return Status(int(self.values["status"]))
+
+
+def impact_of(plan: Plan, first: tuple[str, ...]) -> Impact:
+    """The only impact of a plan; `first` are axes of its source that are at their first value."""
+    config = plan.config
+    law = config.models[0]
+    lanes = plan.lanes(law, 0, 1)
+    solver = config.solver
+    contact = collide(law, lanes, rtol=solver.rtol, max_steps=solver.max_steps)
+    values = {field.name: getattr(contact, field.name)[0].item() for field in fields(contact)}
+    going = values["status"] == Status.OK
+    history = follow(law, lanes, rtol=solver.rtol, max_steps=solver.max_steps) if going else None
+    v0 = lanes.v0[0].item()
+    point = {**config.scalars, **({"e": lanes.e[0].item()} if "alpha" in config.scalars else {})}
+    return Impact(
+        model=law,
+        point=point,
+        first=first,
+        values=values,
+        exponent=lanes.n[0].item(),
+        closing_speed=v0,
+        damping=values["damping_ratio"] * values["stiffness"] / v0 if v0 else float("nan"),
+        e_kinematic=(values["v2_post"] - values["v1_post"]) / v0 if v0 > 0.0 else float("nan"),
+        e_kinetic=history.e_kinetic if history else float("nan"),
+        e_energetic=history.e_energetic if history else float("nan"),
+        history=history_dataset(history, law.key, point) if history else None,
+    )

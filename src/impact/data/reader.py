@@ -1,0 +1,47 @@
+"""A result from a file that was looked at: what was found there is read, and nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import BinaryIO
+
+import h5py
+import numpy as np
+import xarray as xr
+
+from .guard import NETCDF
+from .heap import labels, texts
+from .names import is_quantity
+
+
+def read(file: h5py.File, stream: BinaryIO, axes: Mapping[str, tuple[str, ...]]) -> xr.Dataset:
+    """The dataset in a file.
+
+    Numbers are as they are stored, whatever an attribute says of scales, fill values and times.
+
+    Parameters
+    ----------
+    file, stream : the file, and its bytes
+    axes : the names to read, each with its axes
+    """
+    data = {name: file[name] for name in axes}
+    found = {name: labels(stream, one.id.get_offset(), one.id.get_storage_size())
+             for name, one in data.items() if one.dtype.kind == "O"}  # fmt: skip
+    values = {name: np.array(words).reshape(data[name].shape) for name, words in texts(stream, found).items()}
+    variables = {
+        name: xr.Variable(axes[name], values[name] if name in values else one[()], _attributes(one))
+        for name, one in data.items()
+    }
+    given = [name for name in axes if not is_quantity(name, axes[name])]
+    return xr.Dataset(variables, attrs=_attributes(file)).set_coords(given)
+
+
+def _attributes(holder: h5py.File | h5py.Dataset) -> dict[str, object]:
+    """Attributes as they were before they were stored."""
+    found: dict[str, object] = {}
+    for name in holder.attrs:
+        if name not in NETCDF:
+            value = holder.attrs[name]
+            array = np.ravel(value)
+            found[name] = value.decode() if isinstance(value, bytes) else array[0] if array.size == 1 else value
+    return found

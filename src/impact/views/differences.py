@@ -1,0 +1,165 @@
+"""A picture of where two results differ: for every axis, how many tolerances, at most, at each of its labels."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from textwrap import fill
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from ..data.verdict import Judged, Verdict
+from ..errors import UsageError
+from ..text import safe_text
+from .look import COLOURS, MARKERS, STYLE, axis_label, is_geometric
+
+PANEL_HEIGHT, ROOM = 2.3, 1.3
+# differences far below the tolerance are all the same
+SMALLEST = 1e-4
+TITLE_WIDE, LABEL_WIDE, X_LABEL_WIDE, TICKS, MANY = 78, 34, 44, 24, 40
+# letters of all the names under an axis of half the width
+SHORT_NAMES = 30
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One axis: its label, its values or names, and by variable the largest ratio at each of them."""
+
+    label: str
+    values: tuple[float, ...]
+    names: tuple[str, ...]
+    ratios: Mapping[str, tuple[float, ...]]
+
+
+@dataclass(frozen=True)
+class Differences:
+    """What the picture shows: the verdict's first line, a panel for each axis, and the variables not shown."""
+
+    title: str
+    panels: tuple[Panel, ...]
+    not_shown: int
+
+
+def differences(verdict: Verdict) -> Differences:
+    """The numbers of the picture.
+
+    Raises
+    ------
+    UsageError : the two have no point in common
+    """
+    ratios = verdict.ratios
+    if not ratios.data_vars:
+        raise UsageError("no picture: there is no point to draw at")
+    judged = [one for one in verdict.variables if one.judged != "reported"]
+    wanted = verdict.differing or tuple(sorted((one for one in judged if one.times), key=_nearest_first))
+    shown = [one.name for one in wanted[: len(COLOURS)]]
+    sizes = ratios[shown].sizes if shown else ratios.sizes
+    axes = [str(dim) for dim, size in sizes.items() if size > 1] or [str(dim) for dim in list(sizes)[:1]]
+    panels = []
+    for axis in axes:
+        along = {name: ratios[name] for name in shown if axis in ratios[name].dims}
+        worst = {name: one.max([dim for dim in one.dims if dim != axis]) for name, one in along.items()}
+        coordinate = ratios[axis]
+        numbers = coordinate.dtype.kind == "f" and bool(np.isfinite(coordinate.values).all())
+        order = np.argsort(coordinate.values, kind="stable") if numbers else np.arange(coordinate.size)
+        values = coordinate.values[order]
+        names = () if numbers else tuple(_name(value) for value in values.tolist())
+        panels.append(
+            Panel(
+                label=axis_label(coordinate),
+                values=tuple(values.tolist()) if numbers else tuple(range(len(values))),
+                names=names,
+                ratios={name: tuple(one.values[order].tolist()) for name, one in worst.items()},
+            )
+        )
+    return Differences(verdict.headline, tuple(panels), max(0, len(wanted) - len(shown)))
+
+
+def _nearest_first(one: Judged) -> float:
+    return -one.times
+
+
+def _name(value: float | str) -> str:
+    return f"{value:g}" if isinstance(value, float) else safe_text(value, LABEL_WIDE)
+
+
+def draw_differences(numbers: Differences) -> Figure:
+    """Draw where two results differ: a point above the line does; one that is equal to the bit is not drawn."""
+    with matplotlib.rc_context(fname=str(STYLE)):
+        rows = _rows(numbers.panels)
+        width = matplotlib.rcParams["figure.figsize"][0]
+        figure = Figure((width, ROOM + PANEL_HEIGHT * len(rows)), layout="constrained")
+        grid = figure.add_gridspec(len(rows), 2)
+        names = list(dict.fromkeys(name for panel in numbers.panels for name in panel.ratios))
+        ends = _ends(numbers.panels)
+        for row, panels in enumerate(rows):
+            for column, panel in enumerate(panels):
+                place = grid[row, :] if len(panels) == 1 else grid[row, column]
+                axes = figure.add_subplot(place)
+                _draw_panel(axes, panel, names, ends)
+        figure.suptitle(fill(numbers.title, TITLE_WIDE), x=0.01, ha="left", fontweight="bold", fontsize=10,
+                        parse_math=False)  # fmt: skip
+        figure.supylabel("largest |new − baseline|, in tolerances", fontsize=9)
+        handles, labels = figure.axes[0].get_legend_handles_labels()
+        if numbers.not_shown:
+            handles, labels = [*handles, Line2D([], [], linestyle="")], [*labels, f"and {numbers.not_shown} more"]
+        if handles:
+            figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    return figure
+
+
+def _rows(panels: Sequence[Panel]) -> list[tuple[Panel, ...]]:
+    """Panels in rows of two; one with many names has a row of its own."""
+    rows: list[tuple[Panel, ...]] = []
+    for panel in panels:
+        is_wide = sum(map(len, panel.names)) > SHORT_NAMES
+        if not is_wide and rows and len(rows[-1]) == 1 and sum(map(len, rows[-1][0].names)) <= SHORT_NAMES:
+            rows[-1] = (*rows[-1], panel)
+        else:
+            rows.append((panel,))
+    return rows
+
+
+def _ends(panels: Sequence[Panel]) -> tuple[float, float]:
+    """The ends of the vertical axis: the tolerance in sight, and room above for what has no number."""
+    found = [r for panel in panels for row in panel.ratios.values() for r in row if 0.0 < r < np.inf]
+    return max(SMALLEST, min([0.1, *found]) / 2.0), 10.0 * max([10.0, *found])
+
+
+def _draw_panel(axes: Axes, panel: Panel, names: list[str], ends: tuple[float, float]) -> None:
+    bottom, top = ends
+    axes.axhspan(1.0, top, color="#D55E00", alpha=0.07, linewidth=0)
+    axes.axhline(1.0, color="black", linewidth=1.0)
+    axes.annotate("tolerance", (1.0, 1.0), (-2, -3), xycoords=("axes fraction", "data"),
+                  textcoords="offset points", ha="right", va="top", fontsize=7, color="#555555")  # fmt: skip
+    x = np.asarray(panel.values, float)
+    for place, name in enumerate(names):
+        ratio = np.asarray(panel.ratios.get(name, np.full(len(x), np.nan)), float)
+        # what has no number of tolerances, such as a NaN against a number, stands at the upper edge
+        height = np.where(ratio > 0.0, np.clip(ratio, bottom, top / 2.0), np.nan)
+        axes.plot(
+            x, height, label=name, color=COLOURS[place % len(COLOURS)], marker=MARKERS[place % len(MARKERS)],
+            markerfacecolor="white", linewidth=0.9, linestyle="" if panel.names else "-",
+            markersize=4.5 if len(x) <= MANY else 2.5,
+        )  # fmt: skip
+    axes.set_yscale("log")
+    axes.set_ylim(bottom, top)
+    axes.set_xlabel(fill(panel.label, X_LABEL_WIDE), parse_math=False, fontsize=8)
+    if not panel.names and is_geometric(x):
+        axes.set_xscale("log")
+        room = (x[-1] / x[0]) ** 0.03
+        axes.set_xlim(x[0] / room, x[-1] * room)
+    else:
+        room = 0.04 * (x[-1] - x[0]) or 0.5
+        axes.set_xlim(x[0] - room, x[-1] + room)
+    if panel.names:
+        every = max(1, -(-len(x) // TICKS))
+        is_wide = sum(map(len, panel.names[::every])) > SHORT_NAMES
+        axes.set_xticks(
+            x[::every], panel.names[::every], parse_math=False, fontsize=7.5,
+            rotation=20 if is_wide else 0, ha="right" if is_wide else "center",
+        )  # fmt: skip

@@ -1,0 +1,149 @@
+"""The command line in hundreds of real processes: a server imports what the commands need once, and forks.
+
+Its standard input has a request a line, {"argv": [...], "cwd": "...", "limit": seconds}; its standard output
+a reply a line. The server has one thread, so that a child finds no lock held by a thread that it has not got.
+"""
+
+from __future__ import annotations
+
+import atexit
+import ctypes
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import IO, NoReturn
+
+ROOT = Path(__file__).parent.parent
+PAUSE = 0.002  # s between two looks whether a child has ended
+
+
+@dataclass(frozen=True)
+class Done:
+    """How a command line ended: a negative returncode is a signal; CPU time [s] and largest memory [bytes]."""
+
+    returncode: int
+    seconds: float
+    memory: int
+    timed_out: bool
+    stdout: str
+    stderr: str
+
+
+@dataclass(frozen=True)
+class Forked:
+    """The client's side: `forked("info", path)` runs `impact info PATH` in a process of its own."""
+
+    server: subprocess.Popen[str]
+
+    def __call__(self, *words: str | Path, cwd: Path = ROOT, limit: float = 30.0) -> Done:
+        assert self.server.stdin is not None
+        assert self.server.stdout is not None
+        request = {"argv": [str(word) for word in words], "cwd": str(cwd), "limit": limit}
+        print(json.dumps(request), file=self.server.stdin, flush=True)
+        return Done(**json.loads(self.server.stdout.readline()))
+
+
+@contextmanager
+def forking() -> Iterator[Forked]:
+    """A server for as long as it is needed."""
+    # a pool of threads made before the fork would be missing after it
+    alone = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+    command = [sys.executable, "-m", "tests.forked"]
+    with subprocess.Popen(
+        command, cwd=ROOT, env={**os.environ, **alone}, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as server:
+        try:
+            yield Forked(server)
+        finally:
+            assert server.stdin is not None
+            server.stdin.close()
+
+
+def serve() -> None:
+    """Answer requests until there are no more."""
+    _warm_up()
+    for line in sys.stdin:
+        request = json.loads(line)
+        with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
+            child = os.fork()
+            if child == 0:
+                _command(request["argv"], request["cwd"], out, err)
+            done = _wait(child, request["limit"], out, err)
+        print(json.dumps(asdict(done)), flush=True)
+
+
+def _warm_up() -> None:
+    """Import what the commands import, and what their libraries import on first use."""
+    import impact
+    import impact.cli.summary
+    import impact.cli.tables
+
+    point = {"e": [0.5, 1.0], "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6e9}
+    with tempfile.TemporaryDirectory() as folder:
+        impact.save(impact.sweep({"models": "gharib-hurmuzlu-2012", "sweep": point}), f"{folder}/warm.h5")
+        impact.plot(impact.load(f"{folder}/warm.h5")).savefig(f"{folder}/warm.png")
+
+
+def _command(argv: list[str], cwd: str, out: IO[bytes], err: IO[bytes]) -> NoReturn:
+    """In the child: become the command, and leave as a program does."""
+    from impact.cli.main import main
+
+    code: object = 99
+    try:
+        os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+        os.dup2(out.fileno(), 1)
+        os.dup2(err.fileno(), 2)
+        os.chdir(cwd)
+        sys.argv = ["impact", *argv]
+        main()
+    except SystemExit as leaving:
+        code = leaving.code or 0
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        # libraries close their files at the exit, and can crash there: os._exit would hide it
+        atexit._run_exitfuncs()
+        ctypes.CDLL(None).exit(code if isinstance(code, int) else 99)
+    raise AssertionError("not reached")
+
+
+def _wait(child: int, limit: float, out: IO[bytes], err: IO[bytes]) -> Done:
+    """In the server: how the child ended; one that takes too long is killed."""
+    begun = time.monotonic()
+    timed_out = False
+    while True:
+        ended, status, usage = os.wait4(child, os.WNOHANG)
+        if ended:
+            break
+        if not timed_out and time.monotonic() - begun > limit:
+            os.kill(child, signal.SIGKILL)
+            timed_out = True
+        time.sleep(PAUSE)
+    texts = []
+    for stream in (out, err):
+        stream.seek(0)
+        texts.append(stream.read().decode(errors="backslashreplace"))
+    # the kernel counts memory in units of 1024 bytes, but macOS in bytes
+    unit = 1 if sys.platform == "darwin" else 1024
+    return Done(
+        os.waitstatus_to_exitcode(status),
+        usage.ru_utime + usage.ru_stime,
+        usage.ru_maxrss * unit,
+        timed_out,
+        *texts,
+    )
+
+
+if __name__ == "__main__":
+    serve()

@@ -1,0 +1,364 @@
+"""Files that do harm, each a genuine result in which one thing is wrong, and the words that refuse it.
+
+Where numbers could be read in spite of it they are the genuine ones: the digest is right, and refuses nothing.
+"""
+
+from __future__ import annotations
+
+import mmap
+import os
+import re
+import struct
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import h5py
+import numpy as np
+from h5py import h5a, h5d, h5p, h5s, h5t
+from scipy.io import netcdf_file
+
+SECRET = b"the secret 1234567"
+UTF8 = h5py.string_dtype()
+HERE = "not stored in one piece in this file"
+KIND = "neither numbers nor labels"
+HOLDS = "declares other data than the file holds"
+AXES = "its axes are not those of the file"
+ODD = "an attribute of an unusual kind or size"
+Make = Callable[[Path], object]
+Change = Callable[[h5py.File], object]
+
+
+def _netcdf3(path: Path) -> None:
+    with netcdf_file(path, "w") as file:
+        file.createDimension("e", 3)
+        file.schema_version = 1
+
+
+NOT_HDF5: dict[str, tuple[Make, str]] = {
+    "empty": (lambda path: path.write_bytes(b""), "not an HDF5 file"),
+    "text": (lambda path: path.write_bytes(SECRET), "not an HDF5 file"),
+    "png": (lambda path: path.write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(1000)), "not an HDF5 file"),
+    "netCDF-3": (_netcdf3, "not an HDF5 file"),
+    "magic": (lambda path: path.write_bytes(b"\x89HDF\r\n\x1a\n"), "not a readable result"),
+    "magic and zeros": (lambda path: path.write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(9999)), "not a readable"),
+    "FIFO": (os.mkfifo, "is not a regular file"),
+    "device": (lambda path: path.symlink_to("/dev/zero"), "is not a regular file"),
+    "folder": (lambda path: path.mkdir(), "is not a regular file"),
+    "link to a folder": (lambda path: path.symlink_to("."), "is not a regular file"),
+    "link to nothing": (lambda path: path.symlink_to("nothing"), "does not exist"),
+    "link to itself": (lambda path: path.symlink_to(path.name), "bad.h5: "),
+}  # fmt: skip
+
+
+def anew(file: h5py.File, name: str, **how: object) -> h5py.Dataset:
+    """Store a variable again, with the same numbers, axes and attributes, but in another way."""
+    old = file[name]
+    values, attributes = old[()], {key: old.attrs[key] for key in old.attrs if key != "DIMENSION_LIST"}
+    scales = [dimension[0].name for dimension in old.dims]
+    del file[name]
+    new = file.create_dataset(name, **({"data": values} | how))
+    for key, value in attributes.items():
+        new.attrs[key] = value
+    for dimension, scale in zip(new.dims, scales, strict=True):
+        dimension.attach_scale(file[scale])
+    return new
+
+
+def _beside(file: h5py.File, name: str) -> Path:
+    return Path(file.filename).with_name(name)
+
+
+def _link_to_hdf5(file: h5py.File) -> None:
+    with h5py.File(_beside(file, "secret.h5"), "w") as other:
+        other["v1_post"] = file["v1_post"][()]
+    del file["v1_post"]
+    file["v1_post"] = h5py.ExternalLink("secret.h5", "v1_post")
+
+
+def _link_to_text(file: h5py.File) -> None:
+    _beside(file, "secret.txt").write_bytes(SECRET)
+    file["other"] = h5py.ExternalLink("secret.txt", SECRET.decode())
+
+
+def _soft_link(file: h5py.File) -> None:
+    file.move("v1_post", "duration_")
+    file["v1_post"] = h5py.SoftLink("/duration_")
+
+
+def _external_storage(file: h5py.File, name: str) -> None:
+    values = file["v1_post"][()]
+    _beside(file, "secret.bin").write_bytes(values.tobytes() + SECRET)
+    how = {"data": None, "shape": values.shape, "dtype": "f8", "external": "secret.bin"}
+    anew(file, name, **how) if name in file else file.create_dataset(name, **how)
+
+
+def _virtual(file: h5py.File, source: str) -> None:
+    values = file["v1_post"][()]
+    with h5py.File(_beside(file, "secret.h5"), "w") as other:
+        other["v1_post"] = values
+    layout = h5py.VirtualLayout(values.shape, "f8")
+    layout[:] = h5py.VirtualSource(source, "v1_post", values.shape)
+    file.create_virtual_dataset("other", layout)
+
+
+def _compact(file: h5py.File) -> None:
+    plan = h5p.create(h5p.DATASET_CREATE)
+    plan.set_layout(h5d.COMPACT)
+    h5d.create(file.id, b"other", h5t.IEEE_F64LE, h5s.create_simple((3,)), plan)
+
+
+def _unwritten(file: h5py.File, length: int) -> None:
+    """A dataset that has its place in the file, though not on the disk."""
+    plan = h5p.create(h5p.DATASET_CREATE)
+    plan.set_alloc_time(h5d.ALLOC_TIME_EARLY)
+    plan.set_fill_time(h5d.FILL_TIME_NEVER)
+    h5d.create(file.id, b"other", h5t.IEEE_F64LE, h5s.create_simple((length,)), plan)
+
+
+def _of_kind(file: h5py.File, kind: h5t.TypeID) -> None:
+    plan = h5p.create(h5p.DATASET_CREATE)
+    plan.set_alloc_time(h5d.ALLOC_TIME_EARLY)
+    h5d.create(file.id, b"other", kind, h5s.create_simple((3,)), plan)
+
+
+def _seven_bits() -> h5t.TypeID:
+    kind = h5t.STD_I8LE.copy()
+    kind.set_precision(7)
+    return kind
+
+
+def _nested(file: h5py.File) -> None:
+    group = file
+    for _ in range(3000):
+        group = group.create_group("g")
+
+
+def _many_links(file: h5py.File) -> None:
+    for number in range(100_000):
+        file.id.links.create_hard(b"x%d" % number, file.id, b"e")
+
+
+def _many_attributes(file: h5py.File) -> None:
+    for number in range(10_000):
+        file["e"].attrs.create(f"x{number}", 1)
+
+
+def _bare(file: h5py.File, name: str, **how: object) -> None:
+    file.create_dataset(name, **how)
+
+
+def _null(file: h5py.File) -> None:
+    h5a.create(file["v1_post"].id, b"x", h5t.IEEE_F64LE, h5s.create(h5s.NULL))
+
+
+def _numbered(file: h5py.File, name: str, numbers: object) -> None:
+    file[name].attrs["_Netcdf4Coordinates"] = numbers
+
+
+def _unknown_axis(file: h5py.File) -> None:
+    file["x"] = [1.0, 2.0, 3.0]
+    file["x"].make_scale("x")
+    _numbered(file, "x", [7])
+    _numbered(file, "v1_post", [0, 7, 2])
+
+
+def _set(file: h5py.File, holder: str, name: str, value: object, dtype: object = None) -> None:
+    (file[holder] if holder else file).attrs.create(name, value, dtype=dtype)
+
+
+def _without(file: h5py.File, name: str) -> None:
+    del file.attrs[name]
+
+
+BROKEN = b"caf\xe9"
+CHANGES: dict[str, tuple[Change, str]] = {
+    "no schema": (partial(_without, name="schema_version"), "is not a result of impact"),
+    "no digest": (partial(_without, name="content_digest"), "is not a result of impact"),
+    "later schema": (lambda f: _set(f, "", "schema_version", 99), "schema version 99"),
+    "huge schema": (lambda f: _set(f, "", "schema_version", 2**64 - 1, "u8"), "version 18446744073709551615"),
+    "schema of text": (lambda f: _set(f, "", "schema_version", "1"), "not a number"),
+    "schema of two": (lambda f: _set(f, "", "schema_version", [1, 1]), "not a number"),
+    "schema of a million": (lambda f: _set(f, "", "schema_version", np.ones(8000, int)), "not a number"),
+    "digest of numbers": (lambda f: _set(f, "", "content_digest", 1), "is damaged"),
+    "digest of two numbers": (lambda f: _set(f, "", "content_digest", [1, 2]), "is damaged"),
+    "digest of texts": (lambda f: _set(f, "", "content_digest", ["a", "b"], UTF8), ODD),
+    "external link": (_link_to_hdf5, "a link to somewhere else"),
+    "external link to text": (_link_to_text, "a link to somewhere else"),
+    "soft link": (_soft_link, "a link to somewhere else"),
+    "dangling link": (lambda f: f.__setitem__("other", h5py.SoftLink("/nowhere")), "a link to somewhere else"),
+    "second name": (lambda f: f.__setitem__("other", f["v1_post"]), "a dataset of two names"),
+    "a group": (lambda f: f.create_group("other"), "not a dataset"),
+    "3,000 groups": (_nested, "not a dataset"),
+    "a type": (lambda f: f.__setitem__("other", np.dtype("f8")), "not a dataset"),
+    "100,000 links": (_many_links, "more than 1,000 datasets"),
+    "external storage": (partial(_external_storage, name="v1_post"), HERE),
+    "external storage of another": (partial(_external_storage, name="other"), HERE),
+    "virtual": (partial(_virtual, source="secret.h5"), HERE),
+    "virtual without source": (partial(_virtual, source="nowhere.h5"), HERE),
+    "chunked": (partial(anew, name="v1_post", chunks=True), HERE),
+    "zip bomb": (partial(_bare, name="other", shape=10**8, dtype="f8", compression="gzip", chunks=(10**6,)), HERE),
+    "compact": (_compact, HERE),
+    "1e15 numbers": (partial(_bare, name="other", shape=(10**15,), dtype="f8"), HOLDS),
+    "1e15 labels": (partial(_bare, name="other", shape=(10**15,), dtype=UTF8), HOLDS),
+    "1e15 numbers of a known name": (
+        lambda f: anew(f, "v1_post", data=None, shape=(10**5,) * 3, dtype="f8"), HOLDS),
+    "no numbers": (partial(_bare, name="other", shape=(0,), dtype="f8"), HOLDS),
+    "null": (partial(_bare, name="other", data=h5py.Empty("f8")), HOLDS),
+    "17 GiB": (
+        partial(_unwritten, length=17 * 2**27), "more than 17,179,869,184 bytes of data"),
+    "compound": (partial(_bare, name="other", data=np.zeros(3, "f8,i4")), KIND),
+    "complex": (partial(_bare, name="other", data=np.zeros(3, complex)), KIND),
+    "enum": (partial(_bare, name="other", data=np.zeros(3, bool)), KIND),
+    "opaque": (partial(_bare, name="other", data=np.zeros(3, "V8")), KIND),
+    "reference": (partial(_bare, name="other", shape=3, dtype=h5py.ref_dtype), KIND),
+    "region": (partial(_bare, name="other", shape=3, dtype=h5py.regionref_dtype), KIND),
+    "array": (partial(_of_kind, kind=h5t.array_create(h5t.IEEE_F64LE, (4,))), KIND),
+    "lists": (partial(_bare, name="other", shape=3, dtype=h5py.vlen_dtype(float)), KIND),
+    "bits": (partial(_of_kind, kind=h5t.STD_B8LE), KIND),
+    "fixed text": (partial(_bare, name="other", data=np.array([b"abc"])), KIND),
+    "long double": (partial(_bare, name="other", data=np.zeros(3, np.longdouble)), KIND),
+    "seven bits": (lambda f: _of_kind(f, _seven_bits()), KIND),
+    "10 MB of labels": (
+        lambda f: _bare(f, "other", data=np.full(1000, "x", object), dtype=UTF8) or f["other"].write_direct(
+            np.array(["y" * 10_000, *["x"] * 999], object)), "more than 4,000,000 bytes of labels"),
+    "250,001 empty labels": (
+        partial(_bare, name="other", data=np.full(250_001, "", object), dtype=UTF8), "bytes of labels"),
+    "many attributes": (_many_attributes, "more than 10,000 attributes"),
+    "text of any length": (lambda f: _set(f, "v1_post", "x", "x", UTF8), ODD),
+    "not UTF-8": (lambda f: _set(f, "", "title", BROKEN, h5py.string_dtype(length=4)), "not a readable result"),
+    "labels not UTF-8": (
+        lambda f: anew(f, "title", data=np.array([BROKEN, b""], object), dtype=UTF8), "can't decode"),
+    "100 MB of text": (
+        lambda f: [_set(f, "", name, np.bytes_(b"x" * 50_000_000)) for name in "xy"], "bytes of text"),
+    "texts": (lambda f: _set(f, "v1_post", "x", ["a"] * 1000, UTF8), ODD),
+    "fixed texts": (lambda f: _set(f, "v1_post", "x", np.full(1000, b"abc")), ODD),
+    "65 numbers": (lambda f: _set(f, "v1_post", "x", np.zeros(65)), ODD),
+    "numbers in a table": (lambda f: _set(f, "", "x", np.zeros((9, 9))), ODD),
+    "compound attribute": (lambda f: _set(f, "v1_post", "x", np.zeros(3, "f8,i4")), ODD),
+    "bool attribute": (lambda f: _set(f, "v1_post", "x", True), ODD),
+    "reference attribute": (lambda f: _set(f, "", "x", f["e"].ref, h5py.ref_dtype), ODD),
+    "null attribute": (_null, ODD),
+    "axes without a name": (lambda f: f["v1_post"].attrs.__delitem__("_Netcdf4Coordinates"), AXES),
+    "axis of no number": (partial(_numbered, name="v1_post", numbers=[0, 1, 99]), AXES),
+    "axes of one number": (partial(_numbered, name="v1_reference", numbers=[1, 1]), AXES),
+    "axes of two lengths": (partial(_numbered, name="v1_post", numbers=[0, 2, 1]), AXES),
+    "axes of texts": (partial(_numbered, name="v1_post", numbers=np.bytes_(b"012")), AXES),
+    "axis along another": (partial(_numbered, name="year", numbers=[2]), "is damaged"),
+    "axis of another name": (lambda f: [_numbered(f, "e", [2]), _numbered(f, "m2", [1])], AXES),
+    "unknown axis": (_unknown_axis, AXES),
+}  # fmt: skip
+
+
+def swap(path: Path, was: bytes, becomes: bytes, times: int = 1) -> None:
+    """Change bytes that stand in a file so many times."""
+    assert len(was) == len(becomes)
+    # in place: a file may be larger than its bytes on the disk
+    with path.open("r+b") as file, mmap.mmap(file.fileno(), 0) as whole:
+        places = [found.start() for found in re.finditer(re.escape(was), whole)]
+        assert len(places) == times, (was, places)
+        for place in places:
+            whole[place : place + len(was)] = becomes
+
+
+def _wraps(path: Path) -> None:
+    """A dataset whose size in bytes is 8 again, where it is counted in 64 bits."""
+    with h5py.File(path, "r+") as file:
+        file["other"] = np.zeros(12_347)
+    swap(path, struct.pack("<Q", 12_347), struct.pack("<Q", 2**61 + 1), 2)
+    swap(path, struct.pack("<Q", 8 * 12_347), struct.pack("<Q", 8))
+
+
+def _one_place(path: Path) -> None:
+    """Datasets that all have their numbers at the same place of the file."""
+    lengths = range(12_000, 12_004)
+    with h5py.File(path, "r+") as file:
+        file["other"] = np.zeros(12_347)
+        place = file["other"].id.get_offset()
+        for length in lengths:
+            file.create_dataset(f"x{length}", shape=length, dtype="f8")
+    for length in lengths:
+        swap(path, struct.pack("<QQ", 2**64 - 1, 8 * length), struct.pack("<QQ", place, 8 * length))
+
+
+def _labels(path: Path, length: int | None) -> None:
+    """A thousand labels, all of which are the first, of 20 kB; or say that they have another length."""
+    with h5py.File(path, "r+") as file:
+        file["other"] = np.array(["y" * 20_000, *["x"] * 999], object)
+        place = file["other"].id.get_offset()
+    whole = bytearray(path.read_bytes())
+    first = whole[place : place + 16]
+    if length is not None:
+        first[:4] = struct.pack("<I", length)
+    whole[place : place + 16_000] = first * 1000
+    path.write_bytes(whole)
+
+
+def _many_labels(path: Path) -> None:
+    """Fifty million labels, none of which takes room on the disk."""
+    count = 50_000_000
+    with h5py.File(path, "r+") as file:
+        _unwritten(file, 2 * count)
+        place = file["other"].id.get_offset()
+        file["behind"] = [1.0]
+        del file["other"]
+        file.create_dataset("labels", shape=count, dtype=UTF8)
+    swap(path, struct.pack("<QQ", 2**64 - 1, 16 * count), struct.pack("<QQ", place, 16 * count))
+
+
+def _heap(path: Path, begin: int, becomes: bytes) -> None:
+    """Other bytes in the heap of the titles."""
+    with h5py.File(path) as file:
+        place = file["title"].id.get_offset()
+    whole = path.read_bytes()
+    (heap,) = struct.unpack_from("<Q", whole, place + 4)
+    begin += heap
+    path.write_bytes(whole[:begin] + becomes + whole[begin + len(becomes) :])
+
+
+def _label(path: Path, length: int, heap: int, number: int) -> None:
+    """Another place of the first title."""
+    with h5py.File(path) as file:
+        place = file["title"].id.get_offset()
+    whole = path.read_bytes()
+    path.write_bytes(whole[:place] + struct.pack("<IQI", length, heap, number) + whole[place + 16 :])
+
+
+def _attribute(path: Path, name: str, value: object, dtype: object) -> None:
+    """An attribute whose length, 777, is said to be 4 GB."""
+    with h5py.File(path, "r+") as file:
+        # one that is made anew has no checksum
+        anew(file, "v1_post").attrs.create(name, value, dtype=dtype)
+    whole = path.read_bytes()
+    place = whole.rindex(struct.pack("<I", 777))
+    path.write_bytes(whole[:place] + b"\xff" * 4 + whole[place + 4 :])
+
+
+def _references(path: Path) -> None:
+    with h5py.File(path) as file:
+        listed = np.empty(3, object)
+        listed[:] = [np.array([file["e"].ref] * 777, h5py.ref_dtype)] * 3
+    _attribute(path, "DIMENSION_LIST", listed, h5py.vlen_dtype(h5py.ref_dtype))
+
+
+PATCHES: dict[str, tuple[Make, str]] = {
+    "a length that wraps around": (_wraps, "not a readable result"),
+    "data of one place": (_one_place, "bytes of data"),
+    "labels of one place": (partial(_labels, length=None), "bytes of labels"),
+    "labels of 4 GB": (partial(_labels, length=2**32 - 1), "bytes of labels"),
+    "50,000,000 labels": (_many_labels, "bytes of labels"),
+    "label of another length": (partial(_label, length=23, heap=2048, number=1), "without a heap"),
+    "label without a heap": (partial(_label, length=23, heap=2**63, number=1), "not a readable result"),
+    "endless heap": (partial(_heap, begin=16, becomes=bytes(16)), "is stored as 0"),
+    "heap of 10 MB": (partial(_heap, begin=8, becomes=struct.pack("<Q", 10**7)), "bytes of heaps"),
+    "heap of nothing": (partial(_heap, begin=8, becomes=bytes(8)), "is stored as 0"),
+    "text of 4 EB in a heap": (partial(_heap, begin=24, becomes=struct.pack("<Q", 2**62)), "is stored as 0"),
+    "attribute of 4 GB": (partial(_attribute, name="x", value="y" * 777, dtype=UTF8), ODD),
+    "fixed attribute of 4 GB": (
+        partial(_attribute, name="x", value=b"y" * 777, dtype="S777"), "not a readable result"),
+}  # fmt: skip
+
+# what other readers would fall for, and is not read here
+HARMLESS: dict[str, Make] = {
+    "references of 34 GB": _references,
+}

@@ -1,0 +1,103 @@
+"""A flipped bit is noticed, or does not matter: never other numbers, never a crash, never a hang."""
+
+from __future__ import annotations
+
+import json
+import random
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+import impact
+
+from .forked import Forked
+
+FILE = "FILE"
+COMMANDS = (
+    ("info", FILE, "--json"),
+    ("plot", FILE, "-o", "picture.png"),
+)
+FLIPS, FAULTS = 25, 125  # in one test
+
+
+@pytest.fixture(scope="session")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A result in which every number counts: none is NaN, whose bits are many."""
+    models = ["lankarani-nikravesh-1990", "gharib-hurmuzlu-2012"]
+    point = {"e": [0.2, 0.6, 0.9], "v1": 1.0, "m1": 1.0, "m2": [1.0, 2.0], "K": 6e9}
+    result = impact.sweep({"title": "Small", "models": models, "sweep": point})
+    result = result.drop_vars([name for name, one in result.items() if np.isnan(one).any()])
+    path = tmp_path_factory.mktemp("whole") / "whole.h5"
+    impact.save(result, path)
+    return path
+
+
+def data_bytes(path: Path) -> list[int]:
+    """Where the numbers and the labels of a file are."""
+    with h5py.File(path) as file:
+        spans = [(one.id.get_offset(), one.id.get_storage_size()) for one in file.values()]
+    return [place for start, length in spans for place in range(start, start + length)]
+
+
+def places(path: Path, count: int, seed: int) -> Iterator[tuple[int, int]]:
+    """Bytes and bits: one anywhere, one in the data, one beside the data, and so on."""
+    draw = random.Random(seed)
+    anywhere, data = range(path.stat().st_size), data_bytes(path)
+    beside = sorted(set(anywhere) - set(data))
+    for number in range(count):
+        yield draw.choice((anywhere, data, beside)[number % 3]), draw.randrange(8)
+
+
+def told(forked: Forked, path: Path, command: tuple[str, ...]) -> object:
+    """What a command makes of a file: the reason why it is refused, or all that it gives."""
+    picture = path.parent / "picture.png"
+    picture.unlink(missing_ok=True)
+    done = forked(*(path.name if word == FILE else word for word in command), cwd=path.parent)
+    assert not done.timed_out
+    assert done.returncode in (0, 2), done
+    if done.returncode == 2:
+        (line,) = done.stderr.splitlines()
+        assert line.startswith(f"{path.name}: ")
+        assert (done.stdout, picture.exists()) == ("", False)
+        return line
+    if "--json" not in command:
+        return done.stdout, picture.read_bytes() if picture.exists() else None
+    found = json.loads(done.stdout)
+    found.get("attributes", {}).pop("packages", None)
+    return found
+
+
+def check_flips(forked: Forked, whole: Path, folder: Path, count: int, seed: int) -> None:
+    good, data = whole.read_bytes(), set(data_bytes(whole))
+    path = folder / "flip.h5"
+    path.write_bytes(good)
+    genuine = {command: told(forked, path, command) for command in COMMANDS}
+    counts: Counter[str] = Counter()
+    for place, bit in places(whole, count, seed):
+        path.write_bytes(good[:place] + bytes([good[place] ^ (1 << bit)]) + good[place + 1 :])
+        answers = {command: told(forked, path, command) for command in COMMANDS}
+        noticed = [isinstance(answer, str) for answer in answers.values()]
+        # all commands agree whether this is a result
+        assert len(set(noticed)) == 1, (place, bit, answers)
+        if not noticed[0]:
+            assert answers == genuine, (place, bit)
+            assert place not in data, (place, bit)
+        counts[f"{'data' if place in data else 'beside'}: {'noticed' if noticed[0] else 'harmless'}"] += 1
+    print(f"{count} flips: {dict(sorted(counts.items()))}")
+    assert counts["data: noticed"]
+    assert counts["beside: noticed"]
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_fifty_flips(forked: Forked, whole: Path, tmp_path: Path, seed: int) -> None:
+    check_flips(forked, whole, tmp_path, FLIPS, seed)
+
+
+@pytest.mark.faults
+@pytest.mark.parametrize("seed", range(2, 10))
+def test_a_thousand_flips(forked: Forked, whole: Path, tmp_path: Path, seed: int) -> None:
+    check_flips(forked, whole, tmp_path, FAULTS, seed)

@@ -1,0 +1,598 @@
+"""Compare, bless and rerun on files, with their exit codes."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import resource
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from unicodedata import category
+from xml.etree import ElementTree
+
+import h5py
+import numpy as np
+import pytest
+import xarray as xr
+
+import impact
+from impact.data.digest import content_digest
+from impact.errors import ResultError, StoreError, UsageError
+
+from .forked import Done, Forked
+
+FORMATS = ("table", "json", "junit", "markdown", "github")
+KEY = "lankarani-nikravesh-1990"
+WORST = f"v1_post: 2 of 303 differ, worst 1.6e-07 = 160 x tolerance at model={KEY}, e=0.05"
+SMALL = {
+    "title": "Small",
+    "models": ["hertz", KEY],
+    "sweep": {"e": [0.25, 0.75], "v1": [1.0, 2.0], "m1": 1.0, "m2": 1.0, "K": 6e9},
+}
+
+
+@pytest.fixture(scope="module")
+def folder(figure6: xr.Dataset, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Results that are equal, that differ, and what is no result."""
+    folder = tmp_path_factory.mktemp("regression")
+    impact.save(figure6, folder / "base.h5")
+    impact.save(figure6.isel(e=slice(None, None, -1)), folder / "equal.h5")
+    moved = figure6.copy(deep=True)
+    for e, by in ((0.05, 160e-9), (0.5, -40e-9)):
+        moved["v1_post"].loc[{"model": KEY, "e": e}] += by
+    impact.save(moved, folder / "different.h5")
+    impact.save(moved.drop_vars("duration"), folder / "faulty.h5")
+    impact.save(figure6.isel(e=slice(50)), folder / "low.h5")
+    impact.save(figure6.isel(e=slice(50, None)), folder / "high.h5")
+
+    history = impact.run(at={"e": 0.5}).history
+    assert history is not None
+    impact.save(history, folder / "history.h5")
+    (folder / "text.h5").write_text("text")
+    with h5py.File(folder / "foreign.h5", "w") as file:
+        file["x"] = [1.0]
+    for name in ("damaged", "newer"):
+        shutil.copy(folder / "base.h5", folder / f"{name}.h5")
+        with h5py.File(folder / f"{name}.h5", "r+") as file:
+            if name == "damaged":
+                file["e_out"][1, 50] += 1e-15
+            else:
+                file.attrs["schema_version"] = np.int64(99)
+    return folder
+
+
+UNREADABLE = ("absent", "text", "foreign", "damaged", "newer", "history")
+
+
+def _junit(text: str) -> tuple[int, int, dict[str, ElementTree.Element]]:
+    """Failures, errors and test cases of a JUnit file that has the usual structure."""
+    root = ElementTree.fromstring(text.encode())
+    assert root.tag == "testsuites"
+    (suite,) = root
+    assert suite.tag == "testsuite"
+    assert suite.attrib["name"]
+    cases = suite.findall("testcase")
+    found = {case.attrib["name"]: case for case in cases}
+    assert len(found) == len(cases)
+    for case in cases:
+        assert case.attrib["classname"]
+        assert len(case) <= 1
+        assert all(child.tag in ("failure", "error") and child.attrib["message"] for child in case)
+    assert {child.tag for child in suite} <= {"testcase", "system-out"}
+    failures, errors = (len(suite.findall(f"testcase/{tag}")) for tag in ("failure", "error"))
+    for one in (root, suite):
+        numbers = {name: int(one.attrib[name]) for name in ("tests", "failures", "errors", "skipped")}
+        assert numbers == {"tests": len(cases), "failures": failures, "errors": errors, "skipped": 0}
+    return failures, errors, found
+
+
+def _github(text: str) -> list[tuple[str, str, str]]:
+    """Level, file and message of the annotations, as GitHub reads them."""
+    found = []
+    for line in text.splitlines():
+        match = re.fullmatch(r"::(error|notice) file=([^,:]*),title=([^,:]+)::(.*)", line)
+        assert match is not None, line
+        plain = [re.sub("%(25|0D|0A|3A|2C)", lambda m: chr(int(m[1], 16)), one) for one in match.groups()]
+        for one in match.groups():
+            assert not re.search("%(?!25|0D|0A|3A|2C)", one), line
+        found.append((plain[0], plain[1], plain[3]))
+    return found
+
+
+def _table_rows(text: str) -> list[list[str]]:
+    """The cells of a Markdown table."""
+    rows = [re.split(r"(?<!\\)\|", line) for line in text.splitlines() if line.startswith("|")]
+    assert len({len(row) for row in rows}) <= 1, rows
+    return [[cell.strip() for cell in row[1:-1]] for row in rows]
+
+
+def _is_clean(done: Done) -> bool:
+    """Whether no character that steers a terminal, or is not seen, was printed."""
+    return not [c for c in done.stdout + done.stderr if category(c) in ("Cc", "Cf", "Zl", "Zp") and c != "\n"]
+
+
+# five formats
+
+
+def test_equal_in_five_formats(forked: Forked, folder: Path) -> None:
+    told = {}
+    for name in FORMATS:
+        done = forked("compare", "equal.h5", "base.h5", "--format", name, cwd=folder)
+        assert (done.returncode, done.stderr) == (0, "")
+        told[name] = done.stdout
+    headline = "equal: 19 variables, 5,353 values, none differs"
+    assert forked("compare", "equal.h5", "base.h5", cwd=folder).stdout == told["table"] == f"{headline}\n"
+    data = json.loads(told["json"])
+    assert (data["equal"], data["headline"], data["faults"], data["notes"]) == (True, headline, [], [])
+    assert (data["new"], data["baseline"], len(data["variables"])) == ("equal.h5", "base.h5", 20)
+    assert {one["equal"] for one in data["variables"]} == {True}
+    failures, errors, cases = _junit(told["junit"])
+    assert (failures, errors) == (0, 0)
+    assert {"physics config", "labels", "units", "missing variable", "nothing in common"} < cases.keys()
+    assert {one["name"] for one in data["variables"]} < cases.keys()
+    assert told["markdown"].startswith(f"### ✅ impact compare: {headline}\n")
+    assert _github(told["github"]) == [("notice", "base.h5", headline)]
+
+
+def test_different_in_five_formats(forked: Forked, folder: Path) -> None:
+    told = {}
+    for name in FORMATS:
+        done = forked("compare", "faulty.h5", "base.h5", "--format", name, cwd=folder)
+        assert (done.returncode, done.stderr) == (1, "")
+        told[name] = done.stdout
+    headline = "not equal: missing variable (duration), values (v1_post)"
+    missing = "duration is in BASELINE only"
+    replay = f"impact run faulty.h5 --model {KEY} --at e=0.05"
+    lines = told["table"].splitlines()
+    assert lines[:4] == [headline, f"missing variable: {missing}", WORST, f"  {replay}"]
+    assert re.search(r"v1_post +scaled by v0 +1e-09 +2 of 303 +1\.6e-07 +160", told["table"])
+
+    data = json.loads(told["json"])
+    assert (data["equal"], data["headline"]) == (False, headline)
+    assert data["faults"] == [{"kind": "missing variable", "text": missing}]
+    first, *others = data["variables"]
+    assert (first["name"], first["text"], first["replay"]) == ("v1_post", WORST, replay)
+    assert (first["different"], first["points"], first["at"]) == (2, 303, {"model": KEY, "e": 0.05})
+    assert first["times"] == pytest.approx(160)
+    assert {one["equal"] for one in others} == {True}
+    assert {one["replay"] for one in others} == {""}
+
+    failures, errors, cases = _junit(told["junit"])
+    assert (failures, errors) == (2, 0)
+    assert cases["v1_post"][0].attrib["message"] == WORST
+    assert cases["v1_post"][0].text == f"{WORST}\n{replay}"
+    assert cases["missing variable"][0].attrib["message"] == missing
+    assert headline in ElementTree.fromstring(told["junit"].encode()).findtext("testsuite/system-out", "")
+
+    assert told["markdown"].startswith("### ❌ impact compare: not equal: missing variable (duration), values (v1")
+    assert _table_rows(told["markdown"])[0][:2] == ["variable", "differ"]
+    assert _table_rows(told["markdown"])[2][:2] == ["`v1_post`", "2 of 303"]
+    assert f"````sh\n{replay}\n````\n" in told["markdown"]
+    assert _github(told["github"]) == [
+        ("error", "base.h5", headline), ("error", "base.h5", missing), ("error", "base.h5", f"{WORST}\n{replay}"),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", UNREADABLE)
+def test_unreadable_in_five_formats(forked: Forked, folder: Path, name: str) -> None:
+    for format, words in zip(FORMATS, ("new", "baseline") * 3, strict=False):
+        pair = (f"{name}.h5", "base.h5") if words == "new" else ("base.h5", f"{name}.h5")
+        done = forked("compare", *pair, "--format", format, cwd=folder)
+        assert done.returncode == 2
+        (line,) = done.stderr.splitlines()
+        assert line.startswith(f"{name}.h5: ")
+        match format:
+            case "table":
+                assert done.stdout == ""
+            case "json":
+                data = json.loads(done.stdout)
+                assert (data["equal"], data["headline"], data["variables"]) == (None, line, [])
+            case "junit":
+                failures, errors, cases = _junit(done.stdout)
+                assert (failures, errors) == (0, 1)
+                assert [case[0].attrib["message"] for case in cases.values()] == [line]
+            case "markdown":
+                assert done.stdout.startswith("### ⚠️ impact compare: ")
+            case "github":
+                assert _github(done.stdout) == [("error", pair[1], line)]
+
+
+def test_usage_is_exit_2_and_a_line(forked: Forked, folder: Path) -> None:
+    for words, told in (
+        (["--tol", "e_oot=1"], '--tol e_oot: no variable of a result; did you mean "e_out"?'),
+        (["--tol", "much"], "--tol much: wants a number from 0 up"), (["--tol", "-1"], "--tol -1.0: wants"),
+        (["--tol", "nan"], "--tol nan: wants a number"), (["--tol", "status=1"], "--tol status: is exact"),
+        (["--tol", "1", "--tol", "2"], "--tol all: given twice"), (["--tol", "e_out=x"], "--tol x: wants"),
+    ):  # fmt: skip
+        done = forked("compare", "different.h5", "base.h5", *words, cwd=folder)
+        assert (done.returncode, done.stdout) == (2, "")
+        assert done.stderr.startswith(told)
+        assert len(done.stderr.splitlines()) == 1
+    assert forked("compare", "different.h5", "base.h5", "--format", "yaml", cwd=folder).returncode == 2
+    assert forked("compare", "different.h5", cwd=folder).returncode == 2
+
+
+def test_tolerances_from_the_command_line(forked: Forked, folder: Path) -> None:
+    for words, code in (
+        (["--tol", "1.7e-7"], 0), (["--tol", "1.5e-7"], 1), (["--tol", "v1_post=1.7e-7"], 0),
+        (["--tol", "v2_post=1.7e-7"], 1), (["--tol", "1", "--tol", "v1_post=1.5e-7"], 1), (["--tol", "0"], 1),
+    ):  # fmt: skip
+        assert forked("compare", "different.h5", "base.h5", *words, cwd=folder).returncode == code, words
+    assert forked("compare", "equal.h5", "base.h5", "--tol", "0", cwd=folder).returncode == 0
+    done = forked("compare", "different.h5", "base.h5", "--tol", "1.7e-7", cwd=folder)
+    assert done.stdout.startswith(
+        "equal: 19 variables, 5,353 values, largest difference 0.94 x tolerance: v1_post at"
+    )
+
+
+def test_subset_and_nothing_in_common(forked: Forked, folder: Path) -> None:
+    done = forked("compare", "low.h5", "base.h5", cwd=folder)
+    assert (done.returncode, done.stdout.splitlines()[0]) == (1, "not equal: labels (e)")
+    assert forked("compare", "low.h5", "base.h5", "--subset", cwd=folder).returncode == 0
+    for words in ([], ["--subset"]):
+        done = forked("compare", "low.h5", "high.h5", *words, "--plot", folder / "none.png", cwd=folder)
+        assert (done.returncode, done.stdout.splitlines()[0]) == (1, "not equal: nothing in common (e)")
+        assert done.stderr == "no picture: there is no point to draw at\n"
+        assert not (folder / "none.png").exists()
+
+
+BAD = "\x1b[31m\u202e\u200b[red]|`a`` ````$\\frac{1$\x07<b>&\"'%0A::,=\nx\x9b"
+
+
+def test_hostile_strings_in_every_format(forked: Forked, tmp_path: Path) -> None:
+    steel = {"E": 2e11, "nu": 0.3, "rho": 7850}
+    config = {
+        "title": BAD, "models": ["hertz", "bilinear"], "materials": {BAD: steel, f"{BAD}2": steel},
+        "sweep": {"e": 0.5, "v1": [1.0, 2.0], "m1": 1.0, "m2": 1.0, "material": [BAD, f"{BAD}2"]},
+    }  # fmt: skip
+    base = impact.sweep(config)
+    new = base.copy(deep=True)
+    new["v1_post"][1, 1, 1] += 1.0
+    new["status"][1, 1, 1] = 10
+    new["e_out"].attrs["units"] = BAD
+    for field in ("title", "equation"):
+        new[field] = ("model", [BAD, BAD], new[field].attrs)
+    new["material"].attrs["long_name"] = BAD
+    table = json.loads(base.attrs["materials"])
+    table[BAD]["E"] = 3e11
+    new.attrs |= {"materials": json.dumps(table), "impact_version": BAD}
+    folder = tmp_path / "a \x1b[31m\u202e|`$\\frac{1$%,:\nb"
+    folder.mkdir()
+    paths = [folder / "new.h5", folder / "base.h5"]
+    impact.save(new, paths[0])
+    impact.save(base, paths[1])
+    near = base.copy(deep=True)
+    near["v1_post"][1, 1, 1] += 1e-10
+    impact.save(near, folder / "near.h5")
+    for format in FORMATS:
+        picture = folder / f"{format}.png"
+        done = forked("compare", *paths, "--format", format, "--plot", picture)
+        assert done.returncode == 1, done
+        assert _is_clean(done)
+        assert picture.read_bytes().startswith(b"\x89PNG")
+        match format:
+            case "table":
+                assert done.stdout.startswith("not equal: physics config (materials.")
+            case "json":
+                assert json.loads(done.stdout)["equal"] is False
+            case "junit":
+                _, _, cases = _junit(done.stdout)
+                failed = {name for name, case in cases.items() if len(case)}
+                assert failed == {"physics config", "units", "status", "v1_post", "damping_ratio"}
+            case "markdown":
+                assert len(_table_rows(done.stdout)) == 2 + 3
+                fenced = done.stdout.split("````sh\n")[1].split("\n````\n")[0]
+                assert {line[:11] for line in fenced.splitlines()} == {"impact run "}
+            case "github":
+                assert {level for level, _, _ in _github(done.stdout)} == {"error", "notice"}
+                assert len(_github(done.stdout)) > 5
+        # the first line of an equal verdict names a point too, and stands over the picture
+        done = forked("compare", folder / "near.h5", paths[1], "--format", format, "--plot", picture)
+        assert done.returncode == 0, done
+        assert _is_clean(done)
+        done = forked("compare", paths[0], folder / "absent.h5", "--format", format)
+        assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
+        assert _is_clean(done)
+    done = forked("rerun", paths[0])
+    assert done.returncode == 1
+    assert _is_clean(done)
+    done = forked("bless", *paths, "--reason", BAD)
+    assert done.returncode == 0
+    assert _is_clean(done)
+    assert impact.load(paths[1]).attrs["reason"] == BAD
+
+
+# pictures
+
+
+def test_pictures_of_every_kind_of_verdict(forked: Forked, folder: Path, wide: xr.Dataset, tmp_path: Path) -> None:
+    moved = wide.copy(deep=True)
+    moved["duration"] *= 1 + 1e-7 * np.arange(moved["duration"].size).reshape(moved["duration"].shape)
+    moved["e_out"][1, 1, 1, 1, 1, 1] = np.nan
+    impact.save(wide, tmp_path / "wide.h5")
+    impact.save(moved, tmp_path / "moved.h5")
+    point = impact.sweep(SMALL | {"models": "hertz", "sweep": SMALL["sweep"] | {"e": 0.5, "v1": 1.0}})
+    impact.save(point, tmp_path / "point.h5")
+    impact.save(point.assign(e_out=point["e_out"] + 1), tmp_path / "other.h5")
+    magic = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
+    for number, (new, baseline, code, kind) in enumerate([
+        (folder / "equal.h5", folder / "base.h5", 0, "png"),
+        (folder / "different.h5", folder / "base.h5", 1, "svg"),
+        (tmp_path / "point.h5", tmp_path / "point.h5", 0, "pdf"),
+        (tmp_path / "other.h5", tmp_path / "point.h5", 1, "png"),
+        (tmp_path / "moved.h5", tmp_path / "wide.h5", 1, "pdf"),
+        (tmp_path / "wide.h5", tmp_path / "wide.h5", 0, "svg"),
+    ]):  # fmt: skip
+        picture = tmp_path / f"{number}.{kind}"
+        done = forked("compare", new, baseline, "--plot", picture)
+        assert done.returncode == code, done
+        assert done.stderr == f"{picture}: where the differences lie\n"
+        assert picture.read_bytes().startswith(magic[kind])
+    # one that is there is replaced, with a verdict of another format on stdout
+    (tmp_path / "0.png").write_text("old")
+    words = ["--format", "json", "--plot", str(tmp_path / "0.png")]
+    done = forked("compare", folder / "equal.h5", folder / "base.h5", *words)
+    assert (json.loads(done.stdout)["equal"], done.returncode) == (True, 0)
+    assert (tmp_path / "0.png").read_bytes().startswith(magic["png"])
+
+
+def test_a_picture_that_cannot_be_stored_is_refused_before_any_work(
+    forked: Forked, folder: Path, tmp_path: Path
+) -> None:
+    for name in ("new.png", "base.svg"):
+        shutil.copy(folder / "base.h5", tmp_path / name)
+    os.link(tmp_path / "new.png", tmp_path / "hard.png")
+    (tmp_path / "folder.png").mkdir()
+    for picture, told in (
+        ("new.png", "is what is read from"), ("base.svg", "is what is read from"), ("hard.png", "is what is read"),
+        ("x.jpg", "wants a name that ends in .png"), ("x", "wants a name that ends in .png"),
+        ("folder.png", "is not a regular file"), ("absent/x.png", "does not exist"),
+    ):  # fmt: skip
+        done = forked("compare", "new.png", "base.svg", "--plot", picture, cwd=tmp_path)
+        assert (done.returncode, done.stdout) == (2, "")
+        assert done.stderr.startswith(f"{picture}: ")
+        assert told in done.stderr
+    for words in (["compare", "absent.h5", "base.svg"], ["rerun", "absent.h5"]):
+        done = forked(*words, "--plot", "x.jpg", cwd=tmp_path)
+        assert (done.returncode, done.stderr.startswith("x.jpg: ")) == (2, True)
+    done = forked("rerun", "new.png", "--plot", "new.png", cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["base.svg", "folder.png", "hard.png", "new.png"]
+    assert (tmp_path / "new.png").read_bytes() == (folder / "base.h5").read_bytes()
+    assert (tmp_path / "base.svg").read_bytes() == (folder / "base.h5").read_bytes()
+
+
+# bless
+
+
+def test_bless_makes_and_replaces_a_baseline(forked: Forked, folder: Path, tmp_path: Path) -> None:
+    baseline = tmp_path / "baseline.h5"
+    done = forked("bless", "base.h5", baseline, "--reason", "first", "--tol", "1e-8", cwd=folder)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", f"{baseline}: made, with the reason\n")
+    first = impact.load(baseline)
+    assert first.attrs["reason"] == "first"
+    assert json.loads(first.attrs["tolerances"]) == {"all": 1e-8}
+    assert forked("compare", "base.h5", baseline, cwd=folder).returncode == 0
+    assert "160" not in forked("compare", "different.h5", baseline, cwd=folder).stdout
+
+    words = ["bless", "different.h5", baseline, "--reason", "finer steps", "--tol", "v1_post=1e-5"]
+    done = forked(*words, cwd=folder)
+    assert (done.returncode, done.stderr) == (0, f"{baseline}: replaced, with the reason\n")
+    # the verdict is by the tolerances asked for and those inherited
+    assert done.stdout.startswith("equal: 19 variables")
+    assert re.search(r"v1_post +scaled by v0 +1e-05 +0 of 303", done.stdout)
+    second = impact.load(baseline)
+    assert second.attrs["reason"] == "finer steps"
+    assert json.loads(second.attrs["tolerances"]) == {"all": 1e-8, "v1_post": 1e-5}
+    ours = impact.load(folder / "different.h5")
+    xr.testing.assert_equal(second, ours)
+    kept = ("reason", "tolerances", "content_digest")
+    assert {k: v for k, v in second.attrs.items() if k not in kept} == {
+        k: v for k, v in ours.attrs.items() if k not in kept
+    }
+
+    # inherited without being asked for; one for all takes the place of all
+    done = forked("bless", "base.h5", baseline, "--reason", "back", cwd=folder)
+    assert done.returncode == 0
+    assert json.loads(impact.load(baseline).attrs["tolerances"]) == {"all": 1e-8, "v1_post": 1e-5}
+    done = forked("bless", "faulty.h5", baseline, "--reason", "less", "--tol", "1e-9", cwd=folder)
+    assert done.returncode == 0
+    assert done.stdout.startswith("not equal: missing variable (duration), values (v1_post)\n")
+    assert json.loads(impact.load(baseline).attrs["tolerances"]) == {"all": 1e-9}
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["baseline.h5"]
+
+
+def test_bless_refuses_and_leaves_the_baseline_as_it_was(forked: Forked, folder: Path, tmp_path: Path) -> None:
+    baseline = tmp_path / "baseline.h5"
+    shutil.copy(folder / "base.h5", baseline)
+    for name in UNREADABLE:
+        if name != "absent":
+            shutil.copy(folder / f"{name}.h5", tmp_path / f"{name}.h5")
+    os.link(baseline, tmp_path / "same.h5")
+    (tmp_path / "link.h5").symlink_to(baseline)
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    good = folder / "different.h5"
+    for words, told in (
+        ([good, baseline, "--reason", ""], "--reason: empty"),
+        ([good, baseline, "--reason", " \n"], "--reason: empty"),
+        ([good, baseline], "--reason"), ([baseline, baseline, "--reason", "r"], "is what is read from"),
+        ([tmp_path / "same.h5", baseline, "--reason", "r"], "is what is read from"),
+        ([good, tmp_path / "link.h5", "--reason", "r"], "not a regular file"),
+        ([good, tmp_path, "--reason", "r"], "not a regular file"),
+        ([good, tmp_path / "no" / "b.h5", "--reason", "r"], "does not exist"),
+        ([good, baseline, "--reason", "r", "--tol", "status=1"], "--tol status: is exact"),
+        ([good, tmp_path / "fresh.h5", "--reason", "r", "--tol", "-1"], "--tol -1.0: wants a number"),
+        *(([tmp_path / f"{name}.h5", baseline, "--reason", "r"], f"{name}.h5: ") for name in UNREADABLE),
+        *(([tmp_path / f"{name}.h5", tmp_path / "n.h5", "--reason", "r"], f"{name}.h5: ") for name in UNREADABLE),
+        *(([good, tmp_path / f"{name}.h5", "--reason", "r"], "") for name in UNREADABLE if name != "absent"),
+    ):  # fmt: skip
+        done = forked("bless", *words)
+        assert (done.returncode, done.stdout) == (2, ""), (words, done)
+        assert told in done.stderr
+        assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before, words
+
+
+def test_bless_on_a_full_disk_leaves_the_old_baseline(folder: Path, tmp_path: Path) -> None:
+    # a limit of the system on the size of files stands for the full disk
+    baseline = tmp_path / "baseline.h5"
+    shutil.copy(folder / "base.h5", baseline)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, limits[1]))
+    try:
+        for path in (baseline, tmp_path / "fresh.h5"):
+            with pytest.raises(StoreError, match="not written"):
+                impact.bless(folder / "different.h5", path, reason="r")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        signal.signal(signal.SIGXFSZ, handler)
+    assert [p.name for p in tmp_path.iterdir()] == ["baseline.h5"]
+    assert baseline.read_bytes() == (folder / "base.h5").read_bytes()
+
+
+def test_bless_from_python(folder: Path, tmp_path: Path) -> None:
+    baseline = tmp_path / "baseline.h5"
+    assert impact.bless(folder / "base.h5", str(baseline), reason="first") is None
+    verdict = impact.bless(str(folder / "different.h5"), baseline, reason="second", tol={"v1_post": 1e-6})
+    assert verdict is not None
+    assert verdict.equal
+    assert json.loads(impact.load(baseline).attrs["tolerances"]) == {"v1_post": 1e-6}
+    with pytest.raises(UsageError, match="--reason: empty"):
+        impact.bless(folder / "base.h5", baseline, reason="")
+
+
+# rerun
+
+
+def test_a_rerun_is_equal(forked: Forked, folder: Path, wide: xr.Dataset, tmp_path: Path) -> None:
+    impact.save(wide, tmp_path / "wide.h5")
+    impact.save(impact.sweep(SMALL), tmp_path / "mapping.h5")
+    (tmp_path / "config.toml").write_text(
+        'models = "hertz"\n[sweep]\ne = 0.5\nv1 = 1\nm1 = 1\nm2 = 1\nK = 6e9\n', encoding="utf-8"
+    )
+    words = ["--set", "sweep.e=[0.1,0.9]", "--set", f'models=["{KEY}"]', "--set", "solver.rtol=1e-8"]
+    assert forked("sweep", "config.toml", "-o", "set.h5", *words, cwd=tmp_path).returncode == 0
+    for path in (folder / "base.h5", *(tmp_path / f"{name}.h5" for name in ("wide", "mapping", "set"))):
+        done = forked("rerun", path)
+        assert (done.returncode, done.stderr) == (0, ""), done
+        assert re.fullmatch(r"equal: 19 variables, [\d,]+ values, none differs\n", done.stdout)
+    assert impact.load(tmp_path / "set.h5").attrs["rtol"] == 1e-8
+    assert impact.rerun(tmp_path / "set.h5").equal
+
+
+def test_a_rerun_finds_what_was_changed(forked: Forked, folder: Path) -> None:
+    done = forked("rerun", "different.h5", cwd=folder)
+    assert done.returncode == 1
+    assert done.stdout.startswith("not equal: values (v1_post)\nv1_post: 2 of 303 differ, worst 1.6e-07 = 160 x ")
+    replay = done.stdout.splitlines()[2]
+    assert replay == f"  impact run different.h5 --model {KEY} --at e=0.05"
+    assert forked(*shlex.split(replay)[1:], cwd=folder).returncode == 0
+    assert forked("rerun", "different.h5", "--tol", "1.7e-7", cwd=folder).returncode == 0
+    data = json.loads(forked("rerun", "different.h5", "--format", "json", cwd=folder).stdout)
+    assert (data["equal"], data["new"], data["baseline"]) == (False, "the rerun", "different.h5")
+    for name in UNREADABLE:
+        done = forked("rerun", f"{name}.h5", "--format", "json", cwd=folder)
+        assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
+        assert json.loads(done.stdout)["equal"] is None
+
+
+def test_a_rerun_is_of_the_models_and_tolerances_that_took_effect(tmp_path: Path) -> None:
+    config = "models = [{}]\n[sweep]\ne = [0.2, 0.8]\nv1 = 1.0\nm1 = 1.0\nm2 = 1.0\nK = 6e9\n[solver]\nrtol = {}\n"
+    (tmp_path / "two.toml").write_text(config.format(f'"{KEY}", "hertz"', "1e-6"), encoding="utf-8")
+    result = impact.sweep(tmp_path / "two.toml")
+    # as if there had been two models only, and another default
+    edited = config.format('"X"', "1e-6").replace('["X"]', '"all"').replace("[solver]\nrtol = 1e-6\n", "")
+    impact.save(result.assign_attrs(config=edited), tmp_path / "all.h5")
+    verdict = impact.rerun(tmp_path / "all.h5")
+    assert verdict.equal, verdict
+    assert verdict.headline.endswith("none differs")
+    assert {one.tolerance for one in verdict.variables if one.judged == "scaled by v0"} == {10 * 1e-6}
+    # that of the solver is repeated: another one gives other numbers
+    impact.save(result.assign_attrs(rtol=1e-10), tmp_path / "other.h5")
+    assert not impact.rerun(tmp_path / "other.h5").equal
+    assert impact.rerun(tmp_path / "other.h5", tol=1e-4).equal
+
+
+def test_a_rerun_of_a_part_has_more(forked: Forked, figure6: xr.Dataset, tmp_path: Path) -> None:
+    impact.save(figure6.isel(e=slice(10, 20), model=[2, 0]), tmp_path / "part.h5")
+    done = forked("rerun", "part.h5", cwd=tmp_path)
+    assert (done.returncode, done.stdout.splitlines()[0]) == (1, "not equal: labels (e)")
+    done = forked("rerun", "part.h5", "--subset", cwd=tmp_path)
+    assert done.returncode == 0
+    assert done.stdout.startswith("equal: 19 variables, 360 values")
+
+
+PLUGIN = """\
+from impact import hysteresis
+
+MINE = hysteresis("mine-2026", title="Mine", year=2026, equation="", reference="", chi=lambda e: {chi})
+"""
+
+
+def test_a_rerun_wants_the_same_plug_in_again(forked: Forked, tmp_path: Path) -> None:
+    config = 'models = ["hertz", "mine-2026"]\n[sweep]\ne = [0.2, 0.8]\nv1 = 1\nm1 = 1\nm2 = 1\nK = 6e9\n'
+    (tmp_path / "config.toml").write_text(config, encoding="utf-8")
+    plugin = tmp_path / "mine.py"
+    plugin.write_text(PLUGIN.format(chi="(1 - e * e) / e"), encoding="utf-8")
+    assert forked("sweep", "config.toml", "--plugin", "mine.py", cwd=tmp_path).returncode == 0
+
+    done = forked("rerun", "results.h5", cwd=tmp_path)
+    told = "results.h5: made with mine-2026 of mine.py; give it again with --plugin FILE\n"
+    assert (done.returncode, done.stdout, done.stderr) == (2, "", told)
+    done = forked("rerun", "results.h5", "--plugin", "mine.py", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.endswith("none differs\n")
+    with pytest.raises(UsageError, match="give it again"):
+        impact.rerun(tmp_path / "results.h5")
+    assert impact.rerun(tmp_path / "results.h5", plugins=[plugin]).equal
+
+    # the same to the byte, even where the numbers would be the same
+    plugin.write_text(plugin.read_text(encoding="utf-8") + "# the same\n", encoding="utf-8")
+    done = forked("rerun", "results.h5", "--plugin", "mine.py", "--format", "junit", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.startswith("results.h5: was made with another version of mine.py: its SHA-256 is ")
+    assert _junit(done.stdout)[:2] == (0, 1)
+
+
+def _stored_as_it_is(dataset: xr.Dataset, path: Path) -> None:
+    """A file with the right digest, which `impact.save` might refuse to write."""
+    dataset = dataset.assign_attrs(content_digest=content_digest(dataset))
+    dataset.to_netcdf(path, engine="h5netcdf")
+
+
+def test_a_rerun_of_a_result_whose_config_cannot_be_read(forked: Forked, tmp_path: Path) -> None:
+    result = impact.sweep(SMALL)
+    for attributes in ({"config": "models = ["}, {"config": "{}"}, {"config_set": "3"}, {"rtol": "fast"}):
+        _stored_as_it_is(result.assign_attrs(attributes), tmp_path / "bad.h5")
+        done = forked("rerun", "bad.h5", "--format", "json", cwd=tmp_path)
+        assert done.returncode == 2, done
+        assert json.loads(done.stdout)["equal"] is None
+        assert done.stderr
+        assert "Traceback" not in done.stderr
+    _stored_as_it_is(result.assign_attrs(tolerances="{"), tmp_path / "bad.h5")
+    with pytest.raises(ResultError):
+        impact.rerun(tmp_path / "bad.h5")
+
+
+def test_a_signal_ends_a_rerun(tmp_path: Path) -> None:
+    # a small result that says of itself that it is of a long sweep
+    sweep = SMALL | {"models": ["exact-hysteresis"]}
+    long = json.dumps(sweep | {"sweep": sweep["sweep"] | {"e": {"linspace": [0.01, 0.99, 2_000_000]}}})
+    impact.save(impact.sweep(sweep).assign_attrs(config=long), tmp_path / "long.h5")
+    command = [sys.executable, "-m", "impact", "rerun", "long.h5"]
+    child = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    # three seconds of work: it has long begun, and has not ended
+    ticks = os.sysconf("SC_CLK_TCK")
+    while int(Path(f"/proc/{child.pid}/stat").read_text().rsplit(")", 1)[1].split()[11]) < 3 * ticks:
+        assert child.poll() is None
+        time.sleep(0.05)
+    child.send_signal(signal.SIGINT)
+    stdout, stderr = child.communicate(timeout=60)
+    assert (child.returncode, stdout, stderr) == (130, "", "interrupted; nothing was written\n")
+    assert [p.name for p in tmp_path.iterdir()] == ["long.h5"]
