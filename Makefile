@@ -5,10 +5,10 @@ BIN := $(VENV)/bin
 RESULTS ?= results
 
 .DEFAULT_GOAL := help
-.PHONY: help figure test check docs bench clean
+.PHONY: help figure regress test test-faults check docs bench clean
 
 help:  ## list the targets
-	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-8s %s\n", $$1, $$2}'
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-11s %s\n", $$1, $$2}'
 
 figure: $(BIN)/impact  ## sweep configs/figure6.toml and draw Figure 6 of the paper
 	@mkdir -p $(RESULTS)
@@ -19,10 +19,21 @@ figure: $(BIN)/impact  ## sweep configs/figure6.toml and draw Figure 6 of the pa
 test: $(VENV)/dev  ## run the tests
 	$(BIN)/python -m pytest -n auto
 
+test-faults: $(VENV)/dev  ## run the tests of a thousand faults, and tell what became of them
+	$(BIN)/python -m pytest -n auto -m faults -rP tests
+
 check: $(VENV)/dev  ## lint and type-check
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+# a baseline tests/data/NAME.h5 is of tests/data/NAME.toml, or of configs/NAME.toml
+regress: $(patsubst tests/data/%.h5,regress-%,$(wildcard tests/data/*.h5))  ## sweep every config with a baseline and compare
+
+regress-%: $(BIN)/impact
+	@mkdir -p $(RESULTS)
+	$(BIN)/impact sweep $(or $(wildcard tests/data/$*.toml),configs/$*.toml) -o $(RESULTS)/$*.h5 --overwrite --quiet --allow-failed
+	$(BIN)/impact compare $(RESULTS)/$*.h5 tests/data/$*.h5
 
 docs: $(VENV)/dev  ## regenerate docs/schema.md and the README's picture
 	$(BIN)/python scripts/make_docs.py
