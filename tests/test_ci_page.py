@@ -1,0 +1,120 @@
+"""The workflow that docs/ci.md offers to other projects runs as it stands, the package installed from a wheel."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import venv
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from .conftest import ROOT, Run
+
+PAGE = (ROOT / "docs" / "ci.md").read_text(encoding="utf-8")
+CONTACT = """
+models = ["hertz", "gharib-hurmuzlu-2012"]
+[sweep]
+e = [0.1, 0.5, 0.9]
+v1 = 1.0
+m1 = 1.0
+m2 = 2.0
+K = 6e9
+"""
+Shell = dict[str, str]
+
+
+def block(language: str) -> str:
+    (found,) = re.findall(rf"```{language}\n(.*?)```", PAGE, re.DOTALL)
+    return str(found)
+
+
+@pytest.fixture(scope="module")
+def steps() -> list[dict[str, str]]:
+    workflow = yaml.safe_load(block("yaml"))
+    return list(workflow["jobs"]["regression"]["steps"])
+
+
+@pytest.fixture(scope="module")
+def shell(tmp_path_factory: pytest.TempPathFactory) -> Shell:
+    """The environment of a runner: a new virtual environment, and an index that has a wheel of this project."""
+    folder = tmp_path_factory.mktemp("runner")
+    build = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder / "index")]
+    subprocess.run(build, cwd=ROOT, capture_output=True, check=True)
+    venv.create(folder / "venv", with_pip=True)
+    return {
+        **os.environ,
+        "PATH": f"{folder / 'venv' / 'bin'}{os.pathsep}{os.environ['PATH']}",
+        "PIP_NO_INDEX": "1",
+        "PIP_FIND_LINKS": str(folder / "index"),
+        "PIP_NO_DEPS": "1",
+        "GITHUB_STEP_SUMMARY": str(folder / "summary.md"),
+    }
+
+
+def run(command: str, shell: Shell, folder: Path) -> subprocess.CompletedProcess[str]:
+    if not command.startswith("pip"):
+        # what the project depends on is here already: a path with the libraries, and without the editable project
+        shell = {**shell, "PYTHONPATH": str(Path(np.__file__).parent.parent)}
+    words = ["bash", "-e", "-c", command]
+    return subprocess.run(words, cwd=folder, env=shell, capture_output=True, text=True, check=False, timeout=120)
+
+
+def test_the_workflow(shell: Shell, steps: list[dict[str, str]], tmp_path: Path) -> None:
+    (tmp_path / "contact.toml").write_text(CONTACT, encoding="utf-8")
+    (tmp_path / "baselines").mkdir()
+    always = [step["run"] for step in steps if "run" in step and "if" not in step]
+    assert [command.split()[0] for command in always] == ["pip", "impact", "impact"]
+    for command in (*always[:2], block("sh").splitlines()[1]):
+        done = run(command, shell, tmp_path)
+        assert done.returncode == 0, (command, done.stderr)
+    where = run("command -v impact && python -c 'import impact; print(impact.__file__)'", shell, tmp_path).stdout
+    assert where.count(shell["PATH"].split(os.pathsep)[0].removesuffix("bin")) == 2, where
+    assert run(always[2], shell, tmp_path).returncode == 0
+
+    # the numbers change: the job fails, says where, and the steps that run on failure leave what they say they do
+    (tmp_path / "contact.toml").write_text(CONTACT.replace("6e9", "6.1e9"), encoding="utf-8")
+    assert run(f"{always[1]} --overwrite", shell, tmp_path).returncode == 0
+    failed = run(always[2], shell, tmp_path)
+    assert failed.returncode == 1
+    assert failed.stdout.startswith(
+        "::error file=baselines/contact.h5,title=impact compare::not equal: physics config (K)"
+    )
+    (on_failure,) = [step["run"] for step in steps if step.get("if") == "failure()" and "run" in step]
+    run(on_failure, shell, tmp_path)
+    assert "not equal" in Path(shell["GITHUB_STEP_SUMMARY"]).read_text(encoding="utf-8")
+    (kept,) = [step["with"]["path"] for step in steps if "upload" in step.get("uses", "")]
+    assert all((tmp_path / name).is_file() for name in str(kept).split())
+
+
+def test_the_commands_in_order(cli: Run, tmp_path: Path) -> None:
+    (tmp_path / "contact.toml").write_text(CONTACT, encoding="utf-8")
+    (tmp_path / "baselines").mkdir()
+    for line in block("sh").splitlines():
+        words = [word.strip('"') for word in re.findall(r'"[^"]*"|\S+', line)]
+        assert words[0] == "impact"
+        done = cli(*words[1:], cwd=tmp_path)
+        assert done.returncode == 0, (line, done.stderr)
+
+
+def test_the_test(tmp_path: Path, cli: Run) -> None:
+    (tmp_path / "contact.toml").write_text(CONTACT, encoding="utf-8")
+    (tmp_path / "baselines").mkdir()
+    assert cli("sweep", "contact.toml", "-o", "baselines/contact.h5", "-q", cwd=tmp_path).returncode == 0
+    (tmp_path / "test_contact.py").write_text(block("python"), encoding="utf-8")
+    pytest_run = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_contact.py"]
+    assert subprocess.run(pytest_run, cwd=tmp_path, capture_output=True, check=False).returncode == 0
+    (tmp_path / "contact.toml").write_text(CONTACT.replace("e = [0.1", "e = [0.2"), encoding="utf-8")
+    failed = subprocess.run(pytest_run, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert failed.returncode == 1
+    assert "not equal: labels (e)" in failed.stdout
+    assert "e: 1 of 3 in NEW only: 0.2; 1 of 3 in BASELINE only: 0.1" in failed.stdout
+
+
+def test_the_readme_shows_the_same_steps(steps: list[dict[str, str]]) -> None:
+    shown = re.findall(r"- run: (.*)", (ROOT / "README.md").read_text(encoding="utf-8"))
+    assert shown == [step["run"] for step in steps if "run" in step and "if" not in step]
