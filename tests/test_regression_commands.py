@@ -207,7 +207,7 @@ def test_usage_is_exit_2_and_a_line(forked: Forked, folder: Path) -> None:
     for words, told in (
         (["--tol", "e_oot=1"], '--tol e_oot: no variable of a result; did you mean "e_out"?'),
         (["--tol", "much"], "--tol much: wants a number from 0 up"), (["--tol", "-1"], "--tol -1.0: wants"),
-        (["--tol", "nan"], "--tol nan: wants a number"), (["--tol", "status=1"], "--tol status: is exact"),
+        (["--tol", "nan"], "--tol nan: wants a number"), (["--tol", "status=1"], "--tol status: has none"),
         (["--tol", "1", "--tol", "2"], "--tol all: given twice"), (["--tol", "e_out=x"], "--tol x: wants"),
     ):  # fmt: skip
         done = forked("compare", "different.h5", "base.h5", *words, cwd=folder)
@@ -426,7 +426,7 @@ def test_bless_refuses_and_leaves_the_baseline_as_it_was(forked: Forked, folder:
         ([good, tmp_path / "link.h5", "--reason", "r"], "not a regular file"),
         ([good, tmp_path, "--reason", "r"], "not a regular file"),
         ([good, tmp_path / "no" / "b.h5", "--reason", "r"], "does not exist"),
-        ([good, baseline, "--reason", "r", "--tol", "status=1"], "--tol status: is exact"),
+        ([good, baseline, "--reason", "r", "--tol", "status=1"], "--tol status: has none"),
         ([good, tmp_path / "fresh.h5", "--reason", "r", "--tol", "-1"], "--tol -1.0: wants a number"),
         *(([tmp_path / f"{name}.h5", baseline, "--reason", "r"], f"{name}.h5: ") for name in UNREADABLE),
         *(([tmp_path / f"{name}.h5", tmp_path / "n.h5", "--reason", "r"], f"{name}.h5: ") for name in UNREADABLE),

@@ -153,6 +153,7 @@ def _materials(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
             a, b = own[name].get(field), other[name].get(field)
             if a != b:
                 path = f"materials.{name}.{field}"
+                a, b = (f"{one:.12g}" if isinstance(one, float) else one for one in (a, b))
                 found.append(Fault("physics config", path, safe_text(f"{path} is {a}, in BASELINE {b}")))
     return sorted(found, key=lambda fault: fault.name)
 

@@ -66,7 +66,8 @@ def in_effect(tol: float | Tolerances | None, attributes: Mapping[str, Any]) -> 
 def _check(tolerances: Mapping[str, Any]) -> None:
     for name, value in tolerances.items():
         if name != ALL and name not in WITH_TOLERANCE:
-            how = f"is {JUDGED[name]}, wants one of" if name in JUDGED else "no variable of a result;"
+            has_none = {"exact": "has none, it is judged exactly;", "reported": "has none, it is not judged;"}
+            how = has_none[JUDGED[name]] if name in JUDGED else "no variable of a result;"
             raise UsageError(f"--tol {safe_text(str(name))}: {how} {did_you_mean(str(name), WITH_TOLERANCE)}")
         if isinstance(value, bool) or not (isinstance(value, int | float) and 0.0 <= value <= sys.float_info.max):
             shown = value if name == ALL else f"{name}={value}"
