@@ -518,7 +518,8 @@ def test_the_tolerance_is_the_one_asked_for_else_the_baselines_else_the_solvers(
     ("1e-8", "--tol 1e-8: wants a number from 0 up"), ({"e_out": "1e-8"}, "--tol e_out=1e-8: wants a number"),
     ({"e_out": -1e-8}, "--tol e_out=-1e-08: wants a number"), ({"e_out": None}, "--tol e_out=None: wants"),
     ({"e_oot": 1e-8}, '--tol e_oot: no variable of a result; did you mean "e_out"?'),
-    ({"status": 1e-8}, "--tol status: has none, it is judged exactly"), ({"steps": 1}, "--tol steps: has none, it is not judged"),
+    ({"status": 1e-8}, "--tol status: has none, it is judged exactly"),
+    ({"steps": 1}, "--tol steps: has none, it is not judged"),
     ({"\x1b[31m": 1e-8}, r"--tol \x1b[31m: no variable of a result; known: "), ({3: 1e-8}, "--tol 3: no variable"),
 ])  # fmt: skip
 def test_a_wrong_tolerance_is_one_clear_line(figure6: xr.Dataset, tol: Any, told: str) -> None:
