@@ -737,3 +737,49 @@ def test_without_a_file_there_is_no_command(figure6: xr.Dataset, stored: Path) -
     # one point that several variables share is told once
     moved["e_error"][1, 5] = 0.5
     assert len(impact.compare(moved, stored).lines) == 3
+
+
+def test_points_of_the_same_labels_are_refused(figure6: xr.Dataset) -> None:
+    twice = xr.concat([figure6, figure6.isel(e=[1])], "e", data_vars="minimal")
+    for pair in ((twice, figure6), (figure6, twice), (twice, twice)):
+        with pytest.raises(UsageError, match="two points of the same labels"):
+            impact.compare(*pair, subset=True)
+
+
+def test_an_input_along_two_axes_is_compared(wide: xr.Dataset) -> None:
+    def with_mass(mass: float) -> xr.Dataset:
+        table = np.full((wide.sizes["e"], wide.sizes["v1"]), 2.0)
+        table[1, 1] = mass
+        return wide.assign_coords(R1=(("e", "v1"), table))
+
+    assert impact.compare(with_mass(2.0), with_mass(2.0)).equal
+    assert _faults(impact.compare(with_mass(7.0), with_mass(2.0))) == [("labels", "R1")]
+
+
+def test_a_restitution_from_alpha_is_as_exact_as_one_is() -> None:
+    # e = 1 - alpha v0 is small where the product is near 1, and its rounding is that of 1
+    sweep = {"alpha": 0.1, "v1": [1.0, 9.9999], "m1": 1.0, "m2": 2.0, "K": 6e9}
+    result = impact.sweep({"models": "hertz", "sweep": sweep})
+    near = impact.sweep({"models": "hertz", "sweep": sweep | {"v1": [1.0, np.nextafter(9.9999, 10.0)]}})
+    assert impact.compare(near, result).equal
+
+
+def test_whole_numbers_are_numbers(wide: xr.Dataset) -> None:
+    assert impact.compare(wide.assign_coords(v1=("v1", [1, 2], wide["v1"].attrs)), wide).equal
+
+
+def test_a_missing_answer_of_a_point_that_went_well_is_no_equality(figure6: xr.Dataset) -> None:
+    gone = figure6.assign(v1_post=figure6["v1_post"] * np.nan)
+    verdict = impact.compare(gone, gone)
+    assert [one.name for one in verdict.differing] == ["v1_post"]
+    (judged,) = verdict.differing
+    assert judged.different == int((figure6["status"] == 1).sum())
+
+
+def test_faults_are_told_in_the_order_of_the_headline(figure6: xr.Dataset) -> None:
+    other = figure6.assign_coords(e=figure6["e"] + 5.0, v1=2.0)
+    other["e_out"].attrs["units"] = "%"
+    verdict = impact.compare(other, figure6)
+    kinds = list(dict.fromkeys(line.split(":")[0] for line in verdict.lines))
+    assert kinds == ["nothing in common", "physics config", "units"]
+    assert verdict.headline.index(kinds[0]) < verdict.headline.index(kinds[1]) < verdict.headline.index(kinds[2])

@@ -165,7 +165,9 @@ def rerun(
     solver = (f"solver.{name}={stored.attrs.get(name)}" for name in ("rtol", "max_steps"))
     config = stored_config(stored.attrs, [f"models={json.dumps(keys)}", *solver], own, str(result))
     verdict = compare(execute(Plan(config, own)), stored, tol=tol, subset=subset)
-    return replace(verdict, new="the rerun", baseline=str(result), repeats=repeats(str(result), stored))
+    files = [word for one in plugins if isinstance(one, str | Path) for word in ("--plugin", str(one))]
+    again = ("impact", "run", str(result), *files) if repeats(str(result), stored) else ()
+    return replace(verdict, new="the rerun", baseline=str(result), repeats=again)
 
 
 def models(plugins: Sequence[ForceModel | str | Path] = ()) -> Mapping[str, ForceModel]:

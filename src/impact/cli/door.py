@@ -115,6 +115,21 @@ def _run(command: Callable[[], object]) -> int:
     return OK
 
 
+@contextlib.contextmanager
+def readers_may_leave() -> Iterator[None]:
+    """Print to a reader who may have seen enough, `| head -1`: the exit code is still that of what was found."""
+    try:
+        yield
+        sys.stdout.flush()
+    except BrokenPipeError:
+        _let_go(OK)
+    except SystemExit as leaving:
+        # rich leaves by this when the reader has gone
+        if not isinstance(leaving.__context__, BrokenPipeError):
+            raise
+        _let_go(OK)
+
+
 def _let_go(code: int) -> int:
     """The exit code where nothing more can be written: not at exit either."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

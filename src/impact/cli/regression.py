@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from ..views.report import Report
 
 
+# a narrower terminal shows the sentences only
+NARROWEST = 76
+
+
 class Format(StrEnum):
     """How a verdict is told."""
 
@@ -80,9 +84,14 @@ def bless(
     """Show how a result differs from its baseline, then let it take the baseline's place."""
     from .. import api
 
-    verdict = api.bless(new, baseline, reason=reason, tol=tolerances(tol))
-    if verdict is not None:
+    def show(verdict: Verdict) -> None:
         print_verdict(verdict)
+        sys.stdout.flush()
+
+    try:
+        verdict = api.bless(new, baseline, reason=reason, tol=tolerances(tol), show=show)
+    except (BrokenPipeError, SystemExit):
+        raise UsageError(f"{safe_text(str(baseline))}: not replaced, nobody read the verdict to its end") from None
     word = "made" if verdict is None else "replaced"
     door.say(f"{safe_text(str(baseline))}: {word}, with the reason")
 
@@ -129,19 +138,19 @@ def _tell(verdict: Verdict, format: Format, plot: Path | None) -> None:
     """Print a verdict, draw it, and leave by its exit code."""
     from ..views import report
 
-    if format is Format.table:
-        print_verdict(verdict)
-    else:
-        _print(report.report_of(verdict), format)
-    if plot is not None:
+    with door.readers_may_leave():
+        if format is Format.table:
+            print_verdict(verdict)
+        else:
+            _print(report.report_of(verdict), format)
+    if plot is not None and not verdict.ratios.data_vars:
+        # the verdict stands without a picture
+        door.say("no picture: there is no point to draw at")
+    elif plot is not None:
         from ..views import differences, look
 
-        try:
-            look.save_figure(differences.draw_differences(differences.differences(verdict)), plot)
-            door.say(f"{safe_text(str(plot))}: where the differences lie")
-        except UsageError as error:
-            # the verdict stands, with or without a picture
-            door.say(str(error))
+        look.save_figure(differences.draw_differences(differences.differences(verdict)), plot)
+        door.say(f"{safe_text(str(plot))}: {'drawn' if verdict.equal else 'where the differences lie'}")
     if not verdict.equal:
         raise typer.Exit(door.NOT_EQUAL)
 
@@ -169,8 +178,8 @@ def print_verdict(verdict: Verdict) -> None:
     for line in (verdict.headline, *verdict.lines, *(f"note: {note}" for note in verdict.notes)):
         # as one line, however long: a command is to be copied
         out.print(line, soft_wrap=True)
-    moved = [*verdict.differing, *(one for one in verdict.variables if one.is_equal and one.at)]
-    if moved:
+    moved = [one for one in verdict.ranked if one.at]
+    if moved and out.width >= NARROWEST:
         rows = table("variable", "judged", "tolerance", "differ", "worst", "x tolerance")
         rows.columns[1].justify = "left"
         for one in moved:

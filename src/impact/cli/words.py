@@ -26,13 +26,18 @@ def pairs(option: str, words: list[str] | None) -> dict[str, float | str]:
 
 
 def tolerances(words: list[str] | None) -> dict[str, float] | None:
-    """VALUE for all variables, NAME=VALUE for one; nothing where none is given."""
-    named = [word if "=" in word else f"all={word}" for word in words or ()]
+    """VALUE for all variables, NAME=VALUE for one; None where none is given."""
     found: dict[str, float] = {}
-    for name, value in pairs("--tol", named).items():
-        if not isinstance(value, float):
-            raise UsageError(f"--tol {safe_text(str(value))}: wants a number from 0 up, such as --tol 1e-8")
-        found[name] = value
+    for word in words or ():
+        name, _, value = word.rpartition("=")
+        name = name or "all"
+        if name in found:
+            raise UsageError(f"--tol {safe_text(word)}: the second one for {safe_text(name)}, wants one")
+        try:
+            found[name] = float(value)
+        except ValueError:
+            wants = "wants VALUE or NAME=VALUE, such as --tol 1e-8 or --tol v1_post=1e-6"
+            raise UsageError(f"--tol {safe_text(word)}: {wants}") from None
     return found or None
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from ..errors import UsageError
 from ..sweeps.rules import MATERIALS, SWEEP
 from ..text import safe_text
 from .verdict import Fault, Kind
@@ -17,6 +18,7 @@ from .verdict import Fault, Kind
 # two labels are the same when they differ by the rounding of a range at most: powers and logarithms differ in
 # their last bits from one processor to another
 ROUNDING = 1e-12
+NUMBERS = "fiu"
 NAMED = 3  # labels of one side that a message names
 
 Values = NDArray[Any]
@@ -129,6 +131,8 @@ def _matched(new: Sequence[Values], baseline: Sequence[Values]) -> tuple[Places,
         own, other = row[: len(new[0])], row[len(new[0]) :]
         if len(np.unique(own)) == len(own) and len(np.unique(other)) == len(other):
             break
+    else:
+        raise UsageError("an axis has two points of the same labels; compare takes results of a sweep")
     _, here, there = np.intersect1d(own, other, return_indices=True)
     order = np.argsort(there, kind="stable")
     return here[order], there[order]
@@ -136,10 +140,10 @@ def _matched(new: Sequence[Values], baseline: Sequence[Values]) -> tuple[Places,
 
 def _numbered(new: Values, baseline: Values, rounding: float) -> Places:
     """A number for each label of both, equal where the labels are."""
-    if new.dtype.kind != "f" or baseline.dtype.kind != "f":
-        new, baseline = new.astype(str), baseline.astype(str)
+    numbers = new.dtype.kind in NUMBERS and baseline.dtype.kind in NUMBERS
+    new, baseline = (one.astype(float if numbers else str) for one in (new, baseline))
     values, number = np.unique(np.concatenate([new, baseline]), return_inverse=True)
-    if values.dtype.kind == "f":
+    if numbers:
         another = ~np.isclose(values[1:], values[:-1], rtol=rounding, atol=0.0)
         number = np.concatenate([[0], np.cumsum(another)])[number]
     return np.asarray(number, np.intp)
@@ -169,19 +173,22 @@ def _labels(
 
 
 def _derived(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
-    """Coordinates that are computed from inputs and depend on several axes, or on the model."""
+    """Coordinates along several axes, or along models, that have other values: e by alpha, the exponent."""
     found = []
-    for name in ("e", "exponent"):
-        if name in new.coords and name in baseline.coords:
+    for name in sorted(str(name) for name in new.coords.keys() & baseline.coords.keys()):
+        if name == "exponent" or (is_input(name) and baseline[name].ndim):
             a, b = new[name], baseline[name]
-            if set(a.dims) != set(b.dims) or not _same(a.transpose(*b.dims).values, b.values):
-                found.append(Fault("labels", name, f"the coordinate {name} has other values"))
+            # e = 1 - alpha v0 is rounded as 1 is
+            rounding = ROUNDING if name == "e" else 0.0
+            if set(a.dims) != set(b.dims) or not _same(a.transpose(*b.dims).values, b.values, rounding):
+                found.append(Fault("labels", name, f"the coordinate {safe_text(name)} has other values"))
     return found
 
 
-def _same(a: Values, b: Values) -> bool:
-    if a.dtype.kind in "fiu" and b.dtype.kind in "fiu":
-        return bool(np.isclose(a, b, rtol=ROUNDING, atol=0.0, equal_nan=True).all())
+def _same(a: Values, b: Values, rounding: float = 0.0) -> bool:
+    """Whether all are the same but for rounding, relative, and to so much where they are computed."""
+    if a.dtype.kind in NUMBERS and b.dtype.kind in NUMBERS:
+        return bool(np.isclose(a, b, rtol=ROUNDING, atol=rounding, equal_nan=True).all())
     return bool(np.all(a.astype(str) == b.astype(str)))
 
 

@@ -3,25 +3,35 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
-from ..errors import UsageError
-from .compare import check_result, compare
+import xarray as xr
+
+from ..errors import ResultError, UsageError
+from .compare import check_result, compare, repeats
 from .store import check_output, load, save
-from .tolerances import Tolerances, chosen
+from .tolerances import Tolerances, in_effect
 from .verdict import Verdict
 
 
 def bless(
-    new: str | Path, baseline: str | Path, *, reason: str, tol: float | Tolerances | None = None
+    new: str | Path,
+    baseline: str | Path,
+    *,
+    reason: str,
+    tol: float | Tolerances | None = None,
+    show: Callable[[Verdict], None] = lambda verdict: None,
 ) -> Verdict | None:
-    """Let a result take the place of a baseline, which then carries the reason and the tolerances chosen.
+    """Let a result take the place of a baseline, which then carries the reason and the tolerances it is judged by.
 
     Parameters
     ----------
     new, baseline : files; the baseline need not exist yet
     reason : why the numbers changed
-    tol : see `compare`; kept in the baseline, beside those that it has chosen before
+    tol : see `compare`; the new baseline carries them, so that a coarser solver does not loosen the guard
+    show : is told the verdict before anything is written; if it raises an error nothing is
 
     Returns
     -------
@@ -46,7 +56,22 @@ def bless(
     check_output(baseline, overwrite=True, source=new)
     result = load(new)
     check_result(result, str(new))
-    verdict = compare(new, baseline, tol=tol) if baseline.exists() else None
-    kept = chosen(tol, result.attrs if verdict is None else load(baseline).attrs)
+    before = _standing(baseline)
+    verdict = None
+    if before is not None:
+        found = compare(result, before, tol=tol)
+        verdict = replace(found, new=str(new), baseline=str(baseline), repeats=repeats(str(new), result))
+        show(verdict)
+    kept = in_effect(tol, result.attrs if before is None else before.attrs)
     save(result.assign_attrs(reason=reason, tolerances=json.dumps(kept)), baseline, overwrite=True)
     return verdict
+
+
+def _standing(baseline: Path) -> xr.Dataset | None:
+    """The baseline as it is, if there is one; what is no result is not written over."""
+    if not baseline.exists():
+        return None
+    try:
+        return load(baseline)
+    except ResultError as error:
+        raise ResultError(f"{error}; it is left alone, remove it to make a new baseline") from None

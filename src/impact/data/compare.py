@@ -32,7 +32,7 @@ def compare(
     """Judge a result by another one, each variable as docs/schema.md says, at the points of equal labels.
 
     A value is equal where |new - baseline| <= tolerance x scale, the scale being that of the baseline's point. NaN
-    equals NaN where both points have the same status: a failed point, or a quantity that the law has not got.
+    equals NaN where both points have the same status and no such answer, or the law has no such quantity.
 
     Parameters
     ----------
@@ -66,6 +66,8 @@ def compare(
     faults = [*aligned.faults, *_materials(a, b), *_units(a, b)]
     notes = [*_notes(a, b), *_texts(aligned.new, aligned.baseline)]
     notes += [safe_text(f"not judged: {', '.join(strange)}")] if strange else []
+    if any(fault.kind == "labels" for fault in faults) and not subset:
+        notes.append("--subset judges what both have")
     judged: list[Judged] = []
     ratios: dict[str, xr.Variable] = {}
     for one in SCHEMA:
@@ -158,12 +160,20 @@ def _materials(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
     return sorted(found, key=lambda fault: fault.name)
 
 
-def _table(dataset: xr.Dataset, attribute: str) -> dict[str, dict[str, Any]]:
+def _parsed(dataset: xr.Dataset, attribute: str) -> dict[str, Any]:
+    """What an attribute holds as JSON."""
     try:
-        table = json.loads(dataset.attrs.get(attribute, "{}"))
-        return {str(key): dict(value) for key, value in table.items()}
-    except (ValueError, TypeError, AttributeError, RecursionError):
-        raise ResultError(f"the attribute {attribute} is not what it should be") from None
+        return dict(json.loads(dataset.attrs.get(attribute, "{}")))
+    except (ValueError, TypeError, RecursionError):
+        raise ResultError(f"the attribute {attribute} is not that of a result") from None
+
+
+def _table(dataset: xr.Dataset, attribute: str) -> dict[str, dict[str, Any]]:
+    """The same, where each entry is a table again."""
+    found = _parsed(dataset, attribute)
+    if not all(isinstance(one, dict) for one in found.values()):
+        raise ResultError(f"the attribute {attribute} is not that of a result")
+    return found
 
 
 def _units(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
@@ -179,10 +189,17 @@ def _units(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
 def _notes(new: xr.Dataset, baseline: xr.Dataset) -> list[str]:
     """What may explain a difference, and is no difference by itself."""
     found = []
-    for name in ("rtol", "max_steps", "impact_version", "packages", "plugins"):
+    for name in ("rtol", "max_steps", "impact_version"):
         a, b = (dataset.attrs.get(name) for dataset in (new, baseline))
         if not _alike(a, b):
             found.append(safe_text(f"{name} is {a}, in BASELINE {b}", 400))
+    for name in ("packages", "plugins"):
+        own, other = (_parsed(dataset, name) for dataset in (new, baseline))
+        found += [
+            safe_text(f"{key} is {own.get(key)}, in BASELINE {other.get(key)}", 400)
+            for key in sorted(own.keys() | other.keys())
+            if own.get(key) != other.get(key)
+        ]
     return found
 
 

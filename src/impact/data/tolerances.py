@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, TypeGuard
+
+import numpy as np
 
 from ..errors import ResultError, UsageError, did_you_mean
 from ..text import safe_text
@@ -21,8 +23,8 @@ JUDGED = {one.name: one.judged for one in SCHEMA}
 WITH_TOLERANCE = [name for name, judged in JUDGED.items() if judged not in ("exact", "reported")]
 
 
-def chosen(tol: float | Tolerances | None, attributes: Mapping[str, Any]) -> dict[str, float]:
-    """The tolerances that somebody chose: those asked for now, over those that the baseline carries.
+def in_effect(tol: float | Tolerances | None, attributes: Mapping[str, Any]) -> dict[str, float]:
+    """Tolerances by variable, "all" for the others: those asked for, else the baseline's, else its solver's.
 
     Parameters
     ----------
@@ -34,33 +36,26 @@ def chosen(tol: float | Tolerances | None, attributes: Mapping[str, Any]) -> dic
     UsageError : a name is no variable with a tolerance, or a value is not a number from 0 up
     ResultError : what the baseline carries is not that
 
-    >>> chosen({"e_out": 1e-6}, {"tolerances": '{"all": 1e-8}'})
+    >>> in_effect({"e_out": 1e-6}, {"rtol": 1e-10, "tolerances": '{"all": 1e-8}'})
     {'all': 1e-08, 'e_out': 1e-06}
-    >>> chosen(1e-7, {"tolerances": '{"v1_post": 1e-8}'})
+    >>> in_effect(1e-7, {"rtol": 1e-10, "tolerances": '{"v1_post": 1e-8}'})
     {'all': 1e-07}
+    >>> in_effect(None, {"rtol": 1e-10})
+    {'all': 1e-09}
     """
     asked = dict(tol or {}) if isinstance(tol, Mapping | None) else {ALL: tol}
     _check(asked)
     if ALL in asked:
         return asked
+    rtol = attributes["rtol"]
+    if not _is_number(rtol) or not 0.0 < rtol <= 1.0:
+        raise ResultError("the attribute rtol of the baseline is not that of a result")
     try:
         kept = dict(json.loads(str(attributes.get("tolerances", "{}"))))
         _check(kept)
     except (ValueError, TypeError, RecursionError, UsageError):
         raise ResultError("the attribute tolerances of the baseline is not that of a result") from None
-    return {**kept, **asked}
-
-
-def in_effect(tol: float | Tolerances | None, attributes: Mapping[str, Any]) -> dict[str, float]:
-    """All tolerances, "all" among them: those chosen, else 10 times that of the baseline's solver.
-
-    >>> in_effect(None, {"rtol": 1e-10})
-    {'all': 1e-09}
-    """
-    rtol = attributes["rtol"]
-    if not isinstance(rtol, int | float) or not 0.0 < rtol <= 1.0:
-        raise ResultError("the attribute rtol of the baseline is not that of a result")
-    return {ALL: SOLVER_TOLERANCES * float(rtol), **chosen(tol, attributes)}
+    return {ALL: SOLVER_TOLERANCES * float(rtol), **kept, **asked}
 
 
 def _check(tolerances: Mapping[str, Any]) -> None:
@@ -69,6 +64,10 @@ def _check(tolerances: Mapping[str, Any]) -> None:
             has_none = {"exact": "has none, it is judged exactly;", "reported": "has none, it is not judged;"}
             how = has_none[JUDGED[name]] if name in JUDGED else "no variable of a result;"
             raise UsageError(f"--tol {safe_text(str(name))}: {how} {did_you_mean(str(name), WITH_TOLERANCE)}")
-        if isinstance(value, bool) or not (isinstance(value, int | float) and 0.0 <= value <= sys.float_info.max):
+        if not _is_number(value) or not 0.0 <= value <= sys.float_info.max:
             shown = value if name == ALL else f"{name}={value}"
             raise UsageError(f"--tol {safe_text(str(shown))}: wants a number from 0 up, such as --tol 1e-8")
+
+
+def _is_number(value: object) -> TypeGuard[float]:
+    return isinstance(value, int | float | np.number) and not isinstance(value, bool)

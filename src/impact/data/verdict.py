@@ -139,6 +139,11 @@ class Verdict:
         return tuple(sorted(found, key=lambda one: (-one.times, one.judged != "exact")))
 
     @property
+    def ranked(self) -> tuple[Judged, ...]:
+        """All variables: those whose values differ, the worst first, then the others."""
+        return (*self.differing, *(one for one in self.variables if one.is_equal))
+
+    @property
     def headline(self) -> str:
         """The first line: equal and how closely, or not equal in what."""
         if self.equal:
@@ -162,7 +167,8 @@ class Verdict:
     @property
     def lines(self) -> tuple[str, ...]:
         """What differs, a line each; after a value's the command that repeats its worst point."""
-        found = [f"{fault.kind}: {fault.text}" for fault in self.faults]
+        faults = sorted(self.faults, key=lambda fault: KINDS.index(fault.kind))
+        found = [f"{fault.kind}: {fault.text}" for fault in faults]
         for one in self.differing:
             repeats = f"  {self.replay(one)}"
             # several variables are often worst at one point

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from textwrap import fill
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -21,6 +22,8 @@ PANEL_HEIGHT, ROOM = 2.3, 1.3
 # differences far below the tolerance are all the same
 SMALLEST = 1e-4
 TITLE_WIDE, LABEL_WIDE, X_LABEL_WIDE, TICKS, MANY = 78, 34, 44, 24, 40
+# height of the band, as a ratio
+BAND = 20.0
 # letters of all the names under an axis of half the width
 SHORT_NAMES = 30
 
@@ -127,7 +130,7 @@ def _rows(panels: Sequence[Panel]) -> list[tuple[Panel, ...]]:
 def _ends(panels: Sequence[Panel]) -> tuple[float, float]:
     """The ends of the vertical axis: the tolerance in sight, and room above for what has no number."""
     found = [r for panel in panels for row in panel.ratios.values() for r in row if 0.0 < r < np.inf]
-    return max(SMALLEST, min([0.1, *found]) / 2.0), 10.0 * max([10.0, *found])
+    return max(SMALLEST, min([0.1, *found]) / 2.0), 2.0 * BAND * max([1.0, *found])
 
 
 def _draw_panel(axes: Axes, panel: Panel, names: list[str], ends: tuple[float, float]) -> None:
@@ -139,13 +142,19 @@ def _draw_panel(axes: Axes, panel: Panel, names: list[str], ends: tuple[float, f
     x = np.asarray(panel.values, float)
     for place, name in enumerate(names):
         ratio = np.asarray(panel.ratios.get(name, np.full(len(x), np.nan)), float)
-        # what has no number of tolerances, such as a NaN against a number, stands at the upper edge
-        height = np.where(ratio > 0.0, np.clip(ratio, bottom, top / 2.0), np.nan)
-        axes.plot(
-            x, height, label=name, color=COLOURS[place % len(COLOURS)], marker=MARKERS[place % len(MARKERS)],
-            markerfacecolor="white", linewidth=0.9, linestyle="" if panel.names else "-",
-            markersize=4.5 if len(x) <= MANY else 2.5,
-        )  # fmt: skip
+        look: dict[str, Any] = {
+            "color": COLOURS[place % len(COLOURS)], "marker": MARKERS[place % len(MARKERS)],
+            "markerfacecolor": "white", "markersize": 4.5 if len(x) <= MANY else 2.5,
+        }  # fmt: skip
+        counted = np.where(np.isfinite(ratio) & (ratio > 0.0), np.maximum(ratio, bottom), np.nan)
+        axes.plot(x, counted, label=name, linewidth=0.9, linestyle="" if panel.names else "-", **look)
+        # what has no number of tolerances, such as a NaN against a number, stands in a band above
+        height = top / BAND ** ((place + 1) / (len(names) + 1))
+        axes.plot(x, np.where(np.isinf(ratio), height, np.nan), linestyle="", **look)
+    if any(np.isinf(row).any() for row in panel.ratios.values()):
+        axes.axhline(top / BAND, color="black", linewidth=0.6, linestyle=":")
+        axes.annotate("no number of tolerances", (1.0, top), (-2, -2), xycoords=("axes fraction", "data"),
+                      textcoords="offset points", ha="right", va="top", fontsize=7, color="#555555")  # fmt: skip
     axes.set_yscale("log")
     axes.set_ylim(bottom, top)
     axes.set_xlabel(fill(panel.label, X_LABEL_WIDE), parse_math=False, fontsize=8)

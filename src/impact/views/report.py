@@ -45,11 +45,11 @@ def report_of(verdict: Verdict) -> Report:
     )
     values = (
         Case(one.name) if one.is_equal else Case(one.name, (one.text,), verdict.replay(one))
-        for one in (*verdict.differing, *(one for one in verdict.variables if one.is_equal))
+        for one in verdict.ranked
     )
     return Report(
         safe_text(verdict.new), safe_text(verdict.baseline), verdict.equal, verdict.headline, (*faults, *values),
-        verdict.notes, (*verdict.differing, *(one for one in verdict.variables if one.is_equal)),
+        verdict.notes, verdict.ranked,
     )  # fmt: skip
 
 
