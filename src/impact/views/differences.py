@@ -153,7 +153,7 @@ def _draw_panel(axes: Axes, panel: Panel, names: list[str], ends: tuple[float, f
         axes.plot(x, np.where(np.isinf(ratio), height, np.nan), linestyle="", **look)
     if any(np.isinf(row).any() for row in panel.ratios.values()):
         axes.axhline(top / BAND, color="black", linewidth=0.6, linestyle=":")
-        axes.annotate("no number of tolerances", (1.0, top), (-2, -2), xycoords=("axes fraction", "data"),
+        axes.annotate("above: no number", (1.0, top / BAND), (-2, -2), xycoords=("axes fraction", "data"),
                       textcoords="offset points", ha="right", va="top", fontsize=7, color="#555555")  # fmt: skip
     axes.set_yscale("log")
     axes.set_ylim(bottom, top)
