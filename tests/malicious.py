@@ -241,7 +241,7 @@ CHANGES: dict[str, tuple[Change, str]] = {
     "null attribute": (_null, ODD),
     "axes without a name": (lambda f: f["v1_post"].attrs.__delitem__("_Netcdf4Coordinates"), AXES),
     "axis of no number": (partial(_numbered, name="v1_post", numbers=[0, 1, 99]), AXES),
-    "axes of one number": (partial(_numbered, name="v1_reference", numbers=[1, 1]), AXES),
+    "axes of one number": (partial(_numbered, name="v1_post", numbers=[0, 1, 0]), AXES),
     "axes of two lengths": (partial(_numbered, name="v1_post", numbers=[0, 2, 1]), AXES),
     "axes of texts": (partial(_numbered, name="v1_post", numbers=np.bytes_(b"012")), AXES),
     "axis along another": (partial(_numbered, name="year", numbers=[2]), "is damaged"),

@@ -16,10 +16,13 @@ import impact
 
 from .forked import Forked
 
-FILE = "FILE"
+FILE, WHOLE = "FILE", "WHOLE"
 COMMANDS = (
     ("info", FILE, "--json"),
     ("plot", FILE, "-o", "picture.png"),
+    ("compare", FILE, WHOLE),
+    # of the sweep this is a part: variables with NaN are left out
+    ("rerun", FILE, "--subset"),
 )
 FLIPS, FAULTS = 25, 125  # in one test
 
@@ -52,11 +55,11 @@ def places(path: Path, count: int, seed: int) -> Iterator[tuple[int, int]]:
         yield draw.choice((anywhere, data, beside)[number % 3]), draw.randrange(8)
 
 
-def told(forked: Forked, path: Path, command: tuple[str, ...]) -> object:
+def told(forked: Forked, path: Path, whole: Path, command: tuple[str, ...]) -> object:
     """What a command makes of a file: the reason why it is refused, or all that it gives."""
     picture = path.parent / "picture.png"
     picture.unlink(missing_ok=True)
-    done = forked(*(path.name if word == FILE else word for word in command), cwd=path.parent)
+    done = forked(*({FILE: path.name, WHOLE: whole}.get(word, word) for word in command), cwd=path.parent)
     assert not done.timed_out
     assert done.returncode in (0, 2), done
     if done.returncode == 2:
@@ -64,6 +67,9 @@ def told(forked: Forked, path: Path, command: tuple[str, ...]) -> object:
         assert line.startswith(f"{path.name}: ")
         assert (done.stdout, picture.exists()) == ("", False)
         return line
+    if command[0] in ("compare", "rerun"):
+        # the versions of packages are noted, and are no content
+        return [line for line in done.stdout.splitlines() if not line.startswith("note: ")]
     if "--json" not in command:
         return done.stdout, picture.read_bytes() if picture.exists() else None
     found = json.loads(done.stdout)
@@ -75,11 +81,11 @@ def check_flips(forked: Forked, whole: Path, folder: Path, count: int, seed: int
     good, data = whole.read_bytes(), set(data_bytes(whole))
     path = folder / "flip.h5"
     path.write_bytes(good)
-    genuine = {command: told(forked, path, command) for command in COMMANDS}
+    genuine = {command: told(forked, path, whole, command) for command in COMMANDS}
     counts: Counter[str] = Counter()
     for place, bit in places(whole, count, seed):
         path.write_bytes(good[:place] + bytes([good[place] ^ (1 << bit)]) + good[place + 1 :])
-        answers = {command: told(forked, path, command) for command in COMMANDS}
+        answers = {command: told(forked, path, whole, command) for command in COMMANDS}
         noticed = [isinstance(answer, str) for answer in answers.values()]
         # all commands agree whether this is a result
         assert len(set(noticed)) == 1, (place, bit, answers)

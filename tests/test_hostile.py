@@ -21,7 +21,9 @@ COMMANDS = (
     ("info", FILE),
     ("info", FILE, "--json"),
     ("plot", FILE, "-o", "picture.png"),
-)  # fmt: skip
+    ("compare", FILE, FILE, "--plot", "differences.png"),
+    ("rerun", FILE, "--plot", "differences.png"),
+)
 SECONDS, MEMORY = 2.0, 500_000_000
 
 
@@ -110,7 +112,7 @@ def test_a_genuine_file_is_not(forked: Forked, small: Path, tmp_path: Path) -> N
     shutil.copy(small, tmp_path / "good.h5")
     for command in COMMANDS:
         assert tell(forked, tmp_path / "good.h5", command).returncode == 0
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["good.h5", "picture.png"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["differences.png", "good.h5", "picture.png"]
 
 
 def test_what_is_unknown_is_passed_over_with_a_note(forked: Forked, small: Path, tmp_path: Path) -> None:
@@ -133,12 +135,12 @@ def test_what_is_unknown_is_passed_over_with_a_note(forked: Forked, small: Path,
         note = done.stderr.splitlines()[0]
         assert note.startswith("note: more.h5: passed over")
         assert r"x\x1b[31m\u202e\x0a" in note
-        assert len(done.stderr.splitlines()) == 1 + (command[0] == "plot")
+        assert len(done.stderr.splitlines()) == 1 + (command[0] != "info")
 
 
 def test_how_another_program_packed_it_is_not_kept(small: Path, tmp_path: Path) -> None:
     result = impact.load(small)
-    packed = {str(name): {"zlib": True, "chunksizes": (1, 1, 1)} for name in ("v1_post", "e_out")}
+    packed = {str(name): {"zlib": True, "chunksizes": (1, 1, 1)} for name in ("v1_post", "status")}
     result.to_netcdf(tmp_path / "packed.h5", engine="h5netcdf", encoding=packed)
     with pytest.raises(ResultError, match="not stored in one piece"):
         impact.load(tmp_path / "packed.h5")

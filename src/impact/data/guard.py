@@ -176,6 +176,6 @@ def _axes(known: Mapping[str, h5py.Dataset]) -> dict[str, tuple[str, ...]]:
     axes = {name: tuple(named.get(number, "") for number in own) for name, own in numbers.items()}
     for name, own in axes.items():
         lengths = tuple(known[axis].size if axis else None for axis in own)
-        if len(set(own)) != len(own) or lengths != known[name].shape or (name in scales and own != (name,)):
+        if len(set(own)) != len(own) or lengths != known[name].shape:
             raise _odd("its axes are not those of the file", name)
     return axes

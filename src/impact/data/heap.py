@@ -62,14 +62,14 @@ def _size(stream: BinaryIO, place: int) -> int:
 
 
 def _objects(stream: BinaryIO, place: int, size: int) -> Iterator[tuple[int, bytes]]:
-    """The objects of a heap, each with its number; number 0 is the room that is left."""
+    """The objects of a heap, each with its number."""
     stream.seek(place + HEAP.size)
     left = size - HEAP.size
     while left >= OBJECT.size:
         number, _, _, length = OBJECT.unpack(stream.read(OBJECT.size))
         # each begins at a multiple of eight bytes
         left -= OBJECT.size + length + -length % 8
-        if number == 0 or left < 0:
+        if left < 0:
             return
         yield number, stream.read(length)
         stream.seek(-length % 8, os.SEEK_CUR)
