@@ -140,9 +140,10 @@ def test_a_zip_group_is_matched_by_all_its_columns(wide: xr.Dataset) -> None:
     assert {one.points for one in verdict.variables} == {3 * 2 * 1 * 2 * 2, 4 * 3 * 2 * 1 * 2 * 2}
     crossed = _relabelled(wide, "m2", [math.inf, 1.0])
     assert _faults(impact.compare(crossed, wide)) == [("nothing in common", "m1")]
-    # what was zipped and no longer is has another grid
+    # what was zipped and no longer is: the point that both have is compared
     loose = wide.isel(m1=[0]).drop_vars("m2").assign_coords(m2=((), 1.0, wide["m2"].attrs))
-    assert _faults(impact.compare(loose, wide)) == [("nothing in common", "m1")]
+    assert _faults(impact.compare(loose, wide)) == [("labels", "m1")]
+    assert impact.compare(loose, wide, subset=True).equal
 
 
 def test_an_axis_of_length_one_is_a_single_value(wide: xr.Dataset) -> None:
@@ -475,7 +476,7 @@ def test_nan_in_both_is_equal_where_the_status_is(figure6: xr.Dataset) -> None:
     names = [one.name for one in verdict.differing]
     assert names[0] == "status"
     assert set(names) == {"status", *(name for name in SCALES if figure6[name].ndim == 2)}
-    assert "NaN, baseline NaN, with another status" in str(verdict)
+    assert "NaN, baseline NaN, which their statuses do not explain" in str(verdict)
     assert "status: 1 of 303 differ, the first at model=lankarani-nikravesh-1990, e=0.5: " in str(verdict)
     assert "not_separated, baseline max_steps" in str(verdict)
     # a quantity that the law has not got is NaN at status ok
@@ -783,3 +784,20 @@ def test_faults_are_told_in_the_order_of_the_headline(figure6: xr.Dataset) -> No
     kinds = list(dict.fromkeys(line.split(":")[0] for line in verdict.lines))
     assert kinds == ["nothing in common", "physics config", "units"]
     assert verdict.headline.index(kinds[0]) < verdict.headline.index(kinds[1]) < verdict.headline.index(kinds[2])
+
+
+def test_a_point_of_a_zip_group_is_that_of_an_axis() -> None:
+    sweep = {"e": 0.5, "v1": 1.0, "m1": [1.0, 3.0], "K": 6e9}
+    zipped = impact.sweep({"models": "hertz", "sweep": sweep | {"m2": [1.0, 7.0], "zip": [["m1", "m2"]]}})
+    plain = impact.sweep({"models": "hertz", "sweep": sweep | {"m2": 1.0}})
+    for pair in ((zipped, plain), (plain, zipped)):
+        assert _faults(impact.compare(*pair)) == [("labels", "m1")]
+        verdict = impact.compare(*pair, subset=True)
+        assert verdict.equal
+        assert {one.points for one in verdict.variables} == {1}
+
+
+def test_a_single_point_has_no_coordinates_to_tell() -> None:
+    point = impact.sweep({"models": "hertz", "sweep": {"e": 0.5, "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6e9}})
+    moved = point.assign(v1_reference=point["v1_reference"] + 1.0)
+    assert "v1_reference: 1 of 1 differ, worst 1 = 1e+09 x tolerance\n" in f"{impact.compare(moved, point)}\n"

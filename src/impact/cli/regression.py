@@ -178,7 +178,7 @@ def print_verdict(verdict: Verdict) -> None:
     for line in (verdict.headline, *verdict.lines, *(f"note: {note}" for note in verdict.notes)):
         # as one line, however long: a command is to be copied
         out.print(line, soft_wrap=True)
-    moved = [one for one in verdict.ranked if one.at]
+    moved = [one for one in verdict.ranked if one.times]
     if moved and out.width >= NARROWEST:
         rows = table("variable", "judged", "tolerance", "differ", "worst", "x tolerance")
         rows.columns[1].justify = "left"

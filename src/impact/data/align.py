@@ -91,7 +91,16 @@ def _stretched(own: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
         if axis not in own.dims and axis in own.coords and own[axis].ndim == 0:
             varying = [n for n in own.variables if n in other.variables and axis in other.variables[n].dims]
             own = along(own, axis, varying)
-    return own
+    # a member of a zip group in the other, which here does not vary along their common axis
+    constant = {
+        name: other[name].dims
+        for name in own.coords.keys() & other.coords.keys()
+        if own[name].ndim == 0 and other[name].ndim == 1 and other[name].dims[0] in own.dims
+    }
+    repeated = {
+        n: (dims, np.repeat(own[n].values, own.sizes[dims[0]]), own[n].attrs) for n, dims in constant.items()
+    }
+    return own.assign_coords(repeated)
 
 
 def along(own: xr.Dataset, axis: str, names: Iterable[Hashable]) -> xr.Dataset:

@@ -79,15 +79,17 @@ class Judged:
         if not self.different:
             return f"{self.name}: none of {self.points} differ"
         many = f"{self.name}: {self.different} of {self.points} differ"
+        at = f" at {self.place}" if self.place else ""
         if self.judged == "exact" or self.worst != self.worst:
             words = (_word(self.name, value) for value in (self.new, self.baseline))
-            other = ", with another status" if self.new != self.new and self.baseline != self.baseline else ""
+            both = self.new != self.new and self.baseline != self.baseline
             which = "first" if self.judged == "exact" else "worst"
-            return "{}, the {} at {}: {}, baseline {}".format(many, which, self.place, *words) + other
+            told = f"{many}, the {which}{at}: {', baseline '.join(words)}"
+            return f"{told}, which their statuses do not explain" if both else told
         if self.judged == "reported":
-            return f"{many}, by {self.worst:g} at most, at {self.place} (not judged)"
+            return f"{many}, by {self.worst:g} at most{at} (not judged)"
         times = f"{self.times:.3g} x tolerance" if self.times < float("inf") else "where none is allowed"
-        return f"{many}, worst {self.worst:.2g} = {times} at {self.place}"
+        return f"{many}, worst {self.worst:.2g} = {times}{at}"
 
 
 def _word(name: str, value: float) -> str:
@@ -153,7 +155,8 @@ class Verdict:
             closest = max(judged, key=lambda one: one.times, default=None)
             if closest is None or not closest.times:
                 return f"{said}, none differs"
-            return f"{said}, largest difference {closest.times:.2g} x tolerance: {closest.name} at {closest.place}"
+            at = f" at {closest.place}" if closest.place else ""
+            return f"{said}, largest difference {closest.times:.2g} x tolerance: {closest.name}{at}"
         named = [(fault.kind, fault.name) for fault in self.faults]
         named += [("values", one.name) for one in self.differing]
         told = []
