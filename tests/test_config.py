@@ -220,6 +220,8 @@ BAD = [
      ['x.toml:1: sweep: missing, wants a table [sweep] of what to sweep: e or alpha, v1, m1, m2, material, ...',
       *(f"x.toml:{line}: {key}: unknown key; it belongs under [sweep]" for line, key in ((3, "e"), (4, "v1"), (5, "m1"), (6, "m2"))),
       'x.toml:7: material: unknown key; it belongs under [sweep]']),
+    ("rho = 7850", "rho = 7850\n[solver]\ncollapse = 1",
+     ["x.toml:14: solver.collapse: got 1, wants true or false"]),
     ("rho = 7850", "rho = 7850\n[solver]\nrtol = 1\nmax_steps = 0\nrotl = 1",
      ["x.toml:14: solver.rtol: got 1, wants a number from 1e-13 to 0.0001",
       "x.toml:15: solver.max_steps: got 0, wants a whole number from 1 to 1,000,000,000",

@@ -51,10 +51,18 @@ DEFAULT_RTOL = 1e-10
 
 @dataclass(frozen=True)
 class Solver:
-    """How exactly impacts are integrated: the relative tolerance, and the steps that one impact may take."""
+    """How impacts are integrated.
+
+    Parameters
+    ----------
+    rtol : relative tolerance
+    max_steps : steps that one impact may take
+    collapse : integrate impacts that are the same in the contact's own units once; changes no bit
+    """
 
     rtol: float = DEFAULT_RTOL
     max_steps: int = 10_000
+    collapse: bool = True
 
 
 @dataclass(frozen=True)

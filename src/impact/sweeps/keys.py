@@ -11,7 +11,7 @@ from ..contact.collide import Contact
 from ..contact.model import ForceModel
 from .ranges import Entry, entry_schema, number_schema, read_entry, read_groups, read_names
 from .rules import DEFAULTS, MATERIAL, MATERIALS, REQUIRED, SWEEP, expand_models, own_quantities
-from .values import Problem, Quantity, read_number, read_whole, refuse
+from .values import Problem, Quantity, read_number, read_switch, read_whole, refuse
 
 DEFAULT_TITLE = "Impact sweep"
 RTOL = Quantity("1", "relative tolerance of the integration", least=1e-13, most=1e-4)
@@ -125,6 +125,9 @@ MATERIAL_KEYS = {name: number_key(name, quantity) for name, quantity in MATERIAL
 SOLVER_KEYS = {
     "rtol": number_key("rtol", RTOL),
     "max_steps": Key(lambda value, _: read_whole(value, 1, MOST_STEPS), STEPS, "steps that one impact may take"),
+    "collapse": Key(
+        lambda value, _: read_switch(value), {"type": "boolean"}, "integrate impacts that are the same once"
+    ),
 }
 VARIABLES = tuple(one.name for one in fields(Contact))
 OUTPUT_KEYS = {

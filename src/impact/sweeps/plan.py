@@ -138,7 +138,8 @@ class Plan:
             "scalars": dict(sorted(config.scalars.items())),
             "axes": [{name: list(values) for name, values in axis.columns.items()} for axis in config.axes],
             "materials": {name: asdict(material) for name, material in self.materials_used.items()},
-            "solver": asdict(config.solver),
+            # not whether impacts are collapsed, which changes nothing
+            "solver": {"rtol": config.solver.rtol, "max_steps": config.solver.max_steps},
             "variables": config.variables,
             "plugins": self.plugins.hashes,
         }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import asdict
 
 from ..contact.collide import Contact, collide
 from .plan import BLOCK, Block, Plan
@@ -20,4 +21,4 @@ def run(plan: Plan, block_size: int = BLOCK) -> Iterator[tuple[Block, Contact]]:
     for block in plan.blocks(block_size):
         model = plan.models[block.model]
         lanes = plan.lanes(model, block.start, block.stop)
-        yield block, collide(model, lanes, rtol=solver.rtol, max_steps=solver.max_steps)
+        yield block, collide(model, lanes, **asdict(solver))

@@ -175,6 +175,13 @@ def read_whole(value: object, least: int, most: int) -> int:
     return value
 
 
+def read_switch(value: object) -> bool:
+    """True or false, and nothing that could be taken for them."""
+    if not isinstance(value, bool):
+        raise refuse(value, "true or false")
+    return value
+
+
 def _with_unit(text: str, quantity: Quantity, n: float | None) -> float:
     unit = quantity.unit
     example = "" if quantity.varies else f', such as "1 {unit}"'
