@@ -57,7 +57,11 @@ told. More in [ci.md](ci.md).
 - In a baseline that `impact bless` made also its `reason`, and `tolerances`, those chosen for it, as JSON by
   variable, `all` for the others.
 
-There is no time stamp: equal inputs give equal contents.
+There is no time stamp: equal inputs give equal contents. Attributes of text have a fixed length, so that a reader
+knows it beforehand: xarray, ncdump and others show them as text, h5py as bytes.
+
+A file is read here only if it is one piece: numbers and labels, uncompressed, with the names of this page; what
+has another name is passed over with a note. `impact.save` stores nothing that would not be read again.
 
 ## Time history (`impact run --history`)
 

@@ -157,7 +157,7 @@ def _draw_panel(axes: Axes, panel: Panel, names: list[str], ends: tuple[float, f
                       textcoords="offset points", ha="right", va="top", fontsize=7, color="#555555")  # fmt: skip
     axes.set_yscale("log")
     axes.set_ylim(bottom, top)
-    axes.set_xlabel(fill(panel.label, X_LABEL_WIDE), parse_math=False, fontsize=8)
+    axes.set_xlabel(fill(panel.label, X_LABEL_WIDE, break_on_hyphens=False), parse_math=False, fontsize=8)
     if not panel.names and is_geometric(x):
         axes.set_xscale("log")
         room = (x[-1] / x[0]) ** 0.03
