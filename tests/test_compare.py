@@ -801,3 +801,18 @@ def test_a_single_point_has_no_coordinates_to_tell() -> None:
     point = impact.sweep({"models": "hertz", "sweep": {"e": 0.5, "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6e9}})
     moved = point.assign(v1_reference=point["v1_reference"] + 1.0)
     assert "v1_reference: 1 of 1 differ, worst 1 = 1e+09 x tolerance\n" in f"{impact.compare(moved, point)}\n"
+
+
+def test_the_worst_point_of_a_part_is_run_again_where_the_part_is(
+    forked: Forked, figure6: xr.Dataset, wide: xr.Dataset, tmp_path: Path
+) -> None:
+    for whole, place, point in (
+        (figure6, {"e": 5}, {"e": 0.05}),
+        (wide, {"m1": 1, "v1": 1}, {"m1": 3.0, "m2": "inf", "v1": 2.0}),
+    ):
+        part = whole.isel(place)
+        impact.save(part.assign(e_out=part["e_out"] + 1.0), tmp_path / "part.h5", overwrite=True)
+        verdict = impact.compare(tmp_path / "part.h5", part)
+        command = shlex.split(verdict.replay(verdict.differing[0]))
+        told = json.loads(forked(*command[1:], "--json").stdout)
+        assert point.items() <= told["inputs"].items()

@@ -19,7 +19,7 @@ from .data.compare import compare as compare
 from .data.compare import repeats
 from .data.impact import Impact as Impact
 from .data.impact import impact_of
-from .data.origin import config_of, stored_config
+from .data.origin import config_of, picked_out, stored_config
 from .data.results import assemble
 from .data.store import load as load
 from .data.store import save as save
@@ -125,7 +125,9 @@ def run(
     (0.41072, 0.41072)
     """
     own = read_plugins(plugins)
-    config, first = one_point(lambda more: config_of(source, [*overrides, *more], own), model, at)
+    config, first = one_point(
+        lambda more: config_of(source, [*overrides, *more], own), model, at, picked_out(source)
+    )
     return impact_of(Plan(config, own), first)
 
 

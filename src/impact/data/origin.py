@@ -28,11 +28,24 @@ def config_of(
     if isinstance(source, Mapping):
         return read_config(source, overrides, plugins.models)
     path = Path(source)
-    if path.is_file():
-        with path.open("rb") as file:
-            if file.read(len(HDF5_MAGIC)) == HDF5_MAGIC:
-                return stored_config(load(path).attrs, overrides, plugins, str(path))
+    if _is_result(path):
+        return stored_config(load(path).attrs, overrides, plugins, str(path))
     return read_config(path, overrides, plugins.models)
+
+
+def picked_out(source: str | Path | Mapping[str, object] | None) -> dict[str, float | str]:
+    """The single values of a result; where its sweep varied one of them, the result is the part at that value."""
+    if not isinstance(source, str | Path) or not _is_result(Path(source)):
+        return {}
+    single = {str(name): one for name, one in load(source).coords.items() if one.ndim == 0}
+    return {name: one.values.item() for name, one in single.items() if name != "model"}
+
+
+def _is_result(path: Path) -> bool:
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return file.read(len(HDF5_MAGIC)) == HDF5_MAGIC
 
 
 def stored_config(

@@ -15,7 +15,10 @@ Read = Callable[[Sequence[str]], Config]
 
 
 def one_point(
-    read: Read, model: str | None = None, at: Mapping[str, float | str] | None = None
+    read: Read,
+    model: str | None = None,
+    at: Mapping[str, float | str] | None = None,
+    picked: Mapping[str, float | str] | None = None,
 ) -> tuple[Config, tuple[str, ...]]:
     """The config of a single impact.
 
@@ -25,6 +28,7 @@ def one_point(
     model : key of the model; by default the config's first
     at : values by config name, which need not be on the grid; those of a zip group have to be, since they vary
         together
+    picked : values by config name for the axes among them, where `at` says nothing
 
     Returns
     -------
@@ -37,8 +41,9 @@ def one_point(
     """
     # each override, and how it is called in a message: as it was asked for
     asked = {} if model is None else {f"models={json.dumps([model])}": f"--model {model}"}
-    at = at or {}
     config = _read(read, asked)
+    varied = {name for axis in config.axes for name in axis.columns}
+    at = {**{name: value for name, value in (picked or {}).items() if name in varied}, **(at or {})}
     zipped = {name for axis in config.axes if len(axis.columns) > 1 for name in axis.columns}
     known = [*(name for axis in config.axes for name in axis.columns), *config.scalars]
     for name, value in at.items():
