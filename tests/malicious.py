@@ -9,6 +9,7 @@ import mmap
 import os
 import re
 import struct
+import zlib
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -20,7 +21,8 @@ from scipy.io import netcdf_file
 
 SECRET = b"the secret 1234567"
 UTF8 = h5py.string_dtype()
-HERE = "not stored in one piece in this file"
+HERE = "not stored in this file, in one piece or in pieces of one size"
+MUCH = "more data than such a file may hold"
 KIND = "neither numbers nor labels"
 HOLDS = "declares other data than the file holds"
 AXES = "its axes are not those of the file"
@@ -116,6 +118,21 @@ def _unwritten(file: h5py.File, length: int) -> None:
     h5d.create(file.id, b"other", h5t.IEEE_F64LE, h5s.create_simple((length,)), plan)
 
 
+def _pieces(file: h5py.File, content: bytes | None = None, mask: int = 0) -> None:
+    """A variable in packed pieces, of which the first holds this; the others are right, or none is there."""
+    values = file["v1_post"][()]
+    new = anew(file, "v1_post", data=None, shape=values.shape, dtype="f8", compression="gzip", chunks=(1, 3, 2))
+    if content is not None:
+        new[...] = values
+        new.id.write_direct_chunk((0, 0, 0), content, mask)
+
+
+def _bomb(file: h5py.File) -> None:
+    """A piece of six numbers that unpacks to a gigabyte."""
+    pack = zlib.compressobj(9)
+    _pieces(file, b"".join([*(pack.compress(bytes(2**20)) for _ in range(2**10)), pack.flush()]))
+
+
 def _of_kind(file: h5py.File, kind: h5t.TypeID) -> None:
     plan = h5p.create(h5p.DATASET_CREATE)
     plan.set_alloc_time(h5d.ALLOC_TIME_EARLY)
@@ -196,8 +213,16 @@ CHANGES: dict[str, tuple[Change, str]] = {
     "external storage of another": (partial(_external_storage, name="other"), HERE),
     "virtual": (partial(_virtual, source="secret.h5"), HERE),
     "virtual without source": (partial(_virtual, source="nowhere.h5"), HERE),
-    "chunked": (partial(anew, name="v1_post", chunks=True), HERE),
-    "zip bomb": (partial(_bare, name="other", shape=10**8, dtype="f8", compression="gzip", chunks=(10**6,)), HERE),
+    "growing": (partial(anew, name="v1_post", maxshape=(None, None, None), chunks=True), HERE),
+    "another filter": (partial(anew, name="v1_post", compression="lzf"), HERE),
+    "checksums": (partial(anew, name="v1_post", fletcher32=True), HERE),
+    "a million pieces": (partial(_bare, name="other", shape=10**6, dtype="i1", chunks=(1,)), "200,000 pieces"),
+    "zip bomb": (partial(_bare, name="other", shape=10**8, dtype="f8", compression="gzip", chunks=(10**6,)), MUCH),
+    "zip bomb in a piece": (_bomb, "is damaged"),
+    "short piece": (partial(_pieces, content=zlib.compress(b"short")), "a piece of 5 bytes"),
+    "damaged piece": (partial(_pieces, content=b"not zlib"), "not a readable result"),
+    "unpacked piece": (partial(_pieces, content=bytes(48), mask=1), "a piece at an odd place"),
+    "missing piece": (_pieces, "0 pieces, wants 2"),
     "compact": (_compact, HERE),
     "1e15 numbers": (partial(_bare, name="other", shape=(10**15,), dtype="f8"), HOLDS),
     "1e15 labels": (partial(_bare, name="other", shape=(10**15,), dtype=UTF8), HOLDS),
@@ -206,7 +231,7 @@ CHANGES: dict[str, tuple[Change, str]] = {
     "no numbers": (partial(_bare, name="other", shape=(0,), dtype="f8"), HOLDS),
     "null": (partial(_bare, name="other", data=h5py.Empty("f8")), HOLDS),
     "17 GiB": (
-        partial(_unwritten, length=17 * 2**27), "more than 17,179,869,184 bytes of data"),
+        partial(_unwritten, length=17 * 2**27), MUCH),
     "compound": (partial(_bare, name="other", data=np.zeros(3, "f8,i4")), KIND),
     "complex": (partial(_bare, name="other", data=np.zeros(3, complex)), KIND),
     "enum": (partial(_bare, name="other", data=np.zeros(3, bool)), KIND),
@@ -343,7 +368,7 @@ def _references(path: Path) -> None:
 
 PATCHES: dict[str, tuple[Make, str]] = {
     "a length that wraps around": (_wraps, "not a readable result"),
-    "data of one place": (_one_place, "bytes of data"),
+    "data of one place": (_one_place, MUCH),
     "labels of one place": (partial(_labels, length=None), "bytes of labels"),
     "labels of 4 GB": (partial(_labels, length=2**32 - 1), "bytes of labels"),
     "50,000,000 labels": (_many_labels, "bytes of labels"),

@@ -143,6 +143,6 @@ def test_a_mistake_of_the_program_is_not_taken_for_one_of_the_model(monkeypatch:
     def broken(*_: object, **__: object) -> None:
         raise KeyError("of our own")
 
-    monkeypatch.setattr("impact.contact.collide.strike", broken)
+    monkeypatch.setattr("impact.contact.trajectories.strike", broken)
     with pytest.raises(KeyError, match="of our own"):
         impact.sweep({"models": "hertz", "sweep": SWEEP})

@@ -1,19 +1,42 @@
-"""Impacts that are the same physics are integrated once, and no bit of a result shows it."""
+"""Impacts that are the same physics are integrated once, over the whole plan, and no bit of a result shows it."""
 
 from __future__ import annotations
 
+import numpy as np
+import pytest
+import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import impact
+from impact.api import prepare
+from impact.contact.lanes import Lanes
+from impact.data.estimate import estimate
 from impact.data.results import SCHEMA
+from impact.sweeps import trajectories as module
 from impact.sweeps.config import read_config
+from impact.sweeps.impacts import lanes_of
 from impact.sweeps.plan import Plan
+from impact.sweeps.trajectories import trajectories
+
+DASHPOT = impact.ForceModel(
+    "dashpot", "Spring and dashpot", 2026, equation="F = K x + c v", reference="", exponent=1.0,
+    force=lambda K, x, v, c: K * x + c * v, release="force",
+    parameters=(impact.Parameter("c", "N s/m", "damping constant", default=30.0, least=0.0),),
+)  # fmt: skip
+SPEED = impact.ForceModel(
+    "speed", "A speed of its own", 2026, equation="", reference="",
+    force=lambda elastic, v, a: elastic * (1.0 + a * v),
+    coefficients={"a": lambda v_y, v0: 0.3 * v_y / (v_y + v0)},
+    parameters=(impact.Parameter("v_y", "m/s", "a speed", default=1.0, least=0.1),),
+)  # fmt: skip
+OWN = {"dashpot": {"c": [0.0, 40.0]}, "speed": {"v_y": [0.5, 2.0]}}
 
 # a few values of each, so that many points are the same: in scale only, in a material only, or altogether
 VALUES: dict[str, list[object]] = {
     "e": [0.0, 0.1, 0.5, 1.0], "v1": [-1.0, 0.5, 1.0, 2.0], "v2": [0.0, -1.0], "m1": [1.0, 2.0, float("inf")],
     "m2": [0.5, 1.0, float("inf")], "material": ["soft", "hard"], "n": [1.0, 1.5, 2.0], "R1": [0.05, float("inf")],
+    "alpha": [0.0, 0.4, 2.0],
 }  # fmt: skip
 MATERIALS = {
     "soft": {"E": 2e9, "nu": 0.4, "rho": 1000.0, "yield_strength": 1e7},
@@ -23,24 +46,115 @@ MATERIALS = {
 
 @st.composite
 def sweeps(draw: st.DrawFn) -> dict[str, object]:
-    names = [*["e", "v1", "m1", "m2", "material"], *draw(st.sets(st.sampled_from(["v2", "n", "R1"])))]
+    driver = draw(st.sampled_from(["e", "alpha"]))
+    names = [driver, "v1", "m1", "m2", "material", *draw(st.sets(st.sampled_from(["v2", "n", "R1"])))]
     sweep = {
         name: draw(
             st.sampled_from(VALUES[name]) | st.lists(st.sampled_from(VALUES[name]), min_size=2, unique=True)
         )
         for name in draw(st.permutations(names))
     }
-    models = draw(st.lists(st.sampled_from(sorted(impact.models())), min_size=1, max_size=3, unique=True))
-    return {"models": models, "sweep": sweep, "materials": MATERIALS, "solver": {"rtol": 1e-6}}
+    known = [*sorted(impact.models()), *OWN]
+    models = draw(st.lists(st.sampled_from(known), min_size=1, max_size=3, unique=True))
+    own = {key: OWN[key] for key in models if key in OWN and draw(st.booleans())}
+    return {"models": models, "sweep": sweep, "materials": MATERIALS, "solver": {"rtol": 1e-6}, "model": own}
+
+
+def swept(config: dict[str, object], *overrides: str) -> xr.Dataset:
+    return impact.sweep(config, overrides=overrides, plugins=[DASHPOT, SPEED])
+
+
+def same_bits(one: xr.Dataset, other: xr.Dataset) -> None:
+    for variable in SCHEMA:
+        assert one[variable.name].values.tobytes() == other[variable.name].values.tobytes(), variable.name
 
 
 @settings(max_examples=60)
 @given(sweeps())
 def test_both_give_the_same_bits(config: dict[str, object]) -> None:
-    once = impact.sweep(config)
-    each = impact.sweep(config, overrides=["solver.collapse=false"])
-    for one in SCHEMA:
-        assert once[one.name].values.tobytes() == each[one.name].values.tobytes(), one.name
+    same_bits(swept(config), swept(config, "solver.collapse=false"))
+
+
+@settings(max_examples=20)
+@given(sweeps())
+def test_within_blocks_too_where_there_are_too_many_cells(config: dict[str, object]) -> None:
+    once = swept(config)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "MOST_CELLS", 0)
+        same_bits(once, swept(config))
+
+
+@settings(max_examples=30)
+@given(sweeps())
+def test_a_grid_by_its_axes_is_its_points_one_by_one(config: dict[str, object]) -> None:
+    plan = prepare(config, plugins=[DASHPOT, SPEED])
+    at = np.ix_(*map(np.arange, plan.shape)) if plan.shape else ()
+    flat = tuple(np.unravel_index(np.arange(plan.grid), plan.shape)) if plan.shape else ()
+    for model in plan.models:
+        grid, points = lanes_of(plan, model, at), lanes_of(plan, model, flat)
+        for name in ("e", "v0", "m", "K", "n", "length", "R1", "E2"):
+            with np.errstate(all="ignore"):
+                one, other = getattr(grid, name), getattr(points, name)
+            own = np.broadcast_to(one, plan.shape or (1,)).reshape(-1)
+            assert own.tobytes() == np.broadcast_to(other, own.shape).tobytes(), name
+
+
+def counts(sweep: dict[str, object], *models: str, **more: object) -> list[int]:
+    """The trajectories of each model."""
+    config = {"models": list(models), "sweep": sweep, "materials": MATERIALS, **more}
+    return [one.count for one in trajectories(prepare(config, plugins=[DASHPOT, SPEED]))]
+
+
+GRID = {"e": [0.1, 0.5, 0.9], "v1": [1.0, 2.0], "m1": [1.0, 4.0], "m2": [1.0, 4.0], "material": ["soft", "hard"]}
+
+
+def test_how_many_trajectories_there_are() -> None:
+    # a law that e drives has as many as there are e, one without e has one
+    assert counts(GRID, "gharib-hurmuzlu-2012", "bilinear", "hertz") == [3, 3, 1]
+    assert counts({**GRID, "n": [1.5, 2.0]}, "gharib-hurmuzlu-2012", "bilinear", "hertz") == [6, 3, 2]
+    # a speed of the law's own: v_y over v0, which two of four pairs share, whatever the balls are
+    own = {"model": {"speed": {"v_y": [0.5, 1.0]}}}
+    assert counts(GRID, "speed", **own) == [3]
+    # a damping constant: c over the root of K m, in every other scale another
+    assert counts({**GRID, "e": 0.5, "K": 1e6, "n": 1.0}, "dashpot", model={"dashpot": {"K": 1e6}}) == [3]
+    # e = 1 - alpha v0
+    alpha = {name: GRID[name] for name in ("v1", "m1", "m2", "material")} | {"alpha": [0.1, 0.2]}
+    assert counts(alpha, "gharib-hurmuzlu-2012") == [3]
+    zipped = {**GRID, "v1": [1.0, 2.0, 3.0], "zip": [["e", "v1"]]}
+    assert counts(zipped, "gharib-hurmuzlu-2012", "hertz") == [3, 1]
+    assert counts(GRID, "gharib-hurmuzlu-2012", "hertz", solver={"collapse": False}) == [48, 48]
+
+
+def test_a_plan_of_any_size_is_counted_without_its_points() -> None:
+    long = {"geomspace": [0.1, 10.0, 10_000]}
+    sweep = {"e": {"linspace": [0.01, 1.0, 100]}, "v1": long, "m1": long, "m2": long, "material": ["soft", "hard"]}
+    config = {"models": ["gharib-hurmuzlu-2012", "speed"], "sweep": sweep, "materials": MATERIALS}
+    plan = prepare(config, plugins=[SPEED], max_points=10**15)
+    assert plan.points == 4 * 10**14
+    assert [one.count for one in trajectories(plan)] == [100, 10_000]
+    found = estimate(plan)
+    assert (found.points, found.trajectories) == (plan.points, 10_100)
+    assert found.bytes > 100 * plan.points
+    assert [one.axes for one in found.models] == [("e",), ("v1",)]
+
+
+def test_one_exponent_has_the_same_bits_in_any_company() -> None:
+    # numpy takes a short way for the powers 1/2, 2 and -1 of a whole array, with other last bits
+    rng = np.random.default_rng(7)
+
+    def lanes(n: list[float]) -> Lanes:
+        count = len(n)
+        sizes = {name: rng_values[:count] for name, rng_values in columns.items()}
+        unknown = np.full(count, np.nan)
+        return Lanes(
+            e=unknown, **sizes, n=np.array(n), R1=unknown, R2=unknown, E1=unknown, nu1=unknown, E2=unknown,
+            nu2=unknown, yield_strength1=unknown, yield_strength2=unknown,
+        )  # fmt: skip
+
+    columns = {name: rng.uniform(0.1, 9.0, 400) for name in ("v1", "m1", "m2", "K")} | {"v2": np.zeros(400)}
+    for n in (1.0, 1.5, 2.0, 3.0):
+        alone, mixed = lanes([n] * 400).length, lanes([n] * 399 + [2.5]).length
+        assert alone[:399].tobytes() == mixed[:399].tobytes()
 
 
 def test_it_is_no_other_result() -> None:

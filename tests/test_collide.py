@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from impact.contact.collide import Contact, collide
+from impact.contact.collide import OUTPUTS, Contact, collide
 from impact.contact.lanes import Lanes
 from impact.contact.model import ForceModel, Parameter
 from impact.contact.models import catalogue, find
@@ -18,7 +18,7 @@ from impact.contact.status import FIRST_FAILURE, Status
 from .problems import impacts
 
 RTOL, MAX_STEPS = 1e-10, 10_000
-NAMES = [field.name for field in fields(Contact)]
+NAMES = list(OUTPUTS)
 
 
 def struck(model: ForceModel, lanes: Lanes, collapse: bool = True) -> Contact:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
 import json
-from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -11,13 +11,17 @@ import pytest
 import xarray as xr
 
 import impact
-from impact.contact.collide import Contact
+from impact.contact.collide import OUTPUTS
 from impact.contact.status import Status
+from impact.data.assembly import assemble, parts
 from impact.data.digest import content_digest
-from impact.data.results import SCHEMA, assemble
+from impact.data.results import SCHEMA, outline
 from impact.sweeps.config import parse_config
+from impact.sweeps.finished import Finished
 from impact.sweeps.plan import Plan
+from impact.sweeps.points import boxes, boxes_of
 from impact.sweeps.run import run
+from impact.sweeps.trajectories import stretches, trajectories
 
 from .conftest import WIDE
 
@@ -25,7 +29,7 @@ TABLE1 = {"v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6.118486349e9}
 
 
 def test_the_schema_names_what_a_collision_gives() -> None:
-    assert [one.name for one in SCHEMA] == [field.name for field in fields(Contact)]
+    assert [one.name for one in SCHEMA] == list(OUTPUTS)
 
 
 def test_variables_dimensions_and_units(wide: xr.Dataset) -> None:
@@ -132,18 +136,25 @@ def test_an_axis_of_exponents() -> None:
     assert result["e_out"].values == pytest.approx(np.ones((1, 2)), abs=1e-9)
 
 
+def made(overrides: list[str], size: int, box: int, pieces: bool) -> xr.Dataset:
+    """The result of WIDE from blocks and boxes of some size, the blocks in an order of their own."""
+    plan = Plan(parse_config(WIDE, overrides))
+    found = trajectories(plan)
+    todo = sorted(stretches(found, size), key=lambda one: hash((one.number, "shuffled")))
+    finished = {stretch.number: rebound for stretch, rebound in run(plan, found, todo)}
+    lengths = [min(box, one) for one in plan.shape]
+    of = boxes_of(len(plan.models), plan.shape, lengths, 1) if pieces else boxes(len(plan.models), plan.shape, box)
+    return assemble(plan, parts(plan, found, Finished(found, finished.__getitem__, size).rows, of))
+
+
+@pytest.mark.parametrize("collapse", ["true", "false"])
 @pytest.mark.parametrize("size", [1, 7, 1000])
-def test_the_block_size_changes_no_bit(wide: xr.Dataset, size: int) -> None:
-    plan = Plan(parse_config(WIDE))
-    assert assemble(plan, run(plan, size)).attrs["content_digest"] == wide.attrs["content_digest"]
-
-
-def test_the_order_of_blocks_changes_no_bit_and_a_missing_one_is_noticed(wide: xr.Dataset) -> None:
-    plan = Plan(parse_config(WIDE))
-    blocks = list(run(plan, 10))
-    assert assemble(plan, blocks[::-1]).attrs["content_digest"] == wide.attrs["content_digest"]
-    with pytest.raises(ValueError, match="blocks of"):
-        assemble(plan, blocks[1:])
+def test_sizes_and_order_change_no_bit(wide: xr.Dataset, size: int, collapse: str) -> None:
+    for box, pieces in itertools.product((1, 2, 5, 16, 1000), (False, True)):
+        other = made([f"solver.collapse={collapse}"], size, box, pieces)
+        # what the config was overridden with is an attribute
+        same = other.assign_attrs(config_set=wide.attrs["config_set"])
+        assert content_digest(same) == wide.attrs["content_digest"]
 
 
 def test_chosen_variables_and_always_the_status() -> None:
@@ -167,8 +178,7 @@ def test_the_materials_that_a_ball_has_are_attributes(wide: xr.Dataset, figure6:
     hard = {"E": 210e9, "nu": 0.3, "rho": 7850.0, "yield_strength": None}
     assert json.loads(wide.attrs["materials"]) == {"hard": hard, "soft": soft}
     more = ["materials.idle={E=1e9, nu=0.3, rho=1}", 'materials.hard.yield_strength="250 MPa"']
-    plan = Plan(parse_config(WIDE, more))
-    found = json.loads(assemble(plan, run(plan)).attrs["materials"])
+    found = json.loads(outline(Plan(parse_config(WIDE, more))).attrs["materials"])
     assert found == {"hard": {**hard, "yield_strength": 250e6}, "soft": soft}
     assert list(json.loads(figure6.attrs["materials"])) == ["table1"]
     without = impact.sweep({"models": "hertz", "sweep": {"e": 1.0, **TABLE1}})

@@ -3,34 +3,34 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 # a name imported "as itself" is public: `impact.__all__` hands it on
-from .contact.collide import Contact
 from .contact.model import ForceModel as ForceModel
 from .contact.model import Parameter as Parameter
 from .contact.models import catalogue
 from .contact.models.hysteresis import hysteresis as hysteresis
 from .data.bless import bless as bless
 from .data.compare import compare as compare
-from .data.compare import repeats
 from .data.impact import Impact as Impact
 from .data.impact import impact_of
 from .data.origin import config_of, picked_out, stored_config
-from .data.results import assemble
+from .data.replay import repeats
 from .data.store import load as load
 from .data.store import save as save
+from .data.sweeping import Tell, in_memory
 from .data.tolerances import Tolerances
 from .data.verdict import Verdict as Verdict
 from .errors import ImpactError as ImpactError
 from .sweeps.config import read_config
-from .sweeps.plan import Block, Plan
+from .sweeps.grid import MAX_POINTS
+from .sweeps.plan import Plan
 from .sweeps.plugins import read_plugins
 from .sweeps.point import one_point
-from .sweeps.run import run as run_blocks
+from .sweeps.run import never
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,25 +41,19 @@ def prepare(
     source: str | Path | Mapping[str, object],
     overrides: Sequence[str] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
+    max_points: int = MAX_POINTS,
 ) -> Plan:
     """The plan of a config: a TOML file, or a mapping of the same shape."""
     source = Path(source) if isinstance(source, str) else source
     own = read_plugins(plugins)
-    return Plan(read_config(source, overrides, own.models), own)
+    return Plan(read_config(source, overrides, own.models, max_points), own)
 
 
-def execute(plan: Plan, progress: Callable[[int], None] | None = None) -> xr.Dataset:
-    """The result of a plan; `progress` is told the number of points finished so far."""
-
-    def finished() -> Iterator[tuple[Block, Contact]]:
-        done = 0
-        for block, contact in run_blocks(plan):
-            yield block, contact
-            done += block.stop - block.start
-            if progress is not None:
-                progress(done)
-
-    return assemble(plan, finished())
+def execute(
+    plan: Plan, jobs: int = 1, tell: Tell | None = None, stopping: Callable[[], bool] = never
+) -> xr.Dataset:
+    """The result of a plan, in memory; for the parameters see `impact.data.sweeping.sweep_into`."""
+    return in_memory(plan, jobs=jobs, tell=tell or (lambda progress: None), stopping=stopping)
 
 
 def sweep(
@@ -67,8 +61,10 @@ def sweep(
     *,
     overrides: Sequence[str] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
+    jobs: int = 1,
+    max_points: int = MAX_POINTS,
 ) -> xr.Dataset:
-    """Run a sweep.
+    """Run a sweep, with its result in memory; `impact sweep` on the command line writes one of any size to a file.
 
     Parameters
     ----------
@@ -76,6 +72,9 @@ def sweep(
     overrides : changes to it, such as `"sweep.e=0.5"`
     plugins : models of one's own, which the config may then name, and paths of Python files that hold such;
         the files are executed
+    jobs : how many processes integrate; with more than one, a program of one's own wants the usual
+        `if __name__ == "__main__":`
+    max_points : how many points it may have, of all models together
 
     Returns
     -------
@@ -94,7 +93,7 @@ def sweep(
     >>> result["e_out"].values.round(6).tolist()
     [[0.665265, 0.913177]]
     """
-    return execute(prepare(source, overrides, plugins))
+    return execute(prepare(source, overrides, plugins, max_points), jobs)
 
 
 def run(

@@ -5,7 +5,9 @@
     ├── ModelError     a contact force model is declared wrongly
     ├── UsageError     a request that the data or the file system cannot meet as it was put
     ├── ResultError    a file is not a readable result
-    └── StoreError     the result could not be stored
+    ├── StoreError     the result could not be stored, or not computed; what was finished is kept
+    ├── InUseError     another process writes the output
+    └── UnfinishedError  a signal ended a sweep; what was finished is kept
 
 They say what is wrong, where, what was got and what is wanted. They become exit codes in one place,
 `impact.cli.door`.
@@ -53,6 +55,14 @@ class ResultError(ImpactError):
 
 class StoreError(ImpactError):
     """The result could not be stored: the disk is full, or the device failed."""
+
+
+class InUseError(ImpactError):
+    """Another process is writing the output."""
+
+
+class UnfinishedError(ImpactError):
+    """A sweep was told to stop; what it has finished is kept, as the message says."""
 
 
 def did_you_mean(word: str, known: Sequence[str]) -> str:

@@ -13,11 +13,13 @@ import warnings
 from collections.abc import Callable, Iterator
 from types import FrameType
 
-from ..errors import ImpactError, StoreError
+from ..errors import ImpactError, InUseError, StoreError, UnfinishedError
 from ..text import safe_text
 
 # the exit codes; a shell sees 130 and 143 for the signals of the same meaning
-OK, NOT_EQUAL, USAGE, LANES_FAILED, STORAGE, INTERNAL, INTERRUPTED, TERMINATED = 0, 1, 2, 3, 4, 70, 130, 143
+OK, NOT_EQUAL, USAGE, LANES_FAILED, STORAGE, IN_USE = 0, 1, 2, 3, 4, 5
+INTERNAL, INTERRUPTED, TERMINATED = 70, 130, 143
+CODES = {StoreError: STORAGE, InUseError: IN_USE}
 
 
 class Interrupted(BaseException):
@@ -30,11 +32,11 @@ class Interrupted(BaseException):
 
 
 @contextlib.contextmanager
-def signals() -> Iterator[Callable[[str], None]]:
-    """Take SIGINT and SIGTERM as flags, and give a function that raises `Interrupted` if one has come.
+def signals() -> Iterator[Callable[[], bool]]:
+    """Take SIGINT and SIGTERM as flags, and give a function that tells whether one has come.
 
-    An exception raised by a handler can land in a callback of HDF5, where it is lost; a flag cannot. The third
-    signal raises all the same, for a force that never returns.
+    What then ends unfinished is `Interrupted`. An exception raised by a handler can land in a callback of HDF5,
+    where it is lost; a flag cannot. The third signal raises all the same, for a force that never returns.
     """
     came: list[int] = []
 
@@ -43,13 +45,11 @@ def signals() -> Iterator[Callable[[str], None]]:
         if len(came) > 2:
             raise Interrupted(number, "given up at once")
 
-    def check(done: str) -> None:
-        if came:
-            raise Interrupted(came[0], done)
-
     before = {number: signal.signal(number, take) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        yield check
+        yield lambda: bool(came)
+    except UnfinishedError as unfinished:
+        raise Interrupted(came[0], str(unfinished)) from None
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
@@ -81,7 +81,7 @@ def enter(command: Callable[[], object], *, debug: bool) -> int:
     except ImpactError as error:
         for line in str(error).splitlines():
             say(line, error=True)
-        return STORAGE if isinstance(error, StoreError) else USAGE
+        return next((code for kind, code in CODES.items() if isinstance(error, kind)), USAGE)
     except BrokenPipeError:
         return _let_go(OK)
     except Exception as error:

@@ -12,8 +12,8 @@ import typer
 from .. import __version__
 from ..errors import UsageError
 from ..text import safe_text
-from . import door, regression
-from .options import Json, Overwrite, Plugins, Quiet, Sets
+from . import door, regression, sweeping
+from .options import Json, Overwrite, Plugins, Sets
 from .words import dump, pairs
 
 app = typer.Typer(
@@ -46,44 +46,7 @@ def common(
     """Options that stand before the command; `main` reads --debug, this only documents it."""
 
 
-@app.command(epilog="Example: impact sweep configs/figure6.toml -o results.h5 --set sweep.m2=2.0")
-def sweep(
-    config: Annotated[Path, typer.Argument(help="The sweep, a TOML file; `impact init` writes one.")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="The result file.")] = Path("results.h5"),
-    sets: Sets = None,
-    plugins: Plugins = None,
-    overwrite: Overwrite = False,
-    allow_failed: Annotated[bool, typer.Option("--allow-failed", help="Exit 0 even if points failed.")] = False,
-    quiet: Quiet = False,
-    as_json: Json = False,
-) -> None:
-    """Run every model over a sweep and store post-impact velocities and their errors."""
-    with door.signals() as check:
-        from .. import api
-        from ..data import store
-        from . import summary
-
-        plan = api.prepare(config, sets or (), plugins or ())
-        dataset = None if overwrite else store.held(output, plan.fingerprint)
-        fresh = dataset is None
-        if dataset is None:
-            for source in (config, *(plugins or ())):
-                store.check_output(output, overwrite=overwrite, source=source)
-            dataset = summary.execute(plan, check, quiet=quiet)
-            api.save(dataset, output, overwrite=overwrite)
-            check(f"{safe_text(str(output))} was stored whole")
-    found = summary.summary(dataset, output)
-    if not quiet:
-        if fresh:
-            summary.print_summary(dataset, found)
-        else:
-            door.say(f"{safe_text(str(output))}: already holds this sweep; nothing to do")
-    if as_json:
-        print(dump(found))
-    if found["failed"] and not allow_failed:
-        if quiet or not fresh:
-            door.say(summary.failed_line(found), error=True)
-        raise typer.Exit(door.LANES_FAILED)
+app.command(epilog="Example: impact sweep configs/figure6.toml -o results.h5 --set sweep.m2=2.0")(sweeping.sweep)
 
 
 @app.command(epilog="Example: impact plot results.h5 -o results.png --sel m2=1.0")

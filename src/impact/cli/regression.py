@@ -106,7 +106,7 @@ def rerun(
     quiet: Quiet = False,
 ) -> None:
     """Repeat the sweep of a result from the file alone, and judge what comes out by what is in it."""
-    with door.signals() as check:
+    with door.signals() as stopping:
         from .. import api
         from ..views import report
         from . import summary
@@ -115,7 +115,7 @@ def rerun(
         try:
             verdict = api.rerun(
                 result, plugins=plugins or (), tol=tolerances(tol), subset=subset,
-                execute=lambda plan: summary.execute(plan, check, quiet=quiet),
+                execute=lambda plan: summary.execute(plan, stopping, quiet=quiet),
             )  # fmt: skip
         except ImpactError as error:
             _print(report.report_of_error("the rerun", str(result), str(error)), format)

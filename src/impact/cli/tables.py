@@ -15,7 +15,7 @@ from rich.text import Text
 from ..contact.model import ForceModel
 from ..contact.values import delivered
 from .console import cell, console, shown, table
-from .summary import summary, worst_errors
+from .summary import worst_errors
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -158,8 +158,10 @@ def info_json(dataset: xr.Dataset) -> dict[str, Any]:
 def print_info(dataset: xr.Dataset, path: Path) -> None:
     """What is in a file."""
     from ..data.results import plain_unit
+    from ..data.tally import counted, tally_of
 
     attributes = dataset.attrs
+    tally = tally_of(dataset) if "model" in dataset.dims else None
     sizes = " × ".join(f"{name} {size}" for name, size in dataset.sizes.items())
     rows: dict[str, Any] = {"file": path, "title": attributes.get("title", ""), "dimensions": sizes}
     for name, coordinate in dataset.coords.items():
@@ -181,9 +183,8 @@ def print_info(dataset: xr.Dataset, path: Path) -> None:
             rows[name] = attributes[name]
     if json.loads(attributes.get("config_set", "[]")):
         rows["config_set"] = attributes["config_set"]
-    if "status" in dataset:
-        counts = summary(dataset, path)["status"]
-        rows["status"] = ", ".join(f"{count} {name}" for name, count in counts.items())
+    if tally and tally.counts:
+        rows["status"] = ", ".join(f"{count:,} {name}" for name, count in counted(tally.counts).items())
     _print_rows(rows)
     out = console(sys.stdout)
     out.print()
@@ -197,6 +198,6 @@ def print_info(dataset: xr.Dataset, path: Path) -> None:
             str(values.size - finite.size),
         )  # fmt: skip
     out.print(listed)
-    if "model" in dataset.dims:
+    if tally and tally.worst:
         out.print()
-        out.print(worst_errors(dataset))
+        out.print(worst_errors(dataset, tally))

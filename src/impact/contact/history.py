@@ -14,7 +14,7 @@ from .model import ForceModel
 from .power import Array
 from .status import Status
 from .strike import strike
-from .values import chi_of, own_values, takes_log
+from .values import chi_of, own_values, takes_log, with_coefficients, with_units
 
 # points at which a step is shown, and at which it is integrated again
 SAMPLES, GAUSS = 4, 5
@@ -56,7 +56,7 @@ def follow(model: ForceModel, lanes: Lanes, *, rtol: float, max_steps: int) -> H
     """
     n = float(lanes.n[0])
     with np.errstate(all="ignore"):
-        values = own_values(model, lanes, n)
+        values = with_coefficients(model, with_units(own_values(model, lanes), n), 1)
         law = motion.Law.of(model, n, bool(takes_log(model, chi_of(values, 1))[0]))
         columns = tuple(np.asarray(values[name]) for name in law.names)
         struck = strike(law, columns, 1, rtol, max_steps, record=True)

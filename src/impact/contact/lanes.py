@@ -12,13 +12,16 @@ from numpy.typing import NDArray
 from .material import effective_mass
 from .model import QUANTITIES, ForceModel
 from .oracles import peak_indentation
-from .power import Array, power
+from .power import Array, powers
 from .units import dimension
 
 
 @dataclass(frozen=True)
 class Lanes:
     """Impacts side by side; every field is an array of shape (n,).
+
+    Impacts on a grid may be arrays of several axes that broadcast against each other: what does not vary along
+    an axis has length one there, and nothing is computed twice.
 
     Parameters
     ----------
@@ -57,6 +60,12 @@ class Lanes:
         return Lanes(**arrays, parameters={name: a[chosen] for name, a in self.parameters.items()})
 
     @cached_property
+    def shape(self) -> tuple[int, ...]:
+        """Of all impacts together."""
+        own = (getattr(self, f.name).shape for f in fields(self) if f.name != "parameters")
+        return np.broadcast_shapes(*own, *(array.shape for array in self.parameters.values()))
+
+    @cached_property
     def v0(self) -> Array:
         """Closing speed v1 - v2 [m/s]."""
         return self.v1 - self.v2
@@ -69,26 +78,34 @@ class Lanes:
     @cached_property
     def length(self) -> Array:
         """The contact's unit of length [m], (m v0^2/K)^(1/(n+1)); its unit of mass is m, of time length/v0."""
-        return np.power(self.m * self.v0 / self.K * self.v0, 1.0 / (self.n + 1.0))
+        return powers(self.m * self.v0 / self.K * self.v0, 1.0 / (self.n + 1.0))
 
     def quantity(self, name: str) -> Array:
         """A quantity of the contact or a parameter of the law, in SI."""
         return np.asarray(self.parameters[name] if name in self.parameters else getattr(self, name))
 
-    def own_units(self, model: ForceModel, name: str, n: float) -> Array | float:
+    def own_units(self, model: ForceModel, name: str) -> Array:
         """A quantity or parameter in the contact's own units, in which K = m = v0 = 1."""
-        if name in ("K", "m", "v0"):
-            return 1.0
-        if name == "n":
-            return n
-        declared = {parameter.name: parameter.unit for parameter in model.parameters}
-        mass, length, time = dimension(declared.get(name) or QUANTITIES[name], n)
         value = self.quantity(name)
-        for unit, exponent in ((self.m, mass), (self.length, length), (self.length / self.v0, time)):
-            if exponent:
-                value = value / np.power(unit, exponent)
+        kinds, kind = np.unique(self.n, return_inverse=True)
+        exponents = np.array([list(in_own_units(model, name, n).values()) for n in kinds.tolist()])
+        for place, unit in enumerate((self.m, self.length, self.v0) if exponents.any() else ()):
+            if exponents[:, place].any():
+                value = value / powers(unit, exponents[kind.reshape(self.n.shape), place])
         # adding zero turns -0.0 into 0.0, which is the same physics
         return value + 0.0
+
+
+def in_own_units(model: ForceModel, name: str, n: float) -> dict[str, float]:
+    """The exponents of m, length and v0 by which a quantity or parameter is made dimensionless.
+
+    >>> from impact.contact.models import find
+    >>> in_own_units(find("hertz"), "E1", 1.5)
+    {'m': 1.0, 'length': -3.0, 'v0': 2.0}
+    """
+    declared = {parameter.name: parameter.unit for parameter in model.parameters}
+    mass, length, time = dimension(declared.get(name) or QUANTITIES[name], n)
+    return {"m": mass + 0.0, "length": length + time + 0.0, "v0": 0.0 - time}
 
 
 def stiffness(n: Array, hertz: Array, m: Array, v0: Array) -> Array:
@@ -102,5 +119,7 @@ def stiffness(n: Array, hertz: Array, m: Array, v0: Array) -> Array:
     hertz : stiffness of equation (12) [N/m^1.5], shape (n,)
     m, v0 : effective mass [kg] and closing speed [m/s], shape (n,)
     """
+    if (n == 1.5).all():
+        return hertz
     peak = peak_indentation(m, np.where(v0 > 0.0, v0, np.nan), hertz, 1.5)
-    return np.where(n == 1.5, hertz, hertz * power(peak, 1.5) / np.power(peak, n))
+    return np.where(n == 1.5, hertz, hertz * powers(peak, np.asarray(1.5)) / powers(peak, n))

@@ -13,8 +13,8 @@ Array = NDArray[np.float64]
 def power(base: Array, exponent: float) -> Array:
     """`base` to a scalar power, for a base that is not negative.
 
-    A multiple of a quarter is built from products and square roots, which IEEE arithmetic rounds the same
-    everywhere; NumPy's own power changes its last bits with the processor's vector unit. Any other exponent
+    A multiple of a quarter is built from products, square roots and a quotient, which IEEE arithmetic rounds the
+    same everywhere; NumPy's own power changes its last bits with the processor's vector unit. Any other exponent
     goes to NumPy.
 
     Parameters
@@ -28,8 +28,10 @@ def power(base: Array, exponent: float) -> Array:
     array([2.])
     """
     quarters = 4.0 * exponent
-    if exponent < 0 or exponent > 16 or not quarters.is_integer():
+    if abs(exponent) > 16 or not quarters.is_integer():
         return np.power(base, exponent)
+    if exponent < 0:
+        return 1.0 / power(base, -exponent)
     whole, rest = divmod(int(quarters), 4)
     result = integer_power(base, whole)
     if rest:
@@ -38,6 +40,26 @@ def power(base: Array, exponent: float) -> Array:
             result = result * root
         if rest % 2:
             result = result * np.sqrt(root)
+    return result
+
+
+def powers(base: Array, exponent: Array) -> Array:
+    """`base` to an exponent of each element's own; the arrays broadcast against each other.
+
+    NumPy takes a short way for some exponents where one is for all (2, 1/2, -1), and the long way where there is
+    an array of them, with other last bits: here each exponent is one for all that have it.
+
+    >>> powers(np.array([4.0, 4.0]), np.array([0.5, 2.0]))
+    array([ 2., 16.])
+    """
+    kinds = np.unique(exponent)
+    if kinds.size == 1:
+        return power(base, float(kinds[0]))
+    base, exponent = np.broadcast_arrays(base, exponent)
+    result = np.empty(base.shape)
+    for one in kinds:
+        where = exponent == one
+        result[where] = power(base[where], float(one))
     return result
 
 

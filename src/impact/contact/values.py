@@ -2,32 +2,53 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ModelError
 from . import motion
-from .lanes import Lanes
-from .model import ForceModel, ask, wishes
+from .lanes import Lanes, in_own_units
+from .model import QUANTITIES, ForceModel, ask, wishes
 from .power import Array
 
 # numbers that are the same for all impacts, and arrays of shape (n,)
 Values = dict[str, Array | float]
 
 
-def own_values(model: ForceModel, lanes: Lanes, n: float) -> Values:
-    """The quantities, parameters and coefficients of a law; K, m, v0 and n are numbers.
+def asked(model: ForceModel) -> list[str]:
+    """The quantities and parameters that a law, or its closed form, asks for in its own units; but n."""
+    own = {parameter.name for parameter in model.parameters}
+    exact = {wish for wish in wishes(model.oracle) if wish in QUANTITIES or wish in own}
+    return sorted({*model.quantities, *exact} - {"K", "m", "v0", "n"})
+
+
+def made_of(model: ForceModel, n: Iterable[float]) -> frozenset[str]:
+    """What the values of a law come from: quantities and parameters, and the units they are converted by.
 
     Parameters
     ----------
     model : the law
-    lanes : the impacts
-    n : their compliance exponent
+    n : the exponents it is asked at
+
+    >>> from impact.contact.models import find
+    >>> sorted(made_of(find("gharib-hurmuzlu-2012"), [1.5]))
+    ['e', 'n']
     """
-    names = sorted({*model.quantities, "K", "m", "v0", "n"})
-    return with_coefficients(model, {name: lanes.own_units(model, name, n) for name in names}, len(lanes))
+    names = asked(model)
+    used = (in_own_units(model, name, one).items() for name in names for one in n)
+    return frozenset({"n", *names, *(unit for units in used for unit, exponent in units if exponent)})
+
+
+def own_values(model: ForceModel, lanes: Lanes) -> dict[str, Array]:
+    """What a law asks for of impacts, in the contact's own units; of the lanes' shapes."""
+    return {name: lanes.own_units(model, name) for name in asked(model)}
+
+
+def with_units(given: Mapping[str, Array], n: float) -> Values:
+    """The values of impacts that share n, and those that are the same for all: K, m and v0 are 1."""
+    return {**given, "K": 1.0, "m": 1.0, "v0": 1.0, "n": n}
 
 
 def with_coefficients(model: ForceModel, given: Mapping[str, Array | float], count: int) -> Values:

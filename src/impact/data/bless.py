@@ -10,7 +10,8 @@ from pathlib import Path
 import xarray as xr
 
 from ..errors import ResultError, UsageError
-from .compare import check_result, compare, repeats
+from .compare import check_result, compare
+from .replay import repeats
 from .store import check_output, load, save
 from .tolerances import Tolerances, in_effect
 from .verdict import Verdict

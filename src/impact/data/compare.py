@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from ..errors import ResultError, UsageError
+from ..errors import UsageError
 from ..text import safe_text
 from .align import align, along, is_input
+from .attributes import json_object, json_table
 from .judge import judge
+from .replay import repeats
 from .results import ABOUT_A_MODEL, SCHEMA, SCHEMA_VERSION
 from .store import load
 from .tolerances import ALL, Tolerances, in_effect
@@ -93,20 +94,6 @@ def compare(
     )  # fmt: skip
 
 
-def repeats(path: str, dataset: xr.Dataset) -> tuple[str, ...]:
-    """How a command begins that runs a point of a result again; empty for a dataset that is in no file.
-
-    So it is where a model was given as a value: no command can give it again.
-
-    >>> repeats("new.h5", xr.Dataset(attrs={"plugins": '{"mine": {"file": "my.py", "sha256": ""}}'}))
-    ('impact', 'run', 'new.h5', '--plugin', 'my.py')
-    """
-    files = [one.get("file") for one in _table(dataset, "plugins").values()]
-    if not path or None in files:
-        return ()
-    return ("impact", "run", path, *(word for file in dict.fromkeys(files) for word in ("--plugin", str(file))))
-
-
 def check_result(dataset: xr.Dataset, name: str) -> None:
     """Refuse what is no result of a sweep.
 
@@ -148,7 +135,7 @@ def _known(dataset: xr.Dataset) -> xr.Dataset:
 
 def _materials(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
     """Properties that differ between materials of the same name."""
-    own, other = (_table(dataset, "materials") for dataset in (new, baseline))
+    own, other = (json_table(dataset, "materials") for dataset in (new, baseline))
     found = []
     for name in own.keys() & other.keys():
         for field in own[name].keys() | other[name].keys():
@@ -158,22 +145,6 @@ def _materials(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
                 a, b = (f"{one:.12g}" if isinstance(one, float) else one for one in (a, b))
                 found.append(Fault("physics config", path, safe_text(f"{path} is {a}, in BASELINE {b}")))
     return sorted(found, key=lambda fault: fault.name)
-
-
-def _parsed(dataset: xr.Dataset, attribute: str) -> dict[str, Any]:
-    """What an attribute holds as JSON."""
-    try:
-        return dict(json.loads(dataset.attrs.get(attribute, "{}")))
-    except (ValueError, TypeError, RecursionError):
-        raise ResultError(f"the attribute {attribute} is not that of a result") from None
-
-
-def _table(dataset: xr.Dataset, attribute: str) -> dict[str, dict[str, Any]]:
-    """The same, where each entry is a table again."""
-    found = _parsed(dataset, attribute)
-    if not all(isinstance(one, dict) for one in found.values()):
-        raise ResultError(f"the attribute {attribute} is not that of a result")
-    return found
 
 
 def _units(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
@@ -194,7 +165,7 @@ def _notes(new: xr.Dataset, baseline: xr.Dataset) -> list[str]:
         if not _alike(a, b):
             found.append(safe_text(f"{name} is {a}, in BASELINE {b}", 400))
     for name in ("packages", "plugins"):
-        own, other = (_parsed(dataset, name) for dataset in (new, baseline))
+        own, other = (json_object(dataset, name) for dataset in (new, baseline))
         found += [
             safe_text(f"{key} is {own.get(key)}, in BASELINE {other.get(key)}", 400)
             for key in sorted(own.keys() | other.keys())

@@ -4,37 +4,63 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 # attributes that may differ between installations that compute the same; the digest cannot contain itself
 NOT_DIGESTED = ("content_digest", "packages")
 
 
-def content_digest(dataset: xr.Dataset) -> str:
+def content_digest(dataset: xr.Dataset, taken: Mapping[str, str] | None = None) -> str:
     """SHA-256 over names, dimensions, values and attributes of all variables and coordinates, in canonical form.
 
     Numbers as little-endian bytes with one NaN, text as UTF-8; the order of the variables does not count, nor do
     the versions of the packages.
+
+    Parameters
+    ----------
+    dataset : what is digested
+    taken : by name, the digests of values that were taken before, by `Taken`; those in the dataset do not count
     """
     own = {str(name): value for name, value in dataset.attrs.items() if name not in NOT_DIGESTED}
     total = hashlib.sha256(_canonical(own))
     for name in sorted(str(name) for name in dataset.variables):
         variable = dataset.variables[name]
-        values = variable.values
-        if values.dtype.kind in "fiub":
-            kind = values.dtype.newbyteorder("<").str
-            if values.dtype.kind == "f":
-                values = np.where(np.isnan(values), np.nan, values)
-            data = np.ascontiguousarray(values, dtype=kind).tobytes()
+        kind = _kind(variable.dtype)
+        if taken and name in taken:
+            one = taken[name]
+        elif kind == "text":
+            one = hashlib.sha256(json.dumps(np.asarray(variable.values, object).tolist()).encode()).hexdigest()
         else:
-            kind = "text"
-            data = json.dumps(np.asarray(values, object).tolist()).encode()
-        one = hashlib.sha256(data).hexdigest()
+            one = Taken().add(variable.values).hexdigest()
         total.update(_canonical([name, list(variable.dims), list(variable.shape), kind, one]))
         total.update(_canonical({str(key): value for key, value in variable.attrs.items()}))
     return total.hexdigest()
+
+
+class Taken:
+    """The digest of the values of a variable, taken part after part in C order."""
+
+    def __init__(self) -> None:
+        self._hash = hashlib.sha256()
+
+    def add(self, values: NDArray[Any]) -> Taken:
+        if values.dtype.kind == "f" and np.isnan(values).any():
+            # there are many that are not a number
+            values = np.where(np.isnan(values), np.asarray(np.nan, values.dtype), values)
+        self._hash.update(np.ascontiguousarray(values, dtype=_kind(values.dtype)).data)
+        return self
+
+    def hexdigest(self) -> str:
+        return self._hash.hexdigest()
+
+
+def _kind(dtype: np.dtype[Any]) -> str:
+    return dtype.newbyteorder("<").str if dtype.kind in "fiub" else "text"
 
 
 def _canonical(value: object) -> bytes:

@@ -16,12 +16,13 @@ from typing import BinaryIO
 
 import h5py
 import numpy as np
-from h5py import h5a, h5d, h5l, h5o, h5t
+from h5py import h5a, h5d, h5l, h5o, h5t, h5z
 
 from ..errors import ResultError
 from ..text import safe_text
 from .heap import LABEL, labels
 from .names import is_name
+from .pieces import count
 from .results import SCHEMA_VERSION
 
 MAGIC = b"\x89HDF\r\n\x1a\n"
@@ -32,6 +33,9 @@ MAX_NUMBERS = 64  # of an attribute
 MAX_TEXT = 80_000_000  # bytes of all attributes; a config may have 64 MB
 MAX_LABELS = 4_000_000  # bytes of all datasets of text
 MAX_BYTES = 16 * 2**30
+MAX_PIECES = 200_000  # of all datasets together
+# what is packed may be so many times the file, where it is more than little
+EXPANSION, SMALL = 100, 2**28
 # what netCDF tells other readers, and is not read here
 UNREAD = frozenset({"NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_NCProperties", "coordinates"})
 NETCDF = UNREAD | {"CLASS", "_Netcdf4Dimid", "_Netcdf4Coordinates"}
@@ -67,8 +71,15 @@ def vet(file: h5py.File, stream: BinaryIO) -> Contents:
     datasets = _datasets(file)
     size = file.id.get_filesize()
     held = {name: _held(name, dataset) for name, dataset in datasets.items()}
-    if sum(held.values()) > min(size, MAX_BYTES):
-        raise _odd(f"more than {min(size, MAX_BYTES):,} bytes of data")
+    packed = sum(held[name] for name, one in datasets.items() if is_in_pieces(one))
+    if (
+        sum(held.values()) - packed > size
+        or packed > max(SMALL, EXPANSION * size)
+        or sum(held.values()) > MAX_BYTES
+    ):
+        raise _odd("more data than such a file may hold")
+    if sum(count(one) for one in datasets.values() if is_in_pieces(one)) > MAX_PIECES:
+        raise _odd(f"more than {MAX_PIECES:,} pieces")
     texts = {name: one for name, one in datasets.items() if _is_text(one.get_type())}
     if sum(_labels(one, held[name], stream) for name, one in texts.items()) > MAX_LABELS:
         raise _odd(f"more than {MAX_LABELS:,} bytes of labels")
@@ -137,14 +148,25 @@ def _held(name: str, dataset: h5d.DatasetID) -> int:
     else:
         raise _odd("neither numbers nor labels", name)
     plan = dataset.get_create_plist()
-    # what is filtered, virtual or may grow is not in one piece
-    if plan.get_layout() != h5d.CONTIGUOUS or plan.get_external_count():
-        raise _odd("not stored in one piece in this file", name)
+    pieces = is_in_pieces(dataset) and not _is_text(kind)
+    # what is virtual, may grow, or is packed in another way is not
+    if plan.get_external_count() or not (pieces or plan.get_layout() == h5d.CONTIGUOUS):
+        raise _odd("not stored in this file, in one piece or in pieces of one size", name)
     # the product by HDF5 itself could wrap around
     declared = math.prod(shape) * width if shape is not None else 0
-    if not declared or dataset.get_storage_size() != declared:
+    if not declared or not (pieces or dataset.get_storage_size() == declared):
         raise _odd("declares other data than the file holds", name)
     return declared
+
+
+def is_in_pieces(dataset: h5d.DatasetID) -> bool:
+    """Whether a dataset is stored in pieces of one size that may be packed, and can be read by `chunks`."""
+    plan = dataset.get_create_plist()
+    filters = {plan.get_filter(place)[0] for place in range(plan.get_nfilters())}
+    if plan.get_layout() != h5d.CHUNKED or not filters <= {h5z.FILTER_DEFLATE, h5z.FILTER_SHUFFLE}:
+        return False
+    shape, most = dataset.shape, dataset.get_space().get_simple_extent_dims(maxdims=True)
+    return shape == most and len(plan.get_chunk()) == len(shape)
 
 
 def _labels(dataset: h5d.DatasetID, declared: int, stream: BinaryIO) -> int:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import xarray as xr
 
-from ..contact.collide import collide
+from ..contact.collide import OUTPUTS, collide
 from ..contact.history import follow
 from ..contact.model import ForceModel
 from ..contact.status import Status
+from ..sweeps.impacts import lanes_of
 from ..sweeps.plan import Plan
 from .history import history_dataset
 
@@ -51,10 +52,10 @@ def impact_of(plan: Plan, first: tuple[str, ...]) -> Impact:
     """The only impact of a plan; `first` are axes of its source that are at their first value."""
     config = plan.config
     law = config.models[0]
-    lanes = plan.lanes(law, 0, 1)
+    lanes = lanes_of(plan, law, ())
     solver = config.solver
     contact = collide(law, lanes, rtol=solver.rtol, max_steps=solver.max_steps)
-    values = {field.name: getattr(contact, field.name)[0].item() for field in fields(contact)}
+    values = {name: getattr(contact, name)[0].item() for name in OUTPUTS}
     going = values["status"] == Status.OK
     history = follow(law, lanes, rtol=solver.rtol, max_steps=solver.max_steps) if going else None
     v0 = lanes.v0[0].item()

@@ -1,11 +1,10 @@
-"""What is in a result: the one SCHEMA, and how a plan's blocks become a labelled dataset."""
+"""What is in a result: the one SCHEMA, and the labels, units and provenance of the dataset of a plan."""
 
 from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from typing import Literal
 
@@ -13,11 +12,9 @@ import numpy as np
 import xarray as xr
 
 from .. import __version__
-from ..contact.collide import Contact
 from ..contact.status import Status
-from ..sweeps.plan import Block, Plan
+from ..sweeps.plan import Plan
 from ..sweeps.rules import MATERIALS, SWEEP, own_quantities
-from .digest import content_digest
 
 SCHEMA_VERSION = 1
 # coordinates along `model` that are texts about it
@@ -84,34 +81,22 @@ SCHEMA = (
 PACKAGES = ("numpy", "scipy", "h5py", "h5netcdf", "xarray")
 
 
-def assemble(plan: Plan, finished: Iterable[tuple[Block, Contact]]) -> xr.Dataset:
-    """The dataset of a plan from its finished blocks, in any order.
+def stored(plan: Plan) -> tuple[Variable, ...]:
+    """The variables of the result of a plan; the status is always there: without it a NaN would have no reason."""
+    chosen = {"status", *(plan.config.output.variables or (variable.name for variable in SCHEMA))}
+    return tuple(replace(one, dtype=plan.config.output.dtype if one.dtype == "f8" else one.dtype)
+                 for one in SCHEMA if one.name in chosen)  # fmt: skip
 
-    Raises
-    ------
-    ValueError : the blocks do not cover the plan
-    """
-    # the status is always there: without it a NaN would have no reason
-    chosen = {"status", *(plan.config.variables or (variable.name for variable in SCHEMA))}
-    schema = [variable for variable in SCHEMA if variable.name in chosen]
-    rows = {"model": len(plan.models), "axes": 1}
-    arrays = {one.name: np.zeros((rows[one.per], plan.grid), one.dtype) for one in schema}
-    covered = 0
-    for block, contact in finished:
-        covered += block.stop - block.start
-        for one in schema:
-            if one.per == "model" or block.model == 0:
-                arrays[one.name][block.model, block.start : block.stop] = getattr(contact, one.name)
-    if covered != plan.points:
-        raise ValueError(f"blocks of {covered} points, wants {plan.points}")
 
+def outline(plan: Plan) -> xr.Dataset:
+    """The dataset of a plan without its values: each variable is zero, of no memory, and not to be written to."""
     axes = tuple(axis.name for axis in plan.config.axes)
-    dataset = xr.Dataset(coords=_coordinates(plan))
-    for one in schema:
-        dims, shape = (axes, plan.shape) if one.per == "axes" else (("model", *axes), (-1, *plan.shape))
-        dataset[one.name] = (dims, arrays[one.name].reshape(shape), _attributes(one))
-    dataset.attrs = _provenance(plan)
-    dataset.attrs["content_digest"] = content_digest(dataset)
+    dataset = xr.Dataset(coords=_coordinates(plan), attrs=_provenance(plan))
+    for one in stored(plan):
+        dims, shape = (
+            (axes, plan.shape) if one.per == "axes" else (("model", *axes), (len(plan.models), *plan.shape))
+        )
+        dataset[one.name] = (dims, np.broadcast_to(np.zeros((), one.dtype), shape), _attributes(one))
     return dataset
 
 

@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 import contextlib
-import io
 import os
 import stat
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
-from secrets import token_hex
+from typing import BinaryIO, cast
 
 import h5py
-import numpy as np
 import xarray as xr
 
-from ..errors import ResultError, StoreError, UsageError
+from ..errors import ResultError, UsageError
+from ..sweeps.config import Output
 from ..text import safe_text
 from . import guard
 from .digest import content_digest
 from .form import misfit
 from .reader import read
+from .sink import Sink, appearing
+from .writer import writing
+
+PLAIN = Output()
 
 
 def check_output(path: Path, *, overwrite: bool, source: Path | None = None) -> None:
@@ -58,56 +62,19 @@ def write_whole(path: Path, content: bytes | memoryview, *, overwrite: bool) -> 
     StoreError : the disk is full or failed; nothing is left under the name
     """
     check_output(path, overwrite=overwrite)
-    part = path.with_name(f"{path.name}.{token_hex(4)}.part")
-    try:
-        with part.open("xb") as file:
-            try:
-                file.write(content)
-                file.flush()
-                os.fsync(file.fileno())
-                _publish(part, path, overwrite=overwrite)
-            finally:
-                with contextlib.suppress(FileNotFoundError):
-                    part.unlink()
-        folder = os.open(path.parent, os.O_RDONLY)
-        try:
-            os.fsync(folder)
-        finally:
-            os.close(folder)
-    except FileExistsError:
-        raise UsageError(f"{safe_text(str(path))}: appeared while this ran, and is left alone") from None
-    except OSError as error:
-        raise StoreError(
-            f"{safe_text(str(path))}: not written: {error.strerror} ({len(content)} bytes)"
-        ) from error
+    with appearing(path, overwrite=overwrite) as sink:
+        sink.write(content)
 
 
-def _publish(part: Path, path: Path, *, overwrite: bool) -> None:
-    """Give a complete file its name; without `overwrite` never in the place of a file that appeared meanwhile."""
-    if overwrite:
-        part.replace(path)
-        return
-    try:
-        os.link(part, path)
-    except FileExistsError:
-        raise
-    except OSError:
-        # a file system without hard links: what is left is to look before the rename
-        if path.exists():
-            raise FileExistsError from None
-        part.rename(path)
-
-
-def save(dataset: xr.Dataset, path: str | Path, *, overwrite: bool = False) -> None:
+def save(dataset: xr.Dataset, path: str | Path, *, overwrite: bool = False, output: Output = PLAIN) -> None:
     """Store a dataset as netCDF-4 in HDF5.
-
-    The file is made in memory and written by plain system calls, because HDF5 on a full disk may report success.
 
     Parameters
     ----------
     dataset : a result, or a part of one; it is stored with the digest of what it holds
     path : the file
     overwrite : replace a file that exists
+    output : how it is stored
 
     Raises
     ------
@@ -130,33 +97,22 @@ def save(dataset: xr.Dataset, path: str | Path, *, overwrite: bool = False) -> N
     if odd:
         raise UsageError(f"{safe_text(str(path))}: {odd}; dataset.to_netcdf(path) stores anything")
     check_output(path, overwrite=overwrite)
-    # how a file that the dataset came from was packed is not how a result is stored
-    dataset = dataset.drop_encoding()
-    dataset = _fixed(dataset.assign_attrs(content_digest=content_digest(dataset)))
-    buffer = io.BytesIO()
-    plain = {name: {"_FillValue": None} for name, v in dataset.variables.items() if v.dtype.kind == "f"}
-    dataset.to_netcdf(buffer, engine="h5netcdf", encoding=plain)
+    dataset = dataset.assign_attrs(content_digest=content_digest(dataset))
+    with appearing(path, overwrite=overwrite) as sink:
+        with writing(sink, dataset, output) as (put, seal):
+            for name, one in dataset.data_vars.items():
+                put(str(name), (), one.values)
+            seal(str(dataset.attrs["content_digest"]))
+        vet_own(sink, path)
+
+
+def vet_own(sink: Sink, path: Path) -> None:
+    """Refuse to give its name to a file that would not be read again."""
     try:
-        with h5py.File(buffer, "r") as file:
-            guard.vet(file, buffer)
+        with h5py.File(sink, "r") as file:
+            guard.vet(file, cast(BinaryIO, sink))
     except ResultError as error:
         raise UsageError(f"{safe_text(str(path))}: would not be read again: {error}") from None
-    write_whole(path, buffer.getbuffer(), overwrite=overwrite)
-
-
-def _fixed(dataset: xr.Dataset) -> xr.Dataset:
-    """The dataset with its attributes of text as so many bytes, a number that a reader knows beforehand."""
-
-    def fixed(value: object) -> object:
-        if not isinstance(value, str):
-            return value
-        written = value.encode()
-        return np.array(written, h5py.string_dtype("utf-8", max(len(written), 1)))
-
-    made = dataset.copy()
-    for holder in (made, *(made[name] for name in made.variables)):
-        holder.attrs = {name: fixed(value) for name, value in holder.attrs.items()}
-    return made
 
 
 def load(path: str | Path) -> xr.Dataset:
@@ -180,35 +136,44 @@ def load(path: str | Path) -> xr.Dataset:
     impact.errors.ResultError: README.md: is not a readable result ...
     """
     path = Path(path)
+    with reading(path) as (file, stream, contents):
+        dataset = read(file, stream, contents.axes)
+        check(dataset, content_digest(dataset))
+    if contents.unknown:
+        names = safe_text(", ".join(contents.unknown))
+        warnings.warn(f"{safe_text(str(path))}: passed over what is no part of a result: {names}", stacklevel=2)
+    return dataset
+
+
+@contextlib.contextmanager
+def reading(path: Path) -> Iterator[tuple[h5py.File, BinaryIO, guard.Contents]]:
+    """A file that was looked at, its bytes, and what may be read of it.
+
+    Raises
+    ------
+    ResultError : it is not a readable result, or turns out not to be one while it is read
+    """
     shown = safe_text(str(path))
     try:
         # by its path: a signal that comes while h5py calls a Python stream is lost
         with guard.opened(path) as stream, h5py.File(path, "r", driver="sec2") as file:
-            contents = guard.vet(file, stream)
-            dataset = read(file, stream, contents.axes)
-        digest = content_digest(dataset)
-        odd = misfit(dataset)
+            yield file, stream, guard.vet(file, stream)
     except ResultError as error:
         raise ResultError(f"{shown}: {error}") from None
     except Exception as error:
         # h5py and xarray raise almost anything on a damaged file
         raise ResultError(f"{shown}: is not a readable result ({safe_text(str(error), 80)})") from error
+
+
+def check(dataset: xr.Dataset, digest: str) -> None:
+    """Refuse what has another digest than it carries, or is like no result.
+
+    Raises
+    ------
+    ResultError : so it is
+    """
     if digest != str(dataset.attrs["content_digest"]):
-        raise ResultError(f"{shown}: is damaged: its content does not have the digest that it carries")
+        raise ResultError("is damaged: its content does not have the digest that it carries")
+    odd = misfit(dataset)
     if odd:
-        raise ResultError(f"{shown}: is not a readable result ({odd})")
-    if contents.unknown:
-        names = safe_text(", ".join(contents.unknown))
-        warnings.warn(f"{shown}: passed over what is no part of a result: {names}", stacklevel=2)
-    return dataset
-
-
-def held(path: Path, fingerprint: str) -> xr.Dataset | None:
-    """What a file holds, if it is a whole result with this fingerprint."""
-    if path.is_symlink() or not path.is_file():
-        return None
-    try:
-        dataset = load(path)
-    except ResultError:
-        return None
-    return dataset if dataset.attrs.get("fingerprint") == fingerprint else None
+        raise ResultError(f"is not a readable result ({odd})")

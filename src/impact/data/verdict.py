@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
@@ -11,6 +10,7 @@ import xarray as xr
 
 from ..contact.status import Status
 from ..text import safe_text
+from .replay import replay
 
 Kind = Literal["nothing in common", "physics config", "labels", "units", "missing variable", "values"]
 # in the order in which a verdict tells them: what explains the most first
@@ -182,11 +182,7 @@ class Verdict:
         """The command that runs the worst point of a variable again; empty where there is none."""
         if not self.repeats or not one.at:
             return ""
-        words = list(self.repeats)
-        for name, value in one.at.items():
-            given = repr(value) if isinstance(value, float) else value
-            words += ["--model", given] if name == "model" else ["--at", f"{name}={given}"]
-        return safe_text(shlex.join(words), 2000)
+        return replay(self.repeats, one.at)
 
     def __str__(self) -> str:
         return "\n".join([self.headline, *self.lines, *(f"note: {note}" for note in self.notes)])

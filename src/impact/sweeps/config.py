@@ -23,7 +23,7 @@ from ..contact.material import Material
 from ..contact.model import ForceModel
 from ..contact.models import catalogue
 from ..errors import ConfigError
-from .grid import Axis, lay_out
+from .grid import MAX_POINTS, Axis, chunk_faults, lay_out
 from .keys import (
     DEFAULT_TITLE,
     MATERIAL_KEYS,
@@ -41,28 +41,11 @@ from .keys import (
 from .places import Places, key_lines
 from .problems import faults_of, lines_of
 from .rules import DEFAULTS, SWEEP, cross_faults, expand_models, own_quantities
+from .settings import DEFAULT_RTOL, Output, Solver
 from .source import apply_overrides, load, plain, read_text
 from .values import Fault
 
-__all__ = ["DEFAULT_RTOL", "Axis", "Config", "Solver", "json_schema", "parse_config", "read_config"]
-
-DEFAULT_RTOL = 1e-10
-
-
-@dataclass(frozen=True)
-class Solver:
-    """How impacts are integrated.
-
-    Parameters
-    ----------
-    rtol : relative tolerance
-    max_steps : steps that one impact may take
-    collapse : integrate impacts that are the same in the contact's own units once; changes no bit
-    """
-
-    rtol: float = DEFAULT_RTOL
-    max_steps: int = 10_000
-    collapse: bool = True
+__all__ = ["DEFAULT_RTOL", "Axis", "Config", "Output", "Solver", "json_schema", "parse_config", "read_config"]
 
 
 @dataclass(frozen=True)
@@ -78,7 +61,7 @@ class Config:
     axes : the dimensions of the grid in config order, those of models last
     materials : by name
     solver : tolerances
-    variables : the variables of the result, or None for all
+    output : which variables are stored, and how
     text : the TOML text verbatim, or a mapping as JSON
     overrides : PATH=VALUE strings in order; `text` is without them
     """
@@ -89,7 +72,7 @@ class Config:
     axes: tuple[Axis, ...]
     materials: Mapping[str, Material]
     solver: Solver
-    variables: tuple[str, ...] | None
+    output: Output
     text: str
     overrides: tuple[str, ...]
 
@@ -135,7 +118,10 @@ def json_schema() -> dict[str, object]:
 
 
 def read_config(
-    source: Path | Mapping[str, object], overrides: Sequence[str] = (), plugins: Sequence[ForceModel] = ()
+    source: Path | Mapping[str, object],
+    overrides: Sequence[str] = (),
+    plugins: Sequence[ForceModel] = (),
+    max_points: int = MAX_POINTS,
 ) -> Config:
     """The config of a TOML file or a mapping.
 
@@ -144,6 +130,7 @@ def read_config(
     source : path of a TOML file, or what such a file says as a mapping
     overrides : strings such as "sweep.e.linspace=[0,1,11]"
     plugins : models that are not built in
+    max_points : how many it may have, of all models together; more are refused before there is an array
 
     Raises
     ------
@@ -155,20 +142,26 @@ def read_config(
     (Axis(columns={'e': (0.5, 1.0)}),)
     """
     if not isinstance(source, Mapping):
-        return parse_config(read_text(Path(source)), overrides, plugins, str(source))
-    return _checked(source, None, Places("config", overrides=tuple(overrides)), plugins)
+        return parse_config(read_text(Path(source)), overrides, plugins, str(source), max_points)
+    return _checked(source, None, Places("config", overrides=tuple(overrides)), plugins, max_points)
 
 
 def parse_config(
-    text: str, overrides: Sequence[str] = (), plugins: Sequence[ForceModel] = (), name: str = "<text>"
+    text: str,
+    overrides: Sequence[str] = (),
+    plugins: Sequence[ForceModel] = (),
+    name: str = "<text>",
+    max_points: int = MAX_POINTS,
 ) -> Config:
     """The config of a TOML text, or of a JSON text, which starts with a brace; otherwise as `read_config`."""
     is_json = text.lstrip().startswith("{")
     data = load(text, json.loads if is_json else tomllib.loads, "JSON" if is_json else "TOML", name)
-    return _checked(data, text, Places(name, overrides=tuple(overrides)), plugins)
+    return _checked(data, text, Places(name, overrides=tuple(overrides)), plugins, max_points)
 
 
-def _checked(source: object, text: str | None, places: Places, plugins: Sequence[ForceModel]) -> Config:
+def _checked(
+    source: object, text: str | None, places: Places, plugins: Sequence[ForceModel], max_points: int
+) -> Config:
     """The config, or every problem of its overrides and values; `text` is None for a mapping."""
     given, faults = plain(source)
     problems: list[str] = []
@@ -180,7 +173,7 @@ def _checked(source: object, text: str | None, places: Places, plugins: Sequence
     if not faults:
         if text is None:
             text = json.dumps(given, separators=(",", ":"), default=str)
-        config, faults = _read(data, catalogue(plugins), text, places.overrides)
+        config, faults = _read(data, catalogue(plugins), text, places.overrides, max_points)
     if config is None or problems:
         if text is not None and not text.lstrip().startswith("{"):
             places = replace(places, lines=key_lines(text))
@@ -189,7 +182,11 @@ def _checked(source: object, text: str | None, places: Places, plugins: Sequence
 
 
 def _read(
-    data: Mapping[str, Any], known: Mapping[str, ForceModel], text: str, overrides: tuple[str, ...]
+    data: Mapping[str, Any],
+    known: Mapping[str, ForceModel],
+    text: str,
+    overrides: tuple[str, ...],
+    max_points: int,
 ) -> tuple[Config | None, list[Fault]]:
     """The config that plain data gives, or what is wrong with it."""
     sweep, materials, own = (_dict(data.get(name)) for name in ("sweep", "materials", "model"))
@@ -209,8 +206,10 @@ def _read(
         *(name for key in own for name in (f"{key}.{one}" for one in _dict(own[key])) if name in chosen),
     ]
     entries = {name: context.entries[name] for name in names if name in context.entries}
-    grid = lay_out(entries, SWEEP | chosen, context.groups, swept, len(models))
+    grid = lay_out(entries, SWEEP | chosen, context.groups, swept, len(models), max_points)
     faults += grid.faults
+    if not faults:
+        faults += chunk_faults(_values(parsed["output"]).get("chunks") or {}, grid.axes, len(models))
     if faults:
         return None, faults
     defaults = DEFAULTS | {
@@ -226,8 +225,8 @@ def _read(
         scalars=scalars,
         axes=grid.axes,
         materials={name: Material(**_values(table)) for name, table in (parsed["materials"] or {}).items()},
-        solver=Solver(**{key: value for key, value in _values(parsed["solver"]).items() if value is not None}),
-        variables=_values(parsed["output"]).get("variables"),
+        solver=Solver(**_given(parsed["solver"])),
+        output=Output(**_given(parsed["output"])),
         text=text,
         overrides=overrides,
     ), []
@@ -235,6 +234,11 @@ def _read(
 
 def _dict(value: object) -> dict[str, Any]:
     return value if isinstance(value, dict) else {}
+
+
+def _given(table: BaseModel | None) -> dict[str, Any]:
+    """Those that were given."""
+    return {key: value for key, value in _values(table).items() if value is not None}
 
 
 def _values(table: BaseModel | None) -> dict[str, Any]:

@@ -6,10 +6,16 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from ..contact.collide import OUTPUTS
 from .ranges import MAX_FAULTS, Entry, written_out
 from .values import Fault, KeyPath, Problem, Quantity, nearest, show
 
-MAX_POINTS = 20_000_000  # of all models together
+# of all models together, where nothing else is said
+MAX_POINTS = 10**9
+# pieces of a result, and points of a piece: a reader opens each, and holds it as a whole
+MOST_PIECES, MOST_OF_A_PIECE = 100_000, 2**22
+# bytes that all outputs of a point take at most
+WIDTH = 8 * len(OUTPUTS)
 
 Values = tuple[float, ...] | tuple[str, ...]
 
@@ -48,6 +54,7 @@ def lay_out(
     groups: Sequence[Sequence[str]],
     given: Sequence[str],
     models: int,
+    max_points: int = MAX_POINTS,
 ) -> Grid:
     """The grid of some entries.
 
@@ -58,6 +65,7 @@ def lay_out(
     groups : names that vary together
     given : the names under [sweep], whether their entries could be read or not
     models : how many there are
+    max_points : how many points are allowed
     """
     member_of, faults = _zipped(groups, entries, given)
     scalars = {name: entry.given[0] for name, entry in entries.items() if entry.kind == "scalar"}
@@ -65,8 +73,9 @@ def lay_out(
     # a group stands where its first member does
     leaders = [name for name in swept if member_of.get(name, (name,))[0] == name]
     points = math.prod(entries[name].size for name in leaders) * models
-    if points > MAX_POINTS:
-        faults.append((("sweep",), f"got {points:,} points (axes times models), wants at most {MAX_POINTS:,}"))
+    if points > max_points:
+        size = f"{points:,} points (axes times models), up to {WIDTH * points / 1e9:,.0f} GB"
+        faults.append((("sweep",), f"got {size}, wants at most {max_points:,} points (--max-points)"))
     columns: dict[str, Values] = {}
     for name in swept:
         entry = entries[name]
@@ -75,13 +84,34 @@ def lay_out(
             # the first column names the points of the axis; the others may repeat themselves
             if name in leaders:
                 faults += _repeated(name, entry.given)
-        elif points <= MAX_POINTS:
+        elif points <= max_points:
             try:
                 columns[name] = written_out(entry, quantities[name])
             except Problem as problem:
                 faults += problem.under(*path_of(name))
     axes = () if faults else tuple(Axis({m: columns[m] for m in member_of.get(n, (n,))}) for n in leaders)
     return Grid(scalars, axes, tuple(faults))
+
+
+def chunk_faults(chunks: Mapping[str, int], axes: Sequence[Axis], models: int) -> list[Fault]:
+    """What is wrong with the pieces that a result is to be stored in: no such axis, too small or too large.
+
+    Parameters
+    ----------
+    chunks : their lengths, by axis; along the others they are whole
+    axes, models : of the grid
+    """
+    sizes, path = {axis.name: axis.size for axis in axes}, ("output", "chunks")
+    unknown = [name for name in chunks if name not in sizes]
+    if unknown or not chunks:
+        return [((*path, name), f"no axis of this sweep; {nearest(name, list(sizes))}") for name in unknown]
+    size = math.prod(min(chunks.get(name, whole), whole) for name, whole in sizes.items())
+    count = math.prod(-(-whole // chunks.get(name, whole)) for name, whole in sizes.items())
+    count *= models * len(OUTPUTS)
+    if size > MOST_OF_A_PIECE or count > MOST_PIECES:
+        wants = f"wants at most {MOST_PIECES:,} of at most {MOST_OF_A_PIECE:,}"
+        return [(path, f"got {count:,} pieces of {size:,} points, {wants}")]
+    return []
 
 
 def path_of(name: str) -> KeyPath:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Any
 
-from ..contact.collide import Contact
+from ..contact.collide import OUTPUTS
 from ..contact.model import ForceModel
-from .ranges import Entry, entry_schema, number_schema, read_entry, read_groups, read_names
+from .ranges import MAX_AXIS, Entry, entry_schema, number_schema, read_entry, read_groups, read_names
 from .rules import DEFAULTS, MATERIAL, MATERIALS, REQUIRED, SWEEP, expand_models, own_quantities
+from .settings import COMPRESSIONS, DTYPES
 from .values import Problem, Quantity, read_number, read_switch, read_whole, refuse
 
 DEFAULT_TITLE = "Impact sweep"
@@ -20,6 +21,7 @@ MOST_STEPS = 10**9
 Schema = Mapping[str, Any]
 TEXTS: Schema = {"type": "array", "items": {"type": "string"}, "minItems": 1}
 GROUPS: Schema = {"type": "array", "items": {**TEXTS, "minItems": 2}}
+CHUNKS: Schema = {"type": "object", "additionalProperties": {"type": "integer", "minimum": 1}}
 STEPS: Schema = {"type": "integer", "minimum": 1, "maximum": MOST_STEPS}
 
 
@@ -115,6 +117,31 @@ def parameter_keys(model: ForceModel) -> dict[str, Key]:
     }
 
 
+def _word_key(words: tuple[str, ...], about: str) -> Key:
+    """A key that is one of some words, of which the first is the default."""
+
+    def read(value: object, _: Context) -> str:
+        if value not in words:
+            raise refuse(value, f"one of {', '.join(words)}")
+        return str(value)
+
+    return Key(read, {"enum": list(words), "default": words[0]}, about)
+
+
+def _chunks(value: object, _: Context) -> dict[str, int]:
+    if not isinstance(value, dict):
+        raise refuse(value, "a table of lengths by axis, such as { e = 50 }")
+    found, faults = {}, []
+    for name, length in value.items():
+        try:
+            found[str(name)] = read_whole(length, 1, MAX_AXIS)
+        except Problem as problem:
+            faults += problem.under(str(name))
+    if faults:
+        raise Problem(*faults)
+    return found
+
+
 TITLE = Key(_title, {"type": "string", "default": DEFAULT_TITLE}, "title of the sweep")
 SWEEP_KEYS = {
     **{name: entry_key(name, quantity, default=DEFAULTS.get(name)) for name, quantity in SWEEP.items()},
@@ -129,13 +156,15 @@ SOLVER_KEYS = {
         lambda value, _: read_switch(value), {"type": "boolean"}, "integrate impacts that are the same once"
     ),
 }
-VARIABLES = tuple(one.name for one in fields(Contact))
 OUTPUT_KEYS = {
     "variables": Key(
-        lambda value, _: read_names(value, VARIABLES, "a variable of the result").given,
-        {"type": "array", "items": {"enum": list(VARIABLES)}, "minItems": 1},
+        lambda value, _: read_names(value, OUTPUTS, "a variable of the result").given,
+        {"type": "array", "items": {"enum": list(OUTPUTS)}, "minItems": 1},
         "variables of the result, else all; the status is always among them",
-    )
+    ),
+    "dtype": _word_key(DTYPES, "of the floating-point variables; coordinates are float64"),
+    "compression": _word_key(COMPRESSIONS, "of the variables"),
+    "chunks": Key(_chunks, CHUNKS, "lengths along axes, by name, of the pieces in which variables are stored"),
 }
 
 

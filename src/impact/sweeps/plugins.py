@@ -37,9 +37,10 @@ class Plugin:
 
 @dataclass(frozen=True)
 class Plugins:
-    """The models that are not built in, in the order given."""
+    """The models that are not built in, in the order given; `files` are those that were read for them."""
 
     items: tuple[Plugin, ...] = ()
+    files: tuple[Path, ...] = ()
 
     @property
     def models(self) -> tuple[ForceModel, ...]:
@@ -96,7 +97,7 @@ def read_plugins(given: Sequence[ForceModel | str | Path]) -> Plugins:
                 )
             origins[key] = f"in {name}"
         items += found
-    return Plugins(tuple(items))
+    return Plugins(tuple(items), tuple(Path(one).absolute() for one in given if isinstance(one, str | Path)))
 
 
 def _check_storable(model: ForceModel, name: str) -> None:

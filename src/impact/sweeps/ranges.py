@@ -11,7 +11,7 @@ import numpy as np
 
 from .values import Fault, Problem, Quantity, nearest, read_number, refuse, show
 
-MAX_AXIS = 10**9  # values on one axis
+MAX_AXIS = 10**7  # values on one axis, which are held in memory
 MAX_COUNTED = 10**18  # what a message writes out
 MAX_FAULTS = 100  # of one entry; the rest of a hostile list is not worth its time
 

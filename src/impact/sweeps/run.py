@@ -2,23 +2,50 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import asdict
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
-from ..contact.collide import Contact, collide
-from .plan import BLOCK, Block, Plan
+from ..contact.strike import Rebound
+from .plan import Plan
+from .trajectories import Block, Stretch, Trajectories, block_of, integrated
 
 
-def run(plan: Plan, block_size: int = BLOCK) -> Iterator[tuple[Block, Contact]]:
-    """Collide block after block, in order.
+def never() -> bool:
+    """Do not stop."""
+    return False
+
+
+def run(
+    plan: Plan,
+    found: Sequence[Trajectories],
+    todo: Iterable[Stretch],
+    *,
+    jobs: int = 1,
+    stopping: Callable[[], bool] = never,
+) -> Iterator[tuple[Stretch, Rebound]]:
+    """Integrate block after block; with one process in order, with more as they finish.
 
     Parameters
     ----------
     plan : what to run
-    block_size : points integrated at a time; changes no bit of the result
+    found : its trajectories
+    todo : the stretches of them to be integrated
+    jobs : how many processes
+    stopping : whether no more are to be begun
     """
-    solver = plan.config.solver
-    for block in plan.blocks(block_size):
-        model = plan.models[block.model]
-        lanes = plan.lanes(model, block.start, block.stop)
-        yield block, collide(model, lanes, **asdict(solver))
+    if jobs > 1:
+        from .workers import spread
+
+        begun: dict[int, Stretch] = {}
+
+        def blocks() -> Iterator[Block]:
+            for stretch in todo:
+                begun[stretch.number] = stretch
+                yield block_of(plan, found, stretch)
+
+        for number, rebound in spread(plan, blocks(), jobs, stopping):
+            yield begun.pop(number), rebound
+        return
+    for stretch in todo:
+        if stopping():
+            return
+        yield stretch, integrated(plan.models[stretch.model], block_of(plan, found, stretch), plan.config.solver)

@@ -1,0 +1,37 @@
+"""What `impact sweep --dry-run` tells."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import asdict
+
+from ..data.estimate import estimate
+from ..sweeps.plan import Plan
+from .console import cell, console, table
+from .progress import clock
+from .words import dump
+
+HOW = {
+    "block": "too many cells to compare, equal ones are found within a block",
+    "not": "every point is integrated (solver.collapse = false)",
+}
+
+
+def tell_of(plan: Plan, jobs: int, *, as_json: bool) -> None:
+    """Points, trajectories per model and how they collapse, bytes and time, on stdout."""
+    found = estimate(plan, jobs)
+    if as_json:
+        print(dump(asdict(found)))
+        return
+    out = console(sys.stdout)
+    rows = table("model", "points", "cells", "trajectories", "how the points collapse")
+    rows.columns[-1].justify = "left"
+    for one in found.models:
+        along = f"depends on {', '.join(one.axes)}" if one.axes else "depends on no axis"
+        how = along if one.within == "plan" else f"{along}; {HOW[one.within]}"
+        rows.add_row(cell(one.model), f"{one.points:,}", f"{one.cells:,}", f"{one.trajectories:,}", cell(how))
+    out.print(rows)
+    out.print(
+        f"{found.points:,} points from {found.trajectories:,} trajectories, {found.bytes:,} bytes, about "
+        f"{clock(found.seconds)} and what the disk takes; nothing was written"
+    )

@@ -1,0 +1,130 @@
+"""Trajectories: what a law does with impacts in the contact's own units, each kind of impact integrated once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ModelError
+from ..ode.problem import Columns
+from . import motion
+from .model import ForceModel
+from .power import Array
+from .status import Status
+from .strike import Rebound, strike
+from .values import chi_of, exact_restitution, takes_log, with_coefficients, with_units
+
+Given = Mapping[str, Array]
+
+
+def integrate_all(
+    model: ForceModel,
+    n: Array,
+    given: Given,
+    status: NDArray[np.int8],
+    *,
+    rtol: float,
+    max_steps: int,
+    collapse: bool = True,
+) -> Rebound:
+    """Integrate impacts by the law of a model.
+
+    Parameters
+    ----------
+    model : the law
+    n : their compliance exponents, shape (k,)
+    given : what the law asks for, by name, in the contact's own units, each of shape (k,)
+    status : what is known of them before; those that are not OK are left alone
+    rtol, max_steps, collapse : see `impact.contact.collide.collide`
+
+    Returns
+    -------
+    Rebound : arrays of shape (k,); an impact that fails has a status, and disturbs no other
+    """
+    rebound = Rebound.blank(n.size)
+    rebound.status[:] = status
+    with np.errstate(all="ignore"):
+        for one in np.unique(n):
+            where = np.flatnonzero((status == Status.OK) & (n == one))
+            if where.size:
+                rebound.put(
+                    where, _halving(model, float(one), _at(given, where), where.size, rtol, max_steps, collapse)
+                )
+    return rebound
+
+
+def _at(given: Given, where: NDArray[np.intp]) -> Given:
+    return {name: values[where] for name, values in given.items()}
+
+
+def _halving(
+    model: ForceModel,
+    n: float,
+    given: Given,
+    count: int,
+    rtol: float,
+    max_steps: int,
+    collapse: bool,
+    halved: bool = False,
+) -> Rebound:
+    """What impacts that share n do.
+
+    A law that raises is tried again on the two halves, so that only the impacts that make it raise fail; one that
+    is left alone is tried beside its double, since a result of the wrong shape does not show at one.
+    """
+    try:
+        if halved and count == 1:
+            double = _at(given, np.array([0, 0]))
+            return _struck(model, n, double, 2, rtol, max_steps, collapse=False).take(np.array([0]))
+        return _struck(model, n, given, count, rtol, max_steps, collapse)
+    except ModelError:
+        rebound = Rebound.blank(count)
+        if count == 1:
+            rebound.status[:] = Status.MODEL_ERROR
+            return rebound
+        for half in np.array_split(np.arange(count), 2):
+            part = _halving(model, n, _at(given, half), half.size, rtol, max_steps, collapse, halved=True)
+            rebound.put(half, part)
+        return rebound
+
+
+def _struck(
+    model: ForceModel, n: float, given: Given, count: int, rtol: float, max_steps: int, collapse: bool
+) -> Rebound:
+    values = with_coefficients(model, with_units(given, n), count)
+    rebound = Rebound.blank(count)
+    coefficients = np.array([values[name] for name in model.coefficients]).reshape(-1, count)
+    infinite = np.isinf(coefficients).any(axis=0)
+    plastic = infinite & (given.get("e", np.full(count, np.nan)) == 0.0)
+    rebound.status[infinite & ~plastic] = Status.OUT_OF_RANGE
+    rebound.status[np.isnan(coefficients).any(axis=0)] = Status.INVALID_PARAMETER
+    if model.unloading is None:
+        # an infinite damping lets the balls neither in nor out: the force and the time have no finite limit
+        rebound.status[plastic] = Status.LIMIT
+        for known in (rebound.e_out, rebound.peak, rebound.permanent):
+            known[plastic] = 0.0
+
+    chi = chi_of(values, count)
+    log = takes_log(model, chi)
+    for is_log in (False, True):
+        where = np.flatnonzero((rebound.status == Status.OK) & (log == is_log))
+        if not where.size:
+            continue
+        law = motion.Law.of(model, n, is_log)
+        columns = tuple(np.asarray(values[name])[where] for name in law.names)
+        first, back = _distinct(columns, where.size) if collapse else (np.arange(where.size),) * 2
+        struck = strike(law, tuple(c[first] for c in columns), first.size, rtol, max_steps)
+        rebound.put(where, struck.rebound.take(back))
+    return replace(rebound, chi=chi, exact=exact_restitution(model, values, count))
+
+
+def _distinct(columns: Columns, n: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Places of one impact of each kind, and for every impact the number of its kind."""
+    if not columns:
+        return np.zeros(1, np.intp), np.zeros(n, np.intp)
+    rows = columns[0] if len(columns) == 1 else np.array(columns).T
+    _, first, back = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    return first, back.reshape(-1)

@@ -1,0 +1,73 @@
+"""Assembly: the finished trajectories of a plan become the values of its result, box after box."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from ..sweeps.plan import Plan
+from ..sweeps.points import Box, Rows, boxes, contact_at
+from ..sweeps.trajectories import Trajectories
+from .digest import content_digest
+from .results import outline, stored
+
+
+@dataclass(frozen=True)
+class Part:
+    """The values of some points of one model, by variable, each of the box's shape.
+
+    What depends on the axes alone is there once, with the first model.
+    """
+
+    box: Box
+    values: dict[str, NDArray[Any]]
+
+    def where(self, along_model: bool) -> tuple[int | slice, ...]:
+        """The place of the values in the whole of a variable."""
+        return (self.box.model, *self.box.where) if along_model else self.box.where
+
+
+def parts(
+    plan: Plan, found: Sequence[Trajectories], rows: Rows, of: Iterable[Box] | None = None
+) -> Iterator[Part]:
+    """The values of a plan, box after box.
+
+    Parameters
+    ----------
+    plan : the plan
+    found : its trajectories
+    rows : what became of them
+    of : the boxes; by default all in C order
+    """
+    for box in boxes(len(plan.models), plan.shape) if of is None else of:
+        yield part_at(plan, found, rows, box)
+
+
+def part_at(plan: Plan, found: Sequence[Trajectories], rows: Rows, box: Box) -> Part:
+    """The values of one box."""
+    contact = contact_at(plan, found, rows, box)
+    values = {}
+    for one in stored(plan):
+        if one.per == "model" or box.model == 0:
+            values[one.name] = np.empty(box.shape, one.dtype)
+            # of a plan without axes the only point has an axis
+            natural = getattr(contact, one.name)
+            values[one.name][...] = natural if box.shape else natural.reshape(())
+    return Part(box, values)
+
+
+def assemble(plan: Plan, made: Iterator[Part]) -> xr.Dataset:
+    """The dataset of a plan, in memory, from the parts of it in any order."""
+    dataset = outline(plan)
+    arrays = {str(name): np.empty(one.shape, one.dtype) for name, one in dataset.data_vars.items()}
+    for part in made:
+        for name, values in part.values.items():
+            arrays[name][part.where("model" in dataset[name].dims)] = values
+    dataset = dataset.assign({name: dataset[name].copy(data=array) for name, array in arrays.items()})
+    dataset.attrs["content_digest"] = content_digest(dataset)
+    return dataset

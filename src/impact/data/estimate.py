@@ -1,0 +1,75 @@
+"""What a sweep would take: counted before anything is made, and timed on one block."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from ..sweeps.plan import Plan
+from ..sweeps.points import boxes
+from ..sweeps.trajectories import Trajectories, block_of, integrated, stretches, trajectories
+from .assembly import part_at
+from .digest import Taken
+from .results import outline
+
+
+@dataclass(frozen=True)
+class Collapse:
+    """How the points of a model collapse.
+
+    Parameters
+    ----------
+    model : its key
+    points, cells, trajectories : of the grid; of the product of the axes that its values come from; integrated
+    axes : those axes
+    within : where equal values are found: over the whole "plan", within a "block" only, or "not" at all
+    """
+
+    model: str
+    points: int
+    cells: int
+    trajectories: int
+    axes: tuple[str, ...]
+    within: Literal["plan", "block", "not"]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What a sweep would take: numbers, bytes of the result, seconds; the writing to the disk comes on top."""
+
+    points: int
+    trajectories: int
+    models: tuple[Collapse, ...]
+    bytes: int
+    seconds: float
+
+
+def estimate(plan: Plan, jobs: int = 1) -> Estimate:
+    """Count a sweep, and time one block of its trajectories and one box of its points."""
+    found = trajectories(plan)
+    total = sum(one.count for one in found)
+    blocks = list(stretches(found))
+    # one in the middle is neither the first values nor the last
+    chosen = blocks[len(blocks) // 2]
+    begun = time.perf_counter()
+    rebound = integrated(plan.models[chosen.model], block_of(plan, found, chosen), plan.config.solver)
+    seconds = (time.perf_counter() - begun) / chosen.size * total / jobs
+    # what became of the trajectories of a box does not matter for its time: those of the block, again and again
+    box = replace(next(boxes(1, plan.shape)), model=chosen.model)
+    begun = time.perf_counter()
+    part = part_at(plan, found, lambda _, numbers: rebound.take(numbers % chosen.size), box)
+    for values in part.values.values():
+        Taken().add(values)
+    seconds += (time.perf_counter() - begun) / box.size * plan.points
+    return Estimate(
+        plan.points, total, tuple(_collapse(plan, one) for one in found), outline(plan).nbytes, seconds
+    )
+
+
+def _collapse(plan: Plan, own: Trajectories) -> Collapse:
+    axes = tuple(plan.config.axes[axis].name for axis in own.axes)
+    within: Literal["plan", "block", "not"] = "block" if own.first is None else "plan"
+    if not plan.config.solver.collapse:
+        within = "not"
+    return Collapse(plan.models[own.model].key, plan.grid, own.cells, own.count, axes, within)

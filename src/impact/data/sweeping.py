@@ -1,0 +1,195 @@
+"""A sweep into a file: what is finished is kept, the file is a function of it, and appears when it is whole."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from ..contact.status import FIRST_FAILURE
+from ..contact.strike import Rebound
+from ..errors import StoreError, UnfinishedError
+from ..sweeps.finished import Finished
+from ..sweeps.plan import Plan
+from ..sweeps.points import Rows, boxes_of
+from ..sweeps.run import never, run
+from ..sweeps.trajectories import BLOCK, Stretch, Trajectories, stretches, trajectories
+from ..text import safe_text
+from .assembly import Part, assemble, parts
+from .digest import Taken, content_digest
+from .results import outline
+from .sink import appearing
+from .store import check_output, vet_own
+from .tally import Survey, Tally
+from .work import Work, folder_of, part_of, working
+from .writer import writing
+
+# points up to which a sweep of one block keeps nothing: it is done again sooner than it is read
+FEW = 2**20
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a sweep is: trajectories integrated, and points stored, of all; and how many of either failed."""
+
+    trajectories: int
+    of_trajectories: int
+    points: int
+    of_points: int
+    failed: int
+
+
+Tell = Callable[[Progress], None]
+
+
+def sweep_into(
+    output: Path,
+    plan: Plan,
+    *,
+    resume: bool = False,
+    overwrite: bool = False,
+    jobs: int = 1,
+    tell: Tell = lambda progress: None,
+    stopping: Callable[[], bool] = never,
+) -> Survey:
+    """Run a plan, and store its result.
+
+    Parameters
+    ----------
+    output : the file
+    plan : what to run
+    resume : go on with the work folder that an interrupted sweep left
+    overwrite : replace the file if it exists, and a work folder if it is not to be resumed
+    jobs : how many processes integrate
+    tell : is told how far it is, now and then
+    stopping : whether to stop; what was begun is finished and kept
+
+    Raises
+    ------
+    UsageError : the output, or the work folder, is not to be touched
+    InUseError : another process writes the output
+    StoreError : the disk is full or failed, or processes were killed; what is finished is kept
+    UnfinishedError : it was told to stop; likewise
+    """
+    check_output(output, overwrite=overwrite)
+    found = trajectories(plan)
+    blocks = list(stretches(found))
+    total = sum(one.count for one in found)
+    at = Progress(0, total, 0, plan.points, 0)
+    if total <= BLOCK and plan.points <= FEW and not os.path.lexists(folder_of(output)):
+        finished = {stretch.number: rebound for stretch, rebound in run(plan, found, blocks)}
+        rows = Finished(found, finished.__getitem__).rows
+        return _assemble(
+            output, plan, found, rows, None, overwrite, replace(at, trajectories=total), tell, stopping
+        )
+
+    with working(output, plan, resume=resume, overwrite=overwrite) as work:
+        todo = [stretch for stretch in blocks if work.load(stretch) is None]
+        at = replace(at, trajectories=total - sum(stretch.size for stretch in todo))
+        try:
+            tell(at)
+            for stretch, rebound in run(plan, found, todo, jobs=jobs, stopping=stopping):
+                work.store(stretch, rebound)
+                at = replace(at, trajectories=at.trajectories + stretch.size, failed=at.failed + _failed(rebound))
+                tell(at)
+            if at.trajectories < total:
+                raise UnfinishedError
+            rows = Finished(found, lambda number: _kept(work, blocks[number])).rows
+            return _assemble(output, plan, found, rows, part_of(output), overwrite, at, tell, stopping)
+        except (StoreError, UnfinishedError) as error:
+            shown = safe_text(str(folder_of(output)))
+            kept = f"{at.trajectories:,} of {total:,} trajectories are kept in {shown}; --resume goes on"
+            told = [str(error), *_room(error, output, plan, total - at.trajectories), kept]
+            raise type(error)("; ".join(filter(None, told))) from error
+
+
+def in_memory(plan: Plan, *, jobs: int = 1, tell: Tell, stopping: Callable[[], bool]) -> xr.Dataset:
+    """Run a plan, and hold its result; for the parameters see `sweep_into`.
+
+    Raises
+    ------
+    UnfinishedError : it was told to stop; nothing is kept
+    """
+    found = trajectories(plan)
+    total = sum(one.count for one in found)
+    at = Progress(0, total, 0, plan.points, 0)
+    finished: dict[int, Rebound] = {}
+    for stretch, rebound in run(plan, found, stretches(found), jobs=jobs, stopping=stopping):
+        finished[stretch.number] = rebound
+        at = replace(at, trajectories=at.trajectories + stretch.size, failed=at.failed + _failed(rebound))
+        tell(at)
+    if at.trajectories < total or stopping():
+        raise UnfinishedError("nothing was written")
+    return assemble(plan, parts(plan, found, Finished(found, finished.__getitem__).rows))
+
+
+def _failed(rebound: Rebound) -> int:
+    return int(np.count_nonzero(rebound.status >= FIRST_FAILURE))
+
+
+def _kept(work: Work, stretch: Stretch) -> Rebound:
+    """A block that was finished."""
+    rebound = work.load(stretch)
+    if rebound is None:
+        raise StoreError(f"{safe_text(str(work.path(stretch.number)))}: cannot be read any more")
+    return rebound
+
+
+def _room(error: Exception, output: Path, plan: Plan, left: int) -> list[str]:
+    """On a full disk, how much more room it takes."""
+    cause = error.__cause__
+    if not isinstance(cause, OSError) or cause.errno not in (errno.ENOSPC, errno.EDQUOT):
+        return []
+    wanted = outline(plan).nbytes + left * sum(
+        getattr(Rebound.blank(1), one.name).nbytes for one in fields(Rebound)
+    )
+    free = shutil.disk_usage(output.parent).free
+    return [f"it takes {wanted:,} bytes more, {free:,} are free"]
+
+
+def _assemble(
+    output: Path,
+    plan: Plan,
+    found: Sequence[Trajectories],
+    rows: Rows,
+    part: Path | None,
+    overwrite: bool,
+    at: Progress,
+    tell: Tell,
+    stopping: Callable[[], bool],
+) -> Survey:
+    """Write the result of finished trajectories, and give it its name."""
+    made, output_of = outline(plan), plan.config.output
+    tally, digests = Tally(), {str(name): Taken() for name in made.data_vars}
+    along_model = {name for name in digests if "model" in made[name].dims}
+    with appearing(output, overwrite=overwrite, part=part) as sink:
+        with writing(sink, made, output_of) as (put, seal):
+
+            def store(one: Part) -> None:
+                for name, values in one.values.items():
+                    put(name, one.where(name in along_model), values)
+                if stopping():
+                    raise UnfinishedError
+
+            if output_of.chunks:
+                # each piece is packed once; the digest is of another order, and what it is of is made again
+                lengths = [output_of.chunks.get(axis.name, axis.size) for axis in plan.config.axes]
+                for one in parts(plan, found, rows, boxes_of(len(plan.models), plan.shape, lengths)):
+                    store(one)
+            for one in parts(plan, found, rows):
+                if not output_of.chunks:
+                    store(one)
+                for name, values in one.values.items():
+                    digests[name].add(values)
+                tally.add(one)
+                tell(replace(at, points=tally.points, failed=tally.failed))
+            digest = content_digest(made, {name: taken.hexdigest() for name, taken in digests.items()})
+            seal(digest)
+        vet_own(sink, output)
+    return Survey(made.assign_attrs(content_digest=digest), tally, at.of_trajectories)

@@ -1,0 +1,184 @@
+"""The work folder: what a sweep has finished, kept block by block, so that nothing completed is ever lost.
+
+Beside the output `results.h5` stands `results.h5.work/` while a sweep runs: the plan, a lock, and a file for each
+finished block, written to another name, synced, renamed. It goes when the result is whole.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from filelock import FileLock, Timeout
+
+from ..contact.strike import Rebound
+from ..errors import InUseError, StoreError, UsageError
+from ..sweeps.plan import Plan
+from ..sweeps.trajectories import BLOCK, Stretch
+from ..text import safe_text
+from .results import SCHEMA_VERSION
+from .sink import appearing
+
+PLAN, LOCK = "plan.json", "lock"
+TOLD = 3  # differences
+FIELDS = tuple(one.name for one in fields(Rebound))
+
+
+def folder_of(output: Path) -> Path:
+    """The work folder of an output."""
+    return output.with_name(f"{output.name}.work")
+
+
+def part_of(output: Path) -> Path:
+    """The name of an output while it is assembled."""
+    return output.with_name(f"{output.name}.part")
+
+
+@dataclass(frozen=True)
+class Work:
+    """A work folder that this process has locked."""
+
+    folder: Path
+
+    def path(self, number: int) -> Path:
+        return self.folder / f"{number:08d}.npz"
+
+    def store(self, stretch: Stretch, rebound: Rebound) -> None:
+        """Keep a finished block.
+
+        Raises
+        ------
+        StoreError : the disk is full or failed
+        """
+        own = np.array([stretch.number, stretch.model, stretch.start, stretch.stop])
+        with appearing(self.path(stretch.number), overwrite=True, part=self.folder / "block.part") as sink:
+            np.savez(sink, stretch=own, **{name: getattr(rebound, name) for name in FIELDS})
+
+    def load(self, stretch: Stretch) -> Rebound | None:
+        """A finished block; None if it is not there, or not whole."""
+        own = [stretch.number, stretch.model, stretch.start, stretch.stop]
+        try:
+            with np.load(self.path(stretch.number), allow_pickle=False) as stored:
+                if stored["stretch"].tolist() != own:
+                    return None
+                arrays = {name: stored[name] for name in FIELDS}
+        # numpy and zipfile raise almost anything on a damaged file
+        except Exception:
+            return None
+        blank = Rebound.blank(stretch.stop - stretch.start)
+        right = all(
+            (one.shape, one.dtype) == (getattr(blank, name).shape, getattr(blank, name).dtype)
+            for name, one in arrays.items()
+        )
+        return Rebound(**arrays) if right else None
+
+
+@contextlib.contextmanager
+def working(output: Path, plan: Plan, *, resume: bool, overwrite: bool) -> Iterator[Work]:
+    """The work folder of a sweep, locked; it goes when the block ends without an error.
+
+    Parameters
+    ----------
+    output : the result that the sweep writes
+    plan : what it runs
+    resume : go on with what a leftover folder holds
+    overwrite : throw away what a leftover folder holds, unless it is resumed
+
+    Raises
+    ------
+    InUseError : another process works there
+    UsageError : a leftover folder is neither to be resumed nor overwritten, or is of another sweep
+    StoreError : the disk is full or failed
+    """
+    folder = folder_of(output)
+    shown = safe_text(str(folder))
+    left = folder.exists() or folder.is_symlink()
+    if left and (folder.is_symlink() or not folder.is_dir()):
+        raise UsageError(f"{shown}: is not a folder, and is left alone")
+    try:
+        folder.mkdir(exist_ok=True)
+        lock = FileLock(folder / LOCK, timeout=0)
+        lock.acquire()
+    except Timeout:
+        raise InUseError(f"{safe_text(str(output))}: is being written by another process") from None
+    except OSError as error:
+        raise StoreError(f"{shown}: {error.strerror}") from error
+    with lock:
+        record = _record(plan)
+        if left and not resume and not overwrite:
+            raise UsageError(
+                f"{shown}: is left of an interrupted sweep; --resume goes on with it, --overwrite begins anew"
+            )
+        if not (left and _is_of(folder, record, resume=resume)):
+            _clear(folder)
+            with appearing(folder / PLAN, overwrite=True) as sink:
+                sink.write(json.dumps(record).encode())
+        yield Work(folder)
+        _clear(folder, plan=True)
+        (folder / LOCK).unlink()
+        # what others have put there stays
+        with contextlib.suppress(OSError):
+            folder.rmdir()
+
+
+def _record(plan: Plan) -> dict[str, Any]:
+    """What a folder is of: all that the finished blocks depend on."""
+    solver = plan.config.solver
+    return {"schema": SCHEMA_VERSION, "block": BLOCK, "collapse": solver.collapse, "physics": plan.physics}
+
+
+def _clear(folder: Path, plan: bool = False) -> None:
+    """Remove the finished blocks, and what was left half written."""
+    for one in (*folder.glob("*.npz"), *folder.glob("*.part"), *([folder / PLAN] if plan else [])):
+        one.unlink()
+
+
+def _is_of(folder: Path, record: Mapping[str, Any], *, resume: bool) -> bool:
+    """Whether a folder has finished blocks of a sweep to go on with.
+
+    Raises
+    ------
+    UsageError : it is no work folder; or it is to be resumed and is of another sweep, which is told
+    """
+    shown = safe_text(str(folder))
+    wants = "give the sweep that it is of, another output, or --overwrite to begin anew"
+    if not (folder / PLAN).exists():
+        # interrupted before anything was done; or it is no work folder
+        strange = [one.name for one in folder.iterdir() if one.name != LOCK and not one.name.endswith(".part")]
+        if strange:
+            raise UsageError(f"{shown}: holds {safe_text(strange[0])}, and no {PLAN}; {wants}")
+        return False
+    if not resume:
+        return False
+    try:
+        stored = json.loads((folder / PLAN).read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        raise UsageError(f"{shown}: its {PLAN} cannot be read; {wants}") from None
+    told = list(_differences(stored, json.loads(json.dumps(record))))
+    if told:
+        more = f" and {len(told) - TOLD} more" if len(told) > TOLD else ""
+        raise UsageError(f"{shown}: is of another sweep: {'; '.join(told[:TOLD])}{more}; {wants}")
+    return True
+
+
+def _differences(there: object, here: object, path: str = "") -> Iterator[str]:
+    """In what two records differ, each with its place."""
+    if isinstance(there, dict) and isinstance(here, dict):
+        for key in dict.fromkeys((*there, *here)):
+            name = key if path in ("", "physics") else f"{path}.{key}"
+            yield from _differences(there.get(key), here.get(key), str(name))
+    elif isinstance(there, list) and isinstance(here, list) and len(there) == len(here):
+        for place, (one, other) in enumerate(zip(there, here, strict=True)):
+            yield from _differences(one, other, f"{path}[{place}]")
+    elif there != here and not (there != there and here != here):
+        yield f"{safe_text(path)}: {_shown(there)} there, {_shown(here)} here"
+
+
+def _shown(value: object) -> str:
+    text = f"{len(value)} values" if isinstance(value, list) else json.dumps(value)
+    return safe_text(text, 60)
