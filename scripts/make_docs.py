@@ -60,8 +60,10 @@ told. More in [ci.md](ci.md).
 There is no time stamp: equal inputs give equal contents. Attributes of text have a fixed length, so that a reader
 knows it beforehand: xarray, ncdump and others show them as text, h5py as bytes.
 
-A file is read here only if it is one piece: numbers and labels, uncompressed, with the names of this page; what
-has another name is passed over with a note. `impact.save` stores nothing that would not be read again.
+Each variable lies in one piece, which every reader of HDF5 can map into memory; with `[output] chunks` or
+`compression = "gzip"` in pieces of one size. With `dtype = "float32"` the floating-point variables have half the
+digits, coordinates all of them. Nothing else is read here: numbers and labels with the names of this page; what has
+another name is passed over with a note. `impact.save` stores nothing that would not be read again.
 
 ## Time history (`impact run --history`)
 

@@ -31,7 +31,7 @@ def test_the_toml_and_the_commands_of_daily_use(cli: Run, tmp_path: Path) -> Non
     (toml,) = blocks("toml")
     (tmp_path / "config.toml").write_text(toml, encoding="utf-8")
     commands = [line for block in blocks("sh")[1:] for line in block.splitlines() if line]
-    assert len(commands) == 6
+    assert len(commands) == 8
     for line in commands:
         program, *words = shlex.split(line)
         assert program == "impact"
@@ -53,6 +53,23 @@ def test_generated_pages_are_fresh() -> None:
     import make_docs
 
     assert (ROOT / "docs" / "schema.md").read_text(encoding="utf-8") == make_docs.schema_page(), "run `make docs`"
+
+
+def test_the_page_on_sweeps_says_what_is_so() -> None:
+    from impact.data.sweeping import FEW
+    from impact.data.writer import PIECE
+    from impact.sweeps.config import parse_config
+    from impact.sweeps.grid import MAX_POINTS
+    from impact.sweeps.ranges import MAX_AXIS
+    from impact.sweeps.trajectories import BLOCK, MOST_CELLS
+
+    page = (ROOT / "docs" / "sweeps.md").read_text(encoding="utf-8")
+    for number in (FEW, PIECE, MAX_AXIS, BLOCK, MOST_CELLS):
+        assert f"{number:,}" in page
+    assert MAX_POINTS == 10**9
+    (toml,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    output = parse_config((ROOT / "configs" / "figure6.toml").read_text(encoding="utf-8") + toml).output
+    assert (output.dtype, output.compression, output.chunks) == ("float32", "gzip", {"e": 50})
 
 
 def test_links_lead_somewhere() -> None:

@@ -31,7 +31,7 @@ def execute(plan: Plan, stopping: Callable[[], bool], *, quiet: bool) -> xr.Data
 
 def summary(survey: Survey, output: Path) -> dict[str, Any]:
     """Points, counts per status, and the first failed points with their coordinates and the command for each."""
-    from ..data.replay import repeats, replay
+    from ..data.replay import own, repeats, replay
     from ..data.tally import counted
 
     outline, tally = survey.outline, survey.tally
@@ -39,7 +39,7 @@ def summary(survey: Survey, output: Path) -> dict[str, Any]:
     failures = []
     for status, model, places in tally.failed_at:
         point = outline["status"].isel(dict(zip(outline["status"].dims, (model, *places), strict=True)))
-        at = {str(dim): point[dim].values.item() for dim in outline["status"].dims}
+        at = own({str(dim): point[dim].values.item() for dim in outline["status"].dims})
         again = replay(begin, at) if begin else None
         failures.append({"status": status.name.lower(), "at": at, "replay": again})
     return {

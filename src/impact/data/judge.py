@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..contact.material import effective_mass
 from ..contact.status import Status
 from .align import is_input
+from .replay import own
 from .results import Variable
 from .verdict import Judged
 
@@ -75,14 +76,9 @@ def _worst(
         for name in [dim, *(str(n) for n in new.coords if n != dim and is_input(str(n)))]
         if new.variables[name].dims == (dim,) and not (name == "e" and "alpha" in new.coords)
     }
-    model = at.get("model", "")
+    plain = {name: float(one) if isinstance(one, int | float) else str(one) for name, one in own(at).items()}
     return {
-        "worst": float(difference[index]), "times": float(ratio[index]),
-        "at": {
-            name: float(value) if isinstance(value, int | float) else str(value)
-            for name, value in at.items()
-            if "." not in name or name.rpartition(".")[0] == model
-        },
+        "worst": float(difference[index]), "times": float(ratio[index]), "at": plain,
         "new": float(a[index]), "baseline": float(b[index]),
     }  # fmt: skip
 

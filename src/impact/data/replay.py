@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping, Sequence
+from typing import TypeVar
 
 import xarray as xr
 
 from ..text import safe_text
 from .attributes import json_table
+
+T = TypeVar("T")
 
 
 def repeats(path: str, dataset: xr.Dataset) -> tuple[str, ...]:
@@ -23,6 +26,15 @@ def repeats(path: str, dataset: xr.Dataset) -> tuple[str, ...]:
     if not path or None in files:
         return ()
     return ("impact", "run", path, *(word for file in dict.fromkeys(files) for word in ("--plugin", str(file))))
+
+
+def own(at: Mapping[str, T]) -> dict[str, T]:
+    """The inputs of a point without the parameters of other models than its own.
+
+    >>> own({"model": "mine", "e": 0.5, "mine.c": 2.0, "other.c": 3.0})
+    {'model': 'mine', 'e': 0.5, 'mine.c': 2.0}
+    """
+    return {name: one for name, one in at.items() if name.rpartition(".")[0] in ("", at.get("model"))}
 
 
 def replay(begin: Sequence[str], at: Mapping[str, object]) -> str:

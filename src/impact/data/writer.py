@@ -82,8 +82,9 @@ def _storage(outline: xr.Dataset, name: str, output: Output) -> dict[str, Any]:
     else:
         # whole along the last axes, one place along the first
         chunks, room = (), PIECE
-        for size in reversed(one.shape):
-            chunks = (max(min(size, room), 1), *chunks)
+        for dim, size in reversed(list(one.sizes.items())):
+            length = 1 if dim == "model" else max(min(size, room), 1)
+            chunks = (length, *chunks)
             room //= size
     packed = (
         {"compression": "gzip", "compression_opts": 4, "shuffle": True} if output.compression == "gzip" else {}

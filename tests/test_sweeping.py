@@ -1,0 +1,288 @@
+"""`impact sweep` tells what it will take, how far it is and what came out, and stores it as it was asked to."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import xarray as xr
+
+import impact
+from impact.api import prepare
+from impact.cli.progress import Pace
+from impact.data.guard import is_in_pieces
+from impact.data.survey import held
+from impact.data.sweeping import Progress, sweep_into
+from impact.data.tally import tally_of
+from impact.errors import ConfigError, UsageError
+
+from .conftest import WIDE, Run
+from .forked import Forked
+
+# more than one block, and done in a second
+BLOCKS = """models = ["bilinear", "hertz"]
+[sweep]
+e = { linspace = [0.0, 1.0, 20000] }
+v1 = 1.0
+m1 = [1.0, 2.0]
+m2 = 1.0
+material = "a"
+[materials.a]
+E = 56e9
+nu = 0.3
+rho = 2712
+[solver]
+rtol = 1e-4
+"""
+
+
+@pytest.fixture
+def blocks(tmp_path: Path) -> Path:
+    path = tmp_path / "blocks.toml"
+    path.write_text(BLOCKS, encoding="utf-8")
+    return path
+
+
+# ---- what it will take
+
+
+def test_a_dry_run_tells_what_a_sweep_takes_and_writes_nothing(cli: Run, blocks: Path) -> None:
+    told = cli("sweep", blocks, "--dry-run", cwd=blocks.parent)
+    assert (told.returncode, told.stderr) == (0, "")
+    lines = [line.split() for line in told.stdout.splitlines()]
+    assert lines[1] == ["bilinear", "40,000", "20,000", "20,000", "depends", "on", "e"]
+    assert lines[2] == ["hertz", "40,000", "1", "1", "depends", "on", "no", "axis"]
+    assert "80,000 points from 20,001 trajectories, " in told.stdout
+    assert [one.name for one in blocks.parent.iterdir()] == ["blocks.toml"]
+    found = json.loads(cli("sweep", blocks, "--dry-run", "--json", cwd=blocks.parent).stdout)
+    cli("sweep", blocks, "--quiet", cwd=blocks.parent)
+    result = impact.load(blocks.parent / "results.h5")
+    assert found["bytes"] == result.nbytes
+    assert found["points"] == result["status"].size
+    assert found["seconds"] > 0.0
+
+
+def test_a_dry_run_says_where_equal_values_are_not_looked_for(cli: Run, blocks: Path) -> None:
+    each = cli("sweep", blocks, "--dry-run", "--set", "solver.collapse=false", cwd=blocks.parent)
+    assert "80,000 points from 80,000 trajectories" in each.stdout
+    assert "every point is integrated (solver.collapse = false)" in each.stdout
+    many = ["--set", "sweep.e.linspace=[0.0,1.0,3000000]", "--set", "sweep.n=[1.5,2.0]", "--set", "models='hertz'"]
+    found = json.loads(cli("sweep", blocks, "--dry-run", "--json", *many, cwd=blocks.parent).stdout)
+    assert [(one["trajectories"], one["within"]) for one in found["models"]] == [(2, "plan")]
+    many[-1] = "models='hunt-crossley-1975'"
+    told = cli("sweep", blocks, "--dry-run", *many, cwd=blocks.parent)
+    assert "too many cells to compare, equal ones are found within a block" in told.stdout
+
+
+def test_too_many_points_are_refused_before_there_is_anything(forked: Forked, blocks: Path) -> None:
+    grid = [f"sweep.{name}.geomspace=[1,2,10000]" for name in ("v1", "m1", "m2")]
+    sets = [word for one in grid for word in ("--set", one)]
+    done = forked("sweep", blocks, *sets, cwd=blocks.parent, limit=10.0)
+    wants = "got 40,000,000,000,000,000 points (axes times models), up to 6,400,000,000 GB, wants at most "
+    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
+    assert f"sweep: {wants}1,000,000,000 points (--max-points)" in done.stderr
+    assert done.memory < 300e6
+    fewer = forked("sweep", blocks, "--max-points", "79999", cwd=blocks.parent)
+    assert fewer.returncode == 2
+    assert "got 80,000 points" in fewer.stderr
+    assert [one.name for one in blocks.parent.iterdir()] == ["blocks.toml"]
+    with pytest.raises(ConfigError, match="80,000 points"):
+        impact.sweep(blocks, max_points=79_999)
+
+
+# ---- how far it is
+
+
+def test_a_line_now_and_then_where_there_is_no_terminal(cli: Run, blocks: Path) -> None:
+    # one line after a second, and not one for each block
+    done = cli("sweep", blocks, "--set", "solver.rtol=1e-12", "--set", 'models="all"', cwd=blocks.parent)
+    lines = [line for line in done.stderr.splitlines() if line.startswith(("trajectories ", "points "))]
+    assert 1 <= len(lines) <= 5
+    number = r"[\d,]+"
+    whole = rf"(trajectories {number} of 180,002 for 440,000 points|points {number} of 440,000)"
+    assert all(re.fullmatch(rf"{whole}(, {number}/s, [\d:]+ left)?", line) for line in lines), lines
+    assert "\x1b" not in done.stderr
+    silent = cli("sweep", blocks, "--overwrite", "--quiet", cwd=blocks.parent)
+    assert (silent.returncode, silent.stdout, silent.stderr) == (0, "", "")
+
+
+def test_a_bar_on_a_terminal(blocks: Path) -> None:
+    driver, terminal = pty.openpty()
+    words = ["sweep", str(blocks), "--set", "solver.rtol=1e-12", "--set", 'models="all"']
+    with subprocess.Popen([sys.executable, "-m", "impact", *words], cwd=blocks.parent, stderr=terminal) as child:
+        os.close(terminal)
+        told = b""
+        while True:
+            try:
+                told += os.read(driver, 10_000)
+            except OSError:
+                break
+    os.close(driver)
+    assert child.returncode == 0
+    assert re.search(rb"trajectories [\d,]+ of 180,002", told)
+    assert "━".encode() in told
+    # it goes when it is done
+    assert told.rstrip().endswith(b"limit)")
+
+
+def test_the_pace_of_what_was_resumed_is_that_of_this_run() -> None:
+    pace = Pace()
+    assert (
+        pace.told(Progress(8_000, 10_000, 0, 50_000, 0), 100.0)[2]
+        == "trajectories 8,000 of 10,000 for 50,000 points"
+    )
+    told = pace.told(Progress(9_000, 10_000, 0, 50_000, 2), 110.0)
+    assert told == (9_000, 10_000, "trajectories 9,000 of 10,000 for 50,000 points, 100/s, 0:10 left, 2 failed")
+    pace.told(Progress(10_000, 10_000, 0, 50_000, 2), 120.0)
+    assert pace.told(Progress(10_000, 10_000, 10_000, 50_000, 9), 121.0)[2] == "points 10,000 of 50,000, 9 failed"
+
+
+# ---- what came out
+
+
+def test_a_failed_point_comes_with_the_command_that_repeats_it(cli: Run, tmp_path: Path) -> None:
+    text = WIDE.replace("e = [0.2, 0.6, 1.0]", "alpha = [0.1, 0.3, 0.5]").replace('"bilinear", ', "")
+    (tmp_path / "wide.toml").write_text(text, encoding="utf-8")
+    done = cli("sweep", "wide.toml", "--json", cwd=tmp_path)
+    assert done.returncode == 3
+    found = json.loads(done.stdout)
+    first = found["first_failed"][0]
+    assert first["at"]["model"] == "lankarani-nikravesh-1990"
+    words = shlex.split(first["replay"])
+    again = cli(*words[1:], "--json", cwd=tmp_path)
+    assert again.returncode == 3
+    assert json.loads(again.stdout)["outputs"]["status"] == first["status"]
+    assert f"  {first['replay']}" in done.stderr
+    assert found["trajectories"] == 1 + len(np.unique(impact.load(tmp_path / "results.h5")["e"]).tolist()) + 2
+
+
+def test_what_is_held_is_counted_in_parts_as_in_memory(blocks: Path) -> None:
+    plan = prepare(blocks)
+    output = blocks.parent / "results.h5"
+    swept = sweep_into(output, plan)
+    found = held(output, plan)
+    assert found is not None
+    assert found.tally == swept.tally == tally_of(impact.load(output))
+    assert found.trajectories == swept.trajectories == 20_001
+    assert held(output, prepare(blocks, ["sweep.v1=2"])) is None
+    with output.open("r+b") as file:
+        file.seek(-1_000, os.SEEK_END)
+        byte = file.read(1)
+        file.seek(-1_000, os.SEEK_END)
+        file.write(bytes([byte[0] ^ 1]))
+    assert held(output, plan) is None
+
+
+# ---- several processes
+
+
+def test_several_processes_give_the_same_content(blocks: Path) -> None:
+    one = impact.sweep(blocks)
+    assert impact.sweep(blocks, jobs=2).identical(one)
+    swept = sweep_into(blocks.parent / "two.h5", prepare(blocks), jobs=2)
+    assert swept.outline.attrs["content_digest"] == one.attrs["content_digest"]
+
+
+def test_a_plug_in_goes_to_every_process_and_a_python_value_cannot(blocks: Path, cli: Run) -> None:
+    (blocks.parent / "mine.py").write_text(
+        "import impact\nMINE = impact.hysteresis('mine', title='', year=2026, equation='', reference='', "
+        "chi=lambda e: 1 - e)\n",
+        encoding="utf-8",
+    )
+    words = ["sweep", blocks, "--plugin", "mine.py", "--set", "models=['mine']", "--quiet"]
+    assert cli(*words, "--jobs", 2, "-o", "two.h5", cwd=blocks.parent).returncode == 0
+    assert cli(*words, "-o", "one.h5", cwd=blocks.parent).returncode == 0
+    one, two = (impact.load(blocks.parent / f"{name}.h5") for name in ("one", "two"))
+    assert one.identical(two)
+    mine = impact.hysteresis("mine", title="", year=2026, equation="", reference="", chi=lambda e: 1 - e)
+    with pytest.raises(UsageError, match="mine is given as a Python value"):
+        impact.sweep(blocks, overrides=["models=['mine']"], plugins=[mine], jobs=2)
+
+
+# ---- how it is stored
+
+STORED = {
+    "as it is": ([], None, "f8"),
+    "in fewer digits": (["output.dtype='float32'"], None, "f4"),
+    "packed": (["output.compression='gzip'"], (1, 3, 2, 2, 2, 2), "f8"),
+    "in pieces": (["output.chunks={e=2, m1=1}"], (1, 2, 2, 1, 2, 2), "f8"),
+    "packed in pieces": (["output.compression='gzip'", "output.chunks.v1=1"], (1, 3, 1, 2, 2, 2), "f8"),
+}
+
+
+@pytest.mark.parametrize("name", STORED)
+def test_stored_as_it_was_asked_to(wide: xr.Dataset, tmp_path: Path, name: str) -> None:
+    overrides, chunks, dtype = STORED[name]
+    (tmp_path / "wide.toml").write_text(WIDE, encoding="utf-8")
+    plan = prepare(tmp_path / "wide.toml", overrides)
+    swept = sweep_into(tmp_path / "wide.h5", plan)
+    with h5py.File(tmp_path / "wide.h5") as file:
+        stored = file["v1_post"]
+        packed = "output.compression='gzip'" in overrides
+        assert (stored.chunks, stored.dtype) == (chunks, dtype)
+        assert stored.compression == ("gzip" if packed else None)
+        assert (stored.id.get_storage_size() < stored.nbytes) == packed
+        assert is_in_pieces(stored.id) == (chunks is not None)
+        by_h5py = stored[()]
+    loaded = impact.load(tmp_path / "wide.h5")
+    assert loaded.attrs["content_digest"] == swept.outline.attrs["content_digest"]
+    assert loaded.identical(impact.sweep(tmp_path / "wide.toml", overrides=overrides))
+    assert loaded["v1_post"].values.tobytes() == by_h5py.tobytes()
+    with xr.open_dataset(tmp_path / "wide.h5", engine="h5netcdf") as opened:
+        assert opened.load().drop_encoding().equals(loaded)
+    assert loaded["status"].dtype == np.int8
+    assert loaded["e"].dtype == np.float64
+    # how it is stored is no difference to what it is
+    assert impact.compare(loaded, wide).equal
+    assert held(tmp_path / "wide.h5", plan).tally == swept.tally
+
+
+def test_what_half_the_digits_lose_is_no_difference_and_more_is(wide: xr.Dataset) -> None:
+    short = wide.copy()
+    for name, one in wide.data_vars.items():
+        if one.dtype == np.float64:
+            short[name] = one.astype(np.float32).assign_attrs(one.attrs)
+    assert impact.compare(short, wide).equal
+    assert impact.compare(wide, short).equal
+    moved = short.copy(deep=True)
+    moved["v1_post"][0, 1, 1, 1, 0, 0] *= np.float32(1.0 + 4e-7)
+    assert not impact.compare(moved, wide).equal
+
+
+REFUSED = {
+    "dtype": ("float16", 'output.dtype: got "float16", wants one of float64, float32'),
+    "compression": ("zip", 'output.compression: got "zip", wants one of none, gzip'),
+    "chunks": (3, "output.chunks: got 3, wants a table of lengths by axis, such as { e = 50 }"),
+    "chunks.e": (0, "output.chunks.e: got 0, wants a whole number from 1 to 10,000,000"),
+    "chunks.m2": (2, "output.chunks.m2: no axis of this sweep; known: e, m1"),
+    "chunks.m1": (1, None),
+}
+
+
+@pytest.mark.parametrize("key", REFUSED)
+def test_how_it_cannot_be_stored(blocks: Path, key: str) -> None:
+    value, message = REFUSED[key]
+    override = f"output.{key}={json.dumps(value)}"
+    if message is None:
+        assert prepare(blocks, [override]).config.output.chunks == {"m1": 1}
+        return
+    with pytest.raises(ConfigError) as refused:
+        prepare(blocks, [override])
+    (line,) = refused.value.problems
+    assert line.endswith(message)
+
+
+def test_pieces_that_are_too_many_or_too_large(blocks: Path) -> None:
+    with pytest.raises(ConfigError, match=r"got 800,000 pieces of 2 points, wants at most 100,000 of"):
+        prepare(blocks, ["output.chunks.e=1"])
+    with pytest.raises(ConfigError, match=r"got 80 pieces of 10,000,000 points"):
+        prepare(blocks, ["output.chunks.m1=1", "sweep.e.linspace=[0,1,10000000]"])
