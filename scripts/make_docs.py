@@ -62,8 +62,8 @@ knows it beforehand: xarray, ncdump and others show them as text, h5py as bytes.
 
 Each variable lies in one piece, which every reader of HDF5 can map into memory; with `[output] chunks` or
 `compression = "gzip"` in pieces of one size. With `dtype = "float32"` the floating-point variables have half the
-digits, coordinates all of them. Nothing else is read here: numbers and labels with the names of this page; what has
-another name is passed over with a note. `impact.save` stores nothing that would not be read again.
+digits, coordinates all of them. Nothing else is read here: numbers and labels with the names of this page; what
+has another name is passed over with a note. `impact.save` stores nothing that would not be read again.
 
 ## Time history (`impact run --history`)
 

@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import mpmath as mp
 import numpy as np
 
 from impact.contact.lanes import Lanes, stiffness
@@ -121,3 +122,42 @@ def impacts(n: float = 1.5, **changes: object) -> Lanes:
         **at, n=exponent, nu1=poisson, nu2=poisson, yield_strength1=strength, yield_strength2=strength,
         parameters=own,
     )  # fmt: skip
+
+
+def quadratures(chi: float, n: float) -> tuple[float, float, float]:
+    """Restitution, time and peak force of F = xⁿ (1 + χ v) with m = v₀ = 1, to 15 digits.
+
+    With w = ln(1 + χ v)/χ the motion is dw/dt = −xⁿ, so that x^(n+1)/(n+1) = G(w₀) − G(w) with G(w) =
+    (exp(χ w) − 1 − χ w)/χ², where w goes from w₀ = ln(1 + χ)/χ to the other root of G(w) = G(w₀), w₀ − 1 − e.
+    """
+    with mp.workdps(30):
+        chi, n = mp.mpf(chi), mp.mpf(n)
+        a = 1 + chi
+        b = -mp.lambertw(-a * mp.exp(-a)).real
+        e_out = (1 - b) / chi
+
+        # x^(n+1)/(n+1) at a distance from either end, where exp(χ w) is a and b: no digits are lost there
+        def after_start(d):
+            return (-a * mp.expm1(-chi * d) - chi * d) / chi**2
+
+        def before_end(d):
+            return (chi * d - b * mp.expm1(chi * d)) / chi**2
+
+        # dw/xⁿ with w = zⁿ⁺¹ from an end, in which the rate is smooth: half the way from each
+        time, half = mp.mpf(0), ((1 + e_out) / 2) ** (1 / (n + 1))
+        for work in (after_start, before_end):
+
+            def rate(z, work=work):
+                d = z ** (n + 1)
+                return (n + 1) * (d / ((n + 1) * work(d))) ** (n / (n + 1))
+
+            time += mp.quad(rate, [0, half])
+
+        # the force xⁿ exp(χ w) is stationary where n (exp(χ w) − 1) = χ xⁿ⁺¹, and v > 0 there
+        low, high = mp.mpf(0), mp.log(a) / chi
+        for _ in range(100):
+            d = (low + high) / 2
+            early = chi**2 * (n + 1) * after_start(d) < n * (a * mp.exp(-chi * d) - 1)
+            low, high = (d, high) if early else (low, d)
+        force = ((n + 1) * after_start(low)) ** (n / (n + 1)) * a * mp.exp(-chi * low)
+        return float(e_out), float(time), float(force)

@@ -2,7 +2,6 @@
 
 import functools
 
-import mpmath as mp
 import numpy as np
 import pytest
 
@@ -16,7 +15,7 @@ from impact.contact.status import Status
 from impact.contact.strike import Struck, strike
 from impact.sweeps.config import DEFAULT_RTOL
 
-from .problems import impacts
+from .problems import impacts, quadratures
 
 EXPONENTS = (1.0, 1.3, 1.5, 2.0, 3.0)
 E = np.unique([*np.geomspace(0.001, 0.1, 60), *np.linspace(0.05, 1.0, 191)])
@@ -84,45 +83,6 @@ def test_permanent_indentation_is_that_of_its_closed_form(key, n):
     assert worst(contact.permanent_indentation / peak - (1.0 - E * E)) <= 1e-8
 
 
-def quadratures(chi: float, n: float) -> tuple[float, float, float]:
-    """Restitution, time and peak force of F = xⁿ (1 + χ v) with m = v₀ = 1, to 15 digits.
-
-    With w = ln(1 + χ v)/χ the motion is dw/dt = −xⁿ, so that x^(n+1)/(n+1) = G(w₀) − G(w) with G(w) =
-    (exp(χ w) − 1 − χ w)/χ², where w goes from w₀ = ln(1 + χ)/χ to the other root of G(w) = G(w₀), w₀ − 1 − e.
-    """
-    with mp.workdps(30):
-        chi, n = mp.mpf(chi), mp.mpf(n)
-        a = 1 + chi
-        b = -mp.lambertw(-a * mp.exp(-a)).real
-        e_out = (1 - b) / chi
-
-        # x^(n+1)/(n+1) at a distance from either end, where exp(χ w) is a and b: no digits are lost there
-        def after_start(d):
-            return (-a * mp.expm1(-chi * d) - chi * d) / chi**2
-
-        def before_end(d):
-            return (chi * d - b * mp.expm1(chi * d)) / chi**2
-
-        # dw/xⁿ with w = zⁿ⁺¹ from an end, in which the rate is smooth: half the way from each
-        time, half = mp.mpf(0), ((1 + e_out) / 2) ** (1 / (n + 1))
-        for work in (after_start, before_end):
-
-            def rate(z, work=work):
-                d = z ** (n + 1)
-                return (n + 1) * (d / ((n + 1) * work(d))) ** (n / (n + 1))
-
-            time += mp.quad(rate, [0, half])
-
-        # the force xⁿ exp(χ w) is stationary where n (exp(χ w) − 1) = χ xⁿ⁺¹, and v > 0 there
-        low, high = mp.mpf(0), mp.log(a) / chi
-        for _ in range(100):
-            d = (low + high) / 2
-            early = chi**2 * (n + 1) * after_start(d) < n * (a * mp.exp(-chi * d) - 1)
-            low, high = (d, high) if early else (low, d)
-        force = ((n + 1) * after_start(low)) ** (n / (n + 1)) * a * mp.exp(-chi * low)
-        return float(e_out), float(time), float(force)
-
-
 @functools.cache
 def over_chi(n: float) -> tuple[Lanes, Contact]:
     lanes = impacts(n, e=np.array(CHI) / 1e3)
@@ -149,6 +109,12 @@ def test_extreme_damping_is_accurate_and_not_stiff(key):
     assert contact.e_out[0] == pytest.approx(1e-6, rel=1e-9)
     assert worst(contact.residual) <= 10 * DEFAULT_RTOL
     assert contact.steps[0] <= 3 * contact.steps[1]
+    lanes = impacts(e=[1e-6, 0.1])
+    for place in range(2):
+        _, time, force = quadratures(contact.damping_ratio[place], 1.5)
+        length, v0 = lanes.length[place], lanes.v0[place]
+        assert contact.duration[place] * v0 / length == pytest.approx(time, rel=1e-8)
+        assert contact.peak_force[place] * length / (lanes.m[place] * v0**2) == pytest.approx(force, rel=1e-8)
 
 
 @functools.cache

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,22 +33,17 @@ class Finished:
 
     def rows(self, model: int, numbers: NDArray[np.intp]) -> Rebound:
         """Those of a model of some numbers; arrays of their shape."""
-        own = self.found[model]
+        own, block = self.found[model], numbers // self.size
         # where points share trajectories, any of them may be needed at any time
-        blocks = (
-            np.arange(-(-own.count // self.size)) if own.first is not None else np.unique(numbers // self.size)
-        )
+        blocks = np.unique(block) if own.first is None else np.arange(-(-own.count // self.size))
         key = (model, tuple(blocks.tolist()))
         if key not in self._held:
             passed = sum(-(-one.count // self.size) for one in self.found[:model])
-            joined = _joined([self.load(passed + block) for block in key[1]])
+            # what was held goes before what takes its place is made
             self._held.clear()
+            joined = Rebound.blank(blocks.size * self.size)
+            for place, one in enumerate(key[1]):
+                part = self.load(passed + one)
+                joined.put(np.arange(part.status.size) + place * self.size, part)
             self._held[key] = joined
-        return self._held[key].take(
-            np.searchsorted(blocks, numbers // self.size) * self.size + numbers % self.size
-        )
-
-
-def _joined(parts: Sequence[Rebound]) -> Rebound:
-    names = [one.name for one in fields(Rebound)]
-    return Rebound(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})
+        return self._held[key].take(np.searchsorted(blocks, block) * self.size + numbers % self.size)
