@@ -2,9 +2,10 @@
 
 Every model of the paper that e drives, mixed; e from 0.05 to 0.99, all impacts distinct, nothing collapsed, all
 outputs computed. Both sides have to deliver max |e_out - exact| <= 1e-8: the tolerance of each is the loosest of
-a list that does. Printed is a ratio measured side by side in one run, on one thread.
+a list that does. Printed is a ratio measured side by side in one run, on one thread. Then a sweep of ten times as
+many by one process and by several, from the plan to the dataset, with the start of the processes.
 
-    python scripts/bench_core.py [--impacts 100000] [--loop 300]
+    python scripts/bench_core.py [--impacts 100000] [--loop 300] [--jobs 2]
 """
 
 from __future__ import annotations
@@ -21,11 +22,12 @@ from rich.table import Table
 from scipy.integrate import solve_ivp
 
 import impact
+from impact.api import execute, prepare
 from impact.contact.collide import Contact, collide
 from impact.contact.lanes import Lanes
 from impact.contact.model import ForceModel
 from impact.contact.oracles import delivered_restitution
-from impact.sweeps.plan import BLOCK
+from impact.sweeps.trajectories import BLOCK, even
 
 ACCURACY = 1e-8
 CORE_TOLERANCES = (1e-7, 5e-8, 2e-8, 1e-8, 5e-9, 2e-9, 1e-9)
@@ -52,8 +54,9 @@ def core(models: list[ForceModel], e: np.ndarray, rtol: float) -> tuple[float, f
     seconds, worst, steps = 0.0, 0.0, 0
     for place, model in enumerate(models):
         mine = e[place :: len(models)]
-        for first in range(0, mine.size, BLOCK):
-            lanes = table1(mine[first : first + BLOCK], model)
+        size = even(mine.size, BLOCK)
+        for first in range(0, mine.size, size):
+            lanes = table1(mine[first : first + size], model)
             begun = time.perf_counter()
             contact: Contact = collide(model, lanes, rtol=rtol, max_steps=10_000, collapse=False)
             seconds += time.perf_counter() - begun
@@ -108,10 +111,27 @@ def loop(models: list[ForceModel], e: np.ndarray, rtol: float) -> tuple[float, f
     return time.perf_counter() - begun, worst
 
 
+def sweep(models: list[ForceModel], impacts: int, rtol: float, jobs: int) -> float:
+    """Impacts a second of a sweep, from its plan to its dataset in memory."""
+    plan = prepare(
+        {
+            "models": [model.key for model in models],
+            "sweep": {"e": {"linspace": [0.05, 0.99, impacts // len(models)]}, "v1": 1.0, "m1": 1.0, "m2": 1.0,
+                      "material": "table1"},
+            "materials": {"table1": {"E": 56e9, "nu": 0.3, "rho": 2712.0}},
+            "solver": {"rtol": rtol, "collapse": False},
+        }
+    )  # fmt: skip
+    begun = time.perf_counter()
+    execute(plan, jobs)
+    return plan.points / (time.perf_counter() - begun)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--impacts", type=int, default=100_000)
     parser.add_argument("--loop", type=int, default=300, help="impacts of the loop")
+    parser.add_argument("--jobs", type=int, default=2, help="processes of the sweep")
     asked = parser.parse_args()
     models = [model for model in impact.models().values() if not model.parameters]
     e = np.linspace(0.05, 0.99, asked.impacts)
@@ -129,7 +149,14 @@ def main() -> None:
     table.add_row("solve_ivp RK45, loop", f"{loop_rtol:g}", f"{loop_worst:.2g}", "", f"{base:,.0f}", "1")
     rate = e.size / seconds
     table.add_row("impact", f"{rtol:g}", f"{worst:.2g}", str(steps), f"{rate:,.0f}", f"{rate / base:,.0f}")
-    Console().print(f"{len(models)} models, {e.size:,} impacts (loop: {asked.loop}), one thread", table, sep="\n")
+    about = f"{len(models)} models, {e.size:,} impacts (loop: {asked.loop}), one thread, {os.cpu_count()} cores"
+    Console().print(about, table, sep="\n")
+
+    one, more = (sweep(models, 10 * e.size, rtol, jobs) for jobs in (1, asked.jobs))
+    table = Table("a sweep", "impacts/s", "ratio", box=None)
+    table.add_row("--jobs 1", f"{one:,.0f}", "1")
+    table.add_row(f"--jobs {asked.jobs}", f"{more:,.0f}", f"{more / one:.2f}")
+    Console().print(f"{10 * e.size:,} impacts", table, sep="\n")
 
 
 if __name__ == "__main__":

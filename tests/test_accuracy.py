@@ -4,6 +4,7 @@ import functools
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize_scalar
 
 from impact.contact import motion
 from impact.contact.collide import Contact, collide
@@ -115,6 +116,30 @@ def test_extreme_damping_is_accurate_and_not_stiff(key):
         length, v0 = lanes.length[place], lanes.v0[place]
         assert contact.duration[place] * v0 / length == pytest.approx(time, rel=1e-8)
         assert contact.peak_force[place] * length / (lanes.m[place] * v0**2) == pytest.approx(force, rel=1e-8)
+
+
+def largest_force(chi: float, n: float) -> float:
+    """Peak force of F = xⁿ (1 + χ v) with m = v₀ = 1: x^(n+1)/(n+1) is the integral of v/(1 + χ v) up to v = 1."""
+
+    def force(v: float) -> float:
+        work = (1.0 - v) / chi - np.log((1.0 + chi) / (1.0 + chi * v)) / chi**2
+        return float(((n + 1.0) * work) ** (n / (n + 1.0)) * (1.0 + chi * v))
+
+    found = minimize_scalar(lambda v: -force(v), bounds=(0.0, 1.0), method="bounded", options={"xatol": 1e-10})
+    return force(float(found.x))
+
+
+@pytest.mark.parametrize(
+    ("n", "rtol", "bound"), [(1.5, DEFAULT_RTOL, 1e-9), (1.0, DEFAULT_RTOL, 1e-9), (1.5, 1e-6, 1e-5)]
+)
+def test_peak_force_is_found_between_the_steps_wherever_it_falls(n, rtol, bound):
+    # many values, because it depends on where the steps end how far the peak is from one
+    e = np.linspace(0.02, 0.999, 600)
+    lanes = impacts(n, e=e)
+    contact = collide(find("hunt-crossley-1975"), lanes, rtol=rtol, max_steps=10_000)
+    own = contact.peak_force * lanes.length / (lanes.m * lanes.v0**2)
+    exact = np.array([largest_force(chi, n) for chi in contact.damping_ratio.tolist()])
+    assert np.abs(own / exact - 1.0).max() <= bound
 
 
 @functools.cache

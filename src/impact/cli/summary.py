@@ -59,7 +59,8 @@ def failed_line(found: Mapping[str, Any]) -> str:
 def print_summary(survey: Survey, found: Mapping[str, Any]) -> None:
     """What came out of a sweep, on stderr."""
     out = console(sys.stderr)
-    out.print(worst_errors(survey.outline, survey.tally))
+    if survey.tally.worst:
+        out.print(worst_errors(survey.outline, survey.tally))
     counts = ", ".join(f"{count:,} {name}" for name, count in found["status"].items())
     distinct = f" from {found['trajectories']:,} trajectories" if found["trajectories"] is not None else ""
     out.print(cell(f"{found['output']}: {found['points']:,} points{distinct} ({counts})"))

@@ -30,6 +30,8 @@ FAR = 1e8
 FLOOR = (1e-200, 1.0)
 # step of the difference that gives the rate of the force at the release, relative to s, at which it may vanish
 DIFFERENCE = 1e-7
+# the force of a law without damping is taken to be a power of s below this
+POWER = 16.0
 
 
 @dataclass(frozen=True)
@@ -51,9 +53,8 @@ class Law:
 
     def call(self, formula: Formula, columns: Columns, given: dict[str, Array]) -> Array:
         """A formula's value from the columns and what else is given; K, m and v0 are 1."""
-        known: dict[str, Array | float] = {"K": 1.0, "m": 1.0, "v0": 1.0, "n": self.n}
+        known: dict[str, Array | float] = {"K": 1.0, "m": 1.0, "v0": 1.0, "n": self.n, **given}
         known.update(zip(self.names, columns, strict=True))
-        known.update(given)
         return ask(formula, known)
 
     def velocity(self, momentum: Array, columns: Columns) -> Array:
@@ -84,11 +85,14 @@ def restitution(law: Law) -> Problem:
     rates = _rates(law, branch or law.model.force, branch and ("peak", "force_at_peak", "residual"))
 
     def force_event(y: Array, k: Array, columns: Columns) -> tuple[Array, Array]:
-        # without damping the force vanishes with the indentation, and only touches zero: s then tells the end
-        small = DIFFERENCE * np.minimum(np.abs(y[0]), 1.0)
-        slope = (rates(y + small * k[:2], columns)[4] - k[4]) / small
-        by_force = k[4] < y[0]
-        return np.where(by_force, k[4], y[0]), np.where(by_force, slope, k[0])
+        s, force = y[0], k[4]
+        small = DIFFERENCE * np.minimum(np.abs(s), 1.0)
+        slope = (rates(y + small * k[:2], columns)[4] - force) / small
+        # without damping the force vanishes with the indentation, as a power of s, and only touches zero: s then
+        # tells the end. A force that vanishes before does so in a small part of the time that s still needs
+        sooner = POWER * force * np.abs(k[0]) < s * np.abs(slope)
+        by_force = np.where(s > 0.0, sooner, force < s)
+        return np.where(by_force, force, s), np.where(by_force, slope, k[0])
 
     def gap_event(y: Array, k: Array, columns: Columns) -> tuple[Array, Array]:
         return y[0], k[0]
@@ -136,33 +140,41 @@ def turn(law: Law, columns: Columns, peak: Array, at_peak: Array) -> tuple[Array
 
 def _rates(law: Law, formula: Formula, extra: tuple[str, ...] | None) -> Rates:
     p = law.model.smooth
-    elastic_power = p * law.n
-    asked = frozenset(wishes(formula))
+    stretch, elastic = "x" in wishes(formula), "elastic" in wishes(formula)
     own = len(law.names)
+    chi = law.names.index("chi") if law.log else 0
 
     def rates(y: Array, columns: Columns, out: Array | None = None) -> Array:
-        s = y[0]
-        v = law.velocity(y[1], columns)
+        s, v = y[0], law.velocity(y[1], columns)
         given = {"v": v}
         if extra:
             given.update(zip(extra, columns[own:], strict=True))
-        if "x" in asked or ("elastic" in asked and extra):
-            given["x"] = integer_power(s, p) + given["residual"] if extra else integer_power(s, p)
-        if "elastic" in asked:
-            given["elastic"] = power(given["x"], law.n) if extra else _elastic(s, elastic_power)
-        force = law.call(formula, columns[:own], given)
-        if force.shape not in ((), s.shape):
-            raise ModelError(f"{law.model.key}: the force has the shape {force.shape}, wants {s.shape}")
-        out = np.empty((5, s.size)) if out is None else out
-        out[0] = v
-        np.multiply(integer_power(s, p - 1), p, out=out[2])
-        np.multiply(out[2], force, out=out[1])
-        np.multiply(out[1], v, out=out[3])
-        if law.log:
-            np.multiply(out[2], -columns[law.names.index("chi")] * given["elastic"], out=out[1])
+            x = given["x"] = integer_power(s, p) + given["residual"]
+            if elastic:
+                given["elastic"] = power(x, law.n)
         else:
-            np.negative(out[1], out=out[1])
-        out[4] = force
+            if stretch:
+                given["x"] = integer_power(s, p)
+            if elastic:
+                given["elastic"] = _elastic(s, p * law.n)
+        force = law.call(formula, columns[:own], given)
+        if force.shape != s.shape and force.shape != ():
+            raise ModelError(f"{law.model.key}: the force has the shape {force.shape}, wants {s.shape}")
+
+        # a caller that gives room for fewer rows wants no more; the rows are those of the rates and the force
+        out = np.empty((5, s.size)) if out is None else out
+        wanted = len(out)
+        weight = np.multiply(integer_power(s, p - 1), p, out[2] if wanted > 2 else None)
+        out[0], second = v, out[1]
+        np.multiply(weight, force, second)
+        if wanted > 3:
+            np.multiply(second, v, out[3])
+        if law.log:
+            np.multiply(weight, given["elastic"], second)
+            np.multiply(second, columns[chi], second)
+        np.negative(second, second)
+        if wanted > 4:
+            out[4] = force
         return out
 
     return rates

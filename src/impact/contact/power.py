@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -72,11 +70,13 @@ def integer_power(base: Array, exponent: int) -> Array:
     if exponent == 0:
         return np.ones_like(base)
     square = base
-    result: Array | None = None
-    for bit in range(math.frexp(exponent)[1]):
-        if bit:
-            square = square * square
-        if exponent >> bit & 1:
-            result = square if result is None else result * square
-    assert result is not None
+    while exponent % 2 == 0:
+        square = square * square
+        exponent //= 2
+    result = square
+    while exponent > 1:
+        square = square * square
+        exponent //= 2
+        if exponent % 2:
+            result = result * square
     return result

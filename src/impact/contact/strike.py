@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..ode.problem import Columns, End, Outcome
 from ..ode.rk45 import integrate
+from ..ode.step import Space
 from . import motion
 from .power import Array
 from .status import Status
@@ -90,8 +92,8 @@ def strike(law: motion.Law, columns: Columns, n: int, rtol: float, max_steps: in
     columns : its values per impact, each of shape (n,)
     rtol, max_steps, record : see `impact.ode.rk45.integrate`
     """
-    start = motion.start_of_approach(law, columns, n)
-    inward = integrate(motion.approach(law), start, columns, rtol=rtol, max_steps=max_steps, record=record)
+    run = partial(integrate, rtol=rtol, max_steps=max_steps, record=record, space=Space.of(n))
+    inward = run(motion.approach(law), motion.start_of_approach(law, columns, n), columns)
     peak = motion.indentation(law, inward.state[0])
     at_peak = motion.force_at_peak(law, inward.state[0], columns)
     residual, columns = motion.turn(law, columns, peak, at_peak)
@@ -111,7 +113,7 @@ def strike(law: motion.Law, columns: Columns, n: int, rtol: float, max_steps: in
     if not parts.size:
         return Struck(rebound, inward, None, columns, parts)
     start = motion.start_of_restitution(law, peak[parts], residual[parts])
-    outward = integrate(motion.restitution(law), start, columns, rtol=rtol, max_steps=max_steps, record=record)
+    outward = run(motion.restitution(law), start, columns)
     rebound.e_out[parts] = -law.velocity(outward.state[1], columns)
     rebound.duration[parts] += outward.state[2]
     rebound.work[parts] += 2.0 * outward.state[3]

@@ -6,9 +6,10 @@ import time
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from ..sweeps.blocks import integrated
 from ..sweeps.plan import Plan
 from ..sweeps.points import boxes
-from ..sweeps.trajectories import Trajectories, block_of, integrated, stretches, trajectories
+from ..sweeps.trajectories import Trajectories, block_of, stretches, trajectories
 from .assembly import part_at
 from .digest import Taken
 from .results import outline

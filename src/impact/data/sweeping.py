@@ -84,10 +84,11 @@ def sweep_into(
     at = Progress(0, total, 0, plan.points, 0)
     if total <= BLOCK and plan.points <= FEW and not os.path.lexists(folder_of(output)):
         finished = {stretch.number: rebound for stretch, rebound in run(plan, found, blocks)}
-        rows = Finished(found, finished.__getitem__).rows
-        return _assemble(
-            output, plan, found, rows, None, overwrite, replace(at, trajectories=total), tell, stopping
-        )
+        rows, at = Finished(found, finished.__getitem__).rows, replace(at, trajectories=total)
+        try:
+            return _assemble(output, plan, found, rows, None, overwrite, at, tell, stopping)
+        except UnfinishedError:
+            raise UnfinishedError("nothing was written") from None
 
     with working(output, plan, resume=resume, overwrite=overwrite) as work:
         todo = [stretch for stretch in blocks if work.load(stretch) is None]

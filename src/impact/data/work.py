@@ -7,6 +7,7 @@ finished block, written to another name, synced, renamed. It goes when the resul
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
@@ -22,7 +23,7 @@ from ..sweeps.plan import Plan
 from ..sweeps.trajectories import BLOCK, Stretch
 from ..text import safe_text
 from .results import SCHEMA_VERSION
-from .sink import appearing
+from .sink import appearing, sync_folder
 
 PLAN, LOCK = "plan.json", "lock"
 TOLD = 3  # differences
@@ -41,12 +42,17 @@ def part_of(output: Path) -> Path:
 
 @dataclass(frozen=True)
 class Work:
-    """A work folder that this process has locked."""
+    """A work folder that this process has locked; `key` tells what its blocks are of."""
 
     folder: Path
+    key: str
 
     def path(self, number: int) -> Path:
         return self.folder / f"{number:08d}.npz"
+
+    def _of(self, stretch: Stretch) -> str:
+        """What a block says of itself."""
+        return f"{stretch.number} {stretch.model} {stretch.start} {stretch.stop} {self.key}"
 
     def store(self, stretch: Stretch, rebound: Rebound) -> None:
         """Keep a finished block.
@@ -55,16 +61,14 @@ class Work:
         ------
         StoreError : the disk is full or failed
         """
-        own = np.array([stretch.number, stretch.model, stretch.start, stretch.stop])
         with appearing(self.path(stretch.number), overwrite=True, part=self.folder / "block.part") as sink:
-            np.savez(sink, stretch=own, **{name: getattr(rebound, name) for name in FIELDS})
+            np.savez(sink, of=self._of(stretch), **{name: getattr(rebound, name) for name in FIELDS})
 
     def load(self, stretch: Stretch) -> Rebound | None:
         """A finished block; None if it is not there, or not whole."""
-        own = [stretch.number, stretch.model, stretch.start, stretch.stop]
         try:
             with np.load(self.path(stretch.number), allow_pickle=False) as stored:
-                if stored["stretch"].tolist() != own:
+                if stored["of"].item() != self._of(stretch):
                     return None
                 arrays = {name: stored[name] for name in FIELDS}
         # numpy and zipfile raise almost anything on a damaged file
@@ -97,8 +101,7 @@ def working(output: Path, plan: Plan, *, resume: bool, overwrite: bool) -> Itera
     """
     folder = folder_of(output)
     shown = safe_text(str(folder))
-    left = folder.exists() or folder.is_symlink()
-    if left and (folder.is_symlink() or not folder.is_dir()):
+    if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
         raise UsageError(f"{shown}: is not a folder, and is left alone")
     try:
         folder.mkdir(exist_ok=True)
@@ -110,19 +113,22 @@ def working(output: Path, plan: Plan, *, resume: bool, overwrite: bool) -> Itera
         raise StoreError(f"{shown}: {error.strerror}") from error
     with lock:
         record = _record(plan)
+        left = any(one.name != LOCK for one in folder.iterdir())
         if left and not resume and not overwrite:
             raise UsageError(
                 f"{shown}: is left of an interrupted sweep; --resume goes on with it, --overwrite begins anew"
             )
         if not (left and _is_of(folder, record, resume=resume)):
             _clear(folder)
+            # what is removed must not come back beside another plan
+            sync_folder(folder)
             with appearing(folder / PLAN, overwrite=True) as sink:
                 sink.write(json.dumps(record).encode())
-        yield Work(folder)
-        _clear(folder, plan=True)
-        (folder / LOCK).unlink()
-        # what others have put there stays
+        yield Work(folder, _key(record))
+        # the result is whole: what cannot be removed, and what others have put there, does no harm
         with contextlib.suppress(OSError):
+            _clear(folder, plan=True)
+            (folder / LOCK).unlink()
             folder.rmdir()
 
 
@@ -130,6 +136,10 @@ def _record(plan: Plan) -> dict[str, Any]:
     """What a folder is of: all that the finished blocks depend on."""
     solver = plan.config.solver
     return {"schema": SCHEMA_VERSION, "block": BLOCK, "collapse": solver.collapse, "physics": plan.physics}
+
+
+def _key(record: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(record).encode()).hexdigest()
 
 
 def _clear(folder: Path, plan: bool = False) -> None:

@@ -44,7 +44,8 @@ class Problem:
     Parameters
     ----------
     rates : (y, columns, out=None) -> rates of the two components and the two quadratures, and the watched
-        quantity, of shape (5, n), at components y of shape (2, n); they may be written into `out`
+        quantity, of shape (5, n), at components y of shape (2, n); they may be written into `out`, and the last
+        rows left out that it has no room for
     event : (y, k, columns) -> (g, dg): a function that is positive until the lane ends, and its rate along the
         trajectory, at components y where the rates are k
     lost : y -> mask of the lanes that can no longer reach the event
@@ -61,19 +62,27 @@ class Problem:
 
 @dataclass(frozen=True)
 class Step:
-    """One accepted step, for the interpolant: start (4, n), length (n,), stages (7, 5, n), end as a fraction."""
+    """One accepted step, for the interpolant: start (4, n), length (n,), stages (7, 4, n), end as a fraction."""
 
     start: Array
     length: Array
     stages: Array
     end: Array
 
+    @classmethod
+    def of(cls, start: Array, length: Array, stages: list[Array], end: Array) -> Step:
+        """A copy of a step; rows that a stage does not have are zero, and have no part in it."""
+        rows = np.zeros((len(stages), *start.shape))
+        for room, stage in zip(rows, stages, strict=True):
+            room[: len(stage)] = stage[:INTEGRATED]
+        return cls(start.copy(), length, rows, end)
+
     def at(self, theta: float | Array) -> Array:
         """The integrated rows (4, n) at a fraction of the step, by the interpolant of order four."""
         total = np.zeros_like(self.start)
         for weights, stage in zip(DENSE_WEIGHTS, self.stages, strict=True):
             factor = theta * (weights[0] + theta * (weights[1] + theta * (weights[2] + theta * weights[3])))
-            total += factor * stage[:INTEGRATED]
+            total += factor * stage
         return np.asarray(self.start + self.length * total)
 
 
@@ -86,3 +95,9 @@ class Outcome:
     steps: NDArray[np.int32]
     end: NDArray[np.int8]
     recorded: tuple[Step, ...] = ()
+
+    @classmethod
+    def blank(cls, n: int) -> Outcome:
+        """n lanes of which nothing is known."""
+        unknown = np.full((INTEGRATED, n), np.nan)
+        return cls(unknown, np.full(n, np.nan), np.zeros(n, np.int32), np.zeros(n, np.int8))

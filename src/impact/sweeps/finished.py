@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..contact.strike import Rebound
-from .trajectories import BLOCK, Trajectories
+from .trajectories import BLOCK, Trajectories, even
 
 Load = Callable[[int], Rebound]
 
@@ -22,7 +22,7 @@ class Finished:
     ----------
     found : the trajectories
     load : the finished block of a number
-    size : of a block
+    size : of a block, at most
     """
 
     found: Sequence[Trajectories]
@@ -33,17 +33,19 @@ class Finished:
 
     def rows(self, model: int, numbers: NDArray[np.intp]) -> Rebound:
         """Those of a model of some numbers; arrays of their shape."""
-        own, block = self.found[model], numbers // self.size
+        own = self.found[model]
+        size = even(own.count, self.size)
+        block = numbers // size
         # where points share trajectories, any of them may be needed at any time
-        blocks = np.unique(block) if own.first is None else np.arange(-(-own.count // self.size))
+        blocks = np.unique(block) if own.first is None else np.arange(-(-own.count // size))
         key = (model, tuple(blocks.tolist()))
         if key not in self._held:
             passed = sum(-(-one.count // self.size) for one in self.found[:model])
             # what was held goes before what takes its place is made
             self._held.clear()
-            joined = Rebound.blank(blocks.size * self.size)
+            joined = Rebound.blank(blocks.size * size)
             for place, one in enumerate(key[1]):
                 part = self.load(passed + one)
-                joined.put(np.arange(part.status.size) + place * self.size, part)
+                joined.put(np.arange(part.status.size) + place * size, part)
             self._held[key] = joined
-        return self._held[key].take(np.searchsorted(blocks, block) * self.size + numbers % self.size)
+        return self._held[key].take(np.searchsorted(blocks, block) * size + numbers % size)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from ..contact.strike import Rebound
+from .blocks import Block, integrated
 from .plan import Plan
-from .trajectories import Block, Stretch, Trajectories, block_of, integrated
+from .trajectories import Stretch, Trajectories, block_of
 
 
 def never() -> bool:

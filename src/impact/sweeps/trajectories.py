@@ -17,10 +17,8 @@ from numpy.typing import NDArray
 from ..contact.collide import first_look
 from ..contact.model import ForceModel
 from ..contact.power import Array
-from ..contact.strike import Rebound
-from ..contact.trajectories import integrate_all
 from ..contact.values import made_of, own_values
-from .config import Solver
+from .blocks import Block
 from .impacts import exponents, lanes_of, origins
 from .plan import Index, Plan
 
@@ -79,26 +77,6 @@ class Stretch:
         return self.stop - self.start
 
 
-@dataclass(frozen=True)
-class Block:
-    """What is integrated, in the contact's own units: numbers and names only, so that it can be sent anywhere.
-
-    Parameters
-    ----------
-    number : of its stretch
-    key : of the model
-    n : compliance exponents, shape (k,)
-    given : what the law asks for by name, each of shape (k,)
-    status : what is known beforehand, shape (k,)
-    """
-
-    number: int
-    key: str
-    n: Array
-    given: dict[str, Array]
-    status: NDArray[np.int8]
-
-
 def trajectories(plan: Plan) -> tuple[Trajectories, ...]:
     """Those of every model of a plan, in its order."""
     return tuple(_of_model(plan, place, model) for place, model in enumerate(plan.models))
@@ -111,29 +89,39 @@ def _of_model(plan: Plan, place: int, model: ForceModel) -> Trajectories:
     found = Trajectories(place, axes, tuple(plan.shape[axis] for axis in axes))
     if found.cells > MOST_CELLS:
         return found
-    n, status, given = _asked(plan, model, np.ix_(*(np.arange(size if at in axes else 1)
-                                                    for at, size in enumerate(plan.shape))))  # fmt: skip
-    number = np.zeros(1, np.int64)
-    columns: tuple[NDArray[Any], ...] = (n, status, *given.values())
-    for column in columns:
-        # equal bit for bit: zero has one sign here
-        kinds, kind = np.unique(column, return_inverse=True)
-        number = number * kinds.size + kind.reshape(column.shape)
-        shape = number.shape
-        _, number = np.unique(number, return_inverse=True)
-        number = number.reshape(shape)
+    # the other axes are pinned at their first value
     pinned = tuple(size if at in axes else 1 for at, size in enumerate(plan.shape))
-    _, first, back = np.unique(np.broadcast_to(number, pinned or (1,)), return_index=True, return_inverse=True)
+    n, status, given = _asked(plan, model, np.ix_(*map(np.arange, pinned)))
+    kind = np.zeros(1, np.intp)
+    columns: tuple[NDArray[Any], ...] = (n, status, *given.values())
+    for values in columns:
+        kind = _kind(kind * values.size + _kind(values))
+    _, first, back = np.unique(np.broadcast_to(kind, pinned or (1,)), return_index=True, return_inverse=True)
     return replace(found, first=first, back=back.reshape(-1).astype(np.int32))
+
+
+def _kind(values: NDArray[Any]) -> NDArray[np.intp]:
+    """A number for each value, the same where the values are, bit for bit; zero has one sign here."""
+    return np.unique(values, return_inverse=True)[1].reshape(values.shape)
 
 
 def stretches(found: Sequence[Trajectories], size: int = BLOCK) -> Iterator[Stretch]:
     """All trajectories in order, in stretches of at most `size`."""
     number = 0
     for one in found:
-        for start in range(0, one.count, size):
-            yield Stretch(number, one.model, start, min(start + size, one.count))
+        own = even(one.count, size)
+        for start in range(0, one.count, own):
+            yield Stretch(number, one.model, start, min(start + own, one.count))
             number += 1
+
+
+def even(count: int, most: int) -> int:
+    """The size of blocks of at most so many that share a number evenly: a small last one would cost too much.
+
+    >>> even(10_000, 8_192), even(100, 8_192)
+    (5000, 100)
+    """
+    return -(-count // -(-count // most))
 
 
 def block_of(plan: Plan, found: Sequence[Trajectories], stretch: Stretch) -> Block:
@@ -153,14 +141,6 @@ def block_of(plan: Plan, found: Sequence[Trajectories], stretch: Stretch) -> Blo
     return Block(
         stretch.number, model.key, each(n), {name: each(one) for name, one in given.items()}, each(status)
     )
-
-
-def integrated(model: ForceModel, block: Block, solver: Solver) -> Rebound:
-    """What becomes of a block by the law of its model."""
-    return integrate_all(
-        model, block.n, block.given, block.status,
-        rtol=solver.rtol, max_steps=solver.max_steps, collapse=solver.collapse,
-    )  # fmt: skip
 
 
 def _asked(plan: Plan, model: ForceModel, index: Index) -> tuple[Array, NDArray[np.int8], dict[str, Array]]:

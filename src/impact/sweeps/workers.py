@@ -3,55 +3,21 @@
 from __future__ import annotations
 
 import multiprocessing
-import multiprocessing.connection
-import os
-import signal
-import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from itertools import islice
-from pathlib import Path
 
-from ..contact.model import ForceModel
-from ..contact.models import catalogue
 from ..contact.strike import Rebound
 from ..errors import StoreError, UsageError
 from ..text import safe_text
-from .config import Solver
+from .blocks import Block, begin, work
 from .plan import Plan
-from .plugins import read_plugins
-from .trajectories import Block, integrated
 
 # blocks a process has before it: the one it works at, and the next
 AHEAD = 2
 # how often a block is given out again
 AGAIN = 3
-
-# the models of a worker process, by key; they are made there, since functions cannot be sent
-_models: dict[str, ForceModel] = {}
-
-
-def begin(files: Sequence[Path], hashes: dict[str, str]) -> None:
-    """What a worker does first: learn the models, leave signals to the driver, and end when that does."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    driver = multiprocessing.parent_process()
-    if driver is not None:
-
-        def follow() -> None:
-            multiprocessing.connection.wait([driver.sentinel])
-            os._exit(1)
-
-        threading.Thread(target=follow, daemon=True).start()
-    plugins = read_plugins(files)
-    if plugins.hashes != hashes:
-        raise UsageError("a plug-in was changed while the sweep ran")
-    _models.update(catalogue(plugins.models))
-
-
-def work(block: Block, solver: Solver) -> Rebound:
-    """What becomes of a block; a pure function of it."""
-    return integrated(_models[block.key], block, solver)
 
 
 def spread(
@@ -105,9 +71,9 @@ def spread(
                 trials[block.number] = trials.get(block.number, 0) + 1
             waiting += begun.values()
             if max(trials.values(), default=0) > AGAIN:
-                why = "as happens where memory is short"
                 raise StoreError(
-                    f"processes were killed {AGAIN + 1} times at the same trajectories, {why}"
+                    f"processes were killed {AGAIN + 1} times at the same trajectories: memory is short; or, of a "
+                    'program of your own, it lacks its if __name__ == "__main__":'
                 ) from None
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
