@@ -103,33 +103,51 @@ def working(output: Path, plan: Plan, *, resume: bool, overwrite: bool) -> Itera
     shown = safe_text(str(folder))
     if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
         raise UsageError(f"{shown}: is not a folder, and is left alone")
+    record = _record(plan)
+    lock = FileLock(folder / LOCK, timeout=0)
     try:
-        folder.mkdir(exist_ok=True)
-        lock = FileLock(folder / LOCK, timeout=0)
-        lock.acquire()
-    except Timeout:
-        raise InUseError(f"{safe_text(str(output))}: is being written by another process") from None
-    except OSError as error:
-        raise StoreError(f"{shown}: {error.strerror}") from error
-    with lock:
-        record = _record(plan)
-        left = any(one.name != LOCK for one in folder.iterdir())
-        if left and not resume and not overwrite:
-            raise UsageError(
-                f"{shown}: is left of an interrupted sweep; --resume goes on with it, --overwrite begins anew"
-            )
-        if not (left and _is_of(folder, record, resume=resume)):
-            _clear(folder)
-            # what is removed must not come back beside another plan
-            sync_folder(folder)
-            with appearing(folder / PLAN, overwrite=True) as sink:
-                sink.write(json.dumps(record).encode())
+        _lock(lock, folder)
+        _prepare(folder, record, resume=resume, overwrite=overwrite)
         yield Work(folder, _key(record))
         # the result is whole: what cannot be removed, and what others have put there, does no harm
         with contextlib.suppress(OSError):
             _clear(folder, plan=True)
             (folder / LOCK).unlink()
             folder.rmdir()
+    finally:
+        lock.release()
+
+
+def _lock(lock: FileLock, folder: Path) -> None:
+    try:
+        folder.mkdir(exist_ok=True)
+        lock.acquire()
+    except Timeout:
+        raise InUseError(
+            f"{safe_text(str(folder.with_suffix('')))}: is being written by another process"
+        ) from None
+    except OSError as error:
+        raise StoreError(f"{safe_text(str(folder))}: {error.strerror}") from error
+
+
+def _prepare(folder: Path, record: Mapping[str, Any], *, resume: bool, overwrite: bool) -> None:
+    """Have a folder with the plan, and with the blocks of it that are to be gone on with."""
+    shown = safe_text(str(folder))
+    try:
+        left = any(one.name != LOCK for one in folder.iterdir())
+        if left and not resume and not overwrite:
+            raise UsageError(
+                f"{shown}: is left of an interrupted sweep; --resume goes on with it, --overwrite begins anew"
+            )
+        if left and _is_of(folder, record, resume=resume):
+            return
+        _clear(folder)
+        # what is removed must not come back beside another plan
+        sync_folder(folder)
+        with appearing(folder / PLAN, overwrite=True) as sink:
+            sink.write(json.dumps(record).encode())
+    except OSError as error:
+        raise StoreError(f"{shown}: {error.strerror}") from error
 
 
 def _record(plan: Plan) -> dict[str, Any]:
