@@ -35,7 +35,7 @@ def sweep(
     """Run every model over a sweep and store post-impact velocities and their errors."""
     with door.signals() as stopping:
         from .. import api
-        from ..data import store, survey
+        from ..data import store, survey, work
         from ..data.sweeping import sweep_into
         from . import progress, summary
 
@@ -47,7 +47,9 @@ def sweep(
             return
         found = None if overwrite else survey.held(output, plan)
         fresh = found is None
-        if found is None:
+        if found is not None:
+            work.tidy(output, plan)
+        else:
             for source in (config, *(plugins or ())):
                 store.check_output(output, overwrite=overwrite, source=source)
             with progress.progress(quiet=quiet) as tell:

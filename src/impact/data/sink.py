@@ -100,10 +100,13 @@ def appearing(path: Path, *, overwrite: bool, part: Path | None = None) -> Itera
     StoreError : the disk is full or failed; nothing is left under either name
     """
     shown = safe_text(str(path))
-    mode = "x+" if part is None else "w+"
-    part = part or path.with_name(f"{path.name}.{token_hex(4)}.part")
     try:
-        sink = Sink(part, mode)
+        if part is None:
+            part = path.with_name(f"{path.name}.{token_hex(4)}.part")
+        else:
+            # what was left under this name may be a link, or another name of a whole result
+            part.unlink(missing_ok=True)
+        sink = Sink(part, "x+")
         try:
             yield sink
             sink.sync()

@@ -30,6 +30,8 @@ from .tally import Survey, Tally
 from .work import Work, folder_of, part_of, working
 from .writer import writing
 
+# bytes that a result takes besides its values, about
+OVERHEAD = 2**16
 # points up to which a sweep of one block keeps nothing: it is done again sooner than it is read
 FEW = 2**20
 
@@ -105,7 +107,9 @@ def sweep_into(
             return _assemble(output, plan, found, rows, part_of(output), overwrite, at, tell, stopping)
         except (StoreError, UnfinishedError) as error:
             shown = safe_text(str(folder_of(output)))
-            kept = f"{at.trajectories:,} of {total:,} trajectories are kept in {shown}; --resume goes on"
+            # without the other word a result that is to be replaced would be in the way
+            words = "--resume --overwrite" if os.path.lexists(output) else "--resume"
+            kept = f"{at.trajectories:,} of {total:,} trajectories are kept in {shown}; {words} goes on"
             told = [str(error), *_room(error, output, plan, total - at.trajectories), kept]
             raise type(error)("; ".join(filter(None, told))) from error
 
@@ -147,8 +151,10 @@ def _room(error: Exception, output: Path, plan: Plan, left: int) -> list[str]:
     cause = error.__cause__
     if not isinstance(cause, OSError) or cause.errno not in (errno.ENOSPC, errno.EDQUOT):
         return []
-    wanted = outline(plan).nbytes + left * sum(
-        getattr(Rebound.blank(1), one.name).nbytes for one in fields(Rebound)
+    wanted = (
+        outline(plan).nbytes
+        + OVERHEAD
+        + left * sum(getattr(Rebound.blank(1), one.name).nbytes for one in fields(Rebound))
     )
     free = shutil.disk_usage(output.parent).free
     return [f"it takes {wanted:,} bytes more, {free:,} are free"]

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
+import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -18,7 +19,7 @@ import numpy as np
 from filelock import FileLock, Timeout
 
 from ..contact.strike import Rebound
-from ..errors import InUseError, StoreError, UsageError
+from ..errors import ImpactError, InUseError, StoreError, UsageError
 from ..sweeps.plan import Plan
 from ..sweeps.trajectories import BLOCK, Stretch
 from ..text import safe_text
@@ -26,6 +27,7 @@ from .results import SCHEMA_VERSION
 from .sink import appearing, sync_folder
 
 PLAN, LOCK = "plan.json", "lock"
+ELSE = "give the sweep that it is of, another output, or --overwrite to begin anew"
 TOLD = 3  # differences
 FIELDS = tuple(one.name for one in fields(Rebound))
 
@@ -66,6 +68,9 @@ class Work:
 
     def load(self, stretch: Stretch) -> Rebound | None:
         """A finished block; None if it is not there, or not whole."""
+        # what is no regular file might never end
+        if not self.path(stretch.number).is_file():
+            return None
         try:
             with np.load(self.path(stretch.number), allow_pickle=False) as stored:
                 if stored["of"].item() != self._of(stretch):
@@ -100,9 +105,7 @@ def working(output: Path, plan: Plan, *, resume: bool, overwrite: bool) -> Itera
     StoreError : the disk is full or failed
     """
     folder = folder_of(output)
-    shown = safe_text(str(folder))
-    if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
-        raise UsageError(f"{shown}: is not a folder, and is left alone")
+    _check(folder)
     record = _record(plan)
     lock = FileLock(folder / LOCK, timeout=0)
     try:
@@ -111,16 +114,44 @@ def working(output: Path, plan: Plan, *, resume: bool, overwrite: bool) -> Itera
         yield Work(folder, _key(record))
         # the result is whole: what cannot be removed, and what others have put there, does no harm
         with contextlib.suppress(OSError):
-            _clear(folder, plan=True)
-            (folder / LOCK).unlink()
-            folder.rmdir()
+            _remove(folder)
     finally:
         lock.release()
+
+
+def tidy(output: Path, plan: Plan) -> None:
+    """Remove what a sweep has left that was killed when its result was whole, if nobody works there."""
+    folder = folder_of(output)
+    with contextlib.suppress(ImpactError, Timeout, OSError):
+        if folder.is_dir():
+            _check(folder)
+            with FileLock(folder / LOCK, timeout=0):
+                if not os.path.lexists(folder / PLAN) or _is_of(folder, _record(plan), resume=True):
+                    part_of(output).unlink(missing_ok=True)
+                    _remove(folder)
+
+
+def _check(folder: Path) -> None:
+    """Refuse what has the name of a work folder, and is none."""
+    shown = safe_text(str(folder))
+    if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
+        raise UsageError(f"{shown}: is not a folder, and is left alone")
+    if folder.is_dir() and not os.path.lexists(folder / PLAN):
+        strange = [one.name for one in folder.iterdir() if one.name != LOCK and not one.name.endswith(".part")]
+        if strange:
+            raise UsageError(f"{shown}: holds {safe_text(strange[0])}, and no {PLAN}; it is left alone")
+
+
+def _remove(folder: Path) -> None:
+    _clear(folder, plan=True)
+    (folder / LOCK).unlink()
+    folder.rmdir()
 
 
 def _lock(lock: FileLock, folder: Path) -> None:
     try:
         folder.mkdir(exist_ok=True)
+        sync_folder(folder.parent)
         lock.acquire()
     except Timeout:
         raise InUseError(
@@ -163,7 +194,7 @@ def _key(record: Mapping[str, Any]) -> str:
 def _clear(folder: Path, plan: bool = False) -> None:
     """Remove the finished blocks, and what was left half written."""
     for one in (*folder.glob("*.npz"), *folder.glob("*.part"), *([folder / PLAN] if plan else [])):
-        one.unlink()
+        one.unlink(missing_ok=True)
 
 
 def _is_of(folder: Path, record: Mapping[str, Any], *, resume: bool) -> bool:
@@ -171,26 +202,22 @@ def _is_of(folder: Path, record: Mapping[str, Any], *, resume: bool) -> bool:
 
     Raises
     ------
-    UsageError : it is no work folder; or it is to be resumed and is of another sweep, which is told
+    UsageError : it is to be resumed, and is of another sweep, which is told
     """
     shown = safe_text(str(folder))
-    wants = "give the sweep that it is of, another output, or --overwrite to begin anew"
-    if not (folder / PLAN).exists():
-        # interrupted before anything was done; or it is no work folder
-        strange = [one.name for one in folder.iterdir() if one.name != LOCK and not one.name.endswith(".part")]
-        if strange:
-            raise UsageError(f"{shown}: holds {safe_text(strange[0])}, and no {PLAN}; {wants}")
-        return False
-    if not resume:
+    if not resume or not os.path.lexists(folder / PLAN):
+        # without a plan it was interrupted before anything was done
         return False
     try:
+        if not (folder / PLAN).is_file():
+            raise ValueError
         stored = json.loads((folder / PLAN).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
-        raise UsageError(f"{shown}: its {PLAN} cannot be read; {wants}") from None
+        raise UsageError(f"{shown}: its {PLAN} cannot be read; {ELSE}") from None
     told = list(_differences(stored, json.loads(json.dumps(record))))
     if told:
         more = f" and {len(told) - TOLD} more" if len(told) > TOLD else ""
-        raise UsageError(f"{shown}: is of another sweep: {'; '.join(told[:TOLD])}{more}; {wants}")
+        raise UsageError(f"{shown}: is of another sweep: {'; '.join(told[:TOLD])}{more}; {ELSE}")
     return True
 
 

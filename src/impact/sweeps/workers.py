@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing
+import signal
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -18,6 +20,19 @@ from .plan import Plan
 AHEAD = 2
 # how often a block is given out again
 AGAIN = 3
+
+
+@contextlib.contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Hold back SIGINT, which a terminal sends to all: a process that begins here never gets it, we do later."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def spread(
@@ -57,7 +72,9 @@ def spread(
                         waiting += islice(blocks, 1)
                     if not waiting:
                         break
-                    begun[pool.submit(work, waiting[-1], plan.config.solver)] = waiting[-1]
+                    with _interrupts_held():
+                        future = pool.submit(work, waiting[-1], plan.config.solver)
+                    begun[future] = waiting[-1]
                     waiting.pop()
                 if not begun:
                     return
