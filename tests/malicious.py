@@ -231,7 +231,7 @@ CHANGES: dict[str, tuple[Change, str]] = {
     "no numbers": (partial(_bare, name="other", shape=(0,), dtype="f8"), HOLDS),
     "null": (partial(_bare, name="other", data=h5py.Empty("f8")), HOLDS),
     "17 GiB": (
-        partial(_unwritten, length=17 * 2**27), MUCH),
+        partial(_unwritten, length=17 * 2**27), "more than are read at once"),
     "compound": (partial(_bare, name="other", data=np.zeros(3, "f8,i4")), KIND),
     "complex": (partial(_bare, name="other", data=np.zeros(3, complex)), KIND),
     "enum": (partial(_bare, name="other", data=np.zeros(3, bool)), KIND),

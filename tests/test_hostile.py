@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import shutil
+import struct
 from pathlib import Path
 
 import h5py
@@ -11,6 +13,8 @@ import pytest
 import xarray as xr
 
 import impact
+from impact.api import prepare
+from impact.data.sweeping import sweep_into
 from impact.errors import ResultError
 
 from .forked import Done, Forked
@@ -147,3 +151,25 @@ def test_how_another_program_packed_it_is_not_kept(small: Path, tmp_path: Path) 
     with xr.open_dataset(tmp_path / "packed.h5", engine="h5netcdf") as opened:
         impact.save(opened, tmp_path / "unpacked.h5")
     xr.testing.assert_identical(impact.load(tmp_path / "unpacked.h5"), result)
+
+
+def test_a_tree_of_pieces_that_leads_back_to_itself_is_refused(forked: Forked, tmp_path: Path) -> None:
+    # the library follows it until the process that does so dies
+    config = {
+        "models": ["bilinear"], "sweep": {"e": {"linspace": [0.0, 1.0, 400]}, "v1": 1.0, "m1": 1.0, "m2": 1.0,
+        "K": 1e9, "n": 1.0}, "output": {"variables": ["v1_post", "status"], "chunks": {"e": 1}},
+    }  # fmt: skip
+    path = tmp_path / "bad.h5"
+    sweep_into(path, prepare(config))
+    assert impact.load(path).sizes["e"] == 400
+    content = bytearray(path.read_bytes())
+    # a node of a tree of pieces above the leaves: a key of two axes and the value's width, then its first child
+    nodes = [found.start() for found in re.finditer(rb"TREE\x01[^\x00]", bytes(content))]
+    assert len(nodes) == 2
+    for node in nodes:
+        content[node + 56 : node + 64] = struct.pack("<Q", node)
+    path.write_bytes(content)
+    for command in COMMANDS:
+        done = tell(forked, path, command)
+        assert (done.returncode, done.stdout) == (2, ""), (command, done)
+        assert "bad.h5: is not a readable result (its pieces cannot be found)" in done.stderr

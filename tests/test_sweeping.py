@@ -17,7 +17,7 @@ import pytest
 import xarray as xr
 
 import impact
-from impact.api import prepare
+from impact.api import execute, prepare
 from impact.cli.progress import Pace
 from impact.data.guard import is_in_pieces
 from impact.data.survey import held
@@ -42,6 +42,11 @@ nu = 0.3
 rho = 2712
 [solver]
 rtol = 1e-4
+"""
+
+
+MINE = """import impact
+MINE = impact.hysteresis("mine", title="", year=2026, equation="", reference="", chi=lambda e: 1 - e)
 """
 
 
@@ -193,11 +198,7 @@ def test_several_processes_give_the_same_content(blocks: Path) -> None:
 
 
 def test_a_plug_in_goes_to_every_process_and_a_python_value_cannot(blocks: Path, cli: Run) -> None:
-    (blocks.parent / "mine.py").write_text(
-        "import impact\nMINE = impact.hysteresis('mine', title='', year=2026, equation='', reference='', "
-        "chi=lambda e: 1 - e)\n",
-        encoding="utf-8",
-    )
+    (blocks.parent / "mine.py").write_text(MINE, encoding="utf-8")
     words = ["sweep", blocks, "--plugin", "mine.py", "--set", "models=['mine']", "--quiet"]
     assert cli(*words, "--jobs", 2, "-o", "two.h5", cwd=blocks.parent).returncode == 0
     assert cli(*words, "-o", "one.h5", cwd=blocks.parent).returncode == 0
@@ -206,6 +207,23 @@ def test_a_plug_in_goes_to_every_process_and_a_python_value_cannot(blocks: Path,
     mine = impact.hysteresis("mine", title="", year=2026, equation="", reference="", chi=lambda e: 1 - e)
     with pytest.raises(UsageError, match="mine is given as a Python value"):
         impact.sweep(blocks, overrides=["models=['mine']"], plugins=[mine], jobs=2)
+
+
+def test_a_plug_in_that_is_changed_while_the_sweep_runs_is_told(blocks: Path) -> None:
+    path = blocks.parent / "mine.py"
+    path.write_text(MINE, encoding="utf-8")
+    plan = prepare(blocks, ["models=['mine']"], [path])
+    path.write_text(f"{MINE}#\n", encoding="utf-8")
+    with pytest.raises(UsageError, match=r"mine.py: was changed while the sweep ran"):
+        execute(plan, 2)
+
+
+def test_nobody_who_listens_is_no_reason_to_stop(blocks: Path) -> None:
+    words = f"'{sys.executable}' -m impact sweep blocks.toml --set 'models=\"all\"' --set solver.rtol=1e-12"
+    command = f"{words} 2>&1 >/dev/null | head -c 1 >/dev/null; exit ${{PIPESTATUS[0]}}"
+    done = subprocess.run(["bash", "-c", command], cwd=blocks.parent, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert impact.load(blocks.parent / "results.h5").sizes["model"] == 11
 
 
 # ---- how it is stored
@@ -286,3 +304,14 @@ def test_pieces_that_are_too_many_or_too_large(blocks: Path) -> None:
         prepare(blocks, ["output.chunks.e=1"])
     with pytest.raises(ConfigError, match=r"got 80 pieces of 10,000,000 points"):
         prepare(blocks, ["output.chunks.m1=1", "sweep.e.linspace=[0,1,10000000]"])
+
+
+def test_what_packs_very_well_is_read_again(tmp_path: Path) -> None:
+    config = {
+        "models": ["hertz"], "output": {"variables": ["e_out", "status"], "compression": "gzip"},
+        "sweep": {"v1": {"linspace": [1, 2, 4_000]}, "m1": {"linspace": [1, 2, 2_500]}, "m2": 1, "K": 1e9},
+    }  # fmt: skip
+    swept = sweep_into(tmp_path / "flat.h5", prepare(config))
+    assert (tmp_path / "flat.h5").stat().st_size < swept.outline.nbytes / 300
+    loaded = impact.load(tmp_path / "flat.h5")
+    assert loaded.attrs["content_digest"] == swept.outline.attrs["content_digest"]

@@ -6,7 +6,9 @@ from math import prod
 
 import pytest
 
-from impact.ode.tableau import DENSE_WEIGHTS, ERROR_WEIGHTS, STAGE_WEIGHTS, A, B, C, E, P
+from impact.ode.step import ERROR
+from impact.ode.step import STAGES as STAGES_NESTED
+from impact.ode.tableau import DENSE_WEIGHTS, A, B, C, E, P
 
 STAGES = range(7)
 EMBEDDED = tuple(b - e for b, e in zip(B, E, strict=True))
@@ -106,6 +108,12 @@ def test_interpolant_has_the_rates_of_both_ends():
 
 
 def test_floats_are_the_fractions_with_the_zeros_left_out():
-    for row, pairs in zip((*A, E), (*STAGE_WEIGHTS, ERROR_WEIGHTS), strict=True):
-        assert pairs == tuple((i, float(a)) for i, a in enumerate(row) if a != 0)
+    for row, nested in zip((*A[1:], E), (*STAGES_NESTED, ERROR), strict=True):
+        places = [place for place, _ in nested]
+        assert places == [i for i, a in enumerate(row) if a != 0]
+        # each weight is relative to the next: from the last backwards they are products
+        product = 1.0
+        for place, ratio in reversed(nested):
+            product *= float(ratio)
+            assert product == pytest.approx(float(row[place]), rel=1e-14)
     assert DENSE_WEIGHTS.tolist() == [[float(p) for p in row] for row in P]

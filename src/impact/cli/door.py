@@ -12,6 +12,7 @@ import traceback
 import warnings
 from collections.abc import Callable, Iterator
 from types import FrameType
+from typing import TextIO
 
 from ..errors import ImpactError, InUseError, StoreError, UnfinishedError
 from ..text import safe_text
@@ -58,7 +59,11 @@ def signals() -> Iterator[Callable[[], bool]]:
 def say(line: str, *, error: bool = False) -> None:
     """A line on stderr; an error is red where the terminal shows colours."""
     red = error and sys.stderr.isatty() and not os.environ.get("NO_COLOR")
-    print(f"\x1b[31m{line}\x1b[0m" if red else line, file=sys.stderr)
+    try:
+        print(f"\x1b[31m{line}\x1b[0m" if red else line, file=sys.stderr, flush=True)
+    except BrokenPipeError:
+        # nobody listens, which is no reason to stop
+        _let_go(sys.stderr)
 
 
 def enter(command: Callable[[], object], *, debug: bool) -> int:
@@ -83,11 +88,13 @@ def enter(command: Callable[[], object], *, debug: bool) -> int:
             say(line, error=True)
         return next((code for kind, code in CODES.items() if isinstance(error, kind)), USAGE)
     except BrokenPipeError:
-        return _let_go(OK)
+        _let_go(sys.stdout)
+        return OK
     except Exception as error:
         if isinstance(error, OSError) and error.errno == errno.ENOSPC:
             say(f"cannot write: {error.strerror}", error=True)
-            return _let_go(STORAGE)
+            _let_go(sys.stdout)
+            return STORAGE
         if debug:
             traceback.print_exc()
         else:
@@ -116,24 +123,24 @@ def _run(command: Callable[[], object]) -> int:
 
 
 @contextlib.contextmanager
-def readers_may_leave() -> Iterator[None]:
+def readers_may_leave(stream: TextIO | None = None) -> Iterator[None]:
     """Print to a reader who may have seen enough, `| head -1`: the exit code is still that of what was found."""
+    stream = stream or sys.stdout
     try:
         yield
-        sys.stdout.flush()
+        stream.flush()
     except BrokenPipeError:
-        _let_go(OK)
+        _let_go(stream)
     except SystemExit as leaving:
         # rich leaves by this when the reader has gone
         if not isinstance(leaving.__context__, BrokenPipeError):
             raise
-        _let_go(OK)
+        _let_go(stream)
 
 
-def _let_go(code: int) -> int:
-    """The exit code where nothing more can be written: not at exit either."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    return code
+def _let_go(stream: TextIO) -> None:
+    """Nothing more can be written there: not at exit either."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def _report() -> str:

@@ -31,7 +31,6 @@ def tell_of(plan: Plan, jobs: int, *, as_json: bool) -> None:
         how = along if one.within == "plan" else f"{along}; {HOW[one.within]}"
         rows.add_row(cell(one.model), f"{one.points:,}", f"{one.cells:,}", f"{one.trajectories:,}", cell(how))
     out.print(rows)
-    out.print(
-        f"{found.points:,} points from {found.trajectories:,} trajectories, {found.bytes:,} bytes, about "
-        f"{clock(found.seconds)} and what the disk takes; nothing was written"
-    )
+    size = f"{found.bytes:,} bytes (and {found.kept:,} while it runs)"
+    counts = f"{found.points:,} points from {found.trajectories:,} trajectories"
+    out.print(f"{counts}, {size}, about {clock(found.seconds)} and what the disk takes; nothing was written")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -44,11 +45,15 @@ def sweep(
             from .dry_run import tell_of
 
             tell_of(plan, jobs, as_json=as_json)
+            if stopping():
+                raise UnfinishedError("nothing was written")
             return
         found = None if overwrite else survey.held(output, plan)
         fresh = found is None
         if found is not None:
             work.tidy(output, plan)
+            if stopping():
+                raise UnfinishedError(f"{safe_text(str(output))} already holds this sweep")
         else:
             for source in (config, *(plugins or ())):
                 store.check_output(output, overwrite=overwrite, source=source)
@@ -61,7 +66,8 @@ def sweep(
     told = summary.summary(found, output)
     if not quiet:
         if fresh:
-            summary.print_summary(found, told)
+            with door.readers_may_leave(sys.stderr):
+                summary.print_summary(found, told)
         else:
             door.say(f"{safe_text(str(output))}: already holds this sweep; nothing to do")
     if as_json:

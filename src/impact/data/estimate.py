@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Literal
 
 from ..sweeps.blocks import integrated
@@ -37,12 +37,16 @@ class Collapse:
 
 @dataclass(frozen=True)
 class Estimate:
-    """What a sweep would take: numbers, bytes of the result, seconds; the writing to the disk comes on top."""
+    """What a sweep would take: bytes of the result before it is packed, and of what is kept while it runs.
+
+    The writing to the disk comes on top of the seconds.
+    """
 
     points: int
     trajectories: int
     models: tuple[Collapse, ...]
     bytes: int
+    kept: int
     seconds: float
 
 
@@ -63,9 +67,9 @@ def estimate(plan: Plan, jobs: int = 1) -> Estimate:
     for values in part.values.values():
         Taken().add(values)
     seconds += (time.perf_counter() - begun) / box.size * plan.points
-    return Estimate(
-        plan.points, total, tuple(_collapse(plan, one) for one in found), outline(plan).nbytes, seconds
-    )
+    kept = total * sum(getattr(rebound, one.name).itemsize for one in fields(rebound))
+    models = tuple(_collapse(plan, one) for one in found)
+    return Estimate(plan.points, total, models, outline(plan).nbytes, kept, seconds)
 
 
 def _collapse(plan: Plan, own: Trajectories) -> Collapse:

@@ -1,7 +1,7 @@
 """A file from elsewhere is looked at before anything is read: what is odd in it is refused here.
 
 HDF5 can name other files as the place of its data, can declare what it does not hold, and can hold a little under
-many names. A result does none of that: datasets of numbers and labels, each in one piece, in one group, and
+many names. A result does none of that: datasets of numbers and labels, in one group, and
 attributes whose size stands beside them.
 """
 
@@ -34,8 +34,8 @@ MAX_TEXT = 80_000_000  # bytes of all attributes; a config may have 64 MB
 MAX_LABELS = 4_000_000  # bytes of all datasets of text
 MAX_BYTES = 16 * 2**30
 MAX_PIECES = 200_000  # of all datasets together
-# what is packed may be so many times the file, where it is more than little
-EXPANSION, SMALL = 100, 2**28
+# what is packed may be so many times the file, which is as much as deflate can, where it is more than little
+EXPANSION, SMALL = 1_100, 2**26
 # what netCDF tells other readers, and is not read here
 UNREAD = frozenset({"NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_NCProperties", "coordinates"})
 NETCDF = UNREAD | {"CLASS", "_Netcdf4Dimid", "_Netcdf4Coordinates"}
@@ -60,8 +60,13 @@ def opened(path: Path) -> Iterator[BinaryIO]:
         yield stream
 
 
-def vet(file: h5py.File, stream: BinaryIO) -> Contents:
+def vet(file: h5py.File, stream: BinaryIO, most: float = MAX_BYTES) -> Contents:
     """What may be read from a file; `stream` has its bytes.
+
+    Parameters
+    ----------
+    file, stream : the file, and its bytes
+    most : bytes of data that are to be held at once
 
     Raises
     ------
@@ -72,12 +77,12 @@ def vet(file: h5py.File, stream: BinaryIO) -> Contents:
     size = file.id.get_filesize()
     held = {name: _held(name, dataset) for name, dataset in datasets.items()}
     packed = sum(held[name] for name, one in datasets.items() if is_in_pieces(one))
-    if (
-        sum(held.values()) - packed > size
-        or packed > max(SMALL, EXPANSION * size)
-        or sum(held.values()) > MAX_BYTES
-    ):
+    if sum(held.values()) - packed > size or packed > max(SMALL, EXPANSION * size):
         raise _odd("more data than such a file may hold")
+    if sum(held.values()) > most:
+        raise ResultError(
+            f"has {sum(held.values()):,} bytes, more than are read at once (xarray reads parts of it)"
+        )
     if sum(count(one) for one in datasets.values() if is_in_pieces(one)) > MAX_PIECES:
         raise _odd(f"more than {MAX_PIECES:,} pieces")
     texts = {name: one for name, one in datasets.items() if _is_text(one.get_type())}
@@ -166,7 +171,11 @@ def is_in_pieces(dataset: h5d.DatasetID) -> bool:
     if plan.get_layout() != h5d.CHUNKED or not filters <= {h5z.FILTER_DEFLATE, h5z.FILTER_SHUFFLE}:
         return False
     shape, most = dataset.shape, dataset.get_space().get_simple_extent_dims(maxdims=True)
-    return shape == most and len(plan.get_chunk()) == len(shape)
+    lengths = plan.get_chunk()
+    # a piece that is larger than the whole would be unpacked to its own size
+    return (
+        shape == most and len(lengths) == len(shape) and all(a <= b for a, b in zip(lengths, shape, strict=True))
+    )
 
 
 def _labels(dataset: h5d.DatasetID, declared: int, stream: BinaryIO) -> int:

@@ -12,7 +12,7 @@ from ..errors import ResultError, UsageError
 from ..sweeps.config import Config, parse_config, read_config
 from ..sweeps.plugins import Plugins
 from ..text import safe_text
-from .store import load
+from .survey import outlined
 
 STARTER = files("impact") / "sweeps" / "starter.toml"
 HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
@@ -29,7 +29,7 @@ def config_of(
         return read_config(source, overrides, plugins.models)
     path = Path(source)
     if _is_result(path):
-        return stored_config(load(path).attrs, overrides, plugins, str(path))
+        return stored_config(outlined(path).attrs, overrides, plugins, str(path))
     return read_config(path, overrides, plugins.models)
 
 
@@ -37,7 +37,7 @@ def picked_out(source: str | Path | Mapping[str, object] | None) -> dict[str, fl
     """The single values of a result; where its sweep varied one of them, the result is the part at that value."""
     if not isinstance(source, str | Path) or not _is_result(Path(source)):
         return {}
-    single = {str(name): one for name, one in load(source).coords.items() if one.ndim == 0}
+    single = {str(name): one for name, one in outlined(Path(source)).coords.items() if one.ndim == 0}
     return {name: one.values.item() for name, one in single.items() if name != "model"}
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from .guard import NETCDF, is_in_pieces
 from .heap import labels, texts
 from .names import is_quantity
-from .pieces import read_pieces
+from .pieces import count, find, read_pieces
 
 
 def read(
@@ -32,13 +32,15 @@ def read(
     data = {name: file[name] for name in axes}
     found = {name: labels(stream, one.id.get_offset(), one.id.get_storage_size())
              for name, one in data.items() if one.dtype.kind == "O"}  # fmt: skip
+    packed = {name: count(one.id) for name, one in data.items() if not outline and is_in_pieces(one.id)}
+    pieces = find(file.filename, packed)
     given = [name for name in axes if not is_quantity(name, axes[name])]
 
     def numbers(name: str, one: h5py.Dataset) -> NDArray[Any]:
         skipped = outline and name not in given
         if skipped:
             return np.broadcast_to(np.ones((), one.dtype), one.shape)
-        return read_pieces(one.id, stream) if is_in_pieces(one.id) else np.asarray(one[()])
+        return read_pieces(one.id, stream, pieces[name]) if name in pieces else np.asarray(one[()])
 
     values = {name: np.array(words).reshape(data[name].shape) for name, words in texts(stream, found).items()}
     variables = {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import stat
 import warnings
@@ -110,7 +111,7 @@ def vet_own(sink: Sink, path: Path) -> None:
     """Refuse to give its name to a file that would not be read again."""
     try:
         with h5py.File(sink, "r") as file:
-            guard.vet(file, cast(BinaryIO, sink))
+            guard.vet(file, cast(BinaryIO, sink), math.inf)
     except ResultError as error:
         raise UsageError(f"{safe_text(str(path))}: would not be read again: {error}") from None
 
@@ -146,8 +147,8 @@ def load(path: str | Path) -> xr.Dataset:
 
 
 @contextlib.contextmanager
-def reading(path: Path) -> Iterator[tuple[h5py.File, BinaryIO, guard.Contents]]:
-    """A file that was looked at, its bytes, and what may be read of it.
+def reading(path: Path, most: float = guard.MAX_BYTES) -> Iterator[tuple[h5py.File, BinaryIO, guard.Contents]]:
+    """A file that was looked at, its bytes, and what may be read of it; `most` bytes of data at once.
 
     Raises
     ------
@@ -157,7 +158,7 @@ def reading(path: Path) -> Iterator[tuple[h5py.File, BinaryIO, guard.Contents]]:
     try:
         # by its path: a signal that comes while h5py calls a Python stream is lost
         with guard.opened(path) as stream, h5py.File(path, "r", driver="sec2") as file:
-            yield file, stream, guard.vet(file, stream)
+            yield file, stream, guard.vet(file, stream, most)
     except ResultError as error:
         raise ResultError(f"{shown}: {error}") from None
     except Exception as error:

@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
+from typing import BinaryIO
+
+import h5py
+import numpy as np
+import xarray as xr
 
 from ..errors import ResultError
 from ..sweeps.plan import Plan
@@ -12,9 +18,10 @@ from ..sweeps.trajectories import trajectories
 from .assembly import Part
 from .digest import Taken, content_digest
 from .guard import is_in_pieces
+from .pieces import count, find, read_pieces
 from .reader import read
 from .store import check, reading
-from .tally import Survey, Tally, tally_of
+from .tally import Survey, Tally
 
 
 def held(path: Path, plan: Plan) -> Survey | None:
@@ -28,28 +35,48 @@ def held(path: Path, plan: Plan) -> Survey | None:
         return None
 
 
+def outlined(path: Path) -> xr.Dataset:
+    """The outline of a result, which was verified: its coordinates and attributes, without the values.
+
+    Raises
+    ------
+    ResultError : it is not a readable result
+    """
+    with reading(path, math.inf) as (file, stream, contents):
+        outline = read(file, stream, contents.axes, outline=True)
+        _verify(file, stream, outline)
+    return outline
+
+
 def _survey(path: Path, fingerprint: str) -> Survey | None:
-    with reading(path) as (file, stream, contents):
+    with reading(path, math.inf) as (file, stream, contents):
         outline = read(file, stream, contents.axes, outline=True)
         if outline.attrs.get("fingerprint") != fingerprint:
             return None
-        # as a sweep writes it
-        axes = tuple(dim for dim in outline["status"].dims if dim != "model")
-        shape = tuple(outline.sizes[dim] for dim in axes)
-        along_model = {str(name): one.dims == ("model", *axes) for name, one in outline.data_vars.items()}
+        axes = outline["status"].dims[1:]
         if any(one.dims not in (axes, ("model", *axes)) for one in outline.data_vars.values()):
+            # not as a sweep writes it
             return None
-        if any(is_in_pieces(file[name].id) for name in along_model):
-            dataset = read(file, stream, contents.axes)
-            check(dataset, content_digest(dataset))
-            return Survey(outline, tally_of(dataset))
-        tally, digests = Tally(), {name: Taken() for name in along_model}
-        for box in boxes(outline.sizes["model"], shape):
+        return Survey(outline, _verify(file, stream, outline))
+
+
+def _verify(file: h5py.File, stream: BinaryIO, outline: xr.Dataset) -> Tally:
+    """Check a result, variable after variable and part after part, and count its points."""
+    packed = {str(name): count(file[name].id) for name in outline.data_vars if is_in_pieces(file[name].id)}
+    pieces = find(file.filename, packed)
+    tally, digests = Tally(), {}
+    for name, one in outline.data_vars.items():
+        taken, has_model = Taken(), one.dims[:1] == ("model",)
+        shape = one.shape[1:] if has_model else one.shape
+        # what is packed is one part, unpacked as a whole
+        whole = read_pieces(file[name].id, stream, pieces[str(name)]) if str(name) in pieces else None
+        for box in boxes(one.shape[0] if has_model else 1, shape):
             part = Part(box, {})
-            for name, along in along_model.items():
-                if along or box.model == 0:
-                    part.values[name] = file[name][part.where(along) or ()]
-                    digests[name].add(part.values[name])
-            tally.add(part)
-        check(outline, content_digest(outline, {name: taken.hexdigest() for name, taken in digests.items()}))
-    return Survey(outline, tally)
+            where = part.where(has_model) or ()
+            part.values[str(name)] = np.asarray(file[name][where] if whole is None else whole[where])
+            taken.add(part.values[str(name)])
+            if has_model:
+                tally.add(part)
+        digests[str(name)] = taken.hexdigest()
+    check(outline, content_digest(outline, digests))
+    return tally

@@ -93,13 +93,20 @@ def sweep_into(
             raise UnfinishedError("nothing was written") from None
 
     with working(output, plan, resume=resume, overwrite=overwrite) as work:
-        todo = [stretch for stretch in blocks if work.load(stretch) is None]
-        at = replace(at, trajectories=total - sum(stretch.size for stretch in todo))
+        # another may have stored it since
+        check_output(output, overwrite=overwrite)
+        todo: list[Stretch] = []
         try:
+            for stretch in blocks:
+                kept = None if stopping() else work.load(stretch)
+                if kept is None:
+                    todo.append(stretch)
+                else:
+                    at = _further(at, stretch, kept)
             tell(at)
             for stretch, rebound in run(plan, found, todo, jobs=jobs, stopping=stopping):
                 work.store(stretch, rebound)
-                at = replace(at, trajectories=at.trajectories + stretch.size, failed=at.failed + _failed(rebound))
+                at = _further(at, stretch, rebound)
                 tell(at)
             if at.trajectories < total:
                 raise UnfinishedError
@@ -109,8 +116,8 @@ def sweep_into(
             shown = safe_text(str(folder_of(output)))
             # without the other word a result that is to be replaced would be in the way
             words = "--resume --overwrite" if os.path.lexists(output) else "--resume"
-            kept = f"{at.trajectories:,} of {total:,} trajectories are kept in {shown}; {words} goes on"
-            told = [str(error), *_room(error, output, plan, total - at.trajectories), kept]
+            left = f"{at.trajectories:,} of {total:,} trajectories are kept in {shown}; {words} goes on"
+            told = [str(error), *_room(error, output, plan, total - at.trajectories), left]
             raise type(error)("; ".join(filter(None, told))) from error
 
 
@@ -127,15 +134,17 @@ def in_memory(plan: Plan, *, jobs: int = 1, tell: Tell, stopping: Callable[[], b
     finished: dict[int, Rebound] = {}
     for stretch, rebound in run(plan, found, stretches(found), jobs=jobs, stopping=stopping):
         finished[stretch.number] = rebound
-        at = replace(at, trajectories=at.trajectories + stretch.size, failed=at.failed + _failed(rebound))
+        at = _further(at, stretch, rebound)
         tell(at)
     if at.trajectories < total or stopping():
         raise UnfinishedError("nothing was written")
     return assemble(plan, parts(plan, found, Finished(found, finished.__getitem__).rows))
 
 
-def _failed(rebound: Rebound) -> int:
-    return int(np.count_nonzero(rebound.status >= FIRST_FAILURE))
+def _further(at: Progress, stretch: Stretch, rebound: Rebound) -> Progress:
+    """With one more block finished."""
+    failed = int(np.count_nonzero(rebound.status >= FIRST_FAILURE))
+    return replace(at, trajectories=at.trajectories + stretch.size, failed=at.failed + failed)
 
 
 def _kept(work: Work, stretch: Stretch) -> Rebound:
@@ -181,21 +190,27 @@ def _assemble(
             def store(one: Part) -> None:
                 for name, values in one.values.items():
                     put(name, one.where(name in along_model), values)
+
+            def check() -> None:
+                tell(replace(at, points=max(tally.points, stored), failed=tally.failed or at.failed))
                 if stopping():
                     raise UnfinishedError
 
+            stored = 0
             if output_of.chunks:
                 # each piece is packed once; the digest is of another order, and what it is of is made again
                 lengths = [output_of.chunks.get(axis.name, axis.size) for axis in plan.config.axes]
                 for one in parts(plan, found, rows, boxes_of(len(plan.models), plan.shape, lengths)):
                     store(one)
+                    stored += one.box.size
+                    check()
             for one in parts(plan, found, rows):
                 if not output_of.chunks:
                     store(one)
                 for name, values in one.values.items():
                     digests[name].add(values)
                 tally.add(one)
-                tell(replace(at, points=tally.points, failed=tally.failed))
+                check()
             digest = content_digest(made, {name: taken.hexdigest() for name, taken in digests.items()})
             seal(digest)
         vet_own(sink, output)

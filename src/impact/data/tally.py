@@ -42,7 +42,8 @@ class Tally:
     def add(self, part: Part) -> Tally:
         """Count the points of a part."""
         box = part.box
-        self._count(part.values["status"], box.model, [one.start for one in box.where])
+        if "status" in part.values:
+            self._count(part.values["status"], box.model, [one.start for one in box.where])
         for name in ERRORS:
             if name in part.values:
                 self._judge(name, box.model, part.values[name])

@@ -43,7 +43,4 @@ P = (
     _row("0", "40617522/29380423", "-110615467/29380423", "69997945/29380423"),
 )
 
-# the same as floats, with the zeros left out: (stage, weight) pairs in the order in which they are added
-STAGE_WEIGHTS = tuple(tuple((i, float(a)) for i, a in enumerate(row) if a) for row in A)
-ERROR_WEIGHTS = tuple((i, float(e)) for i, e in enumerate(E) if e)
 DENSE_WEIGHTS = np.array([[float(p) for p in row] for row in P])

@@ -19,11 +19,14 @@ from ..contact.models import catalogue
 from ..contact.power import Array
 from ..contact.strike import Rebound
 from ..contact.trajectories import integrate_all
-from ..errors import UsageError
+from ..errors import ImpactError, UsageError
+from ..text import safe_text
 from .settings import Solver
 
 # the models of a worker process, by key; they are made there, since functions cannot be sent
 _models: dict[str, ForceModel] = {}
+# why it cannot have them: an error while it begins would only end it
+_troubles: list[str] = []
 
 
 @dataclass(frozen=True)
@@ -69,12 +72,24 @@ def begin(files: Sequence[Path], hashes: dict[str, str]) -> None:
     if files:
         from .plugins import read_plugins
 
-        plugins = read_plugins(files)
+        try:
+            plugins = read_plugins(files)
+        except ImpactError as error:
+            _troubles.append(str(error))
+            return
         if plugins.hashes != hashes:
-            raise UsageError("a plug-in was changed while the sweep ran")
+            _troubles.append(f"{safe_text(', '.join(map(str, files)))}: was changed while the sweep ran")
+            return
         _models.update(catalogue(plugins.models))
 
 
 def work(block: Block, solver: Solver) -> Rebound:
-    """What becomes of a block; a pure function of it."""
+    """What becomes of a block; a pure function of it.
+
+    Raises
+    ------
+    UsageError : a plug-in is not what it was
+    """
+    if _troubles:
+        raise UsageError(_troubles[0])
     return integrated(_models[block.key], block, solver)

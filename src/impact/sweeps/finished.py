@@ -28,24 +28,26 @@ class Finished:
     found: Sequence[Trajectories]
     load: Load
     size: int = BLOCK
-    # what was asked for last, by model and blocks, since points are asked for in order
-    _held: dict[tuple[int, tuple[int, ...]], Rebound] = field(default_factory=dict)
+    # those of the model that was asked for last, where its points share them
+    _shared: dict[int, Rebound] = field(default_factory=dict)
 
     def rows(self, model: int, numbers: NDArray[np.intp]) -> Rebound:
         """Those of a model of some numbers; arrays of their shape."""
         own = self.found[model]
-        size = even(own.count, self.size)
-        block = numbers // size
-        # where points share trajectories, any of them may be needed at any time
-        blocks = np.unique(block) if own.first is None else np.arange(-(-own.count // size))
-        key = (model, tuple(blocks.tolist()))
-        if key not in self._held:
-            passed = sum(-(-one.count // self.size) for one in self.found[:model])
-            # what was held goes before what takes its place is made
-            self._held.clear()
-            joined = Rebound.blank(blocks.size * size)
-            for place, one in enumerate(key[1]):
-                part = self.load(passed + one)
-                joined.put(np.arange(part.status.size) + place * size, part)
-            self._held[key] = joined
-        return self._held[key].take(np.searchsorted(blocks, block) * size + numbers % size)
+        if own.first is None:
+            return self._some(model, numbers.reshape(-1)).take(np.arange(numbers.size).reshape(numbers.shape))
+        # any of them may be needed at any time
+        if model not in self._shared:
+            self._shared.clear()
+            self._shared[model] = self._some(model, np.arange(own.count))
+        return self._shared[model].take(numbers)
+
+    def _some(self, model: int, numbers: NDArray[np.intp]) -> Rebound:
+        """Some trajectories, from one block after the other; no more than these are held."""
+        size = even(self.found[model].count, self.size)
+        passed = sum(-(-one.count // self.size) for one in self.found[:model])
+        some, block = Rebound.blank(numbers.size), numbers // size
+        for one in np.unique(block).tolist():
+            where = np.flatnonzero(block == one)
+            some.put(where, self.load(passed + one).take(numbers[where] - one * size))
+        return some

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import multiprocessing
+import os
 import signal
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -92,5 +93,11 @@ def spread(
                     f"processes were killed {AGAIN + 1} times at the same trajectories: memory is short; or, of a "
                     'program of your own, it lacks its if __name__ == "__main__":'
                 ) from None
+        except BaseException as error:
+            # a force that never returns would be waited for
+            if not isinstance(error, Exception | GeneratorExit):
+                for process in list(getattr(pool, "_processes", None) or {}):
+                    os.kill(process, signal.SIGKILL)
+            raise
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
