@@ -95,12 +95,14 @@ def tap(visit: Callable[..., Any]) -> None:
     io.FileIO = Tapped  # type: ignore[misc]
 
 
-def signalled(note: int, place: int, *numbers: int) -> None:
-    """Signals to itself right before the operation of a number; before the next is after this."""
+def signalled(note: int, place: int | list[str], *numbers: int) -> None:
+    """Signals to itself right before an operation, of a number or the first that begins so."""
     count = itertools.count()
 
-    def visit(do: Callable[[], Any], *_: Any) -> Any:
-        if next(count) == place:
+    def visit(do: Callable[[], Any], *what: Any) -> Any:
+        nonlocal place
+        if place in (next(count), [*what[:2]]):
+            place = -1
             for number in numbers:
                 os.kill(os.getpid(), number)
         return do()
