@@ -257,8 +257,8 @@ def check_power_cuts(sweeps: Sweeps, kinds: set[str], writes: int) -> None:
 
 
 def test_power_cuts(sweeps: Sweeps) -> None:
-    # where a name appears
-    check_power_cuts(sweeps, {"link", "rename"}, 0)
+    # where a name appears, and when all is done
+    check_power_cuts(sweeps, {"link", "rename", "rmdir"}, 0)
 
 
 @pytest.mark.faults

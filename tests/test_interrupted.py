@@ -278,7 +278,7 @@ def test_only_what_is_missing_is_done_again(
 # ---- two at once
 
 
-def stopped(sweeps: Sweeps, folder: Path, place: int, *words: str | int) -> Running:
+def stopped(sweeps: Sweeps, folder: Path, place: int | list[str], *words: str | int) -> Running:
     """A sweep that stands still at an operation."""
     running = sweeps.start(*words, cwd=folder, fault=("signalled", place, signal.SIGSTOP))
     until(lambda: running.state in "TZX")
@@ -422,11 +422,13 @@ def check_killed(sweeps: Sweeps, moments: Iterable[int]) -> None:
     for count in moments:
         # twice interrupted before
         folder = sweeps.folder(SLOW)
-        first = stopped(sweeps, folder, sweeps.renames[1])
-        first.signal(TERM)
-        second = stopped(sweeps, folder, sweeps.renames[0], "--resume")
-        second.signal(INT)
-        logs = [first.wait().log, second.wait().log]
+        before = []
+        for words, place in (((), sweeps.renames[1]), (("--resume",), ["rename", f"{WORK}/block.part"])):
+            running = stopped(sweeps, folder, place, *words)
+            running.signal(TERM)
+            before.append(running.wait())
+        # what was begun is finished, and no more is begun
+        assert [len(one.kept) for one in before] == [2, 1]
         third = sweeps.start("--resume", "--jobs", 2, cwd=folder)
         until(lambda at=third, most=count: (len(at.workers()) == 2 and len(at.log()) > most) or at.state in "ZX")
         for pid in third.workers()[:1]:
@@ -434,7 +436,7 @@ def check_killed(sweeps: Sweeps, moments: Iterable[int]) -> None:
         done = third.wait()
         assert (done.returncode, done.stderr) == (0, "")
         # each block once, by whomever
-        kept = [one[1] for log in (*logs, done.log) for one in log if one[0] == "kept"]
+        kept = [one[1] for part in (*before, done) for one in part.log if one[0] == "kept"]
         tally.trials += 1
         tally.lost += [str(kept)] if sorted(kept) != list(range(MANY)) else []
         tally.wrong += [done.stderr] if digest(folder / RESULT) != sweeps.right(folder) else []
