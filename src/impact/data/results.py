@@ -89,9 +89,12 @@ def stored(plan: Plan) -> tuple[Variable, ...]:
 
 
 def outline(plan: Plan) -> xr.Dataset:
-    """The dataset of a plan without its values: each variable is zero, of no memory, and not to be written to."""
+    """The dataset of a plan without its values: each variable is zero, of no memory, and not to be written to.
+
+    It has no index yet: to be stored it needs none, and making one takes longer than all the rest.
+    """
     axes = tuple(axis.name for axis in plan.config.axes)
-    dataset = xr.Dataset(coords=_coordinates(plan), attrs=_provenance(plan))
+    dataset = xr.Dataset(coords=xr.Coordinates(_coordinates(plan), indexes={}), attrs=_provenance(plan))
     for one in stored(plan):
         dims, shape = (
             (axes, plan.shape) if one.per == "axes" else (("model", *axes), (len(plan.models), *plan.shape))
