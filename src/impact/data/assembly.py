@@ -69,7 +69,7 @@ def assemble(plan: Plan, made: Iterator[Part]) -> xr.Dataset:
         for name, values in part.values.items():
             arrays[name][part.where("model" in dataset[name].dims)] = values
     dataset = dataset.assign({name: dataset[name].copy(data=array) for name, array in arrays.items()})
-    for dim in dataset.dims:
+    for dim in map(str, dataset.dims):
         dataset = dataset.set_xindex(dim)
     dataset.attrs["content_digest"] = content_digest(dataset)
     return dataset
