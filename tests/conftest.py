@@ -14,14 +14,14 @@ from hypothesis import settings
 
 import impact
 
-from .forked import Forked, forking
+from .forked import Done, Forked, forking
 
 # no test is about time
 settings.register_profile("untimed", deadline=None)
 settings.load_profile("untimed")
 
 ROOT = Path(__file__).parent.parent
-Run = Callable[..., subprocess.CompletedProcess[str]]
+Run = Callable[..., Done | subprocess.CompletedProcess[str]]
 
 WIDE = """
 title = "Four axes"
@@ -49,13 +49,22 @@ gamma = [1.5, 4.0]
 
 
 @pytest.fixture(scope="session")
-def cli() -> Run:
-    """Run the program as a user does: a process of its own, its output captured."""
+def forked() -> Iterator[Forked]:
+    """Run the program hundreds of times: processes of a server that has imported what they need."""
+    with forking() as run:
+        yield run
 
-    def run(*words: str | Path, cwd: Path | None = None, **environment: str) -> subprocess.CompletedProcess[str]:
+
+@pytest.fixture(scope="session")
+def cli(forked: Forked) -> Run:
+    """Run the program in a process of its own, begun anew where its environment is another."""
+
+    def run(*words: str | Path, cwd: Path = ROOT, **environment: str) -> Done | subprocess.CompletedProcess[str]:
+        if not environment:
+            return forked(*words, cwd=cwd, limit=120)
         return subprocess.run(
             [sys.executable, "-m", "impact", *map(str, words)],
-            cwd=cwd or ROOT,
+            cwd=cwd,
             env={**os.environ, **environment},
             capture_output=True,
             text=True,
@@ -65,13 +74,6 @@ def cli() -> Run:
         )
 
     return run
-
-
-@pytest.fixture(scope="session")
-def forked() -> Iterator[Forked]:
-    """The same, hundreds of times: processes of a server that has imported what they need."""
-    with forking() as run:
-        yield run
 
 
 @pytest.fixture(scope="session")
