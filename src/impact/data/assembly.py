@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections import Counter, deque
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from ..contact.strike import Rebound
+from ..sweeps.finished import Finished
 from ..sweeps.plan import Plan
 from ..sweeps.points import Box, Rows, boxes, contact_at
-from ..sweeps.trajectories import Trajectories
+from ..sweeps.trajectories import Stretch, Trajectories, stretches
 from .digest import content_digest
 from .results import outline, stored
 
@@ -46,6 +50,45 @@ def parts(
     """
     for box in boxes(len(plan.models), plan.shape) if of is None else of:
         yield part_at(plan, found, rows, box)
+
+
+def parts_as_finished(
+    plan: Plan, found: Sequence[Trajectories], finished: Iterable[tuple[Stretch, Rebound]]
+) -> Iterator[Part]:
+    """The values of a plan while its blocks are finished: those of a model when all of its blocks are.
+
+    Parameters
+    ----------
+    plan : the plan
+    found : its trajectories
+    finished : all its blocks, in any order; between two of them no more than one box is made, so that no process
+        waits for its next, and the blocks of a model are let go with its last box
+    """
+    left = Counter(stretch.model for stretch in stretches(found))
+    todo = {model: deque(of) for model, of in groupby(boxes(len(plan.models), plan.shape), lambda one: one.model)}
+    whole = [model for model in todo if not left[model]]
+    held: dict[int, Rebound] = {}
+    rows = Finished(found, held.__getitem__).rows
+
+    def next_part() -> Part:
+        model = whole[0]
+        part = part_at(plan, found, rows, todo[model].popleft())
+        if not todo[model]:
+            whole.remove(model)
+            for stretch in stretches(found):
+                if stretch.model == model:
+                    del held[stretch.number]
+        return part
+
+    for stretch, rebound in finished:
+        held[stretch.number] = rebound
+        left[stretch.model] -= 1
+        if not left[stretch.model]:
+            whole.append(stretch.model)
+        if whole:
+            yield next_part()
+    while whole:
+        yield next_part()
 
 
 def part_at(plan: Plan, found: Sequence[Trajectories], rows: Rows, box: Box) -> Part:

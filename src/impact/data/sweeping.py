@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
@@ -21,7 +21,7 @@ from ..sweeps.points import Rows, boxes_of
 from ..sweeps.run import never, run
 from ..sweeps.trajectories import BLOCK, Stretch, Trajectories, stretches, trajectories
 from ..text import safe_text
-from .assembly import Part, assemble, parts
+from .assembly import Part, assemble, parts, parts_as_finished
 from .digest import Taken, content_digest
 from .results import outline
 from .sink import appearing
@@ -131,14 +131,17 @@ def in_memory(plan: Plan, *, jobs: int = 1, tell: Tell, stopping: Callable[[], b
     found = trajectories(plan)
     total = sum(one.count for one in found)
     at = Progress(0, total, 0, plan.points, 0)
-    finished: dict[int, Rebound] = {}
-    for stretch, rebound in run(plan, found, stretches(found), jobs=jobs, stopping=stopping):
-        finished[stretch.number] = rebound
-        at = _further(at, stretch, rebound)
-        tell(at)
-    if at.trajectories < total or stopping():
-        raise UnfinishedError("nothing was written")
-    return assemble(plan, parts(plan, found, Finished(found, finished.__getitem__).rows))
+
+    def finished() -> Iterator[tuple[Stretch, Rebound]]:
+        nonlocal at
+        for stretch, rebound in run(plan, found, stretches(found), jobs=jobs, stopping=stopping):
+            at = _further(at, stretch, rebound)
+            tell(at)
+            yield stretch, rebound
+        if at.trajectories < total or stopping():
+            raise UnfinishedError("nothing was written")
+
+    return assemble(plan, parts_as_finished(plan, found, finished()))
 
 
 def _further(at: Progress, stretch: Stretch, rebound: Rebound) -> Progress:

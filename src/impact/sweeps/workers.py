@@ -17,8 +17,8 @@ from ..text import safe_text
 from .blocks import Block, begin, work
 from .plan import Plan
 
-# blocks a process has before it: the one it works at, and the next
-AHEAD = 2
+# blocks a process has before it: the one it works at, and those it goes on with while the driver is busy
+AHEAD = 3
 # how often a block is given out again
 AGAIN = 3
 
