@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mpmath as mp
 import numpy as np
 
 from impact.contact.lanes import Lanes, stiffness
 from impact.contact.material import effective_mass, hertz_stiffness, sphere_radius
+from impact.contact.model import ForceModel
+from impact.contact.models import catalogue
 from impact.ode.problem import Problem
 
 
@@ -98,6 +100,10 @@ SPRINGS = Problem(
 )
 
 
+# the laws of the catalogue, each under one name
+LAWS = [key for key, model in catalogue().items() if not model.same_as]
+
+
 def impacts(n: float = 1.5, **changes: object) -> Lanes:
     """Impacts of the balls of Table 1 at e = 0.5, with changes by name; what varies is an array.
 
@@ -122,6 +128,13 @@ def impacts(n: float = 1.5, **changes: object) -> Lanes:
         **at, n=exponent, nu1=poisson, nu2=poisson, yield_strength1=strength, yield_strength2=strength,
         parameters=own,
     )  # fmt: skip
+
+
+def with_parameters(model: ForceModel, lanes: Lanes, value: object) -> Lanes:
+    """The impacts with the law's own parameters, each above its least by a value in the contact's own units."""
+    unit = replace(lanes, parameters={one.name: np.ones(len(lanes)) for one in model.parameters})
+    own = {one.name: max(one.least, 0.0) + value / unit.own_units(model, one.name) for one in model.parameters}
+    return replace(lanes, parameters=own)
 
 
 def quadratures(chi: float, n: float) -> tuple[float, float, float]:

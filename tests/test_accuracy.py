@@ -9,18 +9,18 @@ from scipy.optimize import minimize_scalar
 from impact.contact import motion
 from impact.contact.collide import Contact, collide
 from impact.contact.lanes import Lanes
-from impact.contact.models import catalogue, find
+from impact.contact.models import find
 from impact.contact.models.hysteresis import hysteresis
 from impact.contact.oracles import contact_time_ratio, damped_peak_indentation, peak_indentation
 from impact.contact.status import Status
 from impact.contact.strike import Struck, strike
 from impact.sweeps.config import DEFAULT_RTOL
 
-from .problems import impacts, quadratures
+from .problems import LAWS, impacts, quadratures, with_parameters
 
 EXPONENTS = (1.0, 1.3, 1.5, 2.0, 3.0)
 E = np.unique([*np.geomspace(0.001, 0.1, 60), *np.linspace(0.05, 1.0, 191)])
-CASES = [(key, n) for key, model in catalogue().items() for n in EXPONENTS if model.exponent in (None, n)]
+CASES = [(key, n) for key in LAWS for n in EXPONENTS if find(key).exponent in (None, n)]
 PERMANENT = [(key, n) for key, n in CASES if find(key).family == "permanent"]
 UNDAMPED = [(key, n) for key, n in CASES if find(key).family in ("permanent", "elastic")]
 
@@ -35,8 +35,9 @@ def struck(model, lanes: Lanes) -> Contact:
 
 @functools.cache
 def over_e(key: str, n: float) -> tuple[Lanes, Contact]:
-    parameters = {"gamma": 1.0 / E} if key == "ismail-stronge-2008" else {}
-    lanes = impacts(n, e=E, parameters=parameters)
+    # the restitution of Ismail and Stronge is that of E, the damping of others falls from 1 to 0
+    values = 1.0 / E - 1.0 if key == "ismail-stronge-2008" else 1.0 - E
+    lanes = with_parameters(find(key), impacts(n, e=E), values)
     return lanes, struck(find(key), lanes)
 
 
@@ -48,7 +49,10 @@ def worst(values: np.ndarray) -> float:
 def test_restitution_is_exact_to_1e_9(key, n):
     _, contact = over_e(key, n)
     assert np.all(contact.status == Status.OK)
-    assert worst(contact.oracle_error) <= 1e-9
+    if find(key).oracle is None:
+        assert np.all(np.isnan(contact.oracle_error))
+    else:
+        assert worst(contact.oracle_error) <= 1e-9
 
 
 @pytest.mark.parametrize(("key", "n"), CASES)

@@ -512,7 +512,8 @@ def test_models_are_named_in_many_ways(models: str, keys: list[str]) -> None:
 
 def test_all_models_are_all() -> None:
     config = read_config({**tomllib.loads(GOOD), "models": "all"}, plugins=(), overrides=ALL_NEEDS)
-    assert [one.key for one in config.models] == list(catalogue())
+    # a law that has two names is run once
+    assert [one.key for one in config.models] == [key for key, one in catalogue().items() if not one.same_as]
 
 
 # what some built-in models ask for beyond the rest

@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 
 from impact.contact.oracles import (
-    SERIES_BELOW_CHI,
-    SERIES_FROM_E,
     contact_time_ratio,
     damped_peak_indentation,
     delivered_restitution,
     exact_damping_ratio,
     peak_indentation,
 )
+from impact.contact.oracles.hysteresis import SERIES_BELOW_CHI, SERIES_FROM_E
 
 DIGITS = 80
 EXPONENTS = (1.0, 1.3, 1.5, 2.0, 3.0)

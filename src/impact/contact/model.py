@@ -78,9 +78,10 @@ class ForceModel:
     oracle : exact delivered restitution, where a closed form exists
     release : the contact ends at zero indentation ("gap"), or already at zero force ("force")
     smooth : p of the smooth coordinate δ = δᵣ + sᵖ: 2 for half-integer powers, 4 for quarters
-    momentum : "log" where F = K δⁿ (1 + χ δ̇/v₀) exactly, which lets large χ be integrated without stiffness
+    momentum : "log" where `force` is K δⁿ (1 + χ δ̇/v₀) exactly, which lets large χ be integrated without stiffness
     exponent : n, where the law fixes it; None takes the sweep's
     family : the group it is listed under
+    same_as : the key of the law that this is another name of, if it is
 
     Raises
     ------
@@ -122,14 +123,16 @@ class ForceModel:
     momentum: Literal["v", "log"] = "v"
     exponent: float | None = None
     family: str = "other"
+    same_as: str = ""
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", self.key):
             raise ModelError(f'model key "{self.key}": wants kebab-case, such as "hunt-crossley-1975"')
-        alone = self.unloading is None and {"elastic", "chi"} <= set(wishes(self.force))
-        if self.momentum == "log" and not ("chi" in self.coefficients and alone):
+        if self.momentum == "log" and not (
+            "chi" in self.coefficients and {"elastic", "chi"} <= set(wishes(self.force))
+        ):
             raise ModelError(
-                f'model {self.key}: momentum "log" wants a coefficient chi, and one force of elastic and chi'
+                f'model {self.key}: momentum "log" wants a coefficient chi, and a force of elastic and chi'
             )
         self._check_fields()
         once = {*QUANTITIES, *(parameter.name for parameter in self.parameters)}

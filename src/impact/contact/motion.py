@@ -11,7 +11,7 @@ gives du/dσ = −χ p sᵖ⁻¹ xⁿ, which is not stiff for any χ.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -102,6 +102,11 @@ def restitution(law: Law) -> Problem:
 
     event = force_event if law.model.release == "force" else gap_event
     return Problem(rates=rates, event=event, lost=turned_back, floor=FLOOR)
+
+
+def of_restitution(law: Law) -> Law:
+    """The law of the restitution phase: a branch of its own is not of the form that the log coordinate is for."""
+    return law if law.model.unloading is None else replace(law, log=False)
 
 
 def start_of_approach(law: Law, columns: Columns, n: int) -> Array:

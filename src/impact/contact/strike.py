@@ -83,7 +83,15 @@ class Struck:
     parts: NDArray[np.intp]
 
 
-def strike(law: motion.Law, columns: Columns, n: int, rtol: float, max_steps: int, record: bool = False) -> Struck:
+def strike(
+    law: motion.Law,
+    columns: Columns,
+    n: int,
+    rtol: float,
+    max_steps: int,
+    record: bool = False,
+    creeps: NDArray[np.bool_] | bool = False,
+) -> Struck:
     """Integrate n impacts through approach and restitution.
 
     Parameters
@@ -91,6 +99,7 @@ def strike(law: motion.Law, columns: Columns, n: int, rtol: float, max_steps: in
     law : the law at one exponent and in one momentum coordinate
     columns : its values per impact, each of shape (n,)
     rtol, max_steps, record : see `impact.ode.rk45.integrate`
+    creeps : which are known to part with no speed: where the indentation closes, it takes for ever
     """
     run = partial(integrate, rtol=rtol, max_steps=max_steps, record=record, space=Space.of(n))
     inward = run(motion.approach(law), motion.start_of_approach(law, columns, n), columns)
@@ -107,14 +116,19 @@ def strike(law: motion.Law, columns: Columns, n: int, rtol: float, max_steps: in
     stays = (rebound.status == Status.OK) & (residual >= peak)
     rebound.status[stays] = Status.LIMIT
     rebound.e_out[stays] = 0.0
+    creep = creeps & (rebound.status == Status.OK)
+    rebound.status[creep] = Status.LIMIT
+    rebound.e_out[creep] = 0.0
+    rebound.duration[creep] = np.nan
 
     parts = np.flatnonzero(rebound.status == Status.OK)
     columns = tuple(column[parts] for column in columns)
     if not parts.size:
         return Struck(rebound, inward, None, columns, parts)
+    back = motion.of_restitution(law)
     start = motion.start_of_restitution(law, peak[parts], residual[parts])
-    outward = run(motion.restitution(law), start, columns)
-    rebound.e_out[parts] = -law.velocity(outward.state[1], columns)
+    outward = run(motion.restitution(back), start, columns)
+    rebound.e_out[parts] = -back.velocity(outward.state[1], columns)
     rebound.duration[parts] += outward.state[2]
     rebound.work[parts] += 2.0 * outward.state[3]
     rebound.steps[parts] += outward.steps

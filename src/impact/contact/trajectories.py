@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from ..errors import ModelError
 from ..ode.problem import Columns
 from . import motion
-from .model import ForceModel
+from .model import ForceModel, wishes
 from .power import Array
 from .status import Status
 from .strike import Rebound, strike
-from .values import chi_of, exact_restitution, takes_log, with_coefficients, with_units
+from .values import Values, chi_of, exact_restitution, takes_log, with_coefficients, with_units
 
 Given = Mapping[str, Array]
 
@@ -96,17 +96,18 @@ def _struck(
 ) -> Rebound:
     values = with_coefficients(model, with_units(given, n), count)
     rebound = Rebound.blank(count)
-    coefficients = np.array([values[name] for name in model.coefficients]).reshape(-1, count)
+    coefficients = _coefficients(model, values, count)
     infinite = np.isinf(coefficients).any(axis=0)
     plastic = infinite & (given.get("e", np.full(count, np.nan)) == 0.0)
     rebound.status[infinite & ~plastic] = Status.OUT_OF_RANGE
     rebound.status[np.isnan(coefficients).any(axis=0)] = Status.INVALID_PARAMETER
-    if model.unloading is None:
-        # an infinite damping lets the balls neither in nor out: the force and the time have no finite limit
-        rebound.status[plastic] = Status.LIMIT
-        for known in (rebound.e_out, rebound.peak, rebound.permanent):
-            known[plastic] = 0.0
+    # an infinite damping lets the balls neither in nor out: the force and the time have no finite limit
+    held = plastic & np.isinf(_coefficients(model, values, count, wishes(model.force))).any(axis=0)
+    rebound.status[held] = Status.LIMIT
+    for known in (rebound.e_out, rebound.peak, rebound.permanent):
+        known[held] = 0.0
 
+    exact = exact_restitution(model, values, count)
     chi = chi_of(values, count)
     log = takes_log(model, chi)
     for is_log in (False, True):
@@ -116,9 +117,16 @@ def _struck(
         law = motion.Law.of(model, n, is_log)
         columns = tuple(np.asarray(values[name])[where] for name in law.names)
         first, back = _distinct(columns, where.size) if collapse else (np.arange(where.size),) * 2
-        struck = strike(law, tuple(c[first] for c in columns), first.size, rtol, max_steps)
+        creeps = exact[where][first] == 0.0
+        struck = strike(law, tuple(c[first] for c in columns), first.size, rtol, max_steps, creeps=creeps)
         rebound.put(where, struck.rebound.take(back))
-    return replace(rebound, chi=chi, exact=exact_restitution(model, values, count))
+    return replace(rebound, chi=chi, exact=exact)
+
+
+def _coefficients(model: ForceModel, values: Values, count: int, of: Container[str] | None = None) -> Array:
+    """The coefficients of a law, or some of them, a row each."""
+    names = [name for name in model.coefficients if of is None or name in of]
+    return np.array([values[name] for name in names]).reshape(-1, count)
 
 
 def _distinct(columns: Columns, n: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from fnmatch import fnmatchcase
 
 from ..contact.model import ForceModel, Parameter
+from ..contact.models import built_in
 from .ranges import MAX_FAULTS
 from .values import MAX_UNIT, Fault, Problem, Quantity, nearest, refuse
 
@@ -60,30 +61,49 @@ def own_quantities(model: ForceModel) -> dict[str, Quantity]:
 
 
 def expand_models(asked: object, catalogue: Mapping[str, ForceModel]) -> tuple[list[ForceModel], list[Fault]]:
-    """The models of a key, "all", "family:NAME", a glob or a list of those; and what is wrong with it."""
+    """The models of a key, "all", "family:NAME", a glob or a list of those, less those after "!"; and faults."""
     if not isinstance(asked, str | list) or not asked:
         return [], list(refuse(asked, 'a model, or a list of models; "all" are all').faults)
     found: dict[str, ForceModel] = {}
     faults: list[Fault] = []
     for place, word in enumerate([asked] if isinstance(asked, str) else asked):
         try:
-            found |= _models(word, catalogue)
+            if isinstance(word, str) and word.startswith("!"):
+                _leave_out(found, word, catalogue)
+            else:
+                found |= _models(word, catalogue)
         except Problem as problem:
             faults += problem.faults if isinstance(asked, str) else problem.under(place)
             if len(faults) >= MAX_FAULTS:
                 break
+    if not found and not faults:
+        faults = list(refuse(asked, "models that are not all left out again").faults)
     return list(found.values()), faults
+
+
+def _leave_out(found: dict[str, ForceModel], word: str, catalogue: Mapping[str, ForceModel]) -> None:
+    """Take the models of "!..." out of those found before it."""
+    try:
+        out = _models(word[1:], catalogue)
+    except Problem as problem:
+        raise Problem(*((path, f"after !: {said}") for path, said in problem.faults)) from None
+    if found.keys().isdisjoint(out):
+        raise refuse(word, "models to leave out of those before it")
+    for key in out:
+        found.pop(key, None)
 
 
 def _models(word: object, catalogue: Mapping[str, ForceModel]) -> dict[str, ForceModel]:
     if not isinstance(word, str):
         raise refuse(word, "the name of a model")
+    # a law is not run twice because it has two names
+    laws = {key: model for key, model in catalogue.items() if not model.same_as}
     if word == "all":
-        return dict(catalogue)
+        return {key: model for key, model in laws.items() if key in built_in()}
     if word.startswith("family:"):
         family = word.removeprefix("family:")
-        members = {key: model for key, model in catalogue.items() if model.family == family}
-        families = sorted({model.family for model in catalogue.values()})
+        members = {key: model for key, model in laws.items() if model.family == family}
+        families = sorted({model.family for model in laws.values()})
         if not members:
             raise refuse(word, f"a family of models; {nearest(family, families)}")
         return members
@@ -112,13 +132,15 @@ def cross_faults(data: Mapping[str, object], models: Sequence[ForceModel], n: fl
         yield from _stiffness(given, _table(data.get("model")), models, n)
         yield from _materials(given, models)
         yield from _yield_strengths(given, data.get("materials"), models)
-    own = _table(data.get("model"))
+    own, asked = _table(data.get("model")), data.get("models")
     for model in models:
         table = _table(own.get(model.key))
+        named = model.key == asked or (isinstance(asked, list) and model.key in asked)
         for parameter in model.parameters:
             if parameter.default is None and parameter.name not in table:
-                wants = of_parameter(parameter).wants
-                yield ("model", model.key, parameter.name), f"missing, wants {wants}: {parameter.meaning}"
+                about = f"missing, wants {of_parameter(parameter).wants}: {parameter.meaning}"
+                other = "" if named else f'; or models = [..., "!{model.key}"]'
+                yield ("model", model.key, parameter.name), about + other
 
 
 def _table(value: object) -> Mapping[str, object]:

@@ -13,7 +13,7 @@ from ...text import safe_text
 from ..model import ForceModel
 
 # families in the order of the paper; a family that is not named comes after these
-FAMILIES = ("elastic", "hysteresis", "permanent")
+FAMILIES = ("elastic", "hysteresis", "dashpot", "rate-dependent", "asymmetric", "permanent")
 
 
 @cache
@@ -22,6 +22,11 @@ def _built_in() -> tuple[ForceModel, ...]:
     found = {id(v): v for module in modules for v in vars(module).values() if isinstance(v, ForceModel)}
     rank = {family: place for place, family in enumerate(FAMILIES)}
     return tuple(sorted(found.values(), key=lambda m: (rank.get(m.family, len(rank)), m.year, m.key)))
+
+
+def built_in() -> frozenset[str]:
+    """The keys of the models that are built in."""
+    return frozenset(model.key for model in _built_in())
 
 
 def catalogue(plugins: Sequence[ForceModel] = ()) -> Mapping[str, ForceModel]:

@@ -8,8 +8,10 @@ import numpy as np
 
 from ..model import ForceModel, Formula
 from ..oracles import delivered_restitution, exact_damping_ratio
+from ..power import power
 
 MEMORY = "formula as printed in Gharib and Hurmuzlu (2012); DOI from memory"
+RECALLED = "formula and DOI from memory"
 
 
 def hysteresis(
@@ -23,6 +25,7 @@ def hysteresis(
     doi: str = "",
     evidence: str = "",
     domain: Mapping[str, tuple[float, float]] | None = None,
+    exponent: float | None = None,
 ) -> ForceModel:
     """A member of the hysteresis family, from the formula of its damping ratio χ = λ v₀/K.
 
@@ -30,6 +33,7 @@ def hysteresis(
     ----------
     key, title, year, equation, reference, doi, evidence, domain : see `ForceModel`
     chi : χ [-] as a function of what it asks for by name, such as `lambda e: 1 / e`
+    exponent : n, where the law fixes it
 
     >>> law = hysteresis("mine", title="Mine", year=2026, equation="χ = 1 − e", reference="", chi=lambda e: 1 - e)
     >>> law.force(elastic=1.0, v=0.5, v0=1.0, chi=1.0)
@@ -48,6 +52,7 @@ def hysteresis(
         coefficients={"chi": chi},
         oracle=lambda chi: delivered_restitution(chi),
         momentum="log",
+        exponent=exponent,
         family="hysteresis",
     )
 
@@ -115,6 +120,59 @@ EXACT_HYSTERESIS = hysteresis(
     chi=lambda e: exact_damping_ratio(e),
 )
 
+GONTHIER_2004 = hysteresis(
+    "gonthier-2004",
+    title="Gonthier, McPhee, Lange and Piedboeuf",
+    year=2004,
+    equation="F = K δⁿ (1 + χ δ̇/v₀),  χ = (1 − e²)/e",
+    reference="Gonthier Y, McPhee J, Lange C, Piedboeuf JC (2004) A regularized contact model with asymmetric "
+    "damping "
+    "and dwell-time dependent friction. Multibody Syst. Dyn. 11, 209",
+    doi="10.1023/B:MUBO.0000029392.21648.bc",
+    evidence=RECALLED,
+    domain={"e": (0.0, 1.0)},
+    chi=lambda e: np.divide(1 - e * e, e),
+)
+
+ZHIYING_QISHAO_2006 = hysteresis(
+    "zhiying-qishao-2006",
+    title="Qin and Lu",
+    year=2006,
+    equation="F = K δⁿ (1 + χ δ̇/v₀),  χ = (3/4)(1 − e²) exp(2(1 − e))",
+    reference="Qin Z, Lu Q (2006) Analysis of impact process model based on restitution coefficient. J. Dyn. "
+    "Control "
+    "4, 294",
+    evidence="formula from memory; no DOI known",
+    chi=lambda e: 0.75 * (1 - e * e) * np.exp(2 * (1 - e)),
+)
+
+YE_2009_KELVIN = hysteresis(
+    "ye-2009-kelvin",
+    title="Ye, Li and Zhu, modified Kelvin",
+    year=2009,
+    equation="F = K δ (1 + χ δ̇/v₀),  χ = 3(1 − e)/(2e)",
+    reference="Ye K, Li L, Zhu H (2009) A modified Kelvin impact model for pounding simulation of base-isolated "
+    "building with adjacent structures. Earthq. Eng. Eng. Vib. 8, 433",
+    doi="10.1007/s11803-009-8045-4",
+    evidence=RECALLED,
+    domain={"e": (0.0, 1.0)},
+    exponent=1.0,
+    chi=lambda e: np.divide(1.5 * (1 - e), e),
+)
+
+FLORES_2011 = hysteresis(
+    "flores-2011",
+    title="Flores, Machado, Silva and Martins",
+    year=2011,
+    equation="F = K δⁿ (1 + χ δ̇/v₀),  χ = 8(1 − e)/(5e)",
+    reference="Flores P, Machado M, Silva MT, Martins JM (2011) On the continuous contact force models for soft "
+    "materials in multibody dynamics. Multibody Syst. Dyn. 25, 357",
+    doi="10.1007/s11044-010-9237-4",
+    evidence=RECALLED,
+    domain={"e": (0.0, 1.0)},
+    chi=lambda e: np.divide(8 * (1 - e), 5 * e),
+)
+
 GHARIB_HURMUZLU_2012 = hysteresis(
     "gharib-hurmuzlu-2012",
     title="Gharib and Hurmuzlu",
@@ -126,4 +184,57 @@ GHARIB_HURMUZLU_2012 = hysteresis(
     evidence="formula and DOI seen in the paper",
     domain={"e": (0.0, 0.3)},
     chi=lambda e: np.divide(1.0, e),
+)
+
+HU_GUO_2015 = hysteresis(
+    "hu-guo-2015",
+    title="Hu and Guo",
+    year=2015,
+    equation="F = K δⁿ (1 + χ δ̇/v₀),  χ = 3(1 − e)/(2e)",
+    reference="Hu S, Guo X (2015) A dissipative contact force model for impact analysis in multibody dynamics. "
+    "Multibody Syst. Dyn. 35, 131",
+    doi="10.1007/s11044-015-9453-z",
+    evidence="DOI seen; formula from memory: one public code has 3(1 − e)/(4e), whose slope at e = 1 is wrong",
+    domain={"e": (0.0, 1.0)},
+    chi=lambda e: np.divide(1.5 * (1 - e), e),
+)
+
+CARVALHO_MARTINS_2019 = hysteresis(
+    "carvalho-martins-2019",
+    title="Carvalho and Martins",
+    year=2019,
+    equation="F = K δⁿ (1 + χ δ̇/v₀),  χ = (3/2)(1 − e)(11 − e)/(1 + 9e)",
+    reference="Carvalho AS, Martins JM (2019) Exact restitution and generalizations for the Hunt-Crossley contact "
+    "model. Mech. Mach. Theory 139, 174",
+    doi="10.1016/j.mechmachtheory.2019.03.028",
+    evidence=RECALLED,
+    domain={"e": (0.0, 1.0)},
+    chi=lambda e: 1.5 * (1 - e) * (11 - e) / (1 + 9 * e),
+)
+
+SAFAEIFAR_FARSHIDIANFAR_2020 = hysteresis(
+    "safaeifar-farshidianfar-2020",
+    title="Safaeifar and Farshidianfar",
+    year=2020,
+    equation="F = K δⁿ (1 + χ δ̇/v₀),  χ = 5(1 − e)/(4e)",
+    reference="Safaeifar H, Farshidianfar A (2020) A new model of the contact force for the collision between two "
+    "solid bodies. Multibody Syst. Dyn. 50, 233",
+    doi="10.1007/s11044-020-09732-2",
+    evidence="DOI seen; formula from memory, with some doubt",
+    domain={"e": (0.0, 1.0)},
+    chi=lambda e: np.divide(5 * (1 - e), 4 * e),
+)
+
+ZHANG_2020 = hysteresis(
+    "zhang-2020",
+    title="Zhang, Li, Zhao and He",
+    year=2020,
+    equation="F = K δⁿ (1 + χ δ̇/v₀),  χ = 3(1 − e)/(2 e^0.89)",
+    reference="Zhang J, Li W, Zhao L, He G (2020) A continuous contact force model for impact analysis in "
+    "multibody "
+    "dynamics. Mech. Mach. Theory 153, 103946",
+    doi="10.1016/j.mechmachtheory.2020.103946",
+    evidence=RECALLED,
+    domain={"e": (0.0, 1.0)},
+    chi=lambda e: np.divide(1.5 * (1 - e), power(e, 0.89)),
 )

@@ -1,17 +1,17 @@
-"""Closed forms of the impact of two balls: what the numbers of the program are checked against."""
+"""Closed forms of F = K δⁿ (1 + χ δ̇/v₀): equation (18), damping by the elastic force."""
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 from scipy.special import lambertw
 
-from .power import Array, integer_power
+from ..power import Array, integer_power
 
 # e = Σ aₖ χᵏ, from χ (1 + e) = ln[(1 + χ)/(1 − χ e)] order by order in exact fractions.
 # Below this χ the Lambert form has lost more digits than the truncated series.
 SERIES_BELOW_CHI = 0.06
+# likewise of χ − ln(1 + χ)
+SMALL_CHI = 0.01
 RESTITUTION_SERIES = (
     1, -2 / 3, 4 / 9, -44 / 135, 104 / 405, -40 / 189, 7648 / 42525, -2848 / 18225, 31712 / 229635,
     -23429344 / 189448875, 89072576 / 795685275, -1441952704 / 14105329875, 893393408 / 9499507875,
@@ -82,23 +82,13 @@ def exact_damping_ratio(e: Array | float) -> Array:
     return np.where(near_one, series, np.where(e == 0.0, np.inf, np.where(e > 0.0, chi, np.nan)))
 
 
-def peak_indentation(m: Array, v0: Array, K: Array, n: float | Array) -> Array:
-    """Peak indentation δₘ [m] without damping, equation (31): ((n + 1) m v₀²/(2 K))^(1/(n + 1)).
-
-    >>> print(peak_indentation(np.array([0.5]), np.array([1.0]), np.array([6.118486349e9]), 1.5)[0].round(13))
-    0.0001008542975
-    """
-    return np.power((n + 1.0) * 0.5 * m * v0 / K * v0, 1.0 / (n + 1.0))
-
-
-def contact_time_ratio(n: float) -> float:
-    """Contact time without damping over δₘ/v₀: 2 √π Γ(1 + 1/(n+1))/Γ(1/2 + 1/(n+1)).
-
-    >>> round(contact_time_ratio(1.5), 5)
-    2.94328
-    """
-    q = 1.0 / (n + 1.0)
-    return 2.0 * math.sqrt(math.pi) * math.gamma(1.0 + q) / math.gamma(0.5 + q)
+def _work_to_peak(chi: Array) -> Array:
+    """xₘ^(n+1)/(n+1), the elastic work up to the peak over m v₀²: (χ − ln(1 + χ))/χ²."""
+    small = chi < SMALL_CHI
+    safe = np.where(small | np.isinf(chi), 1.0, chi)
+    series = _series((1 / 2, -1 / 3, 1 / 4, -1 / 5, 1 / 6, -1 / 7), np.where(small, chi, 0.0))
+    integral = np.where(small, series, (safe - np.log1p(safe)) / integer_power(safe, 2))
+    return np.where(np.isinf(chi), 0.0, integral)
 
 
 def damped_peak_indentation(chi: Array, n: float) -> Array:
@@ -109,9 +99,19 @@ def damped_peak_indentation(chi: Array, n: float) -> Array:
     >>> print(damped_peak_indentation(np.array([1.0]), 1.5).round(6))
     [0.89939]
     """
-    chi = np.asarray(chi, dtype=float)
-    small = chi < 0.01
-    safe = np.where(small | np.isinf(chi), 1.0, chi)
-    series = _series((1 / 2, -1 / 3, 1 / 4, -1 / 5, 1 / 6, -1 / 7), np.where(small, chi, 0.0))
-    integral = np.where(small, series, (safe - np.log1p(safe)) / integer_power(safe, 2))
-    return np.where(np.isinf(chi), 0.0, np.power((n + 1.0) * integral, 1.0 / (n + 1.0)))
+    return np.asarray(np.power((n + 1.0) * _work_to_peak(np.asarray(chi, dtype=float)), 1.0 / (n + 1.0)))
+
+
+def approach_damped_restitution(chi: Array | float) -> Array:
+    """The restitution delivered where F = K δⁿ (1 + χ δ̇/v₀) on approach only, and F = K δⁿ on restitution.
+
+    All elastic work up to the peak is given back: e²/2 = xₘ^(n+1)/(n+1), so that e = √(2(χ − ln(1 + χ)))/χ.
+
+    Parameters
+    ----------
+    chi : damping ratio χ = λ v₀/K [-], >= 0, any shape
+
+    >>> approach_damped_restitution(np.array([0.0, 1.0])).round(9)
+    array([1.        , 0.78339367])
+    """
+    return np.asarray(np.sqrt(2.0 * _work_to_peak(np.asarray(chi, dtype=float))))

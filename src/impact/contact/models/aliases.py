@@ -1,0 +1,94 @@
+"""Names under which a law of the catalogue was published again: selectable, and the same to the bit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ..model import ForceModel
+from .dashpot import KELVIN_VOIGT
+from .hysteresis import EXACT_HYSTERESIS, FLORES_2011, HUNT_CROSSLEY_1975, LANKARANI_NIKRAVESH_1990
+
+
+def same_law(
+    law: ForceModel, key: str, *, title: str, year: int, reference: str, doi: str = "", evidence: str = ""
+) -> ForceModel:
+    """A law under another name.
+
+    Parameters
+    ----------
+    law : of the catalogue
+    key, title, year, reference, doi, evidence : of the other publication; its authors' domain is not known
+    """
+    return replace(
+        law, key=key, title=title, year=year, reference=reference, doi=doi, evidence=evidence, domain={},
+        same_as=law.key,
+    )  # fmt: skip
+
+
+MARHEFKA_ORIN_1999 = same_law(
+    HUNT_CROSSLEY_1975,
+    "marhefka-orin-1999",
+    title="Marhefka and Orin",
+    year=1999,
+    reference="Marhefka DW, Orin DE (1999) A compliant contact model with nonlinear damping for simulation of "
+    "robotic "
+    "systems. IEEE Trans. Syst. Man Cybern. A 29, 566",
+    doi="10.1109/3468.798060",
+    evidence="formula and DOI from memory; the paper also derives the exact relation",
+)
+
+MUTHUKUMAR_DESROCHES_2006 = same_law(
+    LANKARANI_NIKRAVESH_1990,
+    "muthukumar-desroches-2006",
+    title="Muthukumar and DesRoches, Hertzdamp",
+    year=2006,
+    reference="Muthukumar S, DesRoches R (2006) A Hertz contact model with non-linear damping for pounding "
+    "simulation. EESD 35, 811",
+    doi="10.1002/eqe.557",
+    evidence="formula and reference seen in the source of OpenSees; DOI from memory",
+)
+
+YE_2009_HERTZ = same_law(
+    FLORES_2011,
+    "ye-2009-hertz",
+    title="Ye, Li and Zhu, corrected Hertzdamp",
+    year=2009,
+    reference="Ye K, Li L, Zhu H (2009) A note on the Hertz contact model with nonlinear damping for pounding "
+    "simulation. EESD 38, 1135",
+    doi="10.1002/eqe.883",
+    evidence="formula seen in the source of OpenSees; two years before flores-2011",
+)
+
+KHATIWADA_2014 = same_law(
+    EXACT_HYSTERESIS,
+    "khatiwada-2014",
+    title="Khatiwada, Chouw and Butterworth",
+    year=2014,
+    reference="Khatiwada S, Chouw N, Butterworth JW (2014) A generic structural pounding model using "
+    "numerically exact "
+    "displacement proportional damping. Eng. Struct. 62-63, 33",
+    doi="10.1016/j.engstruct.2013.12.016",
+    evidence="formula and DOI from memory",
+)
+
+JACOBS_WALDRON_2015 = same_law(
+    EXACT_HYSTERESIS,
+    "jacobs-waldron-2015",
+    title="Jacobs and Waldron",
+    year=2015,
+    reference="Jacobs DA, Waldron KJ (2015) Modeling inelastic collisions with the Hunt-Crossley model using the "
+    "energetic coefficient of restitution. J. Comput. Nonlinear Dyn. 10, 021001",
+    doi="10.1115/1.4028473",
+    evidence="the exact relation from memory; the approximation that the paper prints is not reproduced here",
+)
+
+SCHAFER_1996 = same_law(
+    KELVIN_VOIGT,
+    "schafer-1996",
+    title="Schäfer, Dippel and Wolf",
+    year=1996,
+    reference="Schäfer J, Dippel S, Wolf DE (1996) Force schemes in simulations of granular materials. J. Phys. "
+    "I 6, 5",
+    doi="10.1051/jp1:1996129",
+    evidence="formula and DOI from memory",
+)

@@ -1,0 +1,128 @@
+"""Laws that have another force on restitution than on approach, and no permanent indentation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..model import ForceModel, Formula
+from ..oracles import approach_damped_restitution, approach_damping, approach_restitution
+from ..power import power
+
+
+def approach_dashpot(
+    key: str,
+    *,
+    title: str,
+    year: int,
+    equation: str,
+    reference: str,
+    zeta: Formula,
+    exponent: float | None = None,
+    doi: str = "",
+    evidence: str = "",
+    domain: Mapping[str, tuple[float, float]] | None = None,
+) -> ForceModel:
+    """A spring with a dashpot that works on approach only, from the formula of its damping ratio ζ = α/√(2(n+1)).
+
+    Parameters
+    ----------
+    key, title, year, equation, reference, doi, evidence, domain : see `ForceModel`
+    zeta : ζ [-] as a function of what it asks for by name
+    exponent : n, where the law fixes it
+    """
+    return ForceModel(
+        key=key,
+        title=title,
+        year=year,
+        equation=equation,
+        reference=reference,
+        doi=doi,
+        evidence=evidence,
+        domain=domain or {},
+        coefficients={"zeta": zeta, "c": lambda zeta, n, m, K: zeta * np.sqrt(2 * (n + 1) * m * K)},
+        force=lambda elastic, x, v, n, c: elastic + c * power(x, (n - 1) / 2) * v,
+        unloading=lambda elastic: elastic,
+        oracle=lambda zeta: approach_restitution(zeta),
+        smooth=2 if exponent == 1.0 else 4,
+        exponent=exponent,
+        family="asymmetric",
+    )
+
+
+JANKOWSKI_2006 = approach_dashpot(
+    "jankowski-2006",
+    title="Jankowski",
+    year=2006,
+    equation="F = K δ^(3/2) + 2 ξ √(m K) δ^(1/4) δ̇, then F = K δ^(3/2),  ξ = (9√5/2)(1 − e²)/(e(e(9π − 16) + 16))",
+    reference="Jankowski R (2005) Non-linear viscoelastic modelling of earthquake-induced structural pounding. "
+    "EESD "
+    "34, 595; Jankowski R (2006) Analytical expression between the impact damping ratio and the coefficient of "
+    "restitution in the non-linear viscoelastic model of structural pounding. EESD 35, 517",
+    doi="10.1002/eqe.537",
+    evidence="formula and DOI from memory",
+    domain={"e": (0.0, 1.0)},
+    zeta=lambda e: 9 * np.divide(1 - e * e, e * (e * (9 * np.pi - 16) + 16)),
+    exponent=1.5,
+)
+
+MAHMOUD_JANKOWSKI_2011 = approach_dashpot(
+    "mahmoud-jankowski-2011",
+    title="Mahmoud and Jankowski",
+    year=2011,
+    equation="F = K δ + 2 ξ √(m K) δ̇, then F = K δ,  ξ = (1 − e²)/(e(e(π − 2) + 2))",
+    reference="Mahmoud S, Jankowski R (2011) Modified linear viscoelastic model of earthquake-induced structural "
+    "pounding. Iran. J. Sci. Technol. C 35, 51",
+    evidence="formula from memory; no DOI known",
+    domain={"e": (0.0, 1.0)},
+    zeta=lambda e: np.divide(1 - e * e, e * (e * (np.pi - 2) + 2)),
+    exponent=1.0,
+)
+
+EXACT_APPROACH_DASHPOT = approach_dashpot(
+    "exact-approach-dashpot",
+    title="Exact dashpot on approach",
+    year=2026,
+    equation="F = K δⁿ + α √(m K) δ^((n−1)/2) δ̇, then F = K δⁿ,  α = ζ √(2(n + 1)),  e = exp(−ζ acos(ζ)/√(1 − "
+    "ζ²))",
+    reference="the limit that Jankowski (2006) and Mahmoud and Jankowski (2011) approximate",
+    evidence="formula derived here",
+    domain={"e": (0.0, 1.0)},
+    zeta=lambda e: approach_damping(e),
+)
+
+PANT_WIJEYEWICKREMA_2012 = ForceModel(
+    key="pant-wijeyewickrema-2012",
+    title="Pant and Wijeyewickrema",
+    year=2012,
+    equation="F = K δ (1 + χ δ̇/v₀), then F = K δ,  χ = 3(1 − e²)/(2e²)",
+    reference="Pant DR, Wijeyewickrema AC (2012) Structural performance of a base-isolated reinforced concrete "
+    "building subjected to seismic pounding. EESD 41, 1709",
+    doi="10.1002/eqe.2158",
+    evidence="formula and DOI from memory, the DOI with little confidence",
+    domain={"e": (0.0, 1.0)},
+    coefficients={"chi": lambda e: np.divide(1.5 * (1 - e * e), e * e)},
+    force=lambda elastic, v, v0, chi: elastic * (1 + chi * v / v0),
+    unloading=lambda elastic: elastic,
+    oracle=lambda chi: approach_damped_restitution(chi),
+    momentum="log",
+    exponent=1.0,
+    family="asymmetric",
+)
+
+KELVIN_VOIGT_HYSTERETIC = ForceModel(
+    key="kelvin-voigt-hysteretic",
+    title="Kelvin and Voigt, hysteretic",
+    year=2012,
+    equation="F = K δ, then F = e K δ",
+    reference="Machado M, Moreira P, Flores P, Lankarani HM (2012) Compliant contact force models in multibody "
+    "dynamics: evolution of the Hertz contact theory. Mech. Mach. Theory 53, 99",
+    doi="10.1016/j.mechmachtheory.2012.02.010",
+    evidence="formula as a public code has it, the paper may have e²; DOI from memory",
+    force=lambda elastic: elastic,
+    unloading=lambda elastic, e: e * elastic,
+    oracle=lambda e: np.sqrt(e),
+    exponent=1.0,
+    family="asymmetric",
+)

@@ -1,0 +1,241 @@
+"""Springs with a dashpot of constant damping ratio, F = K δⁿ + α √(m K) δ^((n−1)/2) δ̇: e does not depend on speed.
+
+Such a force pulls before the balls part, so that where the contact ends is part of the law: at zero indentation
+("gap") or, without tension, at zero force ("force").
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Literal
+
+import numpy as np
+
+from ..model import ForceModel, Formula, Parameter
+from ..oracles import force_damping, force_restitution, gap_damping, gap_restitution
+from ..power import Array, power
+
+MEMORY = "formula and DOI from memory"
+
+
+def dashpot(
+    key: str,
+    *,
+    title: str,
+    year: int,
+    equation: str,
+    reference: str,
+    zeta: Formula,
+    release: Literal["gap", "force"],
+    exponent: float | None = None,
+    parameters: tuple[Parameter, ...] = (),
+    doi: str = "",
+    evidence: str = "",
+    domain: Mapping[str, tuple[float, float]] | None = None,
+) -> ForceModel:
+    """A spring and dashpot, from the formula of its damping ratio ζ = α/√(2(n+1)).
+
+    Parameters
+    ----------
+    key, title, year, equation, reference, parameters, doi, evidence, domain : see `ForceModel`
+    zeta : ζ [-] as a function of what it asks for by name, such as `lambda e: gap_damping(e)`
+    release : where the contact ends
+    exponent : n, where the law fixes it
+
+    >>> law = dashpot("mine", title="Mine", year=2026, equation="ζ = 1 − e", reference="", zeta=lambda e: 1 - e,
+    ...               release="force", exponent=1.0)
+    >>> print(law.force(elastic=1.0, x=1.0, v=0.5, n=1.0, c=2.0))
+    2.0
+    """
+    return ForceModel(
+        key=key,
+        title=title,
+        year=year,
+        equation=equation,
+        reference=reference,
+        doi=doi,
+        evidence=evidence,
+        domain=domain or {},
+        parameters=parameters,
+        coefficients={"zeta": zeta, "c": lambda zeta, n, m, K: zeta * np.sqrt(2 * (n + 1) * m * K)},
+        force=lambda elastic, x, v, n, c: elastic + c * power(x, (n - 1) / 2) * v,
+        release=release,
+        oracle=(lambda zeta: gap_restitution(zeta))
+        if release == "gap"
+        else (lambda zeta: force_restitution(zeta)),
+        # with n = 3/2 the dashpot goes as the fourth root of the indentation
+        smooth=2 if exponent == 1.0 else 4,
+        exponent=exponent,
+        family="dashpot",
+    )
+
+
+LINEAR = "F = K δ + 2 ζ √(m K) δ̇"
+HERTZIAN = "F = K δ^(3/2) + α √(m K) δ^(1/4) δ̇"
+GENERAL = "F = K δⁿ + α √(m K) δ^((n−1)/2) δ̇"
+BY_LOGARITHM = "ζ = −ln e/√(π² + ln² e)"
+CONSTANT = (Parameter("C", "N s/m", "damping constant of the dashpot", least=0.0),)
+# of the polynomial of Thornton, Cummins and Cleary, from the first power of e
+THORNTON = (
+    -6.918798, -16.41105, 146.8049, -796.4559, 2928.711, -7206.864, 11494.29, -11342.18, 6276.757, -1489.915,
+)  # fmt: skip
+GOLDSMITH = (
+    "Goldsmith W (1960) Impact. Arnold, London; "
+    "Cundall PA, Strack ODL (1979) A discrete numerical model for granular assemblies. Géotechnique 29, 47"
+)
+
+KELVIN_VOIGT = dashpot(
+    "kelvin-voigt",
+    title="Kelvin and Voigt",
+    year=1960,
+    equation="F = K δ + C δ̇, to δ = 0",
+    reference=GOLDSMITH,
+    doi="10.1680/geot.1979.29.1.47",
+    evidence="formula known from textbooks; DOI seen in a page that cites it",
+    parameters=CONSTANT,
+    zeta=lambda C, m, K: C / (2 * np.sqrt(m * K)),
+    release="gap",
+    exponent=1.0,
+)
+
+KELVIN_VOIGT_NO_TENSION = dashpot(
+    "kelvin-voigt-no-tension",
+    title="Kelvin and Voigt, without tension",
+    year=1960,
+    equation="F = K δ + C δ̇, to F = 0",
+    reference=GOLDSMITH,
+    doi="10.1680/geot.1979.29.1.47",
+    evidence="formula known from textbooks; DOI seen in a page that cites it",
+    parameters=CONSTANT,
+    zeta=lambda C, m, K: C / (2 * np.sqrt(m * K)),
+    release="force",
+    exponent=1.0,
+)
+
+POUNDING = "Anagnostopoulos SA (1988) Pounding of buildings in series during earthquakes. EESD 16, 443"
+
+ANAGNOSTOPOULOS_1988 = dashpot(
+    "anagnostopoulos-1988",
+    title="Anagnostopoulos",
+    year=1988,
+    equation=f"{LINEAR},  {BY_LOGARITHM}, to δ = 0",
+    reference=POUNDING,
+    doi="10.1002/eqe.4290160311",
+    evidence=MEMORY,
+    domain={"e": (0.0, 1.0)},
+    zeta=lambda e: gap_damping(e),
+    release="gap",
+    exponent=1.0,
+)
+
+ANAGNOSTOPOULOS_1988_NO_TENSION = dashpot(
+    "anagnostopoulos-1988-no-tension",
+    title="Anagnostopoulos, without tension",
+    year=1988,
+    equation=f"{LINEAR},  {BY_LOGARITHM}, to F = 0",
+    reference=POUNDING,
+    doi="10.1002/eqe.4290160311",
+    evidence="formula and DOI from memory; the end at zero force is that of codes that use the formula",
+    zeta=lambda e: gap_damping(e),
+    release="force",
+    exponent=1.0,
+)
+
+TTI = (
+    "Tsuji Y, Tanaka T, Ishida T (1992) Lagrangian numerical simulation of plug flow of cohesionless particles. "
+    "Powder Technol. 71, 239; Antypov D, Elliott JA (2011) EPL 94, 50004"
+)
+
+TSUJI_1992 = dashpot(
+    "tsuji-1992",
+    title="Tsuji, Tanaka and Ishida",
+    year=1992,
+    equation=f"{HERTZIAN},  α = −√5 ln e/√(π² + ln² e), to δ = 0",
+    reference=TTI,
+    doi="10.1016/0032-5910(92)88030-L",
+    evidence="DOI seen; α in closed form is that of Antypov and Elliott (10.1209/0295-5075/94/50004), from memory",
+    domain={"e": (0.0, 1.0)},
+    zeta=lambda e: gap_damping(e),
+    release="gap",
+    exponent=1.5,
+)
+
+TSUJI_1992_NO_TENSION = dashpot(
+    "tsuji-1992-no-tension",
+    title="Tsuji, Tanaka and Ishida, without tension",
+    year=1992,
+    equation=f"{HERTZIAN},  α = −√5 ln e/√(π² + ln² e), to F = 0",
+    reference=TTI,
+    doi="10.1016/0032-5910(92)88030-L",
+    evidence="as tsuji-1992; the end at zero force is that of codes that use the formula",
+    zeta=lambda e: gap_damping(e),
+    release="force",
+    exponent=1.5,
+)
+
+SCHWAGER_POSCHEL_2007 = dashpot(
+    "schwager-poschel-2007",
+    title="Schwager and Pöschel",
+    year=2007,
+    equation=f"{LINEAR},  e = exp(−2 ζ acos(ζ)/√(1 − ζ²)), to F = 0",
+    reference="Schwager T, Pöschel T (2007) Coefficient of restitution and linear-dashpot model revisited. "
+    "Granul. Matter 9, 465",
+    doi="10.1007/s10035-007-0065-z",
+    evidence="formula derived here; DOI from memory",
+    domain={"e": (0.0, 1.0)},
+    zeta=lambda e: force_damping(e),
+    release="force",
+    exponent=1.0,
+)
+
+THORNTON_CUMMINS_CLEARY_2013 = dashpot(
+    "thornton-cummins-cleary-2013",
+    title="Thornton, Cummins and Cleary",
+    year=2013,
+    equation="F = K δ^(3/2) + 2 β √(m S) δ̇,  S = (3/2) K δ^(1/2),  β = √(1/(1 − (1 + e)² exp(e p(e))) − 1), to "
+    "F = 0",
+    reference="Thornton C, Cummins SJ, Cleary PW (2013) An investigation of the comparative behaviour of "
+    "alternative "
+    "contact force models during inelastic collisions. Powder Technol. 233, 30",
+    doi="10.1016/j.powtec.2012.08.012",
+    evidence="formula, with the ten coefficients of the polynomial p, and DOI from memory",
+    domain={"e": (0.0, 1.0)},
+    # 2 β √(3/2) is α
+    zeta=lambda e: 2 * np.sqrt(1.5) * thornton_beta(e) / np.sqrt(5.0),
+    release="force",
+    exponent=1.5,
+)
+
+
+def thornton_beta(e: Array) -> Array:
+    """β of Thornton, Cummins and Cleary."""
+    exponent = np.zeros_like(e)
+    for h in reversed(THORNTON):
+        exponent = e * (h + exponent)
+    return np.asarray(np.sqrt(1 / (1 - (1 + e) * (1 + e) * np.exp(exponent)) - 1))
+
+
+FENG_2026 = dashpot(
+    "feng-2026",
+    title="Feng",
+    year=2026,
+    equation=f"{GENERAL},  α = −√(2(n + 1)) ln e/√(π² + ln² e), to δ = 0",
+    reference="Feng YT (2026) Exact phase-space analytical solution for the power-law damped contact oscillator. "
+    "arXiv:2603.27764",
+    evidence="formula seen in the preprint",
+    domain={"e": (0.0, 1.0)},
+    zeta=lambda e: gap_damping(e),
+    release="gap",
+)
+
+EXACT_DASHPOT_NO_TENSION = dashpot(
+    "exact-dashpot-no-tension",
+    title="Exact dashpot, without tension",
+    year=2026,
+    equation=f"{GENERAL},  α = ζ √(2(n + 1)),  e = exp(−2 ζ acos(ζ)/√(1 − ζ²)), to F = 0",
+    reference="Schwager T, Pöschel T (2007) Granul. Matter 9, 465, for n = 1; Feng YT (2026) arXiv:2603.27764",
+    evidence="formula derived here",
+    domain={"e": (0.0, 1.0)},
+    zeta=lambda e: force_damping(e),
+    release="force",
+)

@@ -1,0 +1,57 @@
+"""Viscoelastic laws whose restitution depends on the speed, by parameters of their own."""
+
+from __future__ import annotations
+
+from ..model import ForceModel, Parameter
+from ..power import power
+
+KUWABARA_KONO_1987 = ForceModel(
+    key="kuwabara-kono-1987",
+    title="Kuwabara and Kono",
+    year=1987,
+    equation="F = K(δ^(3/2) + (3/2) A δ^(1/2) δ̇), to F = 0",
+    reference="Kuwabara G, Kono K (1987) Restitution coefficient in a collision between two spheres. Jpn. J. "
+    "Appl. "
+    "Phys. 26, 1230; Brilliantov NV, Spahn F, Hertzsch JM, Pöschel T (1996) Phys. Rev. E 53, 5382; Ramírez R, "
+    "Pöschel T, Brilliantov NV, Schwager T (1999) Phys. Rev. E 60, 4465",
+    doi="10.1143/JJAP.26.1230",
+    evidence="formula and DOI from memory; the paper of 1999 seen",
+    parameters=(Parameter("A", "s", "dissipative constant of the material", least=0.0),),
+    exponent=1.5,
+    force=lambda elastic, x, v, K, A: elastic + 1.5 * A * K * power(x, 0.5) * v,
+    release="force",
+    family="rate-dependent",
+)
+
+LEE_HERRMANN_1993 = ForceModel(
+    key="lee-herrmann-1993",
+    title="Lee and Herrmann",
+    year=1993,
+    equation="F = K δ^(3/2) + γ m δ̇, to F = 0",
+    reference="Lee J, Herrmann HJ (1993) Angle of repose and angle of marginal stability. J. Phys. A 26, 373; "
+    "Ristow GH (1992) Simulating granular flow with molecular dynamics. J. Phys. I 2, 649",
+    doi="10.1088/0305-4470/26/2/021",
+    evidence="formula and DOI from memory",
+    parameters=(Parameter("gamma", "1/s", "damping γ per effective mass", least=0.0),),
+    exponent=1.5,
+    force=lambda elastic, v, m, gamma: elastic + gamma * m * v,
+    release="force",
+    family="rate-dependent",
+)
+
+BORDBAR_HYPPANEN_2007 = ForceModel(
+    key="bordbar-hyppanen-2007",
+    title="Bordbar and Hyppänen",
+    year=2007,
+    equation="F = K δ^(3/2) + C δ^0.65 δ̇, to F = 0",
+    reference="Bordbar MH, Hyppänen T (2007) Modeling of binary collision between multisize viscoelastic spheres. "
+    "J. Numer. Anal. Ind. Appl. Math. 2, 115",
+    evidence="formula from memory; no DOI known",
+    parameters=(Parameter("C", "N s/m^1.65", "damping constant", least=0.0),),
+    exponent=1.5,
+    force=lambda elastic, x, v, C: elastic + C * power(x, 0.65) * v,
+    release="force",
+    # s^(0.65 p) is not smooth for any p of use: the higher the power, the less it shows
+    smooth=8,
+    family="rate-dependent",
+)

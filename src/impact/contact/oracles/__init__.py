@@ -1,0 +1,16 @@
+"""Closed forms of the impact of two balls: what the numbers of the program are checked against."""
+
+from __future__ import annotations
+
+from .dashpot import approach_damping as approach_damping
+from .dashpot import approach_restitution as approach_restitution
+from .dashpot import force_damping as force_damping
+from .dashpot import force_restitution as force_restitution
+from .dashpot import gap_damping as gap_damping
+from .dashpot import gap_restitution as gap_restitution
+from .elastic import contact_time_ratio as contact_time_ratio
+from .elastic import peak_indentation as peak_indentation
+from .hysteresis import approach_damped_restitution as approach_damped_restitution
+from .hysteresis import damped_peak_indentation as damped_peak_indentation
+from .hysteresis import delivered_restitution as delivered_restitution
+from .hysteresis import exact_damping_ratio as exact_damping_ratio
