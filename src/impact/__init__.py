@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from .api import bless, compare, load, models, plot, rerun, run, save, sweep
     from .contact.model import ForceModel, Parameter
     from .contact.models.hysteresis import hysteresis
+    from .contact.power import power
     from .data.verdict import Verdict
     from .errors import ImpactError
 
@@ -24,6 +25,7 @@ __all__ = [
     "load",
     "models",
     "plot",
+    "power",
     "rerun",
     "run",
     "save",

@@ -13,6 +13,7 @@ from .contact.model import ForceModel as ForceModel
 from .contact.model import Parameter as Parameter
 from .contact.models import catalogue
 from .contact.models.hysteresis import hysteresis as hysteresis
+from .contact.power import power as power
 from .data.bless import bless as bless
 from .data.compare import compare as compare
 from .data.impact import Impact as Impact
@@ -46,7 +47,8 @@ def prepare(
     """The plan of a config: a TOML file, or a mapping of the same shape."""
     source = Path(source) if isinstance(source, str) else source
     own = read_plugins(plugins)
-    return Plan(read_config(source, overrides, own.models, max_points), own)
+    config = read_config(source, overrides, own.models, max_points)
+    return Plan(config, own.of(config.models))
 
 
 def execute(
@@ -127,7 +129,7 @@ def run(
     config, first = one_point(
         lambda more: config_of(source, [*overrides, *more], own), model, at, picked_out(source)
     )
-    return impact_of(Plan(config, own), first)
+    return impact_of(Plan(config, own.of(config.models)), first)
 
 
 def rerun(
@@ -165,7 +167,7 @@ def rerun(
     keys = stored["model"].values.tolist() if "model" in stored.dims else []
     solver = (f"solver.{name}={stored.attrs.get(name)}" for name in ("rtol", "max_steps"))
     config = stored_config(stored.attrs, [f"models={json.dumps(keys)}", *solver], own, str(result))
-    verdict = compare(execute(Plan(config, own)), stored, tol=tol, subset=subset)
+    verdict = compare(execute(Plan(config, own.of(config.models))), stored, tol=tol, subset=subset)
     files = [word for one in plugins if isinstance(one, str | Path) for word in ("--plugin", str(one))]
     again = ("impact", "run", str(result), *files) if repeats(str(result), stored) else ()
     return replace(verdict, new="the rerun", baseline=str(result), repeats=again)

@@ -12,7 +12,7 @@ import typer
 from .. import __version__
 from ..errors import UsageError
 from ..text import safe_text
-from . import door, regression, sweeping
+from . import catalogue, door, regression, sweeping
 from .options import Json, Overwrite, Plugins, Sets
 from .words import dump, pairs
 
@@ -144,22 +144,7 @@ app.command(epilog='Example: impact bless results.h5 baseline.h5 --reason "finer
 app.command(epilog="Example: impact rerun baseline.h5")(regression.rerun)
 
 
-@app.command(epilog="Example: impact models gharib-hurmuzlu-2012")
-def models(
-    key: Annotated[str | None, typer.Argument(help="A model to tell all about. [default: list them]")] = None,
-    as_json: Json = False,
-) -> None:
-    """The catalogue of contact force models: equations, references, domains, delivered restitution."""
-    from ..contact.models import catalogue, find
-    from . import tables
-
-    if as_json:
-        chosen = [find(key)] if key else list(catalogue().values())
-        print(dump([tables.model_json(model) for model in chosen]))
-    elif key:
-        tables.print_model(find(key))
-    else:
-        tables.print_models(list(catalogue().values()))
+app.command(epilog="Example: impact models gharib-hurmuzlu-2012")(catalogue.models)
 
 
 @app.command(epilog="Example: impact info results.h5")

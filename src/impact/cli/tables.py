@@ -1,19 +1,16 @@
-"""What the commands print on stdout: the catalogue, one impact, what is in a file."""
+"""What the commands print on stdout: one impact, what is in a file."""
 
 from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.table import Table
-from rich.text import Text
 
-from ..contact.model import ForceModel
-from ..contact.values import delivered
 from .console import cell, console, shown, table
 from .summary import worst_errors
 
@@ -22,73 +19,9 @@ if TYPE_CHECKING:
 
     from ..api import Impact
 
-# where a table of the catalogue shows the delivered restitution
-ASKED = (0.1, 0.3, 0.5, 0.7, 0.9)
-NARROW = 130
 
-
-def model_json(model: ForceModel) -> dict[str, Any]:
-    """A model's declaration as plain data."""
-    own = [vars(parameter) for parameter in model.parameters]
-    texts = {
-        n: getattr(model, n)
-        for n in ("key", "title", "year", "family", "equation", "reference", "doi", "evidence")
-    }
-    return {
-        **texts, "domain": {name: list(ends) for name, ends in model.domain.items()}, "parameters": own,
-        "exponent": model.exponent, "release": model.release, "delivered_restitution": _delivered(model),
-    }  # fmt: skip
-
-
-def _delivered(model: ForceModel) -> dict[str, float]:
-    """The exact delivered restitution by the e asked for; empty where there is none."""
-    found = delivered(model, np.array(ASKED))
-    return {} if found is None else {f"{e:g}": out for e, out in zip(ASKED, found.tolist(), strict=True)}
-
-
-def print_models(models: Sequence[ForceModel]) -> None:
-    """The catalogue, a line a model."""
-    out = console(sys.stdout)
-    # a narrow terminal has no room for the delivered restitution; `impact models KEY` tells it
-    asked = ASKED if out.width >= NARROW else ()
-    rows = table("model", "equation", "claimed for", *(f"e={e:g}" for e in asked))
-    for column in rows.columns[1:3]:
-        column.justify = "left"
-    for model in models:
-        found = _delivered(model)
-        cells = [f"{found[f'{e:g}']:.4f}" if found else "–" for e in asked]
-        rows.add_row(model.key, Text(model.equation), Text(model.domain_text or "–"), *cells)
-    out.print(rows)
-    if asked:
-        out.print("\nThe columns e=... show the restitution that a model delivers when it is asked for e.")
-
-
-def print_model(model: ForceModel) -> None:
-    """All about one model."""
-    rows = {
-        "model": model.key, "title": f"{model.title} ({model.year})", "family": model.family,
-        "equation": model.equation, "reference": model.reference, "doi": model.doi, "evidence": model.evidence,
-        "claimed for": model.domain_text or "nothing in particular",
-        "exponent": "the sweep's n" if model.exponent is None else f"n = {model.exponent:g}, its own",
-        "ends at": _release(model),
-    }  # fmt: skip
-    for parameter in model.parameters:
-        default = "required" if parameter.default is None else f"default {parameter.default:g}"
-        unit = "" if parameter.unit == "1" else f" [{parameter.unit}]"
-        limits = f"from {parameter.least:g} to {parameter.most:g}"
-        rows[f"[model.{model.key}]"] = f"{parameter.name}{unit}: {parameter.meaning}; {limits}, {default}"
-    found = _delivered(model)
-    if found:
-        rows["delivers"] = ", ".join(f"{out:.4f} for e = {e}" for e, out in found.items())
-    _print_rows(rows)
-
-
-def _release(model: ForceModel) -> str:
-    gap = "zero indentation" if model.residual is None else "the permanent indentation"
-    return gap if model.release == "gap" else f"zero force, at {gap} at the latest"
-
-
-def _print_rows(rows: Mapping[str, Any]) -> None:
+def print_rows(rows: Mapping[str, Any]) -> None:
+    """Names and what they are, a line each."""
     table = Table.grid(padding=(0, 2))
     table.add_column(no_wrap=True)
     table.add_column(overflow="fold")
@@ -130,7 +63,7 @@ def print_run(impact: Impact) -> None:
     rows["e energetic (3)"] = _quantity(impact.e_energetic, "1", 12) + "  from their works"
     rows["in the claimed domain"] = "yes" if impact.values["in_domain"] else f"no: {impact.model.domain_text}"
     rows["steps"] = impact.values["steps"]
-    _print_rows(rows)
+    print_rows(rows)
 
 
 def _quantity(value: Any, unit: str, digits: int = 10) -> str:
@@ -185,7 +118,7 @@ def print_info(dataset: xr.Dataset, path: Path) -> None:
         rows["config_set"] = attributes["config_set"]
     if tally and tally.counts:
         rows["status"] = ", ".join(f"{count:,} {name}" for name, count in counted(tally.counts).items())
-    _print_rows(rows)
+    print_rows(rows)
     out = console(sys.stdout)
     out.print()
     listed = table("variable", "unit", "dimensions", "smallest", "largest", "missing")

@@ -98,15 +98,11 @@ def check_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str)
     made = _made_with(attributes, name)
     shown = safe_text(name)
     given = plugins.record
-    # the hash of a file is not that of a value: given in the other way, a model cannot be known to be the same
-    missing = [
-        key
-        for key, one in made.items()
-        if key not in given or (given[key]["file"] is None) != (one["file"] is None)
-    ]
+    # the hash of a file is not that of a value: given in another way, a model cannot be known to be the same
+    missing = [key for key, one in made.items() if key not in given or _way(given[key]) != _way(one)]
     if missing:
-        told = ", ".join(f"{key} of {made[key]['file'] or 'a Python value'}" for key in missing)
-        ways = {"plugins=[...]" if made[key]["file"] is None else "--plugin FILE" for key in missing}
+        told = ", ".join(f"{key} of {_origin(made[key]) or 'a Python value'}" for key in missing)
+        ways = {_way(made[key]) for key in missing}
         again = "it" if len(missing) == 1 else "them"
         raise UsageError(
             f"{shown}: made with {safe_text(told)}; give {again} again with {' and '.join(sorted(ways))}"
@@ -114,9 +110,21 @@ def check_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str)
     for key, one in made.items():
         if one["sha256"] != given[key]["sha256"]:
             raise UsageError(
-                f"{shown}: was made with another version of {safe_text(one['file'] or f'the model {key}')}: its "
+                f"{shown}: was made with another version of {safe_text(_origin(one) or f'the model {key}')}: its "
                 f"SHA-256 is {safe_text(str(one['sha256']), 64)}, this one's is {given[key]['sha256']}"
             )
+
+
+def _origin(one: Mapping[str, str | None]) -> str | None:
+    """The file or the package of a model."""
+    return one.get("package") or one["file"]
+
+
+def _way(one: Mapping[str, str | None]) -> str:
+    """How a model is given again."""
+    if one.get("package"):
+        return "the package installed"
+    return "plugins=[...]" if one["file"] is None else "--plugin FILE"
 
 
 def _made_with(attributes: Mapping[str, object], name: str) -> dict[str, dict[str, str | None]]:
@@ -124,9 +132,10 @@ def _made_with(attributes: Mapping[str, object], name: str) -> dict[str, dict[st
     made = _json(attributes, "plugins", name)
     right = isinstance(made, dict) and all(
         isinstance(one, dict)
-        and one.keys() == {"file", "sha256"}
+        and {"file", "sha256"} <= one.keys() <= {"file", "sha256", "package"}
         and isinstance(one["sha256"], str)
         and isinstance(one["file"], str | None)
+        and isinstance(one.get("package"), str | None)
         for one in made.values()
     )
     if not right:

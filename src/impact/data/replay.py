@@ -22,7 +22,7 @@ def repeats(path: str, dataset: xr.Dataset) -> tuple[str, ...]:
     >>> repeats("new.h5", xr.Dataset(attrs={"plugins": '{"mine": {"file": "my.py", "sha256": ""}}'}))
     ('impact', 'run', 'new.h5', '--plugin', 'my.py')
     """
-    files = [one.get("file") for one in json_table(dataset, "plugins").values()]
+    files = [one.get("file") for one in json_table(dataset, "plugins").values() if not one.get("package")]
     if not path or None in files:
         return ()
     return ("impact", "run", path, *(word for file in dict.fromkeys(files) for word in ("--plugin", str(file))))

@@ -69,7 +69,7 @@ def begin(files: Sequence[Path], hashes: dict[str, str]) -> None:
 
         threading.Thread(target=follow, daemon=True).start()
     _models.update(catalogue())
-    if files:
+    if hashes:
         from .plugins import read_plugins
 
         try:
@@ -77,8 +77,11 @@ def begin(files: Sequence[Path], hashes: dict[str, str]) -> None:
         except ImpactError as error:
             _troubles.append(str(error))
             return
-        if plugins.hashes != hashes:
-            _troubles.append(f"{safe_text(', '.join(map(str, files)))}: was changed while the sweep ran")
+        changed = [key for key, sha256 in hashes.items() if plugins.hashes.get(key) != sha256]
+        if changed:
+            _troubles.append(
+                f"{safe_text(', '.join(map(str, files or changed)))}: was changed while the sweep ran"
+            )
             return
         _models.update(catalogue(plugins.models))
 

@@ -17,6 +17,7 @@ from ..contact.model import ForceModel
 from ..contact.models import catalogue
 from ..errors import ImpactError, ModelError, UsageError
 from ..text import safe_text
+from .installed import installed
 from .values import show
 
 # of the message of a plug-in's error: one that lists what is known is long
@@ -25,26 +26,44 @@ LONG = 1000
 
 @dataclass(frozen=True)
 class Plugin:
-    """A model that is not built in, the file it is from (its name without a folder), and what tells its versions.
+    """A model that is not built in, where it is from, and what tells its versions.
 
-    `sha256` is over the bytes of the file; where `file` is None, the model was given as a value, over its source.
+    `path` is the Python file that was given, or `package` the name and version of an installed one; where both are
+    None, the model was given as a value. `sha256` is over the bytes of the file, or over the value's source.
     """
 
     model: ForceModel
     sha256: str
-    file: str | None = None
+    path: Path | None = None
+    package: str | None = None
+
+    @property
+    def is_value(self) -> bool:
+        """It can be sent to no other process, and no command can give it again."""
+        return self.path is None and self.package is None
+
+    @property
+    def record(self) -> dict[str, str | None]:
+        """What a result says of it: the file's name without a folder, or the package."""
+        file = None if self.path is None else self.path.name
+        about = {"file": file, "sha256": self.sha256}
+        return about if self.package is None else {**about, "package": self.package}
 
 
 @dataclass(frozen=True)
 class Plugins:
-    """The models that are not built in, in the order given; `files` are those that were read for them."""
+    """The models that are not built in, in the order given."""
 
     items: tuple[Plugin, ...] = ()
-    files: tuple[Path, ...] = ()
 
     @property
     def models(self) -> tuple[ForceModel, ...]:
         return tuple(one.model for one in self.items)
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Those that were read for them."""
+        return tuple(dict.fromkeys(one.path.absolute() for one in self.items if one.path is not None))
 
     @property
     def hashes(self) -> dict[str, str]:
@@ -54,11 +73,18 @@ class Plugins:
     @property
     def record(self) -> dict[str, dict[str, str | None]]:
         """What a result says of them, by key."""
-        return {one.model.key: {"file": one.file, "sha256": one.sha256} for one in self.items}
+        return {one.model.key: one.record for one in self.items}
+
+    def of(self, models: Sequence[ForceModel]) -> Plugins:
+        """Those among some models."""
+        keys = {model.key for model in models}
+        return Plugins(tuple(one for one in self.items if one.model.key in keys))
 
 
 def read_plugins(given: Sequence[ForceModel | str | Path]) -> Plugins:
-    """The models given, and those in the files given, which are executed: give none that a data file names.
+    """The models of installed packages, those given, and those in the files given.
+
+    The packages are imported and the files executed: give none that a data file names.
 
     Parameters
     ----------
@@ -67,7 +93,7 @@ def read_plugins(given: Sequence[ForceModel | str | Path]) -> Plugins:
     Raises
     ------
     UsageError : a file is not there, cannot be read or is no Python file
-    ModelError : it is not Python, fails, or holds no model, or one whose key is taken
+    ModelError : it, or a package, is not Python, fails, or holds no model, or one whose key is taken
 
     >>> law = ForceModel("mine", "Mine", 2026, "F = K δⁿ", "", force=lambda elastic: elastic)
     >>> read_plugins([law]).record["mine"]["file"] is None
@@ -75,19 +101,19 @@ def read_plugins(given: Sequence[ForceModel | str | Path]) -> Plugins:
     """
     if isinstance(given, str | Path | ForceModel):
         raise UsageError(f"plugins: got {safe_text(repr(given))}, wants a list of such")
-    items: list[Plugin] = []
-    origins = dict.fromkeys(catalogue(), "built in")
+    read = [(one.package, [Plugin(*one)]) for one in installed()]
     for place, one in enumerate(given):
         if isinstance(one, ForceModel):
-            found = [Plugin(one, _source_hash(one))]
-            name = f"plugins[{place}]"
+            read.append((f"plugins[{place}]", [Plugin(one, _source_hash(one))]))
         elif isinstance(one, str | Path):
-            found = _of_file(Path(one))
-            name = safe_text(str(one))
+            read.append((str(one), _of_file(Path(one))))
         else:
             wants = "a ForceModel or the path of a Python file"
             raise UsageError(f"plugins[{place}]: got {safe_text(repr(one))}, wants {wants}")
-        for plugin in found:
+    origins = dict.fromkeys(catalogue(), "built in")
+    for origin, plugins in read:
+        name = safe_text(origin)
+        for plugin in plugins:
             _check_storable(plugin.model, name)
             key = plugin.model.key
             if key in origins:
@@ -96,8 +122,7 @@ def read_plugins(given: Sequence[ForceModel | str | Path]) -> Plugins:
                     "another key"
                 )
             origins[key] = f"in {name}"
-        items += found
-    return Plugins(tuple(items), tuple(Path(one).absolute() for one in given if isinstance(one, str | Path)))
+    return Plugins(tuple(plugin for _, plugins in read for plugin in plugins))
 
 
 def _check_storable(model: ForceModel, name: str) -> None:
@@ -123,7 +148,7 @@ def _of_file(path: Path) -> list[Plugin]:
     found = {id(v): v for v in vars(module).values() if isinstance(v, ForceModel) and id(v) not in known}
     if not found:
         raise ModelError(f"{name}: no model in it, wants a ForceModel at its top level")
-    return [Plugin(model, sha256, path.name) for model in found.values()]
+    return [Plugin(model, sha256, path) for model in found.values()]
 
 
 def _read(path: Path, name: str) -> bytes:

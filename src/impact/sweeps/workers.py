@@ -53,7 +53,7 @@ def spread(
     UsageError : a model was given as a Python value, which cannot be sent
     StoreError : processes were killed again and again
     """
-    values = [one.model.key for one in plan.plugins.items if one.file is None]
+    values = [one.model.key for one in plan.plugins.items if one.is_value]
     if values:
         raise UsageError(
             f"jobs: got {jobs}, but {safe_text(', '.join(values))} is given as a Python value, which cannot be "

@@ -1,0 +1,167 @@
+"""The command `models`: the catalogue, one law, or whether a law of one's own keeps the contract."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Sequence
+from itertools import groupby
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from . import door
+from .options import Json, Plugins
+from .words import dump
+
+if TYPE_CHECKING:
+    from ..contact.contract import Finding
+    from ..contact.model import ForceModel, Parameter
+
+# where a table of the catalogue shows the delivered restitution
+ASKED = (0.1, 0.3, 0.5, 0.7, 0.9)
+NARROW = 130
+
+
+def models(
+    key: Annotated[str | None, typer.Argument(help="A model to tell all about. [default: list them]")] = None,
+    check: Annotated[
+        Path | None,
+        typer.Option("--check", metavar="FILE", help="Python file of whose models to check the contract."),
+    ] = None,
+    plugins: Plugins = None,
+    as_json: Json = False,
+) -> None:
+    """The catalogue of contact force models: equations, references, domains, delivered restitution."""
+    from ..contact.models import catalogue, find
+    from ..sweeps.plugins import read_plugins
+
+    if check is not None:
+        own = [one.model for one in read_plugins([check]).items if one.path is not None]
+        _check([model for model in own if key in (None, model.key)] or [find(str(key), own)], as_json=as_json)
+        return
+    others = read_plugins(plugins or ()).models
+    if as_json:
+        chosen = [find(key, others)] if key else list(catalogue(others).values())
+        print(dump([model_json(model) for model in chosen]))
+    elif key:
+        _print_model(find(key, others))
+    else:
+        _print_models(list(catalogue(others).values()))
+
+
+def model_json(model: ForceModel) -> dict[str, Any]:
+    """A model's declaration as plain data."""
+    own = [vars(parameter) for parameter in model.parameters]
+    names = ("key", "title", "year", "family", "equation", "reference", "doi", "evidence", "same_as")
+    return {
+        **{name: getattr(model, name) for name in names},
+        "domain": {name: list(ends) for name, ends in model.domain.items()}, "parameters": own,
+        "exponent": model.exponent, "release": model.release, "delivered_restitution": _delivered(model),
+    }  # fmt: skip
+
+
+def _delivered(model: ForceModel) -> dict[str, float]:
+    """The exact delivered restitution by the e asked for; empty where there is none."""
+    import numpy as np
+
+    from ..contact.values import delivered
+
+    found = delivered(model, np.array(ASKED))
+    return {} if found is None else {f"{e:g}": out for e, out in zip(ASKED, found.tolist(), strict=True)}
+
+
+def _print_models(models: Sequence[ForceModel]) -> None:
+    """The catalogue, a line a model, family by family."""
+    from rich.text import Text
+
+    from .console import console, table
+
+    out = console(sys.stdout)
+    # a narrow terminal has no room for the delivered restitution; `impact models KEY` tells it
+    asked = ASKED if out.width >= NARROW else ()
+    rows = table("model", "equation", "claimed for", *(f"e={e:g}" for e in asked))
+    for column in rows.columns[1:3]:
+        column.justify = "left"
+    for family, members in groupby(models, lambda model: model.family):
+        rows.add_row(Text(f"family:{family}", style="dim"))
+        for model in members:
+            found = _delivered(model)
+            if model.same_as:
+                rows.add_row(model.key, Text(f"same law as {model.same_as}"))
+                continue
+            own = ", ".join(one.name for one in model.parameters)
+            about = model.equation + (f"  [{own}]" if own else "")
+            cells = [f"{found[f'{e:g}']:.4f}" if found else "–" for e in asked]
+            rows.add_row(model.key, Text(about), Text(model.domain_text or "–"), *cells)
+    out.print(rows)
+    if asked:
+        out.print("\nThe columns e=... show the restitution that a model delivers when it is asked for e.")
+    out.print("A law with [parameters] of its own is driven by them; `impact models KEY` tells all about one.")
+
+
+def _print_model(model: ForceModel) -> None:
+    """All about one model."""
+    from .tables import print_rows
+
+    rows = {
+        "model": model.key, "same law as": model.same_as, "title": f"{model.title} ({model.year})",
+        "family": model.family, "equation": model.equation, "reference": model.reference, "doi": model.doi,
+        "evidence": model.evidence, "claimed for": model.domain_text or "nothing in particular",
+        "exponent": "the sweep's n" if model.exponent is None else f"n = {model.exponent:g}, its own",
+        "ends at": _release(model),
+    }  # fmt: skip
+    for place, parameter in enumerate(model.parameters):
+        # the table is named once
+        rows[" " * place if place else f"[model.{model.key}]"] = _parameter(parameter)
+    found = _delivered(model)
+    if found:
+        rows["delivers"] = ", ".join(f"{out:.4f} for e = {e}" for e, out in found.items())
+    print_rows({name: text for name, text in rows.items() if text})
+
+
+def _parameter(one: Parameter) -> str:
+    default = "required" if one.default is None else f"default {one.default:g}"
+    unit = "" if one.unit == "1" else f" [{one.unit}]"
+    return f"{one.name}{unit}: {one.meaning}; from {one.least:g} to {one.most:g}, {default}"
+
+
+def _release(model: ForceModel) -> str:
+    gap = "zero indentation" if model.residual is None else "the permanent indentation"
+    return gap if model.release == "gap" else f"zero force, at {gap} at the latest"
+
+
+def _check(models: Sequence[ForceModel], *, as_json: bool) -> None:
+    """Print what came of every clause of the contract; exit 1 if one does not hold."""
+    from rich.text import Text
+
+    from ..contact.contract import contract
+    from .console import cell, console, table
+
+    found = [(model, list(contract(model))) for model in models]
+    broken = [finding for _, findings in found for finding in findings if not finding.holds]
+    if as_json:
+        print(dump([{"model": model.key, "holds": all(one.holds for one in findings),
+                     "clauses": list(_clauses(findings))} for model, findings in found]))  # fmt: skip
+    else:
+        rows = table("model", "clause", "", "worst", "bound")
+        rows.columns[1].justify = "left"
+        for model, findings in found:
+            for place, one in enumerate(findings):
+                mark = Text("holds", style="green") if one.holds else Text("broken", style="red")
+                key = cell("" if place else model.key)
+                rows.add_row(key, one.clause, mark, f"{one.worst:.2g}", f"{one.bound:.2g}")
+        console(sys.stdout).print(rows)
+        for model, findings in found:
+            if not any(one.clause == CLOSED_FORM for one in findings):
+                door.say(f"{model.key}: has no oracle, so that its restitution was compared with no closed form")
+    if broken:
+        raise typer.Exit(door.NOT_EQUAL)
+
+
+CLOSED_FORM = "agrees with its closed form"
+
+
+def _clauses(findings: Sequence[Finding]) -> Iterator[dict[str, Any]]:
+    for one in findings:
+        yield {"clause": one.clause, "holds": one.holds, "worst": one.worst, "bound": one.bound}

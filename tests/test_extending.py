@@ -1,0 +1,167 @@
+"""Models of one's own: docs/extending.md works as it stands, the contract is checked, packages bring theirs."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+import impact
+
+from .conftest import ROOT, Run
+
+PAGE = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
+BROKEN = """
+from impact import ForceModel
+GAINS = ForceModel("gains", "", 2026, equation="", reference="", force=lambda elastic, v: elastic * (1 - 0.3 * v))
+"""
+LAWS = """
+from impact import ForceModel, hysteresis
+from impact.contact.models.hysteresis import FLORES_2011
+open({mark!r}, "a").close()
+OURS = hysteresis("ours-2026", title="Ours", year=2026, equation="χ = 1 − e", reference="", chi=lambda e: 1 - e)
+STIFF = ForceModel("stiff-2026", "Stiff", 2026, equation="", reference="", force=lambda elastic: 2 * elastic)
+"""
+SWEEP = """models = ["ours-2026", "hertz"]
+[sweep]
+e = [0.2, 0.8]
+v1 = 1.0
+m1 = 1.0
+m2 = 1.0
+K = 6e9
+"""
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", PAGE, re.DOTALL)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with the files that the page says to save."""
+    mine, ramped = blocks("python")
+    files = {"my_model.py": mine, "ramped.py": ramped, "config.toml": blocks("toml")[0]}
+    for name, text in files.items():
+        assert f"`{name}`" in PAGE
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    return tmp_path
+
+
+def test_the_commands_of_the_page(cli: Run, folder: Path) -> None:
+    (commands,) = blocks("sh")
+    for line in commands.splitlines():
+        program, *words = shlex.split(line)
+        assert program == "impact"
+        done = cli(*words, cwd=folder)
+        assert done.returncode == 0, (line, done.stderr)
+    result = impact.load(folder / "results.h5")
+    assert result["oracle_error"].sel(model="mine-2026").max() < 1e-9
+    assert (folder / "results.png").exists()
+
+
+def test_the_law_from_its_force(cli: Run, folder: Path) -> None:
+    done = cli("models", "--check", "ramped.py", "--json", cwd=folder)
+    (told,) = json.loads(done.stdout)
+    assert (done.returncode, told["holds"]) == (0, True)
+    # full at once it is the law of Kelvin and Voigt
+    own = {"ramped-2026": {"C": 2e3, "d": 1e-9}, "kelvin-voigt-no-tension": {"C": 2e3}}
+    balls = {"v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 1e7, "n": 1.0}
+    both = impact.sweep({"models": list(own), "sweep": balls, "model": own}, plugins=[folder / "ramped.py"])
+    assert both["e_out"].values[0] == pytest.approx(both["e_out"].values[1], abs=1e-5)
+
+
+def test_a_broken_law_is_told_clause_by_clause(cli: Run, tmp_path: Path) -> None:
+    (tmp_path / "broken.py").write_text(BROKEN, encoding="utf-8")
+    done = cli("models", "--check", "broken.py", cwd=tmp_path)
+    assert done.returncode == 1
+    assert re.search(r"no energy is gained +broken", done.stdout)
+    assert re.search(r"momentum is conserved \(4\) +holds", done.stdout)
+    assert "gains: has no oracle" in done.stderr
+
+
+def test_a_wish_that_cannot_be_met_is_told_when_the_file_is_loaded(cli: Run, tmp_path: Path) -> None:
+    (tmp_path / "wish.py").write_text(BROKEN.replace("lambda elastic, v:", "lambda elastc, v:"), encoding="utf-8")
+    for words in (["models", "--check", "wish.py"], ["models", "--plugin", "wish.py"]):
+        done = cli(*words, cwd=tmp_path)
+        assert done.returncode == 2
+        assert 'wish.py:3: model gains: its force asks for "elastc"; did you mean "elastic"?' in done.stderr
+        assert "Traceback" not in done.stderr
+
+
+# ---- installed packages
+
+
+def install(folder: Path, text: str, value: str = "our_package.laws") -> Path:
+    """A package as pip leaves it, in a folder of its own, with a mark that is made when it is imported."""
+    site = folder / "site"
+    (site / "our_package").mkdir(parents=True)
+    (site / "our_package" / "__init__.py").touch()
+    (site / "our_package" / "laws.py").write_text(text.format(mark=str(folder / "imported")), encoding="utf-8")
+    about = site / "our_package-1.2.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: our-package\nVersion: 1.2\n", encoding="utf-8")
+    (about / "entry_points.txt").write_text(f"[impact.models]\nour-laws = {value}\n", encoding="utf-8")
+    return site
+
+
+def test_the_laws_of_an_installed_package_are_in_the_catalogue(cli: Run, tmp_path: Path) -> None:
+    site = install(tmp_path, LAWS)
+    (tmp_path / "config.toml").write_text(SWEEP, encoding="utf-8")
+    listed = json.loads(cli("models", "--json", PYTHONPATH=str(site)).stdout)
+    # one that it imports is not its own
+    assert [one["key"] for one in listed if one["key"] not in impact.models()] == ["ours-2026", "stiff-2026"]
+
+    done = cli("sweep", "config.toml", "--jobs", "2", cwd=tmp_path, PYTHONPATH=str(site))
+    assert done.returncode == 0, done.stderr
+    record = json.loads(impact.load(tmp_path / "results.h5").attrs["plugins"])
+    assert {key: (one["file"], one["package"]) for key, one in record.items()} == {
+        "ours-2026": (None, "our-package 1.2")
+    }
+    again = cli("rerun", "results.h5", cwd=tmp_path, PYTHONPATH=str(site))
+    assert (again.returncode, again.stdout[:6]) == (0, "equal:")
+    without = cli("rerun", "results.h5", cwd=tmp_path)
+    assert without.returncode == 2
+    assert "made with ours-2026 of our-package 1.2; give it again with the package installed" in without.stderr
+
+
+def test_all_is_what_is_built_in_whatever_is_installed(cli: Run, tmp_path: Path) -> None:
+    site = install(tmp_path, LAWS)
+    text = SWEEP.replace('["ours-2026", "hertz"]', '["all", "!*voigt*", "!family:rate-dependent"]')
+    steel = '[materials.steel]\nE = "210 GPa"\nnu = 0.3\nrho = 7850\n'
+    (tmp_path / "all.toml").write_text(text.replace("K = 6e9", 'material = "steel"') + steel, encoding="utf-8")
+    keys = []
+    for more in ({}, {"PYTHONPATH": str(site)}):
+        done = cli("sweep", "all.toml", "--dry-run", "--json", cwd=tmp_path, **more)
+        keys.append([one["model"] for one in json.loads(done.stdout)["models"]])
+    assert len(keys[0]) > 25
+    assert keys[0] == keys[1]
+
+
+def test_no_data_file_brings_a_package_in(cli: Run, tmp_path: Path) -> None:
+    # what is not installed as a package is imported for no entry in a TOML
+    site = install(tmp_path, LAWS)
+    for path in (site / "our_package-1.2.dist-info").iterdir():
+        path.unlink()
+    (tmp_path / "config.toml").write_text(SWEEP.replace('"hertz"', '"our_package.laws"'), encoding="utf-8")
+    done = cli("sweep", "config.toml", cwd=tmp_path, PYTHONPATH=str(site))
+    assert (done.returncode, (tmp_path / "imported").exists()) == (2, False)
+
+
+@pytest.mark.parametrize(
+    ("text", "value", "said"),
+    [
+        ("1 / 0", "our_package.laws", "ZeroDivisionError: division by zero; wants a package that works, or none"),
+        ("", "our_package.laws", "no model in it, wants a ForceModel, or a module that holds some"),
+        ("", "our_package.laws:GONE", "AttributeError"),
+        ("raise SystemExit", "our_package.laws", "SystemExit"),
+    ],
+)
+def test_a_broken_package_is_named(cli: Run, tmp_path: Path, text: str, value: str, said: str) -> None:
+    done = cli("models", PYTHONPATH=str(install(tmp_path, text, value)))
+    assert done.returncode == 2
+    assert f"our-package 1.2: entry point our-laws = {value}: " in done.stderr
+    assert said in done.stderr
+    assert len(done.stderr.splitlines()) == 1
