@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from typing import Literal
+from typing import Literal, NotRequired, TypedDict
 
 import numpy as np
 
@@ -49,6 +49,20 @@ class Parameter:
     default: float | None = None
     least: float = float("-inf")
     most: float = float("inf")
+
+
+class About(TypedDict):
+    """What is said of a law besides its formulas; see `ForceModel`."""
+
+    title: str
+    year: int
+    equation: str
+    reference: str
+    doi: NotRequired[str]
+    evidence: NotRequired[str]
+    domain: NotRequired[Mapping[str, tuple[float, float]]]
+    parameters: NotRequired[tuple[Parameter, ...]]
+    exponent: NotRequired[float]
 
 
 @dataclass(frozen=True, repr=False)

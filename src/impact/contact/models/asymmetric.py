@@ -2,51 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from dataclasses import replace
+from typing import Unpack
 
 import numpy as np
 
-from ..model import ForceModel, Formula
+from ..model import About, ForceModel, Formula
 from ..oracles import approach_damped_restitution, approach_damping, approach_restitution
-from ..power import power
+from .dashpot import dashpot
 
 
-def approach_dashpot(
-    key: str,
-    *,
-    title: str,
-    year: int,
-    equation: str,
-    reference: str,
-    zeta: Formula,
-    exponent: float | None = None,
-    doi: str = "",
-    evidence: str = "",
-    domain: Mapping[str, tuple[float, float]] | None = None,
-) -> ForceModel:
-    """A spring with a dashpot that works on approach only, from the formula of its damping ratio ζ = α/√(2(n+1)).
+def approach_dashpot(key: str, *, zeta: Formula, **about: Unpack[About]) -> ForceModel:
+    """A spring with a dashpot that works on approach only, from the formula of its damping ratio.
 
     Parameters
     ----------
-    key, title, year, equation, reference, doi, evidence, domain : see `ForceModel`
-    zeta : ζ [-] as a function of what it asks for by name
-    exponent : n, where the law fixes it
+    key, about : see `ForceModel`
+    zeta : see `dashpot`
     """
-    return ForceModel(
-        key=key,
-        title=title,
-        year=year,
-        equation=equation,
-        reference=reference,
-        doi=doi,
-        evidence=evidence,
-        domain=domain or {},
-        coefficients={"zeta": zeta, "c": lambda zeta, n, m, K: zeta * np.sqrt(2 * (n + 1) * m * K)},
-        force=lambda elastic, x, v, n, c: elastic + c * power(x, (n - 1) / 2) * v,
+    return replace(
+        dashpot(key, zeta=zeta, release="gap", **about),
         unloading=lambda elastic: elastic,
         oracle=lambda zeta: approach_restitution(zeta),
-        smooth=2 if exponent == 1.0 else 4,
-        exponent=exponent,
         family="asymmetric",
     )
 

@@ -6,66 +6,41 @@ Such a force pulls before the balls part, so that where the contact ends is part
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Literal
+from typing import Literal, Unpack
 
 import numpy as np
 
-from ..model import ForceModel, Formula, Parameter
+from ..model import About, ForceModel, Formula, Parameter
 from ..oracles import force_damping, force_restitution, gap_damping, gap_restitution
 from ..power import Array, power
 
 MEMORY = "formula and DOI from memory"
 
 
-def dashpot(
-    key: str,
-    *,
-    title: str,
-    year: int,
-    equation: str,
-    reference: str,
-    zeta: Formula,
-    release: Literal["gap", "force"],
-    exponent: float | None = None,
-    parameters: tuple[Parameter, ...] = (),
-    doi: str = "",
-    evidence: str = "",
-    domain: Mapping[str, tuple[float, float]] | None = None,
-) -> ForceModel:
+def dashpot(key: str, *, zeta: Formula, release: Literal["gap", "force"], **about: Unpack[About]) -> ForceModel:
     """A spring and dashpot, from the formula of its damping ratio ζ = α/√(2(n+1)).
 
     Parameters
     ----------
-    key, title, year, equation, reference, parameters, doi, evidence, domain : see `ForceModel`
+    key, about : see `ForceModel`
     zeta : ζ [-] as a function of what it asks for by name, such as `lambda e: gap_damping(e)`
     release : where the contact ends
-    exponent : n, where the law fixes it
 
     >>> law = dashpot("mine", title="Mine", year=2026, equation="ζ = 1 − e", reference="", zeta=lambda e: 1 - e,
     ...               release="force", exponent=1.0)
     >>> print(law.force(elastic=1.0, x=1.0, v=0.5, n=1.0, c=2.0))
     2.0
     """
+    by_gap, by_force = (lambda zeta: gap_restitution(zeta)), (lambda zeta: force_restitution(zeta))
     return ForceModel(
-        key=key,
-        title=title,
-        year=year,
-        equation=equation,
-        reference=reference,
-        doi=doi,
-        evidence=evidence,
-        domain=domain or {},
-        parameters=parameters,
+        key,
+        **about,
         coefficients={"zeta": zeta, "c": lambda zeta, n, m, K: zeta * np.sqrt(2 * (n + 1) * m * K)},
         force=lambda elastic, x, v, n, c: elastic + c * power(x, (n - 1) / 2) * v,
         release=release,
-        oracle=(lambda zeta: gap_restitution(zeta))
-        if release == "gap"
-        else (lambda zeta: force_restitution(zeta)),
+        oracle=by_gap if release == "gap" else by_force,
         # with n = 3/2 the dashpot goes as the fourth root of the indentation
-        smooth=2 if exponent == 1.0 else 4,
-        exponent=exponent,
+        smooth=2 if about.get("exponent") == 1.0 else 4,
         family="dashpot",
     )
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from typing import Unpack
 
 import numpy as np
 
-from ..model import ForceModel, Formula
+from ..model import About, ForceModel, Formula
 from ..oracles import delivered_restitution, exact_damping_ratio
 from ..power import power
 
@@ -14,45 +14,25 @@ MEMORY = "formula as printed in Gharib and Hurmuzlu (2012); DOI from memory"
 RECALLED = "formula and DOI from memory"
 
 
-def hysteresis(
-    key: str,
-    *,
-    title: str,
-    year: int,
-    equation: str,
-    reference: str,
-    chi: Formula,
-    doi: str = "",
-    evidence: str = "",
-    domain: Mapping[str, tuple[float, float]] | None = None,
-    exponent: float | None = None,
-) -> ForceModel:
+def hysteresis(key: str, *, chi: Formula, **about: Unpack[About]) -> ForceModel:
     """A member of the hysteresis family, from the formula of its damping ratio χ = λ v₀/K.
 
     Parameters
     ----------
-    key, title, year, equation, reference, doi, evidence, domain : see `ForceModel`
+    key, about : see `ForceModel`
     chi : χ [-] as a function of what it asks for by name, such as `lambda e: 1 / e`
-    exponent : n, where the law fixes it
 
     >>> law = hysteresis("mine", title="Mine", year=2026, equation="χ = 1 − e", reference="", chi=lambda e: 1 - e)
     >>> law.force(elastic=1.0, v=0.5, v0=1.0, chi=1.0)
     1.5
     """
     return ForceModel(
-        key=key,
-        title=title,
-        year=year,
-        equation=equation,
-        reference=reference,
-        doi=doi,
-        evidence=evidence,
-        domain=domain or {},
+        key,
+        **about,
         force=lambda elastic, v, v0, chi: elastic * (1 + chi * v / v0),
         coefficients={"chi": chi},
         oracle=lambda chi: delivered_restitution(chi),
         momentum="log",
-        exponent=exponent,
         family="hysteresis",
     )
 
