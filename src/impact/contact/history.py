@@ -14,7 +14,7 @@ from .model import ForceModel
 from .power import Array
 from .status import Status
 from .strike import strike
-from .values import chi_of, own_values, takes_log, with_coefficients, with_units
+from .values import chi_of, exact_restitution, own_values, takes_log, with_coefficients, with_units
 
 # points at which a step is shown, and at which it is integrated again
 SAMPLES, GAUSS = 4, 5
@@ -59,11 +59,13 @@ def follow(model: ForceModel, lanes: Lanes, *, rtol: float, max_steps: int) -> H
         values = with_coefficients(model, with_units(own_values(model, lanes), n), 1)
         law = motion.Law.of(model, n, bool(takes_log(model, chi_of(values, 1))[0]))
         columns = tuple(np.asarray(values[name]) for name in law.names)
-        struck = strike(law, columns, 1, rtol, max_steps, record=True)
+        creeps = exact_restitution(model, values, 1) == 0.0
+        struck = strike(law, columns, 1, rtol, max_steps, record=True, creeps=creeps)
     if struck.outward is None or struck.rebound.status[0] != Status.OK:
         return None
     inward = _phase(law, motion.approach(law), struck.inward.recorded, columns)
-    outward = _phase(law, motion.restitution(law), struck.outward.recorded, struck.columns)
+    back = motion.of_restitution(law)
+    outward = _phase(back, motion.restitution(back), struck.outward.recorded, struck.columns)
 
     residual = struck.columns[-1] if model.unloading is not None else np.zeros(1)
     unit_t = lanes.length / lanes.v0
