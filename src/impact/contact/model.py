@@ -86,6 +86,9 @@ class ForceModel:
     force : contact force of the whole contact, or of the approach phase where `unloading` is given
     unloading : contact force of the restitution phase
     residual : permanent indentation, from `peak` and the quantities of the contact
+    bends, unloading_bends : indentations at which `force`, or `unloading`, goes over to another formula, in the
+        order in which they are met; no step goes across. They ask for what is known beforehand, the latter for
+        `peak`, `force_at_peak` and `residual` too; NaN is none
     coefficients : formulas evaluated once per impact, by name; a later one may ask for an earlier one.
         `chi` is the dimensionless damping χ = λ v₀/K
     parameters : what the user gives in `[model.KEY]`
@@ -129,6 +132,8 @@ class ForceModel:
     domain: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     unloading: Formula | None = None
     residual: Formula | None = None
+    bends: tuple[Formula, ...] = ()
+    unloading_bends: tuple[Formula, ...] = ()
     coefficients: Mapping[str, Formula] = field(default_factory=dict)
     parameters: tuple[Parameter, ...] = ()
     oracle: Formula | None = None
@@ -142,12 +147,13 @@ class ForceModel:
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", self.key):
             raise ModelError(f'model key "{self.key}": wants kebab-case, such as "hunt-crossley-1975"')
-        if self.momentum == "log" and not (
-            "chi" in self.coefficients and {"elastic", "chi"} <= set(wishes(self.force))
-        ):
+        smooth = {"elastic", "chi"} <= set(wishes(self.force)) and not self.bends
+        if self.momentum == "log" and not ("chi" in self.coefficients and smooth):
             raise ModelError(
                 f'model {self.key}: momentum "log" wants a coefficient chi, and a force of elastic and chi'
             )
+        if self.unloading_bends and self.unloading is None:
+            raise ModelError(f"model {self.key}: unloading_bends: wants an unloading")
         self._check_fields()
         once = {*QUANTITIES, *(parameter.name for parameter in self.parameters)}
         for name, formula in self.coefficients.items():
@@ -156,6 +162,10 @@ class ForceModel:
         self._check("force", self.force, {*once, *IN_FORCE})
         self._check("unloading", self.unloading, {*once, *IN_FORCE, *IN_UNLOADING})
         self._check("residual", self.residual, {*once, "peak", "force_at_peak"})
+        for formula in self.bends:
+            self._check("bend", formula, once)
+        for formula in self.unloading_bends:
+            self._check("unloading bend", formula, {*once, *IN_UNLOADING})
         self._check("oracle", self.oracle, once)
 
     def _check_fields(self) -> None:
@@ -202,7 +212,8 @@ class ForceModel:
     def quantities(self) -> frozenset[str]:
         """The names of the quantities and parameters that the law's motion depends on."""
         own = {parameter.name for parameter in self.parameters}
-        formulas = (self.force, self.unloading, self.residual, *self.coefficients.values())
+        formulas = (self.force, self.unloading, self.residual, *self.bends, *self.unloading_bends,
+                    *self.coefficients.values())  # fmt: skip
         return frozenset(w for formula in formulas for w in wishes(formula) if w in QUANTITIES or w in own)
 
     @property

@@ -11,6 +11,7 @@ gives du/dσ = −χ p sᵖ⁻¹ xⁿ, which is not stiff for any χ.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,8 +31,11 @@ FAR = 1e8
 FLOOR = (1e-200, 1.0)
 # step of the difference that gives the rate of the force at the release, relative to s, at which it may vanish
 DIFFERENCE = 1e-7
+# what an unloading branch is told besides, in columns that follow the law's own
+BRANCH = ("peak", "force_at_peak", "residual")
 # the force of a law without damping is taken to be a power of s below this
 POWER = 16.0
+Event = Callable[[Array, Array, Columns], tuple[Array, Array]]
 
 
 @dataclass(frozen=True)
@@ -46,7 +50,7 @@ class Law:
     @classmethod
     def of(cls, model: ForceModel, n: float, log: bool) -> Law:
         """The law of a model, which draws on what the formulas of its motion ask for."""
-        formulas = (model.force, model.unloading, model.residual)
+        formulas = (model.force, model.unloading, model.residual, *model.bends, *model.unloading_bends)
         asked = {wish for formula in formulas for wish in wishes(formula)}
         own = {*model.quantities, *model.coefficients} - {"K", "m", "v0", "n"}
         return cls(model, n, tuple(sorted(asked & own)), log)
@@ -64,25 +68,29 @@ class Law:
         return np.asarray(np.expm1(momentum) / columns[self.names.index("chi")])
 
 
-def approach(law: Law) -> Problem:
-    """From contact to the largest indentation: v falls to zero."""
+def approach(law: Law, bend: int = 0) -> Problem:
+    """From contact to the largest indentation: v falls to zero; or to a bend of the force."""
+
+    def stop_event(y: Array, k: Array, columns: Columns) -> tuple[Array, Array]:
+        return y[1], k[1]
+
     return Problem(
         rates=_rates(law, law.model.force, None),
-        event=lambda y, k, columns: (y[1], k[1]),
+        event=_or_bend(stop_event, bend),
         lost=lambda y: np.asarray(y[0] > FAR),
         floor=FLOOR,
         watch=True,
     )
 
 
-def restitution(law: Law) -> Problem:
-    """From the largest indentation to the release: s, or the force, falls to zero.
+def restitution(law: Law, bend: int = 0) -> Problem:
+    """From the largest indentation to the release: s, or the force, falls to zero; or to a bend of the force.
 
     Where the law has an unloading branch, columns of the peak, the force there and the residual indentation
     follow the law's own.
     """
     branch = law.model.unloading
-    rates = _rates(law, branch or law.model.force, branch and ("peak", "force_at_peak", "residual"))
+    rates = _rates(law, branch or law.model.force, branch and BRANCH)
 
     def force_event(y: Array, k: Array, columns: Columns) -> tuple[Array, Array]:
         s, force = y[0], k[4]
@@ -101,7 +109,43 @@ def restitution(law: Law) -> Problem:
         return np.asarray(y[1] >= 0.0)
 
     event = force_event if law.model.release == "force" else gap_event
-    return Problem(rates=rates, event=event, lost=turned_back, floor=FLOOR)
+    return Problem(rates=rates, event=_or_bend(event, bend), lost=turned_back, floor=FLOOR)
+
+
+def _or_bend(event: Event, bend: int) -> Event:
+    """The event, or a bend at the s of the last column, whichever is sooner; `bend` is the direction of s."""
+    if not bend:
+        return event
+
+    def sooner(y: Array, k: Array, columns: Columns) -> tuple[Array, Array]:
+        g, dg = event(y, k, columns)
+        left, rate = bend * (columns[-1] - y[0]), -bend * k[0]
+        by_bend = (left < 0.0) | ((g > 0.0) & (left * dg > g * rate))
+        return np.where(by_bend, left, g), np.where(by_bend, rate, dg)
+
+    return sooner
+
+
+def bends(law: Law, columns: Columns, n: int, residual: Array | None = None) -> list[Array]:
+    """The s at which the force of a phase has a bend, in the order in which they are met; NaN is none.
+
+    Parameters
+    ----------
+    law : the law
+    columns : of the phase, each of shape (n,)
+    residual : permanent indentation, of the restitution phase; None on approach
+    """
+    model, own = law.model, len(law.names)
+    formulas = model.bends
+    if residual is not None:
+        # where one force is for both phases, its bends are met again on the way back
+        formulas = model.bends[::-1] if model.unloading is None else model.unloading_bends
+    given = dict(zip(BRANCH, columns[own:], strict=False))
+    found = []
+    for formula in formulas:
+        x = np.broadcast_to(law.call(formula, columns[:own], given), n) - (0.0 if residual is None else residual)
+        found.append(power(np.where(x > 0.0, x, np.nan), 1.0 / model.smooth))
+    return found
 
 
 def of_restitution(law: Law) -> Law:
@@ -153,7 +197,7 @@ def _rates(law: Law, formula: Formula, extra: tuple[str, ...] | None) -> Rates:
         s, v = y[0], law.velocity(y[1], columns)
         given = {"v": v}
         if extra:
-            given.update(zip(extra, columns[own:], strict=True))
+            given.update(zip(extra, columns[own:], strict=False))
             x = given["x"] = integer_power(s, p) + given["residual"]
             if elastic:
                 given["elastic"] = power(x, law.n)

@@ -12,6 +12,7 @@ from ..ode.problem import Columns, End, Outcome
 from ..ode.rk45 import integrate
 from ..ode.step import Space
 from . import motion
+from .phases import in_parts
 from .power import Array
 from .status import Status
 
@@ -102,7 +103,8 @@ def strike(
     creeps : which are known to part with no speed: where the indentation closes, it takes for ever
     """
     run = partial(integrate, rtol=rtol, max_steps=max_steps, record=record, space=Space.of(n))
-    inward = run(motion.approach(law), motion.start_of_approach(law, columns, n), columns)
+    start = motion.start_of_approach(law, columns, n)
+    inward = in_parts(run, partial(motion.approach, law), start, columns, motion.bends(law, columns, n), 1)
     peak = motion.indentation(law, inward.state[0])
     at_peak = motion.force_at_peak(law, inward.state[0], columns)
     residual, columns = motion.turn(law, columns, peak, at_peak)
@@ -127,7 +129,8 @@ def strike(
         return Struck(rebound, inward, None, columns, parts)
     back = motion.of_restitution(law)
     start = motion.start_of_restitution(law, peak[parts], residual[parts])
-    outward = run(motion.restitution(back), start, columns)
+    bends = motion.bends(back, columns, parts.size, residual[parts])
+    outward = in_parts(run, partial(motion.restitution, back), start, columns, bends, -1)
     rebound.e_out[parts] = -back.velocity(outward.state[1], columns)
     rebound.duration[parts] += outward.state[2]
     rebound.work[parts] += 2.0 * outward.state[3]

@@ -38,10 +38,11 @@ class Lanes:
 
     @classmethod
     def begin(cls, problem: Problem, start: Array, columns: Columns, space: Space) -> Lanes:
-        """All lanes at their start, with room for as many."""
+        """All lanes at their start, with room for as many; what the start does not tell of them is zero."""
         n = start.shape[1]
         y, k = space.y, space.k
-        y[:COMPONENTS], y[COMPONENTS:] = start, 0.0
+        y[: len(start)], y[len(start) :] = start, 0.0
+        start = start[:COMPONENTS]
         np.copyto(k, problem.rates(start, columns, k))
         return cls(
             index=np.arange(n),

@@ -43,7 +43,7 @@ def integrate(
     Parameters
     ----------
     problem : rates, event and error scale
-    start : components at the start, shape (2, n)
+    start : components at the start, shape (2, n); or all rows, of shape (4, n), where it goes on
     columns : what the rates need per lane, each of shape (n,)
     rtol : local error per step, relative to max(|y|, floor)
     max_steps : attempted steps after which a lane is given up
