@@ -35,7 +35,7 @@ regress-%: $(BIN)/impact
 	$(BIN)/impact sweep $(or $(wildcard tests/data/$*.toml),configs/$*.toml) -o $(RESULTS)/$*.h5 --overwrite --quiet --allow-failed
 	$(BIN)/impact compare $(RESULTS)/$*.h5 tests/data/$*.h5
 
-docs: $(VENV)/dev  ## regenerate docs/schema.md and the README's picture
+docs: $(VENV)/dev  ## regenerate docs/schema.md, docs/models.md and the README's picture
 	$(BIN)/python scripts/make_docs.py
 
 bench: $(VENV)/dev  ## measure the core against a solve_ivp loop

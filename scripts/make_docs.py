@@ -1,4 +1,4 @@
-"""Regenerate what the documentation takes from the program: docs/schema.md and the picture of the README.
+"""Regenerate what the documentation takes from the program: docs/schema.md, docs/models.md, the README's picture.
 
 python scripts/make_docs.py
 """
@@ -12,6 +12,8 @@ from impact.contact.status import Status
 from impact.data.history import HISTORY
 from impact.data.results import SCHEMA
 from impact.views.look import save_figure
+from models_page import models_page
+from models_pictures import curves
 
 ROOT = Path(__file__).parent.parent
 
@@ -51,7 +53,8 @@ told. More in [ci.md](ci.md).
 - `materials`, those that some ball has, as JSON from name to `E` [Pa], `nu`, `rho` [kg/m3] and `yield_strength`
   [Pa], null where it is not known.
 - `plugins`, models that are not built in, as JSON from key to `file`, the name of the model's Python file (null
-  where it was given as a value), and `sha256`, of that file, or of the value's source.
+  where it was given as a value), and `sha256`, of that file, or of the value's source; of an installed package `file`
+  is null, and `package` is its name and version.
 - `content_digest`, SHA-256 over names, dimensions, values and attributes of all variables and coordinates, and
   over the other attributes except `packages`.
 - In a baseline that `impact bless` made also its `reason`, and `tolerances`, those chosen for it, as JSON by
@@ -88,8 +91,21 @@ def schema_page() -> str:
     return SCHEMA_PAGE.format(**{name: "\n".join(rows) for name, rows in tables.items()})
 
 
+def write_curves(folder: Path) -> None:
+    """The small pictures of docs/models.md, and no others."""
+    folder.mkdir(exist_ok=True)
+    pictures = curves()
+    for left in folder.glob("*.svg"):
+        if left.name not in pictures:
+            left.unlink()
+    for name, picture in pictures.items():
+        (folder / name).write_text(picture, encoding="utf-8")
+
+
 def main() -> None:
     (ROOT / "docs" / "schema.md").write_text(schema_page(), encoding="utf-8")
+    (ROOT / "docs" / "models.md").write_text(models_page(), encoding="utf-8")
+    write_curves(ROOT / "docs" / "models")
     result = impact.sweep(ROOT / "configs" / "figure6.toml")
     save_figure(impact.plot(result), ROOT / "docs" / "figure6.png")
 

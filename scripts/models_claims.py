@@ -1,0 +1,135 @@
+"""Of docs/models.md: where laws do not do what is said of them, in numbers that are computed here."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from functools import cache
+
+import numpy as np
+
+from impact.contact.model import ForceModel
+from impact.contact.models import catalogue
+from impact.contact.status import Status
+from impact.sweeps.settings import Solver
+from models_measured import (
+    BOUNDS,
+    FEW_STEPS,
+    GRID,
+    ROUNDING,
+    SMALL,
+    delivers,
+    error,
+    largest,
+    laws,
+    measured,
+    number,
+    short,
+    swept,
+    table,
+)
+
+
+def claims() -> str:
+    """What laws are taken for, and the numbers against it."""
+    known = [law for law in laws() if "e" in law.quantities and delivers(law, GRID) is not None]
+    parts = (floors(known), claimed(), at_one(known), slopes(known), without_tension(known), hysteretic(), steps())
+    return "\n\n".join(part for part in parts if part)
+
+
+def at(law: ForceModel, e: float) -> float:
+    """The delivered restitution of a law that has a closed form."""
+    found = delivers(law, [e])
+    assert found is not None, law.key
+    return float(found[0])
+
+
+def law_table(head: Sequence[str], rows: Iterable[tuple[ForceModel, str]]) -> str:
+    """A table of laws; what is said of one is in cells apart by |."""
+    return table(("law", *head), ((f"`{law.key}`", *text.split("|")) for law, text in rows))
+
+
+def floors(known: Sequence[ForceModel]) -> str:
+    """Laws that cannot deliver little."""
+    rows = [(law, number(at(law, 0.0))) for law in known if at(law, 0.0) > ROUNDING]
+    return f"""\
+**A floor.** The damping of these stays finite at e = 0. However little is asked for, they deliver no less than
+
+{law_table(["e_out at e = 0"], rows)}"""
+
+
+def claimed() -> str:
+    """Laws that are off in the domain that their authors claim."""
+    rows = []
+    for law in laws():
+        low, high = law.domain.get("e", (np.inf, np.inf))
+        inside = (low - ROUNDING < GRID) & (high + ROUNDING > GRID)
+        if measured()[law.key].over == "e" and error(law)[inside].max(initial=0.0) > BOUNDS[0] - ROUNDING:
+            rows.append((law, f"{law.domain_text}|{largest(error(law)[inside], GRID[inside])}"))
+    return f"""\
+**Off where they are claimed.** By {BOUNDS[0]:g} or more within the domain that their authors name:
+
+{law_table(["claimed for", "largest error there"], rows)}"""
+
+
+def at_one(known: Sequence[ForceModel]) -> str:
+    """Laws with a loss where none is asked for."""
+    rows = [(law, number(at(law, 1.0))) for law in known if at(law, 1.0) < 1 - ROUNDING]
+    return f"""\
+**A loss at e = 1.** Asked for an elastic impact, these deliver
+
+{law_table(["e_out at e = 1"], rows)}"""
+
+
+def slope_at_one(law: ForceModel) -> float:
+    """de_out/de at e = 1, of second order in the distance."""
+    h = 1e-3
+    return (3 * at(law, 1.0) - 4 * at(law, 1.0 - h) + at(law, 1.0 - 2 * h)) / (2 * h)
+
+
+def slopes(known: Sequence[ForceModel]) -> str:
+    """Laws that are wrong to first order in 1 − e."""
+    whole = {law.key: slope_at_one(law) for law in known if at(law, 1.0) > 1 - ROUNDING}
+    off = [law for law in known if abs(whole.get(law.key, 1.0) - 1) > BOUNDS[0]]
+    rows = [(law, f"{number(whole[law.key], 3)}|{number(at(law, 0.9))}") for law in off]
+    return f"""\
+**Another slope at e = 1.** To be right for small losses a law needs de_out/de = 1 there. Where it is less, less is
+lost than is asked for, with 0.5 half of it; where it is more, more.
+
+{law_table(["de_out/de at e = 1", "e_out at e = 0.9"], rows)}"""
+
+
+def without_tension(known: Sequence[ForceModel]) -> str:
+    """Laws whose damping is meant for another end of the contact."""
+    with_tension = {f"{law.key}-no-tension" for law in known}
+    asked = (0.1, 0.5, 0.9)
+    rows = [(law, "|".join(number(at(law, e)) for e in asked)) for law in known if law.key in with_tension]
+    return f"""\
+**The damping of another end.** ζ = −ln e/√(π² + ln² e) delivers e where the contact lasts to zero indentation.
+Codes that use it and cut the tension off deliver more; `exact-dashpot-no-tension` has the ζ of that end.
+
+{law_table([f"e_out at e = {e:g}" for e in asked], rows)}"""
+
+
+def hysteretic() -> str:
+    """A law that delivers √e."""
+    law = catalogue()["kelvin-voigt-hysteretic"]
+    assert np.abs(measured()[law.key].e_out - np.sqrt(GRID)).max() < ROUNDING
+    return f"""\
+**A root.** `{law.key}` unloads with e K δ. That gives back the part e of the work, and so delivers √e,
+{number(at(law, 0.5))} at e = 0.5; with e² in the place of e it would deliver e."""
+
+
+@cache
+def steps() -> str:
+    """Laws that the program cannot integrate down to e = 0."""
+    dashpots = [law for law in laws() if "zeta" in law.coefficients and "e" in law.quantities]
+    found = swept(dashpots, quantity="status", solver={"max_steps": FEW_STEPS}, e=np.array(SMALL))
+    fails = [f"- `{key}`" for key, ends in found.items() if ends.tolist() == [Status.OK, Status.MAX_STEPS]]
+    if not fails:
+        return ""
+    return f"""\
+**A limit of the program.** ζ of a dashpot without tension, or on approach only, grows without bound as e goes to
+zero. At e = {short(SMALL[0])} these laws end within {FEW_STEPS:,} steps. At e = {short(SMALL[1])} they do not,
+nor within the {Solver().max_steps:,} of the default: the status is `max_steps`, and the answer NaN.
+
+{chr(10).join(fails)}"""

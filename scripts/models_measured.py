@@ -1,0 +1,165 @@
+"""What the laws of the catalogue deliver, for docs/models.md, and how its numbers and tables are written."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Literal
+
+import numpy as np
+
+import impact
+from impact.contact.lanes import in_own_units, stiffness
+from impact.contact.material import effective_mass, hertz_stiffness, sphere_radius
+from impact.contact.model import ForceModel
+from impact.contact.models import catalogue
+from impact.contact.power import Array
+from impact.contact.values import delivered
+
+GRID = np.arange(1, 201) / 200
+SPEEDS = np.logspace(-2, 1, 25)
+# the balls of Table 1 of Gharib and Hurmuzlu (2012), and what a law's own parameter is to them at 1 m/s
+BALLS = {"v1": 1.0, "m1": 1.0, "m2": 1.0, "material": "aluminium"}
+MATERIAL = {"E": 56e9, "nu": 0.3, "rho": 2712.0}
+DAMPING = 0.3
+# what is smaller is rounding or the solver's error, and turns no digit that is shown
+ROUNDING = 1e-9
+BOUNDS = (0.01, 0.05)
+# where laws of large damping are tried, and the steps they get: a sound one takes a quarter of them
+SMALL, FEW_STEPS = (1e-5, 1e-6), 1000
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What a law delivers: `e_out` over the restitution asked for, or over the closing speed at `settings`."""
+
+    over: Literal["e", "v0"]
+    e_out: Array
+    settings: dict[str, float]
+
+
+def laws() -> list[ForceModel]:
+    """The catalogue, each law once."""
+    return [model for model in catalogue().values() if not model.same_as]
+
+
+def driven(model: ForceModel) -> bool:
+    """Whether e is all that a law has to be given; so it is for one that has to be given nothing."""
+    needs = [one for one in model.parameters if one.default is None]
+    return not model.parameters or ("e" in model.quantities and not needs)
+
+
+@cache
+def measured() -> dict[str, Measured]:
+    """What every law delivers, by its key."""
+    exact = {model.key: delivers(model, GRID) for model in laws() if driven(model)}
+    found = {key: Measured("e", e_out, {}) for key, e_out in exact.items() if e_out is not None}
+    rest = [model for model in laws() if exact.get(model.key) is None]
+    over_e = swept([model for model in rest if driven(model)], e=GRID)
+    settings = {model.key: own_settings(model) for model in rest if not driven(model)}
+    over_v0 = swept([catalogue()[key] for key in settings], settings, v1=SPEEDS)
+    found |= {key: Measured("e", e_out, {}) for key, e_out in over_e.items()}
+    return found | {key: Measured("v0", e_out, settings[key]) for key, e_out in over_v0.items()}
+
+
+def delivers(model: ForceModel, e: Array | Sequence[float]) -> Array | None:
+    """See `delivered`; at e = 0 some formulas divide by zero, and mean it."""
+    with np.errstate(all="ignore"):
+        return delivered(model, np.asarray(e, dtype=float))
+
+
+def swept(
+    models: Iterable[ForceModel],
+    own: dict[str, dict[str, float]] | None = None,
+    quantity: str = "e_out",
+    solver: dict[str, object] | None = None,
+    **axes: object,
+) -> dict[str, Array]:
+    """A quantity of laws by key, integrated for the balls of Table 1 over axes of a sweep."""
+    keys = [model.key for model in models]
+    if not keys:
+        return {}
+    lists = {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in axes.items()}
+    config = {
+        "models": keys, "sweep": {**BALLS, **lists}, "materials": {"aluminium": MATERIAL}, "model": own or {},
+        "solver": solver or {},
+    }  # fmt: skip
+    result = impact.sweep(config)
+    return {key: result[quantity].sel(model=key).values.ravel() for key in keys}
+
+
+def own_settings(model: ForceModel) -> dict[str, float]:
+    """The values of a law's own parameters for its curve, in SI, and of K where its exponent is its own."""
+    n = model.exponent or 1.5
+    mass, speed = np.array([BALLS["m1"]], dtype=float), np.array([BALLS["v1"]], dtype=float)
+    E, nu, rho = (np.array([value]) for value in MATERIAL.values())
+    radius = sphere_radius(mass, rho)
+    m = effective_mass(mass, mass)
+    K = stiffness(np.array([n]), hertz_stiffness(E, nu, E, nu, radius, radius), m, speed)
+    units = {"m": m, "length": (m * speed * speed / K) ** (1 / (n + 1)), "v0": speed}
+    found = {} if model.exponent is None else {"K": float(K[0])}
+    for one in model.parameters:
+        size = np.prod([units[u] ** exponent for u, exponent in in_own_units(model, one.name, n).items()])
+        free = float(np.clip(DAMPING * size, one.least, one.most))
+        found[one.name] = free if one.default is None else one.default
+    return found
+
+
+def number(value: float, digits: int = 4) -> str:
+    """A number for the page; what lies between two of them goes up on every machine."""
+    return f"{value + ROUNDING:.{digits}f}"
+
+
+def error(model: ForceModel) -> Array:
+    """|e_out − e| over the grid."""
+    return np.asarray(np.abs(measured()[model.key].e_out - GRID))
+
+
+def within(errors: Array, bound: float) -> str:
+    """Where errors are below a bound, as intervals of the grid; those at the bound are not."""
+    inside = errors < bound - ROUNDING
+    edges = np.flatnonzero(np.diff(inside, prepend=False, append=False)).tolist()
+    runs = zip(GRID[edges[::2]], GRID[[end - 1 for end in edges[1::2]]], strict=True)
+    return ", ".join(map(interval, runs)) or "nowhere"
+
+
+def interval(ends: tuple[float, float]) -> str:
+    """An interval of the grid in words.
+
+    >>> interval((0.005, 0.3)), interval((0.2, 0.3)), interval((0.9, 1.0)), interval((0.005, 1.0))
+    ('≤ 0.3', '0.2 to 0.3', '≥ 0.9', 'all')
+    """
+    first, last = ends[0] == GRID[0], ends[1] == GRID[-1]
+    if first or last:
+        return "all" if first and last else f"≤ {ends[1]:g}" if first else f"≥ {ends[0]:g}"
+    return f"{ends[0]:g} to {ends[1]:g}"
+
+
+def largest(errors: Array, e: Array = GRID) -> str:
+    """The largest of some errors, and where."""
+    place = int(np.argmax(np.round(errors, 10)))
+    return f"{number(errors[place])} at {e[place]:g}" if errors[place] > ROUNDING else "none"
+
+
+def short(value: float) -> str:
+    """A number of any size in three digits."""
+    return f"{float(f'{value:.3g}'):g}".replace("e-0", "e-")
+
+
+def cell(text: str) -> str:
+    """Text in a cell of a Markdown table."""
+    return "".join("\\" + letter if letter in "|*_<\\" else letter for letter in text)
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A Markdown table."""
+    return "\n".join(f"| {' | '.join(row)} |" for row in (head, ["---"] * len(head), *rows))
+
+
+def formula(text: str) -> str:
+    """A formula in a cell: its line is broken behind a comma and where it has two spaces, nowhere else."""
+    return ", ".join(
+        " ".join(part.replace(" ", "\N{NO-BREAK SPACE}") for part in piece.split("  "))
+        for piece in cell(text).replace(",  ", ", ").split(", ")
+    )
