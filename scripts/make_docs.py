@@ -53,8 +53,8 @@ told. More in [ci.md](ci.md).
 - `materials`, those that some ball has, as JSON from name to `E` [Pa], `nu`, `rho` [kg/m3] and `yield_strength`
   [Pa], null where it is not known.
 - `plugins`, models that are not built in, as JSON from key to `file`, the name of the model's Python file (null
-  where it was given as a value), and `sha256`, of that file, or of the value's source; of an installed package `file`
-  is null, and `package` is its name and version.
+  where it was given as a value), and `sha256`, of that file, or of the value's source; of an installed package
+  `file` is null, and `package` is its name and version.
 - `content_digest`, SHA-256 over names, dimensions, values and attributes of all variables and coordinates, and
   over the other attributes except `packages`.
 - In a baseline that `impact bless` made also its `reason`, and `tolerances`, those chosen for it, as JSON by
