@@ -1,0 +1,146 @@
+"""Elastic-plastic laws: a yield on approach, an elastic recovery on restitution; the restitution falls with speed.
+
+A yield strength is that of the softer ball. E* and R* are those of equation (12): where the stiffness K is given,
+E* is 3 K/(4 √R*).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..model import ForceModel, Formula, Parameter
+from ..oracles import luding_restitution, thornton_restitution
+from ..power import Array, power
+
+# E*, R* and the yield strength, for the laws that are written in them
+CONTACT: dict[str, Formula] = {
+    "R": lambda R1, R2: 1 / (1 / R1 + 1 / R2),
+    "E": lambda K, R: 0.75 * K / np.sqrt(R),
+    "Y": lambda yield_strength1, yield_strength2: np.minimum(yield_strength1, yield_strength2),
+}
+
+
+def recovery(stretch: Array, full: Array, force: Array) -> Array:
+    """Hertzian recovery: F = force at full stretch, and goes as its power 3/2."""
+    return force * power(stretch / full, 1.5)
+
+
+WALTON_BRAUN_VARIABLE = ForceModel(
+    key="walton-braun-variable",
+    title="Walton and Braun, variable unloading",
+    year=1986,
+    equation="F = K δ, then F = K₂(δ − δₚ),  K₂ = K + S Fₘ,  δₚ = δₘ(1 − K/K₂)",
+    reference="Walton OR, Braun RL (1986) Viscosity, granular-temperature, and stress calculations for shearing "
+    "assemblies of inelastic, frictional disks. J. Rheol. 30, 949",
+    doi="10.1122/1.549893",
+    evidence="formula and DOI from memory",
+    parameters=(Parameter("S", "1/m", "growth of the unloading stiffness with the force", least=0.0),),
+    force=lambda elastic: elastic,
+    unloading=lambda x, residual, force_at_peak, K, S: (K + S * force_at_peak) * (x - residual),
+    residual=lambda peak, force_at_peak, K, S: peak * (S * force_at_peak / (K + S * force_at_peak)),
+    # with ω₀ = √(K/m): e² = K/K₂, and Fₘ = K v₀/ω₀
+    oracle=lambda K, m, v0, S: np.sqrt(1 / (1 + S * v0 / np.sqrt(K / m))),
+    exponent=1.0,
+    family="elastic-plastic",
+)
+
+LUDING_2008 = ForceModel(
+    key="luding-2008",
+    title="Luding, adhesive",
+    year=2008,
+    equation="F = K δ to δ*, then k₂(δ − δ₀*);  back F = max(k(δ − δ₀), −k_c δ),  k = K + (k₂ − K) δₘ/δ*,  "
+    "δ₀ = (1 − K/k)δₘ,  δ* = k₂/(k₂ − K) φ 2R*",
+    reference="Luding S (2008) Cohesive, frictional powders: contact models for tension. Granul. Matter 10, 235",
+    doi="10.1007/s10035-008-0099-x",
+    evidence="formula and DOI from memory; without the dashpot that may stand beside it",
+    parameters=(
+        Parameter("k2", "1", "largest unloading stiffness k₂ over K", least=1.0),
+        Parameter("kc", "1", "adhesive stiffness k_c over K", default=0.0, least=0.0),
+        Parameter("phi", "1", "plasticity depth φ", default=0.05, least=1e-6, most=10.0),
+    ),
+    # 1/δ*, which is zero where nothing yields
+    coefficients={"R": CONTACT["R"], "shallow": lambda k2, R, phi: (k2 - 1) / (k2 * phi * 2 * R)},
+    bends=(lambda shallow: np.divide(1, shallow),),
+    force=lambda x, K, k2, shallow: K * (x + (k2 - 1) * np.maximum(x - np.divide(1, shallow), 0)),
+    unloading=lambda x, peak, force_at_peak, K, k2, kc, shallow: np.maximum(
+        force_at_peak - K * stiffer(peak, k2, shallow) * (peak - x), -kc * K * x
+    ),
+    # where nothing pulls, the balls part at δ₀
+    residual=lambda peak, force_at_peak, K, k2, kc, shallow: np.where(
+        kc > 0, 0, peak - force_at_peak / (K * stiffer(peak, k2, shallow))
+    ),
+    unloading_bends=(
+        lambda peak, force_at_peak, K, k2, kc, shallow: (
+            (stiffer(peak, k2, shallow) * peak - force_at_peak / K) / (stiffer(peak, k2, shallow) + kc)
+        ),
+    ),
+    oracle=lambda K, m, v0, k2, kc, shallow: luding_restitution(v0 * np.sqrt(m / K), k2, kc, shallow),
+    exponent=1.0,
+    family="elastic-plastic",
+)
+
+
+def stiffer(peak: Array, k2: Array, shallow: Array) -> Array:
+    """The unloading stiffness of Luding's law over K, which grows with the peak up to k₂."""
+    return 1 + (k2 - 1) * np.minimum(peak * shallow, 1)
+
+
+THORNTON_1997 = ForceModel(
+    key="thornton-1997",
+    title="Thornton",
+    year=1997,
+    equation="F = K δ^(3/2) to δ_y, then F_y + π p_y R*(δ − δ_y);  back F = (4/3)E* √Rₚ (δ − δₚ)^(3/2),  "
+    "δ_y = (π p_y/(2E*))² R*,  Rₚ = (4E*/(3Fₘ))((2Fₘ + F_y)/(2π p_y))^(3/2)",
+    reference="Thornton C (1997) Coefficient of restitution for collinear collisions of elastic-perfectly plastic "
+    "spheres. J. Appl. Mech. 64, 383; Thornton C, Ning Z (1998) Powder Technol. 99, 154",
+    doi="10.1115/1.2787319",
+    evidence="reference seen, formula and DOI from memory; p_y over the yield strength is a usual value",
+    parameters=(Parameter("c", "1", "contact yield pressure over the yield strength", 1.6, 0.1, 10.0),),
+    coefficients={
+        **CONTACT,
+        "py": lambda Y, c: c * Y,
+        "dy": lambda E, R, py: np.pi * py / (2 * E) * (np.pi * py / (2 * E)) * R,
+        "Fy": lambda K, dy: K * power(dy, 1.5),
+    },
+    bends=(lambda dy: dy,),
+    force=lambda elastic, x, R, py, dy, Fy: np.where(x < dy, elastic, Fy + np.pi * py * R * (x - dy)),
+    unloading=lambda x, peak, residual, force_at_peak: recovery(x - residual, peak - residual, force_at_peak),
+    residual=lambda peak, force_at_peak, R, E, py, dy, Fy: np.where(
+        peak <= dy,
+        0.0,
+        peak - power(0.75 * force_at_peak / (E * np.sqrt(thornton_radius(force_at_peak, E, py, Fy))), 2 / 3),
+    ),
+    oracle=lambda K, m, v0, dy: thornton_restitution(np.sqrt(0.8 * K / m * power(dy, 2.5)) / v0),
+    exponent=1.5,
+    family="elastic-plastic",
+)
+
+
+def thornton_radius(force_at_peak: Array, E: Array, py: Array, Fy: Array) -> Array:
+    """The radius of curvature that the plastic flow has left."""
+    return 4 * E / (3 * force_at_peak) * power((2 * force_at_peak + Fy) / (2 * np.pi * py), 1.5)
+
+
+JOHNSON_1985 = ForceModel(
+    key="johnson-1985",
+    title="Johnson, fully plastic",
+    year=1985,
+    equation="F = 2π R* p_d δ;  back F = Fₘ((δ − δₚ)/(δₘ − δₚ))^(3/2),  δₘ − δₚ = 3Fₘ/(4 a E*),  a² = 2R*δₘ",
+    reference="Johnson KL (1985) Contact mechanics, chapter 11. Cambridge University Press",
+    evidence="formula from memory; p_d over the yield strength is a usual value; no DOI known",
+    parameters=(Parameter("c", "1", "dynamic yield pressure over the yield strength", 3.0, 0.1, 30.0),),
+    coefficients={**CONTACT, "pd": lambda Y, c: c * Y},
+    force=lambda x, R, pd: 2 * np.pi * R * pd * x,
+    unloading=lambda x, peak, residual, force_at_peak: recovery(x - residual, peak - residual, force_at_peak),
+    # too slow an impact is not fully plastic: it would recover more than it went in
+    residual=lambda peak, force_at_peak, R, E: (
+        peak - np.minimum(0.75 * force_at_peak / (np.sqrt(2 * R * peak) * E), peak)
+    ),
+    # e² = (4/5)(δₘ − δₚ)/δₘ, with m v₀² = 2π R* p_d δₘ²
+    oracle=lambda m, v0, R, E, pd: np.sqrt(
+        0.8 * np.minimum(1.5 * np.pi * pd / E * np.sqrt(0.5 * R / (v0 * np.sqrt(m / (2 * np.pi * R * pd)))), 1.0)
+    ),
+    smooth=2,
+    exponent=1.5,
+    family="elastic-plastic",
+)
