@@ -11,6 +11,8 @@ from ..ode.problem import Array, Columns, End, Outcome, Problem, Step
 
 # a part ended at its bend where what remains of s is this fraction of it; one that stops there stops for good
 AT, STOPPED = 1e-9, 1e-9
+# so far beyond it, of s, the next part begins: where the law is the other formula for sure
+BEYOND = 1e-13
 
 Run = Callable[[Problem, Array, Columns], Outcome]
 
@@ -56,7 +58,7 @@ def in_parts(
         further = part.end == End.LANDED
         if bend is not None:
             further &= (np.abs(part.state[0] - at) <= AT * np.abs(at)) & (np.abs(part.state[1]) > STOPPED)
-            part.state[0] = np.where(further, at, part.state[0])
+            part.state[0] = np.where(further, at * (1.0 + ahead * BEYOND), part.state[0])
             state[:, where] = part.state
             todo[where] = further
     return replace(total, recorded=tuple(recorded))

@@ -139,7 +139,7 @@ def cross_faults(data: Mapping[str, object], models: Sequence[ForceModel], n: fl
         for parameter in model.parameters:
             if parameter.default is None and parameter.name not in table:
                 about = f"missing, wants {of_parameter(parameter).wants}: {parameter.meaning}"
-                other = "" if named else f'; or models = [..., "!{model.key}"]'
+                other = "" if named or len(models) == 1 else f'; or models = [..., "!{model.key}"]'
                 yield ("model", model.key, parameter.name), about + other
 
 

@@ -1,4 +1,4 @@
-"""Names under which a law of the catalogue was published again: selectable, and the same to the bit."""
+"""Names under which a law of the catalogue was published again: selectable, the same law to the bit."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ YE_2009_HERTZ = same_law(
     reference="Ye K, Li L, Zhu H (2009) A note on the Hertz contact model with nonlinear damping for pounding "
     "simulation. EESD 38, 1135",
     doi="10.1002/eqe.883",
-    evidence="formula seen in the source of OpenSees; two years before flores-2011",
+    evidence="formula and DOI seen, in the source of OpenSees; two years before flores-2011",
 )
 
 KHATIWADA_2014 = same_law(
@@ -79,7 +79,7 @@ JACOBS_WALDRON_2015 = same_law(
     reference="Jacobs DA, Waldron KJ (2015) Modeling inelastic collisions with the Hunt-Crossley model using the "
     "energetic coefficient of restitution. J. Comput. Nonlinear Dyn. 10, 021001",
     doi="10.1115/1.4028473",
-    evidence="the exact relation from memory; the approximation that the paper prints is not reproduced here",
+    evidence="the exact relation and DOI from memory; the approximation that the paper prints is not reproduced",
 )
 
 SCHAFER_1996 = same_law(

@@ -51,7 +51,5 @@ BORDBAR_HYPPANEN_2007 = ForceModel(
     exponent=1.5,
     force=lambda elastic, x, v, C: elastic + C * power(x, 0.65) * v,
     release="force",
-    # s^(0.65 p) is not smooth for any p of use: the higher the power, the less it shows
-    smooth=8,
     family="rate-dependent",
 )

@@ -15,4 +15,5 @@ from .hysteresis import damped_peak_indentation as damped_peak_indentation
 from .hysteresis import delivered_restitution as delivered_restitution
 from .hysteresis import exact_damping_ratio as exact_damping_ratio
 from .plastic import luding_restitution as luding_restitution
+from .plastic import muthukumar_restitution as muthukumar_restitution
 from .plastic import thornton_restitution as thornton_restitution

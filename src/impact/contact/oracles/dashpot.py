@@ -71,7 +71,9 @@ def approach_restitution(zeta: Array | float) -> Array:
     >>> approach_restitution(np.array([0.0, 0.5, 1.0])).round(6)
     array([1.      , 0.546293, 0.367879])
     """
-    return np.asarray(np.sqrt(force_restitution(zeta)))
+    zeta = np.asarray(zeta, dtype=float)
+    finite = np.where(np.isinf(zeta), 1.0, zeta)
+    return np.where(np.isinf(zeta), 0.0, np.exp(-_until_peak(finite)))
 
 
 def gap_damping(e: Array | float) -> Array:

@@ -86,7 +86,7 @@ def _work_to_peak(chi: Array) -> Array:
     """xₘ^(n+1)/(n+1), the elastic work up to the peak over m v₀²: (χ − ln(1 + χ))/χ²."""
     small = chi < SMALL_CHI
     safe = np.where(small | np.isinf(chi), 1.0, chi)
-    series = _series((1 / 2, -1 / 3, 1 / 4, -1 / 5, 1 / 6, -1 / 7), np.where(small, chi, 0.0))
+    series = _series((1 / 2, -1 / 3, 1 / 4, -1 / 5, 1 / 6, -1 / 7, 1 / 8, -1 / 9), np.where(small, chi, 0.0))
     integral = np.where(small, series, (safe - np.log1p(safe)) / integer_power(safe, 2))
     return np.where(np.isinf(chi), 0.0, integral)
 

@@ -54,3 +54,26 @@ def luding_restitution(size: Array | float, k2: Array, kc: Array, shallow: Array
     rest = peak - force / k
     back = force * force / k - k * kc / (k + kc) * rest * rest
     return np.asarray(np.sqrt(np.maximum(back, 0.0)) / size)
+
+
+def muthukumar_restitution(root: Array | float, K1: Array, K2: Array, depth: Array) -> Array:
+    """The restitution of a bilinear loading, K₁ to a depth and then K₂, that goes back along K₁ to the line K₂ δ.
+
+    The approach takes K₂ δₘ²/2 and, of the difference K₁ − K₂, depth²/2 + depth (δₘ − depth); what K₁ − K₂ gives
+    back is the triangle of height (K₁ − K₂) depth on K₁'s way to the line, (K₁ − K₂) depth²/2. So δₘ follows from
+    the energy, and the loss is (K₁ − K₂) depth (δₘ − depth).
+
+    Parameters
+    ----------
+    root : v₀ √m, any shape
+    K1, K2 : stiffnesses
+    depth : where the loading goes over from the one to the other
+
+    >>> muthukumar_restitution(np.array([0.1, 10.0]), np.array(2.0), np.array(1.0), np.array(1.0)).round(6)
+    array([1.      , 0.909053])
+    """
+    more = K1 - K2
+    beyond = root * root - K1 * depth * depth
+    # K₁ depth y + K₂ y²/2 is half of what is beyond
+    y = np.maximum(beyond, 0.0) / (K1 * depth + np.sqrt(K1 * K1 * depth * depth + K2 * np.maximum(beyond, 0.0)))
+    return np.asarray(np.sqrt(1.0 - 2.0 * more * depth * y / (root * root)))

@@ -1,0 +1,85 @@
+"""An elastic-plastic law fitted to finite elements, and a bilinear one of pounding; see also `elastoplastic`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..model import ForceModel, Parameter
+from ..oracles import muthukumar_restitution
+from ..power import Array, power
+from .elastoplastic import CONTACT, recovery
+
+
+def softer(nu1: Array, nu2: Array, Y1: Array, Y2: Array) -> Array:
+    """Poisson's ratio of the ball that yields; of two equally strong ones that at which they yield first."""
+    return np.where(Y1 < Y2, nu1, np.where(Y1 > Y2, nu2, np.minimum(nu1, nu2)))
+
+
+JACKSON_GREEN_2010 = ForceModel(
+    key="jackson-green-2010",
+    title="Jackson, Green and Marghitu",
+    year=2010,
+    equation="F = F_c w^(3/2) to w = 1.9, then F_c[exp(−w^(5/12)/4) w^(3/2) + (4H/(C Y))(1 − exp(−w^(5/9)/25)) "
+    "w];  "
+    "back F = Fₘ((δ − δₚ)/(δₘ − δₚ))^(3/2),  δₚ = 1.02 δₘ(1 − ((wₘ + 5.9)/6.9)^−0.54);  w = δ/δ_c",
+    reference="Jackson RL, Green I (2005) A finite element study of elasto-plastic hemispherical contact "
+    "against a "
+    "rigid flat. J. Tribol. 127, 343; Jackson RL, Green I, Marghitu DB (2010) Nonlinear Dyn. 60, 217",
+    doi="10.1007/s11071-009-9591-z",
+    evidence="formula and DOI from memory; no loss below w = 1.9, where the fit of e in the paper has one from "
+    "w = 1",
+    coefficients={
+        **CONTACT,
+        "nu": lambda nu1, nu2, yield_strength1, yield_strength2: softer(
+            nu1, nu2, yield_strength1, yield_strength2
+        ),
+        "C": lambda nu: 1.295 * np.exp(0.736 * nu),
+        "dc": lambda E, R, Y, C: np.pi * C * Y / (2 * E) * (np.pi * C * Y / (2 * E)) * R,
+        "Fc": lambda K, dc: K * power(dc, 1.5),
+        "B": lambda E, Y: 0.14 * np.exp(np.minimum(23 * Y / E, 700)),
+    },
+    bends=(lambda dc: 1.9 * dc,),
+    force=lambda elastic, x, R, C, dc, Fc, B: np.where(
+        x < 1.9 * dc, elastic, Fc * jackson_green(np.maximum(x / dc, 1.9), x / R, C, B)
+    ),
+    unloading=lambda x, peak, residual, force_at_peak: recovery(x - residual, peak - residual, force_at_peak),
+    residual=lambda peak, dc: np.where(
+        peak > 1.9 * dc, 1.02 * peak * (1 - np.power((np.maximum(peak / dc, 1.9) + 5.9) / 6.9, -0.54)), 0
+    ),
+    exponent=1.5,
+    family="elastic-plastic",
+)
+
+
+def jackson_green(w: Array, slope: Array, C: Array, B: Array) -> Array:
+    """F/F_c beyond w = 1.9; `slope` is δ/R, and H falls with the contact radius a, a² = R δ (w/1.9)^B."""
+    ratio = np.sqrt(slope * np.exp(B * np.log(w / 1.9)))
+    hardness = 2.84 - 0.92 * (1 - np.cos(np.pi * ratio))
+    plastic = 4 * hardness / C * (1 - np.exp(-np.power(w, 5 / 9) / 25)) * w
+    return np.asarray(np.exp(-np.power(w, 5 / 12) / 4) * power(w, 1.5) + plastic)
+
+
+MUTHUKUMAR_2003 = ForceModel(
+    key="muthukumar-2003",
+    title="Muthukumar, bilinear",
+    year=2003,
+    equation="F = K₁ δ to d/10, then K₂;  back K₁ to the line K₂ δ, then along it;  K₁ = K d^(n−1) + 10 D,  "
+    "K₂ = K d^(n−1) − (10/9) D,  D = K d^(n−1)(1 − e²)/(n + 1)",
+    reference="Muthukumar S (2003) A contact element approach with hysteresis damping for the analysis and "
+    "design of "
+    "pounding in bridges. PhD thesis, Georgia Institute of Technology",
+    evidence="formula from memory, as the ImpactMaterial of OpenSees has it; no DOI known",
+    parameters=(Parameter("d", "m", "indentation that the law is designed for", least=1e-9),),
+    coefficients={
+        "loss": lambda e, n: (1 - e * e) / (n + 1),
+        "base": lambda K, n, d: K * power(d, n - 1),
+        "K1": lambda base, loss: base * (1 + 10 * loss),
+        "K2": lambda base, loss: base * (1 - 10 * loss / 9),
+    },
+    bends=(lambda d: 0.1 * d,),
+    force=lambda x, K1, K2, d: K2 * x + (K1 - K2) * np.minimum(x, 0.1 * d),
+    unloading=lambda x, peak, force_at_peak, K1, K2: np.maximum(force_at_peak - K1 * (peak - x), K2 * x),
+    unloading_bends=(lambda peak, force_at_peak, K1, K2: (K1 * peak - force_at_peak) / (K1 - K2),),
+    oracle=lambda m, v0, K1, K2, d: muthukumar_restitution(v0 * np.sqrt(m), K1, K2, 0.1 * d),
+    family="elastic-plastic",
+)

@@ -1,0 +1,228 @@
+"""Laws are chosen by name, family and pattern, left out by "!", and say where they are from and where they end."""
+
+import re
+
+import numpy as np
+import pytest
+
+import impact
+from impact.api import Impact
+from impact.contact.models import built_in, catalogue, find
+from impact.errors import ConfigError
+from impact.sweeps.config import Config, read_config
+from impact.sweeps.rules import expand_models
+
+BALLS = {"v1": 1.0, "v2": -0.5, "m1": 1.0, "m2": 2.0}
+NAMES = {key: model.same_as for key, model in catalogue().items() if model.same_as}
+LAWS = [key for key in catalogue() if key not in NAMES]
+# parameters of which a law takes much of the energy, at the stiffness of `shot`
+PARAMETERS = {
+    "kelvin-voigt": {"C": 5e4}, "kelvin-voigt-no-tension": {"C": 5e4}, "schafer-1996": {"C": 5e4},
+    "kuwabara-kono-1987": {"A": 3e-5}, "lee-herrmann-1993": {"gamma": 1e4}, "bordbar-hyppanen-2007": {"C": 4e6},
+}  # fmt: skip
+DAMPED = [key for key in LAWS if find(key).family in ("dashpot", "rate-dependent")]
+WITHOUT_TENSION = [key for key in DAMPED if find(key).release == "force"]
+WITH_TENSION = [key for key in DAMPED if find(key).release == "gap"]
+
+
+def shot(key: str, e: float = 0.4) -> Impact:
+    """One impact of a law, at its own exponent where it has one."""
+    own = {"model": {key: PARAMETERS[key]}} if key in PARAMETERS else {}
+    return impact.run({"models": key, "sweep": {**BALLS, "e": e, "K": 6e9, "n": find(key).exponent or 1.5}, **own})
+
+
+@pytest.mark.parametrize("key", ["anagnostopoulos-1988", "tsuji-1992"])
+@pytest.mark.parametrize(
+    ("e", "e_out"), [(0.1, "0.2527"), (0.3, "0.3971"), (0.5, "0.5503"), (0.7, "0.7182"), (0.9, "0.9020")]
+)
+def test_without_tension_more_is_given_back(key, e, e_out):
+    assert shot(key, e).values["e_out"] == pytest.approx(e, abs=1e-9)
+    assert f"{shot(f'{key}-no-tension', e).values['e_out']:.4f}" == e_out
+
+
+def test_without_tension_more_is_given_back_by_the_same_dashpot():
+    pulls, not_pulls = (shot(key).values["e_out"] for key in ("kelvin-voigt", "kelvin-voigt-no-tension"))
+    assert not_pulls > pulls + 0.01
+
+
+@pytest.mark.parametrize("key", WITHOUT_TENSION)
+def test_a_law_without_tension_ends_where_its_force_does_and_never_pulls(key):
+    one = shot(key)
+    history = one.history
+    assert one.values["e_out"] < 0.9
+    assert history["F"].min() >= -1e-12 * history["F"].max()
+    assert abs(history["F"].values[-1]) <= 1e-12 * history["F"].max()
+    # the balls still touch there: what is left of the indentation is not forced out
+    assert history["delta"].values[-1] > 1e-3 * one.values["peak_indentation"]
+    assert history["delta"].values[-1] == pytest.approx(one.values["permanent_indentation"], rel=1e-9)
+
+
+@pytest.mark.parametrize("key", WITH_TENSION)
+def test_a_dashpot_to_the_end_of_the_gap_pulls_before_it(key):
+    one = shot(key)
+    assert one.history["F"].min() < -0.1 * one.history["F"].max()
+    assert abs(one.history["delta"].values[-1]) <= 1e-12 * one.values["peak_indentation"]
+
+
+def test_names_of_a_law_are_those_of_a_law_that_is_there():
+    assert len(NAMES) >= 6
+    assert set(NAMES.values()) <= set(LAWS)
+
+
+@pytest.mark.parametrize("key", NAMES)
+def test_a_law_is_the_same_to_the_bit_under_either_name(key):
+    law = NAMES[key]
+    own = {name: PARAMETERS[name] for name in (law, key) if name in PARAMETERS}
+    result = impact.sweep(
+        {
+            "models": [law, key],
+            "sweep": {
+                **BALLS, "e": np.linspace(0.0, 1.0, 21).tolist(), "v1": [0.1, 10.0], "K": 6e9,
+                "n": find(law).exponent or 1.3,
+            },
+            **({"model": own} if own else {}),
+        }
+    )  # fmt: skip
+    one, other = (result.sel(model=name) for name in (law, key))
+    assert np.ptp(one["v1_post"].values) > 0.5
+    # the domain is what the authors of the first name claim; those of the other are not known to claim any
+    for name in set(result.data_vars) - {"in_domain"}:
+        assert one[name].values.tobytes() == other[name].values.tobytes(), name
+    assert np.all(other["in_domain"] == 1)
+
+
+def chosen(asked: object) -> list[str]:
+    models, faults = expand_models(asked, catalogue())
+    assert not faults
+    return [model.key for model in models]
+
+
+def test_a_second_name_is_chosen_by_itself_and_by_a_pattern_only():
+    assert chosen("all") == LAWS
+    families = {model.family for model in catalogue().values()}
+    assert sorted(key for family in families for key in chosen(f"family:{family}")) == sorted(LAWS)
+    for key in NAMES:
+        assert chosen(key) == [key]
+        assert chosen(["hertz", f"{key[:-1]}?"]) == ["hertz", key]
+    assert set(chosen("*")) == set(catalogue())
+
+
+@pytest.mark.parametrize(
+    ("asked", "out"),
+    [
+        (["all", "!hertz"], {"hertz"}),
+        (["all", "!family:permanent"], {key for key in LAWS if find(key).family == "permanent"}),
+        (["all", "!*-no-tension"], {key for key in LAWS if key.endswith("-no-tension")}),
+        (
+            ["all", "!kelvin-*", "!family:rate-dependent"],
+            {key for key in LAWS if key.startswith("kelvin-") or find(key).family == "rate-dependent"},
+        ),
+        # what is after an exclusion is not left out by it
+        (["all", "!hertz", "!bilinear", "hertz"], {"bilinear"}),
+    ],
+)
+def test_what_is_after_an_exclamation_mark_is_left_out(asked, out):
+    left = chosen(asked)
+    assert len(out) >= 1
+    assert set(left) == set(LAWS) - out
+    assert len(left) == len(set(left))
+
+
+def test_order_counts_when_laws_are_left_out():
+    assert chosen(["family:elastic", "!hertz", "bilinear", "hertz"]) == ["bilinear", "hertz"]
+    assert chosen(["hertz", "bilinear", "!hertz"]) == ["bilinear"]
+    # a second name goes without its law, and a law without its second name
+    assert chosen(["flores-2011", "ye-2009-*", "!ye-2009-hertz"]) == ["flores-2011", "ye-2009-kelvin"]
+    assert chosen(["flores-2011", "ye-2009-hertz", "!flores-2011"]) == ["ye-2009-hertz"]
+
+
+def config_of(asked: object, **own: object) -> Config:
+    steel = {"E": 210e9, "nu": 0.3, "rho": 7850.0, "yield_strength": 3e8}
+    tables = {"sweep": {**BALLS, "e": 0.5, "material": "steel"}, "materials": {"steel": steel}}
+    return read_config({"models": asked, **tables, **({"model": own} if own else {})}, (), ())
+
+
+def problems(asked: object) -> list[str]:
+    with pytest.raises(ConfigError) as caught:
+        config_of(asked)
+    return list(caught.value.problems)
+
+
+NOTHING_BEFORE = "wants models to leave out of those before it"
+
+
+@pytest.mark.parametrize(
+    ("asked", "line"),
+    [
+        ("!hertz", f'models: got "!hertz", {NOTHING_BEFORE}'),
+        (["!hertz", "hertz"], f'models[0]: got "!hertz", {NOTHING_BEFORE}'),
+        (["hertz", "!tsuji-1992"], f'models[1]: got "!tsuji-1992", {NOTHING_BEFORE}'),
+        (["hertz", "!family:permanent"], f'models[1]: got "!family:permanent", {NOTHING_BEFORE}'),
+        # "all" has each law once, under its first name
+        (["hertz", "bilinear", "!marhefka-*"], f'models[2]: got "!marhefka-*", {NOTHING_BEFORE}'),
+        (["hertz", "!hertzz"], 'models[1]: after !: got "hertzz", wants a model; did you mean "hertz"?'),
+        (["hertz", "!!hertz"], 'models[1]: after !: got "!hertz", wants a model; did you mean "hertz"?'),
+        (
+            ["hertz", "!family:dashpott"],
+            'models[1]: after !: got "family:dashpott", wants a family of models; did you mean "dashpot"?',
+        ),
+        (["hertz", "!zz*"], 'models[1]: after !: got "zz*", wants a pattern that some model matches'),
+        (["hertz", "!hertz"], "models: got a list, wants models that are not all left out again"),
+        (["all", "!all"], "models: got a list, wants models that are not all left out again"),
+    ],
+)
+def test_a_wrong_exclusion_is_told(asked, line):
+    assert problems(asked) == [f"config: {line}"]
+
+
+def test_an_exclusion_of_nothing_is_told_with_what_there_is():
+    (line,) = problems(["hertz", "!"])
+    assert line.startswith('config: models[1]: after !: got "", wants a model; known: ')
+
+
+def test_a_law_of_all_whose_parameter_is_missing_is_told_with_the_way_to_leave_it_out():
+    wanting = [key for key in LAWS if any(one.default is None for one in find(key).parameters)]
+    lines = problems("all")
+    assert list(dict.fromkeys(line.split(".")[1] for line in lines)) == wanting
+    assert (
+        "config: model.kuwabara-kono-1987.A: missing, wants a number of at least 0 s: dissipative constant of the "
+        'material; or models = [..., "!kuwabara-kono-1987"]'
+    ) in lines
+    # the advice of all lines together is right, and so is giving what is missing
+    advice = [re.search(r'; or models = \[\.\.\., "(!.*)"\]$', line) for line in lines]
+    left = config_of(["all", *dict.fromkeys(found[1] for found in advice if found)]).models
+    assert [model.key for model in left] == [key for key in LAWS if key not in wanting]
+    given = {
+        key: {one.name: min(max(1.0, one.least), one.most) for one in find(key).parameters if one.default is None}
+        for key in wanting
+    }
+    assert [model.key for model in config_of("all", **given).models] == LAWS
+
+
+@pytest.mark.parametrize("asked", ["kelvin-voigt", ["hertz", "kelvin-voigt"]])
+def test_a_law_that_was_named_is_not_advised_to_be_left_out(asked):
+    missing = "missing, wants a number of at least 0 N s/m: damping constant of the dashpot"
+    assert problems(asked) == [f"config: model.kelvin-voigt.C: {missing}"]
+
+
+# how the evidence says what was seen and what was not
+SAID = re.compile(r"\b(from memory|seen|derived here|known from|as printed in|as a public code has it)\b")
+
+
+@pytest.mark.parametrize("key", sorted(built_in()))
+def test_a_law_says_where_it_is_from(key):
+    law = find(key)
+    assert re.search(r"\bF = ", law.equation)
+    assert law.title
+    referred = re.match(r"as ([a-z0-9-]+); ", law.evidence)
+    assert SAID.search(find(referred[1]).evidence if referred else law.evidence)
+    derived = "derived here" in law.evidence
+    # a law is of the year of its reference, and of its key, unless it was derived here
+    assert derived or str(law.year) in law.reference
+    assert {int(year) for year in re.findall(r"(?:19|20)\d\d", key)} <= {law.year}
+    assert law.reference
+    assert re.fullmatch(r"10\.\d{4,}/\S+", law.doi) or law.doi == ""
+    # where there is no DOI, that is known, or there is none to be had
+    assert law.doi or derived or "no DOI known" in law.evidence or "arXiv:" in law.reference
+    for parameter in law.parameters:
+        assert parameter.meaning
