@@ -21,7 +21,7 @@ GRID = np.arange(1, 201) / 200
 SPEEDS = np.logspace(-2, 1, 25)
 # the balls of Table 1 of Gharib and Hurmuzlu (2012), and what a law's own parameter is to them at 1 m/s
 BALLS = {"v1": 1.0, "m1": 1.0, "m2": 1.0, "material": "aluminium"}
-MATERIAL = {"E": 56e9, "nu": 0.3, "rho": 2712.0}
+MATERIAL = {"E": 56e9, "nu": 0.3, "rho": 2712.0, "yield_strength": 1e8}
 DAMPING = 0.3
 # what is smaller is rounding or the solver's error, and turns no digit that is shown
 ROUNDING = 1e-9
@@ -45,9 +45,9 @@ def laws() -> list[ForceModel]:
 
 
 def driven(model: ForceModel) -> bool:
-    """Whether e is all that a law has to be given; so it is for one that has to be given nothing."""
-    needs = [one for one in model.parameters if one.default is None]
-    return not model.parameters or ("e" in model.quantities and not needs)
+    """Whether a law is driven by e; so is one that nothing else drives."""
+    others = {"yield_strength1", "yield_strength2", *(one.name for one in model.parameters)}
+    return "e" in model.quantities or model.quantities.isdisjoint(others)
 
 
 @cache
@@ -55,11 +55,11 @@ def measured() -> dict[str, Measured]:
     """What every law delivers, by its key."""
     exact = {model.key: delivers(model, GRID) for model in laws() if driven(model)}
     found = {key: Measured("e", e_out, {}) for key, e_out in exact.items() if e_out is not None}
-    rest = [model for model in laws() if exact.get(model.key) is None]
-    over_e = swept([model for model in rest if driven(model)], e=GRID)
-    settings = {model.key: own_settings(model) for model in rest if not driven(model)}
-    over_v0 = swept([catalogue()[key] for key in settings], settings, v1=SPEEDS)
-    found |= {key: Measured("e", e_out, {}) for key, e_out in over_e.items()}
+    rest = [model for model in laws() if model.key not in found]
+    settings = {model.key: own_settings(model) for model in rest}
+    over_e = swept([model for model in rest if driven(model)], settings, e=GRID)
+    over_v0 = swept([model for model in rest if not driven(model)], settings, v1=SPEEDS)
+    found |= {key: Measured("e", e_out, settings[key]) for key, e_out in over_e.items()}
     return found | {key: Measured("v0", e_out, settings[key]) for key, e_out in over_v0.items()}
 
 
@@ -82,8 +82,8 @@ def swept(
         return {}
     lists = {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in axes.items()}
     config = {
-        "models": keys, "sweep": {**BALLS, **lists}, "materials": {"aluminium": MATERIAL}, "model": own or {},
-        "solver": solver or {},
+        "models": keys, "sweep": {**BALLS, **lists}, "materials": {"aluminium": MATERIAL},
+        "model": {key: own[key] for key in keys} if own else {}, "solver": solver or {},
     }  # fmt: skip
     result = impact.sweep(config)
     return {key: result[quantity].sel(model=key).values.ravel() for key in keys}
@@ -93,7 +93,7 @@ def own_settings(model: ForceModel) -> dict[str, float]:
     """The values of a law's own parameters for its curve, in SI, and of K where its exponent is its own."""
     n = model.exponent or 1.5
     mass, speed = np.array([BALLS["m1"]], dtype=float), np.array([BALLS["v1"]], dtype=float)
-    E, nu, rho = (np.array([value]) for value in MATERIAL.values())
+    E, nu, rho, _ = (np.array([value]) for value in MATERIAL.values())
     radius = sphere_radius(mass, rho)
     m = effective_mass(mass, mass)
     K = stiffness(np.array([n]), hertz_stiffness(E, nu, E, nu, radius, radius), m, speed)
@@ -101,7 +101,9 @@ def own_settings(model: ForceModel) -> dict[str, float]:
     found = {} if model.exponent is None else {"K": float(K[0])}
     for one in model.parameters:
         size = np.prod([units[u] ** exponent for u, exponent in in_own_units(model, one.name, n).items()])
-        free = float(np.clip(DAMPING * size, one.least, one.most))
+        # a depth is that of the elastic peak
+        own = (0.5 * (n + 1)) ** (1 / (n + 1)) if one.unit == "m" else DAMPING
+        free = float(np.clip(max(one.least, 0.0) + own * size, one.least, one.most))
         found[one.name] = free if one.default is None else one.default
     return found
 
