@@ -102,6 +102,9 @@ FAMILIES = {
     "plastic from the start, delivers no more than √0.8). The force does not depend on the rate, so that e_out² "
     "is "
     "the work that comes back over the work that went in.",
+    "codes": "Laws of multibody, robotics and granular codes that no paper has under a name of its own, in the "
+    "parameters that those codes use. A rule of their own for the stiffness is not followed: K is the sweep's, or "
+    "that of the Hertz contact.",
 }
 
 LEFT_OUT = {

@@ -35,8 +35,8 @@ def struck(model, lanes: Lanes) -> Contact:
 
 @functools.cache
 def over_e(key: str, n: float) -> tuple[Lanes, Contact]:
-    # the restitution of Ismail and Stronge is that of E, the damping of others falls from 1 to 0
-    values = 1.0 / E - 1.0 if key == "ismail-stronge-2008" else 1.0 - E
+    # the restitution of Ismail and Stronge is that of E, the damping of others falls from 1.1 to 0.1
+    values = 1.0 / E - 1.0 if key == "ismail-stronge-2008" else 1.1 - E
     lanes = with_parameters(find(key), impacts(n, e=E), values)
     return lanes, struck(find(key), lanes)
 

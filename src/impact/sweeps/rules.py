@@ -129,18 +129,22 @@ def cross_faults(data: Mapping[str, object], models: Sequence[ForceModel], n: fl
     given = data.get("sweep")
     if isinstance(given, dict):
         yield from _restitution(given, models)
-        yield from _stiffness(given, _table(data.get("model")), models, n)
+        yield from _stiffness(given, _table(data.get("model")), models, n, data.get("models"))
         yield from _materials(given, models)
         yield from _yield_strengths(given, data.get("materials"), models)
     own, asked = _table(data.get("model")), data.get("models")
     for model in models:
         table = _table(own.get(model.key))
-        named = model.key == asked or (isinstance(asked, list) and model.key in asked)
         for parameter in model.parameters:
             if parameter.default is None and parameter.name not in table:
                 about = f"missing, wants {of_parameter(parameter).wants}: {parameter.meaning}"
-                other = "" if named or len(models) == 1 else f'; or models = [..., "!{model.key}"]'
-                yield ("model", model.key, parameter.name), about + other
+                yield ("model", model.key, parameter.name), about + _or_without(model, models, asked)
+
+
+def _or_without(model: ForceModel, models: Sequence[ForceModel], asked: object) -> str:
+    """How to leave out a model that was not named, but came with others."""
+    named = model.key == asked or (isinstance(asked, list) and model.key in asked)
+    return "" if named or len(models) == 1 else f'; or models = [..., "!{model.key}"]'
 
 
 def _table(value: object) -> Mapping[str, object]:
@@ -163,7 +167,11 @@ def _restitution(given: Mapping[str, object], models: Sequence[ForceModel]) -> I
 
 
 def _stiffness(
-    given: Mapping[str, object], own: Mapping[str, object], models: Sequence[ForceModel], n: float | None
+    given: Mapping[str, object],
+    own: Mapping[str, object],
+    models: Sequence[ForceModel],
+    n: float | None,
+    asked: object,
 ) -> Iterable[Fault]:
     if "K" not in given or (n is not None and math.isnan(n)):
         return
@@ -180,7 +188,7 @@ def _stiffness(
             yield (
                 ("sweep", "K"),
                 f"got a stiffness for {sweep}, but {model.key} has n = {model.exponent:g} of its own; "
-                f"wants that law's own K under [model.{model.key}], or none",
+                f"wants that law's own K under [model.{model.key}], or none{_or_without(model, models, asked)}",
             )
 
 

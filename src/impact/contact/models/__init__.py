@@ -13,7 +13,17 @@ from ...text import safe_text
 from ..model import ForceModel
 
 # families in the order of the paper; a family that is not named comes after these
-FAMILIES = ("elastic", "hysteresis", "dashpot", "rate-dependent", "asymmetric", "permanent", "elastic-plastic")
+FAMILIES = (
+    "elastic",
+    "hysteresis",
+    "dashpot",
+    "rate-dependent",
+    "asymmetric",
+    "permanent",
+    "elastic-plastic",
+    "codes",
+    "granular",
+)
 
 
 @cache
