@@ -40,7 +40,7 @@ def luding_restitution(size: Array | float, k2: Array, kc: Array, shallow: Array
     shallow : 1/δ*
 
     >>> luding_restitution(1.0, np.array([1.0, 4.0, 4.0]), np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 1.0]))
-    array([1.        , 0.5       , 0.        ])
+    array([1. , 0.5, 0. ])
     """
     with np.errstate(divide="ignore"):
         depth = np.divide(1.0, shallow)
@@ -70,7 +70,7 @@ def muthukumar_restitution(root: Array | float, K1: Array, K2: Array, depth: Arr
     depth : where the loading goes over from the one to the other
 
     >>> muthukumar_restitution(np.array([0.1, 10.0]), np.array(2.0), np.array(1.0), np.array(1.0)).round(6)
-    array([1.      , 0.909053])
+    array([1.      , 0.915429])
     """
     more = K1 - K2
     beyond = root * root - K1 * depth * depth
