@@ -1,0 +1,190 @@
+"""Laws of engineering codes do what those codes do: by their numbers, a second integration, closed forms."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from impact.contact.collide import Contact, collide
+from impact.contact.impulse import velocities_after
+from impact.contact.models import find
+from impact.contact.oracles import delivered_restitution, force_restitution
+from impact.contact.status import Status
+from impact.contact.values import delivered
+
+from .problems import impacts
+
+SPEEDS = np.geomspace(1e-3, 10.0, 9)
+
+
+def struck(key: str, n: float = 1.5, **given) -> Contact:
+    contact = collide(find(key), impacts(n, **given), rtol=1e-10, max_steps=10_000)
+    assert np.all(contact.status == Status.OK)
+    return contact
+
+
+def second(force, m: float, v0: float) -> float:
+    """The restitution of a force F(δ, v) in SI, to F = 0, by another integrator in other coordinates."""
+
+    def no_force(t, y):
+        return force(y[0], y[1]) if t > 0.0 else 1.0
+
+    no_force.terminal, no_force.direction = True, -1
+    found = solve_ivp(
+        lambda t, y: (y[1], -force(y[0], y[1]) / m), (0.0, 10.0), (0.0, v0), "DOP853", events=no_force,
+        rtol=1e-12, atol=(1e-18, 1e-14 * v0), first_step=1e-9,
+    )  # fmt: skip
+    return float(-found.y_events[0][-1][1] / v0)
+
+
+def cubic(t: float) -> float:
+    t = min(t, 1.0)
+    return 3.0 * t**2 - 2.0 * t**3
+
+
+# ---- Adams IMPACT, in its own units: N, mm, s
+
+
+@pytest.mark.parametrize(("speed", "e_out"), [(100, 0.18893), (500, 0.06484), (1000, 0.04858), (5000, 0.07702)])
+def test_adams_with_its_defaults(speed, e_out):
+    # k = 1e5 N/mm^2.2, e = 2.2, c = 10 N s/mm, d = 0.1 mm, between balls of 0.5 kg together, at mm/s
+    own = {"c": 1e4, "d": 1e-4}
+    contact = struck("adams-impact", 2.2, v1=speed / 1e3, K=1e5 * 1e3**2.2, parameters=own)
+    assert f"{contact.e_out[0]:.5f}" == f"{e_out:.5f}"
+
+
+@pytest.mark.parametrize("n", [2.0, 2.2, 3.0])
+@pytest.mark.parametrize("speed", [0.02, 0.3, 3.0])
+def test_adams_by_a_second_integration(n, speed):
+    K, c, d = 1e7 * 1e3 ** (n - 1.5), 3e3, 3e-4
+    contact = struck("adams-impact", n, v1=speed, K=K, parameters={"c": c, "d": d})
+    other = second(lambda x, v: K * max(x, 0.0) ** n + c * cubic(max(x, 0.0) / d) * v, 0.5, speed)
+    assert contact.e_out[0] == pytest.approx(other, abs=1e-8)
+
+
+def test_adams_is_claimed_from_n_2_on():
+    # below, the force is positive once more after its zero, where this ends
+    contacts = [struck("adams-impact", n, K=1e7, parameters={"c": 3e3, "d": 3e-4}) for n in (1.5, 2.0, 2.2)]
+    assert [contact.in_domain[0] for contact in contacts] == [0, 1, 1]
+
+
+# ---- Simscape
+
+
+@pytest.mark.parametrize(("damping", "e_out"), [(0.2, 0.744835), (1.0, 0.299933)])
+def test_simscape_at_a_narrow_transition(damping, e_out):
+    # b = damping √(m K), w a hundredth of v₀ √(m/K)
+    K, m, v0 = 1e6, 0.5, 1.0
+    own = {"b": damping * np.sqrt(m * K), "w": 0.01 * v0 * np.sqrt(m / K)}
+    contact = struck("simscape-contact", 1.0, K=K, parameters=own)
+    assert f"{contact.e_out[0]:.6f}" == f"{e_out:.6f}"
+    other = second(lambda x, v: cubic(max(x, 0.0) / own["w"]) * (K * x + own["b"] * v), m, v0)
+    assert contact.e_out[0] == pytest.approx(other, abs=1e-8)
+
+
+def test_simscape_without_a_transition_is_kelvin_and_voigt():
+    K, b = 1e6, 300.0
+    narrow = struck("simscape-contact", 1.0, K=K, parameters={"b": b, "w": 1e-9})
+    other = struck("kelvin-voigt-no-tension", 1.0, K=K, parameters={"C": b})
+    assert narrow.e_out == pytest.approx(other.e_out, abs=1e-5)
+
+
+# ---- the form of Hunt and Crossley, in other parameters
+
+
+def chi_of(key: str, own: dict[str, float], v0: np.ndarray, K: float, e: float) -> np.ndarray:
+    """χ as each code has it, written out."""
+    asked = e + (0.01 - e) * np.exp(np.log(0.01) * v0 / own.get("vs", 1.0))
+    return {
+        "recurdyn": own.get("c", 0.0) * v0 / K,
+        "simbody-hunt-crossley": 1.5 * own.get("c", 0.0) * v0,
+        "drake-point-contact": own.get("d", 0.0) * v0,
+        "modia3d": np.minimum(own.get("d", 0.0), 8 * (1 - asked) / (5 * asked * v0)) * v0,
+        "chrono-smc-flores": 8 * (1 - max(e, 0.01)) / (5 * max(e, 0.01)) / own.get("vc", 1.0) * v0,
+    }[key]
+
+
+@pytest.mark.parametrize(
+    ("key", "own"),
+    [
+        ("recurdyn", {"c": 3e9}),
+        ("simbody-hunt-crossley", {"c": 0.3}),
+        ("drake-point-contact", {"d": 20.0}),
+        ("modia3d", {"vs": 0.01, "d": 1000.0}),
+        ("modia3d", {"vs": 0.5, "d": 2.0}),
+        ("chrono-smc-flores", {"vc": 0.7}),
+    ],
+)
+@pytest.mark.parametrize("e", [0.001, 0.4, 0.9])
+def test_the_form_of_hunt_and_crossley(key, own, e):
+    n, K = find(key).exponent or 1.5, 6e9
+    contact = struck(key, n, v1=SPEEDS, e=e, K=K, parameters=own)
+    chi = chi_of(key, own, SPEEDS, K, e)
+    assert contact.damping_ratio == pytest.approx(chi, rel=1e-12)
+    assert contact.e_out == pytest.approx(delivered_restitution(chi), abs=1e-9)
+
+
+def test_drake_rebounds_slower_than_one_over_its_dissipation():
+    # (26) as a bound: the force would pull beyond it
+    contact = struck("drake-point-contact", 1.0, v1=np.geomspace(0.01, 1e3, 20), K=1e6, parameters={"d": 20.0})
+    rebound = contact.v2_post - contact.v1_post
+    assert np.all(rebound <= 1 / 20.0 * (1 + 1e-9))
+    assert rebound[-1] == pytest.approx(1 / 20.0, rel=1e-6)
+
+
+def test_modia3d_is_flores_at_speed_and_stiff_when_slow():
+    contact = struck("modia3d", v1=np.array([1e-4, 10.0]), e=0.5, parameters={"vs": 0.01, "d": 1e6})
+    flores = delivered(find("flores-2011"), np.array([0.01, 0.5]))
+    assert contact.e_out[1] == pytest.approx(flores[1], abs=1e-9)
+    assert contact.e_out[0] == pytest.approx(flores[0], abs=0.02)
+
+
+# ---- dashpots
+
+
+@pytest.mark.parametrize("ratio", [0.1, 0.5, 1.0, 2.0])
+def test_mujoco_depends_on_its_damping_ratio_alone(ratio):
+    for timeconst in (1e-3, 0.02):
+        own = {"timeconst": timeconst, "dampratio": ratio}
+        contact = struck("mujoco-solref", 1.0, v1=SPEEDS, K=1e5, parameters=own)
+        assert contact.e_out == pytest.approx(np.full(SPEEDS.size, force_restitution(ratio)), abs=1e-9)
+        # the spring is its own: the time is that of τ, whatever K is
+        other = struck("mujoco-solref", 1.0, v1=SPEEDS, K=1e7, parameters=own)
+        assert other.duration == pytest.approx(contact.duration, rel=1e-7)
+        assert other.peak_indentation == pytest.approx(contact.peak_indentation, rel=1e-7)
+
+
+def test_mujoco_with_its_defaults_gives_back_e_to_the_minus_2():
+    assert struck("mujoco-solref", 1.0, K=1e5, parameters={"timeconst": 0.02, "dampratio": 1.0}).e_out[0] == (
+        pytest.approx(np.exp(-2.0), abs=1e-9)
+    )
+
+
+@pytest.mark.parametrize(
+    ("key", "e", "e_out"),
+    [
+        ("lammps-tsuji-without-root", 0.5, "0.616"),
+        ("lammps-tsuji-limit", 0.5, "0.550"),
+        ("yade-betan", 0.5, "0.466"),
+    ],
+)
+def test_what_fits_and_slips_deliver(key, e, e_out):
+    assert f"{struck(key, e=e).e_out[0]:.3f}" == e_out
+
+
+@pytest.mark.parametrize(("key", "off"), [("lammps-tsuji", "0.0019"), ("demlab-tti", "0.0018")])
+def test_fits_of_tsujis_damping_are_within_two_thousandths(key, off):
+    e = np.linspace(0.05, 1.0, 96)
+    assert f"{np.abs(struck(key, e=e).e_out - e).max():.4f}" == off
+
+
+def test_yade_without_tension_is_in_no_law():
+    # the page has 0.5235 for the traditional formula ended at F = 0
+    zeta = np.sqrt(1.2) * -np.log(0.5) / np.hypot(np.pi, np.log(0.5))
+    assert f"{float(force_restitution(zeta)):.4f}" == "0.5235"
+
+
+def test_velocities_follow_from_the_restitution():
+    contact = struck("drake-point-contact", 1.0, v1=SPEEDS, v2=-0.1, m2=3.0, K=1e6, parameters={"d": 1.0})
+    v1, v2 = velocities_after(impacts(1.0, v1=SPEEDS, v2=-0.1, m2=3.0, K=1e6), contact.e_out)
+    assert contact.v1_post.tobytes() == v1.tobytes()
+    assert contact.v2_post.tobytes() == v2.tobytes()
