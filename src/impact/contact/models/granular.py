@@ -59,9 +59,23 @@ LAMMPS_TSUJI_WITHOUT_ROOT = of_code(
         year=2019,
         equation=f"{HERTZIAN},  α = p(e), p of degree six, to δ = 0",
         reference=LAMMPS,
-        evidence="formula seen in older sources and pages of the documentation, which lack the factor √2; no DOI",
+        evidence="formula seen in older sources; the release of July 2025 still does so, by a comparison; no DOI",
         zeta=lambda e: tsuji_fit(e) / np.sqrt(5.0),
         release="gap",
+        exponent=1.5,
+    )
+)
+
+LAMMPS_TSUJI_WITHOUT_ROOT_LIMIT = of_code(
+    dashpot(
+        "lammps-tsuji-without-root-limit",
+        title="LAMMPS tsuji of older versions with limit_damping",
+        year=2019,
+        equation=f"{HERTZIAN},  α = p(e), p of degree six, to F = 0",
+        reference=LAMMPS,
+        evidence="formula seen in older sources; the release of July 2025 still does so, by a comparison; no DOI",
+        zeta=lambda e: tsuji_fit(e) / np.sqrt(5.0),
+        release="force",
         exponent=1.5,
     )
 )
