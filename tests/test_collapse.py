@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tomllib
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -19,6 +21,8 @@ from impact.sweeps.impacts import lanes_of
 from impact.sweeps.plan import Plan
 from impact.sweeps.trajectories import trajectories
 
+from .conftest import ROOT
+
 DASHPOT = impact.ForceModel(
     "dashpot", "Spring and dashpot", 2026, equation="F = K x + c v", reference="", exponent=1.0,
     force=lambda K, x, v, c: K * x + c * v, release="force",
@@ -31,6 +35,10 @@ SPEED = impact.ForceModel(
     parameters=(impact.Parameter("v_y", "m/s", "a speed", default=1.0, least=0.1),),
 )  # fmt: skip
 OWN = {"dashpot": {"c": [0.0, 40.0]}, "speed": {"v_y": [0.5, 2.0]}}
+# what laws have to be given, as a baseline has it; the unit of one depends on n
+EVERY = tomllib.loads((ROOT / "tests" / "data" / "every_model.toml").read_text(encoding="utf-8"))["model"]
+NEEDS = {key: EVERY[one.same_as or key] for key, one in impact.models().items() if (one.same_as or key) in EVERY}
+NEEDS["recurdyn"] = {"c": 1e4}
 
 # a few values of each, so that many points are the same: in scale only, in a material only, or altogether
 VALUES: dict[str, list[object]] = {
@@ -57,6 +65,7 @@ def sweeps(draw: st.DrawFn) -> dict[str, object]:
     known = [*sorted(impact.models()), *OWN]
     models = draw(st.lists(st.sampled_from(known), min_size=1, max_size=3, unique=True))
     own = {key: OWN[key] for key in models if key in OWN and draw(st.booleans())}
+    own |= {key: NEEDS[key] for key in models if key in NEEDS}
     return {"models": models, "sweep": sweep, "materials": MATERIALS, "solver": {"rtol": 1e-6}, "model": own}
 
 
