@@ -103,8 +103,8 @@ FAMILIES = {
     "is "
     "the work that comes back over the work that went in.",
     "codes": "Laws of multibody, robotics and granular codes that no paper has under a name of its own, in the "
-    "parameters that those codes use. A rule of their own for the stiffness is not followed: K is the sweep's, or "
-    "that of the Hertz contact.",
+    "parameters that those codes use. Where no K is given it is that of the Hertz contact, or by the code's own "
+    "rule.",
 }
 
 LEFT_OUT = {

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+import impact
 from impact.contact.collide import Contact, collide
 from impact.contact.impulse import velocities_after
 from impact.contact.models import find
@@ -188,3 +189,53 @@ def test_velocities_follow_from_the_restitution():
     v1, v2 = velocities_after(impacts(1.0, v1=SPEEDS, v2=-0.1, m2=3.0, K=1e6), contact.e_out)
     assert contact.v1_post.tobytes() == v1.tobytes()
     assert contact.v2_post.tobytes() == v2.tobytes()
+
+
+# ---- stiffness by the rule of a code, where none is given
+
+BALLS = {"E": 56e9, "nu": 0.3, "rho": 2712.0}
+SOFT = {"E": 2e9, "nu": 0.4, "rho": 1000.0}
+
+
+def stiffness(key: str, **given) -> np.ndarray:
+    sweep = {"e": 0.5, "v1": 1.0, "m1": 1.0, "m2": 2.0, "R1": 0.04, "R2": 0.06, "material1": "hard",
+             "material2": "soft", **given}  # fmt: skip
+    own = {"model": {key: {"c": 0.1}}} if key == "simbody-hunt-crossley" else {}
+    config = {"models": key, "sweep": sweep, "materials": {"hard": BALLS, "soft": SOFT}, **own}
+    return impact.sweep(config)["stiffness"].values.squeeze()
+
+
+def test_stiffness_of_simbody():
+    # (4/3) √R k^(3/2), k of two springs in series whose moduli are to the power 2/3
+    R, moduli = 0.04 * 0.06 / 0.1, [one["E"] / (1 - one["nu"] ** 2) for one in (BALLS, SOFT)]
+    k1, k2 = (one ** (2 / 3) for one in moduli)
+    expected = 4 / 3 * np.sqrt(R) * (k1 * k2 / (k1 + k2)) ** 1.5
+    assert stiffness("simbody-hunt-crossley") == pytest.approx(expected, rel=1e-12)
+    assert stiffness("simbody-hunt-crossley", K=1e9) == 1e9
+
+
+@pytest.mark.parametrize("key", ["liggghts-hooke", "chrono-smc-hooke", "liggghts-hooke-limit-force"])
+def test_stiffness_of_a_characteristic_speed(key):
+    R, m = 0.04 * 0.06 / 0.1, 2.0 / 3.0
+    E = 1 / sum((1 - one["nu"] ** 2) / one["E"] for one in (BALLS, SOFT))
+    expected = 16 / 15 * np.sqrt(R) * E * (15 * m / (16 * np.sqrt(R) * E)) ** 0.2
+    # by v_c = 1 m/s, not by the speed of the impact
+    assert stiffness(key) == pytest.approx(expected, rel=1e-12)
+    assert stiffness(key, v1=[1.0, 5.0]) == pytest.approx(np.full(2, expected), rel=1e-12)
+    assert stiffness(key, m1=[1.0, 3.0])[1] > expected
+
+
+def test_stiffness_without_a_radius():
+    E = 1 / sum((1 - one["nu"] ** 2) / one["E"] for one in (BALLS, SOFT))
+    assert stiffness("chrono-smc-plaincoulomb", R1=[0.01, 1.0]) == pytest.approx(np.full(2, 4 / 3 * E), rel=1e-12)
+
+
+def test_points_collapse_by_what_a_stiffness_comes_from():
+    # a speed of their own makes v0 a part of the physics of two laws, but not of the stiffness
+    sweep = {"e": [0.3, 0.6], "v1": [1.0, 2.0], "m1": [1.0, 3.0], "m2": 1.0, "material": ["hard", "soft"]}
+    models = ["liggghts-hooke", "chrono-smc-plaincoulomb", "simbody-hunt-crossley"]
+    config = {"models": models, "sweep": sweep, "materials": {"hard": BALLS, "soft": SOFT},
+              "model": {"simbody-hunt-crossley": {"c": 0.1}}}  # fmt: skip
+    once, each = impact.sweep(config), impact.sweep(config, overrides=["solver.collapse=false"])
+    for name in ("stiffness", "peak_indentation", "duration", "e_out", "peak_force"):
+        assert once[name].values.tobytes() == each[name].values.tobytes()

@@ -91,6 +91,16 @@ def test_a_wish_that_cannot_be_met_is_told_when_the_file_is_loaded(cli: Run, tmp
         assert "Traceback" not in done.stderr
 
 
+def test_one_family_is_listed(cli: Run) -> None:
+    keys = [one["key"] for one in json.loads(cli("models", "--family", "elastic-plastic", "--json").stdout)]
+    assert keys == [key for key, one in impact.models().items() if one.family == "elastic-plastic"]
+    listed = cli("models", "--family", "elastic-plastic").stdout
+    assert "thornton-1997" in listed
+    assert "hertz " not in listed
+    wrong = cli("models", "--family", "elastik")
+    assert (wrong.returncode, wrong.stderr) == (2, '--family: no family "elastik"; did you mean "elastic"?\n')
+
+
 # ---- installed packages
 
 

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ..errors import UsageError, did_you_mean
+from ..text import safe_text
 from . import door
 from .options import Json, Plugins
 from .words import dump
@@ -25,6 +27,9 @@ NARROW = 130
 
 def models(
     key: Annotated[str | None, typer.Argument(help="A model to tell all about. [default: list them]")] = None,
+    family: Annotated[
+        str | None, typer.Option("--family", metavar="NAME", help="List the laws of a family only.")
+    ] = None,
     check: Annotated[
         Path | None,
         typer.Option("--check", metavar="FILE", help="Python file of whose models to check the contract."),
@@ -41,13 +46,21 @@ def models(
         _check([model for model in own if key in (None, model.key)] or [find(str(key), own)], as_json=as_json)
         return
     others = read_plugins(plugins or ()).models
+    chosen = [find(key, others)] if key else _of_family(family, list(catalogue(others).values()))
     if as_json:
-        chosen = [find(key, others)] if key else list(catalogue(others).values())
         print(dump([model_json(model) for model in chosen]))
     elif key:
-        _print_model(find(key, others))
+        _print_model(chosen[0])
     else:
-        _print_models(list(catalogue(others).values()))
+        _print_models(chosen)
+
+
+def _of_family(family: str | None, models: Sequence[ForceModel]) -> Sequence[ForceModel]:
+    """The models of a family, or all."""
+    families = sorted({model.family for model in models})
+    if family is not None and family not in families:
+        raise UsageError(f'--family: no family "{safe_text(family)}"; {did_you_mean(family, families)}')
+    return [model for model in models if family in (None, model.family)]
 
 
 def model_json(model: ForceModel) -> dict[str, Any]:

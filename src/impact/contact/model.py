@@ -93,6 +93,7 @@ class ForceModel:
         `chi` is the dimensionless damping χ = λ v₀/K
     parameters : what the user gives in `[model.KEY]`
     oracle : exact delivered restitution, where a closed form exists
+    stiffness : K in SI from the quantities of the contact and the parameters, where it is not given and not (12)
     release : the contact ends at zero indentation ("gap"), or already at zero force ("force")
     smooth : p of the smooth coordinate δ = δᵣ + sᵖ: 2 for half-integer powers, 4 for quarters
     momentum : "log" where `force` is K δⁿ (1 + χ δ̇/v₀) exactly, which lets large χ be integrated without stiffness
@@ -137,6 +138,7 @@ class ForceModel:
     coefficients: Mapping[str, Formula] = field(default_factory=dict)
     parameters: tuple[Parameter, ...] = ()
     oracle: Formula | None = None
+    stiffness: Formula | None = None
     release: Literal["gap", "force"] = "gap"
     smooth: int = 2
     momentum: Literal["v", "log"] = "v"
@@ -167,6 +169,9 @@ class ForceModel:
         for formula in self.unloading_bends:
             self._check("unloading bend", formula, {*once, *IN_UNLOADING})
         self._check("oracle", self.oracle, once)
+        self._check(
+            "stiffness", self.stiffness, {*QUANTITIES, *(one.name for one in self.parameters)} - {"K", "e"}
+        )
 
     def _check_fields(self) -> None:
         own = isinstance(self.parameters, tuple) and all(isinstance(one, Parameter) for one in self.parameters)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..contact.lanes import Lanes, stiffness
 from ..contact.material import effective_mass, hertz_stiffness, sphere_radius
-from ..contact.model import QUANTITIES, ForceModel
+from ..contact.model import QUANTITIES, ForceModel, ask, wishes
 from ..contact.power import Array
 from .plan import Index, Plan, dimensions
 
@@ -42,11 +44,16 @@ def lanes_of(plan: Plan, model: ForceModel, index: Index) -> Lanes:
             K = stiffness(n, hertz_stiffness(E1, nu1, E2, nu2, R1, R2), effective_mass(m1, m2), v1 - v2)
         e = value("e") if "e" in given else 1.0 - value("alpha") * (v1 - v2)
     own = {parameter.name: value(f"{model.key}.{parameter.name}") for parameter in model.parameters}
-    return Lanes(
+    lanes = Lanes(
         e=e, v1=v1, v2=v2, m1=m1, m2=m2, K=K, n=n, R1=R1, R2=R2, E1=E1, nu1=nu1, E2=E2, nu2=nu2,
         yield_strength1=of_material("1", "yield_strength"), yield_strength2=of_material("2", "yield_strength"),
         parameters=own,
     )  # fmt: skip
+    if model.stiffness is None or own_K in given or "K" in given:
+        return lanes
+    with np.errstate(all="ignore"):
+        known = {name: lanes.quantity(name) for name in wishes(model.stiffness)}
+        return replace(lanes, K=ask(model.stiffness, known))
 
 
 def origins(plan: Plan, model: ForceModel, quantity: str) -> set[str]:
@@ -71,6 +78,8 @@ def origins(plan: Plan, model: ForceModel, quantity: str) -> set[str]:
             return {quantity} if quantity in given else {f"m{ball}", *material(ball)}
         case "K" if own_K in given or "K" in given:
             return {own_K if own_K in given else "K"}
+        case "K" if model.stiffness is not None:
+            return {name for part in wishes(model.stiffness) for name in origins(plan, model, part)}
         case "K":
             secant = ("n", "m", "v0") if exponents(plan, model) != (1.5,) else ()
             parts = ("R1", "R2", *secant)

@@ -1,4 +1,4 @@
-"""Names that simulation codes have for laws of the catalogue; their rules for the stiffness are not followed."""
+"""Names that simulation codes have for laws of the catalogue."""
 
 from __future__ import annotations
 
@@ -14,14 +14,15 @@ from .dashpot import (
     TSUJI_1992,
     TSUJI_1992_NO_TENSION,
 )
+from .granular import CHRONO_SMC_HOOKE
 from .hysteresis import FLORES_2011, HUNT_CROSSLEY_1975, LANKARANI_NIKRAVESH_1990
 from .rate_dependent import LEE_HERRMANN_1993
 
 
-def in_code(law: ForceModel, key: str, title: str, year: int, code: str, more: str = "") -> ForceModel:
+def in_code(law: ForceModel, key: str, title: str, year: int, code: str) -> ForceModel:
     """A law under the name of a code, whose source was seen."""
-    evidence = f"formula seen in the source{more}; no DOI"
-    return of_code(same_law(law, key, title=title, year=year, reference=code, evidence=evidence))
+    evidence = "formula seen in the source; no DOI"
+    return of_code(same_law(law, key, title=title, year=year, reference=code, evidence=evidence), law.stiffness)
 
 
 LAMMPS = "LAMMPS, pair style granular"
@@ -29,7 +30,6 @@ LIGGGHTS = "LIGGGHTS-PUBLIC, normal_model_*.h"
 CHRONO = "Project Chrono, ChContactSMC.h"
 OPENSEES = "OpenSees, materials of pounding by Hughes PJ"
 MBDYN = "MBDyn, module-continuous-contact"
-BY_SPEED = "; its K is that of a characteristic velocity"
 
 LAMMPS_HERTZ = in_code(
     TSUJI_1992, "lammps-coeff-restitution-hertz", "LAMMPS coeff_restitution, hertz", 2019, LAMMPS
@@ -56,24 +56,15 @@ LIGGGHTS_HERTZ = in_code(TSUJI_1992, "liggghts-hertz", "LIGGGHTS hertz", 2012, L
 LIGGGHTS_HERTZ_LIMIT = in_code(
     TSUJI_1992_NO_TENSION, "liggghts-hertz-limit-force", "LIGGGHTS hertz, limitForce", 2012, LIGGGHTS
 )
-LIGGGHTS_HOOKE = in_code(ANAGNOSTOPOULOS_1988, "liggghts-hooke", "LIGGGHTS hooke", 2012, LIGGGHTS, BY_SPEED)
 LIGGGHTS_HOOKE_LIMIT = in_code(
-    ANAGNOSTOPOULOS_1988_NO_TENSION, "liggghts-hooke-limit-force", "LIGGGHTS hooke, limitForce", 2012, LIGGGHTS,
-    BY_SPEED,
-)  # fmt: skip
+    CHRONO_SMC_HOOKE, "liggghts-hooke-limit-force", "LIGGGHTS hooke, limitForce", 2012, LIGGGHTS
+)
 YADE_EN = in_code(TSUJI_1992, "yade-en", "YADE HertzMindlin en", 2010, "YADE, HertzMindlin.cpp")
 MERCURYDPM_LINEAR = in_code(
     ANAGNOSTOPOULOS_1988, "mercurydpm-linear-viscoelastic", "MercuryDPM LinearViscoelastic", 2013,
     "MercuryDPM, kernel",
 )  # fmt: skip
-CHRONO_HOOKE = in_code(
-    ANAGNOSTOPOULOS_1988_NO_TENSION, "chrono-smc-hooke", "Chrono SMC, Hooke", 2016, CHRONO, BY_SPEED
-)
 CHRONO_HERTZ = in_code(TSUJI_1992_NO_TENSION, "chrono-smc-hertz", "Chrono SMC, Hertz", 2016, CHRONO)
-CHRONO_PLAIN = in_code(
-    TSUJI_1992_NO_TENSION, "chrono-smc-plaincoulomb", "Chrono SMC, PlainCoulomb", 2016, CHRONO,
-    "; its K is that of R = 1 m",
-)  # fmt: skip
 OPENSEES_HERTZDAMP = in_code(LANKARANI_NIKRAVESH_1990, "opensees-hertzdamp", "OpenSees Hertzdamp", 2019, OPENSEES)
 OPENSEES_JANKOWSKI = in_code(
     JANKOWSKI_2006, "opensees-jankowski-impact", "OpenSees JankowskiImpact", 2019, OPENSEES

@@ -1,6 +1,6 @@
 """Laws of engineering codes, in the parameters that those codes use.
 
-Their stiffness is the sweep's K, or that of equation (12): rules of their own for it are not followed.
+Where no K is given it is that of equation (12), or by the code's own rule.
 """
 
 from __future__ import annotations
@@ -9,17 +9,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..model import ForceModel, Parameter
+from ..model import ForceModel, Formula, Parameter
 from ..oracles import force_restitution
-from ..power import Array
+from ..power import Array, power
 from .hysteresis import hysteresis
 
 LINEAR_DAMPING = "F = K δⁿ (1 + χ δ̇/v₀)"
 
 
-def of_code(law: ForceModel) -> ForceModel:
-    """A law of some form as that of a code."""
-    return replace(law, family="codes")
+def of_code(law: ForceModel, stiffness: Formula | None = None) -> ForceModel:
+    """A law of some form as that of a code, with its rule for K."""
+    return replace(law, family="codes", stiffness=stiffness)
+
+
+def series(a: Array, b: Array) -> Array:
+    """Two springs, one behind the other."""
+    return a * b / (a + b)
 
 
 def step(t: Array) -> Array:
@@ -70,11 +75,18 @@ SIMBODY_HUNT_CROSSLEY = of_code(
         "Procedia "
         "IUTAM "
         "2, 241",
-        evidence="formula seen in the source, which mixes materials by powers 2/3 of their moduli; no DOI known",
+        evidence="formula seen in the source, which mixes materials by powers 2/3 of their moduli; that these are "
+        "those of plane strain, E/(1 − ν²), from memory; no DOI known",
         parameters=(Parameter("c", "s/m", "dissipation, the slope of e over a small speed", least=0.0),),
         exponent=1.5,
         chi=lambda c, v0: 1.5 * c * v0,
-    )
+    ),
+    stiffness=lambda E1, E2, nu1, nu2, R1, R2: (
+        4
+        / 3
+        * np.sqrt(1 / (1 / R1 + 1 / R2))
+        * series(power(E1 / (1 - nu1 * nu1), 2 / 3), power(E2 / (1 - nu2 * nu2), 2 / 3)) ** 1.5
+    ),
 )
 
 DRAKE_POINT_CONTACT = of_code(

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..model import Parameter
 from ..oracles import gap_damping
-from ..power import Array
+from ..power import Array, power
 from .codes import of_code
-from .dashpot import HERTZIAN, dashpot
+from .dashpot import BY_LOGARITHM, HERTZIAN, LINEAR, dashpot
 
 # LAMMPS, damping tsuji: of the polynomial of α, from the zeroth power of e
 TSUJI_FIT = (1.2728, -4.2783, 11.087, -22.348, 27.467, -18.022, 4.8218)
@@ -78,6 +79,65 @@ LAMMPS_TSUJI_WITHOUT_ROOT_LIMIT = of_code(
         release="force",
         exponent=1.5,
     )
+)
+
+# the stiffness of a linear spring that takes as much energy as Hertz's at a characteristic speed
+CHARACTERISTIC = (Parameter("vc", "m/s", "characteristic speed of the stiffness", default=1.0, least=1e-9),)
+BY_SPEED = "K = (16/15) E* √R* (15 m v_c²/(16 E* √R*))^(1/5)"
+
+
+def by_speed(E1: Array, E2: Array, nu1: Array, nu2: Array, R1: Array, R2: Array, m: Array, vc: Array) -> Array:
+    """K of a linear spring from moduli, radii and a characteristic speed."""
+    root = np.sqrt(1 / (1 / R1 + 1 / R2)) / ((1 - nu1 * nu1) / E1 + (1 - nu2 * nu2) / E2)
+    return 16 / 15 * root * power(15 * m * vc * vc / (16 * root), 0.2)
+
+
+LIGGGHTS_HOOKE = of_code(
+    dashpot(
+        "liggghts-hooke",
+        title="LIGGGHTS hooke",
+        year=2012,
+        equation=f"{LINEAR},  {BY_LOGARITHM}, to δ = 0;  {BY_SPEED}",
+        reference="LIGGGHTS-PUBLIC, normal_model_hooke.h",
+        evidence=IN_SOURCE,
+        domain={"e": (0.0, 1.0)},
+        parameters=CHARACTERISTIC,
+        zeta=lambda e: gap_damping(e),
+        release="gap",
+        exponent=1.0,
+    ),
+    stiffness=by_speed,
+)
+
+CHRONO_SMC_HOOKE = of_code(
+    dashpot(
+        "chrono-smc-hooke",
+        title="Chrono SMC, Hooke",
+        year=2016,
+        equation=f"{LINEAR},  {BY_LOGARITHM}, to F = 0;  {BY_SPEED}",
+        reference="Project Chrono, ChContactSMC.h; so has LIGGGHTS hooke with limitForce",
+        evidence=IN_SOURCE,
+        parameters=CHARACTERISTIC,
+        zeta=lambda e: gap_damping(e),
+        release="force",
+        exponent=1.0,
+    ),
+    stiffness=by_speed,
+)
+
+CHRONO_SMC_PLAINCOULOMB = of_code(
+    dashpot(
+        "chrono-smc-plaincoulomb",
+        title="Chrono SMC, PlainCoulomb",
+        year=2016,
+        equation=f"{HERTZIAN},  α = −√5 ln e/√(π² + ln² e), to F = 0;  K = (4/3) E* √(1 m)",
+        reference="Project Chrono, ChContactSMC.h",
+        evidence=f"{IN_SOURCE}; its stiffness lacks the radius",
+        zeta=lambda e: gap_damping(e),
+        release="force",
+        exponent=1.5,
+    ),
+    stiffness=lambda E1, E2, nu1, nu2: 4 / 3 / ((1 - nu1 * nu1) / E1 + (1 - nu2 * nu2) / E2),
 )
 
 YADE_BETAN = of_code(
