@@ -17,7 +17,7 @@ figure: $(BIN)/impact  ## sweep configs/figure6.toml and draw Figure 6 of the pa
 	@echo "the picture is $(RESULTS)/figure6.png"
 
 test: $(VENV)/dev  ## run the tests
-	$(BIN)/python -m pytest -n auto
+	$(BIN)/python -m pytest -n auto --dist worksteal
 
 test-faults: $(VENV)/dev  ## run the tests of a thousand faults, and tell what became of them
 	$(BIN)/python -m pytest -n auto -m faults -rP tests

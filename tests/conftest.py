@@ -57,11 +57,11 @@ def forked() -> Iterator[Forked]:
 
 @pytest.fixture(scope="session")
 def cli(forked: Forked) -> Run:
-    """Run the program in a process of its own, begun anew where its environment is another."""
+    """Run the program in a process of its own, begun anew where the interpreter reads its environment."""
 
     def run(*words: str | Path, cwd: Path = ROOT, **environment: str) -> Done | subprocess.CompletedProcess[str]:
-        if not environment:
-            return forked(*words, cwd=cwd, limit=120)
+        if environment.keys() <= {"COLUMNS", "NO_COLOR"}:
+            return forked(*words, cwd=cwd, limit=120, **environment)
         return subprocess.run(
             [sys.executable, "-m", "impact", *map(str, words)],
             cwd=cwd,

@@ -1,7 +1,8 @@
 """The command line in hundreds of real processes: a server imports what the commands need once, and forks.
 
-Its standard input has a request a line, {"argv": [...], "cwd": "...", "limit": seconds}; its standard output
-a reply a line. The server has one thread, so that a child finds no lock held by a thread that it has not got.
+Its standard input has a request a line, {"argv": [...], "cwd": "...", "limit": seconds, "environment": {...}}; its
+standard output a reply a line. The server has one thread, so that a child finds no lock held by a thread that it
+has not got.
 """
 
 from __future__ import annotations
@@ -44,10 +45,11 @@ class Forked:
 
     server: subprocess.Popen[str]
 
-    def __call__(self, *words: str | Path, cwd: Path = ROOT, limit: float = 30.0) -> Done:
+    def __call__(self, *words: str | Path, cwd: Path = ROOT, limit: float = 30.0, **environment: str) -> Done:
         assert self.server.stdin is not None
         assert self.server.stdout is not None
-        request = {"argv": [str(word) for word in words], "cwd": str(cwd), "limit": limit}
+        request = {"argv": [str(word) for word in words], "cwd": str(cwd), "limit": limit,
+                   "environment": environment}  # fmt: skip
         print(json.dumps(request), file=self.server.stdin, flush=True)
         return Done(**json.loads(self.server.stdout.readline()))
 
@@ -76,6 +78,7 @@ def serve() -> None:
         with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
             child = os.fork()
             if child == 0:
+                os.environ |= request["environment"]
                 _command(request["argv"], request["cwd"], out, err)
             done = _wait(child, request["limit"], out, err)
         print(json.dumps(asdict(done)), flush=True)

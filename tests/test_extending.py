@@ -5,11 +5,15 @@ from __future__ import annotations
 import json
 import re
 import shlex
+import sys
 from pathlib import Path
 
 import pytest
 
 import impact
+from impact.errors import ModelError
+from impact.sweeps.installed import installed
+from impact.sweeps.plugins import read_plugins
 
 from .conftest import ROOT, Run
 
@@ -172,9 +176,17 @@ def test_no_data_file_brings_a_package_in(cli: Run, tmp_path: Path) -> None:
         ("raise SystemExit", "our_package.laws", "SystemExit"),
     ],
 )
-def test_a_broken_package_is_named(cli: Run, tmp_path: Path, text: str, value: str, said: str) -> None:
-    done = cli("models", PYTHONPATH=str(install(tmp_path, text, value)))
-    assert done.returncode == 2
-    assert f"our-package 1.2: entry point our-laws = {value}: " in done.stderr
-    assert said in done.stderr
-    assert len(done.stderr.splitlines()) == 1
+def test_a_broken_package_is_named(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, text: str, value: str, said: str
+) -> None:
+    monkeypatch.syspath_prepend(install(tmp_path, text, value))
+    for name in ("our_package", "our_package.laws"):
+        monkeypatch.delitem(sys.modules, name, raising=False)
+    installed.cache_clear()
+    try:
+        with pytest.raises(ModelError, match=re.escape(said)) as raised:
+            read_plugins([])
+    finally:
+        installed.cache_clear()
+    assert str(raised.value).startswith(f"our-package 1.2: entry point our-laws = {value}: ")
+    assert len(str(raised.value).splitlines()) == 1
