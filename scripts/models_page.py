@@ -100,8 +100,7 @@ FAMILIES = {
     "elastic-plastic": "A yield on approach, and an elastic recovery on restitution: slower than the yield speed "
     "the impact is elastic, e_out = 1, and beyond it the restitution falls with the speed (`johnson-1985`, fully "
     "plastic from the start, delivers no more than √0.8). The force does not depend on the rate, so that e_out² "
-    "is "
-    "the work that comes back over the work that went in.",
+    "is the work that comes back over the work that went in.",
     "codes": "Laws of multibody, robotics and granular codes that no paper has under a name of its own, in the "
     "parameters that those codes use. Where no K is given it is that of the Hertz contact, or by the code's own "
     "rule.",

@@ -31,8 +31,7 @@ MARHEFKA_ORIN_1999 = same_law(
     title="Marhefka and Orin",
     year=1999,
     reference="Marhefka DW, Orin DE (1999) A compliant contact model with nonlinear damping for simulation of "
-    "robotic "
-    "systems. IEEE Trans. Syst. Man Cybern. A 29, 566",
+    "robotic systems. IEEE Trans. Syst. Man Cybern. A 29, 566",
     doi="10.1109/3468.798060",
     evidence="formula and DOI from memory; the paper also derives the exact relation",
 )
@@ -64,9 +63,8 @@ KHATIWADA_2014 = same_law(
     "khatiwada-2014",
     title="Khatiwada, Chouw and Butterworth",
     year=2014,
-    reference="Khatiwada S, Chouw N, Butterworth JW (2014) A generic structural pounding model using "
-    "numerically exact "
-    "displacement proportional damping. Eng. Struct. 62-63, 33",
+    reference="Khatiwada S, Chouw N, Butterworth JW (2014) A generic structural pounding model using numerically "
+    "exact displacement proportional damping. Eng. Struct. 62-63, 33",
     doi="10.1016/j.engstruct.2013.12.016",
     evidence="formula and DOI from memory",
 )

@@ -34,9 +34,8 @@ JANKOWSKI_2006 = approach_dashpot(
     year=2006,
     equation="F = K δ^(3/2) + 2 ξ √(m K) δ^(1/4) δ̇, then F = K δ^(3/2),  ξ = (9√5/2)(1 − e²)/(e(e(9π − 16) + 16))",
     reference="Jankowski R (2005) Non-linear viscoelastic modelling of earthquake-induced structural pounding. "
-    "EESD "
-    "34, 595; Jankowski R (2006) Analytical expression between the impact damping ratio and the coefficient of "
-    "restitution in the non-linear viscoelastic model of structural pounding. EESD 35, 517",
+    "EESD 34, 595; Jankowski R (2006) Analytical expression between the impact damping ratio and the coefficient "
+    "of restitution in the non-linear viscoelastic model of structural pounding. EESD 35, 517",
     doi="10.1002/eqe.537",
     evidence="formula and DOI from memory",
     domain={"e": (0.0, 1.0)},

@@ -72,9 +72,7 @@ SIMBODY_HUNT_CROSSLEY = of_code(
         year=2008,
         equation="F = K δ^(3/2) (1 + χ δ̇/v₀),  χ = (3/2) c v₀",
         reference="Sherman MA, Seth A, Delp SL (2011) Simbody: multibody dynamics for biomedical research. "
-        "Procedia "
-        "IUTAM "
-        "2, 241",
+        "Procedia IUTAM 2, 241",
         evidence="formula seen in the source, which mixes materials by powers 2/3 of their moduli; that these are "
         "those of plane strain, E/(1 − ν²), from memory; no DOI known",
         parameters=(Parameter("c", "s/m", "dissipation, the slope of e over a small speed", least=0.0),),

@@ -20,11 +20,9 @@ JACKSON_GREEN_2010 = ForceModel(
     title="Jackson, Green and Marghitu",
     year=2010,
     equation="F = F_c w^(3/2) to w = 1.9, then F_c[exp(−w^(5/12)/4) w^(3/2) + (4H/(C Y))(1 − exp(−w^(5/9)/25)) "
-    "w];  "
-    "back F = Fₘ((δ − δₚ)/(δₘ − δₚ))^(3/2),  δₚ = 1.02 δₘ(1 − ((wₘ + 5.9)/6.9)^−0.54);  w = δ/δ_c",
-    reference="Jackson RL, Green I (2005) A finite element study of elasto-plastic hemispherical contact "
-    "against a "
-    "rigid flat. J. Tribol. 127, 343; Jackson RL, Green I, Marghitu DB (2010) Nonlinear Dyn. 60, 217",
+    "w];  back F = Fₘ((δ − δₚ)/(δₘ − δₚ))^(3/2),  δₚ = 1.02 δₘ(1 − ((wₘ + 5.9)/6.9)^−0.54);  w = δ/δ_c",
+    reference="Jackson RL, Green I (2005) A finite element study of elasto-plastic hemispherical contact against "
+    "a rigid flat. J. Tribol. 127, 343; Jackson RL, Green I, Marghitu DB (2010) Nonlinear Dyn. 60, 217",
     doi="10.1007/s11071-009-9591-z",
     evidence="formula and DOI from memory; no loss below w = 1.9, where the fit of e in the paper has one from "
     "w = 1",
@@ -65,9 +63,8 @@ MUTHUKUMAR_2003 = ForceModel(
     year=2003,
     equation="F = K₁ δ to d/10, then K₂;  back K₁ to the line K₂ δ, then along it;  K₁ = K d^(n−1) + 10 D,  "
     "K₂ = K d^(n−1) − (10/9) D,  D = K d^(n−1)(1 − e²)/(n + 1)",
-    reference="Muthukumar S (2003) A contact element approach with hysteresis damping for the analysis and "
-    "design of "
-    "pounding in bridges. PhD thesis, Georgia Institute of Technology",
+    reference="Muthukumar S (2003) A contact element approach with hysteresis damping for the analysis and design "
+    "of pounding in bridges. PhD thesis, Georgia Institute of Technology",
     evidence="formula from memory, as the ImpactMaterial of OpenSees has it; no DOI known",
     parameters=(Parameter("d", "m", "indentation that the law is designed for", least=1e-9),),
     coefficients={

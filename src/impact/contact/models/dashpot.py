@@ -170,8 +170,7 @@ THORNTON_CUMMINS_CLEARY_2013 = dashpot(
     equation="F = K δ^(3/2) + 2 β √(m S) δ̇,  S = (3/2) K δ^(1/2),  β = √(1/(1 − (1 + e)² exp(e p(e))) − 1), to "
     "F = 0",
     reference="Thornton C, Cummins SJ, Cleary PW (2013) An investigation of the comparative behaviour of "
-    "alternative "
-    "contact force models during inelastic collisions. Powder Technol. 233, 30",
+    "alternative contact force models during inelastic collisions. Powder Technol. 233, 30",
     doi="10.1016/j.powtec.2012.08.012",
     evidence="formula, with the ten coefficients of the polynomial p, and DOI from memory",
     domain={"e": (0.0, 1.0)},

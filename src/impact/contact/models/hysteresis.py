@@ -106,8 +106,7 @@ GONTHIER_2004 = hysteresis(
     year=2004,
     equation="F = K δⁿ (1 + χ δ̇/v₀),  χ = (1 − e²)/e",
     reference="Gonthier Y, McPhee J, Lange C, Piedboeuf JC (2004) A regularized contact model with asymmetric "
-    "damping "
-    "and dwell-time dependent friction. Multibody Syst. Dyn. 11, 209",
+    "damping and dwell-time dependent friction. Multibody Syst. Dyn. 11, 209",
     doi="10.1023/B:MUBO.0000029392.21648.bc",
     evidence=RECALLED,
     domain={"e": (0.0, 1.0)},
@@ -120,8 +119,7 @@ ZHIYING_QISHAO_2006 = hysteresis(
     year=2006,
     equation="F = K δⁿ (1 + χ δ̇/v₀),  χ = (3/4)(1 − e²) exp(2(1 − e))",
     reference="Qin Z, Lu Q (2006) Analysis of impact process model based on restitution coefficient. J. Dyn. "
-    "Control "
-    "4, 294",
+    "Control 4, 294",
     evidence="formula from memory; no DOI known",
     chi=lambda e: 0.75 * (1 - e * e) * np.exp(2 * (1 - e)),
 )
@@ -211,8 +209,7 @@ ZHANG_2020 = hysteresis(
     year=2020,
     equation="F = K δⁿ (1 + χ δ̇/v₀),  χ = 3(1 − e)/(2 e^0.89)",
     reference="Zhang J, Li W, Zhao L, He G (2020) A continuous contact force model for impact analysis in "
-    "multibody "
-    "dynamics. Mech. Mach. Theory 153, 103946",
+    "multibody dynamics. Mech. Mach. Theory 153, 103946",
     doi="10.1016/j.mechmachtheory.2020.103946",
     evidence=RECALLED,
     domain={"e": (0.0, 1.0)},

@@ -11,9 +11,8 @@ KUWABARA_KONO_1987 = ForceModel(
     year=1987,
     equation="F = K(δ^(3/2) + (3/2) A δ^(1/2) δ̇), to F = 0",
     reference="Kuwabara G, Kono K (1987) Restitution coefficient in a collision between two spheres. Jpn. J. "
-    "Appl. "
-    "Phys. 26, 1230; Brilliantov NV, Spahn F, Hertzsch JM, Pöschel T (1996) Phys. Rev. E 53, 5382; Ramírez R, "
-    "Pöschel T, Brilliantov NV, Schwager T (1999) Phys. Rev. E 60, 4465",
+    "Appl. Phys. 26, 1230; Brilliantov NV, Spahn F, Hertzsch JM, Pöschel T (1996) Phys. Rev. E 53, 5382; Ramírez "
+    "R, Pöschel T, Brilliantov NV, Schwager T (1999) Phys. Rev. E 60, 4465",
     doi="10.1143/JJAP.26.1230",
     evidence="formula and DOI from memory; the paper of 1999 seen",
     parameters=(Parameter("A", "s", "dissipative constant of the material", least=0.0),),
