@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-import inspect
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cache
 from typing import Literal, NotRequired, TypedDict
 
-import numpy as np
-
 from ..errors import ModelError, did_you_mean
-from .power import Array
+from .formula import Formula, wishes
 from .units import dimension
-
-Formula = Callable[..., object]
 
 # what a law may ask for by name, besides its own parameters and coefficients, and the unit of each
 QUANTITIES = {
@@ -230,31 +224,3 @@ class ForceModel:
         '0.9 ≤ e ≤ 1'
         """
         return ", ".join(f"{low:g} ≤ {name} ≤ {high:g}" for name, (low, high) in self.domain.items())
-
-
-@cache
-def wishes(formula: Formula | None) -> tuple[str, ...]:
-    """The names that a formula asks for; an argument with a default is its own.
-
-    >>> wishes(lambda elastic, v, chi: elastic * (1 + chi * v))
-    ('elastic', 'v', 'chi')
-    """
-    if formula is None:
-        return ()
-    arguments = inspect.signature(formula).parameters.values()
-    return tuple(one.name for one in arguments if one.default is inspect.Parameter.empty)
-
-
-def ask(formula: Formula, known: Mapping[str, Array | float]) -> Array:
-    """The value of a formula, given what it asks for by name.
-
-    Raises
-    ------
-    ModelError : the formula raised an error, whatever it was
-    """
-    given = [known[wish] for wish in wishes(formula)]
-    try:
-        return np.asarray(formula(*given), dtype=float)
-    except (Exception, SystemExit) as error:
-        # a formula that ends the program would take the other impacts with it
-        raise ModelError(f"a formula raised {type(error).__name__}: {error}") from error

@@ -18,7 +18,8 @@ import numpy as np
 
 from ..errors import ModelError
 from ..ode.problem import Array, Columns, Mask, Problem, Rates
-from .model import ForceModel, Formula, ask, wishes
+from .formula import Formula, ask, wishes
+from .model import ForceModel
 from .power import integer_power, power
 
 # above this χ a lane takes the log coordinate, if its law has one; below it plain v takes as many steps, and

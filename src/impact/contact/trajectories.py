@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from ..errors import ModelError
 from ..ode.problem import Columns
 from . import motion
-from .model import ForceModel, wishes
+from .formula import wishes
+from .model import ForceModel
 from .power import Array
 from .status import Status
 from .strike import Rebound, strike

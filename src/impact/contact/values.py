@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from ..errors import ModelError
 from . import motion
+from .formula import ask, wishes
 from .lanes import Lanes, in_own_units
-from .model import QUANTITIES, ForceModel, ask, wishes
+from .model import QUANTITIES, ForceModel
 from .power import Array
 
 # numbers that are the same for all impacts, and arrays of shape (n,)

@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..contact.formula import ask, wishes
 from ..contact.lanes import Lanes, stiffness
 from ..contact.material import effective_mass, hertz_stiffness, sphere_radius
-from ..contact.model import QUANTITIES, ForceModel, ask, wishes
+from ..contact.model import QUANTITIES, ForceModel
 from ..contact.power import Array
 from .plan import Index, Plan, dimensions
 

@@ -206,8 +206,8 @@ def _source_hash(model: ForceModel) -> str:
     """SHA-256 over a model's declaration: its fields, and the source of its formulas with what they close over."""
     parts: list[str] = []
     for name, value in vars(model).items():
-        formulas = value.values() if name == "coefficients" else [value]
-        parts += (_source(one) if callable(one) else repr(one) for one in formulas)
+        several = value.values() if name == "coefficients" else value if name.endswith("bends") else [value]
+        parts += (_source(one) if callable(one) else repr(one) for one in several)
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 

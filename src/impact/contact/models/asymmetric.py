@@ -7,7 +7,8 @@ from typing import Unpack
 
 import numpy as np
 
-from ..model import About, ForceModel, Formula
+from ..formula import Formula
+from ..model import About, ForceModel
 from ..oracles import approach_damped_restitution, approach_damping, approach_restitution
 from .dashpot import dashpot
 

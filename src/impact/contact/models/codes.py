@@ -9,7 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..model import ForceModel, Formula, Parameter
+from ..formula import Formula
+from ..model import ForceModel, Parameter
 from ..oracles import force_restitution
 from ..power import Array, power
 from .hysteresis import hysteresis

@@ -10,7 +10,8 @@ from typing import Literal, Unpack
 
 import numpy as np
 
-from ..model import About, ForceModel, Formula, Parameter
+from ..formula import Formula
+from ..model import About, ForceModel, Parameter
 from ..oracles import force_damping, force_restitution, gap_damping, gap_restitution
 from ..power import Array, power
 

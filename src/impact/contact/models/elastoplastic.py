@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..model import ForceModel, Formula, Parameter
+from ..formula import Formula
+from ..model import ForceModel, Parameter
 from ..oracles import luding_restitution, thornton_restitution
 from ..power import Array, power
 

@@ -6,7 +6,8 @@ from typing import Unpack
 
 import numpy as np
 
-from ..model import About, ForceModel, Formula
+from ..formula import Formula
+from ..model import About, ForceModel
 from ..oracles import delivered_restitution, exact_damping_ratio
 from ..power import power
 
