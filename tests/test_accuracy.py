@@ -46,18 +46,13 @@ def worst(values: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize(("key", "n"), CASES)
-def test_restitution_is_exact_to_1e_9(key, n):
-    _, contact = over_e(key, n)
+def test_restitution_is_exact_to_1e_9_and_work_balances_energy(key, n):
+    lanes, contact = over_e(key, n)
     assert np.all(contact.status == Status.OK)
     if find(key).oracle is None:
         assert np.all(np.isnan(contact.oracle_error))
     else:
         assert worst(contact.oracle_error) <= 1e-9
-
-
-@pytest.mark.parametrize(("key", "n"), CASES)
-def test_work_balances_energy(key, n):
-    lanes, contact = over_e(key, n)
     assert worst(contact.residual) <= 10 * DEFAULT_RTOL
     # it measures the integration: a tolerance ten thousand times looser shows
     loose = collide(find(key), lanes, rtol=1e4 * DEFAULT_RTOL, max_steps=10_000)

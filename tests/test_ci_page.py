@@ -15,6 +15,9 @@ import yaml
 
 from .conftest import ROOT, Run
 
+# each makes environments and builds the package
+pytestmark = pytest.mark.slow
+
 PAGE = (ROOT / "docs" / "ci.md").read_text(encoding="utf-8")
 CONTACT = """
 models = ["hertz", "gharib-hurmuzlu-2012"]

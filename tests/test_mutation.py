@@ -234,6 +234,7 @@ def test_every_variable_bites_at_every_kind_of_point(wide: xr.Dataset, figure6: 
             assert found.at.keys() >= {dim for dim in result[name].dims if "." not in dim}
 
 
+@pytest.mark.slow
 def test_no_change_passes_through_files(
     forked: Forked, figure6: xr.Dataset, wide: xr.Dataset, tmp_path: Path
 ) -> None:

@@ -605,9 +605,16 @@ def test_a_signal_ends_a_rerun(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("format", "new", "code"),
-    [("table", "different", 1), ("table", "equal", 0), ("json", "different", 1), ("junit", "different", 1),
-     ("markdown", "different", 1), ("github", "different", 1)],
-)  # fmt: skip
+    [
+        ("table", "different", 1),
+        pytest.param("table", "equal", 0, marks=pytest.mark.slow),
+        ("json", "different", 1),
+        *(
+            pytest.param(format, "different", 1, marks=pytest.mark.slow)
+            for format in ("junit", "markdown", "github")
+        ),
+    ],
+)
 def test_a_reader_who_leaves_early_does_not_change_the_exit_code(
     folder: Path, tmp_path: Path, format: str, new: str, code: int
 ) -> None:
