@@ -3,28 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from functools import cache
 
 import numpy as np
 
 from impact.contact.model import ForceModel
 from impact.contact.models import catalogue
-from impact.contact.status import Status
-from impact.sweeps.settings import Solver
 from models_measured import (
     BOUNDS,
-    FEW_STEPS,
     GRID,
     ROUNDING,
-    SMALL,
     delivers,
     error,
     largest,
     laws,
     measured,
     number,
-    short,
-    swept,
     table,
 )
 
@@ -32,8 +25,8 @@ from models_measured import (
 def claims() -> str:
     """What laws are taken for, and the numbers against it."""
     known = [law for law in laws() if "e" in law.quantities and delivers(law, GRID) is not None]
-    parts = (floors(known), claimed(), at_one(known), slopes(known), without_tension(known), hysteretic(), steps())
-    return "\n\n".join(part for part in parts if part)
+    parts = (floors(known), claimed(), at_one(known), slopes(known), without_tension(known), hysteretic())
+    return "\n\n".join(parts)
 
 
 def at(law: ForceModel, e: float) -> float:
@@ -117,19 +110,3 @@ def hysteretic() -> str:
     return f"""\
 **A root.** `{law.key}` unloads with e K δ. That gives back the part e of the work, and so delivers √e,
 {number(at(law, 0.5))} at e = 0.5; with e² in the place of e it would deliver e."""
-
-
-@cache
-def steps() -> str:
-    """Laws that the program cannot integrate down to e = 0."""
-    dashpots = [law for law in laws() if "zeta" in law.coefficients and "e" in law.quantities]
-    found = swept(dashpots, quantity="status", solver={"max_steps": FEW_STEPS}, e=np.array(SMALL))
-    fails = [f"- `{key}`" for key, ends in found.items() if ends.tolist() == [Status.OK, Status.MAX_STEPS]]
-    if not fails:
-        return ""
-    return f"""\
-**A limit of the program.** ζ of a dashpot without tension, or on approach only, grows without bound as e goes to
-zero. At e = {short(SMALL[0])} these laws end within {FEW_STEPS:,} steps. At e = {short(SMALL[1])} they do not,
-nor within the {Solver().max_steps:,} of the default: the status is `max_steps`, and the answer NaN.
-
-{chr(10).join(fails)}"""

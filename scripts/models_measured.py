@@ -26,8 +26,6 @@ DAMPING = 0.3
 # what is smaller is rounding or the solver's error, and turns no digit that is shown
 ROUNDING = 1e-9
 BOUNDS = (0.01, 0.05)
-# where laws of large damping are tried, and the steps they get: a sound one takes a quarter of them
-SMALL, FEW_STEPS = (1e-5, 1e-6), 1000
 
 
 @dataclass(frozen=True)
@@ -69,24 +67,18 @@ def delivers(model: ForceModel, e: Array | Sequence[float]) -> Array | None:
         return delivered(model, np.asarray(e, dtype=float))
 
 
-def swept(
-    models: Iterable[ForceModel],
-    own: dict[str, dict[str, float]] | None = None,
-    quantity: str = "e_out",
-    solver: dict[str, object] | None = None,
-    **axes: object,
-) -> dict[str, Array]:
-    """A quantity of laws by key, integrated for the balls of Table 1 over axes of a sweep."""
+def swept(models: Iterable[ForceModel], own: dict[str, dict[str, float]], **axes: Array) -> dict[str, Array]:
+    """The restitution of laws by key, integrated for the balls of Table 1 over axes of a sweep."""
     keys = [model.key for model in models]
     if not keys:
         return {}
-    lists = {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in axes.items()}
+    lists = {name: value.tolist() for name, value in axes.items()}
     config = {
         "models": keys, "sweep": {**BALLS, **lists}, "materials": {"aluminium": MATERIAL},
-        "model": {key: own[key] for key in keys} if own else {}, "solver": solver or {},
+        "model": {key: own[key] for key in keys},
     }  # fmt: skip
     result = impact.sweep(config)
-    return {key: result[quantity].sel(model=key).values.ravel() for key in keys}
+    return {key: result["e_out"].sel(model=key).values.ravel() for key in keys}
 
 
 def own_settings(model: ForceModel) -> dict[str, float]:

@@ -77,7 +77,9 @@ def test_a_changed_model_has_another_fingerprint() -> None:
         ({"domain": {"e": (1, 0)}}, "domain of e: got (1, 0), wants (least, most)"),
         ({"parameters": ("c",)}, "wants a tuple of Parameter"),
         ({"coefficients": {"K": lambda e: e}}, '"K" is the name of a quantity'),
-        ({"momentum": "log"}, 'momentum "log" wants a coefficient chi'),
+        ({"momentum": "log"}, 'momentum "log" wants a coefficient chi, a force of elastic and chi'),
+        ({"momentum": "force"}, 'momentum "force" wants a coefficient c and one q, a force of elastic and c'),
+        ({"momentum": "w"}, 'momentum: got \'w\', wants "v", "log" or "force"'),
     ],
 )
 def test_a_wrong_model_is_refused_when_it_is_made(change: dict[str, object], words: str) -> None:

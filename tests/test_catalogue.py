@@ -271,20 +271,16 @@ def test_a_linear_dashpot_of_critical_damping_and_above_creeps_for_ever():
 
 
 def test_a_linear_dashpot_without_tension_moves_by_its_closed_form():
-    zeta = np.unique([0.0, 1e-6, 1e-3, 1.0, *np.linspace(0.02, 2.0, 100), 5.0, 10.0, 20.0, 50.0])
+    zeta = np.unique([0.0, 1e-6, 1e-3, 1.0, *np.linspace(0.02, 2.0, 100), *np.geomspace(2.0, 1e12, 30)])
     contact = linear("kelvin-voigt-no-tension", zeta)
     own, exact = own_units(contact), force_restitution(zeta)
     assert np.all(contact.status == Status.OK)
-    assert np.abs(own["e_out"] - exact).max() <= 1e-9
+    assert own["e_out"] == pytest.approx(exact, rel=1e-9, abs=0.0)
     assert own["peak"] == pytest.approx(np.exp(-zeta * time_to_peak(zeta)), rel=1e-8)
     assert own["force"] == pytest.approx(largest_force(zeta), rel=1e-8)
     # y + 2 zeta v = 0
     assert own["at_end"] == pytest.approx(2.0 * zeta * exact, rel=1e-8, abs=1e-8)
-    time = 2.0 * time_to_peak(zeta)
-    assert own["duration"][zeta <= 2.0] == pytest.approx(time[zeta <= 2.0], rel=1e-8)
-    # the force y + 2 zeta v comes to zero at the rate v = -e: an error of v, which is judged against the closing
-    # speed, is 2 zeta/e as much of the time, and the time of an overdamped contact is known no better
-    assert np.all(np.abs(own["duration"] - time) <= 1e-8 * time + 2e-10 * zeta / np.maximum(exact, 1e-9))
+    assert own["duration"] == pytest.approx(2.0 * time_to_peak(zeta), rel=1e-9)
 
 
 # exponent of the damping, and the parameter for a dimensionless damping g of contacts of given K/m, v0 and m
@@ -293,7 +289,7 @@ RATE_DEPENDENT = {
     "lee-herrmann-1993": (0.0, "gamma", lambda g, k, v0, m: g * k**0.4 * v0**0.2),
     "bordbar-hyppanen-2007": (0.65, "C", lambda g, k, v0, m: g * m * v0 / (v0**2 / k) ** 0.66),
 }
-DAMPING = np.array([0.01, 0.03, 0.1, 0.3, 0.6, 1.0, 1.5, 2.0, 3.0, 5.0])
+DAMPING = np.array([0.01, 0.03, 0.1, 0.3, 0.6, 1.0, 1.5, 2.0, 3.0, 5.0, 20.0])
 
 
 def rate_dependent(key: str, g: np.ndarray, v1: object = 1.0, v0_of_g: object = None) -> Contact:
@@ -343,6 +339,17 @@ def test_a_law_without_a_closed_form_agrees_with_a_second_integration(key):
     assert np.abs(own["e_out"] - [one["e_out"] for one in second]).max() <= 1e-9
     for name in ("peak", "force", "duration"):
         assert own[name] == pytest.approx([one[name] for one in second], rel=1e-8), name
+
+
+@pytest.mark.parametrize("key", RATE_DEPENDENT)
+def test_a_law_without_a_closed_form_goes_to_its_limit_of_strong_damping(key):
+    # the damping alone stops the balls, at x^(q+1) = (q + 1)/g; then it balances the spring, at -v = x^(1.5-q)/g
+    q, g = RATE_DEPENDENT[key][0], np.geomspace(1e6, 1e9, 4)
+    contact = rate_dependent(key, g)
+    assert np.all(contact.status == Status.OK)
+    peak = ((q + 1.0) / g) ** (1.0 / (q + 1.0))
+    assert own_units(contact)["peak"] == pytest.approx(peak, rel=1e-6)
+    assert contact.e_out == pytest.approx(peak ** (1.5 - q) / g, rel=1e-6, abs=0.0)
 
 
 @pytest.mark.parametrize("key", RATE_DEPENDENT)
@@ -400,9 +407,9 @@ CALIBRATED = (
     [(key, n) for key in CALIBRATED for n in (1.0, 1.5, 2.0, 3.0) if find(key).exponent in (None, n)],
 )
 def test_a_dashpot_of_calibrated_damping_delivers_what_is_asked_for(key, n):
-    # a dashpot of so much damping that e is 1e-5 hides the zero of the force in the error of the speed, at some e
-    least = 5e-5 if key == "exact-dashpot-no-tension" else 1e-5
-    e = np.unique([*np.geomspace(least, 1.0, 60), *np.linspace(0.05, 1.0, 39)])
+    e = np.unique([*np.geomspace(1e-12, 1.0, 60), *np.linspace(0.05, 1.0, 39)])
     contact = collide(find(key), impacts(n, e=e), rtol=DEFAULT_RTOL, max_steps=10_000)
     assert np.all(contact.status == Status.OK)
     assert np.abs(contact.e_out - e).max() <= 1e-9
+    # what is left of the speed keeps its digits, too; to the end of the gap it fades over a long time
+    assert np.abs(contact.e_out / e - 1.0).max() <= (1e-9 if find(key).release == "force" else 1e-6)

@@ -160,7 +160,8 @@ def _too_short(elastic, v, chi):
 POISONS = {
     "the force is nan": (_not_finite, {Status.NOT_FINITE}),
     "the force becomes nan on the way": (_becomes_nan, {Status.NOT_FINITE}),
-    "the force holds the balls": (_holds, {Status.NOT_SEPARATED}),
+    # a force that jumps where the balls are at rest leaves no step that is small enough
+    "the force holds the balls": (_holds, {Status.NOT_SEPARATED, Status.STEP_UNDERFLOW}),
     "the force is too weak": (_lets_through, {Status.NOT_SEPARATED}),
     "the force pulls ever harder": (_pulls_ever_harder, {Status.NOT_SEPARATED, Status.STEP_UNDERFLOW}),
     "the force raises": (_raises, {Status.MODEL_ERROR}),

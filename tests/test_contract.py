@@ -76,6 +76,15 @@ WRONG = {
         ),
         "work balances energy",
     ),
+    "the force coordinate for another law": (
+        wrong(
+            lambda elastic, x, v, c: elastic + c * x * v,
+            coefficients={"c": lambda e: 4.0 - e, "q": lambda: 0.5},
+            momentum="force",
+            release="force",
+        ),
+        "work balances energy",
+    ),
     "a force that tells its balls apart": (
         wrong(
             lambda elastic, v, share: elastic * (1.0 + share * v),

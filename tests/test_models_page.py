@@ -104,7 +104,7 @@ def test_a_law_without_a_closed_form_is_integrated() -> None:
     law = catalogue()["flores-2011"]
     e = models_measured.GRID[::20]
     np.testing.assert_allclose(
-        models_measured.swept([law], e=e)[law.key], models_measured.delivers(law, e), atol=1e-9
+        models_measured.swept([law], {law.key: {}}, e=e)[law.key], models_measured.delivers(law, e), atol=1e-9
     )
 
 

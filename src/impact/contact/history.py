@@ -11,10 +11,11 @@ from ..ode.problem import Columns, Problem, Step
 from . import motion
 from .lanes import Lanes
 from .model import ForceModel
+from .momentum import is_strong
 from .power import Array
 from .status import Status
 from .strike import strike
-from .values import chi_of, exact_restitution, own_values, takes_log, with_coefficients, with_units
+from .values import exact_restitution, own_values, with_coefficients, with_units
 
 # points at which a step is shown, and at which it is integrated again
 SAMPLES, GAUSS = 4, 5
@@ -57,7 +58,7 @@ def follow(model: ForceModel, lanes: Lanes, *, rtol: float, max_steps: int) -> H
     n = float(lanes.n[0])
     with np.errstate(all="ignore"):
         values = with_coefficients(model, with_units(own_values(model, lanes), n), 1)
-        law = motion.Law.of(model, n, bool(takes_log(model, chi_of(values, 1))[0]))
+        law = motion.Law.of(model, n, bool(is_strong(model, values, 1)[0]))
         columns = tuple(np.asarray(values[name]) for name in law.names)
         creeps = exact_restitution(model, values, 1) == 0.0
         struck = strike(law, columns, 1, rtol, max_steps, record=True, creeps=creeps)
@@ -113,7 +114,7 @@ def _phase(law: motion.Law, problem: Problem, steps: tuple[Step, ...], columns: 
         for part in range(SAMPLES + last):
             y = step.at(step.end * part / SAMPLES)
             rates = problem.rates(y[:2], columns)
-            rows.append(np.array([y[2], motion.indentation(law, y[0]), law.velocity(y[1], columns), rates[4]]))
+            rows.append(np.array([y[2], motion.indentation(law, y[0]), law.velocity(y, columns), rates[4]]))
         for node, weight in zip(nodes, weights, strict=True):
             rates = problem.rates(step.at(step.end * 0.5 * (1.0 + node))[:2], columns)
             share = 0.5 * weight * (step.end * step.length)[0]

@@ -24,6 +24,8 @@ IN_UNLOADING = {
     "force_at_peak": "force there",
     "residual": "permanent indentation",
 }
+# coefficients that a coordinate of the velocity asks for; the first is the strength of the damping
+COORDINATES = {"v": (), "log": ("chi",), "force": ("c", "q")}
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,9 @@ class ForceModel:
     stiffness : K in SI from the quantities of the contact and the parameters, where it is not given and not (12)
     release : the contact ends at zero indentation ("gap"), or already at zero force ("force")
     smooth : p of the smooth coordinate δ = δᵣ + sᵖ: 2 for half-integer powers, 4 for quarters
-    momentum : "log" where `force` is K δⁿ (1 + χ δ̇/v₀) exactly, which lets large χ be integrated without stiffness
+    momentum : "log" where `force` is K δⁿ (1 + χ δ̇/v₀) exactly, which lets large χ be integrated without
+        stiffness; "force" where it is K δⁿ + c δ^q δ̇ exactly, with coefficients c, and q of n alone, which keeps
+        the digits of the force at its zero
     exponent : n, where the law fixes it; None takes the sweep's
     family : the group it is listed under
     same_as : the key of the law that this is another name of, if it is
@@ -135,7 +139,7 @@ class ForceModel:
     stiffness: Formula | None = None
     release: Literal["gap", "force"] = "gap"
     smooth: int = 2
-    momentum: Literal["v", "log"] = "v"
+    momentum: Literal["v", "log", "force"] = "v"
     exponent: float | None = None
     family: str = "other"
     same_as: str = ""
@@ -143,14 +147,10 @@ class ForceModel:
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", self.key):
             raise ModelError(f'model key "{self.key}": wants kebab-case, such as "hunt-crossley-1975"')
-        smooth = {"elastic", "chi"} <= set(wishes(self.force)) and not self.bends
-        if self.momentum == "log" and not ("chi" in self.coefficients and smooth):
-            raise ModelError(
-                f'model {self.key}: momentum "log" wants a coefficient chi, and a force of elastic and chi'
-            )
         if self.unloading_bends and self.unloading is None:
             raise ModelError(f"model {self.key}: unloading_bends: wants an unloading")
         self._check_fields()
+        self._check_momentum()
         once = {*QUANTITIES, *(parameter.name for parameter in self.parameters)}
         for name, formula in self.coefficients.items():
             self._check(f"coefficient {name}", formula, once)
@@ -167,11 +167,20 @@ class ForceModel:
             "stiffness", self.stiffness, {*QUANTITIES, *(one.name for one in self.parameters)} - {"K", "e"}
         )
 
+    def _check_momentum(self) -> None:
+        wanted = COORDINATES[self.momentum]
+        smooth = {"elastic", *wanted[:1]} <= set(wishes(self.force)) and not self.bends
+        if wanted and not (smooth and self.coefficients.keys() >= set(wanted)):
+            raise ModelError(
+                f'model {self.key}: momentum "{self.momentum}" wants a coefficient {" and one ".join(wanted)}, a '
+                f"force of elastic and {wanted[0]}, and no bends"
+            )
+
     def _check_fields(self) -> None:
         own = isinstance(self.parameters, tuple) and all(isinstance(one, Parameter) for one in self.parameters)
         allowed = {
             "release": (self.release in ("gap", "force"), '"gap" or "force"'),
-            "momentum": (self.momentum in ("v", "log"), '"v" or "log"'),
+            "momentum": (self.momentum in COORDINATES, '"v", "log" or "force"'),
             "smooth": (self.smooth in (2, 4, 6, 8), "2, 4, 6 or 8"),
             "exponent": (self.exponent is None or 1.0 <= self.exponent <= 10.0, "None, or a number from 1 to 10"),
             "parameters": (own, "a tuple of Parameter"),

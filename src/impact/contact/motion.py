@@ -5,8 +5,7 @@ has no third derivative, and an integrator of order five would lose its order th
 
     ds/dσ = v,  dv/dσ = −p sᵖ⁻¹ F,  dt/dσ = p sᵖ⁻¹,  dW/dσ = p sᵖ⁻¹ F v,
 
-where W is the work done against the force. In the "log" coordinate u = ln(1 + χ v) a force F = xⁿ (1 + χ v)
-gives du/dσ = −χ p sᵖ⁻¹ xⁿ, which is not stiff for any χ.
+where W is the work done against the force. Where the damping is strong, another coordinate may stand for v.
 """
 
 from __future__ import annotations
@@ -20,22 +19,22 @@ from ..errors import ModelError
 from ..ode.problem import Array, Columns, Mask, Problem, Rates
 from .formula import Formula, ask, wishes
 from .model import ForceModel
+from .momentum import Momentum, coordinate, signed_power
 from .power import integer_power, power
 
-# above this χ a lane takes the log coordinate, if its law has one; below it plain v takes as many steps, and
-# an exponential costs more than the rest of a stage
-LOG_ABOVE = 2.0
 # scaled s beyond which a ball is taken to have passed through: no force stopped it
 FAR = 1e8
-# the velocity is judged against v0, the log coordinate against 1, and s against itself: near s = 0 the motion is
-# so smooth that its relative error stays small there
-FLOOR = (1e-200, 1.0)
+# each component is judged against itself: what a strong damping leaves of the velocity is small beside v0 and
+# still decides where the force vanishes; near s = 0 the motion is so smooth that its relative error is small, too
+FLOOR = (1e-200, 1e-200)
 # step of the difference that gives the rate of the force at the release, relative to s, at which it may vanish
 DIFFERENCE = 1e-7
 # what an unloading branch is told besides, in columns that follow the law's own
 BRANCH = ("peak", "force_at_peak", "residual")
 # the force of a law without damping is taken to be a power of s below this
 POWER = 16.0
+# of a coordinate that asks for no coefficient
+NONE = np.empty(0)
 Event = Callable[[Array, Array, Columns], tuple[Array, Array]]
 
 
@@ -46,15 +45,18 @@ class Law:
     model: ForceModel
     n: float
     names: tuple[str, ...]
-    log: bool
+    momentum: Momentum
 
     @classmethod
-    def of(cls, model: ForceModel, n: float, log: bool) -> Law:
-        """The law of a model, which draws on what the formulas of its motion ask for."""
+    def of(cls, model: ForceModel, n: float, strong: bool) -> Law:
+        """The law of a model, which draws on what the formulas of its motion ask for.
+
+        Where the damping is strong, the coordinate that the law declares for it stands for v.
+        """
         formulas = (model.force, model.unloading, model.residual, *model.bends, *model.unloading_bends)
         asked = {wish for formula in formulas for wish in wishes(formula)}
         own = {*model.quantities, *model.coefficients} - {"K", "m", "v0", "n"}
-        return cls(model, n, tuple(sorted(asked & own)), log)
+        return cls(model, n, tuple(sorted(asked & own)), coordinate(model, n) if strong else Momentum())
 
     def call(self, formula: Formula, columns: Columns, given: dict[str, Array]) -> Array:
         """A formula's value from the columns and what else is given; K, m and v0 are 1."""
@@ -62,23 +64,25 @@ class Law:
         known.update(zip(self.names, columns, strict=True))
         return ask(formula, known)
 
-    def velocity(self, momentum: Array, columns: Columns) -> Array:
-        """v from the second component."""
-        if not self.log:
-            return momentum
-        return np.asarray(np.expm1(momentum) / columns[self.names.index("chi")])
+    def velocity(self, y: Array, columns: Columns) -> Array:
+        """v from the components."""
+        return self.momentum.velocity(y, self.strength(columns))
+
+    def strength(self, columns: Columns) -> Array:
+        """The coefficient that the coordinate of the law asks for."""
+        return columns[self.names.index(self.momentum.strength)] if self.momentum.strength else NONE
 
 
 def approach(law: Law, bend: int = 0) -> Problem:
     """From contact to the largest indentation: v falls to zero; or to a bend of the force."""
 
     def stop_event(y: Array, k: Array, columns: Columns) -> tuple[Array, Array]:
-        return y[1], k[1]
+        return law.momentum.stop(y, k)
 
     return Problem(
         rates=_rates(law, law.model.force, None),
         event=_or_bend(stop_event, bend),
-        lost=lambda y: np.asarray(y[0] > FAR),
+        lost=lambda y, k: np.asarray(y[0] > FAR),
         floor=FLOOR,
         watch=True,
     )
@@ -106,8 +110,8 @@ def restitution(law: Law, bend: int = 0) -> Problem:
     def gap_event(y: Array, k: Array, columns: Columns) -> tuple[Array, Array]:
         return y[0], k[0]
 
-    def turned_back(y: Array) -> Mask:
-        return np.asarray(y[1] >= 0.0)
+    def turned_back(y: Array, k: Array) -> Mask:
+        return np.asarray(k[0] >= 0.0)
 
     event = force_event if law.model.release == "force" else gap_event
     return Problem(rates=rates, event=_or_bend(event, bend), lost=turned_back, floor=FLOOR)
@@ -150,19 +154,20 @@ def bends(law: Law, columns: Columns, n: int, residual: Array | None = None) -> 
 
 
 def of_restitution(law: Law) -> Law:
-    """The law of the restitution phase: a branch of its own is not of the form that the log coordinate is for."""
-    return law if law.model.unloading is None else replace(law, log=False)
+    """The law of the restitution phase: a branch of its own is not of the form that a coordinate is for."""
+    return law if law.model.unloading is None else replace(law, momentum=Momentum())
 
 
 def start_of_approach(law: Law, columns: Columns, n: int) -> Array:
     """s = 0, v = 1."""
-    first = np.log1p(columns[law.names.index("chi")]) if law.log else np.ones(n)
-    return np.array([np.zeros(n), first])
+    s = np.zeros(n)
+    return np.array([s, law.momentum.of(s, np.ones(n), law.strength(columns))])
 
 
-def start_of_restitution(law: Law, peak: Array, residual: Array) -> Array:
+def start_of_restitution(law: Law, columns: Columns, peak: Array, residual: Array) -> Array:
     """s at the peak above the residual indentation, v = 0."""
-    return np.array([power(peak - residual, 1.0 / law.model.smooth), np.zeros(peak.size)])
+    s = power(peak - residual, 1.0 / law.model.smooth)
+    return np.array([s, law.momentum.of(s, np.zeros(s.size), law.strength(columns))])
 
 
 def indentation(law: Law, s: Array) -> Array:
@@ -192,10 +197,9 @@ def _rates(law: Law, formula: Formula, extra: tuple[str, ...] | None) -> Rates:
     p = law.model.smooth
     stretch, elastic = "x" in wishes(formula), "elastic" in wishes(formula)
     own = len(law.names)
-    chi = law.names.index("chi") if law.log else 0
 
     def rates(y: Array, columns: Columns, out: Array | None = None) -> Array:
-        s, v = y[0], law.velocity(y[1], columns)
+        s, v = y[0], law.velocity(y, columns)
         given = {"v": v}
         if extra:
             given.update(zip(extra, columns[own:], strict=False))
@@ -206,7 +210,7 @@ def _rates(law: Law, formula: Formula, extra: tuple[str, ...] | None) -> Rates:
             if stretch:
                 given["x"] = integer_power(s, p)
             if elastic:
-                given["elastic"] = _elastic(s, p * law.n)
+                given["elastic"] = signed_power(s, p * law.n)
         force = law.call(formula, columns[:own], given)
         if force.shape != s.shape and force.shape != ():
             raise ModelError(f"{law.model.key}: the force has the shape {force.shape}, wants {s.shape}")
@@ -219,17 +223,9 @@ def _rates(law: Law, formula: Formula, extra: tuple[str, ...] | None) -> Rates:
         np.multiply(weight, force, second)
         if wanted > 3:
             np.multiply(second, v, out[3])
-        if law.log:
-            np.multiply(weight, given["elastic"], second)
-            np.multiply(second, columns[chi], second)
-        np.negative(second, second)
         if wanted > 4:
             out[4] = force
+        law.momentum.rates(out, y, weight, given.get("elastic", weight), law.strength(columns))
         return out
 
     return rates
-
-
-def _elastic(s: Array, exponent: float) -> Array:
-    """s to the power p n. A whole power is continued through zero, so that a step across the release is smooth."""
-    return integer_power(s, int(exponent)) if float(exponent).is_integer() else power(np.abs(s), exponent)

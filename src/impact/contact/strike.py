@@ -97,7 +97,7 @@ def strike(
 
     Parameters
     ----------
-    law : the law at one exponent and in one momentum coordinate
+    law : the law at one exponent and in one coordinate of the velocity
     columns : its values per impact, each of shape (n,)
     rtol, max_steps, record : see `impact.ode.rk45.integrate`
     creeps : which are known to part with no speed: where the indentation closes, it takes for ever
@@ -128,10 +128,10 @@ def strike(
     if not parts.size:
         return Struck(rebound, inward, None, columns, parts)
     back = motion.of_restitution(law)
-    start = motion.start_of_restitution(law, peak[parts], residual[parts])
+    start = motion.start_of_restitution(back, columns, peak[parts], residual[parts])
     bends = motion.bends(back, columns, parts.size, residual[parts])
     outward = in_parts(run, partial(motion.restitution, back), start, columns, bends, -1)
-    rebound.e_out[parts] = -back.velocity(outward.state[1], columns)
+    rebound.e_out[parts] = -back.velocity(outward.state, columns)
     rebound.duration[parts] += outward.state[2]
     rebound.work[parts] += 2.0 * outward.state[3]
     rebound.steps[parts] += outward.steps

@@ -13,10 +13,11 @@ from ..ode.problem import Columns
 from . import motion
 from .formula import wishes
 from .model import ForceModel
+from .momentum import is_strong
 from .power import Array
 from .status import Status
 from .strike import Rebound, strike
-from .values import Values, chi_of, exact_restitution, takes_log, with_coefficients, with_units
+from .values import Values, chi_of, exact_restitution, with_coefficients, with_units
 
 Given = Mapping[str, Array]
 
@@ -110,12 +111,12 @@ def _struck(
 
     exact = exact_restitution(model, values, count)
     chi = chi_of(values, count)
-    log = takes_log(model, chi)
-    for is_log in (False, True):
-        where = np.flatnonzero((rebound.status == Status.OK) & (log == is_log))
+    strong = is_strong(model, values, count)
+    for side in (False, True):
+        where = np.flatnonzero((rebound.status == Status.OK) & (strong == side))
         if not where.size:
             continue
-        law = motion.Law.of(model, n, is_log)
+        law = motion.Law.of(model, n, side)
         columns = tuple(np.asarray(values[name])[where] for name in law.names)
         first, back = _distinct(columns, where.size) if collapse else (np.arange(where.size),) * 2
         creeps = exact[where][first] == 0.0

@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ModelError
-from . import motion
 from .formula import ask, wishes
 from .lanes import Lanes, in_own_units
 from .model import QUANTITIES, ForceModel
@@ -79,11 +77,6 @@ def _of_each(value: Array, count: int) -> Array:
 def chi_of(values: Values, count: int) -> Array:
     """The damping ratio of a law that has one, else NaN; shape (count,)."""
     return np.array(np.broadcast_to(values.get("chi", np.nan), count))
-
-
-def takes_log(model: ForceModel, chi: Array) -> NDArray[np.bool_]:
-    """Which impacts are integrated in the log coordinate: by their own damping ratio, never by their company."""
-    return np.full(chi.shape, model.momentum == "log") & (chi > motion.LOG_ABOVE)
 
 
 def delivered(model: ForceModel, e: Array) -> Array | None:

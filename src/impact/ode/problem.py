@@ -48,14 +48,14 @@ class Problem:
         rows left out that it has no room for
     event : (y, k, columns) -> (g, dg): a function that is positive until the lane ends, and its rate along the
         trajectory, at components y where the rates are k
-    lost : y -> mask of the lanes that can no longer reach the event
+    lost : (y, k) -> mask of the lanes that can no longer reach the event, at components y where the rates are k
     floor : the local error of each component is judged against rtol max(|y|, floor)
     watch : locate the maximum of the watched quantity
     """
 
     rates: Rates
     event: Callable[[Array, Array, Columns], tuple[Array, Array]]
-    lost: Callable[[Array], Mask]
+    lost: Callable[[Array, Array], Mask]
     floor: tuple[float, float]
     watch: bool = False
 

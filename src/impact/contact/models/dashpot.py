@@ -36,9 +36,14 @@ def dashpot(key: str, *, zeta: Formula, release: Literal["gap", "force"], **abou
     return ForceModel(
         key,
         **about,
-        coefficients={"zeta": zeta, "c": lambda zeta, n, m, K: zeta * np.sqrt(2 * (n + 1) * m * K)},
+        coefficients={
+            "zeta": zeta,
+            "c": lambda zeta, n, m, K: zeta * np.sqrt(2 * (n + 1) * m * K),
+            "q": lambda n: (n - 1) / 2,
+        },
         force=lambda elastic, x, v, n, c: elastic + c * power(x, (n - 1) / 2) * v,
         release=release,
+        momentum="force",
         oracle=by_gap if release == "gap" else by_force,
         # with n = 3/2 the dashpot goes as the fourth root of the indentation
         smooth=2 if about.get("exponent") == 1.0 else 4,

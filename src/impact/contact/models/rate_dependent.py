@@ -17,8 +17,10 @@ KUWABARA_KONO_1987 = ForceModel(
     evidence="formula and DOI from memory; the paper of 1999 seen",
     parameters=(Parameter("A", "s", "dissipative constant of the material", least=0.0),),
     exponent=1.5,
-    force=lambda elastic, x, v, K, A: elastic + 1.5 * A * K * power(x, 0.5) * v,
+    coefficients={"c": lambda A, K: 1.5 * A * K, "q": lambda: 0.5},
+    force=lambda elastic, x, v, c: elastic + c * power(x, 0.5) * v,
     release="force",
+    momentum="force",
     family="rate-dependent",
 )
 
@@ -33,8 +35,10 @@ LEE_HERRMANN_1993 = ForceModel(
     evidence="formula and DOI from memory",
     parameters=(Parameter("gamma", "1/s", "damping γ per effective mass", least=0.0),),
     exponent=1.5,
-    force=lambda elastic, v, m, gamma: elastic + gamma * m * v,
+    coefficients={"c": lambda gamma, m: gamma * m, "q": lambda: 0.0},
+    force=lambda elastic, v, c: elastic + c * v,
     release="force",
+    momentum="force",
     family="rate-dependent",
 )
 
@@ -48,7 +52,10 @@ BORDBAR_HYPPANEN_2007 = ForceModel(
     evidence="formula from memory; no DOI known",
     parameters=(Parameter("C", "N s/m^1.65", "damping constant", least=0.0),),
     exponent=1.5,
-    force=lambda elastic, x, v, C: elastic + C * power(x, 0.65) * v,
+    coefficients={"c": lambda C: C, "q": lambda: 0.65},
+    force=lambda elastic, x, v, c: elastic + c * power(x, 0.65) * v,
     release="force",
+    momentum="force",
+    smooth=4,
     family="rate-dependent",
 )

@@ -1,0 +1,115 @@
+"""The second component of the motion: the velocity, or what stands for it where the damping is strong.
+
+In the coordinate "log" a force F = xⁿ (1 + χ v) gives, with dt = p sᵖ⁻¹ dσ and x = sᵖ,
+
+    u = ln(1 + χ v),  du/dσ = −χ p sᵖ⁻¹ xⁿ,
+
+which is not stiff for any χ. In "force" a force F = xⁿ + c x^q v gives
+
+    w = v + x^(n−q)/c,  F = c x^q w,  dw/dσ = −p sᵖ⁻¹ F + (p(n − q)/c) s^(p(n−q)−1) v,
+
+where the force keeps its digits down to its zero, though spring and dashpot cancel nearly all the way to it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..ode.problem import Array
+from .formula import ask
+from .model import COORDINATES, ForceModel
+from .power import integer_power, power
+
+# a lane whose damping is above this takes its law's coordinate; below it v takes as many steps, and costs less
+STRONG = 2.0
+
+
+class Momentum:
+    """v itself, and what a coordinate is asked for; arrays are of shape (n,).
+
+    `strength` is the coefficient, by name or its values, that tells how strong the damping is.
+    """
+
+    strength = ""
+
+    def of(self, s: Array, v: Array, strength: Array) -> Array:
+        """The coordinate of a velocity."""
+        return v
+
+    def velocity(self, y: Array, strength: Array) -> Array:
+        """The velocity of the components."""
+        return np.asarray(y[1])
+
+    def stop(self, y: Array, k: Array) -> tuple[Array, Array]:
+        """What falls to zero with the velocity, and its rate, from components and rates."""
+        return y[1], k[1]
+
+    def rates(self, out: Array, y: Array, weight: Array, elastic: Array, strength: Array) -> None:
+        """Finish rates that have v, and p sᵖ⁻¹ F for the second component; a fifth row is F."""
+        np.negative(out[1], out[1])
+
+
+class Log(Momentum):
+    """u."""
+
+    strength = COORDINATES["log"][0]
+
+    def of(self, s: Array, v: Array, strength: Array) -> Array:
+        return np.asarray(np.log1p(strength * v))
+
+    def velocity(self, y: Array, strength: Array) -> Array:
+        return np.asarray(np.expm1(y[1]) / strength)
+
+    def rates(self, out: Array, y: Array, weight: Array, elastic: Array, strength: Array) -> None:
+        np.multiply(weight, elastic, out[1])
+        np.multiply(out[1], strength, out[1])
+        np.negative(out[1], out[1])
+
+
+@dataclass(frozen=True)
+class Force(Momentum):
+    """w; the exponents of s are those of the drag, x^q = s^drag, and of x^(n−q) = s^spring."""
+
+    drag: float
+    spring: float
+    strength = COORDINATES["force"][0]
+
+    def of(self, s: Array, v: Array, strength: Array) -> Array:
+        return np.asarray(v + signed_power(s, self.spring) / strength)
+
+    def velocity(self, y: Array, strength: Array) -> Array:
+        return np.asarray(y[1] - signed_power(y[0], self.spring) / strength)
+
+    def stop(self, y: Array, k: Array) -> tuple[Array, Array]:
+        return k[0], -k[2] * k[4]
+
+    def rates(self, out: Array, y: Array, weight: Array, elastic: Array, strength: Array) -> None:
+        # the force that did the work is the same, but for digits that it loses before its zero
+        force = strength * signed_power(y[0], self.drag) * y[1]
+        out[1] = self.spring / strength * signed_power(y[0], self.spring - 1.0) * out[0] - weight * force
+        out[4:] = force
+
+
+def is_strong(model: ForceModel, values: Mapping[str, Array | float], count: int) -> NDArray[np.bool_]:
+    """Which impacts are integrated in their law's own coordinate: by their own damping, never by their company."""
+    strength = values[COORDINATES[model.momentum][0]] if COORDINATES[model.momentum] else 0.0
+    return np.broadcast_to(np.asarray(strength) > STRONG, count)
+
+
+def coordinate(model: ForceModel, n: float) -> Momentum:
+    """The coordinate for strong damping that a law declares."""
+    if model.momentum == "log":
+        return Log()
+    if model.momentum == "force":
+        q = float(ask(model.coefficients["q"], {"n": n}))
+        return Force(model.smooth * q, model.smooth * (n - q))
+    return Momentum()
+
+
+def signed_power(s: Array, exponent: float) -> Array:
+    """s to a power. A whole power is continued through zero, so that a step across the release is smooth."""
+    return integer_power(s, int(exponent)) if float(exponent).is_integer() else power(np.abs(s), exponent)
