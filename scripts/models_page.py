@@ -115,9 +115,6 @@ LEFT_OUT = {
         "Hu and Guo as one public code has it (2016), probably by a slip; `hu-guo-2015` has the other coefficient",
     ),
     "Elastic-plastic laws": (
-        "Kogut and Etsion (2002) with Etsion, Kligerman and Kadin (2005), whose printed force jumps up by 3 % at "
-        "first yield, where more comes back than went in, e_out up to 1.015; it ends at 110 times that "
-        "indentation",
         "Ghaednia, Brake, Berryhill and Jackson (2019), of which only the loading is given",
         "Chang and Ling (1992)",
         "Vu-Quoc and Zhang (1999), with an additive contact radius",
@@ -132,6 +129,10 @@ LEFT_OUT = {
     ),
     "Options of programs": (
         "Adams POISSON (1990), a penalty with a restitution",
+        "SmoothSphereHalfSpaceForce of OpenSim (2019), whose force is not zero where the contact begins, nor "
+        "before",
+        "RecurDyn with a power of δ̇ or another power of δ in its damping: the unit of its coefficient depends on "
+        "them; `recurdyn` is its form with m₂ = 1 and m₃ = m₁",
         "the Edinburgh elasto-plastic adhesive law (2014)",
         "MDR of LAMMPS (2024)",
     ),

@@ -54,7 +54,7 @@ def _until(level: float):
     """The end: y1 falls through a level; a lane whose y0 is huge is lost."""
     return {
         "event": lambda y, k, columns: (y[1] - level, k[1]),
-        "lost": lambda y, k: y[0] > 1e6,
+        "lost": lambda y, k, columns: y[0] > 1e6,
         "floor": (1.0, 1.0),
         "watch": True,
     }

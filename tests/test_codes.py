@@ -1,14 +1,18 @@
 """Laws of engineering codes do what those codes do: by their numbers, a second integration, closed forms."""
 
+from dataclasses import replace
+
+import mpmath as mp
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 import impact
 from impact.contact.collide import Contact, collide
 from impact.contact.impulse import velocities_after
 from impact.contact.models import find
-from impact.contact.oracles import delivered_restitution, force_restitution
+from impact.contact.oracles import delivered_restitution, force_restitution, limited_restitution
 from impact.contact.status import Status
 from impact.contact.values import delivered
 
@@ -62,10 +66,151 @@ def test_adams_by_a_second_integration(n, speed):
     assert contact.e_out[0] == pytest.approx(other, abs=1e-8)
 
 
-def test_adams_is_claimed_from_n_2_on():
-    # below, the force is positive once more after its zero, where this ends
-    contacts = [struck("adams-impact", n, K=1e7, parameters={"c": 3e3, "d": 3e-4}) for n in (1.5, 2.0, 2.2)]
-    assert [contact.in_domain[0] for contact in contacts] == [0, 1, 1]
+@pytest.mark.parametrize("n", [1.0, 1.5, 1.7])
+@pytest.mark.parametrize("damping", [1.0, 3.0])
+def test_adams_pushes_once_more_as_the_gap_closes(n, damping):
+    # below n = 2 the spring outlasts the damping: after its zero the force is positive again. In the contact's own
+    # units, with full damping at a depth of 0.3: to the zero, in free flight until the spring wins, to the end
+    def raw(x, v):
+        return max(x, 0.0) ** n + damping * cubic(max(x, 0.0) / 0.3) * v
+
+    def until(ends, start, span=30.0):
+        ends.terminal, ends.direction = True, -1
+        found = solve_ivp(lambda t, y: (y[1], -raw(*y)), (0.0, span), start, "DOP853", events=ends, rtol=1e-12,
+                          atol=1e-15, first_step=1e-6)  # fmt: skip
+        return found.y_events[0][-1]
+
+    x, v = until(lambda t, y: raw(*y) if t > 0.0 else 1.0, (0.0, 1.0))
+    again = brentq(lambda x: raw(x, v), 1e-12, x * (1 - 1e-6), xtol=1e-15)
+    assert again > 1e-6
+    _, last = until(lambda t, y: y[0], (again, v))
+    lanes = impacts(n)
+    own = {"c": damping * lanes.m * lanes.v0 / lanes.length, "d": 0.3 * lanes.length}
+    assert struck("adams-impact", n, parameters=own).e_out[0] == pytest.approx(-last, abs=1e-9)
+    assert -last > -v
+
+
+# ---- Modelica and MapleSim: a damping limited by the spring
+
+
+@pytest.mark.parametrize(
+    ("damping", "e_out"), [(0.1, 0.856085), (0.5, 0.560826), (1.0, 0.406197), (2.0, 0.269006), (10.0, 0.072049)]
+)
+def test_elastogap_at_dampings_in_the_units_of_the_contact(damping, e_out):
+    lanes = impacts()
+    contact = struck("modelica-elastogap", parameters={"d": damping * lanes.m * lanes.v0 / lanes.length})
+    assert f"{contact.e_out[0]:.6f}" == f"{e_out:.6f}"
+
+
+@pytest.mark.parametrize("n", [1.0, 1.5, 2.5])
+def test_elastogap_locates_where_its_damping_stops_to_be_limited(n):
+    lanes = impacts(n, e=np.full(20, 0.5))
+    own = {"d": np.geomspace(1e-3, 30.0, 20) * lanes.m * lanes.v0 / lanes.length}
+    contacts = [
+        collide(
+            find("modelica-elastogap"), impacts(n, e=np.full(20, 0.5), parameters=own), rtol=rtol, max_steps=10**5
+        )
+        for rtol in (1e-10, 1e-12)
+    ]
+    for name in ("e_out", "duration", "peak_indentation", "peak_force"):
+        coarse, fine = (getattr(contact, name) for contact in contacts)
+        assert coarse == pytest.approx(fine, rel=1e-9), name
+
+
+def test_a_limited_damper_on_a_linear_spring_has_a_closed_form():
+    zeta = np.unique([0.0, 1.0, *np.geomspace(1e-3, 100.0, 60), *(1.0 + np.geomspace(1e-12, 0.1, 8))])
+    with mp.workdps(40):
+        for one, found in zip(zeta.tolist(), limited_restitution(zeta).tolist(), strict=True):
+            z = mp.mpf(one)
+            w = mp.sqrt(1 - z * z) if one != 1.0 else mp.mpf(10) ** -25
+            first = mp.atan(2 * z * w / (1 + 2 * z * z)) / w
+            exact = (
+                mp.exp(-z * (2 * mp.acos(z) / mp.sqrt(1 - z * z) - first)).real
+                if one != 1.0
+                else mp.exp(mp.mpf(2) / 3 - 2)
+            )
+            assert found == pytest.approx(float(exact), rel=3e-14)
+    lanes = impacts(1.0, e=np.full(zeta.size, 0.5))
+    contact = struck("maplesim-linear-limited", 1.0, e=np.full(zeta.size, 0.5),
+                     parameters={"d": 2.0 * zeta * np.sqrt(lanes.m * lanes.K)})  # fmt: skip
+    assert np.abs(contact.oracle_error).max() <= 1e-9
+    # the damping that is cut off at the start would have taken part of the energy
+    assert np.all(contact.e_out >= force_restitution(zeta) - 1e-9)
+
+
+# ---- LAMMPS: damping by a rate
+
+
+LAMMPS_RATES = {
+    "lammps-velocity-hertz": (0.0, "C", lambda g, lanes: g * lanes.m * lanes.v0 / lanes.length),
+    "lammps-mass-velocity-hertz": (0.0, "gamma", lambda g, lanes: g * lanes.v0 / lanes.length),
+    "lammps-viscoelastic-hertz": (
+        0.5, "eta",
+        lambda g, lanes: g * lanes.v0 / lanes.length / np.sqrt(lanes.length / (1 / lanes.R1 + 1 / lanes.R2)),
+    ),
+}  # fmt: skip
+
+
+def rated(key: str, g: np.ndarray) -> Contact:
+    """Impacts by a law of LAMMPS with the damping g in the contact's own units."""
+    _, name, own = LAMMPS_RATES[key.removesuffix("-limit")]
+    lanes = impacts(1.5, e=np.full(g.size, 0.5))
+    lanes = replace(lanes, parameters={name: own(g, lanes)})
+    return collide(find(key), lanes, rtol=1e-10, max_steps=10_000)
+
+
+def to_the_gap(q: float, g: float) -> float:
+    """The speed at which x'' = -x^1.5 - g x^q x' closes the gap, by an integrator of another order."""
+
+    def gap(t, y):
+        return y[0] if t > 0.0 else 1.0
+
+    gap.terminal, gap.direction = True, -1
+    found = solve_ivp(
+        lambda t, y: (y[1], -(max(y[0], 0.0) ** 1.5) - g * max(y[0], 0.0) ** q * y[1]), (0.0, 1e3), (0.0, 1.0),
+        "DOP853", events=gap, rtol=1e-12, atol=1e-14, first_step=1e-9,
+    )  # fmt: skip
+    return float(-found.y_events[0][-1][1])
+
+
+@pytest.mark.parametrize("key", LAMMPS_RATES)
+def test_rates_of_lammps_to_the_end_of_the_gap(key):
+    g = np.array([0.01, 0.1, 0.3, 0.6, 1.0])
+    contact = rated(key, g)
+    assert np.all(contact.status == Status.OK)
+    assert contact.e_out == pytest.approx([to_the_gap(LAMMPS_RATES[key][0], one) for one in g.tolist()], abs=1e-9)
+    # where the tension is cut off, more comes back
+    assert np.all(rated(f"{key}-limit", g).e_out > contact.e_out)
+
+
+def test_a_damping_that_does_not_fade_with_the_gap_lets_no_ball_out_from_some_strength_on():
+    g = np.unique([*np.linspace(1.0, 3.0, 41), 10.0, 1e3, 1e6])
+    contact = rated("lammps-velocity-hertz", g)
+    held = contact.status == Status.LIMIT
+    assert np.all(held | (contact.status == Status.OK))
+    # one threshold, below which the rebound falls to zero
+    assert np.all(np.diff(held.astype(int)) >= 0)
+    assert not held[0]
+    assert held[-3:].all()
+    assert np.all(np.diff(contact.e_out[~held]) < 0.0)
+    assert np.all(contact.e_out[held] == 0.0)
+    assert np.all(np.isnan(contact.duration[held]))
+    # a ball that is held is still inside after a thousand times of the contact, by another integrator
+    slow = solve_ivp(lambda t, y: (y[1], -(max(y[0], 0.0) ** 1.5) - g[held][0] * y[1]), (0.0, 3e3), (0.0, 1.0),
+                     "LSODA", rtol=1e-10, atol=1e-14)  # fmt: skip
+    assert slow.y[0, -1] > 0.0
+
+
+def test_a_damping_that_fades_with_the_gap_lets_every_ball_out():
+    g = np.geomspace(1.0, 200.0, 12)
+    contact = rated("lammps-viscoelastic-hertz", g)
+    assert np.all(contact.status == Status.OK)
+    assert np.all(contact.e_out > 0.0)
+    # what is taken for nothing is less than 107/g^5, by the bound that ends it
+    beyond = rated("lammps-viscoelastic-hertz", np.array([260.0, 1e4]))
+    assert np.all(beyond.status == Status.LIMIT)
+    assert np.all(beyond.e_out == 0.0)
+    assert np.all(contact.e_out[g > 10.0] < 107.0 / g[g > 10.0] ** 5)
 
 
 # ---- Simscape
@@ -223,6 +368,13 @@ def test_stiffness_of_a_characteristic_speed(key):
     assert stiffness(key) == pytest.approx(expected, rel=1e-12)
     assert stiffness(key, v1=[1.0, 5.0]) == pytest.approx(np.full(2, expected), rel=1e-12)
     assert stiffness(key, m1=[1.0, 3.0])[1] > expected
+
+
+def test_stiffness_of_drake_is_that_of_two_springs_in_series():
+    sweep = {"v1": 1.0, "m1": 1.0, "m2": 1.0}
+    own = {"drake-point-contact": {"k1": "3 MN/m", "k2": 1e6}}
+    found = impact.sweep({"models": "drake-point-contact", "sweep": sweep, "model": own})
+    assert found["stiffness"].item() == pytest.approx(0.75e6, rel=1e-12)
 
 
 def test_stiffness_without_a_radius():

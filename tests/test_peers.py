@@ -37,7 +37,15 @@ class Case:
 
 def here(case: Case, K: float) -> float:
     """The rebound by impact."""
-    sweep: dict[str, object] = {"v1": SPEED, "m1": MASS, "m2": MASS, "K": K, "n": case.n}
+    sweep: dict[str, object] = {
+        "v1": SPEED,
+        "m1": MASS,
+        "m2": MASS,
+        "R1": RADIUS,
+        "R2": RADIUS,
+        "K": K,
+        "n": case.n,
+    }
     if case.e is not None:
         sweep["e"] = case.e
     own = {"model": {case.key: dict(case.own)}} if case.own else {}
@@ -64,14 +72,16 @@ LAMMPS = [
         for e in (0.1, 0.5, 0.9)
     ),
     *(
-        Case("lammps-velocity-hooke-limit", f"hooke {{k}} {eta} damping velocity limit_damping", 1.0,
-             own=(("C", eta),))
-        for eta in (100.0, 1000.0)
-    ),
-    *(
-        Case("lammps-mass-velocity-hertz-limit", f"hertz {{k}} {eta} damping mass_velocity limit_damping", 1.5,
-             own=(("gamma", eta),))
-        for eta in (300.0, 3000.0)
+        Case(f"lammps-{option.replace('_', '-')}-{name}{limit and '-limit'}",
+             f"{name} {{k}} {eta} damping {option}{limit}", n, own=((parameter, eta),))
+        for option, parameter, cases in (
+            ("velocity", "C", (("hooke", 1.0, (100.0, 1000.0)), ("hertz", 1.5, (100.0, 800.0)))),
+            ("mass_velocity", "gamma", (("hooke", 1.0, (200.0, 2000.0)), ("hertz", 1.5, (300.0, 1500.0)))),
+            ("viscoelastic", "eta", (("hertz", 1.5, (1e5, 1e6)),)),
+        )
+        for name, n, strengths in cases
+        for eta in strengths
+        for limit in ("", " limit_damping")
     ),
 ]  # fmt: skip
 SCRIPT = """

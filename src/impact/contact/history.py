@@ -15,7 +15,7 @@ from .momentum import is_strong
 from .power import Array
 from .status import Status
 from .strike import strike
-from .values import exact_restitution, own_values, with_coefficients, with_units
+from .values import own_values, with_coefficients, with_units
 
 # points at which a step is shown, and at which it is integrated again
 SAMPLES, GAUSS = 4, 5
@@ -60,8 +60,7 @@ def follow(model: ForceModel, lanes: Lanes, *, rtol: float, max_steps: int) -> H
         values = with_coefficients(model, with_units(own_values(model, lanes), n), 1)
         law = motion.Law.of(model, n, bool(is_strong(model, values, 1)[0]))
         columns = tuple(np.asarray(values[name]) for name in law.names)
-        creeps = exact_restitution(model, values, 1) == 0.0
-        struck = strike(law, columns, 1, rtol, max_steps, record=True, creeps=creeps)
+        struck = strike(law, columns, 1, rtol, max_steps, record=True)
     if struck.outward is None or struck.rebound.status[0] != Status.OK:
         return None
     inward = _phase(law, motion.approach(law), struck.inward.recorded, columns)

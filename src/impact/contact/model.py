@@ -82,9 +82,9 @@ class ForceModel:
     force : contact force of the whole contact, or of the approach phase where `unloading` is given
     unloading : contact force of the restitution phase
     residual : permanent indentation, from `peak` and the quantities of the contact
-    bends, unloading_bends : indentations at which `force`, or `unloading`, goes over to another formula, in the
-        order in which they are met; no step goes across. They ask for what is known beforehand, the latter for
-        `peak`, `force_at_peak` and `residual` too; NaN is none
+    bends, unloading_bends : indentations at which `force`, or `unloading`, goes over to another formula, NaN for
+        none; no step goes across. They ask for what is known beforehand, the latter for `peak`, `force_at_peak`
+        and `residual` too. One that asks for `x`, `v` or `elastic` is a function that changes its sign there
     coefficients : formulas evaluated once per impact, by name; a later one may ask for an earlier one.
         `chi` is the dimensionless damping χ = λ v₀/K
     parameters : what the user gives in `[model.KEY]`
@@ -159,9 +159,9 @@ class ForceModel:
         self._check("unloading", self.unloading, {*once, *IN_FORCE, *IN_UNLOADING})
         self._check("residual", self.residual, {*once, "peak", "force_at_peak"})
         for formula in self.bends:
-            self._check("bend", formula, once)
+            self._check("bend", formula, {*once, *IN_FORCE})
         for formula in self.unloading_bends:
-            self._check("unloading bend", formula, {*once, *IN_UNLOADING})
+            self._check("unloading bend", formula, {*once, *IN_FORCE, *IN_UNLOADING})
         self._check("oracle", self.oracle, once)
         self._check(
             "stiffness", self.stiffness, {*QUANTITIES, *(one.name for one in self.parameters)} - {"K", "e"}

@@ -105,9 +105,14 @@ def coordinate(model: ForceModel, n: float) -> Momentum:
     if model.momentum == "log":
         return Log()
     if model.momentum == "force":
-        q = float(ask(model.coefficients["q"], {"n": n}))
-        return Force(model.smooth * q, model.smooth * (n - q))
+        return force_form(model, n)
     return Momentum()
+
+
+def force_form(model: ForceModel, n: float) -> Force:
+    """The coordinate of a law that declares the form K δⁿ + c δ^q δ̇."""
+    q = float(ask(model.coefficients["q"], {"n": n}))
+    return Force(model.smooth * q, model.smooth * (n - q))
 
 
 def signed_power(s: Array, exponent: float) -> Array:

@@ -10,7 +10,6 @@ where W is the work done against the force. Where the damping is strong, another
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,8 +17,9 @@ import numpy as np
 from ..errors import ModelError
 from ..ode.problem import Array, Columns, Mask, Problem, Rates
 from .formula import Formula, ask, wishes
-from .model import ForceModel
-from .momentum import Momentum, coordinate, signed_power
+from .model import IN_FORCE, ForceModel
+from .momentum import Momentum, coordinate, force_form, signed_power
+from .phases import AT, Bend
 from .power import integer_power, power
 
 # scaled s beyond which a ball is taken to have passed through: no force stopped it
@@ -33,9 +33,12 @@ DIFFERENCE = 1e-7
 BRANCH = ("peak", "force_at_peak", "residual")
 # the force of a law without damping is taken to be a power of s below this
 POWER = 16.0
+# a damping is critical from this of its square on, which rounding may have made smaller
+CRITICAL = 1.0 + 1e-12
+# a speed that is none beside v0
+NOTHING = 1e-10
 # of a coordinate that asks for no coefficient
 NONE = np.empty(0)
-Event = Callable[[Array, Array, Columns], tuple[Array, Array]]
 
 
 @dataclass(frozen=True)
@@ -73,29 +76,25 @@ class Law:
         return columns[self.names.index(self.momentum.strength)] if self.momentum.strength else NONE
 
 
-def approach(law: Law, bend: int = 0) -> Problem:
-    """From contact to the largest indentation: v falls to zero; or to a bend of the force."""
-
-    def stop_event(y: Array, k: Array, columns: Columns) -> tuple[Array, Array]:
-        return law.momentum.stop(y, k)
-
+def approach(law: Law) -> Problem:
+    """From contact to the largest indentation: v falls to zero."""
     return Problem(
-        rates=_rates(law, law.model.force, None),
-        event=_or_bend(stop_event, bend),
-        lost=lambda y, k: np.asarray(y[0] > FAR),
+        rates=_rates(law, law.model.force, ()),
+        event=lambda y, k, columns: law.momentum.stop(y, k),
+        lost=lambda y, k, columns: np.asarray(y[0] > FAR),
         floor=FLOOR,
         watch=True,
     )
 
 
-def restitution(law: Law, bend: int = 0) -> Problem:
-    """From the largest indentation to the release: s, or the force, falls to zero; or to a bend of the force.
+def restitution(law: Law) -> Problem:
+    """From the largest indentation to the release: s, or the force, falls to zero.
 
     Where the law has an unloading branch, columns of the peak, the force there and the residual indentation
     follow the law's own.
     """
     branch = law.model.unloading
-    rates = _rates(law, branch or law.model.force, branch and BRANCH)
+    rates = _rates(law, branch or law.model.force, BRANCH if branch else ())
 
     def force_event(y: Array, k: Array, columns: Columns) -> tuple[Array, Array]:
         s, force = y[0], k[4]
@@ -110,47 +109,81 @@ def restitution(law: Law, bend: int = 0) -> Problem:
     def gap_event(y: Array, k: Array, columns: Columns) -> tuple[Array, Array]:
         return y[0], k[0]
 
-    def turned_back(y: Array, k: Array) -> Mask:
+    def turned_back(y: Array, k: Array, columns: Columns) -> Mask:
         return np.asarray(k[0] >= 0.0)
 
+    def creeping(y: Array, k: Array, columns: Columns) -> Mask:
+        c, x = columns[law.names.index("c")], integer_power(y[0], law.model.smooth)
+        return creeps(x, -k[0], c, law.n, force_form(law.model, law.n).drag / law.model.smooth)
+
     event = force_event if law.model.release == "force" else gap_event
-    return Problem(rates=rates, event=_or_bend(event, bend), lost=turned_back, floor=FLOOR)
+    return Problem(rates=rates, event=event, lost=creeping if may_creep(law) else turned_back, floor=FLOOR)
 
 
-def _or_bend(event: Event, bend: int) -> Event:
-    """The event, or a bend at the s of the last column, whichever is sooner; `bend` is the direction of s."""
-    if not bend:
-        return event
-
-    def sooner(y: Array, k: Array, columns: Columns) -> tuple[Array, Array]:
-        g, dg = event(y, k, columns)
-        left, rate = bend * (columns[-1] - y[0]), -bend * k[0]
-        by_bend = (left < 0.0) | ((g > 0.0) & (left * dg > g * rate))
-        return np.where(by_bend, left, g), np.where(by_bend, rate, dg)
-
-    return sooner
+def may_creep(law: Law) -> bool:
+    """Whether the balls may part with no speed, by a damping that pulls until the gap closes."""
+    return law.model.momentum == "force" and law.model.release == "gap" and law.model.unloading is None
 
 
-def bends(law: Law, columns: Columns, n: int, residual: Array | None = None) -> list[Array]:
-    """The s at which the force of a phase has a bend, in the order in which they are met; NaN is none.
+def creeps(x: Array, speed: Array, c: Array, n: float, q: float) -> Mask:
+    """Which balls are sure to part with no speed, where F = xⁿ + c x^q v.
+
+    Once speed ≤ b(x) = c x^(q+1)/(2(q + 1)) it stays so where x^(n−2q−1) ≤ c²/(4(q + 1)), for it changes at the
+    rate xⁿ − c x^q speed. With n ≥ 2q + 1 that is for ever, and x stays above zero. Else it is as far as the x*
+    that makes it an equation; beyond it no more than the energy is left, speed² ≤ b(x*)² + 2 x*^(n+1)/(n + 1).
+    """
+    bound, rest = c / (2.0 * (q + 1.0)), c * c / (4.0 * (q + 1.0))
+    order = n - 2.0 * q - 1.0
+    slow = speed <= bound * power(x, q + 1.0)
+    if order >= 0.0:
+        return np.asarray(slow & (power(x, order) <= CRITICAL * rest))
+    far = power(rest, 1.0 / order)
+    left = np.square(bound * power(far, q + 1.0)) + 2.0 / (n + 1.0) * power(far, n + 1.0)
+    return np.asarray(slow & (x >= far) & (left <= NOTHING * NOTHING))
+
+
+def bends(law: Law, columns: Columns, start: Array, residual: Array | None = None) -> tuple[Columns, list[Bend]]:
+    """The columns of a phase, with those of its bends, and the bends of its force.
 
     Parameters
     ----------
     law : the law
     columns : of the phase, each of shape (n,)
+    start : its components at the start, shape (2, n)
     residual : permanent indentation, of the restitution phase; None on approach
     """
     model, own = law.model, len(law.names)
-    formulas = model.bends
-    if residual is not None:
-        # where one force is for both phases, its bends are met again on the way back
-        formulas = model.bends[::-1] if model.unloading is None else model.unloading_bends
-    given = dict(zip(BRANCH, columns[own:], strict=False))
-    found = []
+    extra = BRANCH if residual is not None and model.unloading is not None else ()
+    # where one force is for both phases, its bends are met again on the way back
+    formulas = model.unloading_bends if extra else model.bends
+    given = dict(zip(extra, columns[own:], strict=False))
+    found: list[Bend] = []
     for formula in formulas:
-        x = np.broadcast_to(law.call(formula, columns[:own], given), n) - (0.0 if residual is None else residual)
-        found.append(power(np.where(x > 0.0, x, np.nan), 1.0 / model.smooth))
-    return found
+        if not IN_FORCE.keys().isdisjoint(wishes(formula)):
+            found.append(_of_motion(law, formula, extra))
+            continue
+        x = np.broadcast_to(law.call(formula, columns[:own], given), start.shape[1])
+        x = x - (0.0 if residual is None else residual)
+        at = power(np.where(x > 0.0, x, np.nan), 1.0 / model.smooth)
+        found.append(_at(len(columns)))
+        # one at which the phase begins is none
+        columns = (*columns, np.where(np.abs(at - start[0]) > AT * at, at, np.nan))
+    return columns, found
+
+
+def _at(place: int) -> Bend:
+    """The bend at an s of a column."""
+    return lambda y, columns: np.asarray(columns[place] - y[0])
+
+
+def _of_motion(law: Law, formula: Formula, extra: tuple[str, ...]) -> Bend:
+    """The bend where a function of the motion changes its sign."""
+
+    def bend(y: Array, columns: Columns) -> Array:
+        given = _given(law, {*wishes(formula)}, extra, y, columns)
+        return law.call(formula, columns[: len(law.names)], given)
+
+    return bend
 
 
 def of_restitution(law: Law) -> Law:
@@ -177,7 +210,7 @@ def indentation(law: Law, s: Array) -> Array:
 
 def force_at_peak(law: Law, s: Array, columns: Columns) -> Array:
     """The force of the approach where it ends."""
-    return np.asarray(_rates(law, law.model.force, None)(np.array([s, np.zeros(s.size)]), columns)[4])
+    return np.asarray(_rates(law, law.model.force, ())(np.array([s, np.zeros(s.size)]), columns)[4])
 
 
 def turn(law: Law, columns: Columns, peak: Array, at_peak: Array) -> tuple[Array, Columns]:
@@ -193,24 +226,30 @@ def turn(law: Law, columns: Columns, peak: Array, at_peak: Array) -> tuple[Array
     return residual, columns if model.unloading is None else (*columns, peak, at_peak, residual)
 
 
-def _rates(law: Law, formula: Formula, extra: tuple[str, ...] | None) -> Rates:
-    p = law.model.smooth
-    stretch, elastic = "x" in wishes(formula), "elastic" in wishes(formula)
-    own = len(law.names)
+def _given(law: Law, asked: set[str], extra: tuple[str, ...], y: Array, columns: Columns) -> dict[str, Array]:
+    """What a formula may ask of the motion: the velocity, and the indentation in the forms that are asked for."""
+    p, s = law.model.smooth, y[0]
+    given = {"v": law.velocity(y, columns)}
+    if extra:
+        given.update(zip(extra, columns[len(law.names) :], strict=False))
+        x = given["x"] = integer_power(s, p) + given["residual"]
+        if "elastic" in asked:
+            given["elastic"] = power(x, law.n)
+    else:
+        if "x" in asked:
+            given["x"] = integer_power(s, p)
+        if "elastic" in asked:
+            given["elastic"] = signed_power(s, p * law.n)
+    return given
+
+
+def _rates(law: Law, formula: Formula, extra: tuple[str, ...]) -> Rates:
+    p, own = law.model.smooth, len(law.names)
+    asked = {*wishes(formula)}
 
     def rates(y: Array, columns: Columns, out: Array | None = None) -> Array:
-        s, v = y[0], law.velocity(y, columns)
-        given = {"v": v}
-        if extra:
-            given.update(zip(extra, columns[own:], strict=False))
-            x = given["x"] = integer_power(s, p) + given["residual"]
-            if elastic:
-                given["elastic"] = power(x, law.n)
-        else:
-            if stretch:
-                given["x"] = integer_power(s, p)
-            if elastic:
-                given["elastic"] = signed_power(s, p * law.n)
+        s, given = y[0], _given(law, asked, extra, y, columns)
+        v = given["v"]
         force = law.call(formula, columns[:own], given)
         if force.shape != s.shape and force.shape != ():
             raise ModelError(f"{law.model.key}: the force has the shape {force.shape}, wants {s.shape}")

@@ -6,59 +6,93 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..ode.problem import Array, Columns, End, Outcome, Problem, Step
+from ..ode.problem import COMPONENTS, INTEGRATED, Array, Columns, End, Event, Outcome, Problem, Step
 
-# a part ended at its bend where what remains of s is this fraction of it; one that stops there stops for good
-AT, STOPPED = 1e-9, 1e-9
-# so far beyond it, of s, the next part begins: where the law is the other formula for sure
-BEYOND = 1e-13
-
+# the force has one formula where this is positive, and another where it is negative; NaN is no bend
+Bend = Callable[[Array, Columns], Array]
 Run = Callable[[Problem, Array, Columns], Outcome]
 
+# a part has ended at what is nearer than this, of the smooth time
+AT = 1e-9
+# step of the difference that gives the rate of a bend, relative to s
+DIFFERENCE = 1e-7
+# so much later, in it, the next part begins: where the law is the other formula for sure
+BEYOND = 1e-12
+# parts after which a lane that goes to and fro over its bends is given up, for each of them
+TIMES = 8
 
-def in_parts(
-    run: Run,
-    problem_of: Callable[[int], Problem],
-    start: Array,
-    columns: Columns,
-    bends: Sequence[Array],
-    ahead: int,
-) -> Outcome:
+
+def in_parts(run: Run, problem: Problem, bends: Sequence[Bend], start: Array, columns: Columns) -> Outcome:
     """Integrate a phase.
 
     Parameters
     ----------
     run : integrates lanes of a problem from their start, of shape (4, n), to their event
-    problem_of : the problem that ends at a bend, whose s is the last column: ahead of it 1, -1; 0 without one
+    problem : of the phase, without its bends
+    bends : where the force goes over to another formula
     start : components at the start, shape (2, n)
     columns : of the law, each of shape (n,)
-    bends : s of the bends, each of shape (n,), in the order in which they are met; NaN is none
-    ahead : 1 where s rises, -1 where it falls
     """
     if not bends:
-        return run(problem_of(0), start, columns)
+        return run(problem, start, columns)
     n = start.shape[1]
     total = Outcome.blank(n)
     total.maximum[:] = -np.inf
-    state, todo = np.vstack([start, np.zeros((2, n))]), np.ones(n, bool)
+    total.end[:] = End.MAX_STEPS
+    state = np.vstack([start, np.zeros((2, n))])
+    sides = np.array([np.sign(bend(start, columns)) for bend in bends])
+    between = replace(problem, event=_sooner(problem, bends))
     recorded: list[Step] = []
-    for bend in (*bends, None):
-        where = np.flatnonzero(todo if bend is None else todo & (ahead * (bend - state[0]) > AT * np.abs(bend)))
-        if not where.size:
-            continue
-        own = tuple(column[where] for column in columns)
-        at = np.empty(0) if bend is None else bend[where]
-        part = run(problem_of(0 if bend is None else ahead), state[:, where], own if bend is None else (*own, at))
+    where = np.arange(n)
+    for _ in range(TIMES * len(bends)):
+        own = (*(column[where] for column in columns), *sides[:, where])
+        part = run(between, state[:, where], own)
         recorded += part.recorded
         total.maximum[where] = np.fmax(total.maximum[where], part.maximum)
         total.steps[where] += part.steps
-        total.end[where] = part.end
-        total.state[:, where] = part.state
-        further = part.end == End.LANDED
-        if bend is not None:
-            further &= (np.abs(part.state[0] - at) <= AT * np.abs(at)) & (np.abs(part.state[1]) > STOPPED)
-            part.state[0] = np.where(further, at * (1.0 + ahead * BEYOND), part.state[0])
-            state[:, where] = part.state
-            todo[where] = further
+        state[:, where] = part.state
+        k = problem.rates(part.state[:COMPONENTS], own)
+        met = _met(problem, bends, part.state[:COMPONENTS], k, own)
+        further = (part.end == End.LANDED) & met.any(axis=0)
+        sides[:, where] = np.where(met, -sides[:, where], sides[:, where])
+        state[:, where] += BEYOND * np.minimum(part.state[0], 1.0) * k[:INTEGRATED]
+        done = where[~further]
+        total.end[done], total.state[:, done] = part.end[~further], part.state[:, ~further]
+        where = where[further]
+        if not where.size:
+            break
     return replace(total, recorded=tuple(recorded))
+
+
+def _bends(bends: Sequence[Bend], y: Array, k: Array, columns: Columns) -> list[tuple[Array, Array]]:
+    """Each bend on the side where the lane is, which falls through zero, and its rate."""
+    small = DIFFERENCE * np.where(y[0] > 0.0, np.minimum(y[0], 1.0), 1.0)
+    ahead = y + small * k[:COMPONENTS]
+    found = []
+    for bend, side in zip(bends, columns[-len(bends) :], strict=True):
+        left = side * bend(y, columns)
+        found.append((left, (side * bend(ahead, columns) - left) / small))
+    return found
+
+
+def _sooner(problem: Problem, bends: Sequence[Bend]) -> Event:
+    """The event of the phase, or a bend, whichever is sooner."""
+
+    def event(y: Array, k: Array, columns: Columns) -> tuple[Array, Array]:
+        g, dg = problem.event(y, k, columns)
+        for left, rate in _bends(bends, y, k, columns):
+            by_bend = (left < 0.0) | ((g > 0.0) & (left * dg > g * rate))
+            g, dg = np.where(by_bend, left, g), np.where(by_bend, rate, dg)
+        return g, dg
+
+    return event
+
+
+def _met(problem: Problem, bends: Sequence[Bend], y: Array, k: Array, columns: Columns) -> NDArray[np.bool_]:
+    """Which bends lanes have ended at, if not at the event of the phase, of shape (bends, n)."""
+    g, dg = problem.event(y, k, columns)
+    away = np.array([np.abs(left / rate) for left, rate in _bends(bends, y, k, columns)])
+    near = np.fmax(np.fmin.reduce(away), AT)
+    return np.asarray((away <= near) & (np.abs(g / dg) > near))

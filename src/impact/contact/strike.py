@@ -91,7 +91,7 @@ def strike(
     rtol: float,
     max_steps: int,
     record: bool = False,
-    creeps: NDArray[np.bool_] | bool = False,
+    sticks: NDArray[np.bool_] | bool = False,
 ) -> Struck:
     """Integrate n impacts through approach and restitution.
 
@@ -100,11 +100,12 @@ def strike(
     law : the law at one exponent and in one coordinate of the velocity
     columns : its values per impact, each of shape (n,)
     rtol, max_steps, record : see `impact.ode.rk45.integrate`
-    creeps : which are known to part with no speed: where the indentation closes, it takes for ever
+    sticks : which are known to stay together, where they do not part
     """
     run = partial(integrate, rtol=rtol, max_steps=max_steps, record=record, space=Space.of(n))
     start = motion.start_of_approach(law, columns, n)
-    inward = in_parts(run, partial(motion.approach, law), start, columns, motion.bends(law, columns, n), 1)
+    among, bends = motion.bends(law, columns, start)
+    inward = in_parts(run, motion.approach(law), bends, start, among)
     peak = motion.indentation(law, inward.state[0])
     at_peak = motion.force_at_peak(law, inward.state[0], columns)
     residual, columns = motion.turn(law, columns, peak, at_peak)
@@ -118,10 +119,6 @@ def strike(
     stays = (rebound.status == Status.OK) & (residual >= peak)
     rebound.status[stays] = Status.LIMIT
     rebound.e_out[stays] = 0.0
-    creep = creeps & (rebound.status == Status.OK)
-    rebound.status[creep] = Status.LIMIT
-    rebound.e_out[creep] = 0.0
-    rebound.duration[creep] = np.nan
 
     parts = np.flatnonzero(rebound.status == Status.OK)
     columns = tuple(column[parts] for column in columns)
@@ -129,13 +126,15 @@ def strike(
         return Struck(rebound, inward, None, columns, parts)
     back = motion.of_restitution(law)
     start = motion.start_of_restitution(back, columns, peak[parts], residual[parts])
-    bends = motion.bends(back, columns, parts.size, residual[parts])
-    outward = in_parts(run, partial(motion.restitution, back), start, columns, bends, -1)
-    rebound.e_out[parts] = -back.velocity(outward.state, columns)
+    among, bends = motion.bends(back, columns, start, residual[parts])
+    outward = in_parts(run, motion.restitution(back), bends, start, among)
+    # held, or parting with no speed in an infinite time: all the energy of such balls is lost
+    held = (outward.end == End.LOST) & (motion.may_creep(back) | np.broadcast_to(sticks, n)[parts])
+    rebound.e_out[parts] = np.where(held, 0.0, -back.velocity(outward.state, columns))
     rebound.duration[parts] += outward.state[2]
-    rebound.work[parts] += 2.0 * outward.state[3]
+    rebound.work[parts] += np.where(held, 0.0, 2.0 * outward.state[3])
     rebound.steps[parts] += outward.steps
-    rebound.status[parts] = _status(outward)
+    rebound.status[parts] = np.where(held, Status.LIMIT, _status(outward))
     if law.model.release == "force":
         rebound.permanent[parts] += motion.indentation(law, outward.state[0])
     return Struck(rebound, inward, outward, columns, parts)

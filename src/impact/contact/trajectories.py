@@ -119,8 +119,8 @@ def _struck(
         law = motion.Law.of(model, n, side)
         columns = tuple(np.asarray(values[name])[where] for name in law.names)
         first, back = _distinct(columns, where.size) if collapse else (np.arange(where.size),) * 2
-        creeps = exact[where][first] == 0.0
-        struck = strike(law, tuple(c[first] for c in columns), first.size, rtol, max_steps, creeps=creeps)
+        sticks = exact[where][first] == 0.0
+        struck = strike(law, tuple(c[first] for c in columns), first.size, rtol, max_steps, sticks=sticks)
         rebound.put(where, struck.rebound.take(back))
     return replace(rebound, chi=chi, exact=exact)
 

@@ -15,6 +15,7 @@ from .tableau import DENSE_WEIGHTS
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Columns = tuple[Array, ...]
+Event = Callable[[Array, Array, Columns], tuple[Array, Array]]
 
 # rows of a state: two components and two quadratures; rates have one row more, the watched quantity
 COMPONENTS, INTEGRATED, WATCHED = 2, 4, 4
@@ -48,14 +49,14 @@ class Problem:
         rows left out that it has no room for
     event : (y, k, columns) -> (g, dg): a function that is positive until the lane ends, and its rate along the
         trajectory, at components y where the rates are k
-    lost : (y, k) -> mask of the lanes that can no longer reach the event, at components y where the rates are k
+    lost : (y, k, columns) -> mask of the lanes that can no longer reach the event
     floor : the local error of each component is judged against rtol max(|y|, floor)
     watch : locate the maximum of the watched quantity
     """
 
     rates: Rates
-    event: Callable[[Array, Array, Columns], tuple[Array, Array]]
-    lost: Callable[[Array, Array], Mask]
+    event: Event
+    lost: Callable[[Array, Array, Columns], Mask]
     floor: tuple[float, float]
     watch: bool = False
 

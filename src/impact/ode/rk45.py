@@ -91,7 +91,7 @@ def _advance(problem: Problem, lanes: Lanes, rtol: float, record: bool) -> Step 
 
     if problem.watch:
         watch(lanes, trial, accepted, home)
-    lost = problem.lost(new, trial.k)
+    lost = problem.lost(new, trial.k, lanes.columns)
     if np.count_nonzero(lost):
         lanes.end[lost & accepted & (lanes.end == RUNNING)] = End.LOST
     small = trial.following < LAST_STEP

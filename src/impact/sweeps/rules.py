@@ -6,6 +6,8 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from fnmatch import fnmatchcase
 
+from ..contact.formula import wishes
+from ..contact.material import hertz_stiffness
 from ..contact.model import ForceModel, Parameter
 from ..contact.models import built_in
 from .ranges import MAX_FAULTS
@@ -130,7 +132,7 @@ def cross_faults(data: Mapping[str, object], models: Sequence[ForceModel], n: fl
     if isinstance(given, dict):
         yield from _restitution(given, models)
         yield from _stiffness(given, _table(data.get("model")), models, n, data.get("models"))
-        yield from _materials(given, models)
+        yield from _materials(given, _table(data.get("model")), models)
         yield from _yield_strengths(given, data.get("materials"), models)
     own, asked = _table(data.get("model")), data.get("models")
     for model in models:
@@ -192,7 +194,9 @@ def _stiffness(
             )
 
 
-def _materials(given: Mapping[str, object], models: Sequence[ForceModel]) -> Iterable[Fault]:
+def _materials(
+    given: Mapping[str, object], own: Mapping[str, object], models: Sequence[ForceModel]
+) -> Iterable[Fault]:
     single = [name for name in ("material1", "material2") if name in given]
     if "material" in given:
         for name in single:
@@ -201,9 +205,12 @@ def _materials(given: Mapping[str, object], models: Sequence[ForceModel]) -> Ite
         other = "material2" if single == ["material1"] else "material1"
         yield ("sweep", other), f"missing beside {single[0]}; material is for both balls"
     elif not single:
-        radii = [name for name in ("R1", "R2") if name not in given]
-        asking = _asking(models, "E1", "E2", "nu1", "nu2", "yield_strength1", "yield_strength2", *radii)
-        if "K" not in given:
+        of_material = {"E1", "E2", "nu1", "nu2", "yield_strength1", "yield_strength2"}
+        of_material |= {name for name in ("R1", "R2") if name not in given}
+        asking = _asking(models, *of_material)
+        # a rule of the law's own may do without
+        by_material = [model for model in models if of_material & {*wishes(model.stiffness or hertz_stiffness)}]
+        if "K" not in given and not (models and all("K" in _table(own.get(one.key)) for one in by_material)):
             yield ("sweep", "material"), "missing, wants a material of [materials], or K"
         elif asking:
             yield ("sweep", "material"), f"missing, wants a material of [materials] (asked for by {asking})"

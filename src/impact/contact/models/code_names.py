@@ -10,6 +10,7 @@ from .contact_fits import MUTHUKUMAR_2003
 from .dashpot import (
     ANAGNOSTOPOULOS_1988,
     ANAGNOSTOPOULOS_1988_NO_TENSION,
+    KELVIN_VOIGT,
     KELVIN_VOIGT_NO_TENSION,
     TSUJI_1992,
     TSUJI_1992_NO_TENSION,
@@ -45,10 +46,11 @@ LAMMPS_HOOKE_LIMIT = in_code(
     ANAGNOSTOPOULOS_1988_NO_TENSION, "lammps-coeff-restitution-hooke-limit",
     "LAMMPS coeff_restitution, hooke, limit_damping", 2019, LAMMPS,
 )  # fmt: skip
-LAMMPS_VELOCITY = in_code(
+LAMMPS_VELOCITY = in_code(KELVIN_VOIGT, "lammps-velocity-hooke", "LAMMPS velocity, hooke", 2019, LAMMPS)
+LAMMPS_VELOCITY_LIMIT = in_code(
     KELVIN_VOIGT_NO_TENSION, "lammps-velocity-hooke-limit", "LAMMPS velocity, hooke, limit_damping", 2019, LAMMPS
 )
-LAMMPS_MASS_VELOCITY = in_code(
+LAMMPS_MASS_VELOCITY_LIMIT = in_code(
     LEE_HERRMANN_1993, "lammps-mass-velocity-hertz-limit", "LAMMPS mass_velocity, hertz, limit_damping", 2019,
     LAMMPS,
 )  # fmt: skip
@@ -60,6 +62,19 @@ LIGGGHTS_HOOKE_LIMIT = in_code(
     CHRONO_SMC_HOOKE, "liggghts-hooke-limit-force", "LIGGGHTS hooke, limitForce", 2012, LIGGGHTS
 )
 YADE_EN = in_code(TSUJI_1992, "yade-en", "YADE HertzMindlin en", 2010, "YADE, HertzMindlin.cpp")
+YADE_VISCOELASTIC = in_code(
+    KELVIN_VOIGT, "yade-viscoelastic", "YADE viscoelastic", 2009, "YADE, Law2_ScGeom_ViscElPhys_Basic"
+)
+MAPLESIM_LINEAR = of_code(
+    same_law(
+        KELVIN_VOIGT_NO_TENSION,
+        "maplesim-linear",
+        title="MapleSim, linear",
+        year=2015,
+        reference="MapleSim, contact of the linear spring and damper",
+        evidence="formula from memory, the documentation was seen; no DOI",
+    )
+)
 MERCURYDPM_LINEAR = in_code(
     ANAGNOSTOPOULOS_1988, "mercurydpm-linear-viscoelastic", "MercuryDPM LinearViscoelastic", 2013,
     "MercuryDPM, kernel",

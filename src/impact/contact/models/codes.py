@@ -11,7 +11,7 @@ import numpy as np
 
 from ..formula import Formula
 from ..model import ForceModel, Parameter
-from ..oracles import force_restitution
+from ..oracles import force_restitution, limited_restitution
 from ..power import Array, power
 from .hysteresis import hysteresis
 
@@ -46,10 +46,9 @@ ADAMS_IMPACT = ForceModel(
         Parameter("d", "m", "penetration at which the damping is full", least=1e-9),
     ),
     # below n = 2 the spring outlasts the damping as the gap closes, and pushes once more after the force was zero
-    domain={"n": (2.0, 10.0)},
-    force=lambda elastic, x, v, c, d: elastic + c * step(x / d) * v,
-    bends=(lambda d: d,),
-    release="force",
+    force=lambda elastic, x, v, c, d: np.maximum(elastic + c * step(x / d) * v, 0),
+    # where the force begins or ceases to be zero; over the spring, so that it does not fade with the indentation
+    bends=(lambda d: d, lambda elastic, x, v, c, d: 1 + c * step(x / d) * v / elastic),
     family="codes",
 )
 
@@ -94,12 +93,48 @@ DRAKE_POINT_CONTACT = of_code(
         title="Drake, point contact",
         year=2019,
         equation="F = K δ (1 + χ δ̇/v₀),  χ = d v₀",
-        reference="Drake, module contact_model_doxygen.h; K is that of two springs in series",
+        reference="Drake, module contact_model_doxygen.h, and the defaults of SceneGraphConfig",
         evidence="formula seen in the source; no DOI",
-        parameters=(Parameter("d", "s/m", "Hunt-Crossley dissipation", default=20.0, least=0.0),),
+        parameters=(
+            Parameter("d", "s/m", "Hunt-Crossley dissipation of the pair", default=20.0, least=0.0),
+            Parameter("k1", "N/m", "point stiffness k₁ of ball 1, where no K is given", default=1e6, least=1e-9),
+            Parameter("k2", "N/m", "point stiffness k₂ of ball 2", default=1e6, least=1e-9),
+        ),
         exponent=1.0,
         chi=lambda d, v0: d * v0,
-    )
+    ),
+    stiffness=lambda k1, k2: series(k1, k2),
+)
+
+MODELICA_ELASTOGAP = ForceModel(
+    key="modelica-elastogap",
+    title="Modelica ElastoGap",
+    year=2008,
+    equation="F = max(0, K δⁿ + min(d δ̇, K δⁿ))",
+    reference="Modelica Standard Library, Mechanics.Translational.Components.ElastoGap",
+    evidence="formula seen in the source; no DOI",
+    parameters=(Parameter("d", "N s/m", "damping constant", least=0.0),),
+    force=lambda elastic, v, d: elastic + np.minimum(d * v, elastic),
+    bends=(lambda elastic, v, d: np.where(v > 0, elastic - d * v, np.nan),),
+    release="force",
+    family="codes",
+)
+
+MAPLESIM_LIMITED = ForceModel(
+    key="maplesim-linear-limited",
+    title="MapleSim, linear with limited damper",
+    year=2015,
+    equation="F = max(0, K δ + min(d δ̇, K δ))",
+    reference="MapleSim, contact of the linear spring with a limited damper",
+    evidence="that the damping is limited by the spring was seen in the documentation, the formula is that of "
+    "modelica-elastogap; no DOI",
+    parameters=(Parameter("d", "N s/m", "damping constant", least=0.0),),
+    force=lambda elastic, v, d: elastic + np.minimum(d * v, elastic),
+    bends=(lambda elastic, v, d: np.where(v > 0, elastic - d * v, np.nan),),
+    oracle=lambda d, m, K: limited_restitution(d / (2 * np.sqrt(m * K))),
+    release="force",
+    exponent=1.0,
+    family="codes",
 )
 
 MODIA3D = of_code(

@@ -1,4 +1,4 @@
-"""Laws of granular codes that no paper has under its own name: dashpots by fits of the damping ratio."""
+"""Laws of granular codes that no paper has under its own name: springs and dashpots of other damping."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from ..model import Parameter
 from ..oracles import gap_damping
 from ..power import Array, power
 from .codes import of_code
-from .dashpot import BY_LOGARITHM, HERTZIAN, LINEAR, dashpot
+from .dashpot import BY_LOGARITHM, CONSTANT, HERTZIAN, LINEAR, dashpot
+from .rate_dependent import drag
 
 # LAMMPS, damping tsuji: of the polynomial of α, from the zeroth power of e
 TSUJI_FIT = (1.2728, -4.2783, 11.087, -22.348, 27.467, -18.022, 4.8218)
@@ -76,6 +77,120 @@ LAMMPS_TSUJI_WITHOUT_ROOT_LIMIT = of_code(
         reference=LAMMPS,
         evidence="formula seen in older sources; the release of July 2025 still does so, by a comparison; no DOI",
         zeta=lambda e: tsuji_fit(e) / np.sqrt(5.0),
+        release="force",
+        exponent=1.5,
+    )
+)
+
+MASS_VELOCITY = (Parameter("gamma", "1/s", "damping γ per effective mass", least=0.0),)
+VISCOELASTIC = (Parameter("eta", "1/m/s", "damping η per effective mass and contact radius", least=0.0),)
+RATE = "LAMMPS, pair style granular, damping"
+
+LAMMPS_MASS_VELOCITY_HOOKE = of_code(
+    dashpot(
+        "lammps-mass-velocity-hooke",
+        title="LAMMPS mass_velocity, hooke",
+        year=2019,
+        equation="F = K δ + γ m δ̇, to δ = 0",
+        reference=f"{RATE} mass_velocity",
+        evidence=IN_SOURCE,
+        parameters=MASS_VELOCITY,
+        zeta=lambda gamma, m, K: 0.5 * gamma * np.sqrt(m / K),
+        release="gap",
+        exponent=1.0,
+    )
+)
+
+LAMMPS_MASS_VELOCITY_HOOKE_LIMIT = of_code(
+    dashpot(
+        "lammps-mass-velocity-hooke-limit",
+        title="LAMMPS mass_velocity, hooke, limit_damping",
+        year=2019,
+        equation="F = K δ + γ m δ̇, to F = 0",
+        reference=f"{RATE} mass_velocity",
+        evidence=IN_SOURCE,
+        parameters=MASS_VELOCITY,
+        zeta=lambda gamma, m, K: 0.5 * gamma * np.sqrt(m / K),
+        release="force",
+        exponent=1.0,
+    )
+)
+
+LAMMPS_MASS_VELOCITY_HERTZ = of_code(
+    drag(
+        "lammps-mass-velocity-hertz",
+        title="LAMMPS mass_velocity, hertz",
+        year=2019,
+        equation="F = K δ^(3/2) + γ m δ̇, to δ = 0",
+        reference=f"{RATE} mass_velocity",
+        evidence=IN_SOURCE,
+        parameters=MASS_VELOCITY,
+        c=lambda gamma, m: gamma * m,
+        q=0.0,
+        release="gap",
+        exponent=1.5,
+    )
+)
+
+LAMMPS_VELOCITY_HERTZ = of_code(
+    drag(
+        "lammps-velocity-hertz",
+        title="LAMMPS velocity, hertz",
+        year=2019,
+        equation="F = K δ^(3/2) + C δ̇, to δ = 0",
+        reference=f"{RATE} velocity",
+        evidence=IN_SOURCE,
+        parameters=CONSTANT,
+        c=lambda C: C,
+        q=0.0,
+        release="gap",
+        exponent=1.5,
+    )
+)
+
+LAMMPS_VELOCITY_HERTZ_LIMIT = of_code(
+    drag(
+        "lammps-velocity-hertz-limit",
+        title="LAMMPS velocity, hertz, limit_damping",
+        year=2019,
+        equation="F = K δ^(3/2) + C δ̇, to F = 0",
+        reference=f"{RATE} velocity",
+        evidence=IN_SOURCE,
+        parameters=CONSTANT,
+        c=lambda C: C,
+        q=0.0,
+        release="force",
+        exponent=1.5,
+    )
+)
+
+LAMMPS_VISCOELASTIC_HERTZ = of_code(
+    drag(
+        "lammps-viscoelastic-hertz",
+        title="LAMMPS viscoelastic, hertz",
+        year=2019,
+        equation="F = K δ^(3/2) + η m √(R* δ) δ̇, to δ = 0",
+        reference=f"{RATE} viscoelastic; so has pair style gran/hertz/history",
+        evidence=IN_SOURCE,
+        parameters=VISCOELASTIC,
+        c=lambda eta, m, R1, R2: eta * m * np.sqrt(1 / (1 / R1 + 1 / R2)),
+        q=0.5,
+        release="gap",
+        exponent=1.5,
+    )
+)
+
+LAMMPS_VISCOELASTIC_HERTZ_LIMIT = of_code(
+    drag(
+        "lammps-viscoelastic-hertz-limit",
+        title="LAMMPS viscoelastic, hertz, limit_damping",
+        year=2019,
+        equation="F = K δ^(3/2) + η m √(R* δ) δ̇, to F = 0",
+        reference=f"{RATE} viscoelastic",
+        evidence=IN_SOURCE,
+        parameters=VISCOELASTIC,
+        c=lambda eta, m, R1, R2: eta * m * np.sqrt(1 / (1 / R1 + 1 / R2)),
+        q=0.5,
         release="force",
         exponent=1.5,
     )

@@ -1,12 +1,42 @@
-"""Viscoelastic laws whose restitution depends on the speed, by parameters of their own."""
+"""Springs with a damping that goes as another power of the indentation: the restitution depends on the speed."""
 
 from __future__ import annotations
 
-from ..model import ForceModel, Parameter
+from typing import Literal, Unpack
+
+from ..formula import Formula
+from ..model import About, ForceModel, Parameter
 from ..power import power
 
-KUWABARA_KONO_1987 = ForceModel(
-    key="kuwabara-kono-1987",
+
+def drag(
+    key: str, *, c: Formula, q: float, release: Literal["gap", "force"], smooth: int = 2, **about: Unpack[About]
+) -> ForceModel:
+    """A spring and a damping of its own power, F = K δⁿ + c δ^q δ̇.
+
+    Parameters
+    ----------
+    key, smooth, about : see `ForceModel`
+    c : the damping coefficient as a function of what it asks for by name
+    q : exponent of the indentation in the damping
+    release : where the contact ends
+    """
+    return ForceModel(
+        key,
+        **about,
+        coefficients={"c": c, "q": lambda: q},
+        force=(lambda elastic, x, v, c: elastic + c * power(x, q) * v)
+        if q
+        else lambda elastic, v, c: elastic + c * v,
+        release=release,
+        momentum="force",
+        smooth=smooth,
+        family="rate-dependent",
+    )
+
+
+KUWABARA_KONO_1987 = drag(
+    "kuwabara-kono-1987",
     title="Kuwabara and Kono",
     year=1987,
     equation="F = K(δ^(3/2) + (3/2) A δ^(1/2) δ̇), to F = 0",
@@ -17,15 +47,13 @@ KUWABARA_KONO_1987 = ForceModel(
     evidence="formula and DOI from memory; the paper of 1999 seen",
     parameters=(Parameter("A", "s", "dissipative constant of the material", least=0.0),),
     exponent=1.5,
-    coefficients={"c": lambda A, K: 1.5 * A * K, "q": lambda: 0.5},
-    force=lambda elastic, x, v, c: elastic + c * power(x, 0.5) * v,
+    c=lambda A, K: 1.5 * A * K,
+    q=0.5,
     release="force",
-    momentum="force",
-    family="rate-dependent",
 )
 
-LEE_HERRMANN_1993 = ForceModel(
-    key="lee-herrmann-1993",
+LEE_HERRMANN_1993 = drag(
+    "lee-herrmann-1993",
     title="Lee and Herrmann",
     year=1993,
     equation="F = K δ^(3/2) + γ m δ̇, to F = 0",
@@ -35,15 +63,13 @@ LEE_HERRMANN_1993 = ForceModel(
     evidence="formula and DOI from memory",
     parameters=(Parameter("gamma", "1/s", "damping γ per effective mass", least=0.0),),
     exponent=1.5,
-    coefficients={"c": lambda gamma, m: gamma * m, "q": lambda: 0.0},
-    force=lambda elastic, v, c: elastic + c * v,
+    c=lambda gamma, m: gamma * m,
+    q=0.0,
     release="force",
-    momentum="force",
-    family="rate-dependent",
 )
 
-BORDBAR_HYPPANEN_2007 = ForceModel(
-    key="bordbar-hyppanen-2007",
+BORDBAR_HYPPANEN_2007 = drag(
+    "bordbar-hyppanen-2007",
     title="Bordbar and Hyppänen",
     year=2007,
     equation="F = K δ^(3/2) + C δ^0.65 δ̇, to F = 0",
@@ -52,10 +78,8 @@ BORDBAR_HYPPANEN_2007 = ForceModel(
     evidence="formula from memory; no DOI known",
     parameters=(Parameter("C", "N s/m^1.65", "damping constant", least=0.0),),
     exponent=1.5,
-    coefficients={"c": lambda C: C, "q": lambda: 0.65},
-    force=lambda elastic, x, v, c: elastic + c * power(x, 0.65) * v,
+    c=lambda C: C,
+    q=0.65,
     release="force",
-    momentum="force",
     smooth=4,
-    family="rate-dependent",
 )

@@ -8,6 +8,7 @@ from .dashpot import force_damping as force_damping
 from .dashpot import force_restitution as force_restitution
 from .dashpot import gap_damping as gap_damping
 from .dashpot import gap_restitution as gap_restitution
+from .dashpot import limited_restitution as limited_restitution
 from .elastic import contact_time_ratio as contact_time_ratio
 from .elastic import peak_indentation as peak_indentation
 from .hysteresis import approach_damped_restitution as approach_damped_restitution

@@ -76,6 +76,37 @@ def approach_restitution(zeta: Array | float) -> Array:
     return np.where(np.isinf(zeta), 0.0, np.exp(-_until_peak(finite)))
 
 
+def limited_restitution(zeta: Array | float) -> Array:
+    """The restitution where the dashpot pushes no more than the spring, n = 1, and the contact ends at zero force.
+
+    At first F = 2y: with ω = √2 that is y = sin(ωτ)/ω until y = 2ζ v, at v₁ = 1/√(1 + 8ζ²). From there the motion
+    is that of the whole dashpot, which passes y = 2ζ v at τ₁ with tan(ωτ₁) = 2ζω/(1 + 2ζ²), ω = √(1 − ζ²), and
+    ends at 2 τₘ: e = v₁ exp(−2ζτₘ)/v(τ₁), where v(τ₁) = exp(−ζτ₁)/√(1 + 8ζ²). So e = exp(−ζ(2τₘ − τ₁)).
+
+    Parameters
+    ----------
+    zeta : damping ratio ζ = d/(2√(mK)) [-], >= 0, any shape
+
+    >>> limited_restitution(np.array([0.0, 0.5, 1.0])).round(6)
+    array([1.      , 0.403774, 0.263597])
+    """
+    zeta = np.asarray(zeta, dtype=float)
+    finite = np.where(np.isinf(zeta), 1.0, zeta)
+    return np.where(np.isinf(zeta), 0.0, np.exp(_until_spring(finite) - 2.0 * _until_peak(finite)))
+
+
+def _until_spring(zeta: Array) -> Array:
+    """ζ τ₁ = ζ atan(2ζω/(1 + 2ζ²))/ω, or with artanh and √(ζ² − 1) for ζ > 1."""
+    square = zeta * zeta
+    root, slope = np.sqrt(np.abs(zeta - 1.0) * (zeta + 1.0)), 2.0 * zeta / (1.0 + 2.0 * square)
+    angle = slope * root
+    # artanh, and where the angle comes near one its logarithm without the difference
+    far = np.log((1.0 + angle) * (1.0 + 2.0 * square) / np.sqrt(1.0 + 8.0 * square))
+    over = np.where(angle < 0.5, np.arctanh(np.minimum(angle, 0.5)), far)
+    time = np.where(zeta < 1.0, np.arctan(angle), over) / np.where(zeta == 1.0, 1.0, root)
+    return np.asarray(zeta * np.where(zeta == 1.0, slope, time))
+
+
 def gap_damping(e: Array | float) -> Array:
     """The damping ratio ζ that delivers e where the contact ends at zero indentation: −ln e/√(π² + ln² e).
 
