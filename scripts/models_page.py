@@ -148,7 +148,7 @@ def keys_of(model: ForceModel) -> str:
 def first_cells(model: ForceModel) -> list[str]:
     """What the row of every law begins with."""
     over = "e" if measured()[model.key].over == "e" else "v₀"
-    gap = "δ = 0" if model.residual is None else "δ = δₚ"
+    gap = "δ = δₚ" if model.is_permanent else "δ = 0"
     return [
         f"![e_out over {over} of {model.key}](models/{model.key}.svg)<br>{keys_of(model)}",
         formula(model.equation),

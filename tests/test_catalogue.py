@@ -398,7 +398,8 @@ def test_kuwabara_and_kono_is_as_far_from_its_pade_forms_as_is_known(above, belo
 
 CALIBRATED = (
     "anagnostopoulos-1988", "tsuji-1992", "feng-2026", "schwager-poschel-2007", "exact-dashpot-no-tension",
-    "exact-approach-dashpot", "exact-hysteresis",
+    "exact-approach-dashpot", "exact-hysteresis", "lankarani-nikravesh-1994", "gharib-hurmuzlu-2012-energetic",
+    "bilinear",
 )  # fmt: skip
 
 
@@ -412,4 +413,5 @@ def test_a_dashpot_of_calibrated_damping_delivers_what_is_asked_for(key, n):
     assert np.all(contact.status == Status.OK)
     assert np.abs(contact.e_out - e).max() <= 1e-9
     # what is left of the speed keeps its digits, too; to the end of the gap it fades over a long time
-    assert np.abs(contact.e_out / e - 1.0).max() <= (1e-9 if find(key).release == "force" else 1e-6)
+    fades = find(key).release == "gap" and find(key).momentum == "force" and find(key).unloading is None
+    assert np.abs(contact.e_out / e - 1.0).max() <= (1e-6 if fades else 1e-9)

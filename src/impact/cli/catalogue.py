@@ -140,7 +140,7 @@ def _parameter(one: Parameter) -> str:
 
 
 def _release(model: ForceModel) -> str:
-    gap = "zero indentation" if model.residual is None else "the permanent indentation"
+    gap = "the permanent indentation" if model.is_permanent else "zero indentation"
     return gap if model.release == "gap" else f"zero force, at {gap} at the latest"
 
 

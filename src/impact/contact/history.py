@@ -67,7 +67,9 @@ def follow(model: ForceModel, lanes: Lanes, *, rtol: float, max_steps: int) -> H
     back = motion.of_restitution(law)
     outward = _phase(back, motion.restitution(back), struck.outward.recorded, struck.columns)
 
-    residual = struck.columns[-1] if model.unloading is not None else np.zeros(1)
+    residual = (
+        struck.columns[motion.BRANCH.index("residual") - len(motion.BRANCH)] if model.unloading else np.zeros(1)
+    )
     unit_t = lanes.length / lanes.v0
     t = np.concatenate([inward.t, struck.inward.state[2] + outward.t]) * unit_t
     delta = np.concatenate([inward.x, residual + outward.x]) * lanes.length

@@ -23,7 +23,9 @@ IN_UNLOADING = {
     "peak": "peak indentation",
     "force_at_peak": "force there",
     "residual": "permanent indentation",
+    "recovered": "peak indentation above the permanent one",
 }
+IN_MOTION_BACK = {"stretch": "indentation above the permanent one"}
 # coefficients that a coordinate of the velocity asks for; the first is the strength of the damping
 COORDINATES = {"v": (), "log": ("chi",), "force": ("c", "q")}
 
@@ -68,9 +70,10 @@ class ForceModel:
     Every formula asks by the names of its arguments for what it needs: `x` (indentation), `v` (its rate),
     `elastic` (K δⁿ), the quantities of the contact (`K, n, m, v0, e, R1, R2, E1, E2, nu1, nu2,
     yield_strength1, yield_strength2`), the model's own parameters and coefficients; `unloading` also for
-    `peak`, `force_at_peak` and `residual`. All arrive in the contact's own units, in which K = m = v0 = 1, as
-    arrays of one shape, (n,), or as numbers where they are the same for all; parameters are converted by their
-    unit, so that the formula does not change. A formula works on arrays: `np.where`, not `if`.
+    `peak`, `force_at_peak`, `residual`, `recovered` and `stretch`, x above the residual. All arrive in the
+    contact's own units, in which K = m = v0 = 1, as arrays of one shape, (n,), or as numbers where they are the
+    same for all; parameters are converted by their unit, so that the formula does not change. A formula works on
+    arrays: `np.where`, not `if`.
 
     Parameters
     ----------
@@ -81,7 +84,8 @@ class ForceModel:
     domain : closed intervals by the name of an input or derived quantity, where its authors claim it
     force : contact force of the whole contact, or of the approach phase where `unloading` is given
     unloading : contact force of the restitution phase
-    residual : permanent indentation, from `peak` and the quantities of the contact
+    residual : permanent indentation, from `peak`, `force_at_peak` and the quantities of the contact
+    recovered : what of the peak indentation is recovered, in place of `residual` where it may be a small part
     bends, unloading_bends : indentations at which `force`, or `unloading`, goes over to another formula, NaN for
         none; no step goes across. They ask for what is known beforehand, the latter for `peak`, `force_at_peak`
         and `residual` too. One that asks for `x`, `v` or `elastic` is a function that changes its sign there
@@ -131,6 +135,7 @@ class ForceModel:
     domain: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     unloading: Formula | None = None
     residual: Formula | None = None
+    recovered: Formula | None = None
     bends: tuple[Formula, ...] = ()
     unloading_bends: tuple[Formula, ...] = ()
     coefficients: Mapping[str, Formula] = field(default_factory=dict)
@@ -147,6 +152,8 @@ class ForceModel:
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", self.key):
             raise ModelError(f'model key "{self.key}": wants kebab-case, such as "hunt-crossley-1975"')
+        if self.residual is not None and self.recovered is not None:
+            raise ModelError(f"model {self.key}: recovered: given beside residual, wants one of the two")
         if self.unloading_bends and self.unloading is None:
             raise ModelError(f"model {self.key}: unloading_bends: wants an unloading")
         self._check_fields()
@@ -156,8 +163,9 @@ class ForceModel:
             self._check(f"coefficient {name}", formula, once)
             once.add(name)
         self._check("force", self.force, {*once, *IN_FORCE})
-        self._check("unloading", self.unloading, {*once, *IN_FORCE, *IN_UNLOADING})
-        self._check("residual", self.residual, {*once, "peak", "force_at_peak"})
+        self._check("unloading", self.unloading, {*once, *IN_FORCE, *IN_UNLOADING, *IN_MOTION_BACK})
+        for role in ("residual", "recovered"):
+            self._check(role, getattr(self, role), {*once, "peak", "force_at_peak"})
         for formula in self.bends:
             self._check("bend", formula, {*once, *IN_FORCE})
         for formula in self.unloading_bends:
@@ -188,7 +196,7 @@ class ForceModel:
         for name, (right, wants) in allowed.items():
             if not right:
                 raise ModelError(f"model {self.key}: {name}: got {getattr(self, name)!r}, wants {wants}")
-        taken = {*QUANTITIES, *IN_FORCE, *IN_UNLOADING}
+        taken = {*QUANTITIES, *IN_FORCE, *IN_UNLOADING, *IN_MOTION_BACK}
         for name in (*(parameter.name for parameter in self.parameters), *self.coefficients):
             if name in taken:
                 raise ModelError(f'model {self.key}: "{name}" is the name of a quantity, wants another')
@@ -220,9 +228,14 @@ class ForceModel:
     def quantities(self) -> frozenset[str]:
         """The names of the quantities and parameters that the law's motion depends on."""
         own = {parameter.name for parameter in self.parameters}
-        formulas = (self.force, self.unloading, self.residual, *self.bends, *self.unloading_bends,
+        formulas = (self.force, self.unloading, self.residual, self.recovered, *self.bends, *self.unloading_bends,
                     *self.coefficients.values())  # fmt: skip
         return frozenset(w for formula in formulas for w in wishes(formula) if w in QUANTITIES or w in own)
+
+    @property
+    def is_permanent(self) -> bool:
+        """Whether an indentation may stay where the force ends."""
+        return self.residual is not None or self.recovered is not None
 
     @property
     def domain_text(self) -> str:

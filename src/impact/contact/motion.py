@@ -30,7 +30,7 @@ FLOOR = (1e-200, 1e-200)
 # step of the difference that gives the rate of the force at the release, relative to s, at which it may vanish
 DIFFERENCE = 1e-7
 # what an unloading branch is told besides, in columns that follow the law's own
-BRANCH = ("peak", "force_at_peak", "residual")
+BRANCH = ("peak", "force_at_peak", "residual", "recovered")
 # the force of a law without damping is taken to be a power of s below this
 POWER = 16.0
 # a damping is critical from this of its square on, which rounding may have made smaller
@@ -56,7 +56,9 @@ class Law:
 
         Where the damping is strong, the coordinate that the law declares for it stands for v.
         """
-        formulas = (model.force, model.unloading, model.residual, *model.bends, *model.unloading_bends)
+        formulas = (
+            model.force, model.unloading, model.residual, model.recovered, *model.bends, *model.unloading_bends
+        )  # fmt: skip
         asked = {wish for formula in formulas for wish in wishes(formula)}
         own = {*model.quantities, *model.coefficients} - {"K", "m", "v0", "n"}
         return cls(model, n, tuple(sorted(asked & own)), coordinate(model, n) if strong else Momentum())
@@ -197,9 +199,9 @@ def start_of_approach(law: Law, columns: Columns, n: int) -> Array:
     return np.array([s, law.momentum.of(s, np.ones(n), law.strength(columns))])
 
 
-def start_of_restitution(law: Law, columns: Columns, peak: Array, residual: Array) -> Array:
+def start_of_restitution(law: Law, columns: Columns, recovered: Array) -> Array:
     """s at the peak above the residual indentation, v = 0."""
-    s = power(peak - residual, 1.0 / law.model.smooth)
+    s = power(recovered, 1.0 / law.model.smooth)
     return np.array([s, law.momentum.of(s, np.zeros(s.size), law.strength(columns))])
 
 
@@ -213,17 +215,20 @@ def force_at_peak(law: Law, s: Array, columns: Columns) -> Array:
     return np.asarray(_rates(law, law.model.force, ())(np.array([s, np.zeros(s.size)]), columns)[4])
 
 
-def turn(law: Law, columns: Columns, peak: Array, at_peak: Array) -> tuple[Array, Columns]:
-    """The residual indentation, and the columns of the restitution phase."""
-    model = law.model
-    residual = np.zeros_like(peak)
-    if model.residual is not None:
-        given = {"peak": peak, "force_at_peak": at_peak}
-        own = law.call(model.residual, columns, given)
+def turn(law: Law, columns: Columns, peak: Array, at_peak: Array) -> tuple[Array, Array, Columns]:
+    """The residual indentation, what of the peak is recovered, and the columns of the restitution phase."""
+    model, residual = law.model, np.zeros_like(peak)
+    formula = model.residual or model.recovered
+    if formula is not None:
+        own = law.call(formula, columns, {"peak": peak, "force_at_peak": at_peak})
         if own.shape not in ((), peak.shape):
             raise ModelError(f"{model.key}: the residual has the shape {own.shape}, wants {peak.shape}")
         residual = residual + own
-    return residual, columns if model.unloading is None else (*columns, peak, at_peak, residual)
+    recovered = peak - residual
+    if model.recovered is not None:
+        residual, recovered = recovered, residual
+    branch = () if model.unloading is None else (peak, at_peak, residual, recovered)
+    return residual, recovered, (*columns, *branch)
 
 
 def _given(law: Law, asked: set[str], extra: tuple[str, ...], y: Array, columns: Columns) -> dict[str, Array]:
@@ -232,7 +237,8 @@ def _given(law: Law, asked: set[str], extra: tuple[str, ...], y: Array, columns:
     given = {"v": law.velocity(y, columns)}
     if extra:
         given.update(zip(extra, columns[len(law.names) :], strict=False))
-        x = given["x"] = integer_power(s, p) + given["residual"]
+        stretch = given["stretch"] = integer_power(s, p)
+        x = given["x"] = stretch + given["residual"]
         if "elastic" in asked:
             given["elastic"] = power(x, law.n)
     else:

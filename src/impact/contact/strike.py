@@ -108,7 +108,7 @@ def strike(
     inward = in_parts(run, motion.approach(law), bends, start, among)
     peak = motion.indentation(law, inward.state[0])
     at_peak = motion.force_at_peak(law, inward.state[0], columns)
-    residual, columns = motion.turn(law, columns, peak, at_peak)
+    residual, recovered, columns = motion.turn(law, columns, peak, at_peak)
     rebound = replace(
         Rebound.blank(n), peak=peak, permanent=residual, force=np.maximum(inward.maximum, at_peak),
         duration=inward.state[2].copy(), work=2.0 * inward.state[3], steps=inward.steps.copy(),
@@ -116,7 +116,7 @@ def strike(
     )  # fmt: skip
 
     # nothing is given back where the balls stay at their peak
-    stays = (rebound.status == Status.OK) & (residual >= peak)
+    stays = (rebound.status == Status.OK) & (recovered <= 0.0)
     rebound.status[stays] = Status.LIMIT
     rebound.e_out[stays] = 0.0
 
@@ -125,7 +125,7 @@ def strike(
     if not parts.size:
         return Struck(rebound, inward, None, columns, parts)
     back = motion.of_restitution(law)
-    start = motion.start_of_restitution(back, columns, peak[parts], residual[parts])
+    start = motion.start_of_restitution(back, columns, recovered[parts])
     among, bends = motion.bends(back, columns, start, residual[parts])
     outward = in_parts(run, motion.restitution(back), bends, start, among)
     # held, or parting with no speed in an infinite time: all the energy of such balls is lost

@@ -24,11 +24,9 @@ LANKARANI_NIKRAVESH_1994 = ForceModel(
     evidence="formula as printed in Gharib and Hurmuzlu (2012); DOI from memory",
     domain={"e": (0.0, 1.0)},
     force=lambda elastic: elastic,
-    unloading=lambda x, n, peak, residual, force_at_peak: power_law(
-        force_at_peak, (x - residual) / (peak - residual), n
-    ),
+    unloading=lambda stretch, recovered, n, force_at_peak: power_law(force_at_peak, stretch / recovered, n),
     # (32), by (31) and fₘ = K δₘⁿ the same as δₘ (1 − e²), which holds for the peak that the integration found
-    residual=lambda e, peak: peak * (1 - e * e),
+    recovered=lambda e, peak: peak * (e * e),
     oracle=lambda e: e,
     family="permanent",
 )
@@ -45,8 +43,8 @@ GHARIB_HURMUZLU_2012_ENERGETIC = ForceModel(
     domain={"e": (0.0, 1.0)},
     force=lambda elastic: elastic,
     coefficients={"Kr": lambda K, n, e: K / power(e * e, n)},
-    unloading=lambda x, n, residual, Kr: power_law(Kr, x - residual, n),
-    residual=lambda e, peak: peak * (1 - e * e),
+    unloading=lambda stretch, n, Kr: power_law(Kr, stretch, n),
+    recovered=lambda e, peak: peak * (e * e),
     oracle=lambda e: e,
     family="permanent",
 )
@@ -64,8 +62,8 @@ BILINEAR = ForceModel(
     exponent=1.0,
     force=lambda elastic: elastic,
     coefficients={"Kr": lambda K, e: K / (e * e)},
-    unloading=lambda x, residual, Kr: Kr * (x - residual),
-    residual=lambda K, Kr, peak: peak * (1 - K / Kr),
+    unloading=lambda stretch, Kr: Kr * stretch,
+    recovered=lambda K, Kr, peak: peak * (K / Kr),
     oracle=lambda e: e,
     family="permanent",
 )
@@ -83,8 +81,8 @@ ISMAIL_STRONGE_2008 = ForceModel(
     exponent=1.0,
     force=lambda elastic: elastic,
     coefficients={"Kr": lambda K, gamma: gamma * gamma * K},
-    unloading=lambda x, residual, Kr: Kr * (x - residual),
-    residual=lambda K, Kr, peak: peak * (1 - K / Kr),
+    unloading=lambda stretch, Kr: Kr * stretch,
+    recovered=lambda K, Kr, peak: peak * (K / Kr),
     oracle=lambda gamma: np.divide(1.0, gamma),
     family="permanent",
 )
