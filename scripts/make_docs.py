@@ -1,4 +1,4 @@
-"""Regenerate what the documentation takes from the program: docs/schema.md, docs/models.md, the README's picture.
+"""Regenerate what the documentation takes from the program: schema, models, gallery, the README's picture.
 
 python scripts/make_docs.py
 """
@@ -8,6 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import impact
+from gallery import gallery_page, write_gallery
 from impact.contact.status import Status
 from impact.data.history import HISTORY
 from impact.data.results import SCHEMA
@@ -106,6 +107,8 @@ def main() -> None:
     (ROOT / "docs" / "schema.md").write_text(schema_page(), encoding="utf-8")
     (ROOT / "docs" / "models.md").write_text(models_page(), encoding="utf-8")
     write_curves(ROOT / "docs" / "models")
+    (ROOT / "docs" / "gallery.md").write_text(gallery_page(), encoding="utf-8")
+    write_gallery(ROOT / "docs" / "gallery")
     result = impact.sweep(ROOT / "configs" / "figure6.toml")
     save_figure(impact.plot(result), ROOT / "docs" / "figure6.png")
 

@@ -43,7 +43,7 @@ def test_from_toml_to_picture(cli: Run, small: Path, tmp_path: Path) -> None:
     assert impact.load(tmp_path / "results.h5").sizes == {"model": 2, "e": 3, "m2": 2}
     drawn = cli("plot", "results.h5", "--sel", "m2=2", cwd=tmp_path)
     assert (drawn.returncode, drawn.stdout) == (0, "")
-    assert drawn.stderr == "results.png: over e at m2 = 2\n"
+    assert drawn.stderr.startswith("results.png: Impact sweep, m2 = 2 kg, v1 = 1 m/s, ")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["results.h5", "results.png", "small.toml"]
 
 
@@ -125,13 +125,52 @@ def test_failed_points_are_told_and_change_the_exit_code(cli: Run, small: Path, 
 
 def test_plot_prints_the_plotted_numbers(cli: Run, stored: Path, tmp_path: Path) -> None:
     drawn = cli("plot", stored, "-o", tmp_path / "a.svg", "--json", "--model", "gharib-hurmuzlu-2012")
-    numbers = json.loads(drawn.stdout)
-    assert numbers["x"] == "e"
-    assert [(c["model"], c["ball"]) for c in numbers["curves"]] == [
-        (None, 1), (None, 2), ("gharib-hurmuzlu-2012", 1), ("gharib-hurmuzlu-2012", 2),
+    (panel,) = json.loads(drawn.stdout)["final-velocities"]["panels"]
+    assert panel["x_label"] == "coefficient of restitution, e"
+    assert [(c["model"], c["end"]) for c in panel["curves"]] == [
+        (None, "v₁⁺"), (None, "v₂⁺"), ("gharib-hurmuzlu-2012", "v₁⁺"), ("gharib-hurmuzlu-2012", "v₂⁺"),
     ]  # fmt: skip
     # e = 0.5: by hand from the delivered restitution of PHYSICS (28), 0.410720
-    assert numbers["curves"][2]["values"][50] == pytest.approx(0.5 - 0.41072 / 2, abs=1e-6)
+    assert panel["curves"][2]["y"][50] == pytest.approx(0.5 - 0.41072 / 2, abs=1e-6)
+
+
+def test_several_kinds_in_one_call_and_the_numbers_behind_them(cli: Run, stored: Path, tmp_path: Path) -> None:
+    drawn = cli("plot", stored, "-k", "restitution", "-k", "loop", "--sel", "e=0.5", "--width", "single",
+                "--model", "gharib-hurmuzlu-2012", "-o", "a.svg", "--data", "a.csv", cwd=tmp_path)  # fmt: skip
+    assert drawn.returncode == 0, drawn.stderr
+    names = {"a-restitution.svg", "a-loop.svg", "a-restitution.csv", "a-loop.csv"}
+    assert names <= {path.name for path in tmp_path.iterdir()}
+    # the loop is at one e, the restitution over all of them
+    assert len((tmp_path / "a-restitution.csv").read_text("utf-8").splitlines()) == 1 + 2 * 101
+    assert "indentation, delta [m]" in (tmp_path / "a-loop.csv").read_text("utf-8")
+    assert [line.split(":")[0] for line in drawn.stderr.splitlines()] == ["a-restitution.svg", "a-loop.svg"]
+
+
+def test_a_report_is_one_page(cli: Run, stored: Path, tmp_path: Path) -> None:
+    # tests/test_report_page.py has the rest
+    told = cli("report", stored, "-o", "page.html", cwd=tmp_path)
+    assert told.returncode == 0, told.stderr
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "<h1>Final velocities comparison</h1>" in page
+    assert page.count("<figure>") == 4
+    assert "<script" not in page
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["-k", "lop"], '--kind: no kind "lop"; did you mean "loop"?'),
+        (["--width", "wide"], "--width wide: wants single or double"),
+        (["--log", "z"], "--log z: wants x, y, xy"),
+        (["--data", "a.txt"], "--data a.txt: wants a name that ends in .csv"),
+    ],
+)
+def test_what_plot_does_not_know_is_told_and_nothing_written(
+    cli: Run, stored: Path, tmp_path: Path, words: list[str], said: str
+) -> None:
+    refused = cli("plot", stored, "-o", "a.png", *words, cwd=tmp_path)
+    assert (refused.returncode, refused.stderr) == (2, f"{said}\n")
+    assert not list(tmp_path.glob("a.*"))
 
 
 def test_run_one_impact(cli: Run, tmp_path: Path) -> None:
@@ -235,7 +274,9 @@ def test_init_and_schema(cli: Run, tmp_path: Path) -> None:
     jsonschema.validate(tomllib.loads((tmp_path / "config.toml").read_text(encoding="utf-8")), printed)
 
 
-@pytest.mark.parametrize("command", ["sweep", "plot", "run", "models", "info", "init", "schema"])
+@pytest.mark.parametrize(
+    "command", ["sweep", "plot", "recommend", "report", "run", "models", "info", "init", "schema"]
+)
 def test_every_command_has_help_with_an_example(cli: Run, command: str) -> None:
     told = cli(command, "--help")
     assert told.returncode == 0

@@ -25,6 +25,8 @@ COMMANDS = (
     ("info", FILE),
     ("info", FILE, "--json"),
     ("plot", FILE, "-o", "picture.png"),
+    ("plot", FILE, "-k", "loop", "-o", "picture.png"),
+    ("recommend", FILE),
     ("compare", FILE, FILE, "--plot", "differences.png"),
     ("rerun", FILE, "--plot", "differences.png"),
 )
@@ -139,7 +141,7 @@ def test_what_is_unknown_is_passed_over_with_a_note(forked: Forked, small: Path,
         note = done.stderr.splitlines()[0]
         assert note.startswith("note: more.h5: passed over")
         assert r"x\x1b[31m\u202e\x0a" in note
-        assert len(done.stderr.splitlines()) == 1 + (command[0] != "info")
+        assert len(done.stderr.splitlines()) == 1 + (command[0] not in ("info", "recommend"))
 
 
 def test_how_another_program_packed_it_is_not_kept(small: Path, tmp_path: Path) -> None:

@@ -31,13 +31,14 @@ def test_the_toml_and_the_commands_of_daily_use(cli: Run, tmp_path: Path) -> Non
     (toml,) = blocks("toml")
     (tmp_path / "config.toml").write_text(toml, encoding="utf-8")
     commands = [line for block in blocks("sh")[1:] for line in block.splitlines() if line]
-    assert len(commands) == 8
+    assert len(commands) == 11
     for line in commands:
         program, *words = shlex.split(line)
         assert program == "impact"
         done = cli(*words, cwd=tmp_path)
         assert done.returncode == 0, (line, done.stderr)
-    assert {"results.h5", "results.png", "baseline.h5", "differences.png"} <= {p.name for p in tmp_path.iterdir()}
+    made = {"results.h5", "results.png", "baseline.h5", "differences.png", "figure-map.svg", "report.html"}
+    assert made <= {path.name for path in tmp_path.iterdir()}
 
 
 @pytest.mark.parametrize("code", blocks("python"))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from .api import bless, compare, load, models, plot, rerun, run, save, sweep
+    from .api import bless, compare, load, models, plot, recommend, report, rerun, run, save, sweep
     from .contact.model import ForceModel, Parameter
     from .contact.models.hysteresis import hysteresis
     from .contact.power import power
@@ -26,6 +26,8 @@ __all__ = [
     "models",
     "plot",
     "power",
+    "recommend",
+    "report",
     "rerun",
     "run",
     "save",

@@ -14,11 +14,13 @@ from .contact.model import Parameter as Parameter
 from .contact.models import catalogue
 from .contact.models.hysteresis import hysteresis as hysteresis
 from .contact.power import power as power
+from .data.again import histories
 from .data.bless import bless as bless
 from .data.compare import compare as compare
 from .data.impact import Impact as Impact
 from .data.impact import impact_of
 from .data.origin import config_of, picked_out, stored_config
+from .data.ranking import Ranking, ranking
 from .data.replay import repeats
 from .data.store import load as load
 from .data.store import save as save
@@ -36,6 +38,8 @@ from .sweeps.run import never
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
+
+    from .views.kinds import Choice, Numbers
 
 
 def prepare(
@@ -186,18 +190,31 @@ def models(plugins: Sequence[ForceModel | str | Path] = ()) -> Mapping[str, Forc
 def plot(
     dataset: xr.Dataset,
     *,
+    kind: str = "final-velocities",
     x: str | None = None,
+    y: str | None = None,
+    variable: str = "e_error",
     sel: Mapping[str, float | str] | None = None,
     models: Sequence[str] | None = None,
+    log: str = "",
+    width: float = 7.1,
+    plugins: Sequence[ForceModel | str | Path] = (),
 ) -> Figure:
-    """Draw the final-velocity comparison, Figure 6 of the paper.
+    """Draw a result; by default the final-velocity comparison, Figure 6 of the paper.
 
     Parameters
     ----------
-    dataset : a result
+    dataset : a result, or a time history
+    kind : one of `impact.views.kinds.KINDS`
     x : what to draw over; by default e, else the first numeric axis
-    sel : values of the other axes, such as `{"m2": 1.0}`; one that is not named shows its first value
+    y : second axis of a map, or of the kind validity; by default the next one
+    variable : that a map shows
+    sel : values of the other axes, such as `{"m2": 1.0}`; one that is not named shows its first value. A loop,
+        a history or an impulse may be at a point that is not on the grid
     models : keys of the models to show; by default all
+    log : which axes are logarithmic, such as "x" or "xy"; axes that are spaced so are in any case
+    width : of the figure [in]
+    plugins : models of one's own, which the kinds that follow a motion want again
 
     Returns
     -------
@@ -212,6 +229,69 @@ def plot(
     >>> figure.axes[0].get_xlabel()
     'coefficient of restitution, e'
     """
-    from .views.figures import draw_final_velocities, final_velocities
+    from .views.kinds import Choice, draw
 
-    return draw_final_velocities(final_velocities(dataset, x, sel, models))
+    return draw(pictured(dataset, kind, Choice(x, y, variable, sel, models, log), plugins), width)
+
+
+def pictured(
+    dataset: xr.Dataset, kind: str, choice: Choice, plugins: Sequence[ForceModel | str | Path] = ()
+) -> Numbers:
+    """The numbers of a picture; see `plot`."""
+    from .views.kinds import numbers_of
+
+    own = read_plugins(plugins)
+    return numbers_of(kind, dataset, choice, lambda: histories(dataset, choice.models, choice.sel or {}, own))
+
+
+def recommend(
+    dataset: xr.Dataset,
+    *,
+    tol: float = 0.01,
+    sel: Mapping[str, float | str] | None = None,
+    models: Sequence[str] | None = None,
+) -> Ranking:
+    """Rank the models of a result by how well they give the restitution asked for, over all that is swept.
+
+    Parameters
+    ----------
+    dataset : a result
+    tol : what |e_out - e| may be
+    sel : values of axes, such as `{"m2": 1.0}`; all values of the others are judged
+    models : keys of the models to rank; by default all
+
+    Returns
+    -------
+    Ranking : the models, the best first; `ranking.best` are those within the tolerance at all points
+
+    Raises
+    ------
+    UsageError : the result asks for no e, or has not got what is asked for; tol is not a positive finite number
+
+    >>> import impact
+    >>> result = impact.sweep("configs/figure6.toml")
+    >>> print(impact.recommend(result, models=["gharib-hurmuzlu-2012"]).headline)
+    no model gives e within 0.01 everywhere; gharib-hurmuzlu-2012 is nearest: 25.7% of 101 points
+    """
+    return ranking(dataset, tol, sel, models)
+
+
+def report(dataset: xr.Dataset, *, plugins: Sequence[ForceModel | str | Path] = ()) -> str:
+    """A result as one page of HTML, which needs no network and runs nothing.
+
+    Parameters
+    ----------
+    dataset : a result
+    plugins : models of one's own that it was made with; without them the figures that follow a motion are left out
+
+    Raises
+    ------
+    UsageError, ResultError : it is a time history, or its attributes are not those of a result
+
+    >>> import impact
+    >>> "<h1>Final velocities comparison</h1>" in impact.report(impact.sweep("configs/figure6.toml"))
+    True
+    """
+    from .views.page import page
+
+    return page(dataset, lambda kind, choice: pictured(dataset, kind, choice, plugins))

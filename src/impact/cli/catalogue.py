@@ -26,7 +26,7 @@ NARROW = 130
 
 
 def models(
-    key: Annotated[str | None, typer.Argument(help="A model to tell all about. [default: list them]")] = None,
+    key: Annotated[str | None, typer.Argument(help="A model to tell all about. \\[default: list them]")] = None,
     family: Annotated[
         str | None, typer.Option("--family", metavar="NAME", help="List the laws of a family only.")
     ] = None,

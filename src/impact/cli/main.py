@@ -12,7 +12,7 @@ import typer
 from .. import __version__
 from ..errors import UsageError
 from ..text import safe_text
-from . import catalogue, door, regression, sweeping
+from . import advice, catalogue, door, pictures, regression, reporting, sweeping
 from .options import Json, Overwrite, Plugins, Sets
 from .words import dump, pairs
 
@@ -49,60 +49,21 @@ def common(
 app.command(epilog="Example: impact sweep configs/figure6.toml -o results.h5 --set sweep.m2=2.0")(sweeping.sweep)
 
 
-@app.command(epilog="Example: impact plot results.h5 -o results.png --sel m2=1.0")
-def plot(
-    result: Annotated[Path, typer.Argument(help="A result of `impact sweep`.")],
-    output: Annotated[
-        Path | None,
-        typer.Option("-o", "--output", help="The picture: .png, .svg or .pdf. [default: RESULT.png]"),
-    ] = None,
-    x: Annotated[
-        str | None, typer.Option("--x", help="What to draw over. [default: e, else the first axis]")
-    ] = None,
-    sel: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--sel", metavar="NAME=VALUE", help="Value of another axis; may be repeated. [default: its first]"
-        ),
-    ] = None,
-    model: Annotated[
-        list[str] | None, typer.Option("--model", metavar="KEY", help="A model to show; may be repeated.")
-    ] = None,
-    as_json: Json = False,
-) -> None:
-    """Draw the final-velocity comparison (Figure 6 of the paper) from a stored result."""
-    from dataclasses import asdict
-
-    from .. import api
-    from ..data import store
-    from ..views import figures, look
-    from . import console
-
-    numbers = figures.final_velocities(api.load(result), x, pairs("--sel", sel), model)
-    output = output or result.with_suffix(".png")
-    store.check_output(output, overwrite=True, source=result)
-    look.save_figure(figures.draw_final_velocities(numbers), output)
-    told = f"{output}: over {numbers.x}"
-    if numbers.slice:
-        told += " at " + ", ".join(f"{name} = {console.shown(value)}" for name, value in numbers.slice.items())
-    if numbers.not_drawn:
-        told += f", without {numbers.x} = inf"
-    empty = {one.model: None for one in numbers.curves if one.model and not any(v == v for v in one.values)}
-    if empty:
-        told += f"; no point to draw of {', '.join(empty)}"
-    door.say(safe_text(told, 1000))
-    if as_json:
-        print(dump(asdict(numbers)))
+app.command(epilog="Example: impact plot results.h5 -k restitution -k loop --sel m2=1.0 -o results.svg")(
+    pictures.plot
+)
+app.command(epilog="Example: impact recommend results.h5 --tol 0.02 --sel m2=1.0")(advice.recommend)
+app.command(epilog="Example: impact report results.h5 -o report.html")(reporting.report)
 
 
 @app.command(epilog="Example: impact run --model gharib-hurmuzlu-2012 --at e=0.05 --at m2=2.0 --history out.h5")
 def run(
     source: Annotated[
-        Path | None, typer.Argument(help="A TOML file or a result. [default: Table 1 of the paper]")
+        Path | None, typer.Argument(help="A TOML file or a result. \\[default: Table 1 of the paper]")
     ] = None,
     model: Annotated[
         str | None,
-        typer.Option("--model", metavar="KEY", help="The model. [default: the first of the source]"),
+        typer.Option("--model", metavar="KEY", help="The model. \\[default: the first of the source]"),
     ] = None,
     at: Annotated[
         list[str] | None,
@@ -177,7 +138,7 @@ def init(
 
 @app.command(epilog="Example: impact schema -o impact.schema.json")
 def schema(
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="The file. [default: stdout]")] = None,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="The file. \\[default: stdout]")] = None,
     overwrite: Overwrite = False,
 ) -> None:
     """The JSON Schema of the config, from which editors complete and check it."""

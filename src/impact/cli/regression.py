@@ -41,7 +41,7 @@ Tol = Annotated[
     typer.Option(
         "--tol", metavar="[NAME=]VALUE",
         help="Tolerance relative to the scale of a point, for all variables or for one; may be repeated. "
-        "[default: the baseline's, else 10 times its solver's rtol]",
+        "\\[default: the baseline's, else 10 times its solver's rtol]",
     ),
 ]  # fmt: skip
 Subset = Annotated[

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
+from ..contact.models import catalogue
 from ..data.results import plain_unit
 from ..data.store import write_whole
 from ..errors import UsageError
@@ -23,9 +25,36 @@ if TYPE_CHECKING:
 # with theirs, so that neighbours in the catalogue differ in both
 COLOURS = ("#7F4F24", "#009E73", "#56B4E9", "#CC79A7", "#D55E00", "#E69F00", "#0072B2")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*", "p")
+DASHES = ("-", (0, (6, 1.5)), (0, (3, 1.2)), (0, (6, 1.5, 1, 1.5)), (0, (1.2, 1.2)))
 STYLE = files(__package__) / "impact.mplstyle"
 # a picture has the same bytes each time: no dates in it
 METADATA: dict[str, dict[str, None]] = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
+
+
+def look_of(model: str | None, models: Sequence[str | None], points: int) -> dict[str, Any]:
+    """How a curve of a model looks, wherever it is drawn; a reference is a plain line.
+
+    Parameters
+    ----------
+    model : its key; None for a reference
+    models : those of the picture; one that is not built in comes after the catalogue
+    points : of the curve
+    """
+    if model is None:
+        # a single point has no line: a disc that shows around the models' markers
+        disc = {"marker": "o", "markersize": 10} if points == 1 else {}
+        return {"color": "black", "linewidth": 2.0, "zorder": 1.5, **disc}
+    place = list(dict.fromkeys([*catalogue(), *(one for one in models if one)])).index(model)
+    every = max(1, points // 12)
+    return {
+        "color": COLOURS[place % len(COLOURS)],
+        "linestyle": DASHES[place % len(DASHES)],
+        "marker": MARKERS[place % len(MARKERS)],
+        # the markers of different models stand at different points, so that equal curves show both
+        "markevery": (place * every // len(MARKERS) % every if every > 1 else 0, every),
+        "markerfacecolor": "white",
+        "linewidth": 1.1,
+    }
 
 
 def is_geometric(values: np.ndarray) -> bool:

@@ -1,0 +1,396 @@
+"""A picture over two axes shows the numbers of the plane that it names, and the model that is closest there."""
+
+from __future__ import annotations
+
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import QuadMesh
+from matplotlib.figure import Figure
+from matplotlib.patches import PathPatch
+from matplotlib.text import Text
+
+import impact
+from impact.errors import UsageError
+from impact.views.grids import CONTOURS, NO_VALUE, Grids, draw_grids, edges_of, field_map, validity
+from impact.views.look import save_figure
+
+MODELS = ["flores-2011", "lankarani-nikravesh-1990", "gharib-hurmuzlu-2012"]
+MORE = [
+    *MODELS, "hertz", "hunt-crossley-1975", "herbert-mcwhannell-1977", "lee-wang-1983", "gonthier-2004",
+    "zhiying-qishao-2006", "hu-guo-2015", "carvalho-martins-2019", "lankarani-nikravesh-1994", "zhang-2020",
+]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def bent() -> xr.Dataset:
+    """Over alpha and v1, where e = 1 - alpha v1 falls below 0 in a corner: those points have no number."""
+    sweep = {
+        "alpha": {"linspace": [0.3, 0.02, 9]}, "v1": {"linspace": [0.5, 6.0, 7]}, "m1": 1.0, "m2": [1.0, 4.0],
+        "K": 6e9,
+    }  # fmt: skip
+    return impact.sweep({"title": "Speed", "models": MODELS, "sweep": sweep})
+
+
+@pytest.fixture(scope="module")
+def many() -> xr.Dataset:
+    """Thirteen models over e, a geometric v1 and two masses."""
+    sweep = {
+        "e": {"linspace": [0.1, 1.0, 6]}, "v1": {"geomspace": [0.1, 10.0, 5]}, "m1": 1.0, "m2": [1.0, 4.0],
+        "K": 6e9,
+    }  # fmt: skip
+    return impact.sweep({"title": "Thirteen", "models": MORE, "sweep": sweep})
+
+
+def expected(dataset: xr.Dataset, numbers: Grids, model: str, **fixed: object) -> np.ndarray:
+    """A field by y and x, looked up one point after another."""
+    one = dataset[numbers.variable].sel(model=model, **fixed)
+    return np.array([[one.sel({numbers.x: x, numbers.y: y}).item() for x in numbers.x_values]
+                     for y in numbers.y_values])  # fmt: skip
+
+
+def conditions_of(numbers: Grids) -> str:
+    """The conditions, whose parts do not break."""
+    return numbers.conditions.replace("\xa0", " ")
+
+
+def panels_of(figure: Figure, numbers: Grids) -> list[Axes]:
+    """The panels; what comes after them is the colour bar."""
+    return figure.axes[: 2 if numbers.closest else len(numbers.panels)]
+
+
+def centres(numbers: Grids) -> np.ndarray:
+    return np.array([(x, y) for y in numbers.y_values for x in numbers.x_values])
+
+
+def covered(patch: PathPatch, numbers: Grids) -> np.ndarray:
+    """By y and x, the cells whose middle lies in a patch."""
+    inside = [patch.get_path().contains_point(point) for point in centres(numbers)]
+    return np.array(inside).reshape(len(numbers.y_values), -1)
+
+
+def test_the_numbers_are_those_of_the_dataset(bent: xr.Dataset) -> None:
+    numbers = field_map(bent, sel={"m2": 4.0}, models=MODELS[::-1])
+    assert (numbers.x, numbers.y, numbers.variable) == ("alpha", "v1", "e_error")
+    assert numbers.x_values == tuple(sorted(bent["alpha"].values))
+    assert [panel.model for panel in numbers.panels] == MODELS[::-1]
+    assert [panel.label for panel in numbers.panels][1] == "Lankarani and Nikravesh (1990), (22)"
+    for panel in numbers.panels:
+        np.testing.assert_array_equal(panel.values, expected(bent, numbers, str(panel.model), m2=4.0))
+    assert "m2 = 4 kg" in conditions_of(numbers)
+    assert "alpha" not in conditions_of(numbers)
+    assert "m2 = 1 kg" in conditions_of(field_map(bent))
+
+
+def test_axes_and_variable_are_chosen(many: xr.Dataset) -> None:
+    assert (field_map(many).x, field_map(many).y) == ("e", "v1")
+    assert (field_map(many, y="e").x, field_map(many, y="e").y) == ("v1", "e")
+    assert (field_map(many, x="m2").x, field_map(many, x="m2").y) == ("m2", "e")
+    assert (field_map(many, sel={"e": 1.0}).x, field_map(many, sel={"e": 1.0}).y) == ("v1", "m2")
+    force = field_map(many, variable="peak_force", x="v1", y="m2", models=["hertz"])
+    np.testing.assert_array_equal(force.panels[0].values, expected(many, force, "hertz", e=0.1))
+    assert not force.signed
+    assert force.labels == (
+        "velocity of ball 1 before the impact, v1 [m/s]", "mass of ball 2, m2 [kg]",
+        "largest contact force, peak_force [N]",
+    )  # fmt: skip
+    (reference,) = field_map(many, variable="v1_reference").panels
+    assert reference.model is None
+    np.testing.assert_array_equal(reference.values, many["v1_reference"].isel(m2=0).transpose("v1", "e"))
+
+
+def test_the_table_holds_every_point(bent: xr.Dataset) -> None:
+    numbers = validity(bent)
+    assert numbers.columns == ("model", "alpha", "v1", "e_error", "closest", "abs_e_error")
+    rows = list(numbers.rows())
+    assert len(rows) == 3 * 9 * 7
+    for model, alpha, v1, error, closest, distance in rows[::5]:
+        at = bent["e_error"].sel(alpha=alpha, v1=v1, m2=1.0)
+        np.testing.assert_equal(error, at.sel(model=model).item())
+        np.testing.assert_equal(distance, abs(at.sel(model=closest).item()) if closest else np.nan)
+    plain = field_map(bent, models=MODELS[:1])
+    assert plain.columns == ("model", "alpha", "v1", "e_error")
+    assert {len(row) for row in plain.rows()} == {4}
+
+
+def test_the_closest_model_is_the_one_with_the_smallest_error(bent: xr.Dataset) -> None:
+    numbers = validity(bent)
+    error = np.abs(np.stack([expected(bent, numbers, model, m2=1.0) for model in MODELS]))
+    seen = set()
+    for j, row in enumerate(numbers.closest):
+        for i, key in enumerate(row):
+            here = dict(zip(MODELS, error[:, j, i], strict=True))
+            seen.add(key)
+            if key is None:
+                assert np.isnan(list(here.values())).all()
+                assert np.isnan(numbers.distance[j][i])
+            else:
+                assert here[key] == numbers.distance[j][i] == min(here.values())
+    assert seen >= {None, "flores-2011", "gharib-hurmuzlu-2012"}
+    keys = [key for row in numbers.closest for key in row]
+    assert numbers.shares == {key: 100.0 * keys.count(key) / 63 for key in (*MODELS, None) if key in keys}
+    assert sum(numbers.shares.values()) == pytest.approx(100.0)
+
+
+def test_a_tie_goes_to_the_first_and_a_model_without_a_number_is_passed_over(many: xr.Dataset) -> None:
+    odd = many.isel(model=slice(0, 3)).copy(deep=True)
+    odd["e_error"][0] = 0.02
+    odd["e_error"][1] = -0.02 + 5e-10
+    odd["e_error"][2] = np.nan
+    assert set(validity(odd).shares) == {MODELS[0]}
+    odd["e_error"][1] = -0.02 + 5e-9
+    assert set(validity(odd).shares) == {MODELS[1]}
+    odd["e_error"][2, 0] = 0.0
+    numbers = validity(odd)
+    assert numbers.shares == pytest.approx({MODELS[1]: 100.0 * 5 / 6, MODELS[2]: 100.0 / 6})
+    draw_grids(numbers, 7.1)
+
+
+def test_edges_lie_half_way_between_the_values() -> None:
+    assert edges_of([1.0, 2.0, 6.0], log=False).tolist() == [0.5, 1.5, 4.0, 8.0]
+    assert edges_of([1.0, 4.0, 64.0], log=True) == pytest.approx([0.5, 2.0, 16.0, 256.0])
+
+
+def test_what_is_drawn_is_what_is_numbered(many: xr.Dataset, bent: xr.Dataset) -> None:
+    for dataset in (many, bent):
+        numbers = field_map(dataset, models=MODELS)
+        figure = draw_grids(numbers, 7.1)
+        for axes, panel in zip(panels_of(figure, numbers), numbers.panels, strict=True):
+            (mesh,) = [one for one in axes.collections if isinstance(one, QuadMesh)]
+            drawn = np.ma.filled(np.ma.asarray(mesh.get_array()), np.nan)
+            np.testing.assert_array_equal(drawn.reshape(np.shape(panel.values)), panel.values)
+            corners = mesh.get_coordinates()
+            np.testing.assert_array_equal(corners[0, :, 0], edges_of(numbers.x_values, numbers.x_log))
+            np.testing.assert_array_equal(corners[:, 0, 1], edges_of(numbers.y_values, numbers.y_log))
+            assert axes.get_title("left").replace("\n", " ") == panel.label
+            # one scale for all, which is white at 0
+            low, high = mesh.get_clim()
+            assert -low == high == np.nanmax(np.abs([one.values for one in numbers.panels]))
+            scales = (axes.get_xscale(), axes.get_yscale())
+            assert scales == ("linear", "log" if dataset is many else "linear")
+    assert draw_grids(field_map(bent, log="xy"), 7.1).axes[0].get_xscale() == "log"
+
+
+def test_contour_lines_lie_where_the_error_has_their_value(many: xr.Dataset) -> None:
+    numbers = field_map(many, models=["lankarani-nikravesh-1990"])
+    figure = draw_grids(numbers, 7.1)
+    lines = [one for one in figure.axes[0].collections if not isinstance(one, QuadMesh)]
+    (contours,) = lines
+    error = numbers.panels[0].values[0]
+    levels = [level for level in (-0.05, -0.01, 0.01, 0.05) if min(error) < level < max(error)]
+    assert levels == [0.01, 0.05]
+    for level, path in zip(levels, contours.get_paths(), strict=True):
+        at = np.interp(level, error[::-1], numbers.x_values[::-1])
+        assert path.vertices[:, 0] == pytest.approx(at)
+        # from one end of the panel to the other
+        assert sorted(path.vertices[[0, -1], 1]) == pytest.approx(edges_of(numbers.y_values, log=True)[[0, -1]])
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert texts == [f"e_error = ±{level:g}" for level in CONTOURS]
+    # only an error has them
+    assert not draw_grids(field_map(many, variable="e_out", models=MODELS), 7.1).legends
+
+
+def test_points_without_a_number_are_hatched_and_named(bent: xr.Dataset) -> None:
+    odd = bent.copy(deep=True)
+    odd["e_error"][1] = np.nan
+    numbers = field_map(odd)
+    figure = draw_grids(numbers, 7.1)
+    for axes, panel in zip(panels_of(figure, numbers), numbers.panels, strict=True):
+        (patch,) = [one for one in axes.patches if isinstance(one, PathPatch)]
+        assert patch.get_hatch()
+        np.testing.assert_array_equal(covered(patch, numbers), np.isnan(panel.values))
+    assert [text.get_text() for text in figure.legends[0].get_texts()].count(NO_VALUE) == 1
+    whole = draw_grids(field_map(bent, sel={"alpha": 0.02}, x="v1"), 7.1)
+    assert NO_VALUE not in [text.get_text() for text in whole.legends[0].get_texts()]
+    assert not whole.axes[0].patches
+
+
+def test_the_patches_of_the_closest_are_the_numbers(bent: xr.Dataset) -> None:
+    numbers = validity(bent)
+    figure = draw_grids(numbers, 7.1)
+    left, right = panels_of(figure, numbers)
+    patches = [one for one in left.patches if isinstance(one, PathPatch)]
+    looks = {(patch.get_facecolor(), patch.get_hatch()) for patch in patches}
+    assert len(looks) == len(patches) == len(numbers.shares)
+    for key, patch in zip(numbers.shares, patches, strict=True):
+        np.testing.assert_array_equal(covered(patch, numbers), np.array(numbers.closest, object) == key)
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    for text, (key, share) in zip(texts, numbers.shares.items(), strict=False):
+        assert text.startswith(f"{share:.1f} %")
+        assert (NO_VALUE in text) == (key is None)
+    (mesh,) = [one for one in right.collections if isinstance(one, QuadMesh)]
+    drawn = np.ma.filled(np.ma.asarray(mesh.get_array()), np.nan).reshape(np.shape(numbers.distance))
+    np.testing.assert_array_equal(drawn, np.maximum(numbers.distance, 1e-9))
+    (hatched,) = right.patches
+    np.testing.assert_array_equal(covered(hatched, numbers), np.isnan(numbers.distance))
+
+
+def test_values_are_sorted_and_what_has_no_place_is_named() -> None:
+    sweep = {"e": [0.9, 0.1, 0.5], "m2": [4.0, np.inf, 1.0], "m1": 1.0, "v1": [1.0], "K": 6e9}
+    numbers = field_map(impact.sweep({"models": "flores-2011", "sweep": sweep}))
+    assert (numbers.x_values, numbers.y_values) == ((0.1, 0.5, 0.9), (1.0, 4.0))
+    assert numbers.not_drawn == ("m2 = inf",)
+    # one value is no axis
+    assert "v1 = 1 m/s" in conditions_of(numbers)
+
+
+def test_more_models_than_panels_are_left_out_and_said(many: xr.Dataset) -> None:
+    numbers = field_map(many)
+    assert [panel.model for panel in numbers.panels] == MORE[:12]
+    assert numbers.left_out == ("zhang-2020",)
+    assert numbers.conditions.endswith("; the first 12 of 13 models")
+    assert len(draw_grids(numbers, 7.1).axes) == 13
+    # all of them compete
+    assert len(validity(many).panels) == 13
+    assert not validity(many).left_out
+
+
+@pytest.mark.parametrize(
+    ("choice", "words"),
+    [
+        ({"variable": "e_eror"}, 'no variable "e_eror" in this result; did you mean "e_error"?'),
+        ({"variable": "\x1b[31m"}, r'no variable "\x1b[31m" in this result; known: damping'),
+        ({"x": "v3"}, 'cannot draw over "v3"'),
+        ({"x": "e"}, "cannot draw over e, which varies over alpha, v1; select one with --sel"),
+        ({"x": "v1", "y": "v1"}, "map wants two axes; v1 and v1 vary together"),
+        ({"sel": {"v1": 6.0, "m2": 1.0}, "y": "e", "x": "alpha"}, "map wants two axes; alpha and e vary together"),
+        ({"sel": {"m3": 1.0}}, 'no axis "m3" in this result'),
+        ({"sel": {"v1": 0.5, "m2": 1.0}}, "map wants two axes; this result has e alone; sweep a second, or"),
+        ({"models": ["herz"]}, 'no model "herz" in this result'),
+    ],
+)  # fmt: skip
+def test_a_bad_wish_is_one_line(bent: xr.Dataset, choice: dict[str, object], words: str) -> None:
+    with pytest.raises(UsageError) as caught:
+        field_map(bent, **choice)  # type: ignore[arg-type]
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_bad_result_is_one_line(figure6: xr.Dataset, many: xr.Dataset) -> None:
+    def refused(dataset: xr.Dataset, kind: str = "map", **choice: str) -> str:
+        with pytest.raises(UsageError) as caught:
+            field_map(dataset, **choice) if kind == "map" else validity(dataset)
+        return str(caught.value)
+
+    alone = "wants two axes; this result has e alone; sweep a second, or use --kind restitution"
+    assert refused(figure6) == f"map {alone}"
+    assert refused(figure6, "validity") == f"validity {alone}"
+    assert refused(figure6.isel(e=0)).startswith("map wants two axes; this result has none")
+    assert refused(impact.run(at={"e": 0.5}).history).startswith("this is a time history")
+    one = many.isel(v1=[0])
+    assert refused(one, y="v1") == "map wants different values along each axis; v1 has 1 that can be drawn"
+    twice = many.assign_coords(v1=[1.0, 1.0, 2.0, 3.0, 4.0])
+    assert refused(twice, y="v1") == "map wants different values along each axis; v1 has a value twice"
+    assert (
+        refused(many.assign_coords(v1=np.arange(5.0)), y="v1", log="y")
+        == "--log y: v1 has values that are not above 0"
+    )
+    assert refused(many.drop_vars("e_error"), "validity").startswith('no variable "e_error" in this result')
+    empty = many.assign(e_error=many["e_error"] * np.nan, kind=("model", ["a"] * 13))
+    assert refused(empty, "validity") == "no picture of e_error over e and v1: it has no value there"
+    assert refused(empty, variable="kind") == "no picture of kind over e and v1: it is not a number at each point"
+
+
+def texts_of(figure: Figure) -> list[Text]:
+    """All text that is seen; a tick beyond the ends of its axis is not."""
+    found = [*figure.texts, *(text for legend in figure.legends for text in legend.get_texts())]
+    for axes in figure.axes:
+        found += [one for one in axes.get_children() if isinstance(one, Text)]
+        for axis in (axes.xaxis, axes.yaxis):
+            low, high = sorted(axis.get_view_interval())
+            for tick in (*axis.get_major_ticks(), *axis.get_minor_ticks()):
+                found += [tick.label1, tick.label2] if low <= tick.get_loc() <= high else []
+            found += [axis.label, axis.get_offset_text()]
+    return [text for text in found if text.get_visible() and text.get_text().strip()]
+
+
+@pytest.mark.parametrize("width", [7.1, 3.5])
+@pytest.mark.parametrize("count", [1, 2, 3, 7, 12])
+@pytest.mark.parametrize("kind", ["map", "validity", "force", "log", "swapped"])
+def test_nothing_covers_a_text(many: xr.Dataset, kind: str, count: int, width: float) -> None:
+    models = MORE[:count]
+    numbers = {
+        "map": lambda: field_map(many, models=models),
+        "validity": lambda: validity(many, models=models),
+        "force": lambda: field_map(many, variable="peak_force", models=models, x="v1", y="m2"),
+        "log": lambda: field_map(many, models=models, log="xy"),
+        "swapped": lambda: field_map(many, variable="residual", models=models, x="m2", y="e"),
+    }[kind]()
+    figure = draw_grids(numbers, width)
+    assert figure.get_size_inches()[0] == width
+    assert figure.get_size_inches()[1] < 3.0 * width
+    check_layout(figure)
+
+
+def check_layout(figure: Figure) -> None:
+    """No text over another, over a panel, or over the edge of the figure."""
+    FigureCanvasAgg(figure).draw()
+    boxes = [(text, text.get_window_extent()) for text in texts_of(figure)]
+    inside = figure.bbox.padded(1)
+    for text, box in boxes:
+        assert inside.x0 <= box.x0 < box.x1 <= inside.x1, text
+        assert inside.y0 <= box.y0 < box.y1 <= inside.y1, text
+        for axes in figure.axes:
+            assert not box.padded(-1).overlaps(axes.get_window_extent()), (text, axes)
+    for (one, first), (other, second) in combinations(boxes, 2):
+        assert not first.padded(-0.5).overlaps(second.padded(-0.5)), (one, other)
+    for legend in figure.legends:
+        assert not any(legend.get_window_extent().overlaps(axes.get_window_extent()) for axes in figure.axes)
+
+
+def test_text_from_a_file_is_text(bent: xr.Dataset, tmp_path: Path) -> None:
+    odd = bent.assign_attrs(title="$\\frac{1}{0}$ \x1b[31m \u202e " + "W" * 90)
+    odd["title"] = ("model", ["$\\frac{1}{0}$", "_" + "W" * 70, "[red] $x^{$"])
+    odd["v1"].attrs["long_name"] = "$\\frac{1}{0}$ " + "long " * 30
+    odd["e_error"].attrs["long_name"] = "_{$ " * 20
+    for numbers in (field_map(odd), validity(odd)):
+        assert "\x1b" not in numbers.title
+        for width in (7.1, 3.5):
+            figure = draw_grids(numbers, width)
+            check_layout(figure)
+            shown = ["".join(text.get_text().split()) for text in texts_of(figure)]
+            assert any("$\\frac{1}{0}$(2011)" in text for text in shown)
+            assert any("$\\frac{1}{0}$\\x1b[31m\\u202eWWW" in text for text in shown)
+            for text in figure.findobj(Text):
+                assert not text.get_parse_math() or "frac" not in text.get_text()
+    save_figure(draw_grids(validity(odd), 3.5), tmp_path / "odd.svg")
+
+
+@pytest.mark.parametrize("kind", ["png", "svg", "pdf"])
+def test_the_same_bytes_each_time(bent: xr.Dataset, tmp_path: Path, kind: str) -> None:
+    for make in (field_map, validity):
+        for name in ("one", "two"):
+            save_figure(draw_grids(make(bent), 3.5), tmp_path / f"{name}.{kind}")
+        content = (tmp_path / f"one.{kind}").read_bytes()
+        assert content == (tmp_path / f"two.{kind}").read_bytes()
+        assert content.startswith({"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}[kind])
+
+
+def test_ticks_are_named_by_their_values(many: xr.Dataset) -> None:
+    figure = draw_grids(field_map(many, models=MODELS), 7.1)
+    raised = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹−", "-0123456789-")
+    for axis in (figure.axes[0].xaxis, figure.axes[0].yaxis, figure.axes[-1].yaxis):
+        names = [text.get_text().translate(raised) for text in axis.get_ticklabels()]
+        assert [float(name) for name in names] == pytest.approx(list(axis.get_ticklocs()))
+        assert len(names) > 3
+    assert [text.get_text() for text in figure.axes[0].get_yticklabels()] == ["0.1", "0.3", "1", "3", "10"]
+    # the last row and the first column have names
+    axes = draw_grids(field_map(many, models=MORE[:7]), 7.1).axes[:7]
+    named = [tuple(any(text.get_text() for text in axis.get_ticklabels()) for axis in (one.xaxis, one.yaxis))
+             for one in axes]  # fmt: skip
+    assert named == [(False, True), *[(False, False)] * 2, (True, False), (True, True), *[(True, False)] * 2]
+
+
+def test_a_large_plane_is_an_image(many: xr.Dataset, tmp_path: Path) -> None:
+    fine = many.isel(model=[0], m2=0).interp(e=np.linspace(0.1, 1.0, 210), v1=np.linspace(0.1, 10.0, 100))
+    fine["e_error"][:, :20] = np.nan
+    for make in (field_map, validity):
+        save_figure(draw_grids(make(fine), 3.5), tmp_path / "large.svg")
+        assert (tmp_path / "large.svg").stat().st_size < 400_000
+        save_figure(draw_grids(make(fine), 3.5), tmp_path / "large.pdf")
+        assert (tmp_path / "large.pdf").stat().st_size < 400_000
