@@ -353,6 +353,7 @@ def test_a_picture_never_replaces_its_result(cli: Run, stored: Path, tmp_path: P
     assert result.read_bytes() == stored.read_bytes()
 
 
+@pytest.mark.slow
 def test_narrow_and_ascii_terminals(cli: Run, stored: Path) -> None:
     for environment in ({"COLUMNS": "20"}, {"PYTHONIOENCODING": "ascii"}, {"NO_COLOR": "1", "LC_ALL": "C"}):
         for words in (["models"], ["info", stored], ["run", "--at", "e=0.5"]):
@@ -360,6 +361,7 @@ def test_narrow_and_ascii_terminals(cli: Run, stored: Path) -> None:
             assert (done.returncode, done.stderr) == (0, ""), (words, environment)
 
 
+@pytest.mark.slow
 def test_closed_streams_are_no_error(stored: Path) -> None:
     for line in ("models >&-", "models --json >&-", f"info '{stored}' 2>&-", "models | head -n 1"):
         command = f"set -o pipefail; '{sys.executable}' -m impact {line}"

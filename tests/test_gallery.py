@@ -24,17 +24,20 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     import impact
 
     folder = tmp_path_factory.mktemp("gallery")
-    for name in gallery.RESULTS:
-        impact.save(impact.sweep(ROOT / "configs" / f"{name}.toml"), folder / f"{name}.h5")
+    for name, path in gallery.RESULTS.items():
+        impact.save(impact.sweep(ROOT / path), folder / f"{name}.h5")
     return folder
 
 
 def test_the_page_is_fresh_and_has_every_kind() -> None:
     assert (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8") == gallery.gallery_page(), "run `make docs`"
     assert [entry.kind for entry in gallery.ENTRIES] == list(KINDS)
-    assert {path.name for path in FOLDER.iterdir()} == {NUMBERS.name, *(f"{kind}.svg" for kind in KINDS)}
+    assert {path.name for path in FOLDER.iterdir()} == {
+        NUMBERS.name, "speeds.toml", *(f"{kind}.svg" for kind in KINDS)
+    }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("entry", gallery.ENTRIES, ids=lambda entry: entry.kind)
 def test_the_numbers_of_a_picture_are_fresh(entry: gallery.Entry, results: Path, cli: Run, tmp_path: Path) -> None:
     _, *words = entry.command

@@ -107,6 +107,7 @@ def test_hdf5_that_begins_later_is_refused(forked: Forked, small: Path, tmp_path
     check_refused(forked, tmp_path / "bad.h5", "not an HDF5 file")
 
 
+@pytest.mark.slow
 def test_what_is_cut_off_is_refused(forked: Forked, small: Path, tmp_path: Path) -> None:
     whole = small.read_bytes()
     for length in (1, 8, 9, 47, 48, 95, 96, 97, *range(200, len(whole), len(whole) // 12), len(whole) - 1):

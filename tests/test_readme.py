@@ -27,6 +27,7 @@ def test_the_readme_opens_with_the_picture_and_two_commands() -> None:
         assert re.search(rf"^{target}:.*##", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
 
 
+@pytest.mark.slow
 def test_the_toml_and_the_commands_of_daily_use(cli: Run, tmp_path: Path) -> None:
     (toml,) = blocks("toml")
     (tmp_path / "config.toml").write_text(toml, encoding="utf-8")

@@ -309,6 +309,7 @@ def test_the_command_refuses_in_one_line(cli: Run, tmp_path: Path) -> None:
         assert (done.returncode, done.stdout, done.stderr) == (2, "", line)
 
 
+@pytest.mark.slow
 def test_help_has_an_example_and_narrow_terminals_do(cli: Run, tmp_path: Path) -> None:
     assert "Example: impact recommend results.h5" in cli("recommend", "--help").stdout
     path = stored(tmp_path, swept(EXACT))
