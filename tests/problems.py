@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import mpmath as mp
 import numpy as np
+import pytest
 
 from impact.contact.lanes import Lanes, stiffness
 from impact.contact.material import effective_mass, hertz_stiffness, sphere_radius
@@ -102,6 +103,10 @@ SPRINGS = Problem(
 
 # the laws of the catalogue, each under one name
 LAWS = [key for key, model in catalogue().items() if not model.same_as]
+# to be tested one by one: those of codes, which are forms of the others, with the slow tests
+EACH_LAW = [
+    pytest.param(key, marks=pytest.mark.slow) if catalogue()[key].family == "codes" else key for key in LAWS
+]
 
 
 def impacts(n: float = 1.5, **changes: object) -> Lanes:

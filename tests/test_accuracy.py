@@ -46,7 +46,13 @@ def worst(values: np.ndarray) -> float:
     return float(np.max(np.abs(values)))
 
 
-@pytest.mark.parametrize(("key", "n"), CASES)
+@pytest.mark.parametrize(
+    ("key", "n"),
+    [
+        pytest.param(key, n, marks=pytest.mark.slow) if find(key).family == "codes" else (key, n)
+        for key, n in CASES
+    ],
+)
 def test_restitution_is_exact_to_1e_9_and_work_balances_energy(key, n):
     lanes, contact = over_e(key, n)
     assert np.all(contact.status == Status.OK)
