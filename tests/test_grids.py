@@ -17,8 +17,9 @@ from matplotlib.text import Text
 
 import impact
 from impact.errors import UsageError
-from impact.views.grids import CONTOURS, NO_VALUE, Grids, draw_grids, edges_of, field_map, validity
+from impact.views.grids import CONTOURS, NO_VALUE, draw_grids, edges_of
 from impact.views.look import save_figure
+from impact.views.planes import Grids, field_map, validity
 
 MODELS = ["flores-2011", "lankarani-nikravesh-1990", "gharib-hurmuzlu-2012"]
 MORE = [

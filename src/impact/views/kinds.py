@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING
 
 from ..errors import UsageError, did_you_mean
 from ..text import safe_text
-from .grids import Grids, draw_grids, field_map, validity
+from .grids import draw_grids
 from .lines import Lines, draw_lines
 from .motions import MOTIONS
 from .names import KINDS, WIDTHS
 from .over import error, final_velocities, restitution
+from .planes import Grids, field_map, validity
 
 if TYPE_CHECKING:
     import xarray as xr

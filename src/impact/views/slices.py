@@ -46,7 +46,7 @@ def take_slice(
         dataset = dataset.isel(model=places_of(models, dataset))
     axes = [str(dim) for dim in dataset.sizes if dim != "model"]
     dataset = select(dataset, sel or {})
-    x = _x_axis(dataset, x)
+    x = x_axis(dataset, x)
     (along,) = dataset[x].dims
     others = [dim for dim in dataset.sizes if dim not in ("model", along)]
     dataset = dataset.isel(dict.fromkeys(others, 0))
@@ -54,7 +54,7 @@ def take_slice(
     return Slice(dataset, x, fixed)
 
 
-def _x_axis(dataset: xr.Dataset, x: str | None) -> str:
+def x_axis(dataset: xr.Dataset, x: str | None) -> str:
     lines = [
         str(name) for name, coord in dataset.coords.items()
         if coord.ndim == 1 and coord.dims != ("model",) and coord.dtype.kind == "f"
