@@ -91,8 +91,9 @@ def own_settings(model: ForceModel) -> dict[str, float]:
     K = stiffness(np.array([n]), hertz_stiffness(E, nu, E, nu, radius, radius), m, speed)
     units = {"m": m, "length": (m * speed * speed / K) ** (1 / (n + 1)), "v0": speed}
     found = {} if model.exponent is None else {"K": float(K[0])}
+    exponents = {"n": n, **{one.name: one.default for one in model.parameters if one.default is not None}}
     for one in model.parameters:
-        size = np.prod([units[u] ** exponent for u, exponent in in_own_units(model, one.name, n).items()])
+        size = np.prod([units[u] ** exponent for u, exponent in in_own_units(model, one.name, exponents).items()])
         # a depth is that of the elastic peak
         own = (0.5 * (n + 1)) ** (1 / (n + 1)) if one.unit == "m" else DAMPING
         free = float(np.clip(max(one.least, 0.0) + own * size, one.least, one.most))

@@ -98,9 +98,9 @@ FAMILIES = {
     "permanent": "One power law on approach, a stiffer one on restitution, which ends at a permanent indentation. "
     "The force does not depend on the rate.",
     "elastic-plastic": "A yield on approach, and an elastic recovery on restitution: slower than the yield speed "
-    "the impact is elastic, e_out = 1, and beyond it the restitution falls with the speed (`johnson-1985`, fully "
-    "plastic from the start, delivers no more than √0.8). The force does not depend on the rate, so that e_out² "
-    "is the work that comes back over the work that went in.",
+    "the impact is elastic, e_out = 1, and beyond it the restitution falls with the speed (with `johnson-1985`, "
+    "fully plastic from there on, at once to no more than √0.8). The force does not depend on the rate, so that "
+    "e_out² is the work that comes back over the work that went in.",
     "codes": "Laws of multibody, robotics and granular codes that no paper has under a name of its own, in the "
     "parameters that those codes use. Where no K is given it is that of the Hertz contact, or by the code's own "
     "rule.",
@@ -131,8 +131,6 @@ LEFT_OUT = {
         "Adams POISSON (1990), a penalty with a restitution",
         "SmoothSphereHalfSpaceForce of OpenSim (2019), whose force is not zero where the contact begins, nor "
         "before",
-        "RecurDyn with a power of δ̇ or another power of δ in its damping: the unit of its coefficient depends on "
-        "them; `recurdyn` is its form with m₂ = 1 and m₃ = m₁",
         "the Edinburgh elasto-plastic adhesive law (2014)",
         "MDR of LAMMPS (2024)",
     ),

@@ -15,6 +15,7 @@ from impact.contact.models import find
 from impact.contact.oracles import delivered_restitution, force_restitution, limited_restitution
 from impact.contact.status import Status
 from impact.contact.values import delivered
+from impact.errors import ConfigError
 
 from .problems import impacts
 
@@ -267,6 +268,50 @@ def test_the_form_of_hunt_and_crossley(key, own, e):
     chi = chi_of(key, own, SPEEDS, K, e)
     assert contact.damping_ratio == pytest.approx(chi, rel=1e-12)
     assert contact.e_out == pytest.approx(delivered_restitution(chi), abs=1e-9)
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.1, 1.0, 10.0])
+@pytest.mark.parametrize("n", [1.0, 1.5, 2.2])
+def test_recurdyn_with_exponents_where_it_has_closed_forms(n, damping):
+    lanes = impacts(n, v1=SPEEDS)
+    for m2, e_out in ((1.0, delivered_restitution(damping)), (2.0, 1 / np.sqrt(1 + damping))):
+        own = {"c": damping * lanes.K / lanes.v0**m2, "damping_exponent": m2, "indentation_exponent": n}
+        contact = struck("recurdyn-exponents", n, v1=SPEEDS, parameters=own)
+        assert contact.e_out == pytest.approx(np.full(SPEEDS.size, e_out), abs=1e-9)
+        assert contact.oracle_error == pytest.approx(np.zeros(SPEEDS.size), abs=1e-9)
+
+
+@pytest.mark.parametrize("m2", [0.5, 1.0, 1.3, 3.0])
+@pytest.mark.parametrize("m3", [1.0, 1.5, 2.0])
+def test_recurdyn_with_exponents_by_a_second_integration(m2, m3):
+    # in the contact's own units, to the gap; the unit of c is made of the exponents
+    def gap(t, y):
+        return y[0] if t > 0.0 else 1.0
+
+    gap.terminal, gap.direction = True, -1
+
+    def motion(t, y):
+        x, v = max(y[0], 0.0), y[1]
+        return v, -(x**1.5) - 0.4 * np.sign(v) * abs(v) ** m2 * x**m3
+
+    found = solve_ivp(
+        motion, (0.0, 30.0), (0.0, 1.0), "DOP853", events=gap, rtol=1e-12, atol=1e-15, first_step=1e-6
+    )
+    lanes = impacts(v1=SPEEDS)
+    own = {
+        "c": 0.4 * lanes.m * lanes.v0 ** (2 - m2) / lanes.length ** (1 + m3),
+        "damping_exponent": m2,
+        "indentation_exponent": m3,
+    }
+    contact = struck("recurdyn-exponents", v1=SPEEDS, parameters=own)
+    assert contact.e_out == pytest.approx(np.full(SPEEDS.size, -found.y_events[0][-1][1]), abs=1e-9)
+
+
+def test_a_unit_that_depends_on_parameters_wants_a_bare_number():
+    sweep = {"v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 1e6}
+    own = {"recurdyn-exponents": {"c": "3 N s/m"}}
+    with pytest.raises(ConfigError, match=r"a bare number: .* depends on damping_exponent and indentation_"):
+        impact.sweep({"models": "recurdyn-exponents", "sweep": sweep, "model": own})
 
 
 def test_drake_rebounds_slower_than_one_over_its_dissipation():

@@ -129,13 +129,11 @@ def in_other_units(model: ForceModel, lanes: Lanes) -> Lanes:
     """The same impacts with grams, feet and minutes as units."""
     units = {one.name: one.unit for one in model.parameters} | QUANTITIES
     units |= {"v1": "m/s", "v2": "m/s", "m1": "kg", "m2": "kg"}
+    given = {"n": lanes.n, **lanes.parameters}
 
     def changed(name: str, value: Array) -> Array:
-        factors = np.ones(len(lanes))
-        for n in np.unique(lanes.n):
-            mass, length, time = dimension(units[name], float(n))
-            factors[lanes.n == n] = 1e3**mass * (1 / 0.3048) ** length * (1 / 60.0) ** time
-        return value * factors
+        mass, length, time = dimension(units[name], given)
+        return np.asarray(value * 1e3**mass * (1 / 0.3048) ** length * (1 / 60.0) ** time)
 
     plain = {f.name: changed(f.name, getattr(lanes, f.name)) for f in fields(lanes) if f.name != "parameters"}
     return Lanes(**plain, parameters={name: changed(name, value) for name, value in lanes.parameters.items()})

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .material import effective_mass
-from .model import QUANTITIES, ForceModel
+from .model import ForceModel
 from .oracles import peak_indentation
 from .power import Array, powers
 from .units import dimension
@@ -87,24 +87,27 @@ class Lanes:
     def own_units(self, model: ForceModel, name: str) -> Array:
         """A quantity or parameter in the contact's own units, in which K = m = v0 = 1."""
         value = self.quantity(name)
-        kinds, kind = np.unique(self.n, return_inverse=True)
-        exponents = np.array([list(in_own_units(model, name, n).values()) for n in kinds.tolist()])
-        for place, unit in enumerate((self.m, self.length, self.v0) if exponents.any() else ()):
-            if exponents[:, place].any():
-                value = value / powers(unit, exponents[kind.reshape(self.n.shape), place])
+        exponents = in_own_units(model, name, {"n": self.n, **self.parameters})
+        for unit, exponent in exponents.items():
+            if np.any(exponent):
+                value = value / powers(getattr(self, unit), np.asarray(exponent))
         # adding zero turns -0.0 into 0.0, which is the same physics
         return value + 0.0
 
 
-def in_own_units(model: ForceModel, name: str, n: float) -> dict[str, float]:
+def in_own_units(model: ForceModel, name: str, given: Mapping[str, Array | float]) -> dict[str, Array | float]:
     """The exponents of m, length and v0 by which a quantity or parameter is made dimensionless.
 
+    Parameters
+    ----------
+    model, name : the law, and which quantity or parameter
+    given : what the exponents of its unit are made of: n, and parameters of the law
+
     >>> from impact.contact.models import find
-    >>> in_own_units(find("hertz"), "E1", 1.5)
+    >>> in_own_units(find("hertz"), "E1", {"n": 1.5})
     {'m': 1.0, 'length': -3.0, 'v0': 2.0}
     """
-    declared = {parameter.name: parameter.unit for parameter in model.parameters}
-    mass, length, time = dimension(declared.get(name) or QUANTITIES[name], n)
+    mass, length, time = dimension(model.unit_of(name), given)
     return {"m": mass + 0.0, "length": length + time + 0.0, "v0": 0.0 - time}
 
 

@@ -34,8 +34,8 @@ COORDINATES = {"v": (), "log": ("chi",), "force": ("c", "q")}
 class Parameter:
     """A parameter of a model that the restitution does not set.
 
-    `unit` is an SI unit whose exponents may contain n ("N/m^n"); `least` and `most` are the closed interval
-    of its values; `default` is None where the user has to give it.
+    `unit` is an SI unit, whose exponents may contain n ("N/m^n") and dimensionless parameters; `least` and `most`
+    are the closed interval of its values; `default` is None where the user has to give it.
 
     >>> Parameter("c", "N s/m", "damping constant", default=100.0, least=0.0).unit
     'N s/m'
@@ -196,12 +196,13 @@ class ForceModel:
         for name, (right, wants) in allowed.items():
             if not right:
                 raise ModelError(f"model {self.key}: {name}: got {getattr(self, name)!r}, wants {wants}")
-        taken = {*QUANTITIES, *IN_FORCE, *IN_UNLOADING, *IN_MOTION_BACK}
+        taken = {*QUANTITIES, *IN_DOMAIN, *IN_FORCE, *IN_UNLOADING, *IN_MOTION_BACK}
         for name in (*(parameter.name for parameter in self.parameters), *self.coefficients):
             if name in taken:
                 raise ModelError(f'model {self.key}: "{name}" is the name of a quantity, wants another')
+        pure = [parameter.name for parameter in self.parameters if parameter.unit == "1"]
         for parameter in self.parameters:
-            dimension(parameter.unit, 1.5)
+            dimension(parameter.unit, {"n": 1.5, **dict.fromkeys(pure, 1.0)})
         bounded = {
             *QUANTITIES,
             *IN_DOMAIN,
@@ -231,6 +232,10 @@ class ForceModel:
         formulas = (self.force, self.unloading, self.residual, self.recovered, *self.bends, *self.unloading_bends,
                     *self.coefficients.values())  # fmt: skip
         return frozenset(w for formula in formulas for w in wishes(formula) if w in QUANTITIES or w in own)
+
+    def unit_of(self, name: str) -> str:
+        """The unit of a quantity or parameter."""
+        return next((one.unit for one in self.parameters if one.name == name), None) or QUANTITIES[name]
 
     @property
     def is_permanent(self) -> bool:

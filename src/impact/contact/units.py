@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import ast
 import re
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from ..errors import ModelError
+from .power import Array
 
 
 class Dimension(NamedTuple):
-    """Exponents of mass, length and time."""
+    """Exponents of mass, length and time; arrays where what they are made of is."""
 
-    mass: float
-    length: float
-    time: float
+    mass: Array | float
+    length: Array | float
+    time: Array | float
 
 
 SYMBOLS = {
@@ -28,43 +30,59 @@ SYMBOLS = {
     "Hz": Dimension(0, 0, -1),
 }
 
-FACTOR = re.compile(r"\s*([*/]?)\s*(1|[A-Za-z]+)(?:\^(-?[\d.]+|n|\([^()]*(?:\([^()]*\)[^()]*)*\)))?")
+FACTOR = re.compile(r"\s*([*/]?)\s*(1|[A-Za-z]+)(?:\^(-?[\d.]+|[A-Za-z]\w*|\([^()]*(?:\([^()]*\)[^()]*)*\)))?")
 
 
-def dimension(unit: str, n: float) -> Dimension:
-    """The dimension of an SI unit whose exponents may contain the compliance exponent n.
+def dimension(unit: str, given: Mapping[str, Array | float]) -> Dimension:
+    """The dimension of an SI unit.
 
-    >>> dimension("N/m^n", 1.5)
+    Parameters
+    ----------
+    unit : its exponents may contain names
+    given : their values: the compliance exponent n, and dimensionless parameters of a law
+
+    >>> dimension("N/m^n", {"n": 1.5})
     Dimension(mass=1.0, length=-0.5, time=-2.0)
-    >>> dimension("N s/m^(n+1)", 1.5)
-    Dimension(mass=1.0, length=-1.5, time=-1.0)
+    >>> dimension("N s^p/m^(n+p)", {"n": 1.5, "p": 2.0})
+    Dimension(mass=1.0, length=-2.5, time=0.0)
 
     Raises
     ------
-    ModelError : the unit is not a product of powers of kg, m, s, N, Pa, J, Hz, 1
+    ModelError : the unit is not a product of powers of kg, m, s, N, Pa, J, Hz, 1, or an exponent is not given
     """
-    total = [0.0, 0.0, 0.0]
+    total: list[Array | float] = [0.0, 0.0, 0.0]
     place = 0
     while place < len(unit):
         factor = FACTOR.match(unit, place)
         if factor is None or factor[2] not in SYMBOLS:
             raise ModelError(f'unit "{unit}": wants powers of {", ".join(SYMBOLS)}, such as "N/m^n"')
-        exponent = _value(factor[3] or "1", n, unit) * (-1 if factor[1] == "/" else 1)
+        exponent = _value(factor[3] or "1", given, unit) * (-1 if factor[1] == "/" else 1)
         for axis, one in enumerate(SYMBOLS[factor[2]]):
-            total[axis] += one * exponent
+            # a power of what it is not made of is none, whatever its exponent
+            total[axis] += one * exponent if one else 0.0
         place = factor.end()
     return Dimension(*total)
 
 
-def _value(text: str, n: float, unit: str) -> float:
+def names_in(unit: str) -> frozenset[str]:
+    """The names in the exponents of a unit.
+
+    >>> sorted(names_in("N s^p/m^(n+p)"))
+    ['n', 'p']
+    """
+    exponents = (factor[3] for factor in FACTOR.finditer(unit))
+    return frozenset(name for one in exponents for name in re.findall(r"[A-Za-z]\w*", one or ""))
+
+
+def _value(text: str, given: Mapping[str, Array | float], unit: str) -> Array | float:
     """The value of an exponent such as `2`, `n` or `(n+1)/2`."""
 
-    def walk(node: ast.expr) -> float:
+    def walk(node: ast.expr) -> Array | float:
         match node:
             case ast.Constant(value=int() | float() as number):
                 return float(number)
-            case ast.Name(id="n"):
-                return n
+            case ast.Name(id=name) if name in given:
+                return given[name]
             case ast.UnaryOp(op=ast.USub(), operand=inner):
                 return -walk(inner)
             case ast.BinOp(left=left, op=ast.Add(), right=right):
@@ -75,7 +93,8 @@ def _value(text: str, n: float, unit: str) -> float:
                 return walk(left) * walk(right)
             case ast.BinOp(left=left, op=ast.Div(), right=right):
                 return walk(left) / walk(right)
-        raise ModelError(f'unit "{unit}": the exponent "{text}" wants numbers, n and + - * /')
+        known = ", ".join(given)
+        raise ModelError(f'unit "{unit}": the exponent "{text}" wants numbers, {known} and + - * /')
 
     try:
         return walk(ast.parse(text, mode="eval").body)

@@ -11,16 +11,19 @@ from .formula import ask, wishes
 from .lanes import Lanes, in_own_units
 from .model import QUANTITIES, ForceModel
 from .power import Array
+from .units import names_in
 
 # numbers that are the same for all impacts, and arrays of shape (n,)
 Values = dict[str, Array | float]
 
 
 def asked(model: ForceModel) -> list[str]:
-    """The quantities and parameters that a law, or its closed form, asks for in its own units; but n."""
+    """The quantities and parameters that a law, its closed form or a unit asks for in its own units; but n."""
     own = {parameter.name for parameter in model.parameters}
     exact = {wish for wish in wishes(model.oracle) if wish in QUANTITIES or wish in own}
-    return sorted({*model.quantities, *exact} - {"K", "m", "v0", "n"})
+    names = {*model.quantities, *exact}
+    exponents = (names_in(model.unit_of(name)) for name in names)
+    return sorted(names.union(*exponents) - {"K", "m", "v0", "n"})
 
 
 def made_of(model: ForceModel, n: Iterable[float]) -> frozenset[str]:
@@ -36,7 +39,9 @@ def made_of(model: ForceModel, n: Iterable[float]) -> frozenset[str]:
     ['e', 'n']
     """
     names = asked(model)
-    used = (in_own_units(model, name, one).items() for name in names for one in n)
+    # an exponent that a parameter has a part in is not known here, and NaN is not zero
+    unknown = dict.fromkeys(names, np.nan)
+    used = (in_own_units(model, name, {**unknown, "n": one}).items() for name in names for one in n)
     return frozenset({"n", *names, *(unit for units in used for unit, exponent in units if exponent)})
 
 

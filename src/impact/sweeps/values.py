@@ -11,7 +11,7 @@ from fractions import Fraction
 from functools import cache, lru_cache
 from typing import Any
 
-from ..contact.units import dimension
+from ..contact.units import dimension, names_in
 from ..errors import did_you_mean
 from ..text import safe_text
 
@@ -91,10 +91,9 @@ class Quantity:
         return (self.least < value if self.above else self.least <= value) and value <= self.most
 
     @property
-    def varies(self) -> bool:
-        """Whether its unit depends on n."""
-        # no symbol of a unit has an n in it
-        return "n" in self.unit
+    def exponents(self) -> frozenset[str]:
+        """The names that its unit depends on."""
+        return names_in(self.unit)
 
 
 def show(value: object) -> str:
@@ -184,23 +183,26 @@ def read_switch(value: object) -> bool:
 
 def _with_unit(text: str, quantity: Quantity, n: float | None) -> float:
     unit = quantity.unit
-    example = "" if quantity.varies else f', such as "1 {unit}"'
-    of_n = f" with n = {n:g}" if quantity.varies and n is not None else ""
+    example = "" if quantity.exponents else f', such as "1 {unit}"'
+    of_n = f" with n = {n:g}" if quantity.exponents and n is not None else ""
     if len(text) > MAX_UNIT:
         raise refuse(text, f"at most {MAX_UNIT} characters")
     parts = NUMBER.fullmatch(text)
     if parts is None or not parts[2]:
         bare = quantity.wants if unit == "1" else f"{quantity.wants}, bare or with a unit{example}"
         raise refuse(text, bare)
-    if n is None and quantity.varies:
+    own = sorted(quantity.exponents - {"n"})
+    if own:
+        raise refuse(text, f"a bare number: its unit {unit} depends on {' and '.join(own)}")
+    if n is None and quantity.exponents:
         raise refuse(text, f"a bare number: its unit {unit} depends on n, which is an axis")
     scale = _scale(parts[2])
     if scale is None:
         wants = "a bare number" if unit == "1" else f"a unit of {unit}{of_n}{example}"
         raise refuse(text, f'{wants}; "{safe_text(parts[2])}" is not a known unit')
     factor, got = scale
-    if not (quantity.varies and n is not None and math.isnan(n)):
-        wanted = dimension(unit, 0.0 if n is None or math.isnan(n) else n)
+    if not (quantity.exponents and n is not None and math.isnan(n)):
+        wanted = map(float, dimension(unit, {"n": 0.0 if n is None or math.isnan(n) else n}))
         if got is None or any(abs(a - b) > 1e-9 for a, b in zip(got, wanted, strict=True)):
             raise refuse(text, "a bare number" if unit == "1" else f"a unit of {unit}{of_n}{example}")
     number = float(parts[1])

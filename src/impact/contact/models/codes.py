@@ -11,8 +11,8 @@ import numpy as np
 
 from ..formula import Formula
 from ..model import ForceModel, Parameter
-from ..oracles import force_restitution, limited_restitution
-from ..power import Array, power
+from ..oracles import delivered_restitution, force_restitution, limited_restitution
+from ..power import Array, power, powers
 from .hysteresis import hysteresis
 
 LINEAR_DAMPING = "F = K δⁿ (1 + χ δ̇/v₀)"
@@ -63,6 +63,32 @@ RECURDYN = of_code(
         parameters=(Parameter("c", "N s/m^(n+1)", "damping coefficient", least=0.0),),
         chi=lambda c, v0, K: c * v0 / K,
     )
+)
+
+RECURDYN_EXPONENTS = ForceModel(
+    key="recurdyn-exponents",
+    title="RecurDyn, free exponents",
+    year=2000,
+    equation="F = K δⁿ + c sgn(δ̇)|δ̇|^m₂ δ^m₃",
+    reference="FunctionBay RecurDyn, standard contact, whose stiffness exponent m₁ is n",
+    evidence="names of the parameters seen in the documentation, formula from memory; no DOI",
+    parameters=(
+        Parameter(
+            "c", "N s^damping_exponent/m^(damping_exponent+indentation_exponent)", "damping coefficient", least=0.0
+        ),
+        Parameter("damping_exponent", "1", "damping exponent m₂, of δ̇", 1.0, 0.25, 4.0),
+        Parameter("indentation_exponent", "1", "indentation exponent m₃, of δ", 1.0, 0.0, 10.0),
+    ),
+    force=lambda elastic, x, v, c, damping_exponent, indentation_exponent: (
+        elastic + c * np.sign(v) * powers(np.abs(v), damping_exponent) * powers(x, indentation_exponent)
+    ),
+    # where m₃ = n: m₂ = 1 is `recurdyn`, and m₂ = 2 gives ln(1 + χ) = −ln(1 − χ e²), χ = c v₀²/K
+    oracle=lambda c, damping_exponent, indentation_exponent, n, v0, K: np.select(
+        [(indentation_exponent == n) & (damping_exponent == m2) for m2 in (1.0, 2.0)],
+        [delivered_restitution(c * v0 / K), np.sqrt(1 / (1 + c * v0 * v0 / K))],
+        np.nan,
+    ),
+    family="codes",
 )
 
 SIMBODY_HUNT_CROSSLEY = of_code(

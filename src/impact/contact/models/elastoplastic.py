@@ -21,6 +21,12 @@ CONTACT: dict[str, Formula] = {
 }
 
 
+def yield_indentation(E: Array, R: Array, pressure: Array) -> Array:
+    """Where the largest pressure of a Hertz contact, (2E*/π) √(δ/R*), comes to one that the material yields at."""
+    root = np.pi * pressure / (2 * E)
+    return root * root * R
+
+
 def recovery(stretch: Array, full: Array, force: Array) -> Array:
     """Hertzian recovery: F = force at full stretch, and goes as its power 3/2."""
     return force * power(stretch / full, 1.5)
@@ -100,7 +106,7 @@ THORNTON_1997 = ForceModel(
     coefficients={
         **CONTACT,
         "py": lambda Y, c: c * Y,
-        "dy": lambda E, R, py: np.pi * py / (2 * E) * (np.pi * py / (2 * E)) * R,
+        "dy": lambda E, R, py: yield_indentation(E, R, py),
         "Fy": lambda K, dy: K * power(dy, 1.5),
     },
     bends=(lambda dy: dy,),
@@ -126,20 +132,32 @@ JOHNSON_1985 = ForceModel(
     key="johnson-1985",
     title="Johnson, fully plastic",
     year=1985,
-    equation="F = 2π R* p_d δ;  back F = Fₘ((δ − δₚ)/(δₘ − δₚ))^(3/2),  δₘ − δₚ = 3Fₘ/(4 a E*),  a² = 2R*δₘ",
+    equation="F = 2π R* p_d δ;  back F = Fₘ((δ − δₚ)/(δₘ − δₚ))^(3/2),  δₘ − δₚ = 3Fₘ/(4 a E*),  a² = 2R*δₘ;  "
+    "F = K δ^(3/2) where v₀ ≤ V_y,  (1/2) m V_y² = (2/5) K δ_y^(5/2),  δ_y = (1.6π Y/(2E*))² R*",
     reference="Johnson KL (1985) Contact mechanics, chapter 11. Cambridge University Press",
-    evidence="formula from memory; p_d over the yield strength is a usual value; no DOI known",
+    evidence="formulas from memory; V_y is that of a largest pressure 1.6 Y, (1/2) m V_y² ≈ 53 R*³ Y⁵/E*⁴; "
+    "p_d over the yield strength is a usual value; no DOI known",
     parameters=(Parameter("c", "1", "dynamic yield pressure over the yield strength", 3.0, 0.1, 30.0),),
-    coefficients={**CONTACT, "pd": lambda Y, c: c * Y},
-    force=lambda x, R, pd: 2 * np.pi * R * pd * x,
+    coefficients={
+        **CONTACT,
+        "pd": lambda Y, c: c * Y,
+        "yields": lambda K, m, v0, E, R, Y: np.where(
+            m * v0 * v0 > 0.8 * K * power(yield_indentation(E, R, 1.6 * Y), 2.5), 1.0, 0.0
+        ),
+    },
+    force=lambda elastic, x, R, pd, yields: np.where(yields > 0, 2 * np.pi * R * pd * x, elastic),
     unloading=lambda x, peak, residual, force_at_peak: recovery(x - residual, peak - residual, force_at_peak),
     # too slow an impact is not fully plastic: it would recover more than it went in
-    residual=lambda peak, force_at_peak, R, E: (
-        peak - np.minimum(0.75 * force_at_peak / (np.sqrt(2 * R * peak) * E), peak)
+    residual=lambda peak, force_at_peak, R, E, yields: (
+        yields * (peak - np.minimum(0.75 * force_at_peak / (np.sqrt(2 * R * peak) * E), peak))
     ),
     # e² = (4/5)(δₘ − δₚ)/δₘ, with m v₀² = 2π R* p_d δₘ²
-    oracle=lambda m, v0, R, E, pd: np.sqrt(
-        0.8 * np.minimum(1.5 * np.pi * pd / E * np.sqrt(0.5 * R / (v0 * np.sqrt(m / (2 * np.pi * R * pd)))), 1.0)
+    oracle=lambda m, v0, R, E, pd, yields: np.where(
+        yields > 0,
+        np.sqrt(
+            0.8 * np.minimum(1.5 * np.pi * pd / E * np.sqrt(R / (2 * v0 * np.sqrt(m / (2 * np.pi * R * pd)))), 1)
+        ),
+        1.0,
     ),
     smooth=2,
     exponent=1.5,
