@@ -137,10 +137,12 @@ def impacts(n: float = 1.5, **changes: object) -> Lanes:
 
 def with_parameters(model: ForceModel, lanes: Lanes, value: object) -> Lanes:
     """The impacts with the law's own parameters, each above its least by a value in the contact's own units."""
-    unit = replace(lanes, parameters={one.name: np.ones(len(lanes)) for one in model.parameters})
-    least = {one.name: max(one.least, 0.0) if one.unit == "1" else 0.0 for one in model.parameters}
-    own = {name: low + value / unit.own_units(model, name) for name, low in least.items()}
-    return replace(lanes, parameters=own)
+    ones = np.ones(len(lanes))
+    pure = {one.name: max(one.least, 0.0) + value * ones for one in model.parameters if one.unit == "1"}
+    # the units of the others may be made of them
+    unit = replace(lanes, parameters={**{one.name: ones for one in model.parameters}, **pure})
+    own = {one.name: value / unit.own_units(model, one.name) for one in model.parameters if one.unit != "1"}
+    return replace(lanes, parameters={**pure, **own})
 
 
 def quadratures(chi: float, n: float) -> tuple[float, float, float]:

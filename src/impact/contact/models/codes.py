@@ -11,7 +11,7 @@ import numpy as np
 
 from ..formula import Formula
 from ..model import ForceModel, Parameter
-from ..oracles import delivered_restitution, force_restitution, limited_restitution
+from ..oracles import force_restitution, limited_restitution
 from ..power import Array, power, powers
 from .hysteresis import hysteresis
 
@@ -76,17 +76,11 @@ RECURDYN_EXPONENTS = ForceModel(
         Parameter(
             "c", "N s^damping_exponent/m^(damping_exponent+indentation_exponent)", "damping coefficient", least=0.0
         ),
-        Parameter("damping_exponent", "1", "damping exponent m₂, of δ̇", 1.0, 0.25, 4.0),
+        Parameter("damping_exponent", "1", "damping exponent m₂, of δ̇", 1.0, 1.0, 4.0),
         Parameter("indentation_exponent", "1", "indentation exponent m₃, of δ", 1.0, 0.0, 10.0),
     ),
     force=lambda elastic, x, v, c, damping_exponent, indentation_exponent: (
         elastic + c * np.sign(v) * powers(np.abs(v), damping_exponent) * powers(x, indentation_exponent)
-    ),
-    # where m₃ = n: m₂ = 1 is `recurdyn`, and m₂ = 2 gives ln(1 + χ) = −ln(1 − χ e²), χ = c v₀²/K
-    oracle=lambda c, damping_exponent, indentation_exponent, n, v0, K: np.select(
-        [(indentation_exponent == n) & (damping_exponent == m2) for m2 in (1.0, 2.0)],
-        [delivered_restitution(c * v0 / K), np.sqrt(1 / (1 + c * v0 * v0 / K))],
-        np.nan,
     ),
     family="codes",
 )
