@@ -187,7 +187,9 @@ class Contact:
         return np.where(self._struck, self.rebound.steps, np.int32(0))
 
 
-def collide(model: ForceModel, lanes: Lanes, *, rtol: float, max_steps: int, collapse: bool = True) -> Contact:
+def collide(
+    model: ForceModel, lanes: Lanes, *, rtol: float, max_steps: int, collapse: bool = True, core: str = "numpy"
+) -> Contact:
     """Let every pair of balls collide by the law of a model.
 
     Parameters
@@ -197,6 +199,7 @@ def collide(model: ForceModel, lanes: Lanes, *, rtol: float, max_steps: int, col
     rtol : local error of a step of the integrator, relative
     max_steps : attempted steps per phase after which an impact is given up
     collapse : integrate impacts that are the same in the contact's own units once; changes no bit
+    core : "numpy", or "numba" for what that compiles; they agree within the tolerance
 
     Returns
     -------
@@ -204,7 +207,9 @@ def collide(model: ForceModel, lanes: Lanes, *, rtol: float, max_steps: int, col
     """
     with np.errstate(all="ignore"):
         given, status = own_values(model, lanes), first_look(model, lanes)
-    rebound = integrate_all(model, lanes.n, given, status, rtol=rtol, max_steps=max_steps, collapse=collapse)
+    rebound = integrate_all(
+        model, lanes.n, given, status, rtol=rtol, max_steps=max_steps, collapse=collapse, core=core
+    )
     return Contact(model, lanes, rebound)
 
 

@@ -65,9 +65,22 @@ class Log(Momentum):
         return np.asarray(np.expm1(y[1]) / strength)
 
     def rates(self, out: Array, y: Array, weight: Array, elastic: Array, strength: Array) -> None:
-        np.multiply(weight, elastic, out[1])
-        np.multiply(out[1], strength, out[1])
-        np.negative(out[1], out[1])
+        out[1] = rate_of_log(weight, elastic, strength)
+
+
+def rate_of_log(weight: Array, elastic: Array, chi: Array) -> Array:
+    """du/dσ; for arrays and for numbers."""
+    return -weight * elastic * chi
+
+
+def velocity_of_force(w: Array, power_of_s: Array, c: Array) -> Array:
+    """v = w − s^(p(n−q))/c; for arrays and for numbers."""
+    return w - power_of_s / c
+
+
+def rate_of_force(v: Array, power_of_s: Array, factor: Array, weight: Array, force: Array) -> Array:
+    """dw/dσ, where the factor is p(n − q)/c and the power that of s^(p(n−q)−1); for arrays and for numbers."""
+    return factor * power_of_s * v - weight * force
 
 
 @dataclass(frozen=True)
@@ -82,7 +95,7 @@ class Force(Momentum):
         return np.asarray(v + signed_power(s, self.spring) / strength)
 
     def velocity(self, y: Array, strength: Array) -> Array:
-        return np.asarray(y[1] - signed_power(y[0], self.spring) / strength)
+        return velocity_of_force(y[1], signed_power(y[0], self.spring), strength)
 
     def stop(self, y: Array, k: Array) -> tuple[Array, Array]:
         return k[0], -k[2] * k[4]
@@ -90,7 +103,9 @@ class Force(Momentum):
     def rates(self, out: Array, y: Array, weight: Array, elastic: Array, strength: Array) -> None:
         # the force that did the work is the same, but for digits that it loses before its zero
         force = strength * signed_power(y[0], self.drag) * y[1]
-        out[1] = self.spring / strength * signed_power(y[0], self.spring - 1.0) * out[0] - weight * force
+        out[1] = rate_of_force(
+            out[0], signed_power(y[0], self.spring - 1.0), self.spring / strength, weight, force
+        )
         out[4:] = force
 
 

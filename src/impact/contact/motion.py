@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import ModelError
+from ..ode.event import choose
 from ..ode.problem import Array, Columns, Mask, Problem, Rates
 from .formula import Formula, ask, wishes
 from .model import IN_FORCE, ForceModel
@@ -102,11 +103,7 @@ def restitution(law: Law) -> Problem:
         s, force = y[0], k[4]
         small = DIFFERENCE * np.minimum(np.abs(s), 1.0)
         slope = (rates(y + small * k[:2], columns)[4] - force) / small
-        # without damping the force vanishes with the indentation, as a power of s, and only touches zero: s then
-        # tells the end. A force that vanishes before does so in a small part of the time that s still needs
-        sooner = POWER * force * np.abs(k[0]) < s * np.abs(slope)
-        by_force = np.where(s > 0.0, sooner, force < s)
-        return np.where(by_force, force, s), np.where(by_force, slope, k[0])
+        return release(s, k[0], force, slope)
 
     def gap_event(y: Array, k: Array, columns: Columns) -> tuple[Array, Array]:
         return y[0], k[0]
@@ -120,6 +117,15 @@ def restitution(law: Law) -> Problem:
 
     event = force_event if law.model.release == "force" else gap_event
     return Problem(rates=rates, event=event, lost=creeping if may_creep(law) else turned_back, floor=FLOOR)
+
+
+def release(s: Array, rate: Array, force: Array, slope: Array) -> tuple[Array, Array]:
+    """The sooner of s and the force to fall to zero, and its rate; for arrays and for numbers."""
+    # without damping the force vanishes with the indentation, as a power of s, and only touches zero: s then
+    # tells the end. A force that vanishes before does so in a small part of the time that s still needs
+    sooner = POWER * force * np.abs(rate) < s * np.abs(slope)
+    by_force = (sooner & (s > 0.0)) | ((force < s) & (s <= 0.0))
+    return choose(by_force, force, s), choose(by_force, slope, rate)
 
 
 def may_creep(law: Law) -> bool:
@@ -137,11 +143,18 @@ def creeps(x: Array, speed: Array, c: Array, n: float, q: float) -> Mask:
     bound, rest = c / (2.0 * (q + 1.0)), c * c / (4.0 * (q + 1.0))
     order = n - 2.0 * q - 1.0
     slow = speed <= bound * power(x, q + 1.0)
-    if order >= 0.0:
+    if order == 0.0:
+        return np.asarray(speed <= creeping_speed(c, n, q) * power(x, q + 1.0))
+    if order > 0.0:
         return np.asarray(slow & (power(x, order) <= CRITICAL * rest))
     far = power(rest, 1.0 / order)
     left = np.square(bound * power(far, q + 1.0)) + 2.0 / (n + 1.0) * power(far, n + 1.0)
     return np.asarray(slow & (x >= far) & (left <= NOTHING * NOTHING))
+
+
+def creeping_speed(c: Array, n: float, q: float) -> Array:
+    """What a speed of balls that part with none is below, over x^(q+1), where n = 2q + 1; -inf where none is."""
+    return np.where(CRITICAL * c * c >= 4.0 * (q + 1.0), c / (2.0 * (q + 1.0)), -np.inf)
 
 
 def bends(law: Law, columns: Columns, start: Array, residual: Array | None = None) -> tuple[Columns, list[Bend]]:

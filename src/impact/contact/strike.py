@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..ode.problem import Columns, End, Outcome
 from ..ode.rk45 import integrate
 from ..ode.step import Space
-from . import motion
+from . import compiled, motion
 from .phases import in_parts
 from .power import Array
 from .status import Status
@@ -92,6 +92,7 @@ def strike(
     max_steps: int,
     record: bool = False,
     sticks: NDArray[np.bool_] | bool = False,
+    core: str = "numpy",
 ) -> Struck:
     """Integrate n impacts through approach and restitution.
 
@@ -101,11 +102,18 @@ def strike(
     columns : its values per impact, each of shape (n,)
     rtol, max_steps, record : see `impact.ode.rk45.integrate`
     sticks : which are known to stay together, where they do not part
+    core : "numba" integrates the phases that have a form for it compiled, unless they are recorded
     """
     run = partial(integrate, rtol=rtol, max_steps=max_steps, record=record, space=Space.of(n))
+    run_form = partial(compiled.integrate, rtol=rtol, max_steps=max_steps)
+    is_compiled = core == "numba" and not record
     start = motion.start_of_approach(law, columns, n)
-    among, bends = motion.bends(law, columns, start)
-    inward = in_parts(run, motion.approach(law), bends, start, among)
+    form = compiled.of_approach(law) if is_compiled else None
+    if form is not None:
+        inward = run_form(form, law, motion.approach(law), start, columns)
+    else:
+        among, bends = motion.bends(law, columns, start)
+        inward = in_parts(run, motion.approach(law), bends, start, among)
     peak = motion.indentation(law, inward.state[0])
     at_peak = motion.force_at_peak(law, inward.state[0], columns)
     residual, recovered, columns = motion.turn(law, columns, peak, at_peak)
@@ -126,8 +134,12 @@ def strike(
         return Struck(rebound, inward, None, columns, parts)
     back = motion.of_restitution(law)
     start = motion.start_of_restitution(back, columns, recovered[parts])
-    among, bends = motion.bends(back, columns, start, residual[parts])
-    outward = in_parts(run, motion.restitution(back), bends, start, among)
+    form = compiled.of_restitution(back) if is_compiled else None
+    if form is not None:
+        outward = run_form(form, back, motion.restitution(back), start, columns)
+    else:
+        among, bends = motion.bends(back, columns, start, residual[parts])
+        outward = in_parts(run, motion.restitution(back), bends, start, among)
     # held, or parting with no speed in an infinite time: all the energy of such balls is lost
     held = (outward.end == End.LOST) & (motion.may_creep(back) | np.broadcast_to(sticks, n)[parts])
     rebound.e_out[parts] = np.where(held, 0.0, -back.velocity(outward.state, columns))

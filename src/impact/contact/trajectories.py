@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping
+from collections.abc import Callable, Container, Mapping
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from .model import ForceModel
 from .momentum import is_strong
 from .power import Array
 from .status import Status
-from .strike import Rebound, strike
+from .strike import Rebound, Struck, strike
 from .values import Values, chi_of, exact_restitution, with_coefficients, with_units
 
 Given = Mapping[str, Array]
@@ -31,6 +32,7 @@ def integrate_all(
     rtol: float,
     max_steps: int,
     collapse: bool = True,
+    core: str = "numpy",
 ) -> Rebound:
     """Integrate impacts by the law of a model.
 
@@ -40,7 +42,7 @@ def integrate_all(
     n : their compliance exponents, shape (k,)
     given : what the law asks for, by name, in the contact's own units, each of shape (k,)
     status : what is known of them before; those that are not OK are left alone
-    rtol, max_steps, collapse : see `impact.contact.collide.collide`
+    rtol, max_steps, collapse, core : see `impact.contact.collide.collide`
 
     Returns
     -------
@@ -52,9 +54,8 @@ def integrate_all(
         for one in np.unique(n):
             where = np.flatnonzero((status == Status.OK) & (n == one))
             if where.size:
-                rebound.put(
-                    where, _halving(model, float(one), _at(given, where), where.size, rtol, max_steps, collapse)
-                )
+                strike_at = partial(strike, rtol=rtol, max_steps=max_steps, core=core)
+                rebound.put(where, _halving(model, float(one), _at(given, where), where.size, strike_at, collapse))
     return rebound
 
 
@@ -67,8 +68,7 @@ def _halving(
     n: float,
     given: Given,
     count: int,
-    rtol: float,
-    max_steps: int,
+    strike_at: Callable[..., Struck],
     collapse: bool,
     halved: bool = False,
 ) -> Rebound:
@@ -80,21 +80,21 @@ def _halving(
     try:
         if halved and count == 1:
             double = _at(given, np.array([0, 0]))
-            return _struck(model, n, double, 2, rtol, max_steps, collapse=False).take(np.array([0]))
-        return _struck(model, n, given, count, rtol, max_steps, collapse)
+            return _struck(model, n, double, 2, strike_at, collapse=False).take(np.array([0]))
+        return _struck(model, n, given, count, strike_at, collapse)
     except ModelError:
         rebound = Rebound.blank(count)
         if count == 1:
             rebound.status[:] = Status.MODEL_ERROR
             return rebound
         for half in np.array_split(np.arange(count), 2):
-            part = _halving(model, n, _at(given, half), half.size, rtol, max_steps, collapse, halved=True)
+            part = _halving(model, n, _at(given, half), half.size, strike_at, collapse, halved=True)
             rebound.put(half, part)
         return rebound
 
 
 def _struck(
-    model: ForceModel, n: float, given: Given, count: int, rtol: float, max_steps: int, collapse: bool
+    model: ForceModel, n: float, given: Given, count: int, strike_at: Callable[..., Struck], collapse: bool
 ) -> Rebound:
     values = with_coefficients(model, with_units(given, n), count)
     rebound = Rebound.blank(count)
@@ -120,7 +120,7 @@ def _struck(
         columns = tuple(np.asarray(values[name])[where] for name in law.names)
         first, back = _distinct(columns, where.size) if collapse else (np.arange(where.size),) * 2
         sticks = exact[where][first] == 0.0
-        struck = strike(law, tuple(c[first] for c in columns), first.size, rtol, max_steps, sticks=sticks)
+        struck = strike_at(law, tuple(c[first] for c in columns), first.size, sticks=sticks)
         rebound.put(where, struck.rebound.take(back))
     return replace(rebound, chi=chi, exact=exact)
 

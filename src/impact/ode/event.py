@@ -29,7 +29,8 @@ def land(problem: Problem, lanes: Lanes, trial: Trial, accepted: Mask) -> tuple[
     if not at.size:
         return at, ahead[at]
     g, dg, h = g[at], dg[at], lanes.h[at]
-    beyond, sure = _beyond(problem, lanes, at, g, dg, h)
+    before = problem.event(lanes.y[:COMPONENTS], lanes.k, lanes.columns)
+    beyond, sure = beyond_end(g, dg, before[0][at], before[1][at], h)
     reach = np.where(sure, np.where(beyond <= CLOSE * h, beyond, SHORT * beyond), np.inf)
     trial.following[at] = np.fmin(trial.following[at], reach)
 
@@ -47,15 +48,19 @@ def land(problem: Problem, lanes: Lanes, trial: Trial, accepted: Mask) -> tuple[
     return home, beyond / h[landed]
 
 
-def _beyond(
-    problem: Problem, lanes: Lanes, at: NDArray[np.intp], g: Array, dg: Array, h: Array
-) -> tuple[Array, Mask]:
-    """How far beyond the end of the step the event is, and whether it is sure to come."""
-    before = problem.event(lanes.y[:COMPONENTS], lanes.k, lanes.columns)
-    g_before, dg_before = before[0][at], before[1][at]
+def beyond_end(g: Array, dg: Array, g_before: Array, dg_before: Array, h: Array) -> tuple[Array, Mask]:
+    """How far beyond the end of a step of length h the event is, and whether it is sure to come.
+
+    Of plain arithmetic, for arrays and for numbers.
+    """
     # beyond the end the event function is taken for the parabola of the cubic through both ends
-    curve = (2.0 * (dg_before + 2.0 * dg) - 6.0 * (g - g_before) / h) / h
+    curve = (2.0 * (dg_before + 2.0 * dg) * h - 6.0 * (g - g_before)) / (h * h)
     root = np.sqrt(dg * dg - 2.0 * curve * g)
     # one that fades away instead comes to no zero by its mean bend; it may be too stiff for the cubic
-    sure = dg * dg >= 2.0 * g * (dg - dg_before) / h
-    return np.asarray(np.where(dg < 0.0, 2.0 * g / (root - dg), np.inf)), sure
+    sure = dg * dg * h >= 2.0 * g * (dg - dg_before)
+    return choose(dg < 0.0, 2.0 * g / (root - dg), np.inf), sure
+
+
+def choose(condition: Mask, this: Array | float, other: Array | float) -> Array:
+    """One of two values; a compiled core has its own way for numbers."""
+    return np.where(condition, this, other)

@@ -7,6 +7,7 @@ from typing import Unpack
 
 import numpy as np
 
+from ..forms import damped, spring, stiffer
 from ..formula import Formula
 from ..model import About, ForceModel
 from ..oracles import approach_damped_restitution, approach_damping, approach_restitution
@@ -23,7 +24,7 @@ def approach_dashpot(key: str, *, zeta: Formula, **about: Unpack[About]) -> Forc
     """
     return replace(
         dashpot(key, zeta=zeta, release="gap", **about),
-        unloading=lambda elastic: elastic,
+        unloading=spring,
         oracle=lambda zeta: approach_restitution(zeta),
         family="asymmetric",
     )
@@ -80,8 +81,8 @@ PANT_WIJEYEWICKREMA_2012 = ForceModel(
     evidence="formula and DOI from memory, the DOI with little confidence",
     domain={"e": (0.0, 1.0)},
     coefficients={"chi": lambda e: np.divide(1.5 * (1 - e * e), e * e)},
-    force=lambda elastic, v, v0, chi: elastic * (1 + chi * v / v0),
-    unloading=lambda elastic: elastic,
+    force=damped,
+    unloading=spring,
     oracle=lambda chi: approach_damped_restitution(chi),
     momentum="log",
     exponent=1.0,
@@ -97,8 +98,9 @@ KELVIN_VOIGT_HYSTERETIC = ForceModel(
     "dynamics: evolution of the Hertz contact theory. Mech. Mach. Theory 53, 99",
     doi="10.1016/j.mechmachtheory.2012.02.010",
     evidence="formula as a public code has it, the paper may have e²; DOI from memory",
-    force=lambda elastic: elastic,
-    unloading=lambda elastic, e: e * elastic,
+    force=spring,
+    coefficients={"Kr": lambda K, e: e * K},
+    unloading=stiffer,
     oracle=lambda e: np.sqrt(e),
     exponent=1.0,
     family="asymmetric",

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..forms import returning
 from ..model import ForceModel, Parameter
 from ..oracles import muthukumar_restitution
 from ..power import Array, power
-from .elastoplastic import CONTACT, recovery
+from .elastoplastic import CONTACT
 
 
 def softer(nu1: Array, nu2: Array, Y1: Array, Y2: Array) -> Array:
@@ -40,7 +41,7 @@ JACKSON_GREEN_2010 = ForceModel(
     force=lambda elastic, x, R, C, dc, Fc, B: np.where(
         x < 1.9 * dc, elastic, Fc * jackson_green(np.maximum(x / dc, 1.9), x / R, C, B)
     ),
-    unloading=lambda x, peak, residual, force_at_peak: recovery(x - residual, peak - residual, force_at_peak),
+    unloading=returning,
     residual=lambda peak, dc: np.where(
         peak > 1.9 * dc, 1.02 * peak * (1 - np.power((np.maximum(peak / dc, 1.9) + 5.9) / 6.9, -0.54)), 0
     ),

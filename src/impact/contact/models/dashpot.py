@@ -10,6 +10,7 @@ from typing import Literal, Unpack
 
 import numpy as np
 
+from ..forms import dragged
 from ..formula import Formula
 from ..model import About, ForceModel, Parameter
 from ..oracles import force_damping, force_restitution, gap_damping, gap_restitution
@@ -41,7 +42,7 @@ def dashpot(key: str, *, zeta: Formula, release: Literal["gap", "force"], **abou
             "c": lambda zeta, n, m, K: zeta * np.sqrt(2 * (n + 1) * m * K),
             "q": lambda n: (n - 1) / 2,
         },
-        force=lambda elastic, x, v, n, c: elastic + c * power(x, (n - 1) / 2) * v,
+        force=lambda elastic, x, v, n, c: dragged(elastic, power(x, (n - 1) / 2), v, c),
         release=release,
         momentum="force",
         oracle=by_gap if release == "gap" else by_force,

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..forms import returning, spring
 from ..formula import Formula
 from ..model import ForceModel, Parameter
 from ..oracles import luding_restitution, thornton_restitution
@@ -27,11 +28,6 @@ def yield_indentation(E: Array, R: Array, pressure: Array) -> Array:
     return root * root * R
 
 
-def recovery(stretch: Array, full: Array, force: Array) -> Array:
-    """Hertzian recovery: F = force at full stretch, and goes as its power 3/2."""
-    return force * power(stretch / full, 1.5)
-
-
 WALTON_BRAUN_VARIABLE = ForceModel(
     key="walton-braun-variable",
     title="Walton and Braun, variable unloading",
@@ -42,8 +38,8 @@ WALTON_BRAUN_VARIABLE = ForceModel(
     doi="10.1122/1.549893",
     evidence="formula and DOI from memory",
     parameters=(Parameter("S", "1/m", "growth of the unloading stiffness with the force", least=0.0),),
-    force=lambda elastic: elastic,
-    unloading=lambda x, residual, force_at_peak, K, S: (K + S * force_at_peak) * (x - residual),
+    force=spring,
+    unloading=returning,
     residual=lambda peak, force_at_peak, K, S: peak * (S * force_at_peak / (K + S * force_at_peak)),
     # with ω₀ = √(K/m): e² = K/K₂, and Fₘ = K v₀/ω₀
     oracle=lambda K, m, v0, S: np.sqrt(1 / (1 + S * v0 / np.sqrt(K / m))),
@@ -111,7 +107,7 @@ THORNTON_1997 = ForceModel(
     },
     bends=(lambda dy: dy,),
     force=lambda elastic, x, R, py, dy, Fy: np.where(x < dy, elastic, Fy + np.pi * py * R * (x - dy)),
-    unloading=lambda x, peak, residual, force_at_peak: recovery(x - residual, peak - residual, force_at_peak),
+    unloading=returning,
     residual=lambda peak, force_at_peak, R, E, py, dy, Fy: np.where(
         peak <= dy,
         0.0,
@@ -146,7 +142,7 @@ JOHNSON_1985 = ForceModel(
         ),
     },
     force=lambda elastic, x, R, pd, yields: np.where(yields > 0, 2 * np.pi * R * pd * x, elastic),
-    unloading=lambda x, peak, residual, force_at_peak: recovery(x - residual, peak - residual, force_at_peak),
+    unloading=returning,
     # too slow an impact is not fully plastic: it would recover more than it went in
     residual=lambda peak, force_at_peak, R, E, yields: (
         yields * (peak - np.minimum(0.75 * force_at_peak / (np.sqrt(2 * R * peak) * E), peak))

@@ -6,6 +6,7 @@ from typing import Unpack
 
 import numpy as np
 
+from ..forms import damped
 from ..formula import Formula
 from ..model import About, ForceModel
 from ..oracles import delivered_restitution, exact_damping_ratio
@@ -30,7 +31,7 @@ def hysteresis(key: str, *, chi: Formula, **about: Unpack[About]) -> ForceModel:
     return ForceModel(
         key,
         **about,
-        force=lambda elastic, v, v0, chi: elastic * (1 + chi * v / v0),
+        force=damped,
         coefficients={"chi": chi},
         oracle=lambda chi: delivered_restitution(chi),
         momentum="log",

@@ -4,14 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..forms import returning, spring, stiffer
 from ..model import ForceModel, Parameter
-from ..power import Array, power
-
-
-def power_law(stiffness: Array, stretch: Array, n: float) -> Array:
-    """k δⁿ."""
-    return stiffness * power(stretch, n)
-
+from ..power import power
 
 LANKARANI_NIKRAVESH_1994 = ForceModel(
     key="lankarani-nikravesh-1994",
@@ -23,8 +18,8 @@ LANKARANI_NIKRAVESH_1994 = ForceModel(
     doi="10.1007/BF00045676",
     evidence="formula as printed in Gharib and Hurmuzlu (2012); DOI from memory",
     domain={"e": (0.0, 1.0)},
-    force=lambda elastic: elastic,
-    unloading=lambda stretch, recovered, n, force_at_peak: power_law(force_at_peak, stretch / recovered, n),
+    force=spring,
+    unloading=returning,
     # (32), by (31) and fₘ = K δₘⁿ the same as δₘ (1 − e²), which holds for the peak that the integration found
     recovered=lambda e, peak: peak * (e * e),
     oracle=lambda e: e,
@@ -41,9 +36,9 @@ GHARIB_HURMUZLU_2012_ENERGETIC = ForceModel(
     doi="10.1115/1.4006494",
     evidence="formula and DOI seen in the paper; (39) as printed has K in the place of Kᵣ",
     domain={"e": (0.0, 1.0)},
-    force=lambda elastic: elastic,
+    force=spring,
     coefficients={"Kr": lambda K, n, e: K / power(e * e, n)},
-    unloading=lambda stretch, n, Kr: power_law(Kr, stretch, n),
+    unloading=stiffer,
     recovered=lambda e, peak: peak * (e * e),
     oracle=lambda e: e,
     family="permanent",
@@ -60,9 +55,9 @@ BILINEAR = ForceModel(
     evidence="formula as printed in Gharib and Hurmuzlu (2012); DOI from memory",
     domain={"e": (0.0, 1.0)},
     exponent=1.0,
-    force=lambda elastic: elastic,
+    force=spring,
     coefficients={"Kr": lambda K, e: K / (e * e)},
-    unloading=lambda stretch, Kr: Kr * stretch,
+    unloading=stiffer,
     recovered=lambda K, Kr, peak: peak * (K / Kr),
     oracle=lambda e: e,
     family="permanent",
@@ -79,9 +74,9 @@ ISMAIL_STRONGE_2008 = ForceModel(
     evidence="formula as printed in Gharib and Hurmuzlu (2012); DOI from memory",
     parameters=(Parameter("gamma", "1", "plastic loss factor γ", 2.0, 1.0),),
     exponent=1.0,
-    force=lambda elastic: elastic,
+    force=spring,
     coefficients={"Kr": lambda K, gamma: gamma * gamma * K},
-    unloading=lambda stretch, Kr: Kr * stretch,
+    unloading=stiffer,
     recovered=lambda K, Kr, peak: peak * (K / Kr),
     oracle=lambda gamma: np.divide(1.0, gamma),
     family="permanent",

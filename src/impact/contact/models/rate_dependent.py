@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Literal, Unpack
 
+from ..forms import dragged
 from ..formula import Formula
 from ..model import About, ForceModel, Parameter
 from ..power import power
@@ -25,9 +26,7 @@ def drag(
         key,
         **about,
         coefficients={"c": c, "q": lambda: q},
-        force=(lambda elastic, x, v, c: elastic + c * power(x, q) * v)
-        if q
-        else lambda elastic, v, c: elastic + c * v,
+        force=lambda elastic, x, v, c: dragged(elastic, power(x, q), v, c),
         release=release,
         momentum="force",
         smooth=smooth,

@@ -1,0 +1,126 @@
+"""Which phases of which laws a compiled core integrates, and how they are handed to it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from importlib.util import find_spec
+
+import numpy as np
+
+from ..ode.problem import Array, Columns, Outcome, Problem
+from . import forms, motion
+from .model import ForceModel
+from .momentum import Force, Log, force_form
+from .power import integer_power, power
+
+# coordinates of the velocity, and what ends a phase: the largest indentation, the gap, no force
+V, LOG, FORCE = 0, 1, 2
+STOP, GAP, NO_FORCE = 0, 1, 2
+# largest power of s
+MOST = 15
+
+
+@cache
+def is_installed() -> bool:
+    """Whether numba is there, of which no more is loaded for that."""
+    return find_spec("numba") is not None
+
+
+@dataclass(frozen=True)
+class Form:
+    """F = A xⁿ (1 + χ v) + c x^q v as whole powers of s: x = sᵖ, xⁿ = s^spring, x^q = s^drag.
+
+    `extra` is the power of s that the coordinate "force" has beside v, `creep` that which bounds the speed of
+    balls that part with none.
+    """
+
+    coordinate: int
+    ending: int
+    smooth: int
+    spring: int
+    drag: int = 0
+    extra: int = 0
+    creep: int = 0
+
+    @property
+    def exponents(self) -> tuple[int, int, int, int, int]:
+        """All of them."""
+        return self.smooth, self.spring, self.drag, self.extra, self.creep
+
+
+def of_approach(law: motion.Law) -> Form | None:
+    """The form of the approach, None where it has none."""
+    return None if law.model.bends else _of_force(law, STOP)
+
+
+def of_restitution(law: motion.Law) -> Form | None:
+    """The form of the restitution phase, None where it has none."""
+    model = law.model
+    ending = NO_FORCE if model.release == "force" else GAP
+    if model.unloading is None:
+        return None if model.bends else _of_force(law, ending)
+    if model.unloading in forms.POWER_LAWS and not model.unloading_bends:
+        return _whole(V, ending, model.smooth, model.smooth * law.n)
+    return None
+
+
+def serves(model: ForceModel, n: float) -> tuple[bool, bool]:
+    """Whether the compiled core integrates the approach, and the restitution phase, of a law."""
+    laws = [motion.Law.of(model, n, strong) for strong in (False, True)]
+    back = [motion.of_restitution(law) for law in laws]
+    return all(map(of_approach, laws)), all(map(of_restitution, back))
+
+
+def _of_force(law: motion.Law, ending: int) -> Form | None:
+    model, p = law.model, law.model.smooth
+    if model.momentum == "force":
+        form = force_form(model, law.n)
+        q = form.drag / p
+        if ending == GAP and law.n != 2.0 * q + 1.0:
+            return None
+        coordinate = FORCE if isinstance(law.momentum, Force) else V
+        return _whole(coordinate, ending, p, p * law.n, form.drag, form.spring, p * (q + 1.0))
+    if model.momentum == "log" or model.force is forms.spring:
+        return _whole(LOG if isinstance(law.momentum, Log) else V, ending, p, p * law.n)
+    return None
+
+
+def _whole(coordinate: int, ending: int, *exponents: float) -> Form | None:
+    if not all(float(one).is_integer() and 0.0 <= one <= MOST for one in exponents):
+        return None
+    return Form(coordinate, ending, *map(int, exponents))
+
+
+def integrate(
+    form: Form, law: motion.Law, problem: Problem, start: Array, columns: Columns, *, rtol: float, max_steps: int
+) -> Outcome:
+    """Integrate a phase as `impact.ode.rk45.integrate` does, without its record.
+
+    Parameters
+    ----------
+    form : of the phase
+    law, problem, columns : of the phase; columns each of shape (n,)
+    start : components at the start, shape (2, n)
+    rtol, max_steps : see there
+    """
+    from .kernel import BY_COORDINATE
+
+    n = start.shape[1]
+    known = dict(zip(law.names, columns, strict=False))
+    nothing = np.zeros(n)
+    stiff, chi, c, bound = np.ones(n), known.get("chi", nothing), known.get("c", nothing), nothing
+    if law.model.unloading is not None and form.ending != STOP:
+        # what a power law is times is the same at every stretch
+        chi = c = nothing
+        stretch = power(integer_power(start[0], form.smooth), law.n)
+        stiff = problem.rates(start, columns)[4] / stretch
+    elif form.ending == GAP and motion.may_creep(law):
+        bound = motion.creeping_speed(c, law.n, form.drag / form.smooth)
+    outcome, top = Outcome.blank(n), np.empty((4, n))
+    rows = (np.ascontiguousarray(start), *(np.ascontiguousarray(one) for one in (stiff, chi, c, bound)))
+    BY_COORDINATE[form.coordinate](
+        *rows, *form.exponents, form.ending, rtol, int(np.float64(rtol).view(np.int64)), float(max_steps),
+        outcome.state, outcome.maximum, top, outcome.steps, outcome.end,
+    )  # fmt: skip
+    return outcome
