@@ -185,10 +185,11 @@ def attempt(coordinate, s, y, s1, y1, watched, h, stiff, chi, c, p, k, d, g):
     new_y = y + h * solution(y1, y3, y4, y5, y6)
     more_t, more_work = h * solution(t1, t3, t4, t5, t6), h * solution(work1, work3, work4, work5, work6)
     s7, y7, t7, work7, watched = rates(coordinate, new_s, new_y, stiff, chi, c, p, k, d, g)
-    off_s = abs(h * difference(s1, s3, s4, s5, s6, s7)) / max(abs(s), abs(new_s), FLOOR[0])
-    off_y = abs(h * difference(y1, y3, y4, y5, y6, y7)) / max(abs(y), abs(new_y), FLOOR[1])
-    # a number that is none stays none, which the larger of two need not be
-    worst = max(off_s, off_y) + 0.0 * (off_s + off_y)
+    off_s, off_y = abs(difference(s1, s3, s4, s5, s6, s7)), abs(difference(y1, y3, y4, y5, y6, y7))
+    scale_s, scale_y = max(abs(s), abs(new_s), FLOOR[0]), max(abs(y), abs(new_y), FLOOR[1])
+    # the larger of two quotients by one division; a sum, since a number that is none has to stay none
+    off_s, off_y = off_s * scale_y, off_y * scale_s
+    worst = abs(h) * (max(off_s, off_y) + 0.0 * (off_s + off_y)) / (scale_s * scale_y)
     return new_s, new_y, more_t, more_work, s7, y7, t7, work7, watched, worst
 
 

@@ -53,12 +53,12 @@ def beyond_end(g: Array, dg: Array, g_before: Array, dg_before: Array, h: Array)
 
     Of plain arithmetic, for arrays and for numbers.
     """
-    # beyond the end the event function is taken for the parabola of the cubic through both ends
-    curve = (2.0 * (dg_before + 2.0 * dg) * h - 6.0 * (g - g_before)) / (h * h)
-    root = np.sqrt(dg * dg - 2.0 * curve * g)
+    # beyond the end the event function is taken for the parabola of the cubic through both ends; in units of h
+    fall, bend = dg * h, 2.0 * (dg_before + 2.0 * dg) * h - 6.0 * (g - g_before)
+    root = np.sqrt(fall * fall - 2.0 * bend * g)
     # one that fades away instead comes to no zero by its mean bend; it may be too stiff for the cubic
-    sure = dg * dg * h >= 2.0 * g * (dg - dg_before)
-    return choose(dg < 0.0, 2.0 * g / (root - dg), np.inf), sure
+    sure = dg * fall >= 2.0 * g * (dg - dg_before)
+    return choose(dg < 0.0, 2.0 * g * h / (root - fall), np.inf), sure
 
 
 def choose(condition: Mask, this: Array | float, other: Array | float) -> Array:
