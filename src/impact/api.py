@@ -56,10 +56,14 @@ def prepare(
 
 
 def execute(
-    plan: Plan, jobs: int = 1, tell: Tell | None = None, stopping: Callable[[], bool] = never
+    plan: Plan,
+    jobs: int = 1,
+    threads: int = 1,
+    tell: Tell | None = None,
+    stopping: Callable[[], bool] = never,
 ) -> xr.Dataset:
     """The result of a plan, in memory; for the parameters see `impact.data.sweeping.sweep_into`."""
-    return in_memory(plan, jobs=jobs, tell=tell or (lambda progress: None), stopping=stopping)
+    return in_memory(plan, jobs=jobs, threads=threads, tell=tell or (lambda progress: None), stopping=stopping)
 
 
 def sweep(
@@ -68,6 +72,7 @@ def sweep(
     overrides: Sequence[str] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
     jobs: int = 1,
+    threads: int = 1,
     max_points: int = MAX_POINTS,
 ) -> xr.Dataset:
     """Run a sweep, with its result in memory; `impact sweep` on the command line writes one of any size to a file.
@@ -80,6 +85,7 @@ def sweep(
         the files are executed
     jobs : how many processes integrate; with more than one, a program of one's own wants the usual
         `if __name__ == "__main__":`
+    threads : how many threads integrate, in place of processes; they run side by side where a core is compiled
     max_points : how many points it may have, of all models together
 
     Returns
@@ -99,7 +105,7 @@ def sweep(
     >>> result["e_out"].values.round(6).tolist()
     [[0.665265, 0.913177]]
     """
-    return execute(prepare(source, overrides, plugins, max_points), jobs)
+    return execute(prepare(source, overrides, plugins, max_points), jobs, threads)
 
 
 def run(
@@ -170,7 +176,9 @@ def rerun(
     # the models by their keys, because "all" is more models now than it was; the tolerances that took effect
     keys = stored["model"].values.tolist() if "model" in stored.dims else []
     solver = (f"solver.{name}={stored.attrs.get(name)}" for name in ("rtol", "max_steps"))
-    config = stored_config(stored.attrs, [f"models={json.dumps(keys)}", *solver], own, str(result))
+    # whichever core is here: they agree
+    changes = [f"models={json.dumps(keys)}", *solver, 'solver.core="auto"']
+    config = stored_config(stored.attrs, changes, own, str(result))
     verdict = compare(execute(Plan(config, own.of(config.models))), stored, tol=tol, subset=subset)
     files = [word for one in plugins if isinstance(one, str | Path) for word in ("--plugin", str(one))]
     again = ("impact", "run", str(result), *files) if repeats(str(result), stored) else ()

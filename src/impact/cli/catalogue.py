@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 # where a table of the catalogue shows the delivered restitution
 ASKED = (0.1, 0.3, 0.5, 0.7, 0.9)
 NARROW = 130
+# exponents of which it is told whether a core is compiled for them
+COMPILED_AT = (1.0, 1.5, 2.0, 2.5, 3.0)
 
 
 def models(
@@ -71,6 +73,7 @@ def model_json(model: ForceModel) -> dict[str, Any]:
         **{name: getattr(model, name) for name in names},
         "domain": {name: list(ends) for name, ends in model.domain.items()}, "parameters": own,
         "exponent": model.exponent, "release": model.release, "delivered_restitution": _delivered(model),
+        "integrated_by": _cores(model),
     }  # fmt: skip
 
 
@@ -93,23 +96,24 @@ def _print_models(models: Sequence[ForceModel]) -> None:
     out = console(sys.stdout)
     # a narrow terminal has no room for the delivered restitution; `impact models KEY` tells it
     asked = ASKED if out.width >= NARROW else ()
-    rows = table("model", "equation", "claimed for", *(f"e={e:g}" for e in asked))
-    for column in rows.columns[1:3]:
+    rows = table("model", "core", "equation", "claimed for", *(f"e={e:g}" for e in asked))
+    for column in rows.columns[1:4]:
         column.justify = "left"
     for family, members in groupby(models, lambda model: model.family):
         rows.add_row(Text(f"family:{family}", style="dim"))
         for model in members:
             found = _delivered(model)
             if model.same_as:
-                rows.add_row(model.key, Text(f"same law as {model.same_as}"))
+                rows.add_row(model.key, "", Text(f"same law as {model.same_as}"))
                 continue
             own = ", ".join(one.name for one in model.parameters)
             about = model.equation + (f"  [{own}]" if own else "")
             cells = [f"{found[f'{e:g}']:.4f}" if found else "–" for e in asked]
-            rows.add_row(model.key, Text(about), Text(model.domain_text or "–"), *cells)
+            rows.add_row(model.key, _cores(model).split()[0].rstrip(","), Text(about), Text(model.domain_text or "–"), *cells)
     out.print(rows)
     if asked:
         out.print("\nThe columns e=... show the restitution that a model delivers when it is asked for e.")
+    out.print('The core is what integrates a law, or a phase of it, where numba is installed (extra "fast").')
     out.print("A law with [parameters] of its own is driven by them; `impact models KEY` tells all about one.")
 
 
@@ -122,7 +126,7 @@ def _print_model(model: ForceModel) -> None:
         "family": model.family, "equation": model.equation, "reference": model.reference, "doi": model.doi,
         "evidence": model.evidence, "claimed for": model.domain_text or "nothing in particular",
         "exponent": "the sweep's n" if model.exponent is None else f"n = {model.exponent:g}, its own",
-        "ends at": _release(model),
+        "ends at": _release(model), "integrated by": _cores(model),
     }  # fmt: skip
     for place, parameter in enumerate(model.parameters):
         # the table is named once
@@ -142,6 +146,20 @@ def _parameter(one: Parameter) -> str:
 def _release(model: ForceModel) -> str:
     gap = "the permanent indentation" if model.is_permanent else "zero indentation"
     return gap if model.release == "gap" else f"zero force, at {gap} at the latest"
+
+
+def _cores(model: ForceModel) -> str:
+    """By what a law is integrated where numba is installed."""
+    from ..contact.compiled import serves
+
+    tried = [model.exponent] if model.exponent is not None else COMPILED_AT
+    approach, restitution = ([n for n in tried if serves(model, n)[phase]] for phase in (0, 1))
+    phases = [name for name, served in (("approach", approach), ("restitution", restitution)) if served]
+    if not phases:
+        return "numpy"
+    where = "" if model.exponent is not None else f", where n is {', '.join(f'{n:g}' for n in approach)}"
+    only = f" on {phases[0]}, numpy else" if len(phases) == 1 else ""
+    return f"numba{only}{where}"
 
 
 def _check(models: Sequence[ForceModel], *, as_json: bool) -> None:

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from ..errors import UnfinishedError
+from ..errors import UnfinishedError, UsageError
 from ..text import safe_text
 from . import door
 from .options import Json, Overwrite, Plugins, Quiet, Sets
@@ -24,6 +24,10 @@ def sweep(
     allow_failed: Annotated[bool, typer.Option("--allow-failed", help="Exit 0 even if points failed.")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with a sweep that was interrupted.")] = False,
     jobs: Annotated[int, typer.Option("--jobs", "-j", metavar="N", min=1, help="Processes that integrate.")] = 1,
+    threads: Annotated[
+        int,
+        typer.Option("--threads", metavar="N", min=1, help="Threads that integrate, in place of processes."),
+    ] = 1,
     max_points: Annotated[
         int, typer.Option("--max-points", metavar="N", min=1, help="Refuse a sweep of more points.")
     ] = 10**9,
@@ -40,11 +44,13 @@ def sweep(
         from ..data.sweeping import sweep_into
         from . import progress, summary
 
+        if jobs > 1 and threads > 1:
+            raise UsageError(f"--jobs {jobs}: given beside --threads {threads}, wants one of the two")
         plan = api.prepare(config, sets or (), plugins or (), max_points)
         if dry_run:
             from .dry_run import tell_of
 
-            tell_of(plan, jobs, as_json=as_json)
+            tell_of(plan, max(jobs, threads), as_json=as_json)
             if stopping():
                 raise UnfinishedError("nothing was written")
             return
@@ -59,8 +65,9 @@ def sweep(
                 store.check_output(output, overwrite=overwrite, source=source)
             with progress.progress(quiet=quiet) as tell:
                 found = sweep_into(
-                    output, plan, resume=resume, overwrite=overwrite, jobs=jobs, tell=tell, stopping=stopping
-                )
+                    output, plan, resume=resume, overwrite=overwrite, jobs=jobs, threads=threads, tell=tell,
+                    stopping=stopping,
+                )  # fmt: skip
             if stopping():
                 raise UnfinishedError(f"{safe_text(str(output))} was stored whole")
     told = summary.summary(found, output)

@@ -9,6 +9,7 @@ from typing import Literal
 from ..sweeps.blocks import integrated
 from ..sweeps.plan import Plan
 from ..sweeps.points import boxes
+from ..sweeps.run import settled
 from ..sweeps.trajectories import Trajectories, block_of, stretches, trajectories
 from .assembly import part_at
 from .digest import Taken
@@ -51,8 +52,15 @@ class Estimate:
 
 
 def estimate(plan: Plan, jobs: int = 1) -> Estimate:
-    """Count a sweep, and time one block of its trajectories and one box of its points."""
+    """Count a sweep, and time one block of its trajectories and one box of its points.
+
+    Parameters
+    ----------
+    plan : the sweep
+    jobs : processes or threads that integrate
+    """
     found = trajectories(plan)
+    plan = settled(plan, found)
     total = sum(one.count for one in found)
     blocks = list(stretches(found))
     # one in the middle is neither the first values nor the last

@@ -207,6 +207,7 @@ def _provenance(plan: Plan) -> dict[str, object]:
         "fingerprint": plan.fingerprint,
         "rtol": config.solver.rtol,
         "max_steps": config.solver.max_steps,
+        "core": config.solver.core,
         "impact_version": __version__,
         "packages": json.dumps({name: version(name) for name in PACKAGES}),
         "plugins": json.dumps(plan.plugins.record),

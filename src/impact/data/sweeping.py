@@ -18,7 +18,7 @@ from ..errors import StoreError, UnfinishedError
 from ..sweeps.finished import Finished
 from ..sweeps.plan import Plan
 from ..sweeps.points import Rows, boxes_of
-from ..sweeps.run import never, run
+from ..sweeps.run import never, run, settled
 from ..sweeps.trajectories import BLOCK, Stretch, Trajectories, stretches, trajectories
 from ..text import safe_text
 from .assembly import Part, assemble, parts, parts_as_finished
@@ -57,6 +57,7 @@ def sweep_into(
     resume: bool = False,
     overwrite: bool = False,
     jobs: int = 1,
+    threads: int = 1,
     tell: Tell = lambda progress: None,
     stopping: Callable[[], bool] = never,
 ) -> Survey:
@@ -68,7 +69,7 @@ def sweep_into(
     plan : what to run
     resume : go on with the work folder that an interrupted sweep left
     overwrite : replace the file if it exists, and a work folder if it is not to be resumed
-    jobs : how many processes integrate
+    jobs, threads : how many processes, or threads of this one, integrate
     tell : is told how far it is, now and then
     stopping : whether to stop; what was begun is finished and kept
 
@@ -81,6 +82,7 @@ def sweep_into(
     """
     check_output(output, overwrite=overwrite)
     found = trajectories(plan)
+    plan = settled(plan, found)
     blocks = list(stretches(found))
     total = sum(one.count for one in found)
     at = Progress(0, total, 0, plan.points, 0)
@@ -104,7 +106,7 @@ def sweep_into(
                 else:
                     at = _further(at, stretch, kept)
             tell(at)
-            for stretch, rebound in run(plan, found, todo, jobs=jobs, stopping=stopping):
+            for stretch, rebound in run(plan, found, todo, jobs=jobs, threads=threads, stopping=stopping):
                 work.store(stretch, rebound)
                 at = _further(at, stretch, rebound)
                 tell(at)
@@ -121,7 +123,9 @@ def sweep_into(
             raise type(error)("; ".join(filter(None, told))) from error
 
 
-def in_memory(plan: Plan, *, jobs: int = 1, tell: Tell, stopping: Callable[[], bool]) -> xr.Dataset:
+def in_memory(
+    plan: Plan, *, jobs: int = 1, threads: int = 1, tell: Tell, stopping: Callable[[], bool]
+) -> xr.Dataset:
     """Run a plan, and hold its result; for the parameters see `sweep_into`.
 
     Raises
@@ -129,12 +133,13 @@ def in_memory(plan: Plan, *, jobs: int = 1, tell: Tell, stopping: Callable[[], b
     UnfinishedError : it was told to stop; nothing is kept
     """
     found = trajectories(plan)
+    plan = settled(plan, found)
     total = sum(one.count for one in found)
     at = Progress(0, total, 0, plan.points, 0)
 
     def finished() -> Iterator[tuple[Stretch, Rebound]]:
         nonlocal at
-        for stretch, rebound in run(plan, found, stretches(found), jobs=jobs, stopping=stopping):
+        for stretch, rebound in run(plan, found, stretches(found), jobs=jobs, threads=threads, stopping=stopping):
             at = _further(at, stretch, rebound)
             tell(at)
             yield stretch, rebound

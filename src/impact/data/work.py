@@ -184,7 +184,8 @@ def _prepare(folder: Path, record: Mapping[str, Any], *, resume: bool, overwrite
 def _record(plan: Plan) -> dict[str, Any]:
     """What a folder is of: all that the finished blocks depend on."""
     solver = plan.config.solver
-    return {"schema": SCHEMA_VERSION, "block": BLOCK, "collapse": solver.collapse, "physics": plan.physics}
+    return {"schema": SCHEMA_VERSION, "block": BLOCK, "collapse": solver.collapse, "core": solver.core,
+            "physics": plan.physics}  # fmt: skip
 
 
 def _key(record: Mapping[str, Any]) -> str:

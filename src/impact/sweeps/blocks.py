@@ -53,7 +53,7 @@ def integrated(model: ForceModel, block: Block, solver: Solver) -> Rebound:
     """What becomes of a block by the law of its model."""
     return integrate_all(
         model, block.n, block.given, block.status,
-        rtol=solver.rtol, max_steps=solver.max_steps, collapse=solver.collapse,
+        rtol=solver.rtol, max_steps=solver.max_steps, collapse=solver.collapse, core=solver.core,
     )  # fmt: skip
 
 

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ..contact.collide import OUTPUTS
+from ..contact.compiled import is_installed
 from ..contact.model import ForceModel
 from .ranges import MAX_AXIS, Entry, entry_schema, number_schema, read_entry, read_groups, read_names
 from .rules import DEFAULTS, MATERIAL, MATERIALS, REQUIRED, SWEEP, expand_models, own_quantities
-from .settings import COMPRESSIONS, DTYPES
+from .settings import COMPRESSIONS, CORES, DTYPES
 from .values import Problem, Quantity, read_number, read_switch, read_whole, refuse
 
 DEFAULT_TITLE = "Impact sweep"
@@ -142,6 +143,16 @@ def _chunks(value: object, _: Context) -> dict[str, int]:
     return found
 
 
+CORE = _word_key(CORES, "what integrates: NumPy, numba where it can, or whichever is sooner done")
+
+
+def _core(value: object, context: Context) -> object:
+    core = CORE.read(value, context)
+    if core == "numba" and not is_installed():
+        raise refuse(value, 'numba, which is not installed (pip install "impact-sweep[fast]"), or "auto"')
+    return core
+
+
 TITLE = Key(_title, {"type": "string", "default": DEFAULT_TITLE}, "title of the sweep")
 SWEEP_KEYS = {
     **{name: entry_key(name, quantity, default=DEFAULTS.get(name)) for name, quantity in SWEEP.items()},
@@ -155,6 +166,7 @@ SOLVER_KEYS = {
     "collapse": Key(
         lambda value, _: read_switch(value), {"type": "boolean"}, "integrate impacts that are the same once"
     ),
+    "core": replace(CORE, read=_core),
 }
 OUTPUT_KEYS = {
     "variables": Key(

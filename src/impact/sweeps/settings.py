@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 DTYPES = ("float64", "float32")
 COMPRESSIONS = ("none", "gzip")
+CORES = ("auto", "numpy", "numba")
 DEFAULT_RTOL = 1e-10
 
 
@@ -19,11 +20,13 @@ class Solver:
     rtol : relative tolerance
     max_steps : steps that one impact may take
     collapse : integrate impacts that are the same in the contact's own units once; changes no bit
+    core : "numpy"; "numba", which compiles what it can; or "auto", whichever is sooner done
     """
 
     rtol: float = DEFAULT_RTOL
     max_steps: int = 10_000
     collapse: bool = True
+    core: str = "auto"
 
 
 @dataclass(frozen=True)
