@@ -19,7 +19,7 @@ from impact.sweeps.config import parse_config
 from impact.sweeps.finished import Finished
 from impact.sweeps.plan import Plan
 from impact.sweeps.points import boxes, boxes_of
-from impact.sweeps.run import run
+from impact.sweeps.run import run, settled
 from impact.sweeps.trajectories import stretches, trajectories
 
 from .conftest import WIDE
@@ -141,6 +141,7 @@ def test_sizes_and_order_change_no_bit(wide: xr.Dataset, size: int, collapse: st
     # blocks of a size, in an order of their own
     plan = Plan(parse_config(WIDE, [f"solver.collapse={collapse}"]))
     found = trajectories(plan)
+    plan = settled(plan, found)
     todo = sorted(stretches(found, size), key=lambda one: hash((one.number, "shuffled")))
     finished = {stretch.number: rebound for stretch, rebound in run(plan, found, todo)}
     for box in (1, 2, 5, 16, 1000):

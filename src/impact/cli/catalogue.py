@@ -109,7 +109,13 @@ def _print_models(models: Sequence[ForceModel]) -> None:
             own = ", ".join(one.name for one in model.parameters)
             about = model.equation + (f"  [{own}]" if own else "")
             cells = [f"{found[f'{e:g}']:.4f}" if found else "–" for e in asked]
-            rows.add_row(model.key, _cores(model).split()[0].rstrip(","), Text(about), Text(model.domain_text or "–"), *cells)
+            rows.add_row(
+                model.key,
+                _cores(model).split()[0].rstrip(","),
+                Text(about),
+                Text(model.domain_text or "–"),
+                *cells,
+            )
     out.print(rows)
     if asked:
         out.print("\nThe columns e=... show the restitution that a model delivers when it is asked for e.")

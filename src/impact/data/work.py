@@ -21,7 +21,8 @@ from filelock import FileLock, Timeout
 from ..contact.strike import Rebound
 from ..errors import ImpactError, InUseError, StoreError, UsageError
 from ..sweeps.plan import Plan
-from ..sweeps.trajectories import BLOCK, Stretch
+from ..sweeps.run import settled
+from ..sweeps.trajectories import BLOCK, Stretch, trajectories
 from ..text import safe_text
 from .results import SCHEMA_VERSION
 from .sink import appearing, sync_folder
@@ -125,6 +126,7 @@ def tidy(output: Path, plan: Plan) -> None:
     with contextlib.suppress(ImpactError, Timeout, OSError):
         if folder.is_dir():
             _check(folder)
+            plan = settled(plan, trajectories(plan))
             with FileLock(folder / LOCK, timeout=0):
                 if not os.path.lexists(folder / PLAN) or _is_of(folder, _record(plan), resume=True):
                     part_of(output).unlink(missing_ok=True)
