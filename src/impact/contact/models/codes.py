@@ -82,6 +82,7 @@ RECURDYN_EXPONENTS = ForceModel(
     force=lambda elastic, x, v, c, damping_exponent, indentation_exponent: (
         elastic + c * np.sign(v) * powers(np.abs(v), damping_exponent) * powers(x, indentation_exponent)
     ),
+    smooth=4,
     family="codes",
 )
 
