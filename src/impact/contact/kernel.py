@@ -322,14 +322,19 @@ def search(coordinate, w, lanes, best, top, stiff, chi, c, p, k, d, g):
     for first in range(0, lanes, LANES):
         for j in range(LANES):
             i = min(first + j, lanes - 1)
-            begin(coordinate, w, j, top[0, i], top[1, i], stiff[i], chi[i], c[i], p, k, d, g)
-            w[BEST * LANES + j], w[BEHIND * LANES + j], w[AHEAD * LANES + j] = best[i], top[2, i], top[3, i]
+            w[S * LANES + j], w[Y * LANES + j] = top[0, i], top[1, i]
+            w[BEHIND * LANES + j], w[AHEAD * LANES + j], w[BEST * LANES + j] = top[2, i], top[3, i], best[i]
+            w[STIFF * LANES + j], w[CHI * LANES + j], w[DRAG * LANES + j] = stiff[i], chi[i], c[i]
         for j in range(LANES):
+            rate_s, rate_y, _, _, watched = rates(
+                coordinate, w[S * LANES + j], w[Y * LANES + j], w[STIFF * LANES + j], w[CHI * LANES + j],
+                w[DRAG * LANES + j], p, k, d, g,
+            )  # fmt: skip
+            w[RATE_S * LANES + j], w[RATE_Y * LANES + j], w[WATCHED * LANES + j] = rate_s, rate_y, watched
             step = SLOPE * max(w[BEHIND * LANES + j], w[AHEAD * LANES + j])
             slope = slope_of_force(
-                coordinate, w[S * LANES + j], w[Y * LANES + j], w[RATE_S * LANES + j], w[RATE_Y * LANES + j],
-                w[WATCHED * LANES + j], step, w[STIFF * LANES + j], w[CHI * LANES + j], w[DRAG * LANES + j],
-                p, k, d, g,
+                coordinate, w[S * LANES + j], w[Y * LANES + j], rate_s, rate_y, watched, step,
+                w[STIFF * LANES + j], w[CHI * LANES + j], w[DRAG * LANES + j], p, k, d, g,
             )  # fmt: skip
             reach = w[AHEAD * LANES + j] if slope > 0.0 else -w[BEHIND * LANES + j]
             reach = reach if abs(slope * reach) > FLAT * abs(w[BEST * LANES + j]) else 0.0

@@ -25,7 +25,7 @@ from .plan import Index, Plan
 # cells up to which equal values are found over the whole plan; beyond, within a block
 MOST_CELLS = 2**22
 # trajectories of a block: enough to pay for the interpreter, few enough to stay in cache
-BLOCK = 8192
+BLOCK = 16384
 
 
 @dataclass(frozen=True)
@@ -118,8 +118,8 @@ def stretches(found: Sequence[Trajectories], size: int = BLOCK) -> Iterator[Stre
 def even(count: int, most: int) -> int:
     """The size of blocks of at most so many that share a number evenly: a small last one would cost too much.
 
-    >>> even(10_000, 8_192), even(100, 8_192)
-    (5000, 100)
+    >>> even(20_000, 16_384), even(100, 16_384)
+    (10000, 100)
     """
     return -(-count // -(-count // most))
 
