@@ -33,4 +33,5 @@ def tell_of(plan: Plan, jobs: int, *, as_json: bool) -> None:
     out.print(rows)
     size = f"{found.bytes:,} bytes (and {found.kept:,} while it runs)"
     counts = f"{found.points:,} points from {found.trajectories:,} trajectories"
-    out.print(f"{counts}, {size}, about {clock(found.seconds)} and what the disk takes; nothing was written")
+    time = f"about {clock(found.seconds)} by {found.core} and what the disk takes"
+    out.print(f"{counts}, {size}, {time}; nothing was written")

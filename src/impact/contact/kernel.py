@@ -11,8 +11,7 @@ import zlib
 from pathlib import Path
 
 import numpy as np
-from numba import njit, types
-from numba.extending import intrinsic, overload
+from numba.extending import overload
 
 from ..ode import event as landing
 from ..ode import maximum, rk45
@@ -22,6 +21,7 @@ from ..ode.tableau import A as FRACTIONS
 from ..ode.tableau import E as DIFFERENCES
 from . import forms, momentum, motion
 from .compiled import FORCE, GAP, LOG, NO_FORCE, STOP, V
+from .vectors import bits, exponential, from_bits, inlined, kept_on_disk, whole_power
 
 LANES = 64
 # so many lanes that have ended make room at a time
@@ -42,6 +42,7 @@ BLANK = (T, WORK, LAST, BEHIND, AHEAD, STEPS, TRIALS, HALVED, ENDED, BOUND)
 A = tuple(tuple(map(float, row)) for row in FRACTIONS)
 E = tuple(map(float, DIFFERENCES))
 SAFETY, SMALLEST, LARGEST, FIFTH = rk45.SAFETY, rk45.SMALLEST, rk45.LARGEST, rk45.FIFTH
+SAFETY_BITS = int(np.float64(SAFETY).view(np.int64))
 LAST_STEP, HALVINGS = rk45.LAST_STEP, float(rk45.HALVINGS)
 LANDING, NEAR, SHORT, CLOSE = landing.LANDING, landing.NEAR, landing.SHORT, landing.CLOSE
 SLOPE, FLAT, GUESSES = maximum.DIFFERENCE, maximum.FLAT, maximum.GUESSES
@@ -54,8 +55,6 @@ _HOUSE = Path(__file__).parent.parent
 _SOURCES = sorted((*(_HOUSE / "ode").glob("*.py"), *(_HOUSE / "contact").glob("*.py")))
 VERSION = zlib.crc32(b"".join(one.read_bytes() for one in _SOURCES))
 
-# products and sums may be fused, which only makes them more exact; the arithmetic is else that of IEEE
-inlined = njit(fastmath={"contract"}, error_model="numpy", forceinline=True)
 damped, dragged = inlined(forms.damped), inlined(forms.dragged)
 rate_of_log, rate_of_force = inlined(momentum.rate_of_log), inlined(momentum.rate_of_force)
 velocity_of_force = inlined(momentum.velocity_of_force)
@@ -67,65 +66,6 @@ def _choose(condition, this, other):
 
 
 beyond_end, release = inlined(landing.beyond_end), inlined(motion.release)
-
-
-def _reinterpreted(there, here):
-    """A function that takes the bits of a number for one of another type."""
-
-    @intrinsic
-    def reinterpret(typing, number):
-        def generate(context, builder, signature, arguments):
-            return builder.bitcast(arguments[0], context.get_value_type(there))
-
-        return there(here), generate
-
-    return reinterpret
-
-
-# with NUMBA_DISABLE_JIT=1 it is all plain Python
-if not hasattr(damped, "py_func"):
-
-    def bits(number):
-        """The bits of a number as an integer."""
-        return np.float64(number).view(np.int64)
-
-    def from_bits(whole):
-        """The number of some bits."""
-        return np.int64(whole).view(np.float64)
-else:
-    bits, from_bits = _reinterpreted(types.int64, types.float64), _reinterpreted(types.float64, types.int64)
-
-ONE = int(np.float64(1.0).view(np.int64))
-SAFETY_BITS = int(np.float64(SAFETY).view(np.int64))
-# a number so large that its last bit is worth 1, ln 2 in two parts, the series of the exponential from its end
-LARGE, PER_LN2 = 6755399441055744.0, 1.4426950408889634
-LN2, REST_OF_LN2 = 0.6931471803691238, 1.9082149292705877e-10
-SERIES = tuple(float(1 / one) for one in np.cumprod(np.arange(1.0, 14.0))[::-1])
-LEAST_EXPONENT = -700.0
-
-
-@inlined
-def exponential(x):
-    """eˣ, as a vector too: that of the C library is one number at a time."""
-    x = max(x, LEAST_EXPONENT)
-    shifted = x * PER_LN2 + LARGE
-    times = shifted - LARGE
-    r = (x - times * LN2) - times * REST_OF_LN2
-    total = SERIES[0]
-    for weight in SERIES[1:]:
-        total = total * r + weight
-    return (total * r + 1.0) * from_bits((bits(shifted) << 52) + ONE)
-
-
-@inlined
-def whole_power(s, exponent):
-    """s to a whole power from 0 to 15, which is the same for all lanes."""
-    square = s * s
-    fourth = square * square
-    result = s if exponent & 1 else 1.0
-    result = result * square if exponent & 2 else result
-    result = result * fourth if exponent & 4 else result
-    return result * (fourth * fourth) if exponent & 8 else result
 
 
 @inlined
@@ -377,7 +317,7 @@ def search(coordinate, w, lanes, best, top, stiff, chi, c, p, k, d, g):
 def _kernel(coordinate: int, version: int):
     """The integrator in a coordinate of the velocity. Numba's cache knows it by these two numbers."""
 
-    @njit(fastmath={"contract"}, error_model="numpy", nogil=True, cache=True)
+    @kept_on_disk
     def integrate(
         start, stiff, chi, c, bound, p, k, d, g, m, ending, rtol, rtol_bits, max_steps,
         state, best, top, steps, end,

@@ -40,7 +40,7 @@ class Collapse:
 class Estimate:
     """What a sweep would take: bytes of the result before it is packed, and of what is kept while it runs.
 
-    The writing to the disk comes on top of the seconds.
+    The writing to the disk comes on top of the seconds. `core` is what would integrate.
     """
 
     points: int
@@ -49,6 +49,7 @@ class Estimate:
     bytes: int
     kept: int
     seconds: float
+    core: str
 
 
 def estimate(plan: Plan, jobs: int = 1) -> Estimate:
@@ -65,9 +66,11 @@ def estimate(plan: Plan, jobs: int = 1) -> Estimate:
     blocks = list(stretches(found))
     # one in the middle is neither the first values nor the last
     chosen = blocks[len(blocks) // 2]
-    begun = time.perf_counter()
-    rebound = integrated(plan.models[chosen.model], block_of(plan, found, chosen), plan.config.solver)
-    seconds = (time.perf_counter() - begun) / chosen.size * total / jobs
+    # the first time loads, or even compiles, what integrates
+    for _ in range(2):
+        begun = time.perf_counter()
+        rebound = integrated(plan.models[chosen.model], block_of(plan, found, chosen), plan.config.solver)
+        seconds = (time.perf_counter() - begun) / chosen.size * total / jobs
     # what became of the trajectories of a box does not matter for its time: those of the block, again and again
     box = replace(next(boxes(1, plan.shape)), model=chosen.model)
     begun = time.perf_counter()
@@ -77,7 +80,7 @@ def estimate(plan: Plan, jobs: int = 1) -> Estimate:
     seconds += (time.perf_counter() - begun) / box.size * plan.points
     kept = total * sum(getattr(rebound, one.name).itemsize for one in fields(rebound))
     models = tuple(_collapse(plan, one) for one in found)
-    return Estimate(plan.points, total, models, outline(plan).nbytes, kept, seconds)
+    return Estimate(plan.points, total, models, outline(plan).nbytes, kept, seconds, plan.config.solver.core)
 
 
 def _collapse(plan: Plan, own: Trajectories) -> Collapse:

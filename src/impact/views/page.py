@@ -301,6 +301,7 @@ def _computed(dataset: xr.Dataset) -> Iterator[Markup]:
         "program": f"impact {attributes.get('impact_version', '')}",
         "packages": ", ".join(f"{name} {one}" for name, one in json_object(dataset, "packages").items()),
         "solver": ", ".join(f"{name} {attributes[name]:g}" for name in settings if name in attributes),
+        "core": attributes.get("core", ""),
         "fingerprint": attributes.get("fingerprint", ""),
         "content digest": attributes.get("content_digest", ""),
         "reason": attributes.get("reason", ""),
