@@ -104,7 +104,7 @@ def integrate(
     start : components at the start, shape (2, n)
     rtol, max_steps : see there
     """
-    from .kernel import BY_COORDINATE
+    from .kernel import KERNELS
 
     n = start.shape[1]
     known = dict(zip(law.names, columns, strict=False))
@@ -119,8 +119,8 @@ def integrate(
         bound = motion.creeping_speed(c, law.n, form.drag / form.smooth)
     outcome, top = Outcome.blank(n), np.empty((4, n))
     rows = (np.ascontiguousarray(start), *(np.ascontiguousarray(one) for one in (stiff, chi, c, bound)))
-    BY_COORDINATE[form.coordinate](
-        *rows, *form.exponents, form.ending, rtol, int(np.float64(rtol).view(np.int64)), float(max_steps),
+    KERNELS[form.coordinate, form.ending](
+        *rows, *form.exponents, rtol, int(np.float64(rtol).view(np.int64)), float(max_steps),
         outcome.state, outcome.maximum, top, outcome.steps, outcome.end,
     )  # fmt: skip
     return outcome

@@ -203,15 +203,17 @@ def advance(coordinate, w, ending, p, k, d, g, m, rtol, rtol_bits, max_steps):
         rest = beyond if landed else 0.0
         new_s, new_y = new_s + rest * new_rate_s, new_y + rest * new_rate_y
 
-        best, last = w[BEST * LANES + j], w[LAST * LANES + j]
-        falls = within and watched < seen and seen > best
-        best = seen if falls else best
-        highest = landed and watched > best
-        w[BEST * LANES + j] = watched if highest else best
-        w[TOP_S * LANES + j] = new_s if highest else s if falls else w[TOP_S * LANES + j]
-        w[TOP_Y * LANES + j] = new_y if highest else y if falls else w[TOP_Y * LANES + j]
-        w[BEHIND * LANES + j] = h if highest else last if falls else w[BEHIND * LANES + j]
-        w[AHEAD * LANES + j] = 0.0 if highest else h if falls else w[AHEAD * LANES + j]
+        last = w[LAST * LANES + j]
+        if ending == STOP:
+            best = w[BEST * LANES + j]
+            falls = within and watched < seen and seen > best
+            best = seen if falls else best
+            highest = landed and watched > best
+            w[BEST * LANES + j] = watched if highest else best
+            w[TOP_S * LANES + j] = new_s if highest else s if falls else w[TOP_S * LANES + j]
+            w[TOP_Y * LANES + j] = new_y if highest else y if falls else w[TOP_Y * LANES + j]
+            w[BEHIND * LANES + j] = h if highest else last if falls else w[BEHIND * LANES + j]
+            w[AHEAD * LANES + j] = 0.0 if highest else h if falls else w[AHEAD * LANES + j]
 
         away = new_s > FAR if ending == STOP else -new_rate_s <= w[BOUND * LANES + j] * whole_power(new_s, m)
         ended = LOST if within and ended == RUNNING and away else ended
@@ -314,12 +316,12 @@ def search(coordinate, w, lanes, best, top, stiff, chi, c, p, k, d, g):
             best[first + j] = w[BEST * LANES + j]
 
 
-def _kernel(coordinate: int, version: int):
-    """The integrator in a coordinate of the velocity. Numba's cache knows it by these two numbers."""
+def _kernel(coordinate: int, ending: int, version: int):
+    """The integrator of a phase in a coordinate, numbers that are constants in it, and by which it is kept."""
 
     @kept_on_disk
     def integrate(
-        start, stiff, chi, c, bound, p, k, d, g, m, ending, rtol, rtol_bits, max_steps,
+        start, stiff, chi, c, bound, p, k, d, g, m, rtol, rtol_bits, max_steps,
         state, best, top, steps, end,
     ):  # fmt: skip
         lanes = start.shape[1] if version >= 0 else 0
@@ -362,4 +364,5 @@ def _kernel(coordinate: int, version: int):
     return integrate
 
 
-BY_COORDINATE = tuple(_kernel(coordinate, VERSION) for coordinate in (V, LOG, FORCE))
+# by the coordinate of the velocity and what ends the phase; each is compiled when it is first called
+KERNELS = {(one, end): _kernel(one, end, VERSION) for one in (V, LOG, FORCE) for end in (STOP, GAP, NO_FORCE)}
