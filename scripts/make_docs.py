@@ -50,7 +50,8 @@ told. More in [ci.md](ci.md).
 
 - `title`; `schema_version`; `impact_version`; `packages`, versions as JSON.
 - `config`, the text of the sweep verbatim (a mapping as JSON), and `config_set`, the overrides in order, as JSON.
-- `fingerprint`, SHA-256 over the config as it took effect; `rtol` and `max_steps` of the solver, and the `core` that integrated.
+- `fingerprint`, SHA-256 over the config as it took effect; `rtol` and `max_steps` of the solver, and the `core`
+  that integrated.
 - `materials`, those that some ball has, as JSON from name to `E` [Pa], `nu`, `rho` [kg/m3] and `yield_strength`
   [Pa], null where it is not known.
 - `plugins`, models that are not built in, as JSON from key to `file`, the name of the model's Python file (null
