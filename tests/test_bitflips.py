@@ -114,6 +114,7 @@ def check_flips(forked: Forked, whole: Path, folder: Path, count: int, seed: int
     assert counts["beside: noticed"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2))
 def test_fifty_flips(forked: Forked, whole: Path, packed: Path, tmp_path: Path, seed: int) -> None:
     check_flips(forked, packed if seed else whole, tmp_path, OF_PACKED if seed else FLIPS, seed)

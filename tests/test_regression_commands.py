@@ -247,6 +247,7 @@ def test_subset_and_nothing_in_common(forked: Forked, folder: Path) -> None:
 BAD = "\x1b[31m\u202e\u200b[red]|`a`` ````$\\frac{1$\x07<b>&\"'%0A::,=\nx\x9b"
 
 
+@pytest.mark.slow
 def test_hostile_strings_in_every_format(forked: Forked, tmp_path: Path) -> None:
     steel = {"E": 2e11, "nu": 0.3, "rho": 7850}
     config = {
@@ -313,6 +314,7 @@ def test_hostile_strings_in_every_format(forked: Forked, tmp_path: Path) -> None
 # pictures
 
 
+@pytest.mark.slow
 def test_pictures_of_every_kind_of_verdict(forked: Forked, folder: Path, wide: xr.Dataset, tmp_path: Path) -> None:
     moved = wide.copy(deep=True)
     moved["duration"] *= 1 + 1e-7 * np.arange(moved["duration"].size).reshape(moved["duration"].shape)

@@ -136,7 +136,7 @@ def test_an_axis_of_exponents() -> None:
 
 
 @pytest.mark.parametrize("collapse", ["true", "false"])
-@pytest.mark.parametrize("size", [1, 7, 1000])
+@pytest.mark.parametrize("size", [7, 1000, pytest.param(1, marks=pytest.mark.slow)])
 def test_sizes_and_order_change_no_bit(wide: xr.Dataset, size: int, collapse: str) -> None:
     # blocks of a size, in an order of their own
     plan = Plan(parse_config(WIDE, [f"solver.collapse={collapse}"]))
