@@ -189,6 +189,7 @@ def _run(data: st.SearchStrategy[Any], examples: int, check: Any) -> None:
     over_examples()
 
 
+@pytest.mark.slow
 def test_no_change_passes(figure6: xr.Dataset, wide: xr.Dataset) -> None:
     def check(pair: Pair) -> None:
         result, mutant = pair.original, pair.mutant
