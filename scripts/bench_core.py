@@ -35,6 +35,7 @@ from impact.contact.compiled import is_installed
 from impact.contact.lanes import Lanes
 from impact.contact.model import ForceModel
 from impact.contact.oracles import delivered_restitution
+from impact.sweeps.teams import team_of
 from impact.sweeps.trajectories import BLOCK, even
 
 # those of the paper whose restitution is e's alone: (10), (19)-(23), (28), (29), (33) and (43)
@@ -203,7 +204,7 @@ def sweep(models: list[ForceModel], impacts: int, rtol: float, by: str, jobs: in
         }
     )  # fmt: skip
     begun = time.perf_counter()
-    execute(plan, jobs, threads)
+    execute(plan, team_of(jobs, threads))
     return plan.points / (time.perf_counter() - begun)
 
 

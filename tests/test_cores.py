@@ -148,8 +148,8 @@ def test_files_of_threads_and_processes_are_the_same(cli: Run, tmp_path: Path) -
 def test_processes_and_threads_are_one_or_the_other(cli: Run, tmp_path: Path) -> None:
     done = cli("sweep", ROOT / "configs" / "figure6.toml", "--jobs", "2", "--threads", "2", cwd=tmp_path)
     assert done.returncode == 2
-    assert "--jobs 2: given beside --threads 2, wants one of the two" in done.stderr
-    with pytest.raises(UsageError, match="jobs: got 2 beside 2 threads"):
+    assert "got jobs = 2 and threads = 2, wants one of them" in done.stderr
+    with pytest.raises(UsageError, match="got jobs = 2 and threads = 2"):
         impact.sweep(SWEEP, overrides=['solver.core="numpy"'], jobs=2, threads=2)
 
 

@@ -112,7 +112,7 @@ def test_every_model_at_the_top_level_is_taken_once_and_built_in_ones_are_not(tm
     (tmp_path / "two.py").write_text(text, encoding="utf-8")
     found = read_plugins([tmp_path / "two.py"])
     assert [model.key for model in found.models] == ["a", "b"]
-    assert [one.path and one.path.name for one in found.items] == ["two.py", "two.py"]
+    assert [one.record["file"] for one in found.items] == ["two.py", "two.py"]
 
 
 def test_a_plug_in_leaves_no_trace_but_its_models(folder: Path) -> None:

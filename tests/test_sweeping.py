@@ -9,6 +9,8 @@ import re
 import shlex
 import subprocess
 import sys
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 
 import h5py
@@ -23,9 +25,10 @@ from impact.data.guard import is_in_pieces
 from impact.data.survey import held
 from impact.data.sweeping import Progress, sweep_into
 from impact.data.tally import tally_of
-from impact.errors import ConfigError, UsageError
+from impact.errors import ConfigError, StoreError, UsageError
+from impact.sweeps.teams import team_of
 
-from .conftest import WIDE, Run
+from .conftest import ROOT, WIDE, Run
 from .forked import Forked
 
 # more than one block, and done in a second
@@ -197,7 +200,7 @@ def test_what_is_held_is_counted_in_parts_as_in_memory(blocks: Path) -> None:
 def test_several_processes_give_the_same_content(blocks: Path) -> None:
     one = impact.sweep(blocks)
     assert impact.sweep(blocks, jobs=2).identical(one)
-    swept = sweep_into(blocks.parent / "two.h5", prepare(blocks), jobs=2)
+    swept = sweep_into(blocks.parent / "two.h5", prepare(blocks), team=team_of(jobs=2))
     assert swept.outline.attrs["content_digest"] == one.attrs["content_digest"]
 
 
@@ -213,13 +216,32 @@ def test_a_plug_in_goes_to_every_process_and_a_python_value_cannot(blocks: Path,
         impact.sweep(blocks, overrides=["models=['mine']"], plugins=[mine], jobs=2)
 
 
-def test_a_plug_in_that_is_changed_while_the_sweep_runs_is_told(blocks: Path) -> None:
+def test_a_plug_in_that_is_changed_while_the_sweep_runs_is_what_it_was(blocks: Path) -> None:
     path = blocks.parent / "mine.py"
     path.write_text(MINE, encoding="utf-8")
     plan = prepare(blocks, ["models=['mine']"], [path])
-    path.write_text(f"{MINE}#\n", encoding="utf-8")
-    with pytest.raises(UsageError, match=r"mine.py: was changed while the sweep ran"):
-        execute(plan, 2)
+    path.write_text("raise SystemExit", encoding="utf-8")
+    assert execute(plan, team_of(jobs=2)).identical(execute(plan))
+
+
+def test_any_executor_integrates(blocks: Path) -> None:
+    one = impact.sweep(blocks)
+    with ThreadPoolExecutor(2) as threads, ProcessPoolExecutor(2, get_context("spawn")) as processes:
+        for executor in (threads, processes):
+            assert impact.sweep(blocks, executor=executor).identical(one)
+        # it is not shut down
+        assert threads.submit(len, "abc").result() == 3
+    with pytest.raises(UsageError, match="got jobs = 2 and an executor, wants one of them"):
+        impact.sweep(blocks, jobs=2, executor=threads)
+
+
+def test_an_executor_that_stays_broken_is_told() -> None:
+    class Broken(Executor):
+        def submit(self, fn: object, /, *args: object, **kwargs: object) -> Future[object]:  # type: ignore[override]
+            raise BrokenExecutor
+
+    with pytest.raises(StoreError, match="killed 4 times"):
+        impact.sweep(ROOT / "configs" / "figure6.toml", executor=Broken())
 
 
 def test_nobody_who_listens_is_no_reason_to_stop(blocks: Path) -> None:

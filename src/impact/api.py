@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -34,6 +35,7 @@ from .sweeps.plan import Plan
 from .sweeps.plugins import read_plugins
 from .sweeps.point import one_point
 from .sweeps.run import never
+from .sweeps.teams import ALONE, Team, team_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -57,13 +59,12 @@ def prepare(
 
 def execute(
     plan: Plan,
-    jobs: int = 1,
-    threads: int = 1,
+    team: Team = ALONE,
     tell: Tell | None = None,
     stopping: Callable[[], bool] = never,
 ) -> xr.Dataset:
     """The result of a plan, in memory; for the parameters see `impact.data.sweeping.sweep_into`."""
-    return in_memory(plan, jobs=jobs, threads=threads, tell=tell or (lambda progress: None), stopping=stopping)
+    return in_memory(plan, team=team, tell=tell or (lambda progress: None), stopping=stopping)
 
 
 def sweep(
@@ -73,6 +74,7 @@ def sweep(
     plugins: Sequence[ForceModel | str | Path] = (),
     jobs: int = 1,
     threads: int = 1,
+    executor: Executor | None = None,
     max_points: int = MAX_POINTS,
 ) -> xr.Dataset:
     """Run a sweep, with its result in memory; `impact sweep` on the command line writes one of any size to a file.
@@ -86,6 +88,8 @@ def sweep(
     jobs : how many processes integrate; with more than one, a program of one's own wants the usual
         `if __name__ == "__main__":`
     threads : how many threads integrate, in place of processes; they run side by side where a core is compiled
+    executor : of the interface of `concurrent.futures`, that integrates in their place: dask's
+        `client.get_executor(pure=False)`, or the one of mpi4py; it is not shut down
     max_points : how many points it may have, of all models together
 
     Returns
@@ -95,7 +99,8 @@ def sweep(
     Raises
     ------
     ConfigError : with all problems of the config
-    UsageError, ModelError : a plug-in cannot be read, or is not right
+    UsageError, ModelError : a plug-in cannot be read, or is not right; more than one of jobs, threads and executor
+    StoreError : processes were killed again and again
 
     >>> import impact
     >>> result = impact.sweep({
@@ -105,7 +110,7 @@ def sweep(
     >>> result["e_out"].values.round(6).tolist()
     [[0.665265, 0.913177]]
     """
-    return execute(prepare(source, overrides, plugins, max_points), jobs, threads)
+    return execute(prepare(source, overrides, plugins, max_points), team_of(jobs, threads, executor))
 
 
 def run(

@@ -44,7 +44,7 @@ def models(
     from ..sweeps.plugins import read_plugins
 
     if check is not None:
-        own = [one.model for one in read_plugins([check]).items if one.path is not None]
+        own = [one.model for one in read_plugins([check]).items if one.source is not None]
         _check([model for model in own if key in (None, model.key)] or [find(str(key), own)], as_json=as_json)
         return
     others = read_plugins(plugins or ()).models

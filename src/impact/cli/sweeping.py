@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from ..errors import UnfinishedError, UsageError
+from ..errors import UnfinishedError
 from ..text import safe_text
 from . import door
 from .options import Json, Overwrite, Plugins, Quiet, Sets
@@ -42,10 +42,10 @@ def sweep(
         from .. import api
         from ..data import store, survey, work
         from ..data.sweeping import sweep_into
+        from ..sweeps.teams import team_of
         from . import progress, summary
 
-        if jobs > 1 and threads > 1:
-            raise UsageError(f"--jobs {jobs}: given beside --threads {threads}, wants one of the two")
+        team = team_of(jobs, threads)
         plan = api.prepare(config, sets or (), plugins or (), max_points)
         if dry_run:
             from .dry_run import tell_of
@@ -65,7 +65,7 @@ def sweep(
                 store.check_output(output, overwrite=overwrite, source=source)
             with progress.progress(quiet=quiet) as tell:
                 found = sweep_into(
-                    output, plan, resume=resume, overwrite=overwrite, jobs=jobs, threads=threads, tell=tell,
+                    output, plan, resume=resume, overwrite=overwrite, team=team, tell=tell,
                     stopping=stopping,
                 )  # fmt: skip
             if stopping():

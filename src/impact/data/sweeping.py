@@ -19,6 +19,7 @@ from ..sweeps.finished import Finished
 from ..sweeps.plan import Plan
 from ..sweeps.points import Rows, boxes_of
 from ..sweeps.run import never, run, settled
+from ..sweeps.teams import ALONE, Team
 from ..sweeps.trajectories import BLOCK, Stretch, Trajectories, stretches, trajectories
 from ..text import safe_text
 from .assembly import Part, assemble, parts, parts_as_finished
@@ -56,8 +57,7 @@ def sweep_into(
     *,
     resume: bool = False,
     overwrite: bool = False,
-    jobs: int = 1,
-    threads: int = 1,
+    team: Team = ALONE,
     tell: Tell = lambda progress: None,
     stopping: Callable[[], bool] = never,
 ) -> Survey:
@@ -69,7 +69,7 @@ def sweep_into(
     plan : what to run
     resume : go on with the work folder that an interrupted sweep left
     overwrite : replace the file if it exists, and a work folder if it is not to be resumed
-    jobs, threads : how many processes, or threads of this one, integrate
+    team : who integrates
     tell : is told how far it is, now and then
     stopping : whether to stop; what was begun is finished and kept
 
@@ -106,7 +106,7 @@ def sweep_into(
                 else:
                     at = _further(at, stretch, kept)
             tell(at)
-            for stretch, rebound in run(plan, found, todo, jobs=jobs, threads=threads, stopping=stopping):
+            for stretch, rebound in run(plan, found, todo, team=team, stopping=stopping):
                 work.store(stretch, rebound)
                 at = _further(at, stretch, rebound)
                 tell(at)
@@ -123,9 +123,7 @@ def sweep_into(
             raise type(error)("; ".join(filter(None, told))) from error
 
 
-def in_memory(
-    plan: Plan, *, jobs: int = 1, threads: int = 1, tell: Tell, stopping: Callable[[], bool]
-) -> xr.Dataset:
+def in_memory(plan: Plan, *, team: Team = ALONE, tell: Tell, stopping: Callable[[], bool]) -> xr.Dataset:
     """Run a plan, and hold its result; for the parameters see `sweep_into`.
 
     Raises
@@ -139,7 +137,7 @@ def in_memory(
 
     def finished() -> Iterator[tuple[Stretch, Rebound]]:
         nonlocal at
-        for stretch, rebound in run(plan, found, stretches(found), jobs=jobs, threads=threads, stopping=stopping):
+        for stretch, rebound in run(plan, found, stretches(found), team=team, stopping=stopping):
             at = _further(at, stretch, rebound)
             tell(at)
             yield stretch, rebound

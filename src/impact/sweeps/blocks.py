@@ -1,32 +1,24 @@
-"""Blocks: what is integrated at a time, here or in a process of its own, which loads no more than it needs."""
+"""Blocks: what is integrated at a time, here or anywhere else, where no more is loaded than it needs."""
 
 from __future__ import annotations
 
-import multiprocessing
-import multiprocessing.connection
-import os
-import signal
-import threading
-from collections.abc import Sequence
+import socket
+from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..contact.compiled import is_installed
 from ..contact.model import ForceModel
 from ..contact.models import catalogue
 from ..contact.power import Array
 from ..contact.strike import Rebound
 from ..contact.trajectories import integrate_all
-from ..errors import ImpactError, UsageError
+from ..errors import UsageError
 from ..text import safe_text
 from .settings import Solver
-
-# the models of a worker process, by key; they are made there, since functions cannot be sent
-_models: dict[str, ForceModel] = {}
-# why it cannot have them: an error while it begins would only end it
-_troubles: list[str] = []
 
 
 @dataclass(frozen=True)
@@ -49,6 +41,24 @@ class Block:
     status: NDArray[np.int8]
 
 
+@dataclass(frozen=True)
+class Kit:
+    """What a block is integrated with where nothing of its sweep is known: numbers, names and source.
+
+    Parameters
+    ----------
+    version : of this package
+    solver : how
+    sources : name and content of the Python files that models of one's own are in
+    hashes : key and SHA-256 of the models that are not built in
+    """
+
+    version: str
+    solver: Solver
+    sources: tuple[tuple[str, bytes], ...] = ()
+    hashes: tuple[tuple[str, str], ...] = ()
+
+
 def integrated(model: ForceModel, block: Block, solver: Solver) -> Rebound:
     """What becomes of a block by the law of its model."""
     return integrate_all(
@@ -57,42 +67,41 @@ def integrated(model: ForceModel, block: Block, solver: Solver) -> Rebound:
     )  # fmt: skip
 
 
-def begin(files: Sequence[Path], hashes: dict[str, str]) -> None:
-    """What a worker does first: learn the models, leave signals to the driver, and end when that does."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    driver = multiprocessing.parent_process()
-    if driver is not None:
-
-        def follow() -> None:
-            multiprocessing.connection.wait([driver.sentinel])
-            os._exit(1)
-
-        threading.Thread(target=follow, daemon=True).start()
-    _models.update(catalogue())
-    if hashes:
-        from .plugins import read_plugins
-
-        try:
-            plugins = read_plugins(files)
-        except ImpactError as error:
-            _troubles.append(str(error))
-            return
-        changed = [key for key, sha256 in hashes.items() if plugins.hashes.get(key) != sha256]
-        if changed:
-            _troubles.append(
-                f"{safe_text(', '.join(map(str, files or changed)))}: was changed while the sweep ran"
-            )
-            return
-        _models.update(catalogue(plugins.models))
-
-
-def work(block: Block, solver: Solver) -> Rebound:
-    """What becomes of a block; a pure function of it.
+def work(block: Block, kit: Kit) -> Rebound:
+    """What becomes of a block; a pure function of both, so that it may be done anywhere, and twice.
 
     Raises
     ------
-    UsageError : a plug-in is not what it was
+    UsageError : this place has another version, no numba where that is wanted, or not the same models
     """
-    if _troubles:
-        raise UsageError(_troubles[0])
-    return integrated(_models[block.key], block, solver)
+    return integrated(_models(kit)[block.key], block, kit.solver)
+
+
+# the models of the sweeps of which this place was sent something last
+@lru_cache(maxsize=4)
+def _models(kit: Kit) -> Mapping[str, ForceModel]:
+    from .. import __version__
+
+    here = socket.gethostname()
+    if kit.version != __version__:
+        raise UsageError(other_version(here, __version__, kit.version))
+    if kit.solver.core == "numba" and not is_installed():
+        raise UsageError(
+            f'{here}: has no numba, which the sweep is integrated by; wants it there, or solver.core = "numpy"'
+        )
+    if not kit.hashes:
+        return catalogue()
+    from .plugins import Source, read_plugins
+
+    plugins = read_plugins([Source(*one) for one in kit.sources])
+    lacking = [key for key, sha256 in kit.hashes if plugins.hashes.get(key) != sha256]
+    if lacking:
+        raise UsageError(
+            f"{here}: {safe_text(', '.join(lacking))}: wants the package that has it, in the version that is here"
+        )
+    return catalogue(plugins.models)
+
+
+def other_version(place: str, there: str, here: str) -> str:
+    """What is said of a place that has another version."""
+    return f"{place}: has impact {safe_text(there)}, this is {here}; wants the same"

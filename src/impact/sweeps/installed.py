@@ -28,11 +28,11 @@ GROUP = "impact.models"
 
 
 class Installed(NamedTuple):
-    """A model, the SHA-256 of the file that it was found in, no path, and the package with its version."""
+    """A model, the SHA-256 of the file that it was found in, no source, and the package with its version."""
 
     model: ForceModel
     sha256: str
-    path: None
+    source: None
     package: str
 
 

@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
+from typing import NamedTuple
 
 from ..contact.model import ForceModel
 from ..contact.models import catalogue
@@ -24,28 +25,35 @@ from .values import show
 LONG = 1000
 
 
+class Source(NamedTuple):
+    """A Python file that was read: its name, and the content that was executed, whatever it holds now."""
+
+    name: str
+    content: bytes
+
+
 @dataclass(frozen=True)
 class Plugin:
     """A model that is not built in, where it is from, and what tells its versions.
 
-    `path` is the Python file that was given, or `package` the name and version of an installed one; where both are
-    None, the model was given as a value. `sha256` is over the bytes of the file, or over the value's source.
+    `source` is the Python file that was given, or `package` the name and version of an installed one; where both
+    are None, the model was given as a value. `sha256` is over the bytes of the file, or over the value's source.
     """
 
     model: ForceModel
     sha256: str
-    path: Path | None = None
+    source: Source | None = None
     package: str | None = None
 
     @property
     def is_value(self) -> bool:
         """It can be sent to no other process, and no command can give it again."""
-        return self.path is None and self.package is None
+        return self.source is None and self.package is None
 
     @property
     def record(self) -> dict[str, str | None]:
         """What a result says of it: the file's name without a folder, or the package."""
-        file = None if self.path is None else self.path.name
+        file = None if self.source is None else Path(self.source.name).name
         about = {"file": file, "sha256": self.sha256}
         return about if self.package is None else {**about, "package": self.package}
 
@@ -61,9 +69,9 @@ class Plugins:
         return tuple(one.model for one in self.items)
 
     @property
-    def files(self) -> tuple[Path, ...]:
-        """Those that were read for them."""
-        return tuple(dict.fromkeys(one.path.absolute() for one in self.items if one.path is not None))
+    def sources(self) -> tuple[Source, ...]:
+        """The files that were read for them."""
+        return tuple(dict.fromkeys(one.source for one in self.items if one.source is not None))
 
     @property
     def hashes(self) -> dict[str, str]:
@@ -81,14 +89,15 @@ class Plugins:
         return Plugins(tuple(one for one in self.items if one.model.key in keys))
 
 
-def read_plugins(given: Sequence[ForceModel | str | Path]) -> Plugins:
+def read_plugins(given: Sequence[ForceModel | str | Path | Source]) -> Plugins:
     """The models of installed packages, those given, and those in the files given.
 
     The packages are imported and the files executed: give none that a data file names.
 
     Parameters
     ----------
-    given : models, and paths of Python files; of a file, every `ForceModel` at its top level is taken
+    given : models, and Python files by their paths or as they were read elsewhere; of a file, every `ForceModel`
+        at its top level is taken
 
     Raises
     ------
@@ -105,8 +114,10 @@ def read_plugins(given: Sequence[ForceModel | str | Path]) -> Plugins:
     for place, one in enumerate(given):
         if isinstance(one, ForceModel):
             read.append((f"plugins[{place}]", [Plugin(one, _source_hash(one))]))
+        elif isinstance(one, Source):
+            read.append((one.name, _of_source(one)))
         elif isinstance(one, str | Path):
-            read.append((str(one), _of_file(Path(one))))
+            read.append((str(one), _of_source(_read(Path(one)))))
         else:
             wants = "a ForceModel or the path of a Python file"
             raise UsageError(f"plugins[{place}]: got {safe_text(repr(one))}, wants {wants}")
@@ -137,42 +148,42 @@ def _check_storable(model: ForceModel, name: str) -> None:
         raise ModelError(f"{name}: model {model.key}: year: got {show(model.year)}, wants a year, such as 2026")
 
 
-def _of_file(path: Path) -> list[Plugin]:
+def _of_source(source: Source) -> list[Plugin]:
     """The models at the top level of a Python file, in their order."""
-    name = safe_text(str(path))
-    content = _read(path, name)
-    sha256 = hashlib.sha256(content).hexdigest()
-    module = _executed(content, path, name, sha256)
+    name = safe_text(source.name)
+    sha256 = hashlib.sha256(source.content).hexdigest()
+    module = _executed(source, name, sha256)
     # one that the file imported, to make its own from, is not its own
     known = {id(model) for model in catalogue().values()}
     found = {id(v): v for v in vars(module).values() if isinstance(v, ForceModel) and id(v) not in known}
     if not found:
         raise ModelError(f"{name}: no model in it, wants a ForceModel at its top level")
-    return [Plugin(model, sha256, path) for model in found.values()]
+    return [Plugin(model, sha256, source) for model in found.values()]
 
 
-def _read(path: Path, name: str) -> bytes:
-    """The bytes of a file that may be Python."""
+def _read(path: Path) -> Source:
+    """A file that may be Python."""
+    name = safe_text(str(path))
     if path.suffix != ".py":
         raise UsageError(f"{name}: its name does not end in .py, wants a Python file")
     try:
         # what is not a regular file might never end
         if path.exists() and not path.is_file():
             raise UsageError(f"{name}: not a regular file, wants a Python file")
-        return path.read_bytes()
+        return Source(str(path), path.read_bytes())
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise UsageError(f"{name}: cannot be read: {safe_text(reason)}") from None
 
 
-def _executed(content: bytes, path: Path, name: str, sha256: str) -> ModuleType:
-    """The module that these bytes are, executed; exactly those that were hashed, and no bytecode is kept of them.
+def _executed(source: Source, name: str, sha256: str) -> ModuleType:
+    """The module that a source is, executed; exactly the bytes that were hashed, and no bytecode is kept of them.
 
     Its folder is not searched for modules: a plug-in is one file, so that its hash is over all of it.
     """
-    file = str(path.absolute())
+    file = str(Path(source.name).absolute())
     try:
-        code = compile(content, file, "exec", dont_inherit=True)
+        code = compile(source.content, file, "exec", dont_inherit=True)
     except Exception as error:
         # a SyntaxError, and what the compiler raises for NUL bytes and absurd nesting
         line = getattr(error, "lineno", None) or 1

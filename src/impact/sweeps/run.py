@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
 from dataclasses import replace
+from functools import partial
 
 from ..contact.compiled import is_installed, serves
 from ..contact.strike import Rebound
-from ..errors import UsageError
-from .blocks import Block, integrated
+from ..errors import StoreError, UsageError
+from ..text import safe_text
+from .blocks import Block, Kit, integrated, work
 from .impacts import exponents
 from .plan import Plan
+from .teams import ALONE, Team
 from .trajectories import Stretch, Trajectories, block_of
 
 # impacts of compiled forms from which on numba is sooner done, though it has to be loaded
 WORTH = 200_000
+# how often a block is given out again
+AGAIN = 3
 
 
 def settled(plan: Plan, found: Sequence[Trajectories]) -> Plan:
@@ -51,47 +58,93 @@ def run(
     found: Sequence[Trajectories],
     todo: Iterable[Stretch],
     *,
-    jobs: int = 1,
-    threads: int = 1,
+    team: Team = ALONE,
     stopping: Callable[[], bool] = never,
 ) -> Iterator[tuple[Stretch, Rebound]]:
-    """Integrate block after block; with one process and thread in order, with more as they finish.
+    """Integrate block after block; alone in order, with others as they finish.
 
     Parameters
     ----------
     plan : what to run
     found : its trajectories
     todo : the stretches of them to be integrated
-    jobs : how many processes
-    threads : how many threads, of one process
-    stopping : whether no more are to be begun
+    team : who integrates
+    stopping : whether no more are to be begun; those that were are finished
 
     Raises
     ------
-    UsageError : both are more than one
+    UsageError : a model was given as a Python value, which cannot be sent; or those who integrate lack something
+    StoreError : they were killed again and again, or cannot be reached any more
     """
-    begun: dict[int, Stretch] = {}
+    integrate = _integrator(plan, team)
+    left, trials = deque(todo), Counter[int]()
+    while True:
+        given: dict[Future[Rebound], Stretch] = {}
+        try:
+            with team.executor() as executor:
 
-    def blocks() -> Iterator[Block]:
-        for stretch in todo:
-            begun[stretch.number] = stretch
-            yield block_of(plan, found, stretch)
+                def give(stretch: Stretch) -> Future[Rebound]:
+                    # no more is held of a block than what it is made of
+                    return executor.submit(integrate, block_of(plan, found, stretch))
 
-    if jobs > 1 and threads > 1:
-        raise UsageError(f"jobs: got {jobs} beside {threads} threads, wants one of the two")
-    if jobs > 1:
-        from .workers import spread
+                yield from _finished(give, left, given, team.room, stopping)
+                return
+        except BrokenExecutor:
+            # which of the blocks it did not live through cannot be known
+            left.extendleft(given.values())
+            trials.update(stretch.number for stretch in given.values() or left)
+            if max(trials.values()) > AGAIN:
+                raise StoreError(
+                    f"processes were killed {AGAIN + 1} times at the same trajectories: memory is short; or, of a "
+                    'program of your own, it lacks its if __name__ == "__main__":'
+                ) from None
 
-        for number, rebound in spread(plan, blocks(), jobs, stopping):
-            yield begun.pop(number), rebound
-        return
-    if threads > 1:
-        from .threads import spread_over_threads
 
-        for number, rebound in spread_over_threads(plan, blocks(), threads, stopping):
-            yield begun.pop(number), rebound
-        return
-    for stretch in todo:
-        if stopping():
-            return
-        yield stretch, integrated(plan.models[stretch.model], block_of(plan, found, stretch), plan.config.solver)
+def _finished(
+    give: Callable[[Stretch], Future[Rebound]],
+    left: deque[Stretch],
+    given: dict[Future[Rebound], Stretch],
+    room: Callable[[], int],
+    stopping: Callable[[], bool],
+) -> Iterator[tuple[Stretch, Rebound]]:
+    """Give what is left, as many blocks at a time as there is room for, and take them as they finish."""
+    try:
+        while True:
+            while left and len(given) < room() and not stopping():
+                given[give(left[0])] = left[0]
+                left.popleft()
+            if not given:
+                return
+            for future in wait(given, return_when=FIRST_COMPLETED).done:
+                rebound = future.result()
+                yield given.pop(future), rebound
+    finally:
+        for future in given:
+            future.cancel()
+
+
+def _integrator(plan: Plan, team: Team) -> Callable[[Block], Rebound]:
+    """What integrates a block of a plan, where the team is."""
+    if team.is_here:
+        models = {model.key: model for model in plan.models}
+        return lambda block: integrated(models[block.key], block, plan.config.solver)
+    values = [one.model.key for one in plan.plugins.items if one.is_value]
+    if values:
+        raise UsageError(
+            f"{safe_text(', '.join(values))} is given as a Python value, which cannot be sent to other processes; "
+            "wants the file that it is in, or jobs=1"
+        )
+    return partial(work, kit=kit_of(plan))
+
+
+def kit_of(plan: Plan) -> Kit:
+    """What the blocks of a plan are integrated with elsewhere."""
+    from .. import __version__
+
+    plugins = plan.plugins
+    return Kit(
+        __version__,
+        plan.config.solver,
+        tuple((one.name, one.content) for one in plugins.sources),
+        tuple(plugins.hashes.items()),
+    )
