@@ -12,6 +12,7 @@ from ..errors import UnfinishedError
 from ..text import safe_text
 from . import door
 from .options import Json, Overwrite, Plugins, Quiet, Sets
+from .who import Who
 from .words import dump
 
 
@@ -28,6 +29,15 @@ def sweep(
         int,
         typer.Option("--threads", metavar="N", min=1, help="Threads that integrate, in place of processes."),
     ] = 1,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            "--scheduler", metavar="ADDRESS", help="Dask's workers integrate: tcp://host:8786, or local."
+        ),
+    ] = None,
+    scheduler_file: Annotated[
+        Path | None, typer.Option("--scheduler-file", metavar="FILE", help="The same, by the scheduler's file.")
+    ] = None,
     max_points: Annotated[
         int, typer.Option("--max-points", metavar="N", min=1, help="Refuse a sweep of more points.")
     ] = 10**9,
@@ -42,10 +52,9 @@ def sweep(
         from .. import api
         from ..data import store, survey, work
         from ..data.sweeping import sweep_into
-        from ..sweeps.teams import team_of
         from . import progress, summary
 
-        team = team_of(jobs, threads)
+        who = Who(jobs, threads, scheduler, scheduler_file)
         plan = api.prepare(config, sets or (), plugins or (), max_points)
         if dry_run:
             from .dry_run import tell_of
@@ -63,7 +72,7 @@ def sweep(
         else:
             for source in (config, *(plugins or ())):
                 store.check_output(output, overwrite=overwrite, source=source)
-            with progress.progress(quiet=quiet) as tell:
+            with who.team(quiet=quiet) as team, progress.progress(quiet=quiet) as tell:
                 found = sweep_into(
                     output, plan, resume=resume, overwrite=overwrite, team=team, tell=tell,
                     stopping=stopping,

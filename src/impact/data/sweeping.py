@@ -14,7 +14,7 @@ import xarray as xr
 
 from ..contact.status import FIRST_FAILURE
 from ..contact.strike import Rebound
-from ..errors import StoreError, UnfinishedError
+from ..errors import StoreError, UnfinishedError, UsageError
 from ..sweeps.finished import Finished
 from ..sweeps.plan import Plan
 from ..sweeps.points import Rows, boxes_of
@@ -114,7 +114,7 @@ def sweep_into(
                 raise UnfinishedError
             rows = Finished(found, lambda number: _kept(work, blocks[number])).rows
             return _assemble(output, plan, found, rows, part_of(output), overwrite, at, tell, stopping)
-        except (StoreError, UnfinishedError) as error:
+        except (StoreError, UnfinishedError, UsageError) as error:
             shown = safe_text(str(folder_of(output)))
             # without the other word a result that is to be replaced would be in the way
             words = "--resume --overwrite" if os.path.lexists(output) else "--resume"

@@ -1,0 +1,52 @@
+"""Who integrates a sweep, as its options say: this process, others, threads, or the workers of a cluster."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..errors import UsageError
+from ..sweeps.teams import Team, team_of
+from .door import say
+
+
+@dataclass(frozen=True)
+class Who:
+    """What was asked for.
+
+    Raises
+    ------
+    UsageError : more than one of them
+    """
+
+    jobs: int = 1
+    threads: int = 1
+    scheduler: str | None = None
+    scheduler_file: Path | None = None
+
+    def __post_init__(self) -> None:
+        asked = [
+            *([f"--jobs {self.jobs}"] if self.jobs > 1 else []),
+            *([f"--threads {self.threads}"] if self.threads > 1 else []),
+            *([f"--scheduler {self.scheduler}"] if self.scheduler is not None else []),
+            *([f"--scheduler-file {self.scheduler_file}"] if self.scheduler_file is not None else []),
+        ]
+        if len(asked) > 1:
+            raise UsageError(f"{asked[0]}: given beside {asked[1]}, wants one of the two")
+
+    @contextmanager
+    def team(self, *, quiet: bool) -> Iterator[Team]:
+        """Those who integrate; a cluster is told of on stderr."""
+        place = self.scheduler if self.scheduler is not None else self.scheduler_file
+        if place is None:
+            yield team_of(self.jobs, self.threads)
+            return
+        from ..sweeps.cluster import cluster
+
+        with cluster(place) as (team, dashboard, workers):
+            if not quiet:
+                waits = "" if workers else ", waits for some"
+                say(f"{workers} worker{'' if workers == 1 else 's'}{waits}; dashboard: {dashboard}")
+            yield team

@@ -1,0 +1,141 @@
+"""A cluster of dask on this machine: a scheduler and workers, each a process started by command line."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import impact
+
+CONFIG = """title = "On a cluster"
+models = ["hertz", "lankarani-nikravesh-1990"]
+[solver]
+collapse = false
+core = "numpy"
+[output]
+variables = ["v1_post", "duration", "status"]
+[sweep]
+e = { linspace = [0.01, 0.99, 100000] }
+v1 = 1.0
+m1 = 1.0
+m2 = 1.0
+K = 1e9
+"""
+BLOCKS = 14
+PATIENCE = 60.0  # s after which what should have happened is not waited for any more
+DASK = (sys.executable, "-m", "dask")
+ALONE = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+
+
+@dataclass
+class Dask:
+    """A scheduler, and workers that come and go; `folder` is where they run, which is not where sweeps do."""
+
+    folder: Path
+    children: dict[str, subprocess.Popen[str]] = field(default_factory=dict)
+
+    @property
+    def file(self) -> Path:
+        return self.folder / "scheduler.json"
+
+    @property
+    def address(self) -> str:
+        import json
+
+        return str(json.loads(self.file.read_text())["address"])
+
+    def start(self, name: str, *words: str, **environment: str) -> None:
+        with (self.folder / f"{name}.log").open("w") as log:
+            self.children[name] = subprocess.Popen(
+                [*DASK, *words], cwd=self.folder, env={**os.environ, **ALONE, **environment}, text=True,
+                stdout=log, stderr=log,
+            )  # fmt: skip
+
+    def scheduler(self, *words: str) -> None:
+        self.start(
+            "scheduler", "scheduler", "--host", "127.0.0.1", "--port", "0", "--dashboard-address", "127.0.0.1:0",
+            "--scheduler-file", str(self.file), *words,
+        )  # fmt: skip
+        until(lambda: self.file.is_file() and self.file.stat().st_size > 0)
+
+    def worker(self, name: str, *, ready: bool = True, **environment: str) -> None:
+        self.start(
+            name, "worker", "--scheduler-file", str(self.file), "--name", name, "--nthreads", "1", "--no-nanny",
+            "--no-dashboard", "--local-directory", str(self.folder), **environment,
+        )  # fmt: skip
+        if ready:
+            until(lambda: "Registered to" in (self.folder / f"{name}.log").read_text())
+
+    def kill(self, *names: str) -> None:
+        """End them at once, each by its own id."""
+        for name in names:
+            self.children[name].send_signal(signal.SIGKILL)
+            self.children[name].wait()
+
+
+@contextmanager
+def dask(folder: Path, *workers: str) -> Iterator[Dask]:
+    folder.mkdir(parents=True)
+    found = Dask(folder)
+    try:
+        found.scheduler()
+        for name in workers:
+            found.worker(name)
+        yield found
+    finally:
+        found.kill(*(name for name, child in found.children.items() if child.poll() is None))
+
+
+@dataclass
+class Sweep:
+    """A sweep on the command line, in a folder with its config."""
+
+    folder: Path
+    process: subprocess.Popen[str]
+
+    def kept(self) -> set[str]:
+        """Its blocks that are kept."""
+        return {one.name for one in self.folder.glob("*.work/*.npz")}
+
+    def until_kept(self, count: int) -> None:
+        until(lambda: len(self.kept()) >= count or self.process.poll() is not None)
+        assert self.process.poll() is None, self.process.communicate()
+
+    def ends(self, code: int = 0) -> str:
+        """What it said, when it has ended with this code."""
+        _, said = self.process.communicate(timeout=PATIENCE)
+        assert self.process.returncode == code, said
+        return said
+
+    @property
+    def digest(self) -> str:
+        return digest(self.folder)
+
+
+def sweep(folder: Path, *words: str | Path, config: str = CONFIG) -> Sweep:
+    """Begin one."""
+    folder.mkdir(exist_ok=True)
+    (folder / "c.toml").write_text(config)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "impact", "sweep", "c.toml", *map(str, words)], cwd=folder,
+        env={**os.environ, **ALONE}, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )  # fmt: skip
+    return Sweep(folder, process)
+
+
+def digest(folder: Path) -> str:
+    return str(impact.load(folder / "results.h5").attrs["content_digest"])
+
+
+def until(condition: Callable[[], bool]) -> None:
+    begun = time.monotonic()
+    while not condition():
+        assert time.monotonic() - begun < PATIENCE
+        time.sleep(0.02)

@@ -1,0 +1,222 @@
+"""Sweeps by the workers of a scheduler of dask: the same content, whatever becomes of the processes."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import impact
+from impact.api import prepare
+from impact.sweeps.blocks import work
+from impact.sweeps.run import kit_of, settled
+from impact.sweeps.trajectories import block_of, stretches, trajectories
+
+from .clusters import BLOCKS, CONFIG, Dask, dask, digest, sweep
+from .conftest import ROOT
+
+pytestmark = pytest.mark.slow
+MINE = """import os
+import impact
+
+def force(elastic, v, {more}):
+    {does}
+    return elastic * (1 + 0.3 * v)
+
+MODEL = impact.ForceModel("mine", "Mine", 2026, "F = K δⁿ (1 + 0.3 δ̇)", "", force=force)
+"""
+
+
+@pytest.fixture(scope="module")
+def right(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The digest of the sweep in one process."""
+    one = sweep(tmp_path_factory.mktemp("one") / "sweep")
+    one.ends()
+    return one.digest
+
+
+@pytest.fixture
+def two(tmp_path: Path) -> Iterator[Dask]:
+    with dask(tmp_path / "cluster", "a", "b") as found:
+        yield found
+
+
+def test_the_same_content_by_address_file_and_local(two: Dask, tmp_path: Path, right: str) -> None:
+    for place, words in enumerate(
+        (("--scheduler", two.address), ("--scheduler-file", two.file), ("--scheduler", "local"))
+    ):
+        one = sweep(tmp_path / str(place), *words)
+        said = one.ends()
+        assert one.digest == right
+        assert re.search(r"^\d+ workers?; dashboard: http://127.0.0.1:\d+/status$", said, re.MULTILINE), said
+        assert "trajectories" in said
+        assert sorted(path.name for path in one.folder.iterdir()) == ["c.toml", "results.h5"]
+
+
+@pytest.mark.parametrize("moment", [1, 4, 8])
+def test_a_worker_killed_in_the_middle(two: Dask, tmp_path: Path, right: str, moment: int) -> None:
+    one = sweep(tmp_path / "sweep", "--scheduler", two.address)
+    one.until_kept(moment)
+    two.kill("a")
+    one.ends()
+    assert one.digest == right
+
+
+@pytest.mark.parametrize("moment", [1, 7])
+def test_all_workers_killed_and_new_ones_join(two: Dask, tmp_path: Path, right: str, moment: int) -> None:
+    one = sweep(tmp_path / "sweep", "--scheduler", two.address)
+    one.until_kept(moment)
+    two.kill("a", "b")
+    assert one.process.poll() is None
+    two.worker("c")
+    one.ends()
+    assert one.digest == right
+
+
+@pytest.mark.parametrize("moment", [1, 7])
+def test_the_scheduler_gone(two: Dask, tmp_path: Path, right: str, moment: int) -> None:
+    one = sweep(tmp_path / "sweep", "--scheduler", two.address)
+    one.until_kept(moment)
+    two.kill("scheduler")
+    said = one.ends(4)
+    assert re.search(rf"{two.address}: the scheduler is gone; [\d,]+ of 200,000 trajectories are kept in", said), (
+        said
+    )
+    assert "--resume goes on" in said
+    assert "Traceback" not in said
+    kept = {path: path.stat().st_mtime_ns for path in one.folder.glob("*.work/*.npz")}
+    assert moment <= len(kept) < BLOCKS
+    again = sweep(tmp_path / "sweep", "--resume")
+    again.until_kept(len(kept) + 1)
+    assert all(path.stat().st_mtime_ns == then for path, then in kept.items() if path.exists())
+    again.ends()
+    assert again.digest == right
+
+
+def other_version(folder: Path) -> dict[str, str]:
+    """The environment of a process that finds another version of the package."""
+    shutil.copytree(ROOT / "src" / "impact", folder / "impact", ignore=shutil.ignore_patterns("__pycache__"))
+    init = folder / "impact" / "__init__.py"
+    text = init.read_text(encoding="utf-8")
+    changed = text.replace(f'__version__ = "{impact.__version__}"', '__version__ = "0.0.1"')
+    assert changed != text
+    init.write_text(changed, encoding="utf-8")
+    return {"PYTHONPATH": str(folder)}
+
+
+def test_a_worker_of_another_version_is_refused(two: Dask, tmp_path: Path, right: str) -> None:
+    two.worker("old", **other_version(tmp_path / "other"))
+    said = sweep(tmp_path / "sweep", "--scheduler", two.address).ends(2)
+    assert f"has impact 0.0.1, this is {impact.__version__}; wants the same" in said
+    assert "tcp://127.0.0.1" in said
+    two.kill("old")
+    again = sweep(tmp_path / "sweep", "--scheduler", two.address, "--resume")
+    again.ends()
+    assert again.digest == right
+
+
+def test_a_worker_of_another_version_that_joins_later_is_refused(two: Dask, tmp_path: Path, right: str) -> None:
+    one = sweep(tmp_path / "sweep", "--scheduler", two.address)
+    one.until_kept(1)
+    two.worker("old", ready=False, **other_version(tmp_path / "other"))
+    two.kill("a")
+    said = one.ends(2)
+    assert re.search(rf"has impact 0\.0\.1, this is {re.escape(impact.__version__)}; wants the same; \d", said), (
+        said
+    )
+    assert "--resume goes on" in said
+    two.kill("old")
+    again = sweep(tmp_path / "sweep", "--scheduler", two.address, "--resume")
+    again.ends()
+    assert again.digest == right
+
+
+def test_a_worker_without_the_package_is_refused(two: Dask, tmp_path: Path) -> None:
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "impact.py").write_text("raise ImportError('none here')")
+    two.worker("bare", PYTHONPATH=str(tmp_path / "other"))
+    said = sweep(tmp_path / "sweep", "--scheduler", two.address).ends(2)
+    assert re.search("^tcp://127.0.0.1:.*: has no impact: none here; wants impact", said, re.MULTILINE), said
+
+
+def test_a_plug_in_whose_file_the_workers_have_not(two: Dask, tmp_path: Path) -> None:
+    text = MINE.format(more="t=None", does="pass").replace(", t=None", "")
+    config = CONFIG.replace('models = ["hertz", "lankarani-nikravesh-1990"]', 'models = ["mine"]')
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "mine.py").write_text(text, encoding="utf-8")
+    sweep(tmp_path / "one", "--plugin", "mine.py", config=config).ends()
+    one = sweep(tmp_path / "two", "--plugin", "mine.py", "--scheduler", two.address, config=config)
+    one.until_kept(1)
+    (tmp_path / "two" / "mine.py").unlink()
+    one.ends()
+    assert one.digest == digest(tmp_path / "one")
+
+
+def test_a_block_executed_twice(two: Dask, tmp_path: Path, right: str) -> None:
+    from distributed import Client
+
+    (tmp_path / "c.toml").write_text(CONFIG)
+    plan = prepare(tmp_path / "c.toml")
+    found = trajectories(plan)
+    plan = settled(plan, found)
+    block = block_of(plan, found, next(stretches(found)))
+    with Client(two.address, set_as_default=False) as client:
+        done = [client.submit(work, block, kit_of(plan), workers=[name], pure=False).result() for name in "ab"]
+    here = work(block, kit_of(plan))
+    for name, values in vars(here).items():
+        assert all(getattr(one, name).tobytes() == values.tobytes() for one in done), name
+    # one that died of a block takes nothing with it: another executes what it had begun, and the driver killed
+    # between a block and its file has it executed again
+    one = sweep(tmp_path / "sweep", "--scheduler", two.address)
+    one.until_kept(3)
+    one.process.kill()
+    one.process.communicate()
+    two.kill("a")
+    again = sweep(tmp_path / "sweep", "--scheduler", two.address, "--resume")
+    again.ends()
+    assert again.digest == right
+
+
+def test_a_block_that_kills_its_worker_once(two: Dask, tmp_path: Path) -> None:
+    config = CONFIG.replace('models = ["hertz", "lankarani-nikravesh-1990"]', 'models = ["mine"]')
+    mark = tmp_path / "died"
+    dies = f"""if os.path.basename(os.getcwd()) == "cluster" and not os.path.exists({str(mark)!r}):
+        open({str(mark)!r}, "w").close()
+        os.kill(os.getpid(), 9)"""
+    text = MINE.format(more="t=None", does=dies).replace(", t=None", "")
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "mine.py").write_text(text, encoding="utf-8")
+    sweep(tmp_path / "one", "--plugin", "mine.py", config=config).ends()
+    one = sweep(tmp_path / "two", "--plugin", "mine.py", "--scheduler", two.address, config=config)
+    one.ends()
+    assert mark.exists()
+    assert one.digest == digest(tmp_path / "one")
+
+
+def test_interrupted_it_is_resumed(two: Dask, tmp_path: Path, right: str) -> None:
+    one = sweep(tmp_path / "sweep", "--scheduler", two.address)
+    one.until_kept(2)
+    one.process.send_signal(signal.SIGINT)
+    said = one.ends(130)
+    assert "--resume goes on" in said
+    again = sweep(tmp_path / "sweep", "--scheduler", two.address, "--resume")
+    again.ends()
+    assert again.digest == right
+
+
+def test_nobody_answers(tmp_path: Path) -> None:
+    said = sweep(tmp_path / "sweep", "--scheduler", "tcp://127.0.0.1:1").ends(2)
+    assert "tcp://127.0.0.1:1: " in said
+    assert "wants the address of a scheduler of dask, such as tcp://host:8786" in said
+    assert "Traceback" not in said
+    assert not (tmp_path / "sweep" / "results.h5.work").exists()
+    said = sweep(tmp_path / "sweep", "--scheduler", "localhorst").ends(2)
+    assert said == "localhorst: wants the address of a scheduler of dask, such as tcp://host:8786; or local\n"
+    said = sweep(tmp_path / "sweep", "--scheduler", "local", "--jobs", "2").ends(2)
+    assert "--jobs 2: given beside --scheduler local, wants one of the two" in said
