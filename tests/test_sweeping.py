@@ -22,8 +22,9 @@ import impact
 from impact.api import execute, prepare
 from impact.cli.progress import Pace
 from impact.data.guard import is_in_pieces
+from impact.data.progress import Progress
 from impact.data.survey import held
-from impact.data.sweeping import Progress, sweep_into
+from impact.data.sweeping import sweep_into
 from impact.data.tally import tally_of
 from impact.errors import ConfigError, StoreError, UsageError
 from impact.sweeps.teams import team_of

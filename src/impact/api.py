@@ -21,11 +21,12 @@ from .data.compare import compare as compare
 from .data.impact import Impact as Impact
 from .data.impact import impact_of
 from .data.origin import config_of, picked_out, stored_config
+from .data.progress import Tell
 from .data.ranking import Ranking, ranking
 from .data.replay import repeats
 from .data.store import load as load
 from .data.store import save as save
-from .data.sweeping import Tell, in_memory
+from .data.sweeping import in_memory
 from .data.tolerances import Tolerances
 from .data.verdict import Verdict as Verdict
 from .errors import ImpactError as ImpactError

@@ -6,15 +6,13 @@ import errno
 import os
 import shutil
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from pathlib import Path
 
-import numpy as np
 import xarray as xr
 
-from ..contact.status import FIRST_FAILURE
 from ..contact.strike import Rebound
-from ..errors import StoreError, UnfinishedError, UsageError
+from ..errors import StoreError, UnfinishedError
 from ..sweeps.finished import Finished
 from ..sweeps.plan import Plan
 from ..sweeps.points import Rows, boxes_of
@@ -24,31 +22,18 @@ from ..sweeps.trajectories import BLOCK, Stretch, Trajectories, stretches, traje
 from ..text import safe_text
 from .assembly import Part, assemble, parts, parts_as_finished
 from .digest import Taken, content_digest
+from .progress import Gauge, Tell, kept
 from .results import outline
 from .sink import appearing
 from .store import check_output, vet_own
 from .tally import Survey, Tally
-from .work import Work, folder_of, part_of, working
+from .work import Work, folder_of, part_of, remove, working
 from .writer import writing
 
 # bytes that a result takes besides its values, about
 OVERHEAD = 2**16
 # points up to which a sweep of one block keeps nothing: it is done again sooner than it is read
 FEW = 2**20
-
-
-@dataclass(frozen=True)
-class Progress:
-    """How far a sweep is: trajectories integrated, and points stored, of all; and how many of either failed."""
-
-    trajectories: int
-    of_trajectories: int
-    points: int
-    of_points: int
-    failed: int
-
-
-Tell = Callable[[Progress], None]
 
 
 def sweep_into(
@@ -85,42 +70,62 @@ def sweep_into(
     plan = settled(plan, found)
     blocks = list(stretches(found))
     total = sum(one.count for one in found)
-    at = Progress(0, total, 0, plan.points, 0)
+    gauge = Gauge.begin(total, plan.points, tell)
     if total <= BLOCK and plan.points <= FEW and not os.path.lexists(folder_of(output)):
-        finished = {stretch.number: rebound for stretch, rebound in run(plan, found, blocks)}
-        rows, at = Finished(found, finished.__getitem__).rows, replace(at, trajectories=total)
+        finished = {}
+        for stretch, rebound in run(plan, found, blocks):
+            finished[stretch.number] = rebound
+            gauge.count(stretch, rebound)
+        rows = Finished(found, finished.__getitem__).rows
         try:
-            return _assemble(output, plan, found, rows, None, overwrite, at, tell, stopping)
+            return assembled(output, plan, found, rows, None, overwrite, gauge, stopping)
         except UnfinishedError:
             raise UnfinishedError("nothing was written") from None
 
-    with working(output, plan, resume=resume, overwrite=overwrite) as work:
+    folder = folder_of(output)
+    with working(folder, plan, resume=resume, overwrite=overwrite) as work:
         # another may have stored it since
         check_output(output, overwrite=overwrite)
-        todo: list[Stretch] = []
-        try:
-            for stretch in blocks:
-                kept = None if stopping() else work.load(stretch)
-                if kept is None:
-                    todo.append(stretch)
-                else:
-                    at = _further(at, stretch, kept)
-            tell(at)
-            for stretch, rebound in run(plan, found, todo, team=team, stopping=stopping):
-                work.store(stretch, rebound)
-                at = _further(at, stretch, rebound)
-                tell(at)
-            if at.trajectories < total:
-                raise UnfinishedError
-            rows = Finished(found, lambda number: _kept(work, blocks[number])).rows
-            return _assemble(output, plan, found, rows, part_of(output), overwrite, at, tell, stopping)
-        except (StoreError, UnfinishedError, UsageError) as error:
-            shown = safe_text(str(folder_of(output)))
-            # without the other word a result that is to be replaced would be in the way
-            words = "--resume --overwrite" if os.path.lexists(output) else "--resume"
-            left = f"{at.trajectories:,} of {total:,} trajectories are kept in {shown}; {words} goes on"
-            told = [str(error), *_room(error, output, plan, total - at.trajectories), left]
-            raise type(error)("; ".join(filter(None, told))) from error
+        # without the other word a result that is to be replaced would be in the way
+        again = "--resume --overwrite" if os.path.lexists(output) else "--resume"
+        with kept(folder, gauge, again, lambda error: _room(error, output, plan, gauge)):
+            fill(work, plan, found, blocks, gauge, team, stopping)
+            rows = Finished(found, lambda number: again_loaded(work, blocks[number])).rows
+            survey = assembled(output, plan, found, rows, part_of(output), overwrite, gauge, stopping)
+        remove(folder)
+    return survey
+
+
+def fill(
+    work: Work,
+    plan: Plan,
+    found: Sequence[Trajectories],
+    blocks: Sequence[Stretch],
+    gauge: Gauge,
+    team: Team,
+    stopping: Callable[[], bool],
+) -> None:
+    """Have all of some blocks in a work folder.
+
+    Raises
+    ------
+    StoreError, UsageError : see `sweep_into`
+    UnfinishedError : it was told to stop
+    """
+    todo: list[Stretch] = []
+    for stretch in blocks:
+        one = None if stopping() else work.load(stretch)
+        if one is None:
+            todo.append(stretch)
+        else:
+            gauge.count(stretch, one)
+    gauge.say()
+    for stretch, rebound in run(plan, found, todo, team=team, stopping=stopping):
+        work.store(stretch, rebound)
+        gauge.count(stretch, rebound)
+        gauge.say()
+    if not gauge.is_full:
+        raise UnfinishedError
 
 
 def in_memory(plan: Plan, *, team: Team = ALONE, tell: Tell, stopping: Callable[[], bool]) -> xr.Dataset:
@@ -132,36 +137,33 @@ def in_memory(plan: Plan, *, team: Team = ALONE, tell: Tell, stopping: Callable[
     """
     found = trajectories(plan)
     plan = settled(plan, found)
-    total = sum(one.count for one in found)
-    at = Progress(0, total, 0, plan.points, 0)
+    gauge = Gauge.begin(sum(one.count for one in found), plan.points, tell)
 
     def finished() -> Iterator[tuple[Stretch, Rebound]]:
-        nonlocal at
         for stretch, rebound in run(plan, found, stretches(found), team=team, stopping=stopping):
-            at = _further(at, stretch, rebound)
-            tell(at)
+            gauge.count(stretch, rebound)
+            gauge.say()
             yield stretch, rebound
-        if at.trajectories < total or stopping():
+        if not gauge.is_full or stopping():
             raise UnfinishedError("nothing was written")
 
     return assemble(plan, parts_as_finished(plan, found, finished()))
 
 
-def _further(at: Progress, stretch: Stretch, rebound: Rebound) -> Progress:
-    """With one more block finished."""
-    failed = int(np.count_nonzero(rebound.status >= FIRST_FAILURE))
-    return replace(at, trajectories=at.trajectories + stretch.size, failed=at.failed + failed)
+def again_loaded(work: Work, stretch: Stretch) -> Rebound:
+    """A block that was finished.
 
-
-def _kept(work: Work, stretch: Stretch) -> Rebound:
-    """A block that was finished."""
+    Raises
+    ------
+    StoreError : it is damaged
+    """
     rebound = work.load(stretch)
     if rebound is None:
         raise StoreError(f"{safe_text(str(work.path(stretch.number)))}: cannot be read any more")
     return rebound
 
 
-def _room(error: Exception, output: Path, plan: Plan, left: int) -> list[str]:
+def _room(error: Exception, output: Path, plan: Plan, gauge: Gauge) -> list[str]:
     """On a full disk, how much more room it takes."""
     cause = error.__cause__
     if not isinstance(cause, OSError) or cause.errno not in (errno.ENOSPC, errno.EDQUOT):
@@ -169,24 +171,25 @@ def _room(error: Exception, output: Path, plan: Plan, left: int) -> list[str]:
     wanted = (
         outline(plan).nbytes
         + OVERHEAD
-        + left * sum(getattr(Rebound.blank(1), one.name).nbytes for one in fields(Rebound))
+        + (gauge.at.of_trajectories - gauge.at.trajectories)
+        * sum(getattr(Rebound.blank(1), one.name).nbytes for one in fields(Rebound))
     )
     free = shutil.disk_usage(output.parent).free
     return [f"it takes {wanted:,} bytes more, {free:,} are free"]
 
 
-def _assemble(
+def assembled(
     output: Path,
     plan: Plan,
     found: Sequence[Trajectories],
     rows: Rows,
     part: Path | None,
     overwrite: bool,
-    at: Progress,
-    tell: Tell,
+    gauge: Gauge,
     stopping: Callable[[], bool],
 ) -> Survey:
     """Write the result of finished trajectories, and give it its name."""
+    at = gauge.at
     made, output_of = outline(plan), plan.config.output
     tally, digests = Tally(), {str(name): Taken() for name in made.data_vars}
     along_model = {name for name in digests if "model" in made[name].dims}
@@ -198,7 +201,7 @@ def _assemble(
                     put(name, one.where(name in along_model), values)
 
             def check() -> None:
-                tell(replace(at, points=max(tally.points, stored), failed=tally.failed or at.failed))
+                gauge.tell(replace(at, points=max(tally.points, stored), failed=tally.failed or at.failed))
                 if stopping():
                     raise UnfinishedError
 

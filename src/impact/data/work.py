@@ -89,12 +89,12 @@ class Work:
 
 
 @contextlib.contextmanager
-def working(output: Path, plan: Plan, *, resume: bool, overwrite: bool) -> Iterator[Work]:
-    """The work folder of a sweep, locked; it goes when the block ends without an error.
+def working(folder: Path, plan: Plan, *, resume: bool, overwrite: bool) -> Iterator[Work]:
+    """A work folder, locked.
 
     Parameters
     ----------
-    output : the result that the sweep writes
+    folder : where
     plan : what it runs
     resume : go on with what a leftover folder holds
     overwrite : throw away what a leftover folder holds, unless it is resumed
@@ -105,7 +105,6 @@ def working(output: Path, plan: Plan, *, resume: bool, overwrite: bool) -> Itera
     UsageError : a leftover folder is neither to be resumed nor overwritten, or is of another sweep
     StoreError : the disk is full or failed
     """
-    folder = folder_of(output)
     _check(folder)
     record = _record(plan)
     lock = FileLock(folder / LOCK, timeout=0)
@@ -113,9 +112,6 @@ def working(output: Path, plan: Plan, *, resume: bool, overwrite: bool) -> Itera
         _lock(lock, folder)
         _prepare(folder, record, resume=resume, overwrite=overwrite)
         yield Work(folder, _key(record))
-        # the result is whole: what cannot be removed, and what others have put there, does no harm
-        with contextlib.suppress(OSError):
-            _remove(folder)
     finally:
         lock.release()
 
@@ -130,7 +126,7 @@ def tidy(output: Path, plan: Plan) -> None:
             with FileLock(folder / LOCK, timeout=0):
                 if not os.path.lexists(folder / PLAN) or _is_of(folder, _record(plan), resume=True):
                     part_of(output).unlink(missing_ok=True)
-                    _remove(folder)
+                    remove(folder)
 
 
 def _check(folder: Path) -> None:
@@ -144,10 +140,12 @@ def _check(folder: Path) -> None:
             raise UsageError(f"{shown}: holds {safe_text(strange[0])}, and no {PLAN}; it is left alone")
 
 
-def _remove(folder: Path) -> None:
-    _clear(folder, plan=True)
-    (folder / LOCK).unlink()
-    folder.rmdir()
+def remove(folder: Path) -> None:
+    """Remove a folder whose result is whole; what cannot be, and what others have put there, does no harm."""
+    with contextlib.suppress(OSError):
+        _clear(folder, plan=True)
+        (folder / LOCK).unlink()
+        folder.rmdir()
 
 
 def _lock(lock: FileLock, folder: Path) -> None:
