@@ -18,3 +18,5 @@ Plugins = Annotated[
     typer.Option("--plugin", metavar="FILE", help="Python file with models of your own; may be repeated."),
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
+Output = Annotated[Path, typer.Option("-o", "--output", help="The result file.")]
+AllowFailed = Annotated[bool, typer.Option("--allow-failed", help="Exit 0 even if points failed.")]

@@ -7,12 +7,15 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import typer
 from rich.table import Table
 
 from ..contact.status import FIRST_FAILURE, Status
 from ..text import safe_text
+from . import door
 from .console import cell, console, shown, table
 from .progress import progress
+from .words import dump
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -47,6 +50,31 @@ def summary(survey: Survey, output: Path) -> dict[str, Any]:
         "trajectories": survey.trajectories, "status": counted(tally.counts), "failed": tally.failed,
         "first_failed": failures, "content_digest": outline.attrs["content_digest"],
     }  # fmt: skip
+
+
+def conclude(survey: Survey, output: Path, *, fresh: bool, quiet: bool, as_json: bool, allow_failed: bool) -> None:
+    """Tell what came out of a sweep, and end with the exit code that it has.
+
+    Parameters
+    ----------
+    survey : the result
+    output : its file
+    fresh : whether it was stored just now
+    quiet, as_json, allow_failed : as the options of those names
+    """
+    told = summary(survey, output)
+    if not quiet:
+        if fresh:
+            with door.readers_may_leave(sys.stderr):
+                print_summary(survey, told)
+        else:
+            door.say(f"{safe_text(str(output))}: already holds this sweep; nothing to do")
+    if as_json:
+        print(dump(told))
+    if told["failed"] and not allow_failed:
+        if quiet or not fresh:
+            door.say(failed_line(told), error=True)
+        raise typer.Exit(door.LANES_FAILED)
 
 
 def failed_line(found: Mapping[str, Any]) -> str:

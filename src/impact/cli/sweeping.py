@@ -2,27 +2,25 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from ..errors import UnfinishedError
+from ..errors import UnfinishedError, UsageError
 from ..text import safe_text
 from . import door
-from .options import Json, Overwrite, Plugins, Quiet, Sets
+from .options import AllowFailed, Json, Output, Overwrite, Plugins, Quiet, Sets
 from .who import Who
-from .words import dump
 
 
 def sweep(
     config: Annotated[Path, typer.Argument(help="The sweep, a TOML file; `impact init` writes one.")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="The result file.")] = Path("results.h5"),
+    output: Output = Path("results.h5"),
     sets: Sets = None,
     plugins: Plugins = None,
     overwrite: Overwrite = False,
-    allow_failed: Annotated[bool, typer.Option("--allow-failed", help="Exit 0 even if points failed.")] = False,
+    allow_failed: AllowFailed = False,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with a sweep that was interrupted.")] = False,
     jobs: Annotated[int, typer.Option("--jobs", "-j", metavar="N", min=1, help="Processes that integrate.")] = 1,
     threads: Annotated[
@@ -37,6 +35,10 @@ def sweep(
     ] = None,
     scheduler_file: Annotated[
         Path | None, typer.Option("--scheduler-file", metavar="FILE", help="The same, by the scheduler's file.")
+    ] = None,
+    shard: Annotated[
+        str | None,
+        typer.Option("--shard", metavar="K/N", help="Do the K-th of N parts, for impact merge; goes on."),
     ] = None,
     max_points: Annotated[
         int, typer.Option("--max-points", metavar="N", min=1, help="Refuse a sweep of more points.")
@@ -56,6 +58,16 @@ def sweep(
 
         who = Who(jobs, threads, scheduler, scheduler_file)
         plan = api.prepare(config, sets or (), plugins or (), max_points)
+        if shard is not None:
+            from .shards import do
+
+            if dry_run:
+                raise UsageError(f"--shard {safe_text(shard)}: given beside --dry-run, which tells of the whole")
+            changes = [word for one in sets or () for word in ("--set", one)]
+            own = [word for one in plugins or () for word in ("--plugin", str(one))]
+            command = ["impact", "sweep", str(config), "-o", str(output), *changes, *own]
+            do(plan, shard, command, output, who, overwrite=overwrite, quiet=quiet, stopping=stopping)
+            return
         if dry_run:
             from .dry_run import tell_of
 
@@ -79,16 +91,4 @@ def sweep(
                 )  # fmt: skip
             if stopping():
                 raise UnfinishedError(f"{safe_text(str(output))} was stored whole")
-    told = summary.summary(found, output)
-    if not quiet:
-        if fresh:
-            with door.readers_may_leave(sys.stderr):
-                summary.print_summary(found, told)
-        else:
-            door.say(f"{safe_text(str(output))}: already holds this sweep; nothing to do")
-    if as_json:
-        print(dump(told))
-    if told["failed"] and not allow_failed:
-        if quiet or not fresh:
-            door.say(summary.failed_line(told), error=True)
-        raise typer.Exit(door.LANES_FAILED)
+    summary.conclude(found, output, fresh=fresh, quiet=quiet, as_json=as_json, allow_failed=allow_failed)

@@ -24,6 +24,7 @@ from ..sweeps.plan import Plan
 from ..sweeps.run import settled
 from ..sweeps.trajectories import BLOCK, Stretch, trajectories
 from ..text import safe_text
+from .apart import differences
 from .results import SCHEMA_VERSION
 from .sink import appearing, sync_folder
 
@@ -111,6 +112,27 @@ def working(folder: Path, plan: Plan, *, resume: bool, overwrite: bool) -> Itera
     try:
         _lock(lock, folder)
         _prepare(folder, record, resume=resume, overwrite=overwrite)
+        yield Work(folder, _key(record))
+    finally:
+        lock.release()
+
+
+@contextlib.contextmanager
+def held(folder: Path, plan: Plan) -> Iterator[Work]:
+    """A work folder of a plan as it is, locked.
+
+    Raises
+    ------
+    InUseError, StoreError : see `working`
+    UsageError : it is of another sweep
+    """
+    record = _record(plan)
+    told = _told_apart(folder, record)
+    if told:
+        raise UsageError(f"{safe_text(str(folder))}: {told}; wants the folders of one sweep")
+    lock = FileLock(folder / LOCK, timeout=0)
+    try:
+        _lock(lock, folder)
         yield Work(folder, _key(record))
     finally:
         lock.release()
@@ -205,36 +227,23 @@ def _is_of(folder: Path, record: Mapping[str, Any], *, resume: bool) -> bool:
     ------
     UsageError : it is to be resumed, and is of another sweep, which is told
     """
-    shown = safe_text(str(folder))
     if not resume or not os.path.lexists(folder / PLAN):
         # without a plan it was interrupted before anything was done
         return False
+    told = _told_apart(folder, record)
+    if told:
+        raise UsageError(f"{safe_text(str(folder))}: {told}; {ELSE}")
+    return True
+
+
+def _told_apart(folder: Path, record: Mapping[str, Any]) -> str | None:
+    """In what a folder is of another sweep; None if it is of this one."""
     try:
         if not (folder / PLAN).is_file():
             raise ValueError
         stored = json.loads((folder / PLAN).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
-        raise UsageError(f"{shown}: its {PLAN} cannot be read; {ELSE}") from None
-    told = list(_differences(stored, json.loads(json.dumps(record))))
-    if told:
-        more = f" and {len(told) - TOLD} more" if len(told) > TOLD else ""
-        raise UsageError(f"{shown}: is of another sweep: {'; '.join(told[:TOLD])}{more}; {ELSE}")
-    return True
-
-
-def _differences(there: object, here: object, path: str = "") -> Iterator[str]:
-    """In what two records differ, each with its place."""
-    if isinstance(there, dict) and isinstance(here, dict):
-        for key in dict.fromkeys((*there, *here)):
-            name = key if path in ("", "physics") else f"{path}.{key}"
-            yield from _differences(there.get(key), here.get(key), str(name))
-    elif isinstance(there, list) and isinstance(here, list) and len(there) == len(here):
-        for place, (one, other) in enumerate(zip(there, here, strict=True)):
-            yield from _differences(one, other, f"{path}[{place}]")
-    elif there != here and not (there != there and here != here):
-        yield f"{safe_text(path)}: {_shown(there)} there, {_shown(here)} here"
-
-
-def _shown(value: object) -> str:
-    text = f"{len(value)} values" if isinstance(value, list) else json.dumps(value)
-    return safe_text(text, 60)
+        return f"its {PLAN} cannot be read"
+    told = list(differences(stored, json.loads(json.dumps(record))))
+    more = f" and {len(told) - TOLD} more" if len(told) > TOLD else ""
+    return f"is of another sweep: {'; '.join(told[:TOLD])}{more}" if told else None
