@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import json
 import os
+import pickle
 import pty
 import re
 import shlex
 import subprocess
 import sys
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import nullcontext
 from multiprocessing import get_context
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -27,7 +30,10 @@ from impact.data.survey import held
 from impact.data.sweeping import sweep_into
 from impact.data.tally import tally_of
 from impact.errors import ConfigError, StoreError, UsageError
-from impact.sweeps.teams import team_of
+from impact.sweeps.blocks import work
+from impact.sweeps.run import kit_of, run
+from impact.sweeps.teams import Team, team_of
+from impact.sweeps.trajectories import block_of, stretches, trajectories
 
 from .conftest import ROOT, WIDE, Run
 from .forked import Forked
@@ -80,6 +86,26 @@ def test_a_dry_run_tells_what_a_sweep_takes_and_writes_nothing(cli: Run, blocks:
     assert found["bytes"] == result.nbytes
     assert found["points"] == result["status"].size
     assert found["seconds"] > 0.0
+
+
+def test_a_dry_run_tells_what_goes_over_the_wire_and_how_many_workers_are_of_use(cli: Run, blocks: Path) -> None:
+    words = ("sweep", blocks, "--dry-run", "--set", "solver.collapse=false", "--set", 'solver.core="numpy"')
+    told = cli(*words, cwd=blocks.parent).stdout.splitlines()[-1]
+    found = json.loads(cli(*words, "--json", cwd=blocks.parent).stdout)
+    counts = r"(\d+:\d\d by \d+, )+\d+:\d\d by \d+ workers"
+    wire = f"{found['wire']:,} bytes over the wire"
+    assert re.fullmatch(f"on a cluster: {wire}; about {counts}; more are of no use", told), told
+    plan = prepare(blocks, ["solver.collapse=false", 'solver.core="numpy"'])
+    trajectories_of_plan = trajectories(plan)
+    sent = 0
+    for stretch in stretches(trajectories_of_plan):
+        block = block_of(plan, trajectories_of_plan, stretch)
+        sent += len(pickle.dumps((block, kit_of(plan)))) + len(pickle.dumps(work(block, kit_of(plan))))
+    # one block is weighed for all
+    assert found["wire"] == pytest.approx(sent, rel=0.1)
+    seconds = {int(count): time for count, time in found["by_workers"].items()}
+    assert list(seconds) == sorted(seconds)
+    assert found["seconds"] == seconds[1] == max(seconds.values())
 
 
 def test_a_dry_run_says_where_equal_values_are_not_looked_for(cli: Run, blocks: Path) -> None:
@@ -234,6 +260,28 @@ def test_any_executor_integrates(blocks: Path) -> None:
         assert threads.submit(len, "abc").result() == 3
     with pytest.raises(UsageError, match="got jobs = 2 and an executor, wants one of them"):
         impact.sweep(blocks, jobs=2, executor=threads)
+
+
+def test_no_more_blocks_are_given_than_there_is_room_for(blocks: Path) -> None:
+    waiting, most = set[Future[object]](), 0
+
+    class Counting(ThreadPoolExecutor):
+        def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+            nonlocal most
+            future = super().submit(fn, *args, **kwargs)
+            waiting.add(future)
+            most = max(most, len(waiting))
+            return future
+
+    plan = prepare(blocks, ["solver.collapse=false", "solver.rtol=1e-4"])
+    found = trajectories(plan)
+    todo = list(stretches(found, 500))
+    with Counting(2) as executor:
+        team = Team(lambda: nullcontext(executor), lambda: 5, is_here=True)
+        for _ in run(plan, found, todo, team=team):
+            waiting -= {future for future in waiting if future.done()}
+    assert len(todo) > 100
+    assert most == 5
 
 
 def test_an_executor_that_stays_broken_is_told() -> None:

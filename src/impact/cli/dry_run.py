@@ -35,3 +35,6 @@ def tell_of(plan: Plan, jobs: int, *, as_json: bool) -> None:
     counts = f"{found.points:,} points from {found.trajectories:,} trajectories"
     time = f"about {clock(found.seconds)} by {found.core} and what the disk takes"
     out.print(f"{counts}, {size}, {time}; nothing was written")
+    if len(found.by_workers) > 1:
+        many = ", ".join(f"{clock(seconds)} by {count:,}" for count, seconds in found.by_workers.items())
+        out.print(f"on a cluster: {found.wire:,} bytes over the wire; about {many} workers; more are of no use")

@@ -2,18 +2,29 @@
 
 from __future__ import annotations
 
+import io
+import pickle
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
 from typing import Literal
 
 from ..sweeps.blocks import integrated
 from ..sweeps.plan import Plan
 from ..sweeps.points import boxes
-from ..sweeps.run import settled
+from ..sweeps.run import kit_of, settled
 from ..sweeps.trajectories import Trajectories, block_of, stretches, trajectories
 from .assembly import part_at
 from .digest import Taken
+from .packing import pack
 from .results import outline
+
+# numbers of workers of which the time is told
+WORKERS = (1, 2, 8, 32, 128, 512)
+# what the driver does for a block that goes elsewhere is about so many times what is timed here: the rest is that
+# of dask, as scripts/bench_scaling.py measures it
+DASK = 2.0
 
 
 @dataclass(frozen=True)
@@ -40,7 +51,9 @@ class Collapse:
 class Estimate:
     """What a sweep would take: bytes of the result before it is packed, and of what is kept while it runs.
 
-    The writing to the disk comes on top of the seconds. `core` is what would integrate.
+    The writing to the disk comes on top of the seconds. `core` is what would integrate; `wire` are the bytes that
+    go to workers elsewhere and come back, `by_workers` the seconds with some of them; the last number is the
+    largest that is of use, because then the driver is busy.
     """
 
     points: int
@@ -50,6 +63,8 @@ class Estimate:
     kept: int
     seconds: float
     core: str
+    wire: int
+    by_workers: dict[int, float]
 
 
 def estimate(plan: Plan, jobs: int = 1) -> Estimate:
@@ -68,19 +83,43 @@ def estimate(plan: Plan, jobs: int = 1) -> Estimate:
     chosen = blocks[len(blocks) // 2]
     # the first time loads, or even compiles, what integrates
     for _ in range(2):
-        begun = time.perf_counter()
-        rebound = integrated(plan.models[chosen.model], block_of(plan, found, chosen), plan.config.solver)
-        seconds = (time.perf_counter() - begun) / chosen.size * total / jobs
+        with _timed() as integrating:
+            rebound = integrated(plan.models[chosen.model], block_of(plan, found, chosen), plan.config.solver)
+    with _timed() as driving:
+        sent = len(pickle.dumps((block_of(plan, found, chosen), kit_of(plan)), pickle.HIGHEST_PROTOCOL))
+        back = pickle.dumps(rebound, pickle.HIGHEST_PROTOCOL)
+        pickle.loads(back)
+        pack(io.BytesIO(), "", rebound)
     # what became of the trajectories of a box does not matter for its time: those of the block, again and again
     box = replace(next(boxes(1, plan.shape)), model=chosen.model)
+    with _timed() as assembling:
+        part = part_at(plan, found, lambda _, numbers: rebound.take(numbers % chosen.size), box)
+        for values in part.values.values():
+            Taken().add(values)
+    each, own = integrating() / chosen.size, DASK * driving() / chosen.size
+    after = assembling() / box.size * plan.points
+    busy = min(max(round(each / own), 1), len(blocks))
+    counts = [*(count for count in WORKERS if count < busy), busy]
+    return Estimate(
+        plan.points,
+        total,
+        tuple(_collapse(plan, one) for one in found),
+        outline(plan).nbytes,
+        total * sum(getattr(rebound, one.name).itemsize for one in fields(rebound)),
+        each * total / jobs + after,
+        plan.config.solver.core,
+        round((sent + len(back)) / chosen.size * total),
+        {count: max(each / count, own) * total + after for count in counts},
+    )
+
+
+@contextmanager
+def _timed() -> Iterator[Callable[[], float]]:
+    """How many seconds it took, when it is over."""
     begun = time.perf_counter()
-    part = part_at(plan, found, lambda _, numbers: rebound.take(numbers % chosen.size), box)
-    for values in part.values.values():
-        Taken().add(values)
-    seconds += (time.perf_counter() - begun) / box.size * plan.points
-    kept = total * sum(getattr(rebound, one.name).itemsize for one in fields(rebound))
-    models = tuple(_collapse(plan, one) for one in found)
-    return Estimate(plan.points, total, models, outline(plan).nbytes, kept, seconds, plan.config.solver.core)
+    ended = begun
+    yield lambda: ended - begun
+    ended = time.perf_counter()
 
 
 def _collapse(plan: Plan, own: Trajectories) -> Collapse:

@@ -11,11 +11,10 @@ import hashlib
 import json
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from filelock import FileLock, Timeout
 
 from ..contact.strike import Rebound
@@ -25,13 +24,13 @@ from ..sweeps.run import settled
 from ..sweeps.trajectories import BLOCK, Stretch, trajectories
 from ..text import safe_text
 from .apart import differences
+from .packing import pack, unpack
 from .results import SCHEMA_VERSION
 from .sink import appearing, sync_folder
 
 PLAN, LOCK = "plan.json", "lock"
 ELSE = "give the sweep that it is of, another output, or --overwrite to begin anew"
 TOLD = 3  # differences
-FIELDS = tuple(one.name for one in fields(Rebound))
 
 
 def folder_of(output: Path) -> Path:
@@ -66,27 +65,14 @@ class Work:
         StoreError : the disk is full or failed
         """
         with appearing(self.path(stretch.number), overwrite=True, part=self.folder / "block.part") as sink:
-            np.savez(sink, of=self._of(stretch), **{name: getattr(rebound, name) for name in FIELDS})
+            pack(sink, self._of(stretch), rebound)
 
     def load(self, stretch: Stretch) -> Rebound | None:
         """A finished block; None if it is not there, or not whole."""
         # what is no regular file might never end
         if not self.path(stretch.number).is_file():
             return None
-        try:
-            with np.load(self.path(stretch.number), allow_pickle=False) as stored:
-                if stored["of"].item() != self._of(stretch):
-                    return None
-                arrays = {name: stored[name] for name in FIELDS}
-        # numpy and zipfile raise almost anything on a damaged file
-        except Exception:
-            return None
-        blank = Rebound.blank(stretch.stop - stretch.start)
-        right = all(
-            (one.shape, one.dtype) == (getattr(blank, name).shape, getattr(blank, name).dtype)
-            for name, one in arrays.items()
-        )
-        return Rebound(**arrays) if right else None
+        return unpack(self.path(stretch.number), self._of(stretch), stretch.size)
 
 
 @contextlib.contextmanager

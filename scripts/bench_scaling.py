@@ -1,0 +1,174 @@
+"""How does a sweep scale over processes and over dask's workers, and when is the driver the bottleneck?
+
+One sweep of two laws, all impacts distinct, nothing collapsed, goes into a file by one process, by two, by one
+and by two workers of dask; scheduler and workers are started by command line on this machine. Printed are
+trajectories a second from the plan to the whole file, and their ratio to one process. For dask also the
+processor time of the driver and of the scheduler for a block while workers integrate, beyond what they take when
+idle, and the bytes over the wire for a trajectory, as the loopback interface counts them; and from these how
+many workers they keep busy: the time that a worker takes for a block over theirs. The file is assembled when all
+is integrated, in its own time.
+
+    python scripts/bench_scaling.py [--points 1000000] [--core numpy]
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from concurrent.futures import wait
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import psutil
+from rich.console import Console
+from rich.table import Table
+
+from impact.api import prepare
+from impact.data.progress import Progress
+from impact.data.sweeping import sweep_into
+from impact.sweeps.blocks import Block, integrated, work
+from impact.sweeps.cluster import cluster
+from impact.sweeps.plan import Plan
+from impact.sweeps.run import kit_of, settled
+from impact.sweeps.teams import AHEAD, Team, team_of
+from impact.sweeps.trajectories import block_of, stretches, trajectories
+
+IDLE = 5.0  # s
+LAWS = ("lankarani-nikravesh-1990", "gharib-hurmuzlu-2012")
+
+
+def plan_of(points: int, core: str) -> Plan:
+    """Impacts of the two balls of Table 1, all distinct."""
+    found = prepare({
+        "models": list(LAWS),
+        "solver": {"collapse": False, "core": core},
+        "sweep": {
+            "e": {"linspace": [0.05, 0.99, points // len(LAWS)]},
+            "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6.118486349e9,
+        },
+    })  # fmt: skip
+    return settled(found, trajectories(found))
+
+
+@contextmanager
+def dask(folder: Path, workers: int) -> Iterator[tuple[Path, psutil.Process]]:
+    """A scheduler and workers, and the scheduler's process."""
+    file, children = folder / f"scheduler{workers}.json", []
+
+    def start(*words: str) -> subprocess.Popen[bytes]:
+        child = subprocess.Popen(
+            [sys.executable, "-m", "dask", *words, "--scheduler-file", str(file), "--no-dashboard"], cwd=folder,
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        )  # fmt: skip
+        children.append(child)
+        return child
+
+    try:
+        scheduler = start("scheduler", "--host", "127.0.0.1", "--port", "0")
+        while not file.is_file():
+            time.sleep(0.05)
+        for _ in range(workers):
+            start("worker", "--nthreads", "1", "--no-nanny", "--local-directory", str(folder))
+        yield file, psutil.Process(scheduler.pid)
+    finally:
+        for child in reversed(children):
+            child.kill()
+            child.wait()
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Seconds on the clock, processor seconds of driver and scheduler, and bytes sent, up to a moment."""
+
+    clock: float
+    driver: float
+    scheduler: float
+    wire: int
+
+    @classmethod
+    def now(cls, scheduler: psutil.Process | None) -> Cost:
+        theirs = scheduler.cpu_times() if scheduler is not None else None
+        sent = psutil.net_io_counters(pernic=True)["lo"].bytes_sent
+        return cls(time.perf_counter(), time.process_time(), theirs.user + theirs.system if theirs else 0.0, sent)
+
+    def since(self, then: Cost) -> Cost:
+        return Cost(*(getattr(self, name) - getattr(then, name) for name in vars(self)))
+
+
+def measured(plan: Plan, team: Team, scheduler: psutil.Process | None = None) -> tuple[float, Cost]:
+    """Seconds that a sweep takes, and what its trajectories alone cost."""
+    begun, ends = Cost.now(scheduler), []
+
+    def tell(at: Progress) -> None:
+        if at.trajectories in (0, at.of_trajectories) and not at.points:
+            ends.append(Cost.now(scheduler))
+
+    with tempfile.TemporaryDirectory() as folder:
+        sweep_into(Path(folder) / "results.h5", plan, team=team, tell=tell)
+    return Cost.now(scheduler).since(begun).clock, ends[-1].since(ends[0])
+
+
+def by_dask(plan: Plan, block: Block, workers: int) -> tuple[float, Cost]:
+    """The same, by workers that have loaded what they need."""
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        dask(Path(folder), workers) as (file, scheduler),
+        cluster(file) as joined,
+    ):
+        while joined.team.room() < AHEAD * workers:
+            time.sleep(0.1)
+        with joined.team.executor() as executor:
+            wait([executor.submit(work, block, kit_of(plan)) for _ in range(4 * workers)])
+        # both do something while nothing is asked of them
+        begun = Cost.now(scheduler)
+        time.sleep(IDLE)
+        idle = Cost.now(scheduler).since(begun)
+        seconds, cost = measured(plan, joined.team, scheduler)
+        share = cost.clock / idle.clock
+        return seconds, Cost(
+            cost.clock, cost.driver - share * idle.driver, cost.scheduler - share * idle.scheduler, cost.wire
+        )
+
+
+def main() -> None:
+    parse = argparse.ArgumentParser(description="How a sweep scales.")
+    parse.add_argument("--points", type=int, default=1_000_000)
+    parse.add_argument("--core", default="numpy", choices=["numpy", "numba"])
+    asked = parse.parse_args()
+    plan = plan_of(asked.points, asked.core)
+    found = trajectories(plan)
+    blocks = list(stretches(found))
+    block = block_of(plan, found, blocks[len(blocks) // 2])
+    for _ in range(2):
+        begun = time.process_time()
+        integrated(plan.models[blocks[len(blocks) // 2].model], block, plan.config.solver)
+        alone = time.process_time() - begun
+    print(f"{plan.points:,} points, {len(blocks)} blocks, {asked.core}, {os.cpu_count()} cores")
+    rows = Table("", "trajectories/s", "ratio", "driver", "scheduler", "bytes", box=None)
+    one, cost = measured(plan, team_of(1))
+    for way, (seconds, cost) in (
+        ("1 process", (one, None)),
+        ("2 processes", (measured(plan, team_of(2))[0], None)),
+        ("1 worker of dask", by_dask(plan, block, 1)),
+        ("2 workers of dask", by_dask(plan, block, 2)),
+    ):
+        told = [f"{plan.points / seconds:,.0f}", f"{one / seconds:.2f}"]
+        if cost is not None:
+            each = (cost.driver / len(blocks), cost.scheduler / len(blocks))
+            told += [*(f"{1e3 * own:.1f} ms" for own in each), f"{cost.wire / plan.points:.0f}"]
+        rows.add_row(way, *told)
+    Console(width=120).print(rows)
+    each = max(cost.driver, cost.scheduler) / len(blocks)
+    print(f"a worker takes {1e3 * alone:.0f} ms for a block: {alone / each:.0f} workers keep the busier one busy")
+
+
+if __name__ == "__main__":
+    main()
