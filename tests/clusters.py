@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -47,8 +48,6 @@ class Dask:
 
     @property
     def address(self) -> str:
-        import json
-
         return str(json.loads(self.file.read_text())["address"])
 
     def start(self, name: str, *words: str, **environment: str) -> None:
@@ -58,10 +57,10 @@ class Dask:
                 stdout=log, stderr=log,
             )  # fmt: skip
 
-    def scheduler(self, *words: str) -> None:
+    def scheduler(self, **environment: str) -> None:
         self.start(
             "scheduler", "scheduler", "--host", "127.0.0.1", "--port", "0", "--dashboard-address", "127.0.0.1:0",
-            "--scheduler-file", str(self.file), *words,
+            "--scheduler-file", str(self.file), **environment,
         )  # fmt: skip
         until(lambda: self.file.is_file() and self.file.stat().st_size > 0)
 
@@ -81,11 +80,12 @@ class Dask:
 
 
 @contextmanager
-def dask(folder: Path, *workers: str) -> Iterator[Dask]:
+def dask(folder: Path, *workers: str, **environment: str) -> Iterator[Dask]:
+    """A scheduler with this environment, and workers."""
     folder.mkdir(parents=True)
     found = Dask(folder)
     try:
-        found.scheduler()
+        found.scheduler(**environment)
         for name in workers:
             found.worker(name)
         yield found

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 import signal
+import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -46,13 +47,16 @@ def two(tmp_path: Path) -> Iterator[Dask]:
 
 
 def test_the_same_content_by_address_file_and_local(two: Dask, tmp_path: Path, right: str) -> None:
-    for place, words in enumerate(
-        (("--scheduler", two.address), ("--scheduler-file", two.file), ("--scheduler", "local"))
-    ):
-        one = sweep(tmp_path / str(place), *words)
+    ways = {"address": ("--scheduler", two.address), "file": ("--scheduler-file", two.file)}
+    for name, words in {**ways, "local": ("--scheduler", "local")}.items():
+        one = sweep(tmp_path / name, *words)
         said = one.ends()
         assert one.digest == right
-        assert re.search(r"^\d+ workers?; dashboard: http://127.0.0.1:\d+/status$", said, re.MULTILINE), said
+        found = re.search(r"^\d+ workers?; dashboard: (http://127.0.0.1:\d+/status)$", said, re.MULTILINE)
+        assert found, said
+        if name != "local":
+            with urllib.request.urlopen(found[1]) as page:
+                assert b"Dask" in page.read()
         assert "trajectories" in said
         assert sorted(path.name for path in one.folder.iterdir()) == ["c.toml", "results.h5"]
 
@@ -141,6 +145,14 @@ def test_a_worker_without_the_package_is_refused(two: Dask, tmp_path: Path) -> N
     two.worker("bare", PYTHONPATH=str(tmp_path / "other"))
     said = sweep(tmp_path / "sweep", "--scheduler", two.address).ends(2)
     assert re.search("^tcp://127.0.0.1:.*: has no impact: none here; wants impact", said, re.MULTILINE), said
+
+
+def test_a_scheduler_without_the_package_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "impact.py").write_text("raise ImportError('none here')")
+    with dask(tmp_path / "cluster", PYTHONPATH=str(tmp_path / "other")) as found:
+        said = sweep(tmp_path / "sweep", "--scheduler", found.address).ends(2)
+    assert said == f"the scheduler: has no impact: none here; wants impact {impact.__version__}\n"
 
 
 def test_a_plug_in_whose_file_the_workers_have_not(two: Dask, tmp_path: Path) -> None:

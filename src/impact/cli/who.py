@@ -48,5 +48,6 @@ class Who:
         with cluster(place) as (team, dashboard, workers):
             if not quiet:
                 waits = "" if workers else ", waits for some"
-                say(f"{workers} worker{'' if workers == 1 else 's'}{waits}; dashboard: {dashboard}")
+                count = f"{workers} worker{'' if workers == 1 else 's'}{waits}"
+                say(f"{count}; dashboard: {dashboard}" if dashboard else count)
             yield team

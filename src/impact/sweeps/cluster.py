@@ -30,10 +30,10 @@ VERSION = "__import__('impact').__version__"
 
 
 class Cluster(NamedTuple):
-    """A team, the address of the scheduler's dashboard, and how many workers there are at first."""
+    """A team, the address of the scheduler's dashboard if it has one, and how many workers there are at first."""
 
     team: Team
-    dashboard: str
+    dashboard: str | None
     workers: int
 
 
@@ -61,8 +61,9 @@ def cluster(place: str | Path) -> Iterator[Cluster]:
         logging.disable()
         client = _connected(place, shown, stack)
         _check_versions(client)
-        room = _room(client)
-        yield Cluster(Team(lambda: _executor(client, shown), room), client.dashboard_link, len(client.nthreads()))
+        team = Team(lambda: _executor(client, shown), _room(client))
+        is_seen = "dashboard" in client.scheduler_info()["services"]
+        yield Cluster(team, client.dashboard_link if is_seen else None, len(client.nthreads()))
 
 
 def _connected(place: str | Path, shown: str, stack: contextlib.ExitStack) -> Client:
@@ -95,14 +96,18 @@ def _wait_for(file: Path, shown: str) -> None:
 
 
 def _check_versions(client: Client) -> None:
-    """Refuse workers that have another version of this package, or none."""
+    """Refuse a scheduler and workers that have another version of this package, or none: all read what is sent."""
     from .. import __version__
 
-    for worker, found in client.run(eval, VERSION, on_error="return").items():
+    try:
+        places = {"the scheduler": client.run_on_scheduler(eval, VERSION)}
+    except ImportError as error:
+        places = {"the scheduler": error}
+    for place, found in (places | client.run(eval, VERSION, on_error="return")).items():
         if isinstance(found, BaseException):
-            raise UsageError(f"{worker}: has no impact: {safe_text(str(found))}; wants impact {__version__}")
+            raise UsageError(f"{place}: has no impact: {safe_text(str(found))}; wants impact {__version__}")
         if found != __version__:
-            raise UsageError(other_version(worker, str(found), __version__))
+            raise UsageError(other_version(place, str(found), __version__))
 
 
 def _room(client: Client) -> Callable[[], int]:
