@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import signal
@@ -120,12 +121,13 @@ class Sweep:
 
 
 def sweep(folder: Path, *words: str | Path, config: str = CONFIG) -> Sweep:
-    """Begin one."""
+    """Begin one, in a group of processes of its own."""
     folder.mkdir(exist_ok=True)
     (folder / "c.toml").write_text(config)
     process = subprocess.Popen(
         [sys.executable, "-m", "impact", "sweep", "c.toml", *map(str, words)], cwd=folder,
         env={**os.environ, **ALONE}, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        start_new_session=True,
     )  # fmt: skip
     return Sweep(folder, process)
 
@@ -139,3 +141,13 @@ def until(condition: Callable[[], bool]) -> None:
     while not condition():
         assert time.monotonic() - begun < PATIENCE
         time.sleep(0.02)
+
+
+def in_group(group: int) -> list[int]:
+    """The processes of a group that run."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            state, _, own = path.read_text().rpartition(")")[2].split()[:3]
+            found += [int(path.parent.name)] if own == str(group) and state != "Z" else []
+    return found

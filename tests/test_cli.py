@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import re
@@ -450,3 +451,18 @@ def test_an_internal_error_is_one_line_and_a_report(tmp_path: Path, stored: Path
     assert line.startswith("internal error: ZeroDivisionError: of our own; report: ")
     (report,) = tmp_path.iterdir()
     assert "Traceback" in report.read_text(encoding="utf-8")
+
+
+def test_a_cluster_without_dask_names_the_extra(small: Path, tmp_path: Path) -> None:
+    hidden = "import sys; sys.modules['distributed'] = None; from impact.cli.main import main; main()"
+    words = [sys.executable, "-c", hidden, "sweep", str(small), "--scheduler", "local"]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
+    wants = 'wants dask.distributed, which is not installed: pip install "impact-sweep[distributed]"'
+    assert (done.returncode, done.stderr) == (2, f"--scheduler local: {wants}\n")
+
+
+def test_one_of_those_who_integrate_is_asked_for(cli: Run, small: Path, tmp_path: Path) -> None:
+    ways = ("--jobs 2", "--threads 2", "--scheduler local", "--scheduler-file s.json")
+    for one, other in itertools.combinations(ways, 2):
+        done = cli("sweep", small, *one.split(), *other.split(), cwd=tmp_path)
+        assert (done.returncode, done.stderr) == (2, f"{one}: given beside {other}, wants one of the two\n")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import signal
@@ -17,7 +18,7 @@ from impact.sweeps.blocks import work
 from impact.sweeps.run import kit_of, settled
 from impact.sweeps.trajectories import block_of, stretches, trajectories
 
-from .clusters import BLOCKS, CONFIG, Dask, dask, digest, sweep
+from .clusters import BLOCKS, CONFIG, Dask, dask, digest, in_group, sweep, until
 from .conftest import ROOT
 
 pytestmark = pytest.mark.slow
@@ -218,6 +219,28 @@ def test_interrupted_it_is_resumed(two: Dask, tmp_path: Path, right: str) -> Non
     said = one.ends(130)
     assert "--resume goes on" in said
     again = sweep(tmp_path / "sweep", "--scheduler", two.address, "--resume")
+    again.ends()
+    assert again.digest == right
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_a_cluster_of_its_own_ends_with_the_sweep(tmp_path: Path, right: str, number: int) -> None:
+    one = sweep(tmp_path / "sweep", "--scheduler", "local")
+    one.until_kept(2)
+    group = one.process.pid
+    if number == signal.SIGINT:
+        # as a terminal does, to all of them
+        os.killpg(group, number)
+        said = one.ends(130)
+        assert said.splitlines()[-1].endswith(
+            "of 200,000 trajectories are kept in results.h5.work; --resume goes on"
+        )
+        assert "Traceback" not in said
+    else:
+        one.process.kill()
+        one.process.communicate()
+    until(lambda: not in_group(group))
+    again = sweep(tmp_path / "sweep", "--resume")
     again.ends()
     assert again.digest == right
 

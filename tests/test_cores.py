@@ -145,12 +145,10 @@ def test_files_of_threads_and_processes_are_the_same(cli: Run, tmp_path: Path) -
     assert (len(list(tmp_path.glob("*.h5"))), len(digests)) == (3, 1)
 
 
-def test_processes_and_threads_are_one_or_the_other(cli: Run, tmp_path: Path) -> None:
-    done = cli("sweep", ROOT / "configs" / "figure6.toml", "--jobs", "2", "--threads", "2", cwd=tmp_path)
-    assert done.returncode == 2
-    assert "got jobs = 2 and threads = 2, wants one of them" in done.stderr
-    with pytest.raises(UsageError, match="got jobs = 2 and threads = 2"):
+def test_processes_and_threads_are_one_or_the_other() -> None:
+    with pytest.raises(UsageError, match="got jobs = 2 and threads = 2, wants one of them"):
         impact.sweep(SWEEP, overrides=['solver.core="numpy"'], jobs=2, threads=2)
+
 
 
 # ---- which core

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from ..errors import UsageError
 from ..sweeps.teams import Team, team_of
+from ..text import safe_text
 from .door import say
 
 
@@ -27,12 +28,8 @@ class Who:
     scheduler_file: Path | None = None
 
     def __post_init__(self) -> None:
-        asked = [
-            *([f"--jobs {self.jobs}"] if self.jobs > 1 else []),
-            *([f"--threads {self.threads}"] if self.threads > 1 else []),
-            *([f"--scheduler {self.scheduler}"] if self.scheduler is not None else []),
-            *([f"--scheduler-file {self.scheduler_file}"] if self.scheduler_file is not None else []),
-        ]
+        given = {f"--{name.replace('_', '-')}": value for name, value in vars(self).items()}
+        asked = [f"{name} {safe_text(str(value))}" for name, value in given.items() if value not in (1, None)]
         if len(asked) > 1:
             raise UsageError(f"{asked[0]}: given beside {asked[1]}, wants one of the two")
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from ..errors import ImpactError, StoreError, UsageError
 from ..text import safe_text
 from .blocks import other_version
-from .teams import AHEAD, Team, interrupts_held
+from .teams import AHEAD, Team
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -27,6 +27,9 @@ MOST = 256
 MOMENT, PATIENCE = 1.0, 10.0
 # asks in words that a worker of any version understands
 VERSION = "__import__('impact').__version__"
+
+# what workers of our own do first: a terminal sends SIGINT to all, and it is the driver's
+DEAF = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"
 
 
 class Cluster(NamedTuple):
@@ -50,9 +53,10 @@ def cluster(place: str | Path) -> Iterator[Cluster]:
     ------
     UsageError : it cannot be reached, dask.distributed is missing, or a worker has another version of this package
     """
-    if find_spec("distributed") is None:
-        raise UsageError('wants dask.distributed, which is not installed: pip install "impact-sweep[distributed]"')
     shown = safe_text(str(place))
+    if find_spec("distributed") is None:
+        extra = 'pip install "impact-sweep[distributed]"'
+        raise UsageError(f"--scheduler {shown}: wants dask.distributed, which is not installed: {extra}")
     if isinstance(place, str) and place != LOCAL and "://" not in place:
         raise UsageError(f"{shown}: wants {ADDRESS}; or {LOCAL}")
     with contextlib.ExitStack() as stack:
@@ -72,9 +76,9 @@ def _connected(place: str | Path, shown: str, stack: contextlib.ExitStack) -> Cl
 
     try:
         if place == LOCAL:
-            with interrupts_held():
-                own = LocalCluster(threads_per_worker=1, dashboard_address="127.0.0.1:0", memory_limit=0)
-            stack.enter_context(own)
+            own = stack.enter_context(
+                LocalCluster(threads_per_worker=1, dashboard_address="127.0.0.1:0", memory_limit=0, preload=[DEAF])
+            )
             return stack.enter_context(Client(own, set_as_default=False))
         if isinstance(place, Path):
             _wait_for(place, shown)

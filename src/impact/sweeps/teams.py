@@ -76,7 +76,7 @@ class _Processes(ProcessPoolExecutor):
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         # it may begin a process
-        with interrupts_held():
+        with _interrupts_held():
             return super().submit(fn, *args, **kwargs)
 
 
@@ -96,7 +96,7 @@ def _processes(jobs: int) -> Iterator[Executor]:
 
 
 @contextlib.contextmanager
-def interrupts_held() -> Iterator[None]:
+def _interrupts_held() -> Iterator[None]:
     """Hold back SIGINT: what begins here never gets it, we do later."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
