@@ -88,7 +88,8 @@ def core(
 
 # the operations of one step, counted where the kernel is plain Python
 COUNT = """
-from impact.contact.kernel import V, attempt
+from impact.contact.compiled import DAMPED, STOP, Form
+from impact.contact.kernel import attempt
 class Counted(float):
     total = 0
 def counted(name):
@@ -98,7 +99,7 @@ def counted(name):
     return operation
 for name in ("add", "radd", "sub", "rsub", "mul", "rmul", "truediv", "rtruediv"):
     setattr(Counted, f"__{name}__", counted(f"__{name}__"))
-attempt(V, *map(Counted, (0.5, 0.5, 0.5, 0.1, 0.1, 0.01, 1.0, 1.0, 0.0)), 2, 3, 0, 0)
+attempt(Form(DAMPED, STOP, 2, 3), *map(Counted, (0.5, 0.5, 0.5, 0.1, 0.1, 0.01, 1.0)))
 print(Counted.total)
 """
 

@@ -231,11 +231,11 @@ def child(program: str, **environment: str) -> str:
 @compiled
 def test_what_is_compiled_is_there_for_the_next_process(tmp_path: Path) -> None:
     program = FORMS.format(count=50, rtol=1e-10) + COUNTS
-    assert child(program, NUMBA_CACHE_DIR=str(tmp_path)).split() == ["0", "7"]
-    assert child(program, NUMBA_CACHE_DIR=str(tmp_path)).split() == ["7", "0"]
+    assert child(program, NUMBA_CACHE_DIR=str(tmp_path)).split() == ["0", "10"]
+    assert child(program, NUMBA_CACHE_DIR=str(tmp_path)).split() == ["10", "0"]
 
 
 @compiled
 def test_as_plain_python_it_is_the_same() -> None:
-    program = FORMS.format(count=3, rtol=1e-6) + "print(hasattr(KERNELS[0, 0], 'stats'))"
+    program = FORMS.format(count=3, rtol=1e-6) + "print(any(hasattr(one, 'stats') for one in KERNELS.values()))"
     assert child(program, NUMBA_DISABLE_JIT="1").split() == ["False"]

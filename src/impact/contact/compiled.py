@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,9 +14,10 @@ from .model import ForceModel
 from .momentum import Force, Log, force_form
 from .power import integer_power, power
 
-# coordinates of the velocity, and what ends a phase: the largest indentation, the gap, no force
-V, LOG, FORCE = 0, 1, 2
-STOP, GAP, NO_FORCE = 0, 1, 2
+# the equations of motion: of A xⁿ, of xⁿ (1 + χ v) in v and in "log", of xⁿ + c x^q v in v and in "force"
+SPRING, DAMPED, LOG, DRAGGED, FORCE = range(5)
+# what ends a phase: the largest indentation, the gap, no force
+STOP, GAP, NO_FORCE = range(3)
 # largest power of s
 MOST = 15
 
@@ -27,26 +28,20 @@ def is_installed() -> bool:
     return find_spec("numba") is not None
 
 
-@dataclass(frozen=True)
-class Form:
-    """F = A xⁿ (1 + χ v) + c x^q v as whole powers of s: x = sᵖ, xⁿ = s^spring, x^q = s^drag.
+class Form(NamedTuple):
+    """A phase of a law in whole powers of s: x = sᵖ, xⁿ = s^spring, x^q = s^drag.
 
     `extra` is the power of s that the coordinate "force" has beside v, `creep` that which bounds the speed of
     balls that part with none.
     """
 
-    coordinate: int
+    equation: int
     ending: int
     smooth: int
     spring: int
     drag: int = 0
     extra: int = 0
     creep: int = 0
-
-    @property
-    def exponents(self) -> tuple[int, int, int, int, int]:
-        """All of them."""
-        return self.smooth, self.spring, self.drag, self.extra, self.creep
 
 
 def of_approach(law: motion.Law) -> Form | None:
@@ -61,7 +56,7 @@ def of_restitution(law: motion.Law) -> Form | None:
     if model.unloading is None:
         return None if model.bends else _of_force(law, ending)
     if model.unloading in forms.POWER_LAWS and not model.unloading_bends:
-        return _whole(V, ending, model.smooth, model.smooth * law.n)
+        return _whole(SPRING, ending, model.smooth, model.smooth * law.n)
     return None
 
 
@@ -79,17 +74,17 @@ def _of_force(law: motion.Law, ending: int) -> Form | None:
         q = form.drag / p
         if ending == GAP and law.n != 2.0 * q + 1.0:
             return None
-        coordinate = FORCE if isinstance(law.momentum, Force) else V
-        return _whole(coordinate, ending, p, p * law.n, form.drag, form.spring, p * (q + 1.0))
-    if model.momentum == "log" or model.force is forms.spring:
-        return _whole(LOG if isinstance(law.momentum, Log) else V, ending, p, p * law.n)
-    return None
+        equation = FORCE if isinstance(law.momentum, Force) else DRAGGED
+        return _whole(equation, ending, p, p * law.n, form.drag, form.spring, p * (q + 1.0))
+    if model.momentum == "log":
+        return _whole(LOG if isinstance(law.momentum, Log) else DAMPED, ending, p, p * law.n)
+    return _whole(SPRING, ending, p, p * law.n) if model.force is forms.spring else None
 
 
-def _whole(coordinate: int, ending: int, *exponents: float) -> Form | None:
+def _whole(equation: int, ending: int, *exponents: float) -> Form | None:
     if not all(float(one).is_integer() and 0.0 <= one <= MOST for one in exponents):
         return None
-    return Form(coordinate, ending, *map(int, exponents))
+    return Form(equation, ending, *map(int, exponents))
 
 
 def integrate(
@@ -104,23 +99,25 @@ def integrate(
     start : components at the start, shape (2, n)
     rtol, max_steps : see there
     """
-    from .kernel import KERNELS
+    from .kernel import kernel
 
     n = start.shape[1]
     known = dict(zip(law.names, columns, strict=False))
-    nothing = np.zeros(n)
-    stiff, chi, c, bound = np.ones(n), known.get("chi", nothing), known.get("c", nothing), nothing
-    if law.model.unloading is not None and form.ending != STOP:
+    bound = np.zeros(n)
+    if form.equation != SPRING:
+        strength = known["chi" if form.equation in (DAMPED, LOG) else "c"]
+    elif law.model.unloading is not None and form.ending != STOP:
         # what a power law is times is the same at every stretch
-        chi = c = nothing
         stretch = power(integer_power(start[0], form.smooth), law.n)
-        stiff = problem.rates(start, columns)[4] / stretch
-    elif form.ending == GAP and motion.may_creep(law):
-        bound = motion.creeping_speed(c, law.n, form.drag / form.smooth)
+        strength = problem.rates(start, columns)[4] / stretch
+    else:
+        strength = np.ones(n)
+    if form.ending == GAP and motion.may_creep(law):
+        bound = motion.creeping_speed(strength, law.n, form.drag / form.smooth)
     outcome, top = Outcome.blank(n), np.empty((4, n))
-    rows = (np.ascontiguousarray(start), *(np.ascontiguousarray(one) for one in (stiff, chi, c, bound)))
-    KERNELS[form.coordinate, form.ending](
-        *rows, *form.exponents, rtol, int(np.float64(rtol).view(np.int64)), float(max_steps),
+    rows = (np.ascontiguousarray(start), np.ascontiguousarray(strength), np.ascontiguousarray(bound))
+    kernel(form)(
+        *rows, rtol, int(np.float64(rtol).view(np.int64)), max_steps,
         outcome.state, outcome.maximum, top, outcome.steps, outcome.end,
     )  # fmt: skip
     return outcome

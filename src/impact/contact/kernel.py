@@ -1,13 +1,16 @@
 """The core compiled by numba: the pair, controller and landing of `impact.ode.rk45`, for the forms of `compiled`.
 
-Lanes advance in lockstep, `LANES` at a time, each by its own step; some that have ended make room for others. All
-loops over lanes have a fixed length and no branch, so that they become vector instructions, and a lane has the
-same bits in whatever company. A row of the workspace is one number of every lane. Numba finds the types.
+Lanes advance in units that begin together and make room together, each lane by its own step. Several units are
+side by side, since a processor that waits for one can go on with the next. All loops over the lanes of a unit have
+a fixed length and no branch, so that they become vector instructions, and a lane has the same bits in whatever
+company; what is seldom, such as a landing, has a loop of its own. A row of the workspace is one number of every
+lane. Numba finds the types.
 """
 
 from __future__ import annotations
 
 import zlib
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -20,24 +23,24 @@ from ..ode.problem import End
 from ..ode.tableau import A as FRACTIONS
 from ..ode.tableau import E as DIFFERENCES
 from . import forms, momentum, motion
-from .compiled import FORCE, GAP, LOG, NO_FORCE, STOP, V
+from .compiled import DAMPED, DRAGGED, FORCE, GAP, LOG, NO_FORCE, SPRING, STOP, Form
 from .vectors import bits, exponential, from_bits, inlined, kept_on_disk, whole_power
 
-LANES = 64
-# so many lanes that have ended make room at a time
-ENOUGH = 4
-# rows of the workspace: the state, its rates and the watched quantity, the event and its rate
+# lanes of a unit, and units side by side
+UNIT, UNITS = 8, 8
+LANES = UNIT * UNITS
+# rows of the workspace: the state, its rates and the watched quantity, the step and the one before
 (
-    S, Y, T, WORK, RATE_S, RATE_Y, WATCHED, G, RATE_G,
-    # the step, the one before, the stiffness, the damping in its two forms, the bound of those that creep
-    H, LAST, STIFF, CHI, DRAG, BOUND,
+    S, Y, T, WORK, RATE_S, RATE_Y, WATCHED, H, LAST,
+    # the same before the step
+    S_0, Y_0, T_0, WORK_0, RATE_S_0, RATE_Y_0, WATCHED_0, H_0, LAST_0,
+    # the coefficient of the form, the bound of those that creep; the error, and whether `settle` has to see it
+    STRENGTH, BOUND, WORST, ODD,
     # the largest watched value at a step's end, where that was, and the steps beside it
     BEST, TOP_S, TOP_Y, BEHIND, AHEAD,
-    STEPS, TRIALS, HALVED, ENDED,
-) = range(24)  # fmt: skip
-ROWS = 24
-# those that begin at zero
-BLANK = (T, WORK, LAST, BEHIND, AHEAD, STEPS, TRIALS, HALVED, ENDED, BOUND)
+    STEPS, HALVED, ENDED,
+) = range(30)  # fmt: skip
+ROWS = 30
 
 A = tuple(tuple(map(float, row)) for row in FRACTIONS)
 E = tuple(map(float, DIFFERENCES))
@@ -81,116 +84,149 @@ def difference(k1, k3, k4, k5, k6, k7):
 
 
 @inlined
-def rates(coordinate, s, y, stiff, chi, c, p, k, d, g):
-    # p and the exponents of s: k of the spring, d of the drag, and g of what w has beside v
-    weight = p * whole_power(s, p - 1)
-    elastic = stiff * whole_power(s, k)
-    if coordinate == FORCE:
-        v = velocity_of_force(y, whole_power(s, g), c)
-        force = c * whole_power(s, d) * y
-        return v, rate_of_force(v, whole_power(s, g - 1), g / c, weight, force), weight, weight * force * v, force
-    if coordinate == LOG:
-        v = (exponential(y) - 1.0) / chi
-        force = damped(elastic, v, 1.0, chi)
-        return v, rate_of_log(weight, elastic, chi), weight, weight * force * v, force
+def rates(form, s, y, strength):
+    """Rates of the two components and the two quadratures, and the force."""
+    weight = form.smooth * whole_power(s, form.smooth - 1)
+    elastic = whole_power(s, form.spring)
+    if form.equation == FORCE:
+        v = velocity_of_force(y, whole_power(s, form.extra), strength)
+        force = strength * whole_power(s, form.drag) * y
+        rate_y = rate_of_force(v, whole_power(s, form.extra - 1), form.extra / strength, weight, force)
+        return v, rate_y, weight, weight * force * v, force
+    if form.equation == LOG:
+        v = (exponential(y) - 1.0) / strength
+        force = damped(elastic, v, 1.0, strength)
+        return v, rate_of_log(weight, elastic, strength), weight, weight * force * v, force
     v = y
-    force = dragged(damped(elastic, v, 1.0, chi), whole_power(s, d), v, c)
+    if form.equation == SPRING:
+        force = strength * elastic
+    elif form.equation == DAMPED:
+        force = damped(elastic, v, 1.0, strength)
+    else:
+        force = dragged(elastic, whole_power(s, form.drag), v, strength)
     return v, -(weight * force), weight, weight * force * v, force
 
 
 @inlined
-def attempt(coordinate, s, y, s1, y1, watched, h, stiff, chi, c, p, k, d, g):
+def attempt(form, s, y, s1, y1, watched, h, strength):
     """One step: components at its end and what is added to the others, rates there, the local error."""
-    t1 = p * whole_power(s, p - 1)
+    t1 = form.smooth * whole_power(s, form.smooth - 1)
     work1 = t1 * watched * s1
-    s2, y2, _, _, _ = rates(coordinate, s + h * (A[1][0] * s1), y + h * (A[1][0] * y1), stiff, chi, c, p, k, d, g)
+    s2, y2, _, _, _ = rates(form, s + h * (A[1][0] * s1), y + h * (A[1][0] * y1), strength)
     s3, y3, t3, work3, _ = rates(
-        coordinate, s + h * (A[2][0] * s1 + A[2][1] * s2), y + h * (A[2][0] * y1 + A[2][1] * y2),
-        stiff, chi, c, p, k, d, g,
-    )  # fmt: skip
+        form, s + h * (A[2][0] * s1 + A[2][1] * s2), y + h * (A[2][0] * y1 + A[2][1] * y2), strength
+    )
     s4, y4, t4, work4, _ = rates(
-        coordinate, s + h * (A[3][0] * s1 + A[3][1] * s2 + A[3][2] * s3),
-        y + h * (A[3][0] * y1 + A[3][1] * y2 + A[3][2] * y3), stiff, chi, c, p, k, d, g,
+        form, s + h * (A[3][0] * s1 + A[3][1] * s2 + A[3][2] * s3),
+        y + h * (A[3][0] * y1 + A[3][1] * y2 + A[3][2] * y3), strength,
     )  # fmt: skip
     s5, y5, t5, work5, _ = rates(
-        coordinate, s + h * (A[4][0] * s1 + A[4][1] * s2 + A[4][2] * s3 + A[4][3] * s4),
-        y + h * (A[4][0] * y1 + A[4][1] * y2 + A[4][2] * y3 + A[4][3] * y4), stiff, chi, c, p, k, d, g,
+        form, s + h * (A[4][0] * s1 + A[4][1] * s2 + A[4][2] * s3 + A[4][3] * s4),
+        y + h * (A[4][0] * y1 + A[4][1] * y2 + A[4][2] * y3 + A[4][3] * y4), strength,
     )  # fmt: skip
     s6, y6, t6, work6, _ = rates(
-        coordinate, s + h * (A[5][0] * s1 + A[5][1] * s2 + A[5][2] * s3 + A[5][3] * s4 + A[5][4] * s5),
-        y + h * (A[5][0] * y1 + A[5][1] * y2 + A[5][2] * y3 + A[5][3] * y4 + A[5][4] * y5),
-        stiff, chi, c, p, k, d, g,
+        form, s + h * (A[5][0] * s1 + A[5][1] * s2 + A[5][2] * s3 + A[5][3] * s4 + A[5][4] * s5),
+        y + h * (A[5][0] * y1 + A[5][1] * y2 + A[5][2] * y3 + A[5][3] * y4 + A[5][4] * y5), strength,
     )  # fmt: skip
     new_s = s + h * solution(s1, s3, s4, s5, s6)
     new_y = y + h * solution(y1, y3, y4, y5, y6)
     more_t, more_work = h * solution(t1, t3, t4, t5, t6), h * solution(work1, work3, work4, work5, work6)
-    s7, y7, t7, work7, watched = rates(coordinate, new_s, new_y, stiff, chi, c, p, k, d, g)
+    s7, y7, _, _, watched = rates(form, new_s, new_y, strength)
     off_s, off_y = abs(difference(s1, s3, s4, s5, s6, s7)), abs(difference(y1, y3, y4, y5, y6, y7))
     scale_s, scale_y = max(abs(s), abs(new_s), FLOOR[0]), max(abs(y), abs(new_y), FLOOR[1])
     # the larger of two quotients by one division; a sum, since a number that is none has to stay none
     off_s, off_y = off_s * scale_y, off_y * scale_s
     worst = abs(h) * (max(off_s, off_y) + 0.0 * (off_s + off_y)) / (scale_s * scale_y)
-    return new_s, new_y, more_t, more_work, s7, y7, t7, work7, watched, worst
+    return new_s, new_y, more_t, more_work, s7, y7, watched, worst
 
 
 @inlined
-def slope_of_force(coordinate, s, y, rate_s, rate_y, force, small, stiff, chi, c, p, k, d, g):
+def slope_of_force(form, s, y, rate_s, rate_y, force, small, strength):
     """The slope of the force along the trajectory, by a small step."""
-    ahead = rates(coordinate, s + small * rate_s, y + small * rate_y, stiff, chi, c, p, k, d, g)
+    ahead = rates(form, s + small * rate_s, y + small * rate_y, strength)
     return (ahead[4] - force) / small
 
 
 @inlined
-def event(coordinate, s, y, rate_s, rate_y, rate_t, force, ending, stiff, chi, c, p, k, d, g):
+def event(form, s, y, rate_s, rate_y, force, strength):
     """What falls to zero at the end of the phase, and its rate."""
-    if ending == GAP:
+    if form.ending == GAP:
         return s, rate_s
-    if ending == NO_FORCE:
+    if form.ending == NO_FORCE:
         small = DIFFERENCE * min(abs(s), 1.0)
-        slope = slope_of_force(coordinate, s, y, rate_s, rate_y, force, small, stiff, chi, c, p, k, d, g)
+        slope = slope_of_force(form, s, y, rate_s, rate_y, force, small, strength)
         return release(s, rate_s, force, slope)
-    if coordinate == FORCE:
-        return rate_s, -rate_t * force
+    if form.equation == FORCE:
+        return rate_s, -form.smooth * whole_power(s, form.smooth - 1) * force
     return y, rate_y
 
 
 @inlined
-def advance(coordinate, w, ending, p, k, d, g, m, rtol, rtol_bits, max_steps):
-    """Try one step in every lane; accept, land or shorten it."""
-    for j in range(LANES):
-        s, y, h = w[S * LANES + j], w[Y * LANES + j], w[H * LANES + j]
-        stiff, chi, c = w[STIFF * LANES + j], w[CHI * LANES + j], w[DRAG * LANES + j]
-        rate_s, rate_y, seen = w[RATE_S * LANES + j], w[RATE_Y * LANES + j], w[WATCHED * LANES + j]
-        new_s, new_y, more_t, more_work, new_rate_s, new_rate_y, new_rate_t, new_rate_work, watched, worst = (
-            attempt(coordinate, s, y, rate_s, rate_y, seen, h, stiff, chi, c, p, k, d, g)
-        )
-        gap, rate_of_gap = event(
-            coordinate,
-            new_s,
-            new_y,
-            new_rate_s,
-            new_rate_y,
-            new_rate_t,
-            watched,
-            ending,
-            stiff,
-            chi,
-            c,
-            p,
-            k,
-            d,
-            g,
-        )
+def is_lost(form, s, rate_s, bound):
+    """Whether the event cannot be reached any more."""
+    if form.ending == STOP:
+        return s > FAR
+    return -rate_s <= (bound * whole_power(s, form.creep) if form.equation >= DRAGGED else 0.0)
 
-        running = w[ENDED * LANES + j] == RUNNING
+
+@inlined
+def advance(form, w, rtol, rtol_bits):
+    """Try one step in every lane of a unit; accept or shorten it. Returns how many lanes `settle` has to see."""
+    more = 0
+    for j in range(UNIT):
+        s, y, h, strength = w[S * UNIT + j], w[Y * UNIT + j], w[H * UNIT + j], w[STRENGTH * UNIT + j]
+        rate_s, rate_y, seen = w[RATE_S * UNIT + j], w[RATE_Y * UNIT + j], w[WATCHED * UNIT + j]
+        t, work, last = w[T * UNIT + j], w[WORK * UNIT + j], w[LAST * UNIT + j]
+        new_s, new_y, more_t, more_work, new_rate_s, new_rate_y, watched, worst = attempt(
+            form, s, y, rate_s, rate_y, seen, h, strength
+        )
+        running = w[ENDED * UNIT + j] == RUNNING
         within, finite = running and worst <= rtol, worst < np.inf
         factor = from_bits(SAFETY_BITS + (rtol_bits >> 8) * FIFTH - (bits(worst) >> 8) * FIFTH)
         following = h * (max(min(factor, LARGEST), SMALLEST) if finite else 0.5)
-        halved = w[HALVED * LANES + j] + (0.0 if finite else 1.0)
-        ended = NOT_FINITE if halved > HALVINGS else RUNNING
 
+        gap, rate_of_gap = event(form, new_s, new_y, new_rate_s, new_rate_y, watched, strength)
+        odd = not finite or min(gap + following * rate_of_gap, gap) < 0.0 or following < LAST_STEP
+        odd = odd or is_lost(form, new_s, new_rate_s, w[BOUND * UNIT + j])
+        if form.ending == STOP:
+            odd = odd or (watched < seen and seen > w[BEST * UNIT + j])
+        odd = running and odd
+        more += 1 if odd else 0
+        w[ODD * UNIT + j], w[WORST * UNIT + j] = 1.0 if odd else 0.0, worst
+
+        w[S_0 * UNIT + j], w[Y_0 * UNIT + j], w[T_0 * UNIT + j], w[WORK_0 * UNIT + j] = s, y, t, work
+        w[RATE_S_0 * UNIT + j], w[RATE_Y_0 * UNIT + j], w[WATCHED_0 * UNIT + j] = rate_s, rate_y, seen
+        w[H_0 * UNIT + j], w[LAST_0 * UNIT + j] = h, last
+        w[S * UNIT + j], w[Y * UNIT + j] = new_s if within else s, new_y if within else y
+        w[T * UNIT + j] = t + more_t if within else t
+        w[WORK * UNIT + j] = work + more_work if within else work
+        w[RATE_S * UNIT + j] = new_rate_s if within else rate_s
+        w[RATE_Y * UNIT + j] = new_rate_y if within else rate_y
+        w[WATCHED * UNIT + j] = watched if within else seen
+        w[LAST * UNIT + j], w[H * UNIT + j] = h if within else last, following
+        w[STEPS * UNIT + j] += 1.0 if within else 0.0
+    return more
+
+
+@inlined
+def settle(form, w, rtol, is_last):
+    """Land, shorten the step before the event, note the largest force, give up. Returns how many lanes go on."""
+    going = 0
+    for j in range(UNIT):
+        odd, ended, strength = w[ODD * UNIT + j] != 0.0, w[ENDED * UNIT + j], w[STRENGTH * UNIT + j]
+        s, y, h, last = w[S_0 * UNIT + j], w[Y_0 * UNIT + j], w[H_0 * UNIT + j], w[LAST_0 * UNIT + j]
+        rate_s, rate_y, seen = w[RATE_S_0 * UNIT + j], w[RATE_Y_0 * UNIT + j], w[WATCHED_0 * UNIT + j]
+        new_s, new_y, following = w[S * UNIT + j], w[Y * UNIT + j], w[H * UNIT + j]
+        new_rate_s, new_rate_y, watched = w[RATE_S * UNIT + j], w[RATE_Y * UNIT + j], w[WATCHED * UNIT + j]
+        _, _, rate_t, rate_work, _ = rates(form, new_s, new_y, strength)
+        within, finite = odd and w[WORST * UNIT + j] <= rtol, w[WORST * UNIT + j] < np.inf
+        halved = w[HALVED * UNIT + j] + (0.0 if finite or not odd else 1.0)
+        ended = NOT_FINITE if halved > HALVINGS else ended
+
+        gap, rate_of_gap = event(form, new_s, new_y, new_rate_s, new_rate_y, watched, strength)
+        gap_0, rate_of_gap_0 = event(form, s, y, rate_s, rate_y, seen, strength)
         at = within and min(gap + following * rate_of_gap, gap) < 0.0
-        beyond, sure = beyond_end(gap, rate_of_gap, w[G * LANES + j], w[RATE_G * LANES + j], h)
+        beyond, sure = beyond_end(gap, rate_of_gap, gap_0, rate_of_gap_0, h)
         reach = (beyond if beyond <= CLOSE * h else SHORT * beyond) if sure else np.inf
         following = reach if at and reach < following else following
         landed = at and abs(beyond) <= LANDING * h + NEAR
@@ -203,107 +239,101 @@ def advance(coordinate, w, ending, p, k, d, g, m, rtol, rtol_bits, max_steps):
         rest = beyond if landed else 0.0
         new_s, new_y = new_s + rest * new_rate_s, new_y + rest * new_rate_y
 
-        last = w[LAST * LANES + j]
-        if ending == STOP:
-            best = w[BEST * LANES + j]
+        if form.ending == STOP:
+            best = w[BEST * UNIT + j]
             falls = within and watched < seen and seen > best
             best = seen if falls else best
             highest = landed and watched > best
-            w[BEST * LANES + j] = watched if highest else best
-            w[TOP_S * LANES + j] = new_s if highest else s if falls else w[TOP_S * LANES + j]
-            w[TOP_Y * LANES + j] = new_y if highest else y if falls else w[TOP_Y * LANES + j]
-            w[BEHIND * LANES + j] = h if highest else last if falls else w[BEHIND * LANES + j]
-            w[AHEAD * LANES + j] = 0.0 if highest else h if falls else w[AHEAD * LANES + j]
+            w[BEST * UNIT + j] = watched if highest else best
+            w[TOP_S * UNIT + j] = new_s if highest else s if falls else w[TOP_S * UNIT + j]
+            w[TOP_Y * UNIT + j] = new_y if highest else y if falls else w[TOP_Y * UNIT + j]
+            w[BEHIND * UNIT + j] = h if highest else last if falls else w[BEHIND * UNIT + j]
+            w[AHEAD * UNIT + j] = 0.0 if highest else h if falls else w[AHEAD * UNIT + j]
 
-        away = new_s > FAR if ending == STOP else -new_rate_s <= w[BOUND * LANES + j] * whole_power(new_s, m)
-        ended = LOST if within and ended == RUNNING and away else ended
+        lost = within and is_lost(form, new_s, new_rate_s, w[BOUND * UNIT + j])
+        ended = LOST if lost and ended == RUNNING else ended
         ended = STEP_UNDERFLOW if ended == RUNNING and following < LAST_STEP else ended
-        trials = w[TRIALS * LANES + j] + 1.0
-        ended = MAX_STEPS if ended == RUNNING and trials >= max_steps else ended
-        w[ENDED * LANES + j] = ended if running else w[ENDED * LANES + j]
-        w[TRIALS * LANES + j], w[HALVED * LANES + j] = trials, halved
-        w[STEPS * LANES + j] += 1.0 if within else 0.0
+        ended = MAX_STEPS if ended == RUNNING and is_last else ended
+        going += 1 if ended == RUNNING else 0
+        w[ENDED * UNIT + j], w[HALVED * UNIT + j], w[H * UNIT + j] = ended, halved, following
 
-        w[S * LANES + j], w[Y * LANES + j] = new_s if within else s, new_y if within else y
-        w[T * LANES + j] += more_t + rest * new_rate_t if within else 0.0
-        w[WORK * LANES + j] += more_work + rest * new_rate_work if within else 0.0
-        w[RATE_S * LANES + j] = new_rate_s if within else rate_s
-        w[RATE_Y * LANES + j] = new_rate_y if within else rate_y
-        w[WATCHED * LANES + j] = watched if within else seen
-        w[G * LANES + j] = gap if within else w[G * LANES + j]
-        w[RATE_G * LANES + j] = rate_of_gap if within else w[RATE_G * LANES + j]
-        w[LAST * LANES + j], w[H * LANES + j] = h if within else last, following
+        w[S * UNIT + j], w[Y * UNIT + j] = s if crossed else new_s, y if crossed else new_y
+        w[T * UNIT + j] = w[T_0 * UNIT + j] if crossed else w[T * UNIT + j] + rest * rate_t
+        w[WORK * UNIT + j] = w[WORK_0 * UNIT + j] if crossed else w[WORK * UNIT + j] + rest * rate_work
+        w[RATE_S * UNIT + j] = rate_s if crossed else new_rate_s
+        w[RATE_Y * UNIT + j] = rate_y if crossed else new_rate_y
+        w[WATCHED * UNIT + j] = seen if crossed else watched
+        w[LAST * UNIT + j] = last if crossed else w[LAST * UNIT + j]
+        w[STEPS * UNIT + j] -= 1.0 if crossed else 0.0
+    return going
 
 
 @inlined
-def count_ended(w):
-    """How many lanes have ended."""
-    count = 0
-    for j in range(LANES):
-        count += 0 if w[ENDED * LANES + j] == RUNNING else 1
-    return count
+def begin(form, w, first, lanes, start, strength, bound):
+    """Put the impacts from the first into a unit; where there are too few, the last one again."""
+    for j in range(UNIT):
+        i = min(first + j, lanes - 1)
+        s, y = start[0, i], start[1, i]
+        rate_s, rate_y, _, _, watched = rates(form, s, y, strength[i])
+        w[S * UNIT + j], w[Y * UNIT + j], w[T * UNIT + j], w[WORK * UNIT + j] = s, y, 0.0, 0.0
+        w[RATE_S * UNIT + j], w[RATE_Y * UNIT + j], w[WATCHED * UNIT + j] = rate_s, rate_y, watched
+        w[H * UNIT + j], w[LAST * UNIT + j] = FIRST_STEP, 0.0
+        w[STRENGTH * UNIT + j], w[BOUND * UNIT + j] = strength[i], bound[i]
+        w[BEST * UNIT + j], w[TOP_S * UNIT + j], w[TOP_Y * UNIT + j] = -np.inf, s, y
+        w[BEHIND * UNIT + j], w[AHEAD * UNIT + j] = 0.0, 0.0
+        w[STEPS * UNIT + j], w[HALVED * UNIT + j], w[ENDED * UNIT + j] = 0.0, 0.0, RUNNING
 
 
 @inlined
-def begin(coordinate, w, j, s, y, stiff, chi, c, p, k, d, g):
-    """Put an impact into a lane; its rate of the time is given."""
-    for row in BLANK:
-        w[row * LANES + j] = 0.0
-    w[S * LANES + j], w[Y * LANES + j] = s, y
-    w[STIFF * LANES + j], w[CHI * LANES + j], w[DRAG * LANES + j] = stiff, chi, c
-    rate_s, rate_y, rate_t, _, watched = rates(coordinate, s, y, stiff, chi, c, p, k, d, g)
-    w[RATE_S * LANES + j], w[RATE_Y * LANES + j], w[WATCHED * LANES + j] = rate_s, rate_y, watched
-    return rate_t
+def end_all(form, w, first, lanes, state, best, top, steps, end):
+    """Write down how the impacts of a unit have ended."""
+    for j in range(min(UNIT, lanes - first)):
+        i, landed = first + j, w[ENDED * UNIT + j] == LANDED
+        for row in range(4):
+            state[row, i] = w[(S + row) * UNIT + j] if landed else np.nan
+        if form.ending == STOP:
+            for row in range(4):
+                top[row, i] = w[(TOP_S + row) * UNIT + j]
+        best[i] = w[BEST * UNIT + j] if landed else np.nan
+        steps[i], end[i] = int(w[STEPS * UNIT + j]), int(w[ENDED * UNIT + j])
 
 
 @inlined
-def search(coordinate, w, lanes, best, top, stiff, chi, c, p, k, d, g):
+def search(form, w, lanes, best, top, strength):
     """Raise the largest watched values to the maxima beside them; see `impact.ode.maximum.search`."""
     # rows of the same numbers by other names: the span of the search, the step of the difference, both ends
-    span, small, right, slope_right = T, LAST, TOP_S, G
+    span, small, right, slope_right = T, LAST, WORK, H_0
     for first in range(0, lanes, LANES):
+        some = 0
         for j in range(LANES):
             i = min(first + j, lanes - 1)
             w[S * LANES + j], w[Y * LANES + j] = top[0, i], top[1, i]
             w[BEHIND * LANES + j], w[AHEAD * LANES + j], w[BEST * LANES + j] = top[2, i], top[3, i], best[i]
-            w[STIFF * LANES + j], w[CHI * LANES + j], w[DRAG * LANES + j] = stiff[i], chi[i], c[i]
+            w[STRENGTH * LANES + j] = strength[i]
         for j in range(LANES):
             rate_s, rate_y, _, _, watched = rates(
-                coordinate, w[S * LANES + j], w[Y * LANES + j], w[STIFF * LANES + j], w[CHI * LANES + j],
-                w[DRAG * LANES + j], p, k, d, g,
-            )  # fmt: skip
+                form, w[S * LANES + j], w[Y * LANES + j], w[STRENGTH * LANES + j]
+            )
             w[RATE_S * LANES + j], w[RATE_Y * LANES + j], w[WATCHED * LANES + j] = rate_s, rate_y, watched
             step = SLOPE * max(w[BEHIND * LANES + j], w[AHEAD * LANES + j])
             slope = slope_of_force(
-                coordinate, w[S * LANES + j], w[Y * LANES + j], rate_s, rate_y, watched, step,
-                w[STIFF * LANES + j], w[CHI * LANES + j], w[DRAG * LANES + j], p, k, d, g,
-            )  # fmt: skip
+                form, w[S * LANES + j], w[Y * LANES + j], rate_s, rate_y, watched, step, w[STRENGTH * LANES + j]
+            )
             reach = w[AHEAD * LANES + j] if slope > 0.0 else -w[BEHIND * LANES + j]
             reach = reach if abs(slope * reach) > FLAT * abs(w[BEST * LANES + j]) else 0.0
+            some += 1 if reach != 0.0 else 0
             w[small * LANES + j], w[slope_right * LANES + j] = step, slope
             w[span * LANES + j], w[H * LANES + j], w[right * LANES + j] = reach, reach, 0.0
+        if not some:
+            continue
         for count in range(GUESSES + 1):
             for j in range(LANES):
-                stiff_j, chi_j, c_j = w[STIFF * LANES + j], w[CHI * LANES + j], w[DRAG * LANES + j]
-                s, y, _, _, rate_s, rate_y, _, _, watched, _ = attempt(
-                    coordinate, w[S * LANES + j], w[Y * LANES + j], w[RATE_S * LANES + j], w[RATE_Y * LANES + j],
-                    w[WATCHED * LANES + j], w[H * LANES + j], stiff_j, chi_j, c_j, p, k, d, g,
+                s, y, _, _, rate_s, rate_y, watched, _ = attempt(
+                    form, w[S * LANES + j], w[Y * LANES + j], w[RATE_S * LANES + j], w[RATE_Y * LANES + j],
+                    w[WATCHED * LANES + j], w[H * LANES + j], w[STRENGTH * LANES + j],
                 )  # fmt: skip
                 slope = slope_of_force(
-                    coordinate,
-                    s,
-                    y,
-                    rate_s,
-                    rate_y,
-                    watched,
-                    w[small * LANES + j],
-                    stiff_j,
-                    chi_j,
-                    c_j,
-                    p,
-                    k,
-                    d,
-                    g,
+                    form, s, y, rate_s, rate_y, watched, w[small * LANES + j], w[STRENGTH * LANES + j]
                 )
                 reach, found = w[span * LANES + j], w[BEST * LANES + j]
                 w[BEST * LANES + j] = watched if reach != 0.0 and watched > found else found
@@ -316,53 +346,46 @@ def search(coordinate, w, lanes, best, top, stiff, chi, c, p, k, d, g):
             best[first + j] = w[BEST * LANES + j]
 
 
-def _kernel(coordinate: int, ending: int, version: int):
-    """The integrator of a phase in a coordinate, numbers that are constants in it, and by which it is kept."""
+def _kernel(form: Form, version: int):
+    """The integrator of a form, whose numbers are constants in it, and the number by which it is kept."""
 
     @kept_on_disk
-    def integrate(
-        start, stiff, chi, c, bound, p, k, d, g, m, rtol, rtol_bits, max_steps,
-        state, best, top, steps, end,
-    ):  # fmt: skip
+    def integrate(start, strength, bound, rtol, rtol_bits, max_steps, state, best, top, steps, end):
         lanes = start.shape[1] if version >= 0 else 0
-        w = np.zeros(ROWS * LANES)
-        index = np.full(LANES, -1)
-        waiting, living, ended_lanes = 0, 0, LANES
-        w[ENDED * LANES : (ENDED + 1) * LANES] = LANDED
-        while True:
-            if ended_lanes - (LANES - living) >= ENOUGH or ended_lanes == LANES:
-                living = 0
-                for j in range(LANES):
-                    i = index[j]
-                    if i >= 0 and w[ENDED * LANES + j] != RUNNING:
-                        landed = w[ENDED * LANES + j] == LANDED
-                        for row in range(4):
-                            state[row, i] = w[(S + row) * LANES + j] if landed else np.nan
-                            top[row, i] = w[(TOP_S + row) * LANES + j]
-                        best[i] = w[BEST * LANES + j] if landed else np.nan
-                        steps[i], end[i] = int(w[STEPS * LANES + j]), int(w[ENDED * LANES + j])
-                        index[j] = -1
-                    if index[j] < 0 and waiting < lanes:
-                        i = index[j] = waiting
-                        waiting += 1
-                        s, y, stiff_i, chi_i, c_i = start[0, i], start[1, i], stiff[i], chi[i], c[i]
-                        rate_t = begin(coordinate, w, j, s, y, stiff_i, chi_i, c_i, p, k, d, g)
-                        w[BOUND * LANES + j], w[H * LANES + j], w[BEST * LANES + j] = bound[i], FIRST_STEP, -np.inf
-                        w[TOP_S * LANES + j], w[TOP_Y * LANES + j] = s, y
-                        w[G * LANES + j], w[RATE_G * LANES + j] = event(
-                            coordinate, s, y, w[RATE_S * LANES + j], w[RATE_Y * LANES + j], rate_t,
-                            w[WATCHED * LANES + j], ending, stiff_i, chi_i, c_i, p, k, d, g,
-                        )  # fmt: skip
-                    living += index[j] >= 0
-                if not living:
-                    break
-            advance(coordinate, w, ending, p, k, d, g, m, rtol, rtol_bits, max_steps)
-            ended_lanes = count_ended(w)
-        if ending == STOP:
-            search(coordinate, w, lanes, best, top, stiff, chi, c, p, k, d, g)
+        w = np.zeros((UNITS, ROWS * UNIT))
+        # the first impact of each unit, and how often a step of it was tried
+        first, trials = np.arange(0, LANES, UNIT), np.zeros(UNITS, np.int64)
+        for unit in range(UNITS):
+            begin(form, w[unit], first[unit], lanes, start, strength, bound)
+        waiting, living = LANES, min(UNITS, -(-lanes // UNIT))
+        while living:
+            for unit in range(UNITS):
+                if first[unit] >= lanes:
+                    continue
+                mine = w[unit]
+                trials[unit] += 1
+                is_last = trials[unit] >= max_steps
+                if (advance(form, mine, rtol, rtol_bits) or is_last) and not settle(form, mine, rtol, is_last):
+                    end_all(form, mine, first[unit], lanes, state, best, top, steps, end)
+                    first[unit], trials[unit] = waiting, 0
+                    waiting += UNIT
+                    if first[unit] < lanes:
+                        begin(form, mine, first[unit], lanes, start, strength, bound)
+                    else:
+                        living -= 1
+        if form.ending == STOP:
+            search(form, w.reshape(-1), lanes, best, top, strength)
 
     return integrate
 
 
-# by the coordinate of the velocity and what ends the phase; each is compiled when it is first called
-KERNELS = {(one, end): _kernel(one, end, VERSION) for one in (V, LOG, FORCE) for end in (STOP, GAP, NO_FORCE)}
+# each is compiled when it is first called
+KERNELS: dict[Form, Callable[..., None]] = {}
+
+
+def kernel(form: Form) -> Callable[..., None]:
+    """The integrator of a form."""
+    if form not in KERNELS:
+        # threads that come at once all take the first one's
+        KERNELS.setdefault(form, _kernel(form, VERSION))
+    return KERNELS[form]
