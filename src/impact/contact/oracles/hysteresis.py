@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import lambertw
 
 from ..power import Array, integer_power
 
 # e = Σ aₖ χᵏ, from χ (1 + e) = ln[(1 + χ)/(1 − χ e)] order by order in exact fractions.
-# Below this χ the Lambert form has lost more digits than the truncated series.
+# Below this χ Newton's iteration has lost more digits than the truncated series.
 SERIES_BELOW_CHI = 0.06
 # likewise of χ − ln(1 + χ)
 SMALL_CHI = 0.01
+# Newton's iterations for e: the start is good to 2 %, the third is exact to rounding
+ITERATIONS = 4
 RESTITUTION_SERIES = (
     1, -2 / 3, 4 / 9, -44 / 135, 104 / 405, -40 / 189, 7648 / 42525, -2848 / 18225, 31712 / 229635,
     -23429344 / 189448875, 89072576 / 795685275, -1441952704 / 14105329875, 893393408 / 9499507875,
@@ -38,7 +39,8 @@ def delivered_restitution(chi: Array | float) -> Array:
 
     v dv/(1 + χ v/v₀) = −(K/m) δⁿ dδ integrates in closed form; the left side vanishes between v = v₀ and
     v = −e v₀, so that χ (1 + e) = ln[(1 + χ)/(1 − χ e)]. With a = 1 + χ that is e = (1 + W₀(−a exp(−a)))/χ,
-    W₀ the principal Lambert function.
+    W₀ the principal Lambert function. In z = χ e and t = χ − ln(1 + χ) it is z = 1 − exp(−z − t), whose digits
+    are kept by Newton's iteration; the right side is concave, so that it comes to the root from one side.
 
     Parameters
     ----------
@@ -49,10 +51,14 @@ def delivered_restitution(chi: Array | float) -> Array:
     """
     chi = np.asarray(chi, dtype=float)
     small = chi < SERIES_BELOW_CHI
-    a = 1.0 + np.where(small | np.isinf(chi), 1.0, chi)
-    lambert = (1.0 + np.real(lambertw(-a * np.exp(-a), 0))) / (a - 1.0)
+    inner = np.where(small | np.isinf(chi), 1.0, chi)
+    t = inner - np.log1p(inner)
+    z = np.minimum(inner / (1.0 + inner * (2.0 / 3.0)), 1.0)
+    for _ in range(ITERATIONS):
+        slope = np.expm1(-(z + t))
+        z = z + (z + slope) / slope
     series = _series(RESTITUTION_SERIES, np.where(small, chi, 0.0))
-    return np.where(small, series, np.where(np.isinf(chi), 0.0, lambert))
+    return np.where(small, series, np.where(np.isinf(chi), 0.0, z / inner))
 
 
 def exact_damping_ratio(e: Array | float) -> Array:
