@@ -39,16 +39,18 @@ class Contact:
     model : the law
     lanes : the impacts
     rebound : what the law does with them, in the contact's own units, of shapes that broadcast to theirs
+    known : what `first_look` says of them, where it has been asked
     """
 
     model: ForceModel
     lanes: Lanes
     rebound: Rebound
+    known: NDArray[np.int8] | None = None
 
     @cached_property
     @quiet
     def _first(self) -> NDArray[np.int8]:
-        return first_look(self.model, self.lanes)
+        return first_look(self.model, self.lanes) if self.known is None else self.known
 
     @cached_property
     def status(self) -> NDArray[np.int8]:
@@ -93,7 +95,9 @@ class Contact:
     @quiet
     def _si(self, value: Array, unit: Array) -> Array:
         """A value in a unit of the contact's own; nothing moves where the balls miss each other."""
-        return np.where(self._missed, 0.0, np.where(self._failed, np.nan, value * unit))
+        value = value * unit
+        value = value if self._failed is False else np.where(self._failed, np.nan, value)
+        return value if self._missed is False else np.where(self._missed, 0.0, value)
 
     @cached_property
     def v1_post(self) -> Array:
@@ -210,7 +214,7 @@ def collide(
     rebound = integrate_all(
         model, lanes.n, given, status, rtol=rtol, max_steps=max_steps, collapse=collapse, core=core
     )
-    return Contact(model, lanes, rebound)
+    return Contact(model, lanes, rebound, status)
 
 
 def first_look(
@@ -228,10 +232,21 @@ def first_look(
     status = np.asarray(Status.OK, np.int8)
     if "length" in known:
         sizes = [lanes.m, lanes.K, lanes.length, lanes.m * lanes.v0 * lanes.v0, lanes.length / lanes.v0]
+        least, most = np.nextafter(0.0, 1.0), np.finfo(float).max
         for size in sizes:
-            status = np.where(np.isfinite(size) & (size > 0.0), status, Status.OUT_OF_RANGE)
+            status = _unless(size, least, most, status, Status.OUT_OF_RANGE)
     if "e" in known and "e" in model.quantities:
-        status = np.where((lanes.e >= 0.0) & (lanes.e <= 1.0), status, Status.INVALID_PARAMETER)
+        status = _unless(lanes.e, 0.0, 1.0, status, Status.INVALID_PARAMETER)
     if "v0" in known or "length" in known:
-        status = np.where(lanes.v0 > 0.0, status, Status.NO_IMPACT)
+        status = _unless(lanes.v0, np.nextafter(0.0, 1.0), np.inf, status, Status.NO_IMPACT)
     return status.astype(np.int8)
+
+
+def _unless(
+    values: Array, least: float, most: float, status: NDArray[np.int8], otherwise: Status
+) -> NDArray[np.int8]:
+    """The status, but another one where a value is not within bounds."""
+    # two numbers tell of most blocks that all is well
+    if least <= np.min(values, initial=most) and np.max(values, initial=least) <= most:
+        return status
+    return np.where((values >= least) & (values <= most), status, otherwise)

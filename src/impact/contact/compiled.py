@@ -114,7 +114,7 @@ def integrate(
         strength = np.ones(n)
     if form.ending == GAP and motion.may_creep(law):
         bound = motion.creeping_speed(strength, law.n, form.drag / form.smooth)
-    outcome, top = Outcome.blank(n), np.empty((4, n))
+    outcome, top = Outcome.unwritten(n), np.empty((4, n))
     rows = (np.ascontiguousarray(start), np.ascontiguousarray(strength), np.ascontiguousarray(bound))
     kernel(form)(
         *rows, rtol, int(np.float64(rtol).view(np.int64)), max_steps,

@@ -54,7 +54,7 @@ def powers(base: Array, exponent: Array) -> Array:
     >>> powers(np.array([4.0, 4.0]), np.array([0.5, 2.0]))
     array([ 2., 16.])
     """
-    kinds = np.unique(exponent)
+    kinds = distinct(exponent)
     if kinds.size == 1:
         return power(base, float(kinds[0]))
     base, exponent = np.broadcast_arrays(base, exponent)
@@ -63,6 +63,17 @@ def powers(base: Array, exponent: Array) -> Array:
         where = exponent == one
         result[where] = power(base[where], float(one))
     return result
+
+
+def distinct(values: Array) -> Array:
+    """The different ones of some values, in order.
+
+    >>> distinct(np.array([1.5, 1.0, 1.5]))
+    array([1. , 1.5])
+    """
+    values = values.reshape(-1)
+    # mostly there is one, and nothing to sort
+    return values[:1] if (values == values[:1]).all() else np.unique(values)
 
 
 def integer_power(base: Array, exponent: int) -> Array:

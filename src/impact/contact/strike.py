@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from functools import partial
 
 import numpy as np
@@ -23,6 +23,15 @@ STATUS_OF_END = {
     End.STEP_UNDERFLOW: Status.STEP_UNDERFLOW,
     End.NOT_FINITE: Status.NOT_FINITE,
 }
+
+
+# places of impacts; a slice where it is all of them, so that nothing is copied
+Places = NDArray[np.intp] | slice
+
+
+def places(chosen: NDArray[np.bool_]) -> Places:
+    """The places of those that are chosen."""
+    return slice(None) if chosen.all() else np.flatnonzero(chosen)
 
 
 @dataclass(frozen=True)
@@ -60,12 +69,19 @@ class Rebound:
             exact=np.full(n, np.nan),
         )
 
-    def put(self, where: NDArray[np.intp] | NDArray[np.bool_], part: Rebound) -> None:
+    def put(self, where: Places | NDArray[np.bool_], part: Rebound) -> None:
         """Write a part's arrays at their places."""
         for field in fields(self):
             getattr(self, field.name)[where] = getattr(part, field.name)
 
-    def take(self, where: NDArray[np.intp]) -> Rebound:
+    def with_part(self, where: Places, part: Rebound) -> Rebound:
+        """The same with a part at its places, which may be all of them."""
+        if isinstance(where, slice):
+            return part
+        self.put(where, part)
+        return self
+
+    def take(self, where: Places) -> Rebound:
         """The impacts at some places."""
         return Rebound(**{field.name: getattr(self, field.name)[where] for field in fields(self)})
 
@@ -74,14 +90,13 @@ class Rebound:
 class Struck:
     """Impacts integrated through both phases: where they ended, and each phase's outcome.
 
-    `columns` are those of the restitution phase, `parts` the places of the impacts that entered it.
+    `columns` are those of the restitution phase, of the impacts that entered it.
     """
 
     rebound: Rebound
     inward: Outcome
     outward: Outcome | None
     columns: Columns
-    parts: NDArray[np.intp]
 
 
 def strike(
@@ -117,10 +132,11 @@ def strike(
     peak = motion.indentation(law, inward.state[0])
     at_peak = motion.force_at_peak(law, inward.state[0], columns)
     residual, recovered, columns = motion.turn(law, columns, peak, at_peak)
-    rebound = replace(
-        Rebound.blank(n), peak=peak, permanent=residual, force=np.maximum(inward.maximum, at_peak),
+    unknown = np.full(n, np.nan)
+    rebound = Rebound(
+        e_out=unknown.copy(), peak=peak, permanent=residual.copy(), force=np.maximum(inward.maximum, at_peak),
         duration=inward.state[2].copy(), work=2.0 * inward.state[3], steps=inward.steps.copy(),
-        status=_status(inward),
+        status=_status(inward), chi=unknown, exact=unknown,
     )  # fmt: skip
 
     # nothing is given back where the balls stay at their peak
@@ -128,10 +144,10 @@ def strike(
     rebound.status[stays] = Status.LIMIT
     rebound.e_out[stays] = 0.0
 
-    parts = np.flatnonzero(rebound.status == Status.OK)
+    parts = places(rebound.status == Status.OK)
     columns = tuple(column[parts] for column in columns)
-    if not parts.size:
-        return Struck(rebound, inward, None, columns, parts)
+    if not recovered[parts].size:
+        return Struck(rebound, inward, None, columns)
     back = motion.of_restitution(law)
     start = motion.start_of_restitution(back, columns, recovered[parts])
     form = compiled.of_restitution(back) if is_compiled else None
@@ -149,7 +165,7 @@ def strike(
     rebound.status[parts] = np.where(held, Status.LIMIT, _status(outward))
     if law.model.release == "force":
         rebound.permanent[parts] += motion.indentation(law, outward.state[0])
-    return Struck(rebound, inward, outward, columns, parts)
+    return Struck(rebound, inward, outward, columns)
 
 
 def _status(outcome: Outcome) -> NDArray[np.int8]:

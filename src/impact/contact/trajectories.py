@@ -15,9 +15,9 @@ from . import motion
 from .formula import wishes
 from .model import ForceModel
 from .momentum import is_strong
-from .power import Array
+from .power import Array, distinct
 from .status import Status
-from .strike import Rebound, Struck, strike
+from .strike import Places, Rebound, Struck, places, strike
 from .values import Values, chi_of, exact_restitution, with_coefficients, with_units
 
 Given = Mapping[str, Array]
@@ -51,15 +51,17 @@ def integrate_all(
     rebound = Rebound.blank(n.size)
     rebound.status[:] = status
     with np.errstate(all="ignore"):
-        for one in np.unique(n):
-            where = np.flatnonzero((status == Status.OK) & (n == one))
-            if where.size:
+        for one in distinct(n):
+            chosen = (status == Status.OK) & (n == one)
+            count, where = int(np.count_nonzero(chosen)), places(chosen)
+            if count:
                 strike_at = partial(strike, rtol=rtol, max_steps=max_steps, core=core)
-                rebound.put(where, _halving(model, float(one), _at(given, where), where.size, strike_at, collapse))
+                part = _halving(model, float(one), _at(given, where), count, strike_at, collapse)
+                rebound = rebound.with_part(where, part)
     return rebound
 
 
-def _at(given: Given, where: NDArray[np.intp]) -> Given:
+def _at(given: Given, where: Places) -> Given:
     return {name: values[where] for name, values in given.items()}
 
 
@@ -113,15 +115,16 @@ def _struck(
     chi = chi_of(values, count)
     strong = is_strong(model, values, count)
     for side in (False, True):
-        where = np.flatnonzero((rebound.status == Status.OK) & (strong == side))
-        if not where.size:
+        chosen = (rebound.status == Status.OK) & (strong == side)
+        if not chosen.any():
             continue
+        where = places(chosen)
         law = motion.Law.of(model, n, side)
         columns = tuple(np.asarray(values[name])[where] for name in law.names)
-        first, back = _distinct(columns, where.size) if collapse else (np.arange(where.size),) * 2
+        first, back = _distinct(columns, int(np.count_nonzero(chosen))) if collapse else (slice(None), slice(None))
         sticks = exact[where][first] == 0.0
-        struck = strike_at(law, tuple(c[first] for c in columns), first.size, sticks=sticks)
-        rebound.put(where, struck.rebound.take(back))
+        struck = strike_at(law, tuple(c[first] for c in columns), sticks.size, sticks=sticks)
+        rebound = rebound.with_part(where, struck.rebound.take(back))
     return replace(rebound, chi=chi, exact=exact)
 
 
@@ -131,7 +134,7 @@ def _coefficients(model: ForceModel, values: Values, count: int, of: Container[s
     return np.array([values[name] for name in names]).reshape(-1, count)
 
 
-def _distinct(columns: Columns, n: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _distinct(columns: Columns, n: int) -> tuple[Places, Places]:
     """Places of one impact of each kind, and for every impact the number of its kind."""
     if not columns:
         return np.zeros(1, np.intp), np.zeros(n, np.intp)

@@ -98,6 +98,11 @@ class Outcome:
     recorded: tuple[Step, ...] = ()
 
     @classmethod
+    def unwritten(cls, n: int) -> Outcome:
+        """Room for n lanes."""
+        return cls(np.empty((INTEGRATED, n)), np.empty(n), np.empty(n, np.int32), np.empty(n, np.int8))
+
+    @classmethod
     def blank(cls, n: int) -> Outcome:
         """n lanes of which nothing is known."""
         unknown = np.full((INTEGRATED, n), np.nan)
