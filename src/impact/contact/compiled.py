@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..ode import rk45
 from ..ode.problem import Array, Columns, Outcome, Problem
 from . import forms, motion
 from .model import ForceModel
@@ -117,7 +118,7 @@ def integrate(
     outcome, top = Outcome.unwritten(n), np.empty((4, n))
     rows = (np.ascontiguousarray(start), np.ascontiguousarray(strength), np.ascontiguousarray(bound))
     kernel(form)(
-        *rows, rtol, int(np.float64(rtol).view(np.int64)), max_steps,
+        *rows, rk45.first_step(problem, rtol), rtol, int(np.float64(rtol).view(np.int64)), max_steps,
         outcome.state, outcome.maximum, top, outcome.steps, outcome.end,
     )  # fmt: skip
     return outcome

@@ -18,7 +18,6 @@ from numba.extending import overload
 
 from ..ode import event as landing
 from ..ode import maximum, rk45
-from ..ode.lanes import FIRST_STEP
 from ..ode.problem import End
 from ..ode.tableau import A as FRACTIONS
 from ..ode.tableau import E as DIFFERENCES
@@ -27,7 +26,7 @@ from .compiled import DAMPED, DRAGGED, FORCE, GAP, LOG, NO_FORCE, SPRING, STOP, 
 from .vectors import bits, exponential, from_bits, inlined, kept_on_disk, whole_power
 
 # lanes of a unit, and units side by side
-UNIT, UNITS = 8, 8
+UNIT, UNITS = 16, 4
 LANES = UNIT * UNITS
 # rows of the workspace: the state, its rates and the watched quantity, the step and the one before
 (
@@ -269,7 +268,7 @@ def settle(form, w, rtol, is_last):
 
 
 @inlined
-def begin(form, w, first, lanes, start, strength, bound):
+def begin(form, w, first, lanes, start, strength, bound, first_step):
     """Put the impacts from the first into a unit; where there are too few, the last one again."""
     for j in range(UNIT):
         i = min(first + j, lanes - 1)
@@ -277,7 +276,7 @@ def begin(form, w, first, lanes, start, strength, bound):
         rate_s, rate_y, _, _, watched = rates(form, s, y, strength[i])
         w[S * UNIT + j], w[Y * UNIT + j], w[T * UNIT + j], w[WORK * UNIT + j] = s, y, 0.0, 0.0
         w[RATE_S * UNIT + j], w[RATE_Y * UNIT + j], w[WATCHED * UNIT + j] = rate_s, rate_y, watched
-        w[H * UNIT + j], w[LAST * UNIT + j] = FIRST_STEP, 0.0
+        w[H * UNIT + j], w[LAST * UNIT + j] = first_step, 0.0
         w[STRENGTH * UNIT + j], w[BOUND * UNIT + j] = strength[i], bound[i]
         w[BEST * UNIT + j], w[TOP_S * UNIT + j], w[TOP_Y * UNIT + j] = -np.inf, s, y
         w[BEHIND * UNIT + j], w[AHEAD * UNIT + j] = 0.0, 0.0
@@ -350,13 +349,13 @@ def _kernel(form: Form, version: int):
     """The integrator of a form, whose numbers are constants in it, and the number by which it is kept."""
 
     @kept_on_disk
-    def integrate(start, strength, bound, rtol, rtol_bits, max_steps, state, best, top, steps, end):
+    def integrate(start, strength, bound, first_step, rtol, rtol_bits, max_steps, state, best, top, steps, end):
         lanes = start.shape[1] if version >= 0 else 0
         w = np.zeros((UNITS, ROWS * UNIT))
         # the first impact of each unit, and how often a step of it was tried
         first, trials = np.arange(0, LANES, UNIT), np.zeros(UNITS, np.int64)
         for unit in range(UNITS):
-            begin(form, w[unit], first[unit], lanes, start, strength, bound)
+            begin(form, w[unit], first[unit], lanes, start, strength, bound, first_step)
         waiting, living = LANES, min(UNITS, -(-lanes // UNIT))
         while living:
             for unit in range(UNITS):
@@ -370,7 +369,7 @@ def _kernel(form: Form, version: int):
                     first[unit], trials[unit] = waiting, 0
                     waiting += UNIT
                     if first[unit] < lanes:
-                        begin(form, mine, first[unit], lanes, start, strength, bound)
+                        begin(form, mine, first[unit], lanes, start, strength, bound, first_step)
                     else:
                         living -= 1
         if form.ending == STOP:

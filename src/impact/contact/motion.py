@@ -28,6 +28,8 @@ FAR = 1e8
 # each component is judged against itself: what a strong damping leaves of the velocity is small beside v0 and
 # still decides where the force vanishes; near s = 0 the motion is so smooth that its relative error is small, too
 FLOOR = (1e-200, 1e-200)
+# first steps for an error of 1: on approach there is no force yet, at the peak it is largest and there is no speed
+FIRST_INWARD, FIRST_OUTWARD = 2.7, 0.87
 # step of the difference that gives the rate of the force at the release, relative to s, at which it may vanish
 DIFFERENCE = 1e-7
 # what an unloading branch is told besides, in columns that follow the law's own
@@ -87,6 +89,7 @@ def approach(law: Law) -> Problem:
         lost=lambda y, k, columns: np.asarray(y[0] > FAR),
         floor=FLOOR,
         watch=True,
+        first=FIRST_INWARD,
     )
 
 
@@ -116,7 +119,8 @@ def restitution(law: Law) -> Problem:
         return creeps(x, -k[0], c, law.n, force_form(law.model, law.n).drag / law.model.smooth)
 
     event = force_event if law.model.release == "force" else gap_event
-    return Problem(rates=rates, event=event, lost=creeping if may_creep(law) else turned_back, floor=FLOOR)
+    lost = creeping if may_creep(law) else turned_back
+    return Problem(rates=rates, event=event, lost=lost, floor=FLOOR, first=FIRST_OUTWARD)
 
 
 def release(s: Array, rate: Array, force: Array, slope: Array) -> tuple[Array, Array]:

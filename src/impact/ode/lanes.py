@@ -11,7 +11,6 @@ from .maximum import Top
 from .problem import COMPONENTS, Array, Columns, End, Mask, Outcome, Problem
 from .step import Space, narrow
 
-FIRST_STEP = 0.05
 RUNNING, LANDED = int(End.RUNNING), int(End.LANDED)
 
 
@@ -37,7 +36,7 @@ class Lanes:
     space: Space
 
     @classmethod
-    def begin(cls, problem: Problem, start: Array, columns: Columns, space: Space) -> Lanes:
+    def begin(cls, problem: Problem, start: Array, columns: Columns, space: Space, first_step: float) -> Lanes:
         """All lanes at their start, with room for as many; what the start does not tell of them is zero."""
         n = start.shape[1]
         y, k = space.y, space.k
@@ -49,7 +48,7 @@ class Lanes:
             columns=columns,
             y=y,
             k=k,
-            h=np.full(n, FIRST_STEP),
+            h=np.full(n, first_step),
             last=np.zeros(n),
             halvings=np.zeros(n, np.int8),
             steps=np.zeros(n, np.int32),

@@ -52,6 +52,7 @@ class Problem:
     lost : (y, k, columns) -> mask of the lanes that can no longer reach the event
     floor : the local error of each component is judged against rtol max(|y|, floor)
     watch : locate the maximum of the watched quantity
+    first : the length of a step whose error is of the order of 1, by which the first one is chosen
     """
 
     rates: Rates
@@ -59,6 +60,7 @@ class Problem:
     lost: Callable[[Array, Array, Columns], Mask]
     floor: tuple[float, float]
     watch: bool = False
+    first: float = 1.0
 
 
 @dataclass(frozen=True)

@@ -59,7 +59,7 @@ def integrate(
     recorded: list[Step] = []
     space = Space.of(n) if space is None else space.narrow(n)
     with np.errstate(all="ignore"):
-        lanes = Lanes.begin(problem, start, columns, space.narrow(n))
+        lanes = Lanes.begin(problem, start, columns, space.narrow(n), first_step(problem, rtol))
         for count in range(1, max_steps + 1):
             step = _advance(problem, lanes, rtol, record)
             if step is not None:
@@ -104,18 +104,28 @@ def _advance(problem: Problem, lanes: Lanes, rtol: float, record: bool) -> Step 
     return step
 
 
+def first_step(problem: Problem, rtol: float) -> float:
+    """The length of the first step, by which none of an ordinary impact is rejected."""
+    return problem.first * float(_factor(np.ones(1), rtol)[0])
+
+
 def _following(h: Array, worst: Array, rtol: float) -> Array:
     """The length of the next step by the controller."""
+    following = _factor(worst, rtol)
+    np.minimum(following, LARGEST, out=following)
+    np.maximum(following, SMALLEST, out=following)
+    following *= h
+    return following
+
+
+def _factor(worst: Array, rtol: float) -> Array:
+    """What the step of an error is to be multiplied by."""
     # the bits of a number taken for an integer are its logarithm, but for a few per cent; unlike those of a power
     # they are the same on every processor
     bits = worst.view(np.int64) >> 8
     bits *= FIFTH
     np.subtract(_bits(SAFETY) + (_bits(rtol) >> 8) * FIFTH, bits, bits)
-    following = bits.view(np.float64)
-    np.minimum(following, LARGEST, out=following)
-    np.maximum(following, SMALLEST, out=following)
-    following *= h
-    return following
+    return bits.view(np.float64)
 
 
 def _bits(number: float) -> int:
