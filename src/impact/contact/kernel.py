@@ -93,7 +93,8 @@ def rates(form, s, y, strength):
         rate_y = rate_of_force(v, whole_power(s, form.extra - 1), form.extra / strength, weight, force)
         return v, rate_y, weight, weight * force * v, force
     if form.equation == LOG:
-        v = (exponential(y) - 1.0) / strength
+        # one division for all stages
+        v = (exponential(y) - 1.0) * (1.0 / strength)
         force = damped(elastic, v, 1.0, strength)
         return v, rate_of_log(weight, elastic, strength), weight, weight * force * v, force
     v = y
