@@ -71,8 +71,9 @@ def test_both_cores_agree(key: str, n: float) -> None:
     one, other = (struck(find(key), lanes, core) for core in ("numpy", "numba"))
     np.testing.assert_array_equal(one.status, other.status)
     alike = one.steps == other.steps
-    # rounding seldom decides about a step
-    assert np.mean(alike) > 0.9
+    # rounding seldom decides about a step, but in lanes of thousands about one or the other
+    assert np.mean(alike | (one.steps > 1000)) > 0.9
+    assert np.all(np.abs(one.steps - other.steps) <= np.maximum(2, 0.005 * one.steps))
     for name, distance in off(one, other).items():
         assert np.array_equal(np.isnan(getattr(one, name)), np.isnan(getattr(other, name))), name
         assert np.nanmax(distance[alike], initial=0.0) <= EQUAL, name

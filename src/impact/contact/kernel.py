@@ -48,7 +48,7 @@ SAFETY_BITS = int(np.float64(SAFETY).view(np.int64))
 LAST_STEP, HALVINGS = rk45.LAST_STEP, float(rk45.HALVINGS)
 LANDING, NEAR, SHORT, CLOSE = landing.LANDING, landing.NEAR, landing.SHORT, landing.CLOSE
 SLOPE, FLAT, GUESSES = maximum.DIFFERENCE, maximum.FLAT, maximum.GUESSES
-FAR, FLOOR, DIFFERENCE = motion.FAR, motion.FLOOR, motion.DIFFERENCE
+FAR, FLOOR, DIFFERENCE, NEAREST = motion.FAR, motion.FLOOR, motion.DIFFERENCE, motion.NEAREST
 RUNNING, LANDED, LOST, MAX_STEPS = (float(end) for end in (End.RUNNING, End.LANDED, End.LOST, End.MAX_STEPS))
 STEP_UNDERFLOW, NOT_FINITE = float(End.STEP_UNDERFLOW), float(End.NOT_FINITE)
 
@@ -153,7 +153,7 @@ def event(form, s, y, rate_s, rate_y, force, strength):
     if form.ending == GAP:
         return s, rate_s
     if form.ending == NO_FORCE:
-        small = DIFFERENCE * min(abs(s), 1.0)
+        small = DIFFERENCE * min(max(abs(s), NEAREST), 1.0)
         slope = slope_of_force(form, s, y, rate_s, rate_y, force, small, strength)
         return release(s, rate_s, force, slope)
     if form.equation == FORCE:

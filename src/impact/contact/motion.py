@@ -30,8 +30,9 @@ FAR = 1e8
 FLOOR = (1e-200, 1e-200)
 # first steps for an error of 1: on approach there is no force yet, at the peak it is largest and there is no speed
 FIRST_INWARD, FIRST_OUTWARD = 2.7, 0.87
-# step of the difference that gives the rate of the force at the release, relative to s, at which it may vanish
-DIFFERENCE = 1e-7
+# step of the difference that gives the rate of the force at the release, relative to s, at which it may vanish; a
+# step may end at s = 0 itself, and s below this is taken for it
+DIFFERENCE, NEAREST = 1e-7, 1e-12
 # what an unloading branch is told besides, in columns that follow the law's own
 BRANCH = ("peak", "force_at_peak", "residual", "recovered")
 # the force of a law without damping is taken to be a power of s below this
@@ -104,7 +105,7 @@ def restitution(law: Law) -> Problem:
 
     def force_event(y: Array, k: Array, columns: Columns) -> tuple[Array, Array]:
         s, force = y[0], k[4]
-        small = DIFFERENCE * np.minimum(np.abs(s), 1.0)
+        small = DIFFERENCE * np.clip(np.abs(s), NEAREST, 1.0)
         slope = (rates(y + small * k[:2], columns)[4] - force) / small
         return release(s, k[0], force, slope)
 
