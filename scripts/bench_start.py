@@ -28,7 +28,7 @@ def hello(name: str = "you"):
     "Greet somebody."
 app()
 """
-LIBRARIES = "import xarray, h5netcdf, pydantic, typer, rich, scipy.special"
+LIBRARIES = "import xarray, h5netcdf, pydantic, typer, rich"
 FIGURE6 = Path(__file__).parents[1] / "configs" / "figure6.toml"
 
 

@@ -151,7 +151,6 @@ def test_processes_and_threads_are_one_or_the_other() -> None:
         impact.sweep(SWEEP, overrides=['solver.core="numpy"'], jobs=2, threads=2)
 
 
-
 # ---- which core
 
 

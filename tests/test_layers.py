@@ -16,7 +16,7 @@ FLOORS = {
 LIBRARIES = {
     "typer": {"cli"}, "rich": {"cli"}, "matplotlib": {"views"}, "xarray": {"data"}, "h5py": {"data"},
     "h5netcdf": {"data"}, "tomllib": {"sweeps"}, "pydantic": {"sweeps"}, "pydantic_core": {"sweeps"},
-    "pint": {"sweeps"}, "scipy": {"contact"}, "filelock": {"data"}, "numba": {"contact"},
+    "pint": {"sweeps"}, "filelock": {"data"}, "numba": {"contact"},
     "distributed": {"sweeps"},
 }  # fmt: skip
 MODULES = sorted(SOURCE.rglob("*.py"))

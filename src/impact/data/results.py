@@ -78,7 +78,7 @@ SCHEMA = (
              "approach + restitution", "i4"),
 )  # fmt: skip
 
-PACKAGES = ("numpy", "scipy", "h5py", "h5netcdf", "xarray")
+PACKAGES = ("numpy", "h5py", "h5netcdf", "xarray")
 
 
 def stored(plan: Plan) -> tuple[Variable, ...]:
