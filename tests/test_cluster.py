@@ -25,12 +25,13 @@ pytestmark = pytest.mark.slow
 MINE = """import os
 import impact
 
-def force(elastic, v, {more}):
-    {does}
+def force(elastic, v):
+    DOES
     return elastic * (1 + 0.3 * v)
 
 MODEL = impact.ForceModel("mine", "Mine", 2026, "F = K δⁿ (1 + 0.3 δ̇)", "", force=force)
 """
+OWN = CONFIG.replace('models = ["hertz", "lankarani-nikravesh-1990"]', 'models = ["mine"]')
 
 
 @pytest.fixture(scope="module")
@@ -157,13 +158,12 @@ def test_a_scheduler_without_the_package_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_plug_in_whose_file_the_workers_have_not(two: Dask, tmp_path: Path) -> None:
-    text = MINE.format(more="t=None", does="pass").replace(", t=None", "")
-    config = CONFIG.replace('models = ["hertz", "lankarani-nikravesh-1990"]', 'models = ["mine"]')
+    text = MINE.replace("DOES", "pass")
     for name in ("one", "two"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "mine.py").write_text(text, encoding="utf-8")
-    sweep(tmp_path / "one", "--plugin", "mine.py", config=config).ends()
-    one = sweep(tmp_path / "two", "--plugin", "mine.py", "--scheduler", two.address, config=config)
+    sweep(tmp_path / "one", "--plugin", "mine.py", config=OWN).ends()
+    one = sweep(tmp_path / "two", "--plugin", "mine.py", "--scheduler", two.address, config=OWN)
     one.until_kept(1)
     (tmp_path / "two" / "mine.py").unlink()
     one.ends()
@@ -196,17 +196,16 @@ def test_a_block_executed_twice(two: Dask, tmp_path: Path, right: str) -> None:
 
 
 def test_a_block_that_kills_its_worker_once(two: Dask, tmp_path: Path) -> None:
-    config = CONFIG.replace('models = ["hertz", "lankarani-nikravesh-1990"]', 'models = ["mine"]')
     mark = tmp_path / "died"
     dies = f"""if os.path.basename(os.getcwd()) == "cluster" and not os.path.exists({str(mark)!r}):
         open({str(mark)!r}, "w").close()
         os.kill(os.getpid(), 9)"""
-    text = MINE.format(more="t=None", does=dies).replace(", t=None", "")
+    text = MINE.replace("DOES", dies)
     for name in ("one", "two"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "mine.py").write_text(text, encoding="utf-8")
-    sweep(tmp_path / "one", "--plugin", "mine.py", config=config).ends()
-    one = sweep(tmp_path / "two", "--plugin", "mine.py", "--scheduler", two.address, config=config)
+    sweep(tmp_path / "one", "--plugin", "mine.py", config=OWN).ends()
+    one = sweep(tmp_path / "two", "--plugin", "mine.py", "--scheduler", two.address, config=OWN)
     one.ends()
     assert mark.exists()
     assert one.digest == digest(tmp_path / "one")
@@ -221,6 +220,30 @@ def test_interrupted_it_is_resumed(two: Dask, tmp_path: Path, right: str) -> Non
     again = sweep(tmp_path / "sweep", "--scheduler", two.address, "--resume")
     again.ends()
     assert again.digest == right
+
+
+def test_interrupted_when_nobody_is_left_it_ends(two: Dask, tmp_path: Path, right: str) -> None:
+    one = sweep(tmp_path / "sweep", "--scheduler", two.address)
+    one.until_kept(2)
+    two.kill("a", "b")
+    one.process.send_signal(signal.SIGINT)
+    assert "--resume goes on" in one.ends(130)
+    again = sweep(tmp_path / "sweep", "--resume")
+    again.ends()
+    assert again.digest == right
+
+
+def test_a_block_that_kills_every_worker_is_given_up(tmp_path: Path) -> None:
+    # not where the sweep was begun
+    dies = "if multiprocessing.parent_process() is not None and elastic.size > 100: os.kill(os.getpid(), 9)"
+    (tmp_path / "mine.py").write_text(
+        MINE.replace("import os", "import multiprocessing, os").replace("DOES", dies)
+    )
+    said = sweep(tmp_path, "--plugin", "mine.py", "--scheduler", "local", config=OWN).ends(4)
+    assert said.splitlines()[-1].startswith(
+        "processes were killed 4 times at the same trajectories: memory is short"
+    )
+    assert "--resume goes on" in said
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])

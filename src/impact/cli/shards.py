@@ -5,16 +5,18 @@ from __future__ import annotations
 import shlex
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ..errors import UnfinishedError
-from ..sweeps.plan import Plan
 from ..text import safe_text
 from . import door
 from .options import AllowFailed, Json, Output, Overwrite, Plugins, Quiet
 from .who import Who
+
+if TYPE_CHECKING:
+    from ..sweeps.plan import Plan
 
 
 def do(

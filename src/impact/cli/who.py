@@ -6,11 +6,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..errors import UsageError
-from ..sweeps.teams import Team, team_of
 from ..text import safe_text
 from .door import say
+
+if TYPE_CHECKING:
+    from ..sweeps.teams import Team
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,8 @@ class Who:
         """Those who integrate; a cluster is told of on stderr."""
         place = self.scheduler if self.scheduler is not None else self.scheduler_file
         if place is None:
+            from ..sweeps.teams import team_of
+
             yield team_of(self.jobs, self.threads)
             return
         from ..sweeps.cluster import cluster

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import math
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, CancelledError, Executor
@@ -25,11 +26,12 @@ ADDRESS = "the address of a scheduler of dask, such as tcp://host:8786"
 MOST = 256
 # seconds for which a number of workers is taken to hold, and after which nobody is waited for any more
 MOMENT, PATIENCE = 1.0, 10.0
+# seconds without a worker of our own, which are begun again when they die, after which there will be none
+AWAY = 60.0
 # asks in words that a worker of any version understands
 VERSION = "__import__('impact').__version__"
-
-# what workers of our own do first: a terminal sends SIGINT to all, and it is the driver's
-DEAF = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"
+# what workers of our own do first: a terminal sends SIGINT to all, and it is the driver's; so is what is told
+DEAF = "import logging, signal; logging.disable(); signal.signal(signal.SIGINT, signal.SIG_IGN)"
 
 
 class Cluster(NamedTuple):
@@ -65,7 +67,7 @@ def cluster(place: str | Path) -> Iterator[Cluster]:
         logging.disable()
         client = _connected(place, shown, stack)
         _check_versions(client)
-        team = Team(lambda: _executor(client, shown), _room(client))
+        team = Team(lambda: _executor(client, shown), _room(client, shown))
         is_seen = "dashboard" in client.scheduler_info()["services"]
         yield Cluster(team, client.dashboard_link if is_seen else None, len(client.nthreads()))
 
@@ -114,17 +116,22 @@ def _check_versions(client: Client) -> None:
             raise UsageError(other_version(place, str(found), __version__))
 
 
-def _room(client: Client) -> Callable[[], int]:
-    """How many blocks may be given at the moment: workers come and go."""
-    counted, room = -MOMENT, AHEAD
+def _room(client: Client, shown: str) -> Callable[[], int]:
+    """How many blocks may be given at the moment: workers come and go; those of our own are to stay."""
+    asked = seen = -math.inf
+    workers = 0
 
     def of_now() -> int:
-        nonlocal counted, room
-        if time.monotonic() - counted > MOMENT:
-            counted = time.monotonic()
+        nonlocal asked, seen, workers
+        now = time.monotonic()
+        if now - asked > MOMENT:
+            asked = now
             with contextlib.suppress(OSError, ValueError):
-                room = min(max(AHEAD * sum(client.nthreads().values()), AHEAD), MOST)
-        return room
+                workers = sum(client.nthreads().values())
+            seen = now if workers or seen == -math.inf else seen
+            if shown == LOCAL and now - seen > AWAY:
+                raise StoreError(f"{shown}: all workers are gone")
+        return min(AHEAD * workers, MOST)
 
     return of_now
 

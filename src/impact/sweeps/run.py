@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
@@ -22,6 +23,8 @@ from .trajectories import Stretch, Trajectories, block_of
 WORTH = 200_000
 # how often a block is given out again
 AGAIN = 3
+# seconds after which it is looked again whether to stop, and whether there is room
+MOMENT = 0.2
 
 
 def settled(plan: Plan, found: Sequence[Trajectories]) -> Plan:
@@ -109,15 +112,18 @@ def _finished(
 ) -> Iterator[tuple[Stretch, Rebound]]:
     """Give what is left, as many blocks at a time as there is room for, and take them as they finish."""
     try:
-        while True:
+        while left or given:
             while left and len(given) < room() and not stopping():
                 given[give(left[0])] = left[0]
                 left.popleft()
-            if not given:
+            # what was begun is finished, unless there is nobody left to do it
+            if stopping() and not (given and room()):
                 return
-            for future in wait(given, return_when=FIRST_COMPLETED).done:
+            for future in wait(given, MOMENT, FIRST_COMPLETED).done if given else ():
                 rebound = future.result()
                 yield given.pop(future), rebound
+            if not given and left:
+                time.sleep(MOMENT)
     finally:
         for future in given:
             future.cancel()

@@ -29,7 +29,7 @@ class Team:
     Parameters
     ----------
     executor : makes the executor, and again where it was broken (`concurrent.futures.BrokenExecutor`)
-    room : how many blocks may be given to it before one is finished, at the moment
+    room : how many blocks may be given to it before one is finished, at the moment; none if nobody is there
     is_here : whether it shares our memory; to others numbers, names and source are sent
     """
 
