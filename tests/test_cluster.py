@@ -195,17 +195,20 @@ def test_a_block_executed_twice(two: Dask, tmp_path: Path, right: str) -> None:
     assert again.digest == right
 
 
-def test_a_block_that_kills_its_worker_once(two: Dask, tmp_path: Path) -> None:
+@pytest.mark.parametrize("place", ["there", "local"])
+def test_a_block_that_kills_its_worker_once(two: Dask, tmp_path: Path, place: str) -> None:
     mark = tmp_path / "died"
-    dies = f"""if os.path.basename(os.getcwd()) == "cluster" and not os.path.exists({str(mark)!r}):
+    elsewhere = 'multiprocessing.parent_process() is not None or os.path.basename(os.getcwd()) == "cluster"'
+    dies = f"""if ({elsewhere}) and not os.path.exists({str(mark)!r}):
         open({str(mark)!r}, "w").close()
         os.kill(os.getpid(), 9)"""
-    text = MINE.replace("DOES", dies)
+    text = MINE.replace("import os", "import multiprocessing, os").replace("DOES", dies)
     for name in ("one", "two"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "mine.py").write_text(text, encoding="utf-8")
     sweep(tmp_path / "one", "--plugin", "mine.py", config=OWN).ends()
-    one = sweep(tmp_path / "two", "--plugin", "mine.py", "--scheduler", two.address, config=OWN)
+    address = two.address if place == "there" else "local"
+    one = sweep(tmp_path / "two", "--plugin", "mine.py", "--scheduler", address, config=OWN)
     one.ends()
     assert mark.exists()
     assert one.digest == digest(tmp_path / "one")

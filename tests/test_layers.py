@@ -17,7 +17,7 @@ LIBRARIES = {
     "typer": {"cli"}, "rich": {"cli"}, "matplotlib": {"views"}, "xarray": {"data"}, "h5py": {"data"},
     "h5netcdf": {"data"}, "tomllib": {"sweeps"}, "pydantic": {"sweeps"}, "pydantic_core": {"sweeps"},
     "pint": {"sweeps"}, "filelock": {"data"}, "numba": {"contact"},
-    "distributed": {"sweeps"},
+    "dask": {"sweeps"}, "distributed": {"sweeps"},
 }  # fmt: skip
 MODULES = sorted(SOURCE.rglob("*.py"))
 

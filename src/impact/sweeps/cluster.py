@@ -30,6 +30,9 @@ MOMENT, PATIENCE = 1.0, 10.0
 AWAY = 60.0
 # asks in words that a worker of any version understands
 VERSION = "__import__('impact').__version__"
+# of a scheduler of our own: a block whose worker died comes back to us, to be given out again; and a worker that
+# is dead when it is looked at is begun again all the same
+OWN = {"distributed.scheduler.allowed-failures": 0, "distributed.deploy.lost-worker-timeout": "1000 days"}
 # what workers of our own do first: a terminal sends SIGINT to all, and it is the driver's; so is what is told
 DEAF = "import logging, signal; logging.disable(); signal.signal(signal.SIGINT, signal.SIG_IGN)"
 
@@ -74,10 +77,12 @@ def cluster(place: str | Path) -> Iterator[Cluster]:
 
 def _connected(place: str | Path, shown: str, stack: contextlib.ExitStack) -> Client:
     """A client of the scheduler; it is closed with the stack, and a scheduler of our own with it."""
+    import dask.config
     from distributed import Client, LocalCluster
 
     try:
         if place == LOCAL:
+            dask.config.set(OWN)
             own = stack.enter_context(
                 LocalCluster(threads_per_worker=1, dashboard_address="127.0.0.1:0", memory_limit=0, preload=[DEAF])
             )
