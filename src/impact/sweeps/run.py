@@ -119,11 +119,12 @@ def _finished(
             # what was begun is finished, unless there is nobody left to do it
             if stopping() and not (given and room()):
                 return
-            for future in wait(given, MOMENT, FIRST_COMPLETED).done if given else ():
+            if not given:
+                # nobody is there yet
+                time.sleep(MOMENT)
+            for future in wait(given, MOMENT, FIRST_COMPLETED).done:
                 rebound = future.result()
                 yield given.pop(future), rebound
-            if not given and left:
-                time.sleep(MOMENT)
     finally:
         for future in given:
             future.cancel()
