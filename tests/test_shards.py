@@ -79,6 +79,11 @@ def test_a_shard_says_what_it_did_and_what_comes_next(cli: Run, folder: Path) ->
     assert done.returncode == 0
     assert "out.h5.2-of-2.work: 2 of 5 blocks, " in done.stderr
     assert "with all 2 shards: impact merge out.h5.*-of-2.work -o out.h5" in done.stderr
+    told = json.loads(cli("sweep", "c.toml", "--shard", "2/2", "-o", "out.h5", "--json", cwd=folder).stdout)
+    assert told == {
+        "folder": "out.h5.2-of-2.work", "shard": "2/2", "blocks": 2, "of_blocks": 5, "trajectories": 60,
+        "failed": 0,
+    }  # fmt: skip
     # again, there is nothing left to do
     before = {path: path.stat().st_mtime_ns for path in folder.glob("*.work/*.npz")}
     assert cli("sweep", "c.toml", "--shard", "2/2", "-o", "out.h5", cwd=folder).returncode == 0

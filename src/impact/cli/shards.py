@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,6 +15,7 @@ from ..text import safe_text
 from . import door
 from .options import AllowFailed, Json, Output, Overwrite, Plugins, Quiet
 from .who import Who
+from .words import dump
 
 if TYPE_CHECKING:
     from ..sweeps.plan import Plan
@@ -28,6 +30,7 @@ def do(
     *,
     overwrite: bool,
     quiet: bool,
+    as_json: bool,
     stopping: Callable[[], bool],
 ) -> None:
     """Do a shard of a plan.
@@ -48,6 +51,8 @@ def do(
         )
     if stopping():
         raise UnfinishedError(f"{safe_text(str(done.folder))} has the whole shard")
+    if as_json:
+        print(dump({**asdict(done), "folder": str(done.folder), "shard": str(part)}))
     if not quiet:
         failed = f", {done.failed:,} failed" if done.failed else ""
         every = output.with_name(f"{shlex.quote(output.name)}.*-of-{part.of}.work")

@@ -66,7 +66,17 @@ def sweep(
             changes = [word for one in sets or () for word in ("--set", one)]
             own = [word for one in plugins or () for word in ("--plugin", str(one))]
             command = ["impact", "sweep", str(config), "-o", str(output), *changes, *own]
-            do(plan, shard, command, output, who, overwrite=overwrite, quiet=quiet, stopping=stopping)
+            do(
+                plan,
+                shard,
+                command,
+                output,
+                who,
+                overwrite=overwrite,
+                quiet=quiet,
+                as_json=as_json,
+                stopping=stopping,
+            )
             return
         if dry_run:
             from .dry_run import tell_of
