@@ -38,7 +38,7 @@ def sweep(
     ] = None,
     shard: Annotated[
         str | None,
-        typer.Option("--shard", metavar="K/N", help="Do the K-th of N parts, for impact merge; goes on."),
+        typer.Option("--shard", metavar="K/N", help="Only part K of N; impact merge joins the parts."),
     ] = None,
     max_points: Annotated[
         int, typer.Option("--max-points", metavar="N", min=1, help="Refuse a sweep of more points.")
