@@ -63,7 +63,7 @@ def merged(cli: Run, folder: Path, *folders: Path) -> str:
     return done.stderr
 
 
-@pytest.mark.parametrize("of", [1, 2, 3, 7])
+@pytest.mark.parametrize("of", [1, 3, pytest.param(7, marks=pytest.mark.slow)])
 def test_the_parts_in_any_order_make_the_whole(cli: Run, folder: Path, of: int) -> None:
     found = shards(cli, folder, *(f"{number}/{of}" for number in range(of, 0, -1)))
     counts = [len(list(one.glob("*.npz"))) for one in found]
@@ -114,6 +114,7 @@ def test_an_unfinished_shard_is_told_from_a_missing_one(cli: Run, folder: Path) 
     merged(cli, folder, *found)
 
 
+@pytest.mark.slow
 def test_many_missing_ones_are_counted(cli: Run, folder: Path) -> None:
     more = '"gharib-hurmuzlu-2012", "herbert-mcwhannell-1977", "lankarani-nikravesh-1994"]'
     (folder / "c.toml").write_text(CONFIG.replace('hysteresis"]', f'hysteresis", {more}'))
@@ -146,6 +147,7 @@ def test_foreign_ones_are_told(cli: Run, folder: Path) -> None:
     assert "its plan.json cannot be read" in cli("merge", *own, *other, cwd=folder).stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "text", ["[]", "{}", '{"shard": [1, 0]}', '{"shard": [true, "x"], "command": 1}', "[" * 9000]
 )
@@ -157,6 +159,7 @@ def test_what_a_folder_says_may_be_anything(cli: Run, folder: Path, text: str) -
     assert "is no shard, wants a folder that impact sweep --shard K/N makes" in done.stderr
 
 
+@pytest.mark.slow
 def test_shards_that_overlap_are_one_where_their_bits_are(cli: Run, folder: Path) -> None:
     found = shards(cli, folder, "1/2", "2/2", "1/3")
     said = merged(cli, folder, *found, found[0])
@@ -180,6 +183,7 @@ def test_a_shard_that_is_being_made_is_told(cli: Run, folder: Path) -> None:
         assert cli("sweep", "c.toml", "--shard", "2/2", cwd=folder).returncode == 5
 
 
+@pytest.mark.slow
 def test_a_model_of_ones_own_is_wanted_again(cli: Run, folder: Path) -> None:
     (folder / "mine.py").write_text(MINE)
     (folder / "c.toml").write_text(CONFIG.replace('"hertz"', '"mine"'))
@@ -205,6 +209,7 @@ def test_what_is_no_shard_is_told(cli: Run, folder: Path, text: str) -> None:
     assert f"--shard {text}: wants K/N with K from 1 to N, such as 3/16" in done.stderr
 
 
+@pytest.mark.slow
 def test_failed_points_are_told_by_the_shard_and_end_the_merge_with_three(cli: Run, folder: Path) -> None:
     few = ("--set", "solver.max_steps=1")
     done = cli("sweep", "c.toml", "--shard", "1/2", *few, cwd=folder)

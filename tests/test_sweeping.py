@@ -141,6 +141,7 @@ def test_too_many_points_are_refused_before_there_is_anything(forked: Forked, bl
 # ---- how far it is
 
 
+@pytest.mark.slow
 def test_a_line_now_and_then_where_there_is_no_terminal(cli: Run, blocks: Path) -> None:
     # one line after a second, and not one for each block
     done = cli("sweep", blocks, "--set", "solver.rtol=1e-12", "--set", THREE, cwd=blocks.parent)
@@ -251,6 +252,7 @@ def test_a_plug_in_that_is_changed_while_the_sweep_runs_is_what_it_was(blocks: P
     assert execute(plan, team_of(jobs=2)).identical(execute(plan))
 
 
+@pytest.mark.slow
 def test_any_executor_integrates(blocks: Path) -> None:
     one = impact.sweep(blocks)
     with ThreadPoolExecutor(2) as threads, ProcessPoolExecutor(2, get_context("spawn")) as processes:
@@ -293,6 +295,7 @@ def test_an_executor_that_stays_broken_is_told() -> None:
         impact.sweep(ROOT / "configs" / "figure6.toml", executor=Broken())
 
 
+@pytest.mark.slow
 def test_nobody_who_listens_is_no_reason_to_stop(blocks: Path) -> None:
     words = f"'{sys.executable}' -m impact sweep blocks.toml --set '{THREE}' --set solver.rtol=1e-12"
     command = f"{words} 2>&1 >/dev/null | head -c 1 >/dev/null; exit ${{PIPESTATUS[0]}}"
