@@ -42,6 +42,13 @@ def right(tmp_path_factory: pytest.TempPathFactory) -> str:
     return one.digest
 
 
+def resumed(folder: Path, *words: str) -> str:
+    """The digest of a sweep that was gone on with."""
+    again = sweep(folder, "--resume", *words)
+    again.ends()
+    return again.digest
+
+
 @pytest.fixture
 def two(tmp_path: Path) -> Iterator[Dask]:
     with dask(tmp_path / "cluster", "a", "b") as found:
@@ -120,9 +127,7 @@ def test_a_worker_of_another_version_is_refused(two: Dask, tmp_path: Path, right
     assert f"has impact 0.0.1, this is {impact.__version__}; wants the same" in said
     assert "tcp://127.0.0.1" in said
     two.kill("old")
-    again = sweep(tmp_path / "sweep", "--scheduler", two.address, "--resume")
-    again.ends()
-    assert again.digest == right
+    assert resumed(tmp_path / "sweep", "--scheduler", two.address) == right
 
 
 def test_a_worker_of_another_version_that_joins_later_is_refused(two: Dask, tmp_path: Path, right: str) -> None:
@@ -136,9 +141,7 @@ def test_a_worker_of_another_version_that_joins_later_is_refused(two: Dask, tmp_
     )
     assert "--resume goes on" in said
     two.kill("old")
-    again = sweep(tmp_path / "sweep", "--scheduler", two.address, "--resume")
-    again.ends()
-    assert again.digest == right
+    assert resumed(tmp_path / "sweep", "--scheduler", two.address) == right
 
 
 def test_a_worker_without_the_package_is_refused(two: Dask, tmp_path: Path) -> None:
@@ -190,9 +193,7 @@ def test_a_block_executed_twice(two: Dask, tmp_path: Path, right: str) -> None:
     one.process.kill()
     one.process.communicate()
     two.kill("a")
-    again = sweep(tmp_path / "sweep", "--scheduler", two.address, "--resume")
-    again.ends()
-    assert again.digest == right
+    assert resumed(tmp_path / "sweep", "--scheduler", two.address) == right
 
 
 @pytest.mark.parametrize("place", ["there", "local"])
@@ -220,9 +221,7 @@ def test_interrupted_it_is_resumed(two: Dask, tmp_path: Path, right: str) -> Non
     one.process.send_signal(signal.SIGINT)
     said = one.ends(130)
     assert "--resume goes on" in said
-    again = sweep(tmp_path / "sweep", "--scheduler", two.address, "--resume")
-    again.ends()
-    assert again.digest == right
+    assert resumed(tmp_path / "sweep", "--scheduler", two.address) == right
 
 
 def test_interrupted_when_nobody_is_left_it_ends(two: Dask, tmp_path: Path, right: str) -> None:
@@ -231,9 +230,7 @@ def test_interrupted_when_nobody_is_left_it_ends(two: Dask, tmp_path: Path, righ
     two.kill("a", "b")
     one.process.send_signal(signal.SIGINT)
     assert "--resume goes on" in one.ends(130)
-    again = sweep(tmp_path / "sweep", "--resume")
-    again.ends()
-    assert again.digest == right
+    assert resumed(tmp_path / "sweep") == right
 
 
 def test_a_block_that_kills_every_worker_is_given_up(tmp_path: Path) -> None:
@@ -266,9 +263,7 @@ def test_a_cluster_of_its_own_ends_with_the_sweep(tmp_path: Path, right: str, nu
         one.process.kill()
         one.process.communicate()
     until(lambda: not in_group(group))
-    again = sweep(tmp_path / "sweep", "--resume")
-    again.ends()
-    assert again.digest == right
+    assert resumed(tmp_path / "sweep") == right
 
 
 def test_nobody_answers(tmp_path: Path) -> None:
