@@ -85,7 +85,8 @@ class Contact:
     @cached_property
     def _asked(self) -> Array:
         e = self.lanes.e
-        return np.where((e >= 0.0) & (e <= 1.0), e, np.nan)
+        asked = (e >= 0.0) & (e <= 1.0)
+        return e if asked.all() else np.where(asked, e, np.nan)
 
     @cached_property
     @quiet
@@ -247,6 +248,6 @@ def _unless(
 ) -> NDArray[np.int8]:
     """The status, but another one where a value is not within bounds."""
     # two numbers tell of most blocks that all is well
-    if least <= np.min(values, initial=most) and np.max(values, initial=least) <= most:
+    if least <= values.min(initial=most) and values.max(initial=least) <= most:
         return status
     return np.where((values >= least) & (values <= most), status, otherwise)

@@ -23,4 +23,5 @@ def velocities_after(lanes: Lanes, e: Array) -> tuple[Array, Array]:
     approach keep their velocities; an impulse that is too large for a number gives NaN.
     """
     impulse = np.where(lanes.v0 > 0.0, (1.0 + e) * lanes.m * lanes.v0, 0.0)
-    return velocities_at(lanes, np.where(np.isfinite(impulse), impulse, np.nan))
+    finite = np.isfinite(impulse)
+    return velocities_at(lanes, impulse if finite.all() else np.where(finite, impulse, np.nan))

@@ -62,8 +62,8 @@ class Lanes:
     @cached_property
     def shape(self) -> tuple[int, ...]:
         """Of all impacts together."""
-        own = (getattr(self, f.name).shape for f in fields(self) if f.name != "parameters")
-        return np.broadcast_shapes(*own, *(array.shape for array in self.parameters.values()))
+        own = {getattr(self, f.name).shape for f in fields(self) if f.name != "parameters"}
+        return np.broadcast_shapes(*own.union(array.shape for array in self.parameters.values()))
 
     @cached_property
     def v0(self) -> Array:

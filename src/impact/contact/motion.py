@@ -230,7 +230,10 @@ def indentation(law: Law, s: Array) -> Array:
 
 def force_at_peak(law: Law, s: Array, columns: Columns) -> Array:
     """The force of the approach where it ends."""
-    return np.asarray(_rates(law, law.model.force, ())(np.array([s, np.zeros(s.size)]), columns)[4])
+    at_rest = np.array([s, law.momentum.of(s, np.zeros(s.size), law.strength(columns))])
+    formula = law.model.force
+    force = law.call(formula, columns, _given(law, {*wishes(formula)}, (), at_rest, columns))
+    return np.broadcast_to(force, s.shape)
 
 
 def turn(law: Law, columns: Columns, peak: Array, at_peak: Array) -> tuple[Array, Array, Columns]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import partial
 
@@ -74,12 +75,16 @@ class Rebound:
         for field in fields(self):
             getattr(self, field.name)[where] = getattr(part, field.name)
 
-    def with_part(self, where: Places, part: Rebound) -> Rebound:
-        """The same with a part at its places, which may be all of them."""
-        if isinstance(where, slice):
-            return part
-        self.put(where, part)
-        return self
+    @classmethod
+    def joined(cls, status: NDArray[np.int8], parts: Sequence[tuple[Places, Rebound]]) -> Rebound:
+        """Parts at their places; impacts that are in none have their status, shape (n,), and nothing else."""
+        if parts and isinstance(parts[0][0], slice):
+            return parts[0][1]
+        rebound = cls.blank(status.size)
+        rebound.status[:] = status
+        for where, part in parts:
+            rebound.put(where, part)
+        return rebound
 
     def take(self, where: Places) -> Rebound:
         """The impacts at some places."""
@@ -119,11 +124,14 @@ def strike(
     sticks : which are known to stay together, where they do not part
     core : "numba" integrates the phases that have a form for it compiled, unless they are recorded
     """
-    run = partial(integrate, rtol=rtol, max_steps=max_steps, record=record, space=Space.of(n))
     run_form = partial(compiled.integrate, rtol=rtol, max_steps=max_steps)
     is_compiled = core == "numba" and not record
-    start = motion.start_of_approach(law, columns, n)
+    back = motion.of_restitution(law)
     form = compiled.of_approach(law) if is_compiled else None
+    form_back = compiled.of_restitution(back) if is_compiled else None
+    space = None if form and form_back else Space.of(n)
+    run = partial(integrate, rtol=rtol, max_steps=max_steps, record=record, space=space)
+    start = motion.start_of_approach(law, columns, n)
     if form is not None:
         inward = run_form(form, law, motion.approach(law), start, columns)
     else:
@@ -140,7 +148,7 @@ def strike(
     )  # fmt: skip
 
     # nothing is given back where the balls stay at their peak
-    stays = (rebound.status == Status.OK) & (recovered <= 0.0)
+    stays = (recovered <= 0.0) & (rebound.status == Status.OK)
     rebound.status[stays] = Status.LIMIT
     rebound.e_out[stays] = 0.0
 
@@ -148,21 +156,21 @@ def strike(
     columns = tuple(column[parts] for column in columns)
     if not recovered[parts].size:
         return Struck(rebound, inward, None, columns)
-    back = motion.of_restitution(law)
     start = motion.start_of_restitution(back, columns, recovered[parts])
-    form = compiled.of_restitution(back) if is_compiled else None
-    if form is not None:
-        outward = run_form(form, back, motion.restitution(back), start, columns)
+    if form_back is not None:
+        outward = run_form(form_back, back, motion.restitution(back), start, columns)
     else:
         among, bends = motion.bends(back, columns, start, residual[parts])
         outward = in_parts(run, motion.restitution(back), bends, start, among)
     # held, or parting with no speed in an infinite time: all the energy of such balls is lost
     held = (outward.end == End.LOST) & (motion.may_creep(back) | np.broadcast_to(sticks, n)[parts])
-    rebound.e_out[parts] = np.where(held, 0.0, -back.velocity(outward.state, columns))
+    e_out, work, status = -back.velocity(outward.state, columns), 2.0 * outward.state[3], _status(outward)
+    e_out[held], work[held], status[held] = 0.0, 0.0, Status.LIMIT
+    rebound.e_out[parts] = e_out
     rebound.duration[parts] += outward.state[2]
-    rebound.work[parts] += np.where(held, 0.0, 2.0 * outward.state[3])
+    rebound.work[parts] += work
     rebound.steps[parts] += outward.steps
-    rebound.status[parts] = np.where(held, Status.LIMIT, _status(outward))
+    rebound.status[parts] = status
     if law.model.release == "force":
         rebound.permanent[parts] += motion.indentation(law, outward.state[0])
     return Struck(rebound, inward, outward, columns)
@@ -172,4 +180,4 @@ def _status(outcome: Outcome) -> NDArray[np.int8]:
     table = np.zeros(len(End), np.int8)
     for end, status in STATUS_OF_END.items():
         table[end] = status
-    return table[outcome.end]
+    return table.take(outcome.end)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 
@@ -48,17 +48,15 @@ def integrate_all(
     -------
     Rebound : arrays of shape (k,); an impact that fails has a status, and disturbs no other
     """
-    rebound = Rebound.blank(n.size)
-    rebound.status[:] = status
+    parts: list[tuple[Places, Rebound]] = []
+    strike_at = partial(strike, rtol=rtol, max_steps=max_steps, core=core)
     with np.errstate(all="ignore"):
         for one in distinct(n):
             chosen = (status == Status.OK) & (n == one)
             count, where = int(np.count_nonzero(chosen)), places(chosen)
             if count:
-                strike_at = partial(strike, rtol=rtol, max_steps=max_steps, core=core)
-                part = _halving(model, float(one), _at(given, where), count, strike_at, collapse)
-                rebound = rebound.with_part(where, part)
-    return rebound
+                parts.append((where, _halving(model, float(one), _at(given, where), count, strike_at, collapse)))
+    return Rebound.joined(np.broadcast_to(status, n.shape), parts)
 
 
 def _at(given: Given, where: Places) -> Given:
@@ -99,23 +97,13 @@ def _struck(
     model: ForceModel, n: float, given: Given, count: int, strike_at: Callable[..., Struck], collapse: bool
 ) -> Rebound:
     values = with_coefficients(model, with_units(given, n), count)
-    rebound = Rebound.blank(count)
-    coefficients = _coefficients(model, values, count)
-    infinite = np.isinf(coefficients).any(axis=0)
-    plastic = infinite & (given.get("e", np.full(count, np.nan)) == 0.0)
-    rebound.status[infinite & ~plastic] = Status.OUT_OF_RANGE
-    rebound.status[np.isnan(coefficients).any(axis=0)] = Status.INVALID_PARAMETER
-    # an infinite damping lets the balls neither in nor out: the force and the time have no finite limit
-    held = plastic & np.isinf(_coefficients(model, values, count, wishes(model.force))).any(axis=0)
-    rebound.status[held] = Status.LIMIT
-    for known in (rebound.e_out, rebound.peak, rebound.permanent):
-        known[held] = 0.0
-
+    status = _second_look(model, values, given, count)
     exact = exact_restitution(model, values, count)
     chi = chi_of(values, count)
     strong = is_strong(model, values, count)
+    parts: list[tuple[Places, Rebound]] = []
     for side in (False, True):
-        chosen = (rebound.status == Status.OK) & (strong == side)
+        chosen = (status == Status.OK) & (strong == side)
         if not chosen.any():
             continue
         where = places(chosen)
@@ -124,14 +112,30 @@ def _struck(
         first, back = _distinct(columns, int(np.count_nonzero(chosen))) if collapse else (slice(None), slice(None))
         sticks = exact[where][first] == 0.0
         struck = strike_at(law, tuple(c[first] for c in columns), sticks.size, sticks=sticks)
-        rebound = rebound.with_part(where, struck.rebound.take(back))
-    return replace(rebound, chi=chi, exact=exact)
+        parts.append((where, struck.rebound.take(back)))
+    rebound = replace(Rebound.joined(status, parts), chi=chi, exact=exact)
+    held = status == Status.LIMIT
+    if held.any():
+        for known in (rebound.e_out, rebound.peak, rebound.permanent):
+            known[held] = 0.0
+    return rebound
 
 
-def _coefficients(model: ForceModel, values: Values, count: int, of: Container[str] | None = None) -> Array:
-    """The coefficients of a law, or some of them, a row each."""
-    names = [name for name in model.coefficients if of is None or name in of]
-    return np.array([values[name] for name in names]).reshape(-1, count)
+def _second_look(model: ForceModel, values: Values, given: Given, count: int) -> NDArray[np.int8]:
+    """What can be said of impacts once their coefficients are known, before they are integrated."""
+    status = np.full(count, Status.OK, np.int8)
+    coefficients = {name: np.asarray(values[name]) for name in model.coefficients}
+    if all(np.isfinite(one).all() for one in coefficients.values()):
+        return status
+    plastic = given.get("e", np.full(count, np.nan)) == 0.0
+    for one in coefficients.values():
+        status[np.isinf(one) & ~plastic] = Status.OUT_OF_RANGE
+    for one in coefficients.values():
+        status[np.isnan(one)] = Status.INVALID_PARAMETER
+    # an infinite damping lets the balls neither in nor out: the force and the time have no finite limit
+    for name in coefficients.keys() & wishes(model.force):
+        status[np.isinf(coefficients[name]) & plastic] = Status.LIMIT
+    return status
 
 
 def _distinct(columns: Columns, n: int) -> tuple[Places, Places]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Mapping
+from functools import cache
 from typing import NamedTuple
 
 from ..errors import ModelError
@@ -64,6 +65,7 @@ def dimension(unit: str, given: Mapping[str, Array | float]) -> Dimension:
     return Dimension(*total)
 
 
+@cache
 def names_in(unit: str) -> frozenset[str]:
     """The names in the exponents of a unit.
 

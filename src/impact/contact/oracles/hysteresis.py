@@ -57,8 +57,9 @@ def delivered_restitution(chi: Array | float) -> Array:
     for _ in range(ITERATIONS):
         slope = np.expm1(-(z + t))
         z = z + (z + slope) / slope
-    series = _series(RESTITUTION_SERIES, np.where(small, chi, 0.0))
-    return np.where(small, series, np.where(np.isinf(chi), 0.0, z / inner))
+    e = np.where(np.isinf(chi), 0.0, z / inner)
+    e[small] = _series(RESTITUTION_SERIES, chi[small])
+    return e
 
 
 def exact_damping_ratio(e: Array | float) -> Array:
@@ -84,8 +85,9 @@ def exact_damping_ratio(e: Array | float) -> Array:
         decay = np.exp(-(1.0 + inner) * chi)
         value = inner * chi - 1.0 + (1.0 + chi) * decay
         chi = chi - value / (inner - decay * (inner + (1.0 + inner) * chi))
-    series = _series(DAMPING_SERIES, np.where(near_one, 1.0 - e, 0.0))
-    return np.where(near_one, series, np.where(e == 0.0, np.inf, np.where(e > 0.0, chi, np.nan)))
+    chi = np.where(e == 0.0, np.inf, np.where(e > 0.0, chi, np.nan))
+    chi[near_one] = _series(DAMPING_SERIES, 1.0 - e[near_one])
+    return chi
 
 
 def _work_to_peak(chi: Array) -> Array:
