@@ -2,13 +2,14 @@
 
 Every model of the paper that e drives, mixed; e from 0.05 to 0.99, all impacts distinct, nothing collapsed, all
 outputs computed. Both sides have to deliver max |e_out - exact| <= 1e-8: the tolerance of each is the loosest of
-a list that does. Printed is a ratio measured side by side in one run: of the NumPy core and, where numba is
-installed, of the compiled one, on one thread and on several; and how much it is of what the arithmetic of the
-accepted steps would take at the speed of a loop of multiply-adds. Then sweeps of ten and forty times as many by
-one process, by several and by threads, from the plan to the dataset, with their start; and what the start of a
-command takes with each core, compiled anew and from what is kept.
+a list that does. They run in turn for some rounds, since a machine that is shared is now faster, now slower.
+Printed is the middle one of the rounds' ratios, with the least and the most: of the NumPy core and, where numba is
+installed, of the compiled one, on one thread and on several; how many times one thread's rate several have; and
+what part of the rate at which the arithmetic of the accepted steps would go as a loop of multiply-adds. Then
+sweeps by one process, by several and by threads, from the plan to the dataset, with their start; and what the
+start of a command takes with each core, compiled anew and from what is kept.
 
-    python scripts/bench_core.py [--impacts 100000] [--loop 300] [--jobs 2]
+    python scripts/bench_core.py [--impacts 400000] [--loop 300] [--rounds 15] [--jobs 2]
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from concurrent.futures import ThreadPoolExecutor
+from statistics import median
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
@@ -79,7 +80,7 @@ def core(
         found = {name: getattr(contact, name) for name in OUTPUTS}
         return float(np.max(np.abs(found["oracle_error"]))), int(found["steps"].sum())
 
-    with ThreadPoolExecutor(threads) as pool:
+    with team_of(1, threads).executor() as pool:
         begun = time.perf_counter()
         found = list(pool.map(outputs, blocks))
         seconds = time.perf_counter() - begun
@@ -211,8 +212,9 @@ def sweep(models: list[ForceModel], impacts: int, rtol: float, by: str, jobs: in
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--impacts", type=int, default=100_000)
+    parser.add_argument("--impacts", type=int, default=400_000)
     parser.add_argument("--loop", type=int, default=300, help="impacts of the loop")
+    parser.add_argument("--rounds", type=int, default=15)
     parser.add_argument("--jobs", type=int, default=2, help="processes of the sweep")
     asked = parser.parse_args()
     models = [impact.models()[key] for key in PAPER]
@@ -222,33 +224,46 @@ def main() -> None:
     cores = ["numpy", "numba"] if is_installed() else ["numpy"]
     rtol = next(r for r in TOLERANCES if all(core(models, few, r, by)[1] <= ACCURACY for by in cores))
     loop_rtol = next(r for r in TOLERANCES if loop(models, few, r)[1] <= ACCURACY)
-    # the best of a few, of both: what else runs on the machine only makes it slower
-    loop_seconds, loop_worst = min(loop(models, few, loop_rtol) for _ in range(5))
-    base = asked.loop / loop_seconds
-    table = Table("engine", "rtol", "max |e_out − exact|", "steps", "impacts/s", "ratio", "of the limit", box=None)
-    table.add_row("solve_ivp RK45, loop", f"{loop_rtol:g}", f"{loop_worst:.2g}", "", f"{base:,.0f}", "1")
     rows = [("numpy", 1), *((("numba", threads) for threads in sorted({1, asked.jobs})) if len(cores) > 1 else ())]
-    for by, threads in rows:
-        seconds, worst, steps = min(core(models, e, rtol, by, threads) for _ in range(5))
+    loops, engines = [], {row: [] for row in rows}
+    for _ in range(asked.rounds):
+        loops.append(loop(models, few, loop_rtol))
+        for row in rows:
+            engines[row].append(core(models, e, rtol, *row))
+    base = [asked.loop / seconds for seconds, _ in loops]
+    table = Table(
+        "engine", "threads", "rtol", "worst error", "steps", "impacts/s", "ratio", "least", "most",
+        "of one thread", "of the limit", box=None,
+    )  # fmt: skip
+    worst = f"{loops[0][1]:.2g}"
+    table.add_row("solve_ivp RK45, loop", "1", f"{loop_rtol:g}", worst, "", f"{median(base):,.0f}", "1")
+    for (by, threads), found in engines.items():
+        _, worst, steps = found[0]
         if worst > ACCURACY:
             raise SystemExit(f"the core is off by {worst:.2g}, wants {ACCURACY:g}")
-        rate = e.size / seconds
-        share = f"{100 * rate / limit(steps) / threads:.0f} %" if by == "numba" else ""
-        name = f"impact, {by}, {threads} thread{'s' * (threads > 1)}"
-        table.add_row(name, f"{rtol:g}", f"{worst:.2g}", str(steps), f"{rate:,.0f}", f"{rate / base:,.0f}", share)
-    about = f"{len(models)} models, {e.size:,} impacts (loop: {asked.loop}), {os.cpu_count()} cores"
-    Console(width=120).print(about, table, sep="\n")
+        rates = [e.size / seconds for seconds, _, _ in found]
+        ratios = [rate / one for rate, one in zip(rates, base, strict=True)]
+        alone = [e.size / seconds for seconds, _, _ in engines[by, 1]]
+        gain = median(rate / one for rate, one in zip(rates, alone, strict=True))
+        share = f"{100 * median(rates) / limit(steps) / threads:.0f} %" if by == "numba" else ""
+        table.add_row(
+            f"impact, {by}", str(threads), f"{rtol:g}", f"{worst:.2g}", str(steps), f"{median(rates):,.0f}",
+            *(f"{one:,.0f}" for one in (median(ratios), min(ratios), max(ratios))), f"{gain:.2f}", share,
+        )  # fmt: skip
+    sizes = f"{e.size:,} impacts (loop: {asked.loop}), {asked.rounds} rounds"
+    about = f"{len(models)} models, {sizes}, {os.cpu_count()} cores"
+    Console(width=130).print(about, table, sep="\n")
 
     # processes take most of a second to begin, whatever they are to do
     for by in cores:
         table = Table(
             f"a sweep ({by}) of", "1 [impacts/s]", f"--jobs {asked.jobs}", f"--threads {asked.jobs}", box=None
         )
-        for impacts in (10 * e.size, 40 * e.size):
+        for impacts in (1_000_000, 4_000_000):
             ways = ((1, 1), (asked.jobs, 1), (1, asked.jobs))
             one, *more = (sweep(models, impacts, rtol, by, jobs, threads) for jobs, threads in ways)
             table.add_row(f"{impacts:,}", f"{one:,.0f}", *(f"{rate:,.0f} ({rate / one:.2f})" for rate in more))
-        Console(width=120).print(table)
+        Console(width=130).print(table)
     if len(cores) > 1:
         Console().print(starts())
 

@@ -27,7 +27,7 @@ UNDAMPED = [(key, n) for key, n in CASES if find(key).family in ("permanent", "e
 
 # a law of the hysteresis family with any damping ratio: e from 0 to 1 is χ from 0 to 1000
 ANY_CHI = hysteresis("any-chi", title="", year=2026, equation="χ = 1000 e", reference="", chi=lambda e: 1e3 * e)
-CHI = (0.05, 0.3, 1.0, 1.9, STRONG, float(np.nextafter(STRONG, 3.0)), 2.1, 10.0, 100.0, 1e3)
+CHI = (0.05, 0.3, 1.0, 1.9, STRONG["log"], float(np.nextafter(STRONG["log"], 9.0)), 10.0, 100.0, 1e3)
 
 
 def struck(model, lanes: Lanes) -> Contact:

@@ -71,7 +71,7 @@ WRONG = {
     "the log coordinate for another law": (
         wrong(
             lambda elastic, v, chi: elastic * (1.0 + chi * v * v),
-            coefficients={"chi": lambda e: 4.0 - e},
+            coefficients={"chi": lambda e: 8.0 - e},
             momentum="log",
         ),
         "work balances energy",

@@ -1,10 +1,14 @@
 """The integrator has the order of its tableau, finds where lanes end, and computes a lane as if it were alone."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from impact.contact import motion
+from impact.contact.models import find
 from impact.ode import tableau
 from impact.ode.problem import End, Outcome, Problem
 from impact.ode.rk45 import integrate
@@ -155,6 +159,15 @@ def test_given_up_after_max_steps_attempts():
     assert enough >= reference.steps[0]
     assert bits(springs([(1.0, 0.0, 0.0)], enough), 0) == bits(reference, 0)
     assert springs([(1.0, 0.0, 0.0)], enough - 1).end[0] == End.MAX_STEPS
+
+
+@pytest.mark.parametrize("rtol", [1e-7, 1e-8])
+def test_hardly_a_step_of_an_impact_is_tried_again(rtol):
+    law = motion.Law.of(find("hunt-crossley-1975"), 1.5, strong=False)
+    for chi in np.linspace(0.0, 2.0, 9):
+        start = motion.start_of_approach(law, (), 1)
+        into = partial(integrate, motion.approach(law), start, (np.array([chi]),), rtol=rtol)
+        assert into(max_steps=int(into(max_steps=1000).steps[0]) + 1).end[0] == End.LANDED
 
 
 def test_no_lanes_give_no_outcome():

@@ -115,10 +115,10 @@ def integrate(
         strength = np.ones(n)
     if form.ending == GAP and motion.may_creep(law):
         bound = motion.creeping_speed(strength, law.n, form.drag / form.smooth)
-    outcome, top = Outcome.unwritten(n), np.empty((4, n))
+    outcome = Outcome.unwritten(n)
     rows = (np.ascontiguousarray(start), np.ascontiguousarray(strength), np.ascontiguousarray(bound))
     kernel(form)(
         *rows, rk45.first_step(problem, rtol), rtol, int(np.float64(rtol).view(np.int64)), max_steps,
-        outcome.state, outcome.maximum, top, outcome.steps, outcome.end,
+        outcome.state, outcome.maximum, outcome.steps, outcome.end,
     )  # fmt: skip
     return outcome

@@ -26,8 +26,7 @@ from .compiled import DAMPED, DRAGGED, FORCE, GAP, LOG, NO_FORCE, SPRING, STOP, 
 from .vectors import bits, exponential, from_bits, inlined, kept_on_disk, whole_power
 
 # lanes of a unit, and units side by side
-UNIT, UNITS = 16, 4
-LANES = UNIT * UNITS
+UNIT, UNITS = 32, 2
 # rows of the workspace: the state, its rates and the watched quantity, the step and the one before
 (
     S, Y, T, WORK, RATE_S, RATE_Y, WATCHED, H, LAST,
@@ -43,10 +42,10 @@ ROWS = 30
 
 A = tuple(tuple(map(float, row)) for row in FRACTIONS)
 E = tuple(map(float, DIFFERENCES))
-SAFETY, SMALLEST, LARGEST, FIFTH = rk45.SAFETY, rk45.SMALLEST, rk45.LARGEST, rk45.FIFTH
+SAFETY, SMALLEST, LARGEST, GAIN = rk45.SAFETY, rk45.SMALLEST, rk45.LARGEST, rk45.GAIN
 SAFETY_BITS = int(np.float64(SAFETY).view(np.int64))
 LAST_STEP, HALVINGS = rk45.LAST_STEP, float(rk45.HALVINGS)
-LANDING, NEAR, SHORT, CLOSE = landing.LANDING, landing.NEAR, landing.SHORT, landing.CLOSE
+REST, LANDING, NEAR = landing.REST, landing.LANDING, landing.NEAR
 SLOPE, FLAT, GUESSES = maximum.DIFFERENCE, maximum.FLAT, maximum.GUESSES
 FAR, FLOOR, DIFFERENCE, NEAREST = motion.FAR, motion.FLOOR, motion.DIFFERENCE, motion.NEAREST
 RUNNING, LANDED, LOST, MAX_STEPS = (float(end) for end in (End.RUNNING, End.LANDED, End.LOST, End.MAX_STEPS))
@@ -67,7 +66,7 @@ def _choose(condition, this, other):
     return lambda condition, this, other: this if condition else other
 
 
-beyond_end, release = inlined(landing.beyond_end), inlined(motion.release)
+beyond_end, linear, release = inlined(landing.beyond_end), inlined(landing.linear), inlined(motion.release)
 
 
 @inlined
@@ -84,27 +83,40 @@ def difference(k1, k3, k4, k5, k6, k7):
 
 @inlined
 def rates(form, s, y, strength):
-    """Rates of the two components and the two quadratures, and the force."""
+    """Rates of the two components and the two quadratures."""
     weight = form.smooth * whole_power(s, form.smooth - 1)
-    elastic = whole_power(s, form.spring)
+    # of the force, K δⁿ and the drag with the weight in them: fewer products that a step has to wait for
+    weighted = form.smooth * whole_power(s, form.spring + form.smooth - 1)
     if form.equation == FORCE:
         v = velocity_of_force(y, whole_power(s, form.extra), strength)
         force = strength * whole_power(s, form.drag) * y
         rate_y = rate_of_force(v, whole_power(s, form.extra - 1), form.extra / strength, weight, force)
-        return v, rate_y, weight, weight * force * v, force
+        return v, rate_y, weight, weight * force * v
     if form.equation == LOG:
         # one division for all stages
         v = (exponential(y) - 1.0) * (1.0 / strength)
-        force = damped(elastic, v, 1.0, strength)
-        return v, rate_of_log(weight, elastic, strength), weight, weight * force * v, force
+        return v, rate_of_log(weighted, 1.0, strength), weight, damped(weighted, v, 1.0, strength) * v
     v = y
     if form.equation == SPRING:
-        force = strength * elastic
+        pushed = strength * weighted
     elif form.equation == DAMPED:
-        force = damped(elastic, v, 1.0, strength)
+        pushed = damped(weighted, v, 1.0, strength)
     else:
-        force = dragged(elastic, whole_power(s, form.drag), v, strength)
-    return v, -(weight * force), weight, weight * force * v, force
+        pushed = dragged(weighted, form.smooth * whole_power(s, form.drag + form.smooth - 1), v, strength)
+    return v, -pushed, weight, pushed * v
+
+
+@inlined
+def force(form, s, y, v, strength):
+    """The force."""
+    elastic = whole_power(s, form.spring)
+    if form.equation == FORCE:
+        return strength * whole_power(s, form.drag) * y
+    if form.equation == SPRING:
+        return strength * elastic
+    if form.equation == DRAGGED:
+        return dragged(elastic, whole_power(s, form.drag), v, strength)
+    return damped(elastic, v, 1.0, strength)
 
 
 @inlined
@@ -112,26 +124,28 @@ def attempt(form, s, y, s1, y1, watched, h, strength):
     """One step: components at its end and what is added to the others, rates there, the local error."""
     t1 = form.smooth * whole_power(s, form.smooth - 1)
     work1 = t1 * watched * s1
-    s2, y2, _, _, _ = rates(form, s + h * (A[1][0] * s1), y + h * (A[1][0] * y1), strength)
-    s3, y3, t3, work3, _ = rates(
-        form, s + h * (A[2][0] * s1 + A[2][1] * s2), y + h * (A[2][0] * y1 + A[2][1] * y2), strength
+    s2, y2, _, _ = rates(form, s + (h * A[1][0]) * s1, y + (h * A[1][0]) * y1, strength)
+    # a stage comes last, and by itself, into the next one, which waits for it
+    s3, y3, t3, work3 = rates(
+        form, s + h * (A[2][0] * s1) + (h * A[2][1]) * s2, y + h * (A[2][0] * y1) + (h * A[2][1]) * y2, strength
     )
-    s4, y4, t4, work4, _ = rates(
-        form, s + h * (A[3][0] * s1 + A[3][1] * s2 + A[3][2] * s3),
-        y + h * (A[3][0] * y1 + A[3][1] * y2 + A[3][2] * y3), strength,
+    s4, y4, t4, work4 = rates(
+        form, s + h * (A[3][0] * s1 + A[3][1] * s2) + (h * A[3][2]) * s3,
+        y + h * (A[3][0] * y1 + A[3][1] * y2) + (h * A[3][2]) * y3, strength,
     )  # fmt: skip
-    s5, y5, t5, work5, _ = rates(
-        form, s + h * (A[4][0] * s1 + A[4][1] * s2 + A[4][2] * s3 + A[4][3] * s4),
-        y + h * (A[4][0] * y1 + A[4][1] * y2 + A[4][2] * y3 + A[4][3] * y4), strength,
+    s5, y5, t5, work5 = rates(
+        form, s + h * (A[4][0] * s1 + A[4][1] * s2 + A[4][2] * s3) + (h * A[4][3]) * s4,
+        y + h * (A[4][0] * y1 + A[4][1] * y2 + A[4][2] * y3) + (h * A[4][3]) * y4, strength,
     )  # fmt: skip
-    s6, y6, t6, work6, _ = rates(
-        form, s + h * (A[5][0] * s1 + A[5][1] * s2 + A[5][2] * s3 + A[5][3] * s4 + A[5][4] * s5),
-        y + h * (A[5][0] * y1 + A[5][1] * y2 + A[5][2] * y3 + A[5][3] * y4 + A[5][4] * y5), strength,
+    s6, y6, t6, work6 = rates(
+        form, s + h * (A[5][0] * s1 + A[5][1] * s2 + A[5][2] * s3 + A[5][3] * s4) + (h * A[5][4]) * s5,
+        y + h * (A[5][0] * y1 + A[5][1] * y2 + A[5][2] * y3 + A[5][3] * y4) + (h * A[5][4]) * y5, strength,
     )  # fmt: skip
     new_s = s + h * solution(s1, s3, s4, s5, s6)
     new_y = y + h * solution(y1, y3, y4, y5, y6)
     more_t, more_work = h * solution(t1, t3, t4, t5, t6), h * solution(work1, work3, work4, work5, work6)
-    s7, y7, _, _, watched = rates(form, new_s, new_y, strength)
+    s7, y7, _, _ = rates(form, new_s, new_y, strength)
+    watched = force(form, new_s, new_y, s7, strength)
     off_s, off_y = abs(difference(s1, s3, s4, s5, s6, s7)), abs(difference(y1, y3, y4, y5, y6, y7))
     scale_s, scale_y = max(abs(s), abs(new_s), FLOOR[0]), max(abs(y), abs(new_y), FLOOR[1])
     # the larger of two quotients by one division; a sum, since a number that is none has to stay none
@@ -141,23 +155,24 @@ def attempt(form, s, y, s1, y1, watched, h, strength):
 
 
 @inlined
-def slope_of_force(form, s, y, rate_s, rate_y, force, small, strength):
+def slope_of_force(form, s, y, rate_s, rate_y, now, small, strength):
     """The slope of the force along the trajectory, by a small step."""
-    ahead = rates(form, s + small * rate_s, y + small * rate_y, strength)
-    return (ahead[4] - force) / small
+    ahead_s, ahead_y = s + small * rate_s, y + small * rate_y
+    v, _, _, _ = rates(form, ahead_s, ahead_y, strength)
+    return (force(form, ahead_s, ahead_y, v, strength) - now) / small
 
 
 @inlined
-def event(form, s, y, rate_s, rate_y, force, strength):
+def event(form, s, y, rate_s, rate_y, now, strength):
     """What falls to zero at the end of the phase, and its rate."""
     if form.ending == GAP:
         return s, rate_s
     if form.ending == NO_FORCE:
         small = DIFFERENCE * min(max(abs(s), NEAREST), 1.0)
-        slope = slope_of_force(form, s, y, rate_s, rate_y, force, small, strength)
-        return release(s, rate_s, force, slope)
+        slope = slope_of_force(form, s, y, rate_s, rate_y, now, small, strength)
+        return release(s, rate_s, now, slope)
     if form.equation == FORCE:
-        return rate_s, -form.smooth * whole_power(s, form.smooth - 1) * force
+        return rate_s, -form.smooth * whole_power(s, form.smooth - 1) * now
     return y, rate_y
 
 
@@ -182,7 +197,7 @@ def advance(form, w, rtol, rtol_bits):
         )
         running = w[ENDED * UNIT + j] == RUNNING
         within, finite = running and worst <= rtol, worst < np.inf
-        factor = from_bits(SAFETY_BITS + (rtol_bits >> 8) * FIFTH - (bits(worst) >> 8) * FIFTH)
+        factor = from_bits(SAFETY_BITS + (rtol_bits >> 8) * GAIN - (bits(worst) >> 8) * GAIN)
         following = h * (max(min(factor, LARGEST), SMALLEST) if finite else 0.5)
 
         gap, rate_of_gap = event(form, new_s, new_y, new_rate_s, new_rate_y, watched, strength)
@@ -218,7 +233,7 @@ def settle(form, w, rtol, is_last):
         rate_s, rate_y, seen = w[RATE_S_0 * UNIT + j], w[RATE_Y_0 * UNIT + j], w[WATCHED_0 * UNIT + j]
         new_s, new_y, following = w[S * UNIT + j], w[Y * UNIT + j], w[H * UNIT + j]
         new_rate_s, new_rate_y, watched = w[RATE_S * UNIT + j], w[RATE_Y * UNIT + j], w[WATCHED * UNIT + j]
-        _, _, rate_t, rate_work, _ = rates(form, new_s, new_y, strength)
+        _, _, rate_t, rate_work = rates(form, new_s, new_y, strength)
         within, finite = odd and w[WORST * UNIT + j] <= rtol, w[WORST * UNIT + j] < np.inf
         halved = w[HALVED * UNIT + j] + (0.0 if finite or not odd else 1.0)
         ended = NOT_FINITE if halved > HALVINGS else ended
@@ -227,17 +242,29 @@ def settle(form, w, rtol, is_last):
         gap_0, rate_of_gap_0 = event(form, s, y, rate_s, rate_y, seen, strength)
         at = within and min(gap + following * rate_of_gap, gap) < 0.0
         beyond, sure = beyond_end(gap, rate_of_gap, gap_0, rate_of_gap_0, h)
-        reach = (beyond if beyond <= CLOSE * h else SHORT * beyond) if sure else np.inf
-        following = reach if at and reach < following else following
-        landed = at and abs(beyond) <= LANDING * h + NEAR
+        following = beyond if at and sure and beyond < following else following
+        landed = at and abs(beyond) <= REST * h + NEAR
+        rest = beyond if landed else 0.0
+        there_s, there_y, there_t, there_work = rates(
+            form, new_s + rest * new_rate_s, new_y + rest * new_rate_y, strength
+        )
+        end_s = new_s + 0.5 * rest * (new_rate_s + there_s)
+        end_y = new_y + 0.5 * rest * (new_rate_y + there_y)
+        end_rate_s, end_rate_y, end_t, end_work = rates(form, end_s, end_y, strength)
+        pushed = force(form, end_s, end_y, end_rate_s, strength)
+        end_gap, rate_of_end_gap = event(form, end_s, end_y, end_rate_s, end_rate_y, pushed, strength)
+        more = linear(end_gap, rate_of_end_gap)
+        landed = landed and abs(more) <= LANDING * h + NEAR
         crossed = at and gap < 0.0 and not landed
-        onto = SHORT * (h + beyond)
+        onto = h + beyond
         back = onto if 0.0 < onto < h else 0.5 * h
         following = back if crossed else following
         within = within and not crossed
         ended = LANDED if landed else ended
-        rest = beyond if landed else 0.0
-        new_s, new_y = new_s + rest * new_rate_s, new_y + rest * new_rate_y
+        new_s = end_s + more * end_rate_s if landed else new_s
+        new_y = end_y + more * end_rate_y if landed else new_y
+        rest_t = 0.5 * rest * (rate_t + there_t) + more * end_t if landed else 0.0
+        rest_work = 0.5 * rest * (rate_work + there_work) + more * end_work if landed else 0.0
 
         if form.ending == STOP:
             best = w[BEST * UNIT + j]
@@ -258,8 +285,8 @@ def settle(form, w, rtol, is_last):
         w[ENDED * UNIT + j], w[HALVED * UNIT + j], w[H * UNIT + j] = ended, halved, following
 
         w[S * UNIT + j], w[Y * UNIT + j] = s if crossed else new_s, y if crossed else new_y
-        w[T * UNIT + j] = w[T_0 * UNIT + j] if crossed else w[T * UNIT + j] + rest * rate_t
-        w[WORK * UNIT + j] = w[WORK_0 * UNIT + j] if crossed else w[WORK * UNIT + j] + rest * rate_work
+        w[T * UNIT + j] = w[T_0 * UNIT + j] if crossed else w[T * UNIT + j] + rest_t
+        w[WORK * UNIT + j] = w[WORK_0 * UNIT + j] if crossed else w[WORK * UNIT + j] + rest_work
         w[RATE_S * UNIT + j] = rate_s if crossed else new_rate_s
         w[RATE_Y * UNIT + j] = rate_y if crossed else new_rate_y
         w[WATCHED * UNIT + j] = seen if crossed else watched
@@ -274,7 +301,8 @@ def begin(form, w, first, lanes, start, strength, bound, first_step):
     for j in range(UNIT):
         i = min(first + j, lanes - 1)
         s, y = start[0, i], start[1, i]
-        rate_s, rate_y, _, _, watched = rates(form, s, y, strength[i])
+        rate_s, rate_y, _, _ = rates(form, s, y, strength[i])
+        watched = force(form, s, y, rate_s, strength[i])
         w[S * UNIT + j], w[Y * UNIT + j], w[T * UNIT + j], w[WORK * UNIT + j] = s, y, 0.0, 0.0
         w[RATE_S * UNIT + j], w[RATE_Y * UNIT + j], w[WATCHED * UNIT + j] = rate_s, rate_y, watched
         w[H * UNIT + j], w[LAST * UNIT + j] = first_step, 0.0
@@ -285,79 +313,67 @@ def begin(form, w, first, lanes, start, strength, bound, first_step):
 
 
 @inlined
-def end_all(form, w, first, lanes, state, best, top, steps, end):
+def search(form, w):
+    """Raise the largest watched values to the maxima beside them; see `impact.ode.maximum.search`."""
+    # rows of the same numbers by other names: the span of the search, the step of the difference, both ends
+    span, small, right, slope_right = T, LAST, WORK, H_0
+    some = 0
+    for j in range(UNIT):
+        s, y, strength = w[TOP_S * UNIT + j], w[TOP_Y * UNIT + j], w[STRENGTH * UNIT + j]
+        rate_s, rate_y, _, _ = rates(form, s, y, strength)
+        watched = force(form, s, y, rate_s, strength)
+        w[RATE_S * UNIT + j], w[RATE_Y * UNIT + j], w[WATCHED * UNIT + j] = rate_s, rate_y, watched
+        step = SLOPE * max(w[BEHIND * UNIT + j], w[AHEAD * UNIT + j])
+        slope = slope_of_force(form, s, y, rate_s, rate_y, watched, step, strength)
+        reach = w[AHEAD * UNIT + j] if slope > 0.0 else -w[BEHIND * UNIT + j]
+        reach = reach if abs(slope * reach) > FLAT * abs(w[BEST * UNIT + j]) else 0.0
+        some += 1 if reach != 0.0 else 0
+        w[small * UNIT + j], w[slope_right * UNIT + j] = step, slope
+        w[span * UNIT + j], w[H * UNIT + j], w[right * UNIT + j] = reach, reach, 0.0
+    for count in range(GUESSES + 1 if some else 0):
+        for j in range(UNIT):
+            s, y, _, _, rate_s, rate_y, watched, _ = attempt(
+                form, w[TOP_S * UNIT + j], w[TOP_Y * UNIT + j], w[RATE_S * UNIT + j], w[RATE_Y * UNIT + j],
+                w[WATCHED * UNIT + j], w[H * UNIT + j], w[STRENGTH * UNIT + j],
+            )  # fmt: skip
+            slope = slope_of_force(
+                form, s, y, rate_s, rate_y, watched, w[small * UNIT + j], w[STRENGTH * UNIT + j]
+            )
+            reach, found = w[span * UNIT + j], w[BEST * UNIT + j]
+            w[BEST * UNIT + j] = watched if reach != 0.0 and watched > found else found
+            here = 1.0 if count == 0 else w[H * UNIT + j] / reach
+            before, slope_before = w[right * UNIT + j], w[slope_right * UNIT + j]
+            w[right * UNIT + j], w[slope_right * UNIT + j] = here, slope
+            guess = here - slope * (here - before) / (slope - slope_before)
+            w[H * UNIT + j] = (guess if 0.0 <= guess <= 1.0 else here) * reach
+
+
+@inlined
+def end_all(form, w, first, lanes, state, best, steps, end):
     """Write down how the impacts of a unit have ended."""
     for j in range(min(UNIT, lanes - first)):
         i, landed = first + j, w[ENDED * UNIT + j] == LANDED
         for row in range(4):
             state[row, i] = w[(S + row) * UNIT + j] if landed else np.nan
-        if form.ending == STOP:
-            for row in range(4):
-                top[row, i] = w[(TOP_S + row) * UNIT + j]
-        best[i] = w[BEST * UNIT + j] if landed else np.nan
         steps[i], end[i] = int(w[STEPS * UNIT + j]), int(w[ENDED * UNIT + j])
-
-
-@inlined
-def search(form, w, lanes, best, top, strength):
-    """Raise the largest watched values to the maxima beside them; see `impact.ode.maximum.search`."""
-    # rows of the same numbers by other names: the span of the search, the step of the difference, both ends
-    span, small, right, slope_right = T, LAST, WORK, H_0
-    for first in range(0, lanes, LANES):
-        some = 0
-        for j in range(LANES):
-            i = min(first + j, lanes - 1)
-            w[S * LANES + j], w[Y * LANES + j] = top[0, i], top[1, i]
-            w[BEHIND * LANES + j], w[AHEAD * LANES + j], w[BEST * LANES + j] = top[2, i], top[3, i], best[i]
-            w[STRENGTH * LANES + j] = strength[i]
-        for j in range(LANES):
-            rate_s, rate_y, _, _, watched = rates(
-                form, w[S * LANES + j], w[Y * LANES + j], w[STRENGTH * LANES + j]
-            )
-            w[RATE_S * LANES + j], w[RATE_Y * LANES + j], w[WATCHED * LANES + j] = rate_s, rate_y, watched
-            step = SLOPE * max(w[BEHIND * LANES + j], w[AHEAD * LANES + j])
-            slope = slope_of_force(
-                form, w[S * LANES + j], w[Y * LANES + j], rate_s, rate_y, watched, step, w[STRENGTH * LANES + j]
-            )
-            reach = w[AHEAD * LANES + j] if slope > 0.0 else -w[BEHIND * LANES + j]
-            reach = reach if abs(slope * reach) > FLAT * abs(w[BEST * LANES + j]) else 0.0
-            some += 1 if reach != 0.0 else 0
-            w[small * LANES + j], w[slope_right * LANES + j] = step, slope
-            w[span * LANES + j], w[H * LANES + j], w[right * LANES + j] = reach, reach, 0.0
-        if not some:
-            continue
-        for count in range(GUESSES + 1):
-            for j in range(LANES):
-                s, y, _, _, rate_s, rate_y, watched, _ = attempt(
-                    form, w[S * LANES + j], w[Y * LANES + j], w[RATE_S * LANES + j], w[RATE_Y * LANES + j],
-                    w[WATCHED * LANES + j], w[H * LANES + j], w[STRENGTH * LANES + j],
-                )  # fmt: skip
-                slope = slope_of_force(
-                    form, s, y, rate_s, rate_y, watched, w[small * LANES + j], w[STRENGTH * LANES + j]
-                )
-                reach, found = w[span * LANES + j], w[BEST * LANES + j]
-                w[BEST * LANES + j] = watched if reach != 0.0 and watched > found else found
-                here = 1.0 if count == 0 else w[H * LANES + j] / reach
-                before, slope_before = w[right * LANES + j], w[slope_right * LANES + j]
-                w[right * LANES + j], w[slope_right * LANES + j] = here, slope
-                guess = here - slope * (here - before) / (slope - slope_before)
-                w[H * LANES + j] = (guess if 0.0 <= guess <= 1.0 else here) * reach
-        for j in range(min(LANES, lanes - first)):
-            best[first + j] = w[BEST * LANES + j]
+    if form.ending == STOP:
+        search(form, w)
+    for j in range(min(UNIT, lanes - first)):
+        best[first + j] = w[BEST * UNIT + j] if w[ENDED * UNIT + j] == LANDED else np.nan
 
 
 def _kernel(form: Form, version: int):
     """The integrator of a form, whose numbers are constants in it, and the number by which it is kept."""
 
     @kept_on_disk
-    def integrate(start, strength, bound, first_step, rtol, rtol_bits, max_steps, state, best, top, steps, end):
+    def integrate(start, strength, bound, first_step, rtol, rtol_bits, max_steps, state, best, steps, end):
         lanes = start.shape[1] if version >= 0 else 0
         w = np.zeros((UNITS, ROWS * UNIT))
         # the first impact of each unit, and how often a step of it was tried
-        first, trials = np.arange(0, LANES, UNIT), np.zeros(UNITS, np.int64)
+        first, trials = np.arange(0, UNITS * UNIT, UNIT), np.zeros(UNITS, np.int64)
         for unit in range(UNITS):
             begin(form, w[unit], first[unit], lanes, start, strength, bound, first_step)
-        waiting, living = LANES, min(UNITS, -(-lanes // UNIT))
+        waiting, living = UNITS * UNIT, min(UNITS, -(-lanes // UNIT))
         while living:
             for unit in range(UNITS):
                 if first[unit] >= lanes:
@@ -366,15 +382,13 @@ def _kernel(form: Form, version: int):
                 trials[unit] += 1
                 is_last = trials[unit] >= max_steps
                 if (advance(form, mine, rtol, rtol_bits) or is_last) and not settle(form, mine, rtol, is_last):
-                    end_all(form, mine, first[unit], lanes, state, best, top, steps, end)
+                    end_all(form, mine, first[unit], lanes, state, best, steps, end)
                     first[unit], trials[unit] = waiting, 0
                     waiting += UNIT
                     if first[unit] < lanes:
                         begin(form, mine, first[unit], lanes, start, strength, bound, first_step)
                     else:
                         living -= 1
-        if form.ending == STOP:
-            search(form, w.reshape(-1), lanes, best, top, strength)
 
     return integrate
 

@@ -66,10 +66,12 @@ def exponential(x):
 
 @inlined
 def whole_power(s, exponent):
-    """s to a whole power from 0 to 15, which is the same for all lanes."""
+    """s to a whole power from 0 to 31, which is the same for all lanes."""
     square = s * s
     fourth = square * square
+    eighth = fourth * fourth
     result = s if exponent & 1 else 1.0
     result = result * square if exponent & 2 else result
     result = result * fourth if exponent & 4 else result
-    return result * (fourth * fourth) if exponent & 8 else result
+    result = result * eighth if exponent & 8 else result
+    return result * (eighth * eighth) if exponent & 16 else result

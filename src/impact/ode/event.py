@@ -8,11 +8,9 @@ from numpy.typing import NDArray
 from .lanes import LANDED, Lanes, Trial
 from .problem import COMPONENTS, INTEGRATED, Array, Mask, Problem
 
-# an event is reached when what remains is this fraction of the step, or this much: a linear step onto it is then
-# exact to rounding
-LANDING, NEAR = 1e-6, 1e-12
-# a step towards the event ends SHORT of it, and seldom beyond; one of less than CLOSE of the last goes onto it
-SHORT, CLOSE = 0.99, 0.05
+# a rest of up to REST of a step is gone by a step of order two, there or back; the event is reached when what then
+# remains is LANDING of it, or NEAR: a linear step onto it is then exact to rounding
+REST, LANDING, NEAR = 1e-3, 1e-6, 1e-12
 
 
 def land(problem: Problem, lanes: Lanes, trial: Trial, accepted: Mask) -> tuple[NDArray[np.intp], Array]:
@@ -31,21 +29,37 @@ def land(problem: Problem, lanes: Lanes, trial: Trial, accepted: Mask) -> tuple[
     g, dg, h = g[at], dg[at], lanes.h[at]
     before = problem.event(lanes.y[:COMPONENTS], lanes.k, lanes.columns)
     beyond, sure = beyond_end(g, dg, before[0][at], before[1][at], h)
-    reach = np.where(sure, np.where(beyond <= CLOSE * h, beyond, SHORT * beyond), np.inf)
-    trial.following[at] = np.fmin(trial.following[at], reach)
+    trial.following[at] = np.fmin(trial.following[at], np.where(sure, beyond, np.inf))
 
-    landed = np.abs(beyond) <= LANDING * h + NEAR
+    near = np.abs(beyond) <= REST * h + NEAR
+    rows, more = _glide(problem, lanes, trial, at, np.where(near, beyond, 0.0))
+    landed = near & (np.abs(more) <= LANDING * h + NEAR)
     crossed = ((g < 0.0) & ~landed).nonzero()[0]
     if crossed.size:
-        whole, onto = h[crossed], SHORT * (h[crossed] + beyond[crossed])
+        whole, onto = h[crossed], h[crossed] + beyond[crossed]
         trial.following[at[crossed]] = np.where((onto > 0.0) & (onto < whole), onto, 0.5 * whole)
         trial.within[at[crossed]] = False
     home, beyond = at[landed], beyond[landed]
     if home.size:
-        for row, rate in zip(trial.new, trial.k[:INTEGRATED], strict=True):
-            row[home] += beyond * rate[home]
+        trial.new[:, home] = rows[:, landed]
         lanes.end[home] = LANDED
     return home, beyond / h[landed]
+
+
+def _glide(problem: Problem, lanes: Lanes, trial: Trial, at: NDArray[np.intp], rest: Array) -> tuple[Array, Array]:
+    """The rows of lanes a rest beyond the end of their step and linearly on to the event, and how far that is."""
+    y, k, columns = trial.new[:, at], trial.k[:, at], tuple(column[at] for column in lanes.columns)
+    mean = 0.5 * (k + problem.rates(y[:COMPONENTS] + rest * k[:COMPONENTS], columns))
+    y = y + rest * mean[:INTEGRATED]
+    k = problem.rates(y[:COMPONENTS], columns)
+    g, dg = problem.event(y[:COMPONENTS], k, columns)
+    more = linear(g, dg)
+    return y + more * k[:INTEGRATED], more
+
+
+def linear(g: Array, dg: Array) -> Array:
+    """How far an event is whose function is linear and falls, and none else; for arrays and for numbers."""
+    return choose(dg < 0.0, -g / dg, 0.0)
 
 
 def beyond_end(g: Array, dg: Array, g_before: Array, dg_before: Array, h: Array) -> tuple[Array, Mask]:
@@ -53,12 +67,16 @@ def beyond_end(g: Array, dg: Array, g_before: Array, dg_before: Array, h: Array)
 
     Of plain arithmetic, for arrays and for numbers.
     """
-    # beyond the end the event function is taken for the parabola of the cubic through both ends; in units of h
+    # the event function is taken for the cubic through both ends, in units of h: the root of its parabola at the
+    # end, and a step of Newton's from there
     fall, bend = dg * h, 2.0 * (dg_before + 2.0 * dg) * h - 6.0 * (g - g_before)
-    root = np.sqrt(fall * fall - 2.0 * bend * g)
+    cubic = (dg + dg_before) * h - 2.0 * (g - g_before)
+    root = 2.0 * g / (np.sqrt(fall * fall - 2.0 * bend * g) - fall)
+    more = cubic * root * root * root / (fall + root * (bend + 3.0 * root * cubic))
+    root = choose(2.0 * np.abs(more) < np.abs(root), root - more, root)
     # one that fades away instead comes to no zero by its mean bend; it may be too stiff for the cubic
     sure = dg * fall >= 2.0 * g * (dg - dg_before)
-    return choose(dg < 0.0, 2.0 * g * h / (root - fall), np.inf), sure
+    return choose(dg < 0.0, root * h, np.inf), sure
 
 
 def choose(condition: Mask, this: Array | float, other: Array | float) -> Array:
