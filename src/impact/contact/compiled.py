@@ -14,6 +14,7 @@ from . import forms, motion
 from .model import ForceModel
 from .momentum import Force, Log, force_form
 from .power import integer_power, power
+from .turns import aside
 
 # the equations of motion: of A xⁿ, of xⁿ (1 + χ v) in v and in "log", of xⁿ + c x^q v in v and in "force"
 SPRING, DAMPED, LOG, DRAGGED, FORCE = range(5)
@@ -117,8 +118,9 @@ def integrate(
         bound = motion.creeping_speed(strength, law.n, form.drag / form.smooth)
     outcome = Outcome.unwritten(n)
     rows = (np.ascontiguousarray(start), np.ascontiguousarray(strength), np.ascontiguousarray(bound))
-    kernel(form)(
-        *rows, rk45.first_step(problem, rtol), rtol, int(np.float64(rtol).view(np.int64)), max_steps,
-        outcome.state, outcome.maximum, outcome.steps, outcome.end,
-    )  # fmt: skip
+    with aside():
+        kernel(form)(
+            *rows, rk45.first_step(problem, rtol), rtol, int(np.float64(rtol).view(np.int64)), max_steps,
+            outcome.state, outcome.maximum, outcome.steps, outcome.end,
+        )  # fmt: skip
     return outcome
