@@ -5,9 +5,10 @@ outputs computed. Both sides have to deliver max |e_out - exact| <= 1e-8: the to
 a list that does. They run in turn for some rounds, since a machine that is shared is now faster, now slower.
 Printed is the middle one of the rounds' ratios, with the least and the most: of the NumPy core and, where numba is
 installed, of the compiled one, on one thread and on several; how many times one thread's rate several have; and
-what part of the rate at which the arithmetic of the accepted steps would go as a loop of multiply-adds. Then
-sweeps by one process, by several and by threads, from the plan to the dataset, with their start; and what the
-start of a command takes with each core, compiled anew and from what is kept.
+what part of the rate at which the arithmetic of the accepted steps would go as a loop of multiply-adds. That loop,
+and processes that each do the same by themselves, tell what several threads could gain on the machine. Then sweeps
+by one process, by several and by threads, from the plan to the dataset, with their start; and what the start of a
+command takes with each core, compiled anew and from what is kept.
 
     python scripts/bench_core.py [--impacts 400000] [--loop 300] [--rounds 15] [--jobs 2]
 """
@@ -20,6 +21,9 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
 from statistics import median
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -105,26 +109,39 @@ print(Counted.total)
 """
 
 
-def limit(steps: int) -> float:
-    """Impacts a second whose accepted steps would take all the arithmetic that there is."""
+def multiply_adds() -> Callable[[int], float]:
+    """What measures how many operations a second a loop of multiply-adds does, on so many threads at once."""
     from numba import njit
 
-    @njit(fastmath={"contract"})
+    @njit(fastmath={"contract"}, nogil=True)
     def multiply_and_add(x: np.ndarray, times: int) -> None:
         for _ in range(times):
             for j in range(192):
                 x[j] = x[j] * 0.999 + 0.001
 
-    x, times, seconds = np.ones(192), 20_000, []
-    for _ in range(20):
-        begun = time.perf_counter()
-        multiply_and_add(x, times)
-        seconds.append(time.perf_counter() - begun)
+    multiply_and_add(np.ones(192), 1)
+
+    def rate(threads: int) -> float:
+        with ThreadPoolExecutor(threads) as pool:
+            begun = time.perf_counter()
+            list(pool.map(lambda _: multiply_and_add(np.ones(192), 1_000_000), range(16)))
+            return 16 * 2 * 192 * 1_000_000 / (time.perf_counter() - begun)
+
+    return rate
+
+
+def by_itself(e: np.ndarray, rtol: float) -> float:
+    """Impacts a second of the compiled core, in a process of its own."""
+    return e.size / core([impact.models()[key] for key in PAPER], e, rtol, "numba")[0]
+
+
+def operations() -> int:
+    """Additions, multiplications and divisions of a step."""
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
     told = subprocess.run(
         [sys.executable, "-c", COUNT], env=environment, capture_output=True, text=True, check=True
     )
-    return 2 * x.size * times / min(seconds) / (steps * int(told.stdout))
+    return int(told.stdout)
 
 
 def starts() -> Table:
@@ -226,10 +243,20 @@ def main() -> None:
     loop_rtol = next(r for r in TOLERANCES if loop(models, few, r)[1] <= ACCURACY)
     rows = [("numpy", 1), *((("numba", threads) for threads in sorted({1, asked.jobs})) if len(cores) > 1 else ())]
     loops, engines = [], {row: [] for row in rows}
+    arithmetic = multiply_adds() if "numba" in cores else None
+    flops: dict[int, list[float]] = {1: [], asked.jobs: []}
+    # processes that share no interpreter tell what the machine itself lets several threads gain
+    processes, apart = ProcessPoolExecutor(asked.jobs, get_context("spawn")), []
+    if arithmetic:
+        list(processes.map(by_itself, [few] * asked.jobs * 8, [rtol] * asked.jobs * 8))
     for _ in range(asked.rounds):
         loops.append(loop(models, few, loop_rtol))
         for row in rows:
             engines[row].append(core(models, e, rtol, *row))
+        if arithmetic:
+            for threads, found in flops.items():
+                found.append(arithmetic(threads))
+            apart.append(sum(processes.map(by_itself, [e] * asked.jobs, [rtol] * asked.jobs)))
     base = [asked.loop / seconds for seconds, _ in loops]
     table = Table(
         "engine", "threads", "rtol", "worst error", "steps", "impacts/s", "ratio", "least", "most",
@@ -237,6 +264,7 @@ def main() -> None:
     )  # fmt: skip
     worst = f"{loops[0][1]:.2g}"
     table.add_row("solve_ivp RK45, loop", "1", f"{loop_rtol:g}", worst, "", f"{median(base):,.0f}", "1")
+    each = operations() if arithmetic else 0
     for (by, threads), found in engines.items():
         _, worst, steps = found[0]
         if worst > ACCURACY:
@@ -245,11 +273,21 @@ def main() -> None:
         ratios = [rate / one for rate, one in zip(rates, base, strict=True)]
         alone = [e.size / seconds for seconds, _, _ in engines[by, 1]]
         gain = median(rate / one for rate, one in zip(rates, alone, strict=True))
-        share = f"{100 * median(rates) / limit(steps) / threads:.0f} %" if by == "numba" else ""
+        share = f"{100 * median(rates) * steps * each / median(flops[threads]):.0f} %" if by == "numba" else ""
         table.add_row(
             f"impact, {by}", str(threads), f"{rtol:g}", f"{worst:.2g}", str(steps), f"{median(rates):,.0f}",
             *(f"{one:,.0f}" for one in (median(ratios), min(ratios), max(ratios))), f"{gain:.2f}", share,
         )  # fmt: skip
+    processes.shutdown()
+    if arithmetic:
+        ones = [e.size / seconds for seconds, _, _ in engines["numba", 1]]
+        gain = median(several / one for several, one in zip(apart, ones, strict=True))
+        name = f"the same, {asked.jobs} processes"
+        table.add_row(name, "1 each", "", "", "", f"{median(apart):,.0f}", "", "", "", f"{gain:.2f}")
+    for threads, found in flops.items() if arithmetic else ():
+        gain = median(several / one for several, one in zip(found, flops[1], strict=True))
+        rate = f"{median(found) / 1e9:,.0f} GFLOP/s"
+        table.add_row("multiply-adds", str(threads), "", "", "", rate, "", "", "", f"{gain:.2f}")
     sizes = f"{e.size:,} impacts (loop: {asked.loop}), {asked.rounds} rounds"
     about = f"{len(models)} models, {sizes}, {os.cpu_count()} cores"
     Console(width=130).print(about, table, sep="\n")

@@ -24,6 +24,7 @@ STATUS_OF_END = {
     End.STEP_UNDERFLOW: Status.STEP_UNDERFLOW,
     End.NOT_FINITE: Status.NOT_FINITE,
 }
+TABLE = np.array([STATUS_OF_END.get(end, 0) for end in End], np.int8)
 
 
 # places of impacts; a slice where it is all of them, so that nothing is copied
@@ -76,11 +77,11 @@ class Rebound:
             getattr(self, field.name)[where] = getattr(part, field.name)
 
     @classmethod
-    def joined(cls, status: NDArray[np.int8], parts: Sequence[tuple[Places, Rebound]]) -> Rebound:
-        """Parts at their places; impacts that are in none have their status, shape (n,), and nothing else."""
+    def joined(cls, n: int, status: NDArray[np.int8], parts: Sequence[tuple[Places, Rebound]]) -> Rebound:
+        """n impacts, parts of them at their places; those that are in none have their status, and nothing else."""
         if parts and isinstance(parts[0][0], slice):
             return parts[0][1]
-        rebound = cls.blank(status.size)
+        rebound = cls.blank(n)
         rebound.status[:] = status
         for where, part in parts:
             rebound.put(where, part)
@@ -163,7 +164,9 @@ def strike(
         among, bends = motion.bends(back, columns, start, residual[parts])
         outward = in_parts(run, motion.restitution(back), bends, start, among)
     # held, or parting with no speed in an infinite time: all the energy of such balls is lost
-    held = (outward.end == End.LOST) & (motion.may_creep(back) | np.broadcast_to(sticks, n)[parts])
+    held = outward.end == End.LOST
+    if held.any():
+        held &= motion.may_creep(back) | np.broadcast_to(sticks, n)[parts]
     e_out, work, status = -back.velocity(outward.state, columns), 2.0 * outward.state[3], _status(outward)
     e_out[held], work[held], status[held] = 0.0, 0.0, Status.LIMIT
     rebound.e_out[parts] = e_out
@@ -177,7 +180,4 @@ def strike(
 
 
 def _status(outcome: Outcome) -> NDArray[np.int8]:
-    table = np.zeros(len(End), np.int8)
-    for end, status in STATUS_OF_END.items():
-        table[end] = status
-    return table.take(outcome.end)
+    return TABLE.take(outcome.end)

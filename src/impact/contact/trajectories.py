@@ -56,7 +56,7 @@ def integrate_all(
             count, where = int(np.count_nonzero(chosen)), places(chosen)
             if count:
                 parts.append((where, _halving(model, float(one), _at(given, where), count, strike_at, collapse)))
-    return Rebound.joined(np.broadcast_to(status, n.shape), parts)
+    return Rebound.joined(n.size, status, parts)
 
 
 def _at(given: Given, where: Places) -> Given:
@@ -113,7 +113,7 @@ def _struck(
         sticks = exact[where][first] == 0.0
         struck = strike_at(law, tuple(c[first] for c in columns), sticks.size, sticks=sticks)
         parts.append((where, struck.rebound.take(back)))
-    rebound = replace(Rebound.joined(status, parts), chi=chi, exact=exact)
+    rebound = replace(Rebound.joined(count, status, parts), chi=chi, exact=exact)
     held = status == Status.LIMIT
     if held.any():
         for known in (rebound.e_out, rebound.peak, rebound.permanent):
