@@ -17,14 +17,13 @@ from .phases import in_parts
 from .power import Array
 from .status import Status
 
-STATUS_OF_END = {
-    End.LANDED: Status.OK,
-    End.LOST: Status.NOT_SEPARATED,
-    End.MAX_STEPS: Status.MAX_STEPS,
-    End.STEP_UNDERFLOW: Status.STEP_UNDERFLOW,
-    End.NOT_FINITE: Status.NOT_FINITE,
-}
-TABLE = np.array([STATUS_OF_END.get(end, 0) for end in End], np.int8)
+# the status of each end, by its number; no lane ends running
+STATUS_OF_END = np.zeros(len(End), np.int8)
+STATUS_OF_END[End.LANDED] = Status.OK
+STATUS_OF_END[End.LOST] = Status.NOT_SEPARATED
+STATUS_OF_END[End.MAX_STEPS] = Status.MAX_STEPS
+STATUS_OF_END[End.STEP_UNDERFLOW] = Status.STEP_UNDERFLOW
+STATUS_OF_END[End.NOT_FINITE] = Status.NOT_FINITE
 
 
 # places of impacts; a slice where it is all of them, so that nothing is copied
@@ -149,7 +148,7 @@ def strike(
     )  # fmt: skip
 
     # nothing is given back where the balls stay at their peak
-    stays = (recovered <= 0.0) & (rebound.status == Status.OK)
+    stays = (rebound.status == Status.OK) & (recovered <= 0.0)
     rebound.status[stays] = Status.LIMIT
     rebound.e_out[stays] = 0.0
 
@@ -180,4 +179,4 @@ def strike(
 
 
 def _status(outcome: Outcome) -> NDArray[np.int8]:
-    return TABLE.take(outcome.end)
+    return STATUS_OF_END.take(outcome.end)
