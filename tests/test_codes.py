@@ -103,6 +103,16 @@ def test_elastogap_at_dampings_in_the_units_of_the_contact(damping, e_out):
     assert f"{contact.e_out[0]:.6f}" == f"{e_out:.6f}"
 
 
+def test_a_release_is_located_where_the_force_hardly_falls_below_zero():
+    lanes = impacts(1.5, e=[1.0])
+    coarse, fine = (
+        collide(find("lammps-tsuji-without-root-limit"), lanes, rtol=rtol, max_steps=10**5)
+        for rtol in (1e-10, 1e-12)
+    )
+    assert coarse.duration == pytest.approx(fine.duration, rel=1e-11)
+    assert coarse.permanent_indentation == pytest.approx(fine.permanent_indentation, rel=1e-6)
+
+
 @pytest.mark.parametrize("n", [1.0, 1.5, 2.5])
 def test_elastogap_locates_where_its_damping_stops_to_be_limited(n):
     lanes = impacts(n, e=np.full(20, 0.5))
