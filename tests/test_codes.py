@@ -103,6 +103,17 @@ def test_elastogap_at_dampings_in_the_units_of_the_contact(damping, e_out):
     assert f"{contact.e_out[0]:.6f}" == f"{e_out:.6f}"
 
 
+def test_of_peak_and_bend_in_one_step_the_sooner_ends_it():
+    lanes = impacts(2.0, e=np.full(400, 0.5))
+    own = {
+        "c": np.full(400, 0.27) * lanes.K * lanes.length**2 / lanes.v0,
+        "d": np.geomspace(0.5, 1.5, 400) * lanes.length,
+    }
+    lanes = impacts(2.0, e=np.full(400, 0.5), parameters=own)
+    loose, fine = (collide(find("adams-impact"), lanes, rtol=rtol, max_steps=10**4) for rtol in (1e-4, 1e-8))
+    assert loose.peak_indentation == pytest.approx(fine.peak_indentation, rel=1e-3)
+
+
 def test_a_release_is_located_where_the_force_hardly_falls_below_zero():
     lanes = impacts(1.5, e=[1.0])
     coarse, fine = (

@@ -83,7 +83,9 @@ def _sooner(problem: Problem, bends: Sequence[Bend]) -> Event:
     def event(y: Array, k: Array, columns: Columns) -> tuple[Array, Array]:
         g, dg = problem.event(y, k, columns)
         for left, rate in _bends(bends, y, k, columns):
-            by_bend = (left < 0.0) | ((g > 0.0) & (left * dg > g * rate))
+            # of two that a step has gone across the one that was sooner, as of two that are to come
+            alike = (left < 0.0) == (g < 0.0)
+            by_bend = np.where(alike, left * dg > g * rate, left < 0.0)
             g, dg = np.where(by_bend, left, g), np.where(by_bend, rate, dg)
         return g, dg
 
