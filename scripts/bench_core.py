@@ -234,18 +234,11 @@ def sweep(models: list[ForceModel], impacts: int, rtol: float, by: str, jobs: in
     return plan.points / (time.perf_counter() - begun)
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--impacts", type=int, default=400_000)
-    parser.add_argument("--loop", type=int, default=300, help="impacts of the loop")
-    parser.add_argument("--rounds", type=int, default=15)
-    parser.add_argument("--jobs", type=int, default=2, help="processes of the sweep")
-    asked = parser.parse_args()
-    models = [impact.models()[key] for key in PAPER]
+def side_by_side(asked: argparse.Namespace, models: list[ForceModel], cores: list[str]) -> float:
+    """Run the engines in turn, and print what they do at matched accuracy. Returns the tolerance of the cores."""
     e = np.linspace(0.05, 0.99, asked.impacts)
     few = np.linspace(0.05, 0.99, asked.loop)
 
-    cores = ["numpy", "numba"] if is_installed() else ["numpy"]
     rtol = next(r for r in TOLERANCES if all(core(models, few, r, by)[1] <= ACCURACY for by in cores))
     loop_rtol = next(r for r in TOLERANCES if loop(models, few, r)[1] <= ACCURACY)
     rows = [("numpy", 1), *((("numba", threads) for threads in sorted({1, asked.jobs})) if len(cores) > 1 else ())]
@@ -295,7 +288,19 @@ def main() -> None:
     sizes = f"{e.size:,} impacts (loop: {asked.loop}), {asked.rounds} rounds"
     about = f"{len(models)} models, {sizes}, {os.cpu_count()} cores"
     Console(width=140).print(about, table, sep="\n")
+    return rtol
 
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--impacts", type=int, default=400_000)
+    parser.add_argument("--loop", type=int, default=300, help="impacts of the loop")
+    parser.add_argument("--rounds", type=int, default=15)
+    parser.add_argument("--jobs", type=int, default=2, help="processes of the sweep")
+    asked = parser.parse_args()
+    models = [impact.models()[key] for key in PAPER]
+    cores = ["numpy", "numba"] if is_installed() else ["numpy"]
+    rtol = side_by_side(asked, models, cores)
     # processes take most of a second to begin, whatever they are to do
     for by in cores:
         table = Table(
