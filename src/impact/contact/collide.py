@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +12,8 @@ from numpy.typing import NDArray
 from .impulse import velocities_after
 from .lanes import Lanes
 from .model import ForceModel
-from .power import Array
-from .status import FIRST_FAILURE, Status
+from .power import Array, all_within
+from .status import FIRST_FAILURE, NO_IMPACT, OK, Status
 from .strike import Rebound
 from .trajectories import integrate_all
 from .values import own_values
@@ -54,28 +55,23 @@ class Contact:
 
     @cached_property
     def status(self) -> NDArray[np.int8]:
-        return np.where(self._first == Status.OK, self.rebound.status, self._first)
+        return _but(self.rebound.status, self._left_alone, self._first)
 
     @cached_property
-    def _failed(self) -> Mask | bool:
-        failed = self.status >= FIRST_FAILURE
-        # no mask is cheaper than an empty one
-        return failed if failed.any() else False
+    def _left_alone(self) -> Mask | None:
+        return _if_any(self._first != OK)
 
     @cached_property
-    def _missed(self) -> Mask | bool:
-        missed = self._first == Status.NO_IMPACT
-        return missed if missed.any() else False
+    def _failed(self) -> Mask | None:
+        return _if_any(self.status >= FIRST_FAILURE)
 
     @cached_property
-    def _struck(self) -> Mask | bool:
-        struck = self._first == Status.OK
-        return True if struck.all() else struck
+    def _missed(self) -> Mask | None:
+        return _if_any(self._first == NO_IMPACT)
 
     @cached_property
-    @quiet
-    def _energy(self) -> Array:
-        return 0.5 * self.lanes.m * self.lanes.v0 * self.lanes.v0
+    def _unknown(self) -> Mask | None:
+        return self._failed if self._missed is None else _if_any(self._missed | (self.status >= FIRST_FAILURE))
 
     @cached_property
     @quiet
@@ -85,8 +81,7 @@ class Contact:
     @cached_property
     def _asked(self) -> Array:
         e = self.lanes.e
-        asked = (e >= 0.0) & (e <= 1.0)
-        return e if asked.all() else np.where(asked, e, np.nan)
+        return e if all_within(e, 0.0, 1.0) else np.where((e >= 0.0) & (e <= 1.0), e, np.nan)
 
     @cached_property
     @quiet
@@ -96,9 +91,7 @@ class Contact:
     @quiet
     def _si(self, value: Array, unit: Array) -> Array:
         """A value in a unit of the contact's own; nothing moves where the balls miss each other."""
-        value = value * unit
-        value = value if self._failed is False else np.where(self._failed, np.nan, value)
-        return value if self._missed is False else np.where(self._missed, 0.0, value)
+        return _but(_but(value * unit, self._failed, np.nan), self._missed, 0.0)
 
     @cached_property
     def v1_post(self) -> Array:
@@ -128,8 +121,7 @@ class Contact:
 
     @cached_property
     def e_out(self) -> Array:
-        unknown = np.logical_or(self._failed, self._missed)
-        return np.where(unknown, np.nan, self.rebound.e_out)
+        return _but(self.rebound.e_out, self._unknown, np.nan)
 
     @cached_property
     def e_error(self) -> Array:
@@ -146,32 +138,32 @@ class Contact:
     @cached_property
     @quiet
     def peak_force(self) -> Array:
-        return self._si(self.rebound.force, 2.0 * self._energy / self.lanes.length)
+        return self._si(self.rebound.force, self.lanes.energy / self.lanes.length)
 
     @cached_property
     @quiet
     def duration(self) -> Array:
-        return self._si(self.rebound.duration, self.lanes.length / self.lanes.v0)
+        return self._si(self.rebound.duration, self.lanes.time)
 
     @cached_property
+    @quiet
     def energy_loss(self) -> Array:
-        return self._si(1.0 - self.rebound.e_out * self.rebound.e_out, self._energy)
+        return self._si(1.0 - self.rebound.e_out * self.rebound.e_out, 0.5 * self.lanes.energy)
 
     @cached_property
     def stiffness(self) -> Array:
-        return np.where(self._failed, np.nan, self.lanes.K)
+        return _but(self.lanes.K, self._failed, np.nan)
 
     @cached_property
     def damping_ratio(self) -> Array:
-        known = np.logical_and(self._struck, np.isfinite(self.rebound.chi))
-        return np.where(known, self.rebound.chi, np.nan)
+        chi = self.rebound.chi
+        return _but(_but(chi, self._left_alone, np.nan), _if_any(np.isinf(chi)), np.nan)
 
     @cached_property
     @quiet
     def residual(self) -> Array:
         rebound = self.rebound
-        unknown = np.logical_or(self._failed, self._missed)
-        return np.where(unknown, np.nan, rebound.work - (1.0 - rebound.e_out * rebound.e_out))
+        return _but(rebound.work - (1.0 - rebound.e_out * rebound.e_out), self._unknown, np.nan)
 
     @cached_property
     @quiet
@@ -189,7 +181,17 @@ class Contact:
 
     @cached_property
     def steps(self) -> NDArray[np.int32]:
-        return np.where(self._struck, self.rebound.steps, np.int32(0))
+        return _but(self.rebound.steps, self._left_alone, np.int32(0))
+
+
+def _if_any(found: Mask) -> Mask | None:
+    """A mask, if there is anything in it: none is cheaper than an empty one."""
+    return found if found.any() else None
+
+
+def _but(value: NDArray[Any], where: Mask | None, otherwise: NDArray[Any] | float | np.int32) -> NDArray[Any]:
+    """The value, but another one somewhere."""
+    return value if where is None else np.where(where, otherwise, value)
 
 
 def collide(
@@ -232,7 +234,7 @@ def first_look(
     """
     status = np.asarray(Status.OK, np.int8)
     if "length" in known:
-        sizes = [lanes.m, lanes.K, lanes.length, lanes.m * lanes.v0 * lanes.v0, lanes.length / lanes.v0]
+        sizes = [lanes.m, lanes.K, lanes.length, lanes.energy, lanes.time]
         least, most = np.nextafter(0.0, 1.0), np.finfo(float).max
         for size in sizes:
             status = _unless(size, least, most, status, Status.OUT_OF_RANGE)
@@ -247,7 +249,6 @@ def _unless(
     values: Array, least: float, most: float, status: NDArray[np.int8], otherwise: Status
 ) -> NDArray[np.int8]:
     """The status, but another one where a value is not within bounds."""
-    # two numbers tell of most blocks that all is well
-    if least <= values.min(initial=most) and values.max(initial=least) <= most:
+    if all_within(values, least, most):
         return status
     return np.where((values >= least) & (values <= most), status, otherwise)

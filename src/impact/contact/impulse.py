@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from .lanes import Lanes
-from .power import Array
+from .power import Array, all_within
+
+LARGEST = float(np.finfo(float).max)
 
 
 def velocities_at(lanes: Lanes, impulse: Array) -> tuple[Array, Array]:
@@ -22,6 +24,9 @@ def velocities_after(lanes: Lanes, e: Array) -> tuple[Array, Array]:
     They are those at the impulse tau_c (1 + e), where tau_c = m v0 is that of the approach. Balls that do not
     approach keep their velocities; an impulse that is too large for a number gives NaN.
     """
-    impulse = np.where(lanes.v0 > 0.0, (1.0 + e) * lanes.m * lanes.v0, 0.0)
-    finite = np.isfinite(impulse)
-    return velocities_at(lanes, impulse if finite.all() else np.where(finite, impulse, np.nan))
+    impulse = (1.0 + e) * lanes.m * lanes.v0
+    if not lanes.approach:
+        impulse = np.where(lanes.v0 > 0.0, impulse, 0.0)
+    if not all_within(impulse, -LARGEST, LARGEST):
+        impulse = np.where(np.isfinite(impulse), impulse, np.nan)
+    return velocities_at(lanes, impulse)

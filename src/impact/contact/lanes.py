@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .material import effective_mass
 from .model import ForceModel
 from .oracles import peak_indentation
-from .power import Array, powers
+from .power import Array, all_within, powers
 from .units import dimension
 
 
@@ -71,14 +71,29 @@ class Lanes:
         return self.v1 - self.v2
 
     @cached_property
+    def approach(self) -> bool:
+        """Whether all of the balls approach each other."""
+        return all_within(self.v0, float(np.nextafter(0.0, 1.0)), np.inf)
+
+    @cached_property
     def m(self) -> Array:
         """Effective mass [kg], equation (17)."""
         return effective_mass(self.m1, self.m2)
 
     @cached_property
     def length(self) -> Array:
-        """The contact's unit of length [m], (m v0^2/K)^(1/(n+1)); its unit of mass is m, of time length/v0."""
+        """The contact's unit of length [m], (m v0^2/K)^(1/(n+1)); its unit of mass is m."""
         return powers(self.m * self.v0 / self.K * self.v0, 1.0 / (self.n + 1.0))
+
+    @cached_property
+    def time(self) -> Array:
+        """The contact's unit of time [s], length/v0."""
+        return self.length / self.v0
+
+    @cached_property
+    def energy(self) -> Array:
+        """The contact's unit of energy [J], m v0^2, twice what the balls bring with them."""
+        return self.m * self.v0 * self.v0
 
     def quantity(self, name: str) -> Array:
         """A quantity of the contact or a parameter of the law, in SI."""

@@ -76,6 +76,15 @@ def distinct(values: Array) -> Array:
     return values[:1] if (values == values[:1]).all() else np.unique(values)
 
 
+def all_within(values: Array, least: float, most: float) -> bool:
+    """Whether all values are within bounds, which two numbers tell; NaN is not.
+
+    >>> all_within(np.array([0.0, 0.5]), 0.0, 1.0), all_within(np.array([0.5, np.nan]), 0.0, 1.0)
+    (True, False)
+    """
+    return bool(least <= values.min(initial=most) and values.max(initial=least) <= most)
+
+
 def integer_power(base: Array, exponent: int) -> Array:
     """`base` (of either sign) to a whole power >= 0, by repeated squaring.
 

@@ -15,7 +15,7 @@ from ..ode.step import Space
 from . import compiled, motion
 from .phases import in_parts
 from .power import Array
-from .status import Status
+from .status import LIMIT, OK, Status
 
 # the status of each end, by its number; no lane ends running
 STATUS_OF_END = np.zeros(len(End), np.int8)
@@ -24,7 +24,7 @@ STATUS_OF_END[End.LOST] = Status.NOT_SEPARATED
 STATUS_OF_END[End.MAX_STEPS] = Status.MAX_STEPS
 STATUS_OF_END[End.STEP_UNDERFLOW] = Status.STEP_UNDERFLOW
 STATUS_OF_END[End.NOT_FINITE] = Status.NOT_FINITE
-
+LANDED, LOST = int(End.LANDED), int(End.LOST)
 
 # places of impacts; a slice where it is all of them, so that nothing is copied
 Places = NDArray[np.intp] | slice
@@ -148,11 +148,11 @@ def strike(
     )  # fmt: skip
 
     # nothing is given back where the balls stay at their peak
-    stays = (rebound.status == Status.OK) & (recovered <= 0.0)
-    rebound.status[stays] = Status.LIMIT
-    rebound.e_out[stays] = 0.0
+    stays = (rebound.status == OK) & (recovered <= 0.0)
+    if stays.any():
+        rebound.status[stays], rebound.e_out[stays] = LIMIT, 0.0
 
-    parts = places(rebound.status == Status.OK)
+    parts = places(rebound.status == OK)
     columns = tuple(column[parts] for column in columns)
     if not recovered[parts].size:
         return Struck(rebound, inward, None, columns)
@@ -163,11 +163,11 @@ def strike(
         among, bends = motion.bends(back, columns, start, residual[parts])
         outward = in_parts(run, motion.restitution(back), bends, start, among)
     # held, or parting with no speed in an infinite time: all the energy of such balls is lost
-    held = outward.end == End.LOST
+    e_out, work, status = -back.velocity(outward.state, columns), 2.0 * outward.state[3], _status(outward)
+    held = outward.end == LOST
     if held.any():
         held &= motion.may_creep(back) | np.broadcast_to(sticks, n)[parts]
-    e_out, work, status = -back.velocity(outward.state, columns), 2.0 * outward.state[3], _status(outward)
-    e_out[held], work[held], status[held] = 0.0, 0.0, Status.LIMIT
+        e_out[held], work[held], status[held] = 0.0, 0.0, LIMIT
     rebound.e_out[parts] = e_out
     rebound.duration[parts] += outward.state[2]
     rebound.work[parts] += work
@@ -179,4 +179,6 @@ def strike(
 
 
 def _status(outcome: Outcome) -> NDArray[np.int8]:
+    if (outcome.end == LANDED).all():
+        return np.full(outcome.end.size, OK, np.int8)
     return STATUS_OF_END.take(outcome.end)

@@ -16,7 +16,7 @@ from .formula import wishes
 from .model import ForceModel
 from .momentum import is_strong
 from .power import Array, distinct
-from .status import Status
+from .status import LIMIT, OK, Status
 from .strike import Places, Rebound, Struck, places, strike
 from .values import Values, chi_of, exact_restitution, with_coefficients, with_units
 
@@ -52,7 +52,7 @@ def integrate_all(
     strike_at = partial(strike, rtol=rtol, max_steps=max_steps, core=core)
     with np.errstate(all="ignore"):
         for one in distinct(n):
-            chosen = (status == Status.OK) & (n == one)
+            chosen = (status == OK) & (n == one)
             count, where = int(np.count_nonzero(chosen)), places(chosen)
             if count:
                 parts.append((where, _halving(model, float(one), _at(given, where), count, strike_at, collapse)))
@@ -103,7 +103,7 @@ def _struck(
     strong = is_strong(model, values, count)
     parts: list[tuple[Places, Rebound]] = []
     for side in (False, True):
-        chosen = (status == Status.OK) & (strong == side)
+        chosen = (status == OK) & (strong if side else ~strong)
         if not chosen.any():
             continue
         where = places(chosen)
@@ -114,7 +114,7 @@ def _struck(
         struck = strike_at(law, tuple(c[first] for c in columns), sticks.size, sticks=sticks)
         parts.append((where, struck.rebound.take(back)))
     rebound = replace(Rebound.joined(count, status, parts), chi=chi, exact=exact)
-    held = status == Status.LIMIT
+    held = status == LIMIT
     if held.any():
         for known in (rebound.e_out, rebound.peak, rebound.permanent):
             known[held] = 0.0
