@@ -21,10 +21,11 @@ models = ["hertz", "lankarani-nikravesh-1990"]
 [solver]
 collapse = false
 core = "numpy"
+rtol = 1e-5
 [output]
 variables = ["v1_post", "duration", "status"]
 [sweep]
-e = { linspace = [0.01, 0.99, 100000] }
+e = { linspace = [0.01, 0.99, 200000] }
 v1 = 1.0
 m1 = 1.0
 m2 = 1.0

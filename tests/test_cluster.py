@@ -96,7 +96,7 @@ def test_the_scheduler_gone(two: Dask, tmp_path: Path, right: str, moment: int) 
     one.until_kept(moment)
     two.kill("scheduler")
     said = one.ends(4)
-    assert re.search(rf"{two.address}: the scheduler is gone; [\d,]+ of 200,000 trajectories are kept in", said), (
+    assert re.search(rf"{two.address}: the scheduler is gone; [\d,]+ of 400,000 trajectories are kept in", said), (
         said
     )
     assert "--resume goes on" in said
@@ -256,7 +256,7 @@ def test_a_cluster_of_its_own_ends_with_the_sweep(tmp_path: Path, right: str, nu
         os.killpg(group, number)
         said = one.ends(130)
         assert said.splitlines()[-1].endswith(
-            "of 200,000 trajectories are kept in results.h5.work; --resume goes on"
+            "of 400,000 trajectories are kept in results.h5.work; --resume goes on"
         )
         assert "Traceback" not in said
     else:

@@ -38,7 +38,7 @@ def script(name: str) -> str:
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """A folder with a sweep, and with this environment under the name that the scripts have for one."""
-    (tmp_path / "config.toml").write_text(CONFIG.replace("100000", "20000"))
+    (tmp_path / "config.toml").write_text(CONFIG.replace("200000", "40000"))
     (tmp_path / "venv" / "bin").mkdir(parents=True)
     here = Path(sys.executable).parent
     (tmp_path / "venv" / "bin" / "activate").write_text(f'PATH="{here}:$PATH"\nexport PATH\n')

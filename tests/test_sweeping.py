@@ -41,7 +41,7 @@ from .forked import Forked
 # more than one block, and done in a second
 BLOCKS = """models = ["bilinear", "hertz"]
 [sweep]
-e = { linspace = [0.0, 1.0, 20000] }
+e = { linspace = [0.0, 1.0, 40000] }
 v1 = 1.0
 m1 = [1.0, 2.0]
 m2 = 1.0
@@ -76,9 +76,9 @@ def test_a_dry_run_tells_what_a_sweep_takes_and_writes_nothing(cli: Run, blocks:
     told = cli("sweep", blocks, "--dry-run", cwd=blocks.parent)
     assert (told.returncode, told.stderr) == (0, "")
     lines = [line.split() for line in told.stdout.splitlines()]
-    assert lines[1] == ["bilinear", "40,000", "20,000", "20,000", "depends", "on", "e"]
-    assert lines[2] == ["hertz", "40,000", "1", "1", "depends", "on", "no", "axis"]
-    assert "80,000 points from 20,001 trajectories, " in told.stdout
+    assert lines[1] == ["bilinear", "80,000", "40,000", "40,000", "depends", "on", "e"]
+    assert lines[2] == ["hertz", "80,000", "1", "1", "depends", "on", "no", "axis"]
+    assert "160,000 points from 40,001 trajectories, " in told.stdout
     assert [one.name for one in blocks.parent.iterdir()] == ["blocks.toml"]
     found = json.loads(cli("sweep", blocks, "--dry-run", "--json", cwd=blocks.parent).stdout)
     cli("sweep", blocks, "--quiet", cwd=blocks.parent)
@@ -110,10 +110,10 @@ def test_a_dry_run_tells_what_goes_over_the_wire_and_how_many_workers_are_of_use
 
 def test_a_dry_run_says_where_equal_values_are_not_looked_for(cli: Run, blocks: Path) -> None:
     each = cli("sweep", blocks, "--dry-run", "--set", "solver.collapse=false", cwd=blocks.parent)
-    assert "80,000 points from 80,000 trajectories" in each.stdout
+    assert "160,000 points from 160,000 trajectories" in each.stdout
     assert "every point is integrated (solver.collapse = false)" in each.stdout
     # e = 1 - alpha v0 has a cell for each pair, in which a law without e does not share
-    pairs = BLOCKS.replace("e = { linspace = [0.0, 1.0, 20000] }", "alpha = { linspace = [0.0, 0.1, 2100] }")
+    pairs = BLOCKS.replace("e = { linspace = [0.0, 1.0, 40000] }", "alpha = { linspace = [0.0, 0.1, 2100] }")
     pairs = pairs.replace("v1 = 1.0", "v1 = { linspace = [1.0, 2.0, 2100] }")
     (blocks.parent / "pairs.toml").write_text(pairs, encoding="utf-8")
     told = cli("sweep", "pairs.toml", "--dry-run", cwd=blocks.parent)
@@ -126,15 +126,15 @@ def test_too_many_points_are_refused_before_there_is_anything(forked: Forked, bl
     grid = [f"sweep.{name}.geomspace=[1,2,10000]" for name in ("v1", "m1", "m2")]
     sets = [word for one in grid for word in ("--set", one)]
     done = forked("sweep", blocks, *sets, cwd=blocks.parent, limit=10.0)
-    wants = "got 40,000,000,000,000,000 points (axes times models), up to 6,400,000,000 GB, wants at most "
+    wants = "got 80,000,000,000,000,000 points (axes times models), up to 12,800,000,000 GB, wants at most "
     assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
     assert f"sweep: {wants}1,000,000,000 points (--max-points)" in done.stderr
     assert done.memory < 300e6
-    fewer = forked("sweep", blocks, "--max-points", "79999", cwd=blocks.parent)
+    fewer = forked("sweep", blocks, "--max-points", "159999", cwd=blocks.parent)
     assert fewer.returncode == 2
-    assert "got 80,000 points" in fewer.stderr
+    assert "got 160,000 points" in fewer.stderr
     assert [one.name for one in blocks.parent.iterdir()] == ["blocks.toml"]
-    with pytest.raises(ConfigError, match="80,000 points"):
+    with pytest.raises(ConfigError, match="160,000 points"):
         impact.sweep(blocks, max_points=79_999)
 
 
@@ -144,11 +144,11 @@ def test_too_many_points_are_refused_before_there_is_anything(forked: Forked, bl
 @pytest.mark.slow
 def test_a_line_now_and_then_where_there_is_no_terminal(cli: Run, blocks: Path) -> None:
     # one line after a second, and not one for each block
-    done = cli("sweep", blocks, "--set", "solver.rtol=1e-12", "--set", THREE, cwd=blocks.parent)
+    done = cli("sweep", blocks, "--set", "solver.rtol=1e-10", "--set", THREE, cwd=blocks.parent)
     lines = [line for line in done.stderr.splitlines() if line.startswith(("trajectories ", "points "))]
     assert 1 <= len(lines) <= 5
     number = r"[\d,]+"
-    whole = rf"(trajectories {number} of 60,000 for 120,000 points|points {number} of 120,000)"
+    whole = rf"(trajectories {number} of 120,000 for 240,000 points|points {number} of 240,000)"
     assert all(re.fullmatch(rf"{whole}(, {number}/s, [\d:]+ left)?", line) for line in lines), lines
     assert "\x1b" not in done.stderr
     silent = cli("sweep", blocks, "--overwrite", "--quiet", cwd=blocks.parent)
@@ -157,7 +157,7 @@ def test_a_line_now_and_then_where_there_is_no_terminal(cli: Run, blocks: Path) 
 
 def test_a_bar_on_a_terminal(blocks: Path) -> None:
     driver, terminal = pty.openpty()
-    words = ["sweep", str(blocks), "--set", "solver.rtol=1e-12", "--set", THREE]
+    words = ["sweep", str(blocks), "--set", "solver.rtol=1e-10", "--set", THREE]
     with subprocess.Popen([sys.executable, "-m", "impact", *words], cwd=blocks.parent, stderr=terminal) as child:
         os.close(terminal)
         told = b""
@@ -168,7 +168,7 @@ def test_a_bar_on_a_terminal(blocks: Path) -> None:
                 break
     os.close(driver)
     assert child.returncode == 0
-    assert re.search(rb"trajectories [\d,]+ of 60,000", told)
+    assert re.search(rb"trajectories [\d,]+ of 120,000", told)
     assert "━".encode() in told
     # it goes when it is done
     assert told.rstrip().endswith(b"limit)")
@@ -212,7 +212,7 @@ def test_what_is_held_is_counted_in_parts_as_in_memory(blocks: Path) -> None:
     found = held(output, plan)
     assert found is not None
     assert found.tally == swept.tally == tally_of(impact.load(output))
-    assert found.trajectories == swept.trajectories == 20_001
+    assert found.trajectories == swept.trajectories == 40_001
     assert held(output, prepare(blocks, ["sweep.v1=2"])) is None
     with output.open("r+b") as file:
         file.seek(-1_000, os.SEEK_END)
@@ -297,7 +297,7 @@ def test_an_executor_that_stays_broken_is_told() -> None:
 
 @pytest.mark.slow
 def test_nobody_who_listens_is_no_reason_to_stop(blocks: Path) -> None:
-    words = f"'{sys.executable}' -m impact sweep blocks.toml --set '{THREE}' --set solver.rtol=1e-12"
+    words = f"'{sys.executable}' -m impact sweep blocks.toml --set '{THREE}' --set solver.rtol=1e-10"
     command = f"{words} 2>&1 >/dev/null | head -c 1 >/dev/null; exit ${{PIPESTATUS[0]}}"
     done = subprocess.run(["bash", "-c", command], cwd=blocks.parent, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
@@ -378,7 +378,7 @@ def test_how_it_cannot_be_stored(blocks: Path, key: str) -> None:
 
 
 def test_pieces_that_are_too_many_or_too_large(blocks: Path) -> None:
-    with pytest.raises(ConfigError, match=r"got 800,000 pieces of 2 points, wants at most 100,000 of"):
+    with pytest.raises(ConfigError, match=r"got 1,600,000 pieces of 2 points, wants at most 100,000 of"):
         prepare(blocks, ["output.chunks.e=1"])
     with pytest.raises(ConfigError, match=r"got 80 pieces of 10,000,000 points"):
         prepare(blocks, ["output.chunks.m1=1", "sweep.e.linspace=[0,1,10000000]"])

@@ -37,6 +37,4 @@ MEANINGS = {
     Status.MODEL_ERROR: "the force raised an error or returned the wrong shape",
 }
 # an array is compared with a plain number eight times as fast as with a member of an enum
-OK, NO_IMPACT, LIMIT, FIRST_FAILURE = map(
-    int, (Status.OK, Status.NO_IMPACT, Status.LIMIT, Status.NOT_SEPARATED)
-)
+OK, NO_IMPACT, LIMIT, FIRST_FAILURE = map(int, (Status.OK, Status.NO_IMPACT, Status.LIMIT, Status.NOT_SEPARATED))

@@ -25,7 +25,7 @@ from .plan import Index, Plan
 # cells up to which equal values are found over the whole plan; beyond, within a block
 MOST_CELLS = 2**22
 # trajectories of a block: enough to pay for the interpreter, few enough to stay in cache
-BLOCK = 16384
+BLOCK = 32768
 
 
 @dataclass(frozen=True)
