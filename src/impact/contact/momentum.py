@@ -37,8 +37,8 @@ class Momentum:
 
     strength = ""
 
-    def of(self, s: Array, v: Array, strength: Array) -> Array:
-        """The coordinate of a velocity."""
+    def of(self, s: Array, v: float, strength: Array) -> Array | float:
+        """The coordinate of a velocity that all have."""
         return v
 
     def velocity(self, y: Array, strength: Array) -> Array:
@@ -59,7 +59,7 @@ class Log(Momentum):
 
     strength = COORDINATES["log"][0]
 
-    def of(self, s: Array, v: Array, strength: Array) -> Array:
+    def of(self, s: Array, v: float, strength: Array) -> Array:
         return np.asarray(np.log1p(strength * v))
 
     def velocity(self, y: Array, strength: Array) -> Array:
@@ -92,7 +92,7 @@ class Force(Momentum):
     spring: float
     strength = COORDINATES["force"][0]
 
-    def of(self, s: Array, v: Array, strength: Array) -> Array:
+    def of(self, s: Array, v: float, strength: Array) -> Array:
         return np.asarray(v + signed_power(s, self.spring) / strength)
 
     def velocity(self, y: Array, strength: Array) -> Array:

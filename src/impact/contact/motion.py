@@ -213,14 +213,20 @@ def of_restitution(law: Law) -> Law:
 
 def start_of_approach(law: Law, columns: Columns, n: int) -> Array:
     """s = 0, v = 1."""
-    s = np.zeros(n)
-    return np.array([s, law.momentum.of(s, np.ones(n), law.strength(columns))])
+    return _components(law, columns, np.zeros(1), 1.0, n)
 
 
 def start_of_restitution(law: Law, columns: Columns, recovered: Array) -> Array:
     """s at the peak above the residual indentation, v = 0."""
-    s = power(recovered, 1.0 / law.model.smooth)
-    return np.array([s, law.momentum.of(s, np.zeros(s.size), law.strength(columns))])
+    return _components(law, columns, power(recovered, 1.0 / law.model.smooth), 0.0, recovered.size)
+
+
+def _components(law: Law, columns: Columns, s: Array, v: float, n: int) -> Array:
+    """The components, shape (2, n), at s, of shape (n,) or (1,), where all have a velocity."""
+    y = np.empty((2, n))
+    y[0] = s
+    y[1] = law.momentum.of(s, v, law.strength(columns))
+    return y
 
 
 def indentation(law: Law, s: Array) -> Array:
@@ -230,8 +236,7 @@ def indentation(law: Law, s: Array) -> Array:
 
 def force_at_peak(law: Law, s: Array, columns: Columns) -> Array:
     """The force of the approach where it ends."""
-    at_rest = np.array([s, law.momentum.of(s, np.zeros(s.size), law.strength(columns))])
-    formula = law.model.force
+    at_rest, formula = _components(law, columns, s, 0.0, s.size), law.model.force
     force = law.call(formula, columns, _given(law, {*wishes(formula)}, (), at_rest, columns))
     return np.broadcast_to(force, s.shape)
 
