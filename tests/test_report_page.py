@@ -24,7 +24,8 @@ from impact import api
 from impact.contact.models import catalogue
 from impact.data.ranking import ranking
 from impact.errors import UsageError
-from impact.views.page import FIGURES, POLICY, page
+from impact.views.page import POLICY, page
+from impact.views.page_figures import FIGURES
 
 from .conftest import ROOT, Run
 
