@@ -95,7 +95,7 @@ def core(
 # the operations of one step, counted where the kernel is plain Python
 COUNT = """
 from impact.contact.compiled import DAMPED, STOP, Form
-from impact.contact.kernel import attempt
+from impact.contact.equations import attempt
 class Counted(float):
     total = 0
 def counted(name):
@@ -253,9 +253,10 @@ def side_by_side(asked: argparse.Namespace, models: list[ForceModel], cores: lis
     processes, apart = ProcessPoolExecutor(asked.jobs, get_context("spawn")), []
     if arithmetic:
         list(processes.map(by_itself, [few] * asked.jobs * 8, [rtol] * asked.jobs * 8))
-    for _ in range(asked.rounds):
+    for turn in range(asked.rounds):
         loops.append(loop(models, few, loop_rtol))
-        for row in rows:
+        # forth and back: what comes after another finds its caches and its memory
+        for row in rows[:: -1 if turn % 2 else 1]:
             e = impacts[row[0]]
             seconds, worst, steps = core(models, e, rtol, *row)
             engines[row].append((e.size / seconds, worst, steps))

@@ -11,6 +11,7 @@ import numpy as np
 from ..ode import rk45
 from ..ode.problem import Array, Columns, Outcome, Problem
 from . import forms, motion
+from .creeping import creeping_speed, may_creep
 from .model import ForceModel
 from .momentum import Force, Log, force_form
 from .power import integer_power, power
@@ -114,8 +115,8 @@ def integrate(
         strength = problem.rates(start, columns)[4] / stretch
     else:
         strength = np.ones(n)
-    if form.ending == GAP and motion.may_creep(law):
-        bound = motion.creeping_speed(strength, law.n, form.drag / form.smooth)
+    if form.ending == GAP and may_creep(law.model):
+        bound = creeping_speed(strength, law.n, form.drag / form.smooth)
     outcome = Outcome.unwritten(n)
     rows = (np.ascontiguousarray(start), np.ascontiguousarray(strength), np.ascontiguousarray(bound))
     with aside():

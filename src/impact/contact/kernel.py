@@ -14,16 +14,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from numba.extending import overload
 
 from ..ode import event as landing
 from ..ode import maximum, rk45
 from ..ode.problem import End
-from ..ode.tableau import A as FRACTIONS
-from ..ode.tableau import E as DIFFERENCES
-from . import forms, momentum, motion
-from .compiled import DAMPED, DRAGGED, FORCE, GAP, LOG, NO_FORCE, SPRING, STOP, Form
-from .vectors import bits, exponential, from_bits, inlined, kept_on_disk, whole_power
+from .compiled import STOP, Form
+from .equations import attempt, beyond_end, event, force, is_lost, linear, rates, slope_of_force
+from .vectors import bits, from_bits, inlined, kept_on_disk
 
 # lanes of a unit, and units side by side
 UNIT, UNITS = 32, 2
@@ -40,14 +37,11 @@ UNIT, UNITS = 32, 2
 ) = range(30)  # fmt: skip
 ROWS = 30
 
-A = tuple(tuple(map(float, row)) for row in FRACTIONS)
-E = tuple(map(float, DIFFERENCES))
 SAFETY, SMALLEST, LARGEST, GAIN = rk45.SAFETY, rk45.SMALLEST, rk45.LARGEST, rk45.GAIN
 SAFETY_BITS = int(np.float64(SAFETY).view(np.int64))
 LAST_STEP, HALVINGS = rk45.LAST_STEP, float(rk45.HALVINGS)
 REST, LANDING, NEAR = landing.REST, landing.LANDING, landing.NEAR
 SLOPE, FLAT, GUESSES = maximum.DIFFERENCE, maximum.FLAT, maximum.GUESSES
-FAR, FLOOR, DIFFERENCE, NEAREST = motion.FAR, motion.FLOOR, motion.DIFFERENCE, motion.NEAREST
 RUNNING, LANDED, LOST, MAX_STEPS = (float(end) for end in (End.RUNNING, End.LANDED, End.LOST, End.MAX_STEPS))
 STEP_UNDERFLOW, NOT_FINITE = float(End.STEP_UNDERFLOW), float(End.NOT_FINITE)
 
@@ -55,133 +49,6 @@ STEP_UNDERFLOW, NOT_FINITE = float(End.STEP_UNDERFLOW), float(End.NOT_FINITE)
 _HOUSE = Path(__file__).parent.parent
 _SOURCES = sorted((*(_HOUSE / "ode").glob("*.py"), *(_HOUSE / "contact").glob("*.py")))
 VERSION = zlib.crc32(b"".join(one.read_bytes() for one in _SOURCES))
-
-damped, dragged = inlined(forms.damped), inlined(forms.dragged)
-rate_of_log, rate_of_force = inlined(momentum.rate_of_log), inlined(momentum.rate_of_force)
-velocity_of_force = inlined(momentum.velocity_of_force)
-
-
-@overload(landing.choose, jit_options={"forceinline": True})
-def _choose(condition, this, other):
-    return lambda condition, this, other: this if condition else other
-
-
-beyond_end, linear, release = inlined(landing.beyond_end), inlined(landing.linear), inlined(motion.release)
-
-
-@inlined
-def solution(k1, k3, k4, k5, k6):
-    """The weighted sum of the rates, of order five."""
-    return A[6][0] * k1 + A[6][2] * k3 + A[6][3] * k4 + A[6][4] * k5 + A[6][5] * k6
-
-
-@inlined
-def difference(k1, k3, k4, k5, k6, k7):
-    """What it differs by from that of order four."""
-    return E[0] * k1 + E[2] * k3 + E[3] * k4 + E[4] * k5 + E[5] * k6 + E[6] * k7
-
-
-@inlined
-def rates(form, s, y, strength):
-    """Rates of the two components and the two quadratures."""
-    weight = form.smooth * whole_power(s, form.smooth - 1)
-    # of the force, K δⁿ and the drag with the weight in them: fewer products that a step has to wait for
-    weighted = form.smooth * whole_power(s, form.spring + form.smooth - 1)
-    if form.equation == FORCE:
-        v = velocity_of_force(y, whole_power(s, form.extra), strength)
-        force = strength * whole_power(s, form.drag) * y
-        rate_y = rate_of_force(v, whole_power(s, form.extra - 1), form.extra / strength, weight, force)
-        return v, rate_y, weight, weight * force * v
-    if form.equation == LOG:
-        # one division for all stages
-        v = (exponential(y) - 1.0) * (1.0 / strength)
-        return v, rate_of_log(weighted, 1.0, strength), weight, damped(weighted, v, 1.0, strength) * v
-    v = y
-    if form.equation == SPRING:
-        pushed = strength * weighted
-    elif form.equation == DAMPED:
-        pushed = damped(weighted, v, 1.0, strength)
-    else:
-        pushed = dragged(weighted, form.smooth * whole_power(s, form.drag + form.smooth - 1), v, strength)
-    return v, -pushed, weight, pushed * v
-
-
-@inlined
-def force(form, s, y, v, strength):
-    """The force."""
-    elastic = whole_power(s, form.spring)
-    if form.equation == FORCE:
-        return strength * whole_power(s, form.drag) * y
-    if form.equation == SPRING:
-        return strength * elastic
-    if form.equation == DRAGGED:
-        return dragged(elastic, whole_power(s, form.drag), v, strength)
-    return damped(elastic, v, 1.0, strength)
-
-
-@inlined
-def attempt(form, s, y, s1, y1, watched, h, strength):
-    """One step: components at its end and what is added to the others, rates there, the local error."""
-    t1 = form.smooth * whole_power(s, form.smooth - 1)
-    work1 = t1 * watched * s1
-    s2, y2, _, _ = rates(form, s + (h * A[1][0]) * s1, y + (h * A[1][0]) * y1, strength)
-    # a stage comes last, and by itself, into the next one, which waits for it
-    s3, y3, t3, work3 = rates(
-        form, s + h * (A[2][0] * s1) + (h * A[2][1]) * s2, y + h * (A[2][0] * y1) + (h * A[2][1]) * y2, strength
-    )
-    s4, y4, t4, work4 = rates(
-        form, s + h * (A[3][0] * s1 + A[3][1] * s2) + (h * A[3][2]) * s3,
-        y + h * (A[3][0] * y1 + A[3][1] * y2) + (h * A[3][2]) * y3, strength,
-    )  # fmt: skip
-    s5, y5, t5, work5 = rates(
-        form, s + h * (A[4][0] * s1 + A[4][1] * s2 + A[4][2] * s3) + (h * A[4][3]) * s4,
-        y + h * (A[4][0] * y1 + A[4][1] * y2 + A[4][2] * y3) + (h * A[4][3]) * y4, strength,
-    )  # fmt: skip
-    s6, y6, t6, work6 = rates(
-        form, s + h * (A[5][0] * s1 + A[5][1] * s2 + A[5][2] * s3 + A[5][3] * s4) + (h * A[5][4]) * s5,
-        y + h * (A[5][0] * y1 + A[5][1] * y2 + A[5][2] * y3 + A[5][3] * y4) + (h * A[5][4]) * y5, strength,
-    )  # fmt: skip
-    new_s = s + h * solution(s1, s3, s4, s5, s6)
-    new_y = y + h * solution(y1, y3, y4, y5, y6)
-    more_t, more_work = h * solution(t1, t3, t4, t5, t6), h * solution(work1, work3, work4, work5, work6)
-    s7, y7, _, _ = rates(form, new_s, new_y, strength)
-    watched = force(form, new_s, new_y, s7, strength)
-    off_s, off_y = abs(difference(s1, s3, s4, s5, s6, s7)), abs(difference(y1, y3, y4, y5, y6, y7))
-    scale_s, scale_y = max(abs(s), abs(new_s), FLOOR[0]), max(abs(y), abs(new_y), FLOOR[1])
-    # the larger of two quotients by one division; a sum, since a number that is none has to stay none
-    off_s, off_y = off_s * scale_y, off_y * scale_s
-    worst = abs(h) * (max(off_s, off_y) + 0.0 * (off_s + off_y)) / (scale_s * scale_y)
-    return new_s, new_y, more_t, more_work, s7, y7, watched, worst
-
-
-@inlined
-def slope_of_force(form, s, y, rate_s, rate_y, now, small, strength):
-    """The slope of the force along the trajectory, by a small step."""
-    ahead_s, ahead_y = s + small * rate_s, y + small * rate_y
-    v, _, _, _ = rates(form, ahead_s, ahead_y, strength)
-    return (force(form, ahead_s, ahead_y, v, strength) - now) / small
-
-
-@inlined
-def event(form, s, y, rate_s, rate_y, now, strength):
-    """What falls to zero at the end of the phase, and its rate."""
-    if form.ending == GAP:
-        return s, rate_s
-    if form.ending == NO_FORCE:
-        small = DIFFERENCE * min(max(abs(s), NEAREST), 1.0)
-        slope = slope_of_force(form, s, y, rate_s, rate_y, now, small, strength)
-        return release(s, rate_s, now, slope)
-    if form.equation == FORCE:
-        return rate_s, -form.smooth * whole_power(s, form.smooth - 1) * now
-    return y, rate_y
-
-
-@inlined
-def is_lost(form, s, rate_s, bound):
-    """Whether the event cannot be reached any more."""
-    if form.ending == STOP:
-        return s > FAR
-    return -rate_s <= (bound * whole_power(s, form.creep) if form.equation >= DRAGGED else 0.0)
 
 
 @inlined

@@ -17,6 +17,7 @@ import numpy as np
 from ..errors import ModelError
 from ..ode.event import choose
 from ..ode.problem import Array, Columns, Mask, Problem, Rates
+from .creeping import creeps, may_creep
 from .formula import Formula, ask, wishes
 from .model import IN_FORCE, ForceModel
 from .momentum import Momentum, coordinate, force_form, signed_power
@@ -37,10 +38,6 @@ DIFFERENCE, NEAREST = 1e-7, 1e-12
 BRANCH = ("peak", "force_at_peak", "residual", "recovered")
 # the force of a law without damping is taken to be a power of s below this
 POWER = 16.0
-# a damping is critical from this of its square on, which rounding may have made smaller
-CRITICAL = 1.0 + 1e-12
-# a speed that is none beside v0
-NOTHING = 1e-10
 # of a coordinate that asks for no coefficient
 NONE = np.empty(0)
 
@@ -120,7 +117,7 @@ def restitution(law: Law) -> Problem:
         return creeps(x, -k[0], c, law.n, force_form(law.model, law.n).drag / law.model.smooth)
 
     event = force_event if law.model.release == "force" else gap_event
-    lost = creeping if may_creep(law) else turned_back
+    lost = creeping if may_creep(law.model) else turned_back
     return Problem(rates=rates, event=event, lost=lost, floor=FLOOR, first=FIRST_OUTWARD)
 
 
@@ -131,35 +128,6 @@ def release(s: Array, rate: Array, force: Array, slope: Array) -> tuple[Array, A
     sooner = POWER * force * np.abs(rate) < s * np.abs(slope)
     by_force = (sooner & (s > 0.0)) | ((force < s) & (s <= 0.0))
     return choose(by_force, force, s), choose(by_force, slope, rate)
-
-
-def may_creep(law: Law) -> bool:
-    """Whether the balls may part with no speed, by a damping that pulls until the gap closes."""
-    return law.model.momentum == "force" and law.model.release == "gap" and law.model.unloading is None
-
-
-def creeps(x: Array, speed: Array, c: Array, n: float, q: float) -> Mask:
-    """Which balls are sure to part with no speed, where F = xⁿ + c x^q v.
-
-    Once speed ≤ b(x) = c x^(q+1)/(2(q + 1)) it stays so where x^(n−2q−1) ≤ c²/(4(q + 1)), for it changes at the
-    rate xⁿ − c x^q speed. With n ≥ 2q + 1 that is for ever, and x stays above zero. Else it is as far as the x*
-    that makes it an equation; beyond it no more than the energy is left, speed² ≤ b(x*)² + 2 x*^(n+1)/(n + 1).
-    """
-    bound, rest = c / (2.0 * (q + 1.0)), c * c / (4.0 * (q + 1.0))
-    order = n - 2.0 * q - 1.0
-    slow = speed <= bound * power(x, q + 1.0)
-    if order == 0.0:
-        return np.asarray(speed <= creeping_speed(c, n, q) * power(x, q + 1.0))
-    if order > 0.0:
-        return np.asarray(slow & (power(x, order) <= CRITICAL * rest))
-    far = power(rest, 1.0 / order)
-    left = np.square(bound * power(far, q + 1.0)) + 2.0 / (n + 1.0) * power(far, n + 1.0)
-    return np.asarray(slow & (x >= far) & (left <= NOTHING * NOTHING))
-
-
-def creeping_speed(c: Array, n: float, q: float) -> Array:
-    """What a speed of balls that part with none is below, over x^(q+1), where n = 2q + 1; -inf where none is."""
-    return np.where(CRITICAL * c * c >= 4.0 * (q + 1.0), c / (2.0 * (q + 1.0)), -np.inf)
 
 
 def bends(law: Law, columns: Columns, start: Array, residual: Array | None = None) -> tuple[Columns, list[Bend]]:

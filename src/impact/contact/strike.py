@@ -13,6 +13,7 @@ from ..ode.problem import Columns, End, Outcome
 from ..ode.rk45 import integrate
 from ..ode.step import Space
 from . import compiled, motion
+from .creeping import may_creep
 from .phases import in_parts
 from .power import Array
 from .status import LIMIT, OK, Status
@@ -166,7 +167,7 @@ def strike(
     e_out, work, status = -back.velocity(outward.state, columns), 2.0 * outward.state[3], _status(outward)
     held = outward.end == LOST
     if held.any():
-        held &= motion.may_creep(back) | np.broadcast_to(sticks, n)[parts]
+        held &= may_creep(back.model) | np.broadcast_to(sticks, n)[parts]
         e_out[held], work[held], status[held] = 0.0, 0.0, LIMIT
     rebound.e_out[parts] = e_out
     rebound.duration[parts] += outward.state[2]
