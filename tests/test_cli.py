@@ -225,6 +225,23 @@ def test_run_reads_a_result(cli: Run, tmp_path: Path) -> None:
         (["info", "pyproject.toml"], "pyproject.toml: is not a readable result"),
         (["plot", "absent.h5"], "absent.h5: does not exist"),
         (["init", "README.md"], "README.md: exists; give another name, or overwrite it (--overwrite)"),
+        (["swep"], "impact: No such command 'swep'. Did you mean 'sweep'?; impact -h tells what there is"),
+        (["sweep"], "impact sweep: Missing argument 'config'; impact sweep -h tells what there is"),
+        (["sweep", "--job", "2"], "impact sweep: No such option: --job"),
+        (["sweep", "a.toml", "b.toml"], "impact sweep: Got unexpected extra argument(s) (b.toml); "),
+        (
+            ["sweep", "a.toml", "--max-points", "1e6.5"],
+            "impact sweep: Invalid value for '--max-points': "
+            'got "1e6.5", wants a whole number of at least 1, such as 8 or 1e9; ',
+        ),
+        (
+            ["sweep", "a.toml", "-j", "0"],
+            "impact sweep: Invalid value for '--jobs' / '-j': got \"0\", wants a whole number of at least 1",
+        ),
+        (
+            ["recommend", "a.h5", "--tol", "x"],
+            "impact recommend: Invalid value for '--tol': got \"x\", wants a number, such as 8 or 0.02; ",
+        ),
     ],
 )
 def test_a_mistake_is_one_line(cli: Run, words: list[str], line: str) -> None:

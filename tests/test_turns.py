@@ -1,7 +1,9 @@
 """Threads take turns at what is not compiled: half of them at a time, but for what they do aside."""
 
+import faulthandler
 import threading
 import time
+from collections.abc import Iterator
 
 import pytest
 
@@ -9,6 +11,14 @@ from impact.contact.turns import aside
 from impact.sweeps.teams import team_of
 
 THREADS = 4
+
+
+@pytest.fixture(autouse=True)
+def in_time() -> Iterator[None]:
+    """A thread that waits for ever ends with its process only, which fails the test."""
+    faulthandler.dump_traceback_later(30.0, exit=True)
+    yield
+    faulthandler.cancel_dump_traceback_later()
 
 
 def test_half_of_the_threads_have_a_turn_at_a_time():

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .options import Json
-from .words import dump, pairs
+from .words import dump, number, pairs
 
 if TYPE_CHECKING:
     from ..data.ranking import Ranked, Ranking
@@ -21,7 +21,10 @@ ROWS = 30
 def recommend(
     result: Annotated[Path, typer.Argument(help="A result of `impact sweep`.")],
     tol: Annotated[
-        float, typer.Option("--tol", metavar="VALUE", help="What the restitution may be off by, |e_out − e|.")
+        float,
+        typer.Option(
+            "--tol", metavar="VALUE", parser=number, help="What the restitution may be off by, |e_out − e|."
+        ),
     ] = 0.01,
     sel: Annotated[
         list[str] | None,

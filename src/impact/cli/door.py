@@ -14,6 +14,8 @@ from collections.abc import Callable, Iterator
 from types import FrameType
 from typing import TextIO
 
+from typer import TyperException
+
 from ..errors import ImpactError, InUseError, StoreError, UnfinishedError
 from ..text import safe_text
 
@@ -83,6 +85,11 @@ def enter(command: Callable[[], object], *, debug: bool) -> int:
     except Interrupted as signalled:
         say(str(signalled), error=True)
         return signalled.code
+    except TyperException as error:
+        # without a message it has shown the help
+        if error.format_message():
+            say(_usage(error), error=True)
+        return USAGE
     except ImpactError as error:
         for line in str(error).splitlines():
             say(line, error=True)
@@ -108,18 +115,26 @@ def _note(message: Warning | str, *_: object, **__: object) -> None:
     say(f"note: {safe_text(str(message), 1000)}")
 
 
+def _usage(error: TyperException) -> str:
+    """What is wrong with the words of a command."""
+    context = getattr(error, "ctx", None)
+    at = context.command_path if context else "impact"
+    told = " ".join(safe_text(error.format_message(), 1000).split())
+    return f"{at}: {told.rstrip('. ')}; {at} -h tells what there is"
+
+
 def _run(command: Callable[[], object]) -> int:
-    """The exit code of a command, which leaves by SystemExit if it has one."""
+    """The exit code of a command, which returns it, or leaves by SystemExit, if it has one."""
     try:
-        command()
+        code = command()
     except SystemExit as leaving:
         if isinstance(leaving.__context__, OSError):
             # typer leaves by this when the reader of our output has gone
             raise leaving.__context__ from None
-        if leaving.code == INTERRUPTED:
-            say("interrupted", error=True)
-        return leaving.code if isinstance(leaving.code, int) else OK
-    return OK
+        code = leaving.code
+    if code == INTERRUPTED:
+        say("interrupted", error=True)
+    return code if isinstance(code, int) else OK
 
 
 @contextlib.contextmanager

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -156,4 +157,4 @@ def schema(
 
 def main() -> None:
     """Entry point of the console script `impact`."""
-    sys.exit(door.enter(app, debug="--debug" in sys.argv))
+    sys.exit(door.enter(partial(app, standalone_mode=False, prog_name="impact"), debug="--debug" in sys.argv))

@@ -10,7 +10,7 @@ import typer
 from ..errors import UnfinishedError, UsageError
 from ..text import safe_text
 from . import door
-from .options import AllowFailed, Json, Output, Overwrite, Plugins, Quiet, Sets
+from .options import AllowFailed, Jobs, Json, MaxPoints, Output, Overwrite, Plugins, Quiet, Sets, Threads
 from .who import Who
 
 
@@ -22,11 +22,8 @@ def sweep(
     overwrite: Overwrite = False,
     allow_failed: AllowFailed = False,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with a sweep that was interrupted.")] = False,
-    jobs: Annotated[int, typer.Option("--jobs", "-j", metavar="N", min=1, help="Processes that integrate.")] = 1,
-    threads: Annotated[
-        int,
-        typer.Option("--threads", metavar="N", min=1, help="Threads that integrate, in place of processes."),
-    ] = 1,
+    jobs: Jobs = 1,
+    threads: Threads = 1,
     scheduler: Annotated[
         str | None,
         typer.Option(
@@ -40,9 +37,7 @@ def sweep(
         str | None,
         typer.Option("--shard", metavar="K/N", help="Only part K of N; impact merge joins the parts."),
     ] = None,
-    max_points: Annotated[
-        int, typer.Option("--max-points", metavar="N", min=1, help="Refuse a sweep of more points.")
-    ] = 10**9,
+    max_points: MaxPoints = 10**9,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Only tell how many points and trajectories, bytes and minutes.")
     ] = False,

@@ -1,12 +1,46 @@
-"""Words in and out of a command: NAME=VALUE options, and JSON."""
+"""Words in and out of a command: numbers, NAME=VALUE options, and JSON."""
 
 from __future__ import annotations
 
 import json
+import math
 from typing import Any
+
+import typer
 
 from ..errors import UsageError
 from ..text import safe_text
+
+
+def whole_number(given: str | int) -> int:
+    """A whole number of at least 1, as a person writes it; a default, which is a number, too.
+
+    >>> whole_number("8"), whole_number("1e9")
+    (8, 1000000000)
+    """
+    found = _value(given)
+    if not (found >= 1.0 and found.is_integer()):
+        raise _refused(given, "a whole number of at least 1, such as 8 or 1e9")
+    return int(found)
+
+
+def number(given: str | float) -> float:
+    """A number, as a person writes it; a default, which is one, too."""
+    found = _value(given)
+    if math.isnan(found):
+        raise _refused(given, "a number, such as 8 or 0.02")
+    return found
+
+
+def _value(given: str | float) -> float:
+    try:
+        return float(given)
+    except ValueError:
+        return math.nan
+
+
+def _refused(given: str | float, wants: str) -> typer.BadParameter:
+    return typer.BadParameter(f'got "{safe_text(str(given))}", wants {wants}')
 
 
 def pairs(option: str, words: list[str] | None) -> dict[str, float | str]:
