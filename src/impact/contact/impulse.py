@@ -25,7 +25,7 @@ def velocities_after(lanes: Lanes, e: Array) -> tuple[Array, Array]:
     approach keep their velocities; an impulse that is too large for a number gives NaN.
     """
     impulse = (1.0 + e) * lanes.m * lanes.v0
-    if not lanes.approach:
+    if not lanes.all_approach:
         impulse = np.where(lanes.v0 > 0.0, impulse, 0.0)
     if not all_within(impulse, -LARGEST, LARGEST):
         impulse = np.where(np.isfinite(impulse), impulse, np.nan)

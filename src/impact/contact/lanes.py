@@ -71,8 +71,8 @@ class Lanes:
         return self.v1 - self.v2
 
     @cached_property
-    def approach(self) -> bool:
-        """Whether all of the balls approach each other."""
+    def all_approach(self) -> bool:
+        """Whether all pairs of balls approach each other."""
         return all_within(self.v0, float(np.nextafter(0.0, 1.0)), np.inf)
 
     @cached_property

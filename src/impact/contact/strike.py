@@ -163,8 +163,8 @@ def strike(
     else:
         among, bends = motion.bends(back, columns, start, residual[parts])
         outward = in_parts(run, motion.restitution(back), bends, start, among)
-    # held, or parting with no speed in an infinite time: all the energy of such balls is lost
     e_out, work, status = -back.velocity(outward.state, columns), 2.0 * outward.state[3], _status(outward)
+    # held, or parting with no speed in an infinite time: all the energy of such balls is lost
     held = outward.end == LOST
     if held.any():
         held &= may_creep(back.model) | np.broadcast_to(sticks, n)[parts]
