@@ -85,6 +85,11 @@ def test_impact_without_an_answer_says_why_and_is_nan(key, given, status):
         assert np.isnan(getattr(contact, name)[0]), name
 
 
+def test_an_impulse_too_large_for_a_number_gives_no_reference():
+    contact = struck(find("hertz"), impacts(e=0.5, v1=1e10, m1=1e300, m2=1e300))
+    assert np.isnan([contact.v1_reference[0], contact.v2_reference[0]]).all()
+
+
 @pytest.mark.parametrize("e", [-0.1, 1.2, np.nan])
 def test_law_that_is_not_driven_by_e_does_not_mind_it(e):
     contact = struck(find("hertz"), impacts(e=e))
