@@ -21,7 +21,7 @@ models = ["hertz", "lankarani-nikravesh-1990"]
 [solver]
 collapse = false
 core = "numpy"
-rtol = 1e-5
+rtol = 1e-8
 [output]
 variables = ["v1_post", "duration", "status"]
 [sweep]

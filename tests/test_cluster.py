@@ -133,14 +133,16 @@ def test_a_worker_of_another_version_is_refused(two: Dask, tmp_path: Path, right
 def test_a_worker_of_another_version_that_joins_later_is_refused(two: Dask, tmp_path: Path, right: str) -> None:
     one = sweep(tmp_path / "sweep", "--scheduler", two.address)
     one.until_kept(1)
+    # nobody else is there to finish before it has begun
+    two.kill("a", "b")
     two.worker("old", ready=False, **other_version(tmp_path / "other"))
-    two.kill("a")
     said = one.ends(2)
     assert re.search(rf"has impact 0\.0\.1, this is {re.escape(impact.__version__)}; wants the same; \d", said), (
         said
     )
     assert "--resume goes on" in said
     two.kill("old")
+    two.worker("c")
     assert resumed(tmp_path / "sweep", "--scheduler", two.address) == right
 
 
