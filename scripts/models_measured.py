@@ -97,6 +97,7 @@ def own_settings(model: ForceModel) -> dict[str, float]:
         # a depth is that of the elastic peak
         own = (0.5 * (n + 1)) ** (1 / (n + 1)) if one.unit == "m" else DAMPING
         free = float(np.clip(max(one.least, 0.0) + own * size, one.least, one.most))
+        free = free if one.typical is None else one.typical
         found[one.name] = free if one.default is None else one.default
     return found
 

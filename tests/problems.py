@@ -136,12 +136,17 @@ def impacts(n: float = 1.5, **changes: object) -> Lanes:
 
 
 def with_parameters(model: ForceModel, lanes: Lanes, value: object) -> Lanes:
-    """The impacts with the law's own parameters, each above its least by a value in the contact's own units."""
+    """The impacts with the law's own parameters, each above its least by a value in the contact's own units.
+
+    Of a parameter with a typical value it is that value times it.
+    """
     ones = np.ones(len(lanes))
     pure = {one.name: max(one.least, 0.0) + value * ones for one in model.parameters if one.unit == "1"}
     # the units of the others may be made of them
     unit = replace(lanes, parameters={**{one.name: ones for one in model.parameters}, **pure})
-    own = {one.name: value / unit.own_units(model, one.name) for one in model.parameters if one.unit != "1"}
+    typical = {one.name: one.typical * value * ones for one in model.parameters if one.typical is not None}
+    others = [one.name for one in model.parameters if one.unit != "1" and one.typical is None]
+    own = typical | {name: value / unit.own_units(model, name) for name in others}
     return replace(lanes, parameters={**pure, **own})
 
 

@@ -8,6 +8,7 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from .api import bless, compare, load, models, plot, recommend, report, rerun, run, save, sweep
+    from .contact.evidence import Evidence
     from .contact.model import ForceModel, Parameter
     from .contact.models.hysteresis import hysteresis
     from .contact.power import power
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from .errors import ImpactError
 
 __all__ = [
+    "Evidence",
     "ForceModel",
     "ImpactError",
     "Parameter",

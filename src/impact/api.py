@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 # a name imported "as itself" is public: `impact.__all__` hands it on
+from .contact.evidence import Evidence as Evidence
 from .contact.model import ForceModel as ForceModel
 from .contact.model import Parameter as Parameter
 from .contact.models import catalogue

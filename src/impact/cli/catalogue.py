@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -68,10 +68,11 @@ def _of_family(family: str | None, models: Sequence[ForceModel]) -> Sequence[For
 def model_json(model: ForceModel) -> dict[str, Any]:
     """A model's declaration as plain data."""
     own = [vars(parameter) for parameter in model.parameters]
-    names = ("key", "title", "year", "family", "equation", "reference", "doi", "evidence", "same_as")
+    names = ("key", "title", "year", "family", "equation", "reference", "doi", "same_as")
     return {
-        **{name: getattr(model, name) for name in names},
-        "domain": {name: list(ends) for name, ends in model.domain.items()}, "parameters": own,
+        **{name: getattr(model, name) for name in names}, "evidence": vars(model.evidence),
+        "domain": {name: list(ends) for name, ends in model.domain.items()},
+        "domain_source": model.domain_source, "parameters": own,
         "exponent": model.exponent, "release": model.release, "delivered_restitution": _delivered(model),
         "integrated_by": _cores(model),
     }  # fmt: skip
@@ -96,7 +97,7 @@ def _print_models(models: Sequence[ForceModel]) -> None:
     out = console(sys.stdout)
     # a narrow terminal has no room for the delivered restitution; `impact models KEY` tells it
     asked = ASKED if out.width >= NARROW else ()
-    rows = table("model", "core", "equation", "claimed for", *(f"e={e:g}" for e in asked))
+    rows = table("model", "core", "equation", "said to hold for", *(f"e={e:g}" for e in asked))
     for column in rows.columns[1:4]:
         column.justify = "left"
     for family, members in groupby(models, lambda model: model.family):
@@ -120,7 +121,16 @@ def _print_models(models: Sequence[ForceModel]) -> None:
     if asked:
         out.print("\nThe columns e=... show the restitution that a model delivers when it is asked for e.")
     out.print('The core is what integrates a law, or a phase of it, where numba is installed (extra "fast").')
-    out.print("A law with [parameters] of its own is driven by them; `impact models KEY` tells all about one.")
+    out.print("A law with [parameters] of its own is driven by them; `impact models KEY` describes one in full.")
+    out.print(f"Evidence for the formulas of these {len(models)} entries: {evidence_counts(models)}.")
+
+
+def evidence_counts(models: Iterable[ForceModel]) -> str:
+    """How many models are in each state of evidence, in one line."""
+    from ..contact.evidence import STATES
+
+    states = [model.evidence.state for model in models]
+    return ", ".join(f"{states.count(state)} {state}" for state in STATES if state in states)
 
 
 def _print_model(model: ForceModel) -> None:
@@ -130,7 +140,7 @@ def _print_model(model: ForceModel) -> None:
     rows = {
         "model": model.key, "same law as": model.same_as, "title": f"{model.title} ({model.year})",
         "family": model.family, "equation": model.equation, "reference": model.reference, "doi": model.doi,
-        "evidence": model.evidence, "claimed for": model.domain_text or "nothing in particular",
+        "evidence": str(model.evidence), "said to hold for": model.domain_text or "not stated",
         "exponent": "the sweep's n" if model.exponent is None else f"n = {model.exponent:g}, its own",
         "ends at": _release(model), "integrated by": _cores(model),
     }  # fmt: skip

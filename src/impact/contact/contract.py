@@ -16,7 +16,8 @@ from .power import Array
 from .status import FIRST_FAILURE, Status
 from .units import dimension
 
-RTOL, MAX_STEPS = 1e-10, 10_000
+# a strongly damped law that pulls until the gap closes takes tens of thousands of steps
+RTOL, MAX_STEPS = 1e-10, 50_000
 # what rounding leaves of an identity, relative to its largest term
 ROUNDING = 1e-12
 
@@ -57,11 +58,11 @@ def sample(model: ForceModel) -> Lanes:
 
 
 def _values(model: ForceModel, parameter: Parameter, lanes: Lanes) -> Array:
-    """Values of a parameter: its default, or from its least upwards, by the size of each contact."""
+    """Values of a parameter: its default, or from its least upwards, by a typical value or each contact's size."""
     if parameter.default is not None:
         return np.full(len(lanes), parameter.default)
     # what one of its units is in the contact's own
-    size = 1.0 / lanes.own_units(model, parameter.name)
+    size = 1.0 / lanes.own_units(model, parameter.name) if parameter.typical is None else parameter.typical
     least = parameter.least if math.isfinite(parameter.least) else min(0.0, parameter.most)
     return np.clip(least + np.linspace(0.0, 4.0, len(lanes)) * size, parameter.least, parameter.most)
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Literal, NotRequired, TypedDict
 
 from ..errors import ModelError, did_you_mean
+from .evidence import Evidence
 from .formula import Formula, wishes
 from .units import dimension
 
@@ -16,6 +17,7 @@ QUANTITIES = {
     "e": "1", "n": "1", "K": "N/m^n", "m": "kg", "v0": "m/s", "R1": "m", "R2": "m", "E1": "Pa", "E2": "Pa",
     "nu1": "1", "nu2": "1", "yield_strength1": "Pa", "yield_strength2": "Pa",
 }  # fmt: skip
+NOT_VERIFIED = Evidence("not verified")
 # what else a domain may bound
 IN_DOMAIN = ("v1", "v2", "m1", "m2", "length")
 IN_FORCE = {"x": "indentation", "v": "indentation rate", "elastic": "K δⁿ"}
@@ -35,7 +37,8 @@ class Parameter:
     """A parameter of a model that the restitution does not set.
 
     `unit` is an SI unit, whose exponents may contain n ("N/m^n") and dimensionless parameters; `least` and `most`
-    are the closed interval of its values; `default` is None where the user has to give it.
+    are the closed interval of its values; `default` is None where the user has to give it; `typical` is a value
+    in that unit for checks and pictures, where the contact's own units are no measure of it.
 
     >>> Parameter("c", "N s/m", "damping constant", default=100.0, least=0.0).unit
     'N s/m'
@@ -47,6 +50,7 @@ class Parameter:
     default: float | None = None
     least: float = float("-inf")
     most: float = float("inf")
+    typical: float | None = None
 
 
 class About(TypedDict):
@@ -57,8 +61,9 @@ class About(TypedDict):
     equation: str
     reference: str
     doi: NotRequired[str]
-    evidence: NotRequired[str]
+    evidence: NotRequired[Evidence]
     domain: NotRequired[Mapping[str, tuple[float, float]]]
+    domain_source: NotRequired[str]
     parameters: NotRequired[tuple[Parameter, ...]]
     exponent: NotRequired[float]
 
@@ -80,8 +85,9 @@ class ForceModel:
     key : kebab-case name, unique in the catalogue
     title, year, reference, doi : where the law comes from
     equation : the law in one line of Unicode
-    evidence : what of the above was seen in a source, and what is from memory
-    domain : closed intervals by the name of an input or derived quantity, where its authors claim it
+    evidence : where the formula and the DOI were read, derived, or that they were not verified
+    domain : closed intervals by the name of an input or derived quantity, where the law is said to hold
+    domain_source : who says so, where it is not the authors themselves
     force : contact force of the whole contact, or of the approach phase where `unloading` is given
     unloading : contact force of the restitution phase
     residual : permanent indentation, from `peak`, `force_at_peak` and the quantities of the contact
@@ -131,8 +137,9 @@ class ForceModel:
     reference: str
     force: Formula
     doi: str = ""
-    evidence: str = ""
+    evidence: Evidence = NOT_VERIFIED
     domain: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    domain_source: str = ""
     unloading: Formula | None = None
     residual: Formula | None = None
     recovered: Formula | None = None
@@ -186,7 +193,9 @@ class ForceModel:
 
     def _check_fields(self) -> None:
         own = isinstance(self.parameters, tuple) and all(isinstance(one, Parameter) for one in self.parameters)
+        known = isinstance(self.evidence, Evidence)
         allowed = {
+            "evidence": (known, 'an impact.Evidence, such as Evidence("derived", "our report, equation (3)")'),
             "release": (self.release in ("gap", "force"), '"gap" or "force"'),
             "momentum": (self.momentum in COORDINATES, '"v", "log" or "force"'),
             "smooth": (self.smooth in (2, 4, 6, 8), "2, 4, 6 or 8"),
@@ -244,10 +253,11 @@ class ForceModel:
 
     @property
     def domain_text(self) -> str:
-        """The claimed domain in words.
+        """The domain in words, and who says so.
 
         >>> from impact.contact.models import catalogue
         >>> catalogue()["lankarani-nikravesh-1990"].domain_text
-        '0.9 ≤ e ≤ 1'
+        '0.9 ≤ e ≤ 1 (Gharib and Hurmuzlu 2012)'
         """
-        return ", ".join(f"{low:g} ≤ {name} ≤ {high:g}" for name, (low, high) in self.domain.items())
+        text = ", ".join(f"{low:g} ≤ {name} ≤ {high:g}" for name, (low, high) in self.domain.items())
+        return f"{text} ({self.domain_source})" if text and self.domain_source else text

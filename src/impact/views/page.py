@@ -218,8 +218,8 @@ def _models(dataset: xr.Dataset) -> Iterator[Markup]:
         known = catalogue().get(key)
         # a plug-in, or another version of the program, may mean another law by this name
         if known is not None and known.equation == equation:
-            about += [tag("p", f"Claimed for {known.domain_text}.")] if known.domain_text else []
-            about += [tag("p", f"Evidence: {known.evidence}", class_="soft")] if known.evidence else []
+            about += [tag("p", f"Said to hold for {known.domain_text}.")] if known.domain_text else []
+            about += [tag("p", f"Evidence: {known.evidence}.", class_="soft")]
         yield tag("article", tag("h3", f"{title} ({year}) ", tag("span", key, class_="soft")), *about)
 
 

@@ -1,4 +1,4 @@
-"""The catalogue: every `ForceModel` found in the modules of this package."""
+"""The catalogue: every `ForceModel` in the modules of this package, by name or in their tuples MODELS."""
 
 from __future__ import annotations
 
@@ -21,15 +21,16 @@ FAMILIES = (
     "asymmetric",
     "permanent",
     "elastic-plastic",
+    "adhesive",
     "codes",
-    "granular",
 )
 
 
 @cache
 def _built_in() -> tuple[ForceModel, ...]:
     modules = [import_module(f"{__name__}.{module.name}") for module in iter_modules(__path__)]
-    found = {id(v): v for module in modules for v in vars(module).values() if isinstance(v, ForceModel)}
+    values = [v for m in modules for v in (*vars(m).values(), *getattr(m, "MODELS", ()))]
+    found = {id(v): v for v in values if isinstance(v, ForceModel)}
     rank = {family: place for place, family in enumerate(FAMILIES)}
     return tuple(sorted(found.values(), key=lambda m: (rank.get(m.family, len(rank)), m.year, m.key)))
 

@@ -4,24 +4,26 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from ..evidence import Evidence
 from ..model import ForceModel
 from .dashpot import KELVIN_VOIGT
 from .hysteresis import EXACT_HYSTERESIS, FLORES_2011, HUNT_CROSSLEY_1975, LANKARANI_NIKRAVESH_1990
+from .sources import OPENSEES_HERTZDAMP, RIGID_BODY_DYNAMICS
 
 
 def same_law(
-    law: ForceModel, key: str, *, title: str, year: int, reference: str, doi: str = "", evidence: str = ""
+    law: ForceModel, key: str, *, title: str, year: int, reference: str, evidence: Evidence, doi: str = ""
 ) -> ForceModel:
     """A law under another name.
 
     Parameters
     ----------
     law : of the catalogue
-    key, title, year, reference, doi, evidence : of the other publication; its authors' domain is not known
+    key, title, year, reference, evidence, doi : of the other publication; its domain is not known
     """
     return replace(
         law, key=key, title=title, year=year, reference=reference, doi=doi, evidence=evidence, domain={},
-        same_as=law.key,
+        domain_source="", same_as=law.key,
     )  # fmt: skip
 
 
@@ -33,7 +35,11 @@ MARHEFKA_ORIN_1999 = same_law(
     reference="Marhefka DW, Orin DE (1999) A compliant contact model with nonlinear damping for simulation of "
     "robotic systems. IEEE Trans. Syst. Man Cybern. A 29, 566",
     doi="10.1109/3468.798060",
-    evidence="formula and DOI from memory; the paper also derives the exact relation",
+    evidence=Evidence(
+        "seen",
+        RIGID_BODY_DYNAMICS,
+        doi="superAngGao/robot_simulator, docs/restitution_impedance_research_2026-04-07.md @cc6a33f (2026)",
+    ),
 )
 
 MUTHUKUMAR_DESROCHES_2006 = same_law(
@@ -44,7 +50,12 @@ MUTHUKUMAR_DESROCHES_2006 = same_law(
     reference="Muthukumar S, DesRoches R (2006) A Hertz contact model with non-linear damping for pounding "
     "simulation. EESD 35, 811",
     doi="10.1002/eqe.557",
-    evidence="formula and reference seen in the source of OpenSees; DOI from memory",
+    evidence=Evidence(
+        "not verified",
+        doi=OPENSEES_HERTZDAMP,
+        note="that it had a formula for e which Ye, Li and Zhu (2009) call incorrect was seen; the material of "
+        "OpenSees takes χ itself",
+    ),
 )
 
 YE_2009_HERTZ = same_law(
@@ -55,7 +66,7 @@ YE_2009_HERTZ = same_law(
     reference="Ye K, Li L, Zhu H (2009) A note on the Hertz contact model with nonlinear damping for pounding "
     "simulation. EESD 38, 1135",
     doi="10.1002/eqe.883",
-    evidence="formula and DOI seen, in the source of OpenSees; two years before flores-2011",
+    evidence=Evidence("seen", OPENSEES_HERTZDAMP, doi="the first page of the paper"),
 )
 
 KHATIWADA_2014 = same_law(
@@ -65,8 +76,7 @@ KHATIWADA_2014 = same_law(
     year=2014,
     reference="Khatiwada S, Chouw N, Butterworth JW (2014) A generic structural pounding model using numerically "
     "exact displacement proportional damping. Eng. Struct. 62-63, 33",
-    doi="10.1016/j.engstruct.2013.12.016",
-    evidence="formula and DOI from memory",
+    evidence=Evidence("not verified", note="neither the paper nor its formula was seen anywhere"),
 )
 
 JACOBS_WALDRON_2015 = same_law(
@@ -77,7 +87,11 @@ JACOBS_WALDRON_2015 = same_law(
     reference="Jacobs DA, Waldron KJ (2015) Modeling inelastic collisions with the Hunt-Crossley model using the "
     "energetic coefficient of restitution. J. Comput. Nonlinear Dyn. 10, 021001",
     doi="10.1115/1.4028473",
-    evidence="the exact relation and DOI from memory; the approximation that the paper prints is not reproduced",
+    evidence=Evidence(
+        "not verified",
+        doi="the publisher's page",
+        note="by its abstract the paper prints an approximation, which this exact relation is not",
+    ),
 )
 
 SCHAFER_1996 = same_law(
@@ -88,5 +102,7 @@ SCHAFER_1996 = same_law(
     reference="Schäfer J, Dippel S, Wolf DE (1996) Force schemes in simulations of granular materials. J. Phys. "
     "I 6, 5",
     doi="10.1051/jp1:1996129",
-    evidence="formula and DOI from memory",
+    evidence=Evidence(
+        "not verified", doi="the publisher's page", note="the formula is that of every linear spring and dashpot"
+    ),
 )

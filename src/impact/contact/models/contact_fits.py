@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..evidence import Evidence
 from ..forms import returning
 from ..model import ForceModel, Parameter
 from ..oracles import muthukumar_restitution
 from ..power import Array, power
 from .elastoplastic import CONTACT
+from .sources import IMPACT_MATERIAL
 
 
 def softer(nu1: Array, nu2: Array, Y1: Array, Y2: Array) -> Array:
@@ -23,10 +25,16 @@ JACKSON_GREEN_2010 = ForceModel(
     equation="F = F_c w^(3/2) to w = 1.9, then F_c[exp(−w^(5/12)/4) w^(3/2) + (4H/(C Y))(1 − exp(−w^(5/9)/25)) "
     "w];  back F = Fₘ((δ − δₚ)/(δₘ − δₚ))^(3/2),  δₚ = 1.02 δₘ(1 − ((wₘ + 5.9)/6.9)^−0.54);  w = δ/δ_c",
     reference="Jackson RL, Green I (2005) A finite element study of elasto-plastic hemispherical contact against "
-    "a rigid flat. J. Tribol. 127, 343; Jackson RL, Green I, Marghitu DB (2010) Nonlinear Dyn. 60, 217",
-    doi="10.1007/s11071-009-9591-z",
-    evidence="formula and DOI from memory; no loss below w = 1.9, where the fit of e in the paper has one from "
-    "w = 1 on: this is up to 0.04 above that fit there, and within 0.009 of it beyond",
+    "a rigid "
+    "flat. J. Tribol. 127, 343, the loading; Jackson RL, Chusoipin I, Green I (2005), the residual; Jackson RL, "
+    "Green I, Marghitu DB (2010) Nonlinear Dyn. 60, 217",
+    evidence=Evidence(
+        "seen",
+        "tmd-lab/microslip-rough-contact, SPHERE_PLASTIC_PRE2.m and test_plastic_contact_unload.m @21706045 "
+        "(2022)",
+        note="no loss below w = 1.9, where the fit of e in the paper has one from w = 1 on: this is up to 0.04 "
+        "above that fit there, and within 0.009 of it beyond",
+    ),
     coefficients={
         **CONTACT,
         "nu": lambda nu1, nu2, yield_strength1, yield_strength2: softer(
@@ -70,10 +78,14 @@ KOGUT_ETSION_2005 = ForceModel(
     reference="Kogut L, Etsion I (2002) Elastic-plastic contact analysis of a sphere and a rigid flat. J. Appl. "
     "Mech. 69, 657; Etsion I, Kligerman Y, Kadin Y (2005) Unloading of an elastic-plastic loaded spherical "
     "contact. Int. J. Solids Struct. 42, 3716",
-    doi="10.1016/j.ijsolstr.2004.12.006",
-    evidence="formula and DOI from memory; printed is a second branch from w = 1, where it lies 3 % above the "
-    "first, and more energy would come back than went in: here it begins where the two meet; the fits end at w = "
-    "110, and are continued",
+    evidence=Evidence(
+        "not verified",
+        "the loading was seen in TaoYang1999/SCHC-framework, asperity_f_cal.m @98b786e (2024), which goes on with "
+        "2π R w H beyond w = 110",
+        note="the unloading was not seen, public code has another one under the names of Etsion, Kligerman and "
+        "Kadin; printed is a second branch from w = 1, where it lies 3 % above the first, and more energy would "
+        "come back than went in: here it begins where the two meet; the fits are continued beyond w = 110",
+    ),
     coefficients={
         **CONTACT,
         "nu": lambda nu1, nu2, yield_strength1, yield_strength2: softer(
@@ -118,7 +130,10 @@ MUTHUKUMAR_2003 = ForceModel(
     "K₂ = K d^(n−1) − (10/9) D,  D = K d^(n−1)(1 − e²)/(n + 1)",
     reference="Muthukumar S (2003) A contact element approach with hysteresis damping for the analysis and design "
     "of pounding in bridges. PhD thesis, Georgia Institute of Technology",
-    evidence="formula from memory, as the ImpactMaterial of OpenSees has it; no DOI known",
+    evidence=Evidence(
+        "seen",
+        f"{IMPACT_MATERIAL}, and OpenSees/OpenSees, SRC/material/uniaxial/ImpactMaterial.cpp @2890cb36f (2026)",
+    ),
     parameters=(Parameter("d", "m", "indentation that the law is designed for", least=1e-9),),
     coefficients={
         "loss": lambda e, n: (1 - e * e) / (n + 1),

@@ -10,13 +10,13 @@ from typing import Literal, Unpack
 
 import numpy as np
 
+from ..evidence import Evidence
 from ..forms import dragged
 from ..formula import Formula
 from ..model import About, ForceModel, Parameter
 from ..oracles import force_damping, force_restitution, gap_damping, gap_restitution
 from ..power import Array, power
-
-MEMORY = "formula and DOI from memory"
+from .sources import LIGGGHTS, YADE_2025
 
 
 def dashpot(key: str, *, zeta: Formula, release: Literal["gap", "force"], **about: Unpack[About]) -> ForceModel:
@@ -61,6 +61,9 @@ CONSTANT = (Parameter("C", "N s/m", "damping constant of the dashpot", least=0.0
 THORNTON = (
     -6.918798, -16.41105, 146.8049, -796.4559, 2928.711, -7206.864, 11494.29, -11342.18, 6276.757, -1489.915,
 )  # fmt: skip
+THORNTON_EQUATION = (
+    "F = K δ^(3/2) + 2 β √(m S) δ̇,  S = (3/2) K δ^(1/2),  β = √(1/(1 − (1 + e)² exp(e p(e))) − 1), to F = 0"
+)
 GOLDSMITH = (
     "Goldsmith W (1960) Impact. Arnold, London; "
     "Cundall PA, Strack ODL (1979) A discrete numerical model for granular assemblies. Géotechnique 29, 47"
@@ -73,7 +76,11 @@ KELVIN_VOIGT = dashpot(
     equation="F = K δ + C δ̇, to δ = 0",
     reference=GOLDSMITH,
     doi="10.1680/geot.1979.29.1.47",
-    evidence="formula known from textbooks; DOI seen in a page that cites it",
+    evidence=Evidence(
+        "seen",
+        "OpenSees/OpenSees, SRC/material/uniaxial/ViscoelasticGap.cpp @2890cb36f (2026), after Goldsmith (1960)",
+        doi="rlrangel/DEMLab, src/interactions/force @23e741d (2024)",
+    ),
     parameters=CONSTANT,
     zeta=lambda C, m, K: C / (2 * np.sqrt(m * K)),
     release="gap",
@@ -87,7 +94,11 @@ KELVIN_VOIGT_NO_TENSION = dashpot(
     equation="F = K δ + C δ̇, to F = 0",
     reference=GOLDSMITH,
     doi="10.1680/geot.1979.29.1.47",
-    evidence="formula known from textbooks; DOI seen in a page that cites it",
+    evidence=Evidence(
+        "seen",
+        "the MapleSim help, Multibody Contact Modes (2026)",
+        doi="rlrangel/DEMLab, src/interactions/force @23e741d (2024)",
+    ),
     parameters=CONSTANT,
     zeta=lambda C, m, K: C / (2 * np.sqrt(m * K)),
     release="force",
@@ -103,8 +114,12 @@ ANAGNOSTOPOULOS_1988 = dashpot(
     equation=f"{LINEAR},  {BY_LOGARITHM}, to δ = 0",
     reference=POUNDING,
     doi="10.1002/eqe.4290160311",
-    evidence=MEMORY,
-    domain={"e": (0.0, 1.0)},
+    evidence=Evidence(
+        "seen",
+        f"{LIGGGHTS}normal_model_hooke.h",
+        doi="koreascience.or.kr, JAKO201832853252619, references",
+        note="no source of the formula names the paper",
+    ),
     zeta=lambda e: gap_damping(e),
     release="gap",
     exponent=1.0,
@@ -117,15 +132,23 @@ ANAGNOSTOPOULOS_1988_NO_TENSION = dashpot(
     equation=f"{LINEAR},  {BY_LOGARITHM}, to F = 0",
     reference=POUNDING,
     doi="10.1002/eqe.4290160311",
-    evidence="formula and DOI from memory; the end at zero force is that of codes that use the formula",
+    evidence=Evidence(
+        "seen",
+        "projectchrono/chrono, src/chrono/physics/ChContactSMC.cpp @7689fbc02d (2026)",
+        doi="koreascience.or.kr, JAKO201832853252619, references",
+        note="the end at zero force is that of codes",
+    ),
     zeta=lambda e: gap_damping(e),
     release="force",
     exponent=1.0,
 )
 
 TTI = (
-    "Tsuji Y, Tanaka T, Ishida T (1992) Lagrangian numerical simulation of plug flow of cohesionless particles. "
-    "Powder Technol. 71, 239; Antypov D, Elliott JA (2011) EPL 94, 50004"
+    "Tsuji Y, Tanaka T, Ishida T (1992) Lagrangian numerical simulation of plug flow of cohesionless particles in "
+    "a "
+    "horizontal pipe. Powder Technol. 71, 239; Antypov D, Elliott JA (2011) On an analytical solution for the "
+    "damped "
+    "Hertzian spring. EPL 94, 50004"
 )
 
 TSUJI_1992 = dashpot(
@@ -135,8 +158,12 @@ TSUJI_1992 = dashpot(
     equation=f"{HERTZIAN},  α = −√5 ln e/√(π² + ln² e), to δ = 0",
     reference=TTI,
     doi="10.1016/0032-5910(92)88030-L",
-    evidence="DOI seen; α in closed form is that of Antypov and Elliott (10.1209/0295-5075/94/50004), from memory",
-    domain={"e": (0.0, 1.0)},
+    evidence=Evidence(
+        "seen",
+        f"{LIGGGHTS}normal_model_hertz.h; equations (10) and (17) of Antypov and Elliott (2011) in "
+        "Azeko2xo/woodem, pkg/dem/Hertz.cpp @f94485c (2015)",
+        doi="rlrangel/DEMLab, ContactForceN_ViscoElasticNonlinear.m @23e741d (2024)",
+    ),
     zeta=lambda e: gap_damping(e),
     release="gap",
     exponent=1.5,
@@ -149,7 +176,13 @@ TSUJI_1992_NO_TENSION = dashpot(
     equation=f"{HERTZIAN},  α = −√5 ln e/√(π² + ln² e), to F = 0",
     reference=TTI,
     doi="10.1016/0032-5910(92)88030-L",
-    evidence="as tsuji-1992; the end at zero force is that of codes that use the formula",
+    evidence=Evidence(
+        "seen",
+        "Azeko2xo/woodem, pkg/dem/Hertz.cpp @f94485c (2015), noAttraction; projectchrono/chrono, ChContactSMC.cpp "
+        "@7689fbc02d (2026)",
+        doi="rlrangel/DEMLab, ContactForceN_ViscoElasticNonlinear.m @23e741d (2024)",
+        note="the end at zero force is that of codes",
+    ),
     zeta=lambda e: gap_damping(e),
     release="force",
     exponent=1.5,
@@ -163,8 +196,11 @@ SCHWAGER_POSCHEL_2007 = dashpot(
     reference="Schwager T, Pöschel T (2007) Coefficient of restitution and linear-dashpot model revisited. "
     "Granul. Matter 9, 465",
     doi="10.1007/s10035-007-0065-z",
-    evidence="formula derived here; DOI from memory",
-    domain={"e": (0.0, 1.0)},
+    evidence=Evidence(
+        "seen",
+        f"{YADE_2025}, ViscoelasticPM.cpp, after equation (21) of the paper, whose sign it corrects",
+        doi="YADE, doc/references.bib @f1486c0 (2025)",
+    ),
     zeta=lambda e: force_damping(e),
     release="force",
     exponent=1.0,
@@ -174,26 +210,28 @@ THORNTON_CUMMINS_CLEARY_2013 = dashpot(
     "thornton-cummins-cleary-2013",
     title="Thornton, Cummins and Cleary",
     year=2013,
-    equation="F = K δ^(3/2) + 2 β √(m S) δ̇,  S = (3/2) K δ^(1/2),  β = √(1/(1 − (1 + e)² exp(e p(e))) − 1), to "
-    "F = 0",
+    equation=THORNTON_EQUATION,
     reference="Thornton C, Cummins SJ, Cleary PW (2013) An investigation of the comparative behaviour of "
     "alternative contact force models during inelastic collisions. Powder Technol. 233, 30",
     doi="10.1016/j.powtec.2012.08.012",
-    evidence="formula, with the ten coefficients of the polynomial p, and DOI from memory",
-    domain={"e": (0.0, 1.0)},
-    # 2 β √(3/2) is α
-    zeta=lambda e: 2 * np.sqrt(1.5) * thornton_beta(e) / np.sqrt(5.0),
+    evidence=Evidence(
+        "seen",
+        f"{YADE_2025}, HertzMindlin.cpp, after (B6), (B7) and Table 2 of the paper",
+        doi="YADE, doc/references.bib @f1486c0 (2025)",
+    ),
+    zeta=lambda e: thornton_zeta(e),
     release="force",
     exponent=1.5,
 )
 
 
-def thornton_beta(e: Array) -> Array:
-    """β of Thornton, Cummins and Cleary."""
+def thornton_zeta(e: Array) -> Array:
+    """ζ of Thornton, Cummins and Cleary: their β is √(5/6) times it, since 2 β √(3/2) is α."""
     exponent = np.zeros_like(e)
     for h in reversed(THORNTON):
         exponent = e * (h + exponent)
-    return np.asarray(np.sqrt(1 / (1 - (1 + e) * (1 + e) * np.exp(exponent)) - 1))
+    beta = np.sqrt(1 / (1 - (1 + e) * (1 + e) * np.exp(exponent)) - 1)
+    return np.asarray(2 * np.sqrt(1.5) * beta / np.sqrt(5.0))
 
 
 FENG_2026 = dashpot(
@@ -203,8 +241,7 @@ FENG_2026 = dashpot(
     equation=f"{GENERAL},  α = −√(2(n + 1)) ln e/√(π² + ln² e), to δ = 0",
     reference="Feng YT (2026) Exact phase-space analytical solution for the power-law damped contact oscillator. "
     "arXiv:2603.27764",
-    evidence="formula seen in the preprint",
-    domain={"e": (0.0, 1.0)},
+    evidence=Evidence("seen", "arXiv:2603.27764"),
     zeta=lambda e: gap_damping(e),
     release="gap",
 )
@@ -215,8 +252,7 @@ EXACT_DASHPOT_NO_TENSION = dashpot(
     year=2026,
     equation=f"{GENERAL},  α = ζ √(2(n + 1)),  e = exp(−2 ζ acos(ζ)/√(1 − ζ²)), to F = 0",
     reference="Schwager T, Pöschel T (2007) Granul. Matter 9, 465, for n = 1; Feng YT (2026) arXiv:2603.27764",
-    evidence="formula derived here",
-    domain={"e": (0.0, 1.0)},
+    evidence=Evidence("derived", "src/impact/contact/oracles/dashpot.py"),
     zeta=lambda e: force_damping(e),
     release="force",
 )

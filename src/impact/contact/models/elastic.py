@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from ..evidence import Evidence
 from ..forms import spring
 from ..model import ForceModel
+from .sources import GHARIB_HURMUZLU
 
 HERTZ = ForceModel(
     key="hertz",
@@ -11,8 +13,13 @@ HERTZ = ForceModel(
     year=1882,
     equation="F = K δⁿ  (10)",
     reference="Hertz H (1882) Über die Berührung fester elastischer Körper. J. reine angew. Math. 92, 156",
+    domain_source="no loss",
     doi="10.1515/crll.1882.92.156",
-    evidence="formula as printed in Gharib and Hurmuzlu (2012); DOI from memory",
+    evidence=Evidence(
+        "seen",
+        f"{GHARIB_HURMUZLU}, equation (10)",
+        doi="rlrangel/DEMLab, ContactForceN_ViscoElasticNonlinear.m @23e741d (2024)",
+    ),
     force=spring,
     domain={"e": (1.0, 1.0)},
     oracle=lambda: 1.0,

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..evidence import Evidence
 from ..forms import returning, spring
 from ..formula import Formula
 from ..model import ForceModel, Parameter
@@ -36,7 +37,12 @@ WALTON_BRAUN_VARIABLE = ForceModel(
     reference="Walton OR, Braun RL (1986) Viscosity, granular-temperature, and stress calculations for shearing "
     "assemblies of inelastic, frictional disks. J. Rheol. 30, 949",
     doi="10.1122/1.549893",
-    evidence="formula and DOI from memory",
+    evidence=Evidence(
+        "seen",
+        "rlrangel/DEMLab, ContactForceN_ElastoPlasticLinear.m @23e741d (2024)",
+        doi="the same file",
+        note="that code keeps the residual of e, so that its force may jump at the peak",
+    ),
     parameters=(Parameter("S", "1/m", "growth of the unloading stiffness with the force", least=0.0),),
     force=spring,
     unloading=returning,
@@ -55,7 +61,12 @@ LUDING_2008 = ForceModel(
     "δ₀ = (1 − K/k)δₘ,  δ* = k₂/(k₂ − K) φ 2R*",
     reference="Luding S (2008) Cohesive, frictional powders: contact models for tension. Granul. Matter 10, 235",
     doi="10.1007/s10035-008-0099-x",
-    evidence="formula and DOI from memory; without the dashpot that may stand beside it",
+    evidence=Evidence(
+        "seen",
+        "CFDEMproject/LIGGGHTS-PUBLIC @3d5c00f2 (3.8.0, 2024), src/normal_model_hooke_hysteresis.h",
+        doi="YADE, doc/references.bib @f1486c0 (2025)",
+        note="without the dashpot that may stand beside it",
+    ),
     parameters=(
         Parameter("k2", "1", "largest unloading stiffness k₂ over K", least=1.0),
         Parameter("kc", "1", "adhesive stiffness k_c over K", default=0.0, least=0.0),
@@ -96,8 +107,11 @@ THORNTON_1997 = ForceModel(
     "δ_y = (π p_y/(2E*))² R*,  Rₚ = (4E*/(3Fₘ))((2Fₘ + F_y)/(2π p_y))^(3/2)",
     reference="Thornton C (1997) Coefficient of restitution for collinear collisions of elastic-perfectly plastic "
     "spheres. J. Appl. Mech. 64, 383; Thornton C, Ning Z (1998) Powder Technol. 99, 154",
-    doi="10.1115/1.2787319",
-    evidence="reference seen, formula and DOI from memory; p_y over the yield strength is a usual value",
+    evidence=Evidence(
+        "seen",
+        "a public digest (2026) of Thornton and Ning (1998), equations (2) to (46)",
+        note="p_y over the yield strength is a usual value",
+    ),
     parameters=(Parameter("c", "1", "contact yield pressure over the yield strength", 1.6, 0.1, 10.0),),
     coefficients={
         **CONTACT,
@@ -131,8 +145,11 @@ JOHNSON_1985 = ForceModel(
     equation="F = 2π R* p_d δ;  back F = Fₘ((δ − δₚ)/(δₘ − δₚ))^(3/2),  δₘ − δₚ = 3Fₘ/(4 a E*),  a² = 2R*δₘ;  "
     "F = K δ^(3/2) where v₀ ≤ V_y,  (1/2) m V_y² = (2/5) K δ_y^(5/2),  δ_y = (1.6π Y/(2E*))² R*",
     reference="Johnson KL (1985) Contact mechanics, chapter 11. Cambridge University Press",
-    evidence="formulas from memory; V_y is that of a largest pressure 1.6 Y, (1/2) m V_y² ≈ 53 R*³ Y⁵/E*⁴; "
-    "p_d over the yield strength is a usual value; no DOI known",
+    evidence=Evidence(
+        "not verified",
+        note="a public digest of Thornton and Ning (1998) gives the prefactor 1.72 of its e(V), ours is 1.7176; "
+        "V_y is that of a largest pressure 1.6 Y; p_d over the yield strength is a usual value",
+    ),
     parameters=(Parameter("c", "1", "dynamic yield pressure over the yield strength", 3.0, 0.1, 30.0),),
     coefficients={
         **CONTACT,

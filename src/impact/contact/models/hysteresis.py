@@ -6,14 +6,13 @@ from typing import Unpack
 
 import numpy as np
 
+from ..evidence import Evidence
 from ..forms import damped
 from ..formula import Formula
 from ..model import About, ForceModel
 from ..oracles import delivered_restitution, exact_damping_ratio
 from ..power import power
-
-MEMORY = "formula as printed in Gharib and Hurmuzlu (2012); DOI from memory"
-RECALLED = "formula and DOI from memory"
+from .sources import DYS, GHARIB_HURMUZLU, MBDYN, MBDYN_BIBLIOGRAPHY, OPENSEES_HERTZDAMP, RAILWAY
 
 
 def hysteresis(key: str, *, chi: Formula, **about: Unpack[About]) -> ForceModel:
@@ -46,8 +45,10 @@ HUNT_CROSSLEY_1975 = hysteresis(
     equation="F = K δⁿ (1 + χ δ̇/v₀),  χ = 3(1 − e)/2  (19)",
     reference="Hunt KH, Crossley FRE (1975) Coefficient of restitution interpreted as damping in vibroimpact. "
     "J. Appl. Mech. 42, 440",
+    domain_source="Zhang and Sharf, quoted by Gharib and Hurmuzlu 2012",
+    domain={"e": (0.95, 1.0)},
     doi="10.1115/1.3423596",
-    evidence=MEMORY,
+    evidence=Evidence("seen", f"{GHARIB_HURMUZLU}, equation (19)", doi=MBDYN_BIBLIOGRAPHY),
     chi=lambda e: 1.5 * (1 - e),
 )
 
@@ -58,8 +59,7 @@ HERBERT_MCWHANNELL_1977 = hysteresis(
     equation="F = K δⁿ (1 + χ δ̇/v₀),  χ = 6(1 − e)/((2e − 1)² + 3)  (20)",
     reference="Herbert RG, McWhannell DC (1977) Shape and frequency composition of pulses from an impact pair. "
     "J. Eng. Ind. 99, 513",
-    doi="10.1115/1.3439270",
-    evidence=MEMORY,
+    evidence=Evidence("seen", f"{GHARIB_HURMUZLU}, equation (20); {DYS}", note="the paper's title was not seen"),
     chi=lambda e: 6 * (1 - e) / ((2 * e - 1) * (2 * e - 1) + 3),
 )
 
@@ -68,10 +68,10 @@ LEE_WANG_1983 = hysteresis(
     title="Lee and Wang",
     year=1983,
     equation="F = K δⁿ (1 + χ δ̇/v₀),  χ = 3(1 − e)/4  (21)",
-    reference="Lee TW, Wang AC (1983) On the dynamics of intermittent-motion mechanisms, part 1. "
+    reference="Lee TW, Wang AC (1983) On the dynamics of intermittent-motion mechanisms, part 1: Dynamic model "
+    "and response. "
     "J. Mech. Transm. Autom. Des. 105, 534",
-    doi="10.1115/1.3267392",
-    evidence=MEMORY,
+    evidence=Evidence("seen", f"{GHARIB_HURMUZLU}, equation (21)"),
     chi=lambda e: 0.75 * (1 - e),
 )
 
@@ -82,8 +82,9 @@ LANKARANI_NIKRAVESH_1990 = hysteresis(
     equation="F = K δⁿ (1 + χ δ̇/v₀),  χ = 3(1 − e²)/4  (22)",
     reference="Lankarani HM, Nikravesh PE (1990) A contact force model with hysteresis damping for impact "
     "analysis of multibody systems. J. Mech. Des. 112, 369",
+    domain_source="Gharib and Hurmuzlu 2012",
     doi="10.1115/1.2912617",
-    evidence=MEMORY,
+    evidence=Evidence("seen", f"{GHARIB_HURMUZLU}, equation (22)", doi=OPENSEES_HERTZDAMP),
     domain={"e": (0.9, 1.0)},
     chi=lambda e: 0.75 * (1 - e * e),
 )
@@ -91,14 +92,17 @@ LANKARANI_NIKRAVESH_1990 = hysteresis(
 EXACT_HYSTERESIS = hysteresis(
     "exact-hysteresis",
     title="Exact hysteresis",
-    year=2004,
+    year=2002,
     equation="F = K δⁿ (1 + χ δ̇/v₀),  χ(1 + e) = ln[(1 + χ)/(1 − e χ)]  (23)",
-    reference="Zhang Y, Sharf I (2004) Compliant force modelling for impact analysis. ASME DETC2004-57220; "
-    "Gonthier Y, McPhee J, Lange C, Piedboeuf JC (2004) Multibody Syst. Dyn. 11, 209",
-    doi="10.1023/B:MUBO.0000029392.21648.bc",
-    evidence="formula derived here; equation (23) as printed in Gharib and Hurmuzlu (2012) lacks a factor v₀; "
-    "references and DOI from memory",
-    domain={"e": (0.0, 1.0)},
+    reference="Gonthier Y, McPhee J, Lange C, Piedboeuf JC (2002) CSME Forum, Queen's University; Gonthier and "
+    "others (2004) "
+    "Multibody Syst. Dyn. 11, 209",
+    evidence=Evidence(
+        "derived",
+        "the first integral of the motion, docs/paper.md",
+        note="equation (23) as printed in Gharib and Hurmuzlu (2012), who give it to their reference 14, lacks a "
+        "factor v₀; Zhang and Sharf (2004) were not seen",
+    ),
     chi=lambda e: exact_damping_ratio(e),
 )
 
@@ -110,8 +114,7 @@ GONTHIER_2004 = hysteresis(
     reference="Gonthier Y, McPhee J, Lange C, Piedboeuf JC (2004) A regularized contact model with asymmetric "
     "damping and dwell-time dependent friction. Multibody Syst. Dyn. 11, 209",
     doi="10.1023/B:MUBO.0000029392.21648.bc",
-    evidence=RECALLED,
-    domain={"e": (0.0, 1.0)},
+    evidence=Evidence("seen", DYS, doi="a bibliography checked at Crossref in October 2026"),
     chi=lambda e: np.divide(1 - e * e, e),
 )
 
@@ -122,7 +125,7 @@ ZHIYING_QISHAO_2006 = hysteresis(
     equation="F = K δⁿ (1 + χ δ̇/v₀),  χ = (3/4)(1 − e²) exp(2(1 − e))",
     reference="Qin Z, Lu Q (2006) Analysis of impact process model based on restitution coefficient. J. Dyn. "
     "Control 4, 294",
-    evidence="formula from memory; no DOI known",
+    evidence=Evidence("seen", DYS),
     chi=lambda e: 0.75 * (1 - e * e) * np.exp(2 * (1 - e)),
 )
 
@@ -133,9 +136,7 @@ YE_2009_KELVIN = hysteresis(
     equation="F = K δ (1 + χ δ̇/v₀),  χ = 3(1 − e)/(2e)",
     reference="Ye K, Li L, Zhu H (2009) A modified Kelvin impact model for pounding simulation of base-isolated "
     "building with adjacent structures. Earthq. Eng. Eng. Vib. 8, 433",
-    doi="10.1007/s11803-009-8045-4",
-    evidence=RECALLED,
-    domain={"e": (0.0, 1.0)},
+    evidence=Evidence("seen", RAILWAY, note="the abstract of the paper was seen, without the formula"),
     exponent=1.0,
     chi=lambda e: np.divide(1.5 * (1 - e), e),
 )
@@ -148,8 +149,9 @@ FLORES_2011 = hysteresis(
     reference="Flores P, Machado M, Silva MT, Martins JM (2011) On the continuous contact force models for soft "
     "materials in multibody dynamics. Multibody Syst. Dyn. 25, 357",
     doi="10.1007/s11044-010-9237-4",
-    evidence=RECALLED,
-    domain={"e": (0.0, 1.0)},
+    evidence=Evidence(
+        "seen", f"{DYS}; {MBDYN}", doi="ModiaSim/Modia3D.jl, docs/src/internal/ContactForceLaw.md @a418027"
+    ),
     chi=lambda e: np.divide(8 * (1 - e), 5 * e),
 )
 
@@ -160,8 +162,9 @@ GHARIB_HURMUZLU_2012 = hysteresis(
     equation="F = K δⁿ (1 + χ δ̇/v₀),  χ = 1/e  (28)",
     reference="Gharib M, Hurmuzlu Y (2012) A new contact force model for low coefficient of restitution impact. "
     "J. Appl. Mech. 79, 064506",
+    domain_source="Gharib and Hurmuzlu 2012",
     doi="10.1115/1.4006494",
-    evidence="formula and DOI seen in the paper",
+    evidence=Evidence("seen", f"{GHARIB_HURMUZLU}, equation (28)", doi=GHARIB_HURMUZLU),
     domain={"e": (0.0, 0.3)},
     chi=lambda e: np.divide(1.0, e),
 )
@@ -174,8 +177,13 @@ HU_GUO_2015 = hysteresis(
     reference="Hu S, Guo X (2015) A dissipative contact force model for impact analysis in multibody dynamics. "
     "Multibody Syst. Dyn. 35, 131",
     doi="10.1007/s11044-015-9453-z",
-    evidence="DOI seen; formula from memory: one public code has 3(1 − e)/(4e), whose slope at e = 1 is wrong",
-    domain={"e": (0.0, 1.0)},
+    evidence=Evidence(
+        "disputed",
+        "3(1 − e)/(2e) here and in a wheel-rail code (Multi_Con_250812, 2025), with the right slope at e = 1; "
+        f"3(1 − e)/(4e) in {DYS}",
+        doi="the address of a page of the publisher's text",
+        note="the formula of the paper was not seen",
+    ),
     chi=lambda e: np.divide(1.5 * (1 - e), e),
 )
 
@@ -187,8 +195,11 @@ CARVALHO_MARTINS_2019 = hysteresis(
     reference="Carvalho AS, Martins JM (2019) Exact restitution and generalizations for the Hunt-Crossley contact "
     "model. Mech. Mach. Theory 139, 174",
     doi="10.1016/j.mechmachtheory.2019.03.028",
-    evidence=RECALLED,
-    domain={"e": (0.0, 1.0)},
+    evidence=Evidence(
+        "not verified",
+        doi="two public bibliographies (2026)",
+        note="the formula agrees with the exact law to 5e-4 above e = 0.45",
+    ),
     chi=lambda e: 1.5 * (1 - e) * (11 - e) / (1 + 9 * e),
 )
 
@@ -200,8 +211,11 @@ SAFAEIFAR_FARSHIDIANFAR_2020 = hysteresis(
     reference="Safaeifar H, Farshidianfar A (2020) A new model of the contact force for the collision between two "
     "solid bodies. Multibody Syst. Dyn. 50, 233",
     doi="10.1007/s11044-020-09732-2",
-    evidence="DOI seen; formula from memory, with some doubt",
-    domain={"e": (0.0, 1.0)},
+    evidence=Evidence(
+        "not verified",
+        doi="the address of a page of the publisher's text",
+        note="its slope at e = 1 is 0.833, which is wrong for small losses",
+    ),
     chi=lambda e: np.divide(5 * (1 - e), 4 * e),
 )
 
@@ -213,7 +227,10 @@ ZHANG_2020 = hysteresis(
     reference="Zhang J, Li W, Zhao L, He G (2020) A continuous contact force model for impact analysis in "
     "multibody dynamics. Mech. Mach. Theory 153, 103946",
     doi="10.1016/j.mechmachtheory.2020.103946",
-    evidence=RECALLED,
-    domain={"e": (0.0, 1.0)},
+    evidence=Evidence(
+        "not verified",
+        doi="a list of references of the index OUCI, with the title",
+        note="the formula agrees with the exact law to 0.0083",
+    ),
     chi=lambda e: np.divide(1.5 * (1 - e), power(e, 0.89)),
 )

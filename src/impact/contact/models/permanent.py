@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..evidence import Evidence
 from ..forms import returning, spring, stiffer
 from ..model import ForceModel, Parameter
 from ..power import power
+from .sources import GHARIB_HURMUZLU
 
 LANKARANI_NIKRAVESH_1994 = ForceModel(
     key="lankarani-nikravesh-1994",
@@ -16,8 +18,11 @@ LANKARANI_NIKRAVESH_1994 = ForceModel(
     reference="Lankarani HM, Nikravesh PE (1994) Continuous contact force models for impact analysis in "
     "multibody systems. Nonlinear Dyn. 5, 193",
     doi="10.1007/BF00045676",
-    evidence="formula as printed in Gharib and Hurmuzlu (2012); DOI from memory",
-    domain={"e": (0.0, 1.0)},
+    evidence=Evidence(
+        "seen",
+        f"{GHARIB_HURMUZLU}, equations (29) to (32)",
+        doi="modelica/ModelicaStandardLibrary, ElastoGap.mo @b756f9deed (2026)",
+    ),
     force=spring,
     unloading=returning,
     # (32), by (31) and fₘ = K δₘⁿ the same as δₘ (1 − e²), which holds for the peak that the integration found
@@ -34,8 +39,12 @@ GHARIB_HURMUZLU_2012_ENERGETIC = ForceModel(
     reference="Gharib M, Hurmuzlu Y (2012) A new contact force model for low coefficient of restitution impact. "
     "J. Appl. Mech. 79, 064506",
     doi="10.1115/1.4006494",
-    evidence="formula and DOI seen in the paper; (39) as printed has K in the place of Kᵣ",
-    domain={"e": (0.0, 1.0)},
+    evidence=Evidence(
+        "seen",
+        f"{GHARIB_HURMUZLU}, equations (33) to (42)",
+        doi=GHARIB_HURMUZLU,
+        note="(39) as printed has K in the place of Kᵣ",
+    ),
     force=spring,
     coefficients={"Kr": lambda K, n, e: K / power(e * e, n)},
     unloading=stiffer,
@@ -52,8 +61,11 @@ BILINEAR = ForceModel(
     reference="Walton OR, Braun RL (1986) Viscosity, granular-temperature, and stress calculations for shearing "
     "assemblies of inelastic, frictional disks. J. Rheol. 30, 949",
     doi="10.1122/1.549893",
-    evidence="formula as printed in Gharib and Hurmuzlu (2012); DOI from memory",
-    domain={"e": (0.0, 1.0)},
+    evidence=Evidence(
+        "seen",
+        f"{GHARIB_HURMUZLU}, equation (43); rlrangel/DEMLab, ContactForceN_ElastoPlasticLinear.m @23e741d (2024)",
+        doi="rlrangel/DEMLab, ContactForceN_ElastoPlasticLinear.m @23e741d (2024)",
+    ),
     exponent=1.0,
     force=spring,
     coefficients={"Kr": lambda K, e: K / (e * e)},
@@ -70,8 +82,7 @@ ISMAIL_STRONGE_2008 = ForceModel(
     equation="F = K δ, then F = Kᵣ(δ − δₚ),  Kᵣ = γ² K,  e = 1/γ  (43)",
     reference="Ismail KA, Stronge WJ (2008) Impact of viscoplastic bodies: dissipation and restitution. "
     "J. Appl. Mech. 75, 061011",
-    doi="10.1115/1.2965371",
-    evidence="formula as printed in Gharib and Hurmuzlu (2012); DOI from memory",
+    evidence=Evidence("seen", f"{GHARIB_HURMUZLU}, equation (43)", note="the paper itself was not seen"),
     parameters=(Parameter("gamma", "1", "plastic loss factor γ", 2.0, 1.0),),
     exponent=1.0,
     force=spring,

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from .adhesive import edinburgh_adhesion as edinburgh_adhesion
+from .adhesive import edinburgh_restitution as edinburgh_restitution
+from .adhesive import jkr_restitution as jkr_restitution
+from .adhesive import jkr_root as jkr_root
 from .dashpot import approach_damping as approach_damping
 from .dashpot import approach_restitution as approach_restitution
 from .dashpot import force_damping as force_damping
@@ -18,3 +22,5 @@ from .hysteresis import exact_damping_ratio as exact_damping_ratio
 from .plastic import luding_restitution as luding_restitution
 from .plastic import muthukumar_restitution as muthukumar_restitution
 from .plastic import thornton_restitution as thornton_restitution
+from .viscoelastic import pade_damping as pade_damping
+from .viscoelastic import pade_restitution as pade_restitution

@@ -1,0 +1,48 @@
+"""What is known of where a law comes from, as data: read at a source, derived, disputed, or not verified."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from ..errors import ModelError
+
+State = Literal["seen", "derived", "disputed", "not verified"]
+STATES: tuple[State, ...] = get_args(State)
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """How far the formula of a law, and its DOI, are known.
+
+    Parameters
+    ----------
+    state : "seen", "derived", "disputed" or "not verified"
+    source : where the formula was read (repository, path and commit or date; a page; a paper and its equation),
+        where it is derived, or both sides of a dispute; may be missing only where nothing was verified
+    doi : where the DOI of the law was read; empty where the law gives none
+    note : what else a user has to know, such as what the source does not contain
+
+    Raises
+    ------
+    ModelError : the state is none of the four, or a source is missing
+
+    >>> print(Evidence("seen", "Gharib and Hurmuzlu (2012), equation (19)", note="for e > 0.95"))
+    seen in Gharib and Hurmuzlu (2012), equation (19); for e > 0.95
+    """
+
+    state: State
+    source: str = ""
+    doi: str = ""
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        if self.state not in STATES:
+            raise ModelError(f"evidence: got state {self.state!r}, expected one of {', '.join(STATES)}")
+        if self.state != "not verified" and not self.source:
+            raise ModelError(f'evidence: "{self.state}" without a source, expected where')
+
+    def __str__(self) -> str:
+        source = f" in {self.source}" if self.state == "seen" else f": {self.source}" if self.source else ""
+        doi = f"; DOI seen in {self.doi}" if self.doi else ""
+        return self.state + source + doi + (f"; {self.note}" if self.note else "")

@@ -1,0 +1,313 @@
+"""Laws of granular codes other than LAMMPS, and of Chrono's smooth contacts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..evidence import Evidence
+from ..model import ForceModel, Parameter
+from ..oracles import force_damping, gap_damping
+from ..power import Array, power
+from .aliases import same_law
+from .dashpot import (
+    ANAGNOSTOPOULOS_1988,
+    BY_LOGARITHM,
+    HERTZIAN,
+    KELVIN_VOIGT,
+    KELVIN_VOIGT_NO_TENSION,
+    LINEAR,
+    SCHWAGER_POSCHEL_2007,
+    THORNTON_EQUATION,
+    TSUJI_1992,
+    TSUJI_1992_NO_TENSION,
+    dashpot,
+    thornton_zeta,
+)
+from .multibody_codes import of_code
+from .rate_dependent import KUWABARA_KONO_AT_SPEED
+from .sources import CHRONO, LIGGGHTS, YADE_2025
+
+TANGENT = "F = K δ^(3/2) + 2 β √(m S) δ̇,  S = (3/2) K δ^(1/2)"
+# the stiffness of a linear spring that takes as much energy as Hertz's at a characteristic speed
+CHARACTERISTIC = (Parameter("vc", "m/s", "characteristic speed of the stiffness", default=1.0, least=1e-9),)
+BY_SPEED = "K = (16/15) E* √R* (15 m v_c²/(16 E* √R*))^(1/5)"
+
+
+def in_code(
+    law: ForceModel, key: str, title: str, year: int, reference: str, source: str, note: str = ""
+) -> ForceModel:
+    """A law under the name of a code, with the law's rule for K."""
+    evidence = Evidence("seen", source, note=note)
+    return of_code(
+        same_law(law, key, title=title, year=year, reference=reference, evidence=evidence), law.stiffness
+    )
+
+
+def effective_modulus(E1: Array, E2: Array, nu1: Array, nu2: Array) -> Array:
+    """E* of equation (13)."""
+    return 1 / ((1 - nu1 * nu1) / E1 + (1 - nu2 * nu2) / E2)
+
+
+def by_speed(E1: Array, E2: Array, nu1: Array, nu2: Array, R1: Array, R2: Array, m: Array, vc: Array) -> Array:
+    """K of a linear spring from moduli, radii and a characteristic speed."""
+    root = np.sqrt(1 / (1 / R1 + 1 / R2)) * effective_modulus(E1, E2, nu1, nu2)
+    return 16 / 15 * root * power(15 * m * vc * vc / (16 * root), 0.2)
+
+
+# ---- LIGGGHTS
+
+LIGGGHTS_REFERENCE = "LIGGGHTS-PUBLIC, pair style gran, model"
+
+LIGGGHTS_HERTZ = in_code(
+    TSUJI_1992, "liggghts-hertz", "LIGGGHTS hertz (3.0.0 to 3.8.0)", 2014, f"{LIGGGHTS_REFERENCE} hertz",
+    f"{LIGGGHTS}normal_model_hertz.h",
+)  # fmt: skip
+LIGGGHTS_HERTZ_LIMIT = in_code(
+    TSUJI_1992_NO_TENSION, "liggghts-hertz-limit-force", "LIGGGHTS hertz, limitForce (3.0.0 to 3.8.0)", 2014,
+    f"{LIGGGHTS_REFERENCE} hertz", f"{LIGGGHTS}normal_model_hertz.h",
+)  # fmt: skip
+
+LIGGGHTS_HOOKE = of_code(
+    dashpot(
+        "liggghts-hooke",
+        title="LIGGGHTS hooke (3.0.0 to 3.8.0)",
+        year=2014,
+        equation=f"{LINEAR},  {BY_LOGARITHM}, to δ = 0;  {BY_SPEED}",
+        reference=f"{LIGGGHTS_REFERENCE} hooke, without the option viscous",
+        evidence=Evidence("seen", f"{LIGGGHTS}normal_model_hooke.h"),
+        parameters=CHARACTERISTIC,
+        zeta=lambda e: gap_damping(e),
+        release="gap",
+        exponent=1.0,
+    ),
+    stiffness=by_speed,
+)
+
+CHRONO_SMC_HOOKE = of_code(
+    dashpot(
+        "chrono-smc-hooke",
+        title="Chrono SMC, Hooke (sequential core, 2016 to 2026)",
+        year=2016,
+        equation=f"{LINEAR},  {BY_LOGARITHM}, to F = 0;  {BY_SPEED}",
+        reference="Project Chrono, ChContactSMC; LIGGGHTS hooke with limitForce has it too",
+        evidence=Evidence("seen", CHRONO, note="the multicore solver does not cut the tension off"),
+        parameters=CHARACTERISTIC,
+        zeta=lambda e: gap_damping(e),
+        release="force",
+        exponent=1.0,
+    ),
+    stiffness=by_speed,
+)
+
+LIGGGHTS_HOOKE_LIMIT = in_code(
+    CHRONO_SMC_HOOKE, "liggghts-hooke-limit-force", "LIGGGHTS hooke, limitForce (3.0.0 to 3.8.0)", 2014,
+    f"{LIGGGHTS_REFERENCE} hooke, without the option viscous", f"{LIGGGHTS}normal_model_hooke.h",
+)  # fmt: skip
+
+# ---- Chrono
+
+CHRONO_HERTZ = in_code(
+    TSUJI_1992_NO_TENSION, "chrono-smc-hertz", "Chrono SMC, Hertz (sequential core, 2016 to 2026)", 2016,
+    "Project Chrono, ChContactSMC", CHRONO, "the multicore solver does not cut the tension off, as in tsuji-1992",
+)  # fmt: skip
+
+CHRONO_SMC_PLAINCOULOMB = of_code(
+    dashpot(
+        "chrono-smc-plaincoulomb",
+        title="Chrono SMC, PlainCoulomb (sequential core, 2016 to 2026)",
+        year=2016,
+        equation=f"{HERTZIAN},  α = −√5 ln e/√(π² + ln² e), to F = 0;  K = (4/3) E* √(1 m)",
+        reference="Project Chrono, ChContactSMC",
+        evidence=Evidence("seen", CHRONO, note="its stiffness lacks the radius"),
+        zeta=lambda e: gap_damping(e),
+        release="force",
+        exponent=1.5,
+    ),
+    stiffness=lambda E1, E2, nu1, nu2: 4 / 3 * effective_modulus(E1, E2, nu1, nu2),
+)
+
+# ---- YADE
+
+HERTZ_MINDLIN = "YADE, Law2_ScGeom_MindlinPhys_Mindlin"
+MINDLIN_SOURCE = f"{YADE_2025}, HertzMindlin.cpp"
+CLAMPED_SOURCE = "YADE, pkg/dem/HertzMindlin.cpp, commit 45c86581d (September 2013)"
+
+YADE_EN = of_code(
+    dashpot(
+        "yade-en",
+        title="YADE HertzMindlin en (since 2023.02a)",
+        year=2023,
+        equation=THORNTON_EQUATION.replace("to F = 0", "β = 0 at e = 1, to F = 0"),
+        reference=f"{HERTZ_MINDLIN}, en, by (B6), (B7) and Table 2 of Thornton, Cummins and Cleary (2013)",
+        evidence=Evidence("seen", MINDLIN_SOURCE),
+        zeta=lambda e: np.where(e < 1.0, thornton_zeta(np.minimum(e, np.nextafter(1.0, 0.0))), 0.0),
+        release="force",
+        exponent=1.5,
+    )
+)
+YADE_EN_CLAMPED = in_code(
+    TSUJI_1992_NO_TENSION, "yade-en-clamped", "YADE HertzMindlin en (September 2013 to 2022.01a)", 2013,
+    f"{HERTZ_MINDLIN}, en, with the damping of Tsuji and others", CLAMPED_SOURCE,
+)  # fmt: skip
+YADE_EN_PULLING = in_code(
+    TSUJI_1992, "yade-en-pulling", "YADE HertzMindlin en (2011 to September 2013)", 2011,
+    f"{HERTZ_MINDLIN}, en, with the damping of Tsuji and others",
+    "YADE, pkg/dem/HertzMindlin.cpp, commit ddb7a1a19 (January 2011)",
+)  # fmt: skip
+YADE_EN_AT_SPEED = in_code(
+    KUWABARA_KONO_AT_SPEED, "yade-en-at-speed", "YADE HertzMindlin en and vn (since 2024.02a)", 2024,
+    f"{HERTZ_MINDLIN}, en at the speed vn", MINDLIN_SOURCE,
+)  # fmt: skip
+
+YADE_BETAN = of_code(
+    dashpot(
+        "yade-betan",
+        title="YADE HertzMindlin betan, by the traditional formula (since September 2013)",
+        year=2013,
+        equation=f"{TANGENT},  β = −ln e/√(π² + ln² e), to F = 0",
+        reference=f"{HERTZ_MINDLIN}, betan, which YADE leaves to the user, by the formula of a linear spring",
+        evidence=Evidence("seen", MINDLIN_SOURCE),
+        # 2 β √(3/2) is α
+        zeta=lambda e: np.sqrt(1.2) * gap_damping(e),
+        release="force",
+        exponent=1.5,
+    )
+)
+YADE_BETAN_PULLING = of_code(
+    dashpot(
+        "yade-betan-pulling",
+        title="YADE HertzMindlin betan, by the traditional formula (2010 to September 2013)",
+        year=2010,
+        equation=f"{TANGENT},  β = −ln e/√(π² + ln² e), to δ = 0",
+        reference=f"{HERTZ_MINDLIN}, betan, which YADE leaves to the user, by the formula of a linear spring",
+        evidence=Evidence("seen", f"{CLAMPED_SOURCE}, whose removed lines pull"),
+        zeta=lambda e: np.sqrt(1.2) * gap_damping(e),
+        release="gap",
+        exponent=1.5,
+    )
+)
+YADE_BETAN_DIRECT = of_code(
+    dashpot(
+        "yade-betan-direct",
+        title="YADE HertzMindlin betan (since September 2013)",
+        year=2013,
+        equation=f"{TANGENT}, to F = 0",
+        reference=f"{HERTZ_MINDLIN}, betan",
+        evidence=Evidence("seen", MINDLIN_SOURCE),
+        parameters=(Parameter("betan", "1", "damping ratio β of the tangent stiffness", least=0.0),),
+        zeta=lambda betan: np.sqrt(1.2) * betan,
+        release="force",
+        exponent=1.5,
+    )
+)
+
+VISCO_ELASTIC = "YADE, Law2_ScGeom_ViscElPhys_Basic"
+YADE_VISCOELASTIC = in_code(
+    KELVIN_VOIGT_NO_TENSION, "yade-viscoelastic", "YADE viscoelastic (since January 2014)", 2014,
+    f"{VISCO_ELASTIC}, kn and cn", f"{YADE_2025}, ViscoelasticPM.cpp",
+)  # fmt: skip
+YADE_VISCOELASTIC_PULLING = in_code(
+    KELVIN_VOIGT, "yade-viscoelastic-pulling", "YADE viscoelastic (2009 to January 2014)", 2009,
+    f"{VISCO_ELASTIC}, kn and cn",
+    "YADE, pkg/dem/ViscoelasticPM.cpp, commit fe8647e14 (January 2014), which adds the limit",
+)  # fmt: skip
+YADE_VISCOELASTIC_EN = in_code(
+    SCHWAGER_POSCHEL_2007, "yade-viscoelastic-en", "YADE viscoelastic, en with young (since June 2015)", 2015,
+    f"{VISCO_ELASTIC}, en with young and poisson", f"{YADE_2025}, ViscoelasticPM.cpp",
+    "YADE finds the damping to 1 % of en, this law exactly",
+)  # fmt: skip
+
+# ---- MFiX
+
+MFIX = "soufiane92/MFiX-21.3.2, model/check_data/check_solids_dem.f and model/des/calc_force_dem.f @e8a0d92 (2021)"
+MFIX_LSD = in_code(
+    ANAGNOSTOPOULOS_1988, "mfix-lsd", "MFiX DEM, LSD (2016 to 21.3.2)", 2014, "MFiX, DES_COLL_MODEL LSD", MFIX
+)
+MFIX_HERTZ = of_code(
+    dashpot(
+        "mfix-hertz",
+        title="MFiX DEM, Hertzian (2014 to 21.3.2)",
+        year=2014,
+        equation=f"{HERTZIAN},  α = −2 ln e/√(π² + ln² e), to δ = 0",
+        reference="MFiX, DES_COLL_MODEL HERTZIAN, whose α has 2 in the place of √5",
+        evidence=Evidence("seen", MFIX),
+        zeta=lambda e: 2 / np.sqrt(5.0) * gap_damping(e),
+        release="gap",
+        exponent=1.5,
+    )
+)
+
+# ---- Kratos
+
+KRATOS = "KratosMultiphysics/Kratos, applications/DEMApplication"
+# sphere_strategy.py takes e below the first for it, and no damping above the second
+KRATOS_LEAST, KRATOS_MOST = 0.001, 0.999
+
+KRATOS_HERTZ = of_code(
+    dashpot(
+        "kratos-hertz",
+        title="Kratos DEM, Hertz with viscous damping (since 2015)",
+        year=2015,
+        equation=THORNTON_EQUATION.replace("to F = 0", "e from 0.001, β = 0 above e = 0.999, to F = 0"),
+        reference="Kratos DEM, DEM_D_Hertz_viscous_Coulomb",
+        evidence=Evidence(
+            "seen",
+            f"{KRATOS}, custom_constitutive/DEM_D_Hertz_viscous_Coulomb_CL.cpp @72b6f58f and "
+            "python_scripts/sphere_strategy.py @4ddf9200",
+        ),
+        zeta=lambda e: np.where(e <= KRATOS_MOST, thornton_zeta(np.clip(e, KRATOS_LEAST, KRATOS_MOST)), 0.0),
+        release="force",
+        exponent=1.5,
+    )
+)
+KRATOS_LINEAR = of_code(
+    dashpot(
+        "kratos-linear",
+        title="Kratos DEM, linear with viscous damping (since 2015)",
+        year=2015,
+        equation=f"{LINEAR},  e = exp(−2 ζ acos(ζ)/√(1 − ζ²)), e from 0.001, ζ = 0 above e = 0.999, to F = 0;  "
+        "K = 1.432 π 0.31225 E* R*, against a wall without 1.432",
+        reference="Kratos DEM, DEM_D_Linear_viscous_Coulomb",
+        evidence=Evidence(
+            "seen",
+            f"{KRATOS}, custom_constitutive/DEM_D_Linear_viscous_Coulomb_CL.cpp @013f9253 and "
+            "python_scripts/sphere_strategy.py @4ddf9200",
+            note="Kratos finds ζ by bisection to 1e-4, this law exactly",
+        ),
+        zeta=lambda e: np.where(e <= KRATOS_MOST, force_damping(np.maximum(e, KRATOS_LEAST)), 0.0),
+        release="force",
+        exponent=1.0,
+    ),
+    stiffness=lambda E1, E2, nu1, nu2, R1, R2: (
+        np.where(np.isinf(R1) | np.isinf(R2), 1.0, 1.432)
+        * np.pi * 0.31225 * effective_modulus(E1, E2, nu1, nu2) / (1 / R1 + 1 / R2)
+    ),
+)  # fmt: skip
+
+# ---- MercuryDPM and DEMLab
+
+MERCURYDPM_LINEAR = in_code(
+    ANAGNOSTOPOULOS_1988, "mercurydpm-linear-viscoelastic", "MercuryDPM LinearViscoelastic (state of 2015)", 2013,
+    "MercuryDPM, kernel",
+    "gladk/MercuryDPM, Kernel/Interactions/NormalForceInteractions/LinearViscoelasticInteraction.cc @c50970e "
+    "(2015)",
+    "its first year was not seen",
+)  # fmt: skip
+
+DEMLAB_TTI = of_code(
+    dashpot(
+        "demlab-tti",
+        title="DEMLab TTI (2021 to 2024)",
+        year=2021,
+        equation=f"{HERTZIAN},  α = −2.2664 ln e/√(10.1354 + ln² e), to F = 0",
+        reference="Rangel R, DEMLab, contact law of Tsuji, Tanaka and Ishida with remove_cohesion, its default",
+        evidence=Evidence(
+            "seen",
+            "rlrangel/DEMLab, src/interactions/force/ContactForceN_ViscoElasticNonlinear.m @23e741d (2024)",
+            note="its first year was not seen",
+        ),
+        zeta=lambda e: 2.2664 / np.sqrt(5.0) / np.sqrt(1.0 + 10.1354 / np.square(np.log(e))),
+        release="force",
+        exponent=1.5,
+    )
+)

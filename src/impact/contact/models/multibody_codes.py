@@ -1,0 +1,429 @@
+"""Laws of multibody and robotics codes, in the parameters that those codes use.
+
+Where no K is given it is that of equation (12), or by the code's own rule.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..evidence import Evidence
+from ..formula import Formula
+from ..model import ForceModel, Parameter
+from ..oracles import force_restitution, limited_restitution
+from ..power import Array, power, powers
+from .aliases import same_law
+from .dashpot import KELVIN_VOIGT_NO_TENSION
+from .hysteresis import FLORES_2011, HUNT_CROSSLEY_1975, LANKARANI_NIKRAVESH_1990, hysteresis
+from .sources import CHRONO_MULTICORE, DRAKE, MBDYN, MODIA3D, MUJOCO, SIMBODY
+
+LINEAR_DAMPING = "F = K δⁿ (1 + χ δ̇/v₀)"
+
+
+def of_code(law: ForceModel, stiffness: Formula | None = None) -> ForceModel:
+    """A law of some form as that of a code, with its rule for K."""
+    return replace(law, family="codes", stiffness=stiffness)
+
+
+def series(a: Array, b: Array) -> Array:
+    """Two springs, one behind the other."""
+    return a * b / (a + b)
+
+
+def step(t: Array) -> Array:
+    """The cubic from 0 at 0 to 1 at 1, level at both."""
+    t = np.minimum(t, 1.0)
+    return t * t * (3.0 - 2.0 * t)
+
+
+def flores(e: Array) -> Array:
+    """χ of Flores and others (2011)."""
+    return np.asarray(np.divide(8.0 * (1.0 - e), 5.0 * e))
+
+
+ADAMS_IMPACT = ForceModel(
+    key="adams-impact",
+    title="Adams IMPACT; MotionSolve and SolidWorks Motion",
+    year=1990,
+    equation="F = max(0, K δⁿ + c s(δ/d) δ̇),  s(t) = t²(3 − 2t) to t = 1, then 1",
+    reference="MSC Adams, function IMPACT; MotionSolve and SolidWorks Motion have it too",
+    evidence=Evidence(
+        "seen",
+        "the SolidWorks help, r_function_impact (2012 to 2025); the Adams help, functions IMPACT and STEP",
+        note="the cubic follows from the words of the help, cubic and with continuous slopes; its year was not "
+        "seen",
+    ),
+    parameters=(
+        Parameter("c", "N s/m", "largest damping", least=0.0),
+        Parameter("d", "m", "penetration at which the damping is full", least=1e-9),
+    ),
+    # below n = 2 the spring outlasts the damping as the gap closes, and pushes once more after the force was zero
+    force=lambda elastic, x, v, c, d: np.maximum(elastic + c * step(x / d) * v, 0),
+    # where the force begins or ceases to be zero; over the spring, so that it does not fade with the indentation
+    bends=(lambda d: d, lambda elastic, x, v, c, d: 1 + c * step(x / d) * v / elastic),
+    family="codes",
+)
+
+RECURDYN_EVIDENCE = Evidence(
+    "not verified",
+    "the RecurDyn help and FAQ name k, c, m₁, m₂ and m₃, but show the formula as a picture that was not stored",
+)
+
+RECURDYN = of_code(
+    hysteresis(
+        "recurdyn",
+        title="RecurDyn",
+        year=2000,
+        equation=f"{LINEAR_DAMPING},  χ = c v₀/K",
+        reference="FunctionBay RecurDyn, standard contact, with the damping exponents m₂ = 1 and m₃ = m₁",
+        evidence=RECURDYN_EVIDENCE,
+        parameters=(Parameter("c", "N s/m^(n+1)", "damping coefficient", least=0.0),),
+        chi=lambda c, v0, K: c * v0 / K,
+    )
+)
+
+RECURDYN_EXPONENTS = ForceModel(
+    key="recurdyn-exponents",
+    title="RecurDyn, free exponents",
+    year=2000,
+    equation="F = K δⁿ + c sgn(δ̇)|δ̇|^m₂ δ^m₃",
+    reference="FunctionBay RecurDyn, standard contact, whose stiffness exponent m₁ is n",
+    evidence=RECURDYN_EVIDENCE,
+    parameters=(
+        Parameter(
+            "c", "N s^damping_exponent/m^(damping_exponent+indentation_exponent)", "damping coefficient", least=0.0
+        ),
+        Parameter("damping_exponent", "1", "damping exponent m₂, of δ̇", 1.0, 1.0, 4.0),
+        Parameter("indentation_exponent", "1", "indentation exponent m₃, of δ", 1.0, 0.0, 10.0),
+    ),
+    force=lambda elastic, x, v, c, damping_exponent, indentation_exponent: (
+        elastic + c * np.sign(v) * powers(np.abs(v), damping_exponent) * powers(x, indentation_exponent)
+    ),
+    smooth=4,
+    family="codes",
+)
+
+
+def simbody_stiffness(E1: Array, E2: Array, nu1: Array, nu2: Array, R1: Array, R2: Array) -> Array:
+    """K of Simbody, which mixes the plane strain moduli by their powers 2/3."""
+    k1, k2 = power(E1 / (1 - nu1 * nu1), 2 / 3), power(E2 / (1 - nu2 * nu2), 2 / 3)
+    return 4 / 3 * np.sqrt(1 / (1 / R1 + 1 / R2)) * series(k1, k2) ** 1.5
+
+
+def simbody_dissipation(c1: Array, c2: Array, E1: Array, E2: Array, nu1: Array, nu2: Array) -> Array:
+    """The dissipation of a pair: that of a body weighs as much as the stiffness of the other."""
+    k1, k2 = power(E1 / (1 - nu1 * nu1), 2 / 3), power(E2 / (1 - nu2 * nu2), 2 / 3)
+    return (c1 * k2 + c2 * k1) / (k1 + k2)
+
+
+SHERMAN = (
+    "Sherman MA, Seth A, Delp SL (2011) Simbody: multibody dynamics for biomedical research. Procedia IUTAM 2, 241"
+)
+SIMBODY_EVIDENCE = Evidence("seen", SIMBODY, doi="simbody/simbody, CONTRIBUTING.md @f312d0dd (2026)")
+
+SIMBODY_HUNT_CROSSLEY = of_code(
+    hysteresis(
+        "simbody-hunt-crossley",
+        title="Simbody and OpenSim HuntCrossleyForce (2010 to 2026)",
+        year=2010,
+        equation="F = K δ^(3/2) (1 + χ δ̇/v₀),  χ = (3/2) c v₀",
+        reference=SHERMAN,
+        doi="10.1016/j.piutam.2011.04.023",
+        evidence=SIMBODY_EVIDENCE,
+        parameters=(
+            Parameter("c", "s/m", "dissipation of the pair, the slope of e over a small speed", least=0.0),
+        ),
+        exponent=1.5,
+        chi=lambda c, v0: 1.5 * c * v0,
+    ),
+    stiffness=simbody_stiffness,
+)
+
+SIMBODY_HUNT_CROSSLEY_MIXED = of_code(
+    hysteresis(
+        "simbody-hunt-crossley-mixed",
+        title="Simbody and OpenSim HuntCrossleyForce, two materials (2010 to 2026)",
+        year=2010,
+        equation="F = K δ^(3/2) (1 + χ δ̇/v₀),  χ = (3/2) c v₀,  c = (c₁ k₂ + c₂ k₁)/(k₁ + k₂),  "
+        "k = (E/(1 − ν²))^(2/3)",
+        reference=SHERMAN,
+        doi="10.1016/j.piutam.2011.04.023",
+        evidence=SIMBODY_EVIDENCE,
+        parameters=(
+            Parameter("c1", "s/m", "dissipation of the material of ball 1", least=0.0),
+            Parameter("c2", "s/m", "dissipation of the material of ball 2", least=0.0),
+        ),
+        exponent=1.5,
+        chi=lambda c1, c2, E1, E2, nu1, nu2, v0: 1.5 * simbody_dissipation(c1, c2, E1, E2, nu1, nu2) * v0,
+    ),
+    stiffness=simbody_stiffness,
+)
+
+DRAKE_REFERENCE = (
+    "Drake, contact_model_doxygen.h, and the defaults of SceneGraphConfig since v1.36.0 (December 2024)"
+)
+POINT_STIFFNESS = (
+    Parameter("k1", "N/m", "point stiffness k₁ of ball 1, where no K is given", default=1e6, least=1e-9),
+    Parameter("k2", "N/m", "point stiffness k₂ of ball 2", default=1e6, least=1e-9),
+)
+DRAKE_EVIDENCE = Evidence(
+    "seen",
+    DRAKE,
+    note="of the discrete approximations TAMSI, SIMILAR and LAGGED in the limit of small steps; SAP has another "
+    "law",
+)
+
+DRAKE_POINT_CONTACT = of_code(
+    hysteresis(
+        "drake-point-contact",
+        title="Drake, point contact (defaults since v1.36.0, December 2024)",
+        year=2019,
+        equation="F = K δ (1 + χ δ̇/v₀),  χ = d v₀",
+        reference=DRAKE_REFERENCE,
+        evidence=DRAKE_EVIDENCE,
+        parameters=(
+            Parameter("d", "s/m", "Hunt-Crossley dissipation of the pair", default=50.0, least=0.0),
+            *POINT_STIFFNESS,
+        ),
+        exponent=1.0,
+        chi=lambda d, v0: d * v0,
+    ),
+    stiffness=lambda k1, k2: series(k1, k2),
+)
+
+DRAKE_POINT_CONTACT_MIXED = of_code(
+    hysteresis(
+        "drake-point-contact-mixed",
+        title="Drake, point contact of two materials (defaults since v1.36.0, December 2024)",
+        year=2019,
+        equation="F = K δ (1 + χ δ̇/v₀),  χ = d v₀,  d = (k₂ d₁ + k₁ d₂)/(k₁ + k₂)",
+        reference=DRAKE_REFERENCE,
+        evidence=DRAKE_EVIDENCE,
+        parameters=(
+            Parameter("d1", "s/m", "Hunt-Crossley dissipation d₁ of ball 1", default=50.0, least=0.0),
+            Parameter("d2", "s/m", "Hunt-Crossley dissipation d₂ of ball 2", default=50.0, least=0.0),
+            *POINT_STIFFNESS,
+        ),
+        exponent=1.0,
+        chi=lambda d1, d2, k1, k2, v0: (k2 * d1 + k1 * d2) / (k1 + k2) * v0,
+    ),
+    stiffness=lambda k1, k2: series(k1, k2),
+)
+
+MODELICA_ELASTOGAP = ForceModel(
+    key="modelica-elastogap",
+    title="Modelica ElastoGap (4.1.0, 2026)",
+    year=2008,
+    equation="F = max(0, K δⁿ + min(d δ̇, K δⁿ))",
+    reference="Modelica Standard Library, Mechanics.Translational.Components.ElastoGap",
+    evidence=Evidence(
+        "seen",
+        "modelica/ModelicaStandardLibrary, Modelica/Mechanics/Translational/Components/ElastoGap.mo @b756f9deed "
+        "(2026)",
+        note="its first year was not seen",
+    ),
+    parameters=(Parameter("d", "N s/m", "damping constant", least=0.0),),
+    force=lambda elastic, v, d: elastic + np.minimum(d * v, elastic),
+    bends=(lambda elastic, v, d: np.where(v > 0, elastic - d * v, np.nan),),
+    release="force",
+    family="codes",
+)
+
+MAPLESIM_HELP = "the MapleSim help, Multibody Contact Modes (read in November 2026)"
+
+MAPLESIM_LINEAR = of_code(
+    same_law(
+        KELVIN_VOIGT_NO_TENSION,
+        "maplesim-linear",
+        title="MapleSim, linear",
+        year=2015,
+        reference="MapleSim, contact of the linear spring and damper",
+        evidence=Evidence("seen", MAPLESIM_HELP, note="its first year was not seen"),
+    )
+)
+
+MAPLESIM_LIMITED = ForceModel(
+    key="maplesim-linear-limited",
+    title="MapleSim, linear with limited damper",
+    year=2015,
+    equation="F = max(0, K δ + min(d δ̇, K δ))",
+    reference="MapleSim, contact of the linear spring with a limited damper, its default",
+    evidence=Evidence("seen", MAPLESIM_HELP, note="its first year was not seen"),
+    parameters=(Parameter("d", "N s/m", "damping constant", least=0.0),),
+    force=lambda elastic, v, d: elastic + np.minimum(d * v, elastic),
+    bends=(lambda elastic, v, d: np.where(v > 0, elastic - d * v, np.nan),),
+    oracle=lambda d, m, K: limited_restitution(d / (2 * np.sqrt(m * K))),
+    release="force",
+    exponent=1.0,
+    family="codes",
+)
+
+NEUMAYR = (
+    "Neumayr A, Otter M (2019) Collision handling with elastic response calculation and zero-crossing functions. "
+    "EOOLT '19, 57"
+)
+NEUMAYR_DOI = "10.1145/3365984.3365986"
+SMALL_SPEED = Parameter("vs", "m/s", "speed v_s up to which e is reduced", default=0.01, least=1e-9)
+
+MODIA3D_PRESENT = of_code(
+    hysteresis(
+        "modia3d",
+        title="Modia3D (v0.6.0 to v0.12.3, since February 2022)",
+        year=2022,
+        equation="F = K δ^(3/2) (1 + χ δ̇/v₀),  χ = min(d v₀, 8(1 − ε)/(5ε)),  ε = e where v₀ > v_s, else 0",
+        reference=NEUMAYR,
+        doi=NEUMAYR_DOI,
+        evidence=Evidence(
+            "seen",
+            f"{MODIA3D} @a418027 (v0.12.3, 2026)",
+            doi="ModiaSim/Modia3D.jl, docs/src/internal/ContactForceLaw.md @a418027",
+        ),
+        parameters=(SMALL_SPEED, Parameter("d", "s/m", "largest damping", default=2000.0, least=0.0)),
+        exponent=1.5,
+        chi=lambda e, v0, vs, d: np.minimum(d * v0, flores(np.where(v0 > vs, e, 0.0))),
+    )
+)
+
+MODIA3D_EXPONENTIAL = of_code(
+    hysteresis(
+        "modia3d-exponential",
+        title="Modia3D (v0.4.0 to v0.5.2, 2019 to 2021)",
+        year=2019,
+        equation="F = K δ^(3/2) (1 + χ δ̇/v₀),  χ = min(d v₀, 8(1 − ε)/(5ε) v₀/r),  ε = e + (0.01 − e) "
+        "0.01^(v₀/v_s),  r = v₀ from v_s on, below it v_s/3 + (v₀²/v_s)(1 − v₀/(3 v_s))",
+        reference=NEUMAYR,
+        doi=NEUMAYR_DOI,
+        evidence=Evidence(
+            "seen",
+            f"{MODIA3D} at v0.4.0 (2019) and v0.5.2 (2021)",
+            doi="ModiaSim/Modia3D.jl, docs/src/internal/ContactForceLaw.md @a418027",
+        ),
+        parameters=(SMALL_SPEED, Parameter("d", "s/m", "largest damping", default=1000.0, least=0.0)),
+        exponent=1.5,
+        chi=lambda e, v0, vs, d: np.minimum(
+            d * v0, flores(e + (0.01 - e) * np.exp(np.log(0.01) * v0 / vs)) * v0 / regularized(v0, vs)
+        ),
+    )
+)
+
+
+def regularized(v0: Array, vs: Array) -> Array:
+    """The speed that Modia3D divides by, which does not fall below v_s/3."""
+    return np.where(v0 >= vs, v0, v0 * (v0 / vs) * (1 - v0 / (3 * vs)) + vs / 3)
+
+
+CHRONO_SMC_FLORES = of_code(
+    hysteresis(
+        "chrono-smc-flores",
+        title="Chrono SMC, Flores (multicore, since 5.0.0, February 2020)",
+        year=2020,
+        equation="F = K δ^(3/2) (1 + χ δ̇/v₀),  χ = 8(1 − ε)/(5ε) v₀/v_c,  ε = max(e, 0.01)",
+        reference="Project Chrono, ChIterativeSolverMulticoreSMC.cpp; v_c is the characteristic speed, in its "
+        "MultiStep mode the larger of it and the speed at contact",
+        evidence=Evidence(
+            "seen", CHRONO_MULTICORE, note="the sequential core has no Flores law and takes that of Hooke instead"
+        ),
+        parameters=(Parameter("vc", "m/s", "characteristic speed v_c", least=1e-9),),
+        exponent=1.5,
+        chi=lambda e, v0, vc: flores(np.maximum(e, 0.01)) * v0 / vc,
+    )
+)
+
+TODOROV = (
+    "Todorov E (2014) Convex and analytically-invertible dynamics with contacts and constraints: Theory and "
+    "implementation in MuJoCo. ICRA, 6054; documentation of MuJoCo, Modeling, Solver parameters"
+)
+TODOROV_DOI = "10.1109/ICRA.2014.6907751"
+MUJOCO_EVIDENCE = Evidence(
+    "seen",
+    MUJOCO,
+    doi="google-deepmind/mujoco, python/LQR.ipynb @a7255075b",
+    note="for a constant impedance, which the default solimp is not, and in the limit of small time steps",
+)
+
+MUJOCO_SOLREF = ForceModel(
+    key="mujoco-solref",
+    title="MuJoCo solref, standard format (2.0 to 3.12)",
+    year=2014,
+    equation="F = m(δ/(τ ζ)² + 2 δ̇/τ), to F = 0",
+    reference=TODOROV,
+    doi=TODOROV_DOI,
+    evidence=MUJOCO_EVIDENCE,
+    parameters=(
+        Parameter("timeconst", "s", "time constant τ", default=0.02, least=1e-9),
+        Parameter("dampratio", "1", "damping ratio ζ", default=1.0, least=1e-3),
+    ),
+    # a spring of its own: a K that is given sets no more than the units
+    stiffness=lambda m, timeconst, dampratio: m / (timeconst * timeconst * dampratio * dampratio),
+    force=lambda x, v, m, timeconst, dampratio: (
+        m * (x / (timeconst * timeconst * dampratio * dampratio) + 2.0 * v / timeconst)
+    ),
+    oracle=lambda dampratio: force_restitution(dampratio),
+    release="force",
+    exponent=1.0,
+    family="codes",
+)
+
+MUJOCO_SOLREF_DIRECT = ForceModel(
+    key="mujoco-solref-direct",
+    title="MuJoCo solref, direct format (2.0 to 3.12)",
+    year=2018,
+    equation="F = m(k δ + b δ̇), to F = 0",
+    reference=TODOROV,
+    doi=TODOROV_DOI,
+    evidence=MUJOCO_EVIDENCE,
+    parameters=(
+        Parameter("k", "1/s^2", "stiffness per effective mass, the negative first number of solref", least=1e-9),
+        Parameter("b", "1/s", "damping per effective mass, the negative second number", default=0.0, least=0.0),
+    ),
+    stiffness=lambda m, k: m * k,
+    force=lambda x, v, m, k, b: m * (k * x + b * v),
+    oracle=lambda k, b: force_restitution(b / (2.0 * np.sqrt(k))),
+    release="force",
+    exponent=1.0,
+    family="codes",
+)
+
+SIMSCAPE_CONTACT = ForceModel(
+    key="simscape-contact",
+    title="after Simscape Spatial Contact Force (R2019b)",
+    year=2019,
+    equation="F = max(0, s(δ/w)(K δ + b δ̇)),  s(t) = t²(3 − 2t) to t = 1, then 1",
+    reference="MathWorks Simscape Multibody, block Spatial Contact Force, from R2019b on",
+    evidence=Evidence(
+        "not verified",
+        "the MathWorks documentation gives no formula for s, only its ends and that they are level",
+        note="the cubic and the limit at zero are ours",
+    ),
+    parameters=(
+        Parameter("b", "N s/m", "damping", least=0.0),
+        Parameter("w", "m", "transition region width", least=1e-9),
+    ),
+    force=lambda elastic, x, v, b, w: step(x / w) * (elastic + b * v),
+    bends=(lambda w: w,),
+    release="force",
+    exponent=1.0,
+    family="codes",
+)
+
+
+def in_mbdyn(law: ForceModel, key: str, formulation: str) -> ForceModel:
+    """A law under the name that MBDyn has for it."""
+    return of_code(
+        same_law(
+            law,
+            key,
+            title=f"MBDyn continuous contact, {formulation} (since 1.5.0)",
+            year=2015,
+            reference=f"MBDyn, module-cont-contact, law continuous contact, formulation {formulation}; no damping "
+            "at a speed of contact up to EpsPrimeTol, by default 1e-6",
+            evidence=Evidence("seen", MBDYN, note="its first year was not seen"),
+        )
+    )
+
+
+MBDYN_FLORES = in_mbdyn(FLORES_2011, "mbdyn-flores", "flores")
+MBDYN_HUNT_CROSSLEY = in_mbdyn(HUNT_CROSSLEY_1975, "mbdyn-hunt-crossley", "hunt crossley")
+MBDYN_LANKARANI_NIKRAVESH = in_mbdyn(LANKARANI_NIKRAVESH_1990, "mbdyn-lankarani-nikravesh", "lankarani nikravesh")
