@@ -25,7 +25,8 @@ from models_measured import (
 def claims() -> str:
     """What laws are taken for, and the numbers against it."""
     known = [law for law in laws() if "e" in law.quantities and delivers(law, GRID) is not None]
-    parts = (floors(known), claimed(), at_one(known), slopes(known), without_tension(known), hysteretic())
+    ends = (floors(known), claimed(), at_one(known), slopes(known), without_tension(known))
+    parts = (*ends, of_codes(known), hysteretic())
     return "\n\n".join(parts)
 
 
@@ -51,7 +52,7 @@ def floors(known: Sequence[ForceModel]) -> str:
 
 
 def claimed() -> str:
-    """Laws that are off in the domain that their authors claim."""
+    """Laws that are off in the domain in which they are said to hold."""
     rows = []
     for law in laws():
         low, high = law.domain.get("e", (np.inf, np.inf))
@@ -59,9 +60,9 @@ def claimed() -> str:
         if measured()[law.key].over == "e" and error(law)[inside].max(initial=0.0) > BOUNDS[0] - ROUNDING:
             rows.append((law, f"{law.domain_text}|{largest(error(law)[inside], GRID[inside])}"))
     return f"""\
-**Off where they are claimed.** By {BOUNDS[0]:g} or more within the domain that their authors name:
+**Off where they are said to hold.** By {BOUNDS[0]:g} or more there:
 
-{law_table(["claimed for", "largest error there"], rows)}"""
+{law_table(["said to hold for", "largest error there"], rows)}"""
 
 
 def at_one(known: Sequence[ForceModel]) -> str:
@@ -81,7 +82,10 @@ def slope_at_one(law: ForceModel) -> float:
 
 def slopes(known: Sequence[ForceModel]) -> str:
     """Laws that are wrong to first order in 1 − e."""
-    whole = {law.key: slope_at_one(law) for law in known if at(law, 1.0) > 1 - ROUNDING}
+    near = 1 - 1e-3
+    # some codes have no damping at e = 1, or just below, in the place of a formula that is wrong there
+    smooth = [law for law in known if at(law, 1.0) > 1 - ROUNDING and abs(at(law, near) - near) < 5e-3]
+    whole = {law.key: slope_at_one(law) for law in smooth}
     off = [law for law in known if abs(whole.get(law.key, 1.0) - 1) > BOUNDS[0]]
     rows = [(law, f"{number(whole[law.key], 3)}|{number(at(law, 0.9))}") for law in off]
     return f"""\
@@ -101,6 +105,17 @@ def without_tension(known: Sequence[ForceModel]) -> str:
 Codes that use it and cut the tension off deliver more; `exact-dashpot-no-tension` has the ζ of that end.
 
 {law_table([f"e_out at e = {e:g}" for e in asked], rows)}"""
+
+
+def of_codes(known: Sequence[ForceModel]) -> str:
+    """Codes that deliver another restitution than they are asked for."""
+    asked = (0.1, 0.5, 0.9)
+    codes = [law for law in known if law.family == "codes" and np.abs(error(law)).max() > BOUNDS[0]]
+    rows = [(law, "|".join([law.title, *(number(at(law, e)) for e in asked)])) for law in codes]
+    return f"""\
+**Codes that deliver another e.** Asked for e, at small time steps, by {BOUNDS[0]:g} or more off somewhere:
+
+{law_table(["code", *(f"e_out at e = {e:g}" for e in asked)], rows)}"""
 
 
 def hysteretic() -> str:

@@ -23,6 +23,8 @@ SPEEDS = np.logspace(-2, 1, 25)
 BALLS = {"v1": 1.0, "m1": 1.0, "m2": 1.0, "material": "aluminium"}
 MATERIAL = {"E": 56e9, "nu": 0.3, "rho": 2712.0, "yield_strength": 1e8}
 DAMPING = 0.3
+# of adhesive laws such a value would hold the balls at every speed
+SHOWN = {"jkr-1971": {"gamma": 1200.0}, "liggghts-edinburgh": {"gamma": 3e4, "k2": 2.0}}
 # what is smaller is rounding or the solver's error, and turns no digit that is shown
 ROUNDING = 1e-9
 BOUNDS = (0.01, 0.05)
@@ -97,8 +99,8 @@ def own_settings(model: ForceModel) -> dict[str, float]:
         # a depth is that of the elastic peak
         own = (0.5 * (n + 1)) ** (1 / (n + 1)) if one.unit == "m" else DAMPING
         free = float(np.clip(max(one.least, 0.0) + own * size, one.least, one.most))
-        free = free if one.typical is None else one.typical
         found[one.name] = free if one.default is None else one.default
+    found |= SHOWN.get(model.key, {})
     return found
 
 

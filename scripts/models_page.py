@@ -11,6 +11,7 @@ from urllib.parse import quote
 
 import numpy as np
 
+from impact.contact.evidence import summary
 from impact.contact.model import ForceModel, Parameter
 from impact.contact.models import catalogue
 from models_claims import claims
@@ -55,11 +56,11 @@ more often than not by a formula that is an approximation: this page says how fa
 law once, `models = ["family:hysteresis", "!lee-wang-1983"]` a family less one of it, and
 `models = ["lankarani-nikravesh-*", "bilinear"]` chooses by a pattern and by name.
 
-A law is computed outside the domain that its authors claim, too; the variable `in_domain` of a result says which
-points lie inside. How the tables read:
+A law is computed outside the domain in which it is said to hold, too; the variable `in_domain` of a result says
+which points lie inside. Most papers were not seen; few domains are stated, each with who states it. How the
+tables read:
 
-- *restitution curve*: e_out over e, both from 0 to 1. Dashed is e_out = e; the claimed domain is shaded, where it
-  is not the whole.
+- *restitution curve*: e_out over e, both from 0 to 1. Dashed is e_out = e; the stated domain is shaded.
 - *key*: what a config calls the law, and the names of its later publications, which do as well.
 - *ends at*: where the contact does, at zero indentation, at the permanent indentation or already at zero force.
 - *n*: the law's own, or any. A number in brackets behind an equation is its number in Gharib and Hurmuzlu (2012).
@@ -69,6 +70,13 @@ points lie inside. How the tables read:
   logarithmic scale. The balls are those of Table 1 there: {balls}.
   A parameter without a default is {damping} above its least in the contact's own units, K = m = v₀ = 1, at
   1 m/s, a depth the peak of the elastic impact; K is that of 1 m/s at every speed.
+
+## Evidence
+
+Every entry says how far its formula is known. *Seen*: read in the source that is named, with its commit or date.
+*Derived*: follows from mathematics at the place that is named. *Disputed*: sources contradict each other. *Not
+verified*: no public source of the formula was found; it may be right. A DOI stands only where it was read, and the
+entry says where. These {count} entries are {evidence}.
 {families}
 
 ## Laws that do not do what they are taken for
@@ -77,7 +85,8 @@ points lie inside. How the tables read:
 
 ## Left out
 
-The force of these could not be substantiated, and a guess would pass for their authors' word.
+No public source of the force of most of these was found, and a guess would pass for their authors' word. Others do
+not fit the contract, as they say.
 
 {left_out}
 """
@@ -101,6 +110,9 @@ FAMILIES = {
     "the impact is elastic, e_out = 1, and beyond it the restitution falls with the speed (with `johnson-1985`, "
     "fully plastic from there on, at once to no more than √0.8). The force does not depend on the rate, so that "
     "e_out² is the work that comes back over the work that went in.",
+    "adhesive": "The balls attract each other where they touch. What pulling them apart takes is lost, so that "
+    "the "
+    "restitution grows with the speed from zero at a sticking speed, below which the balls stay together.",
     "codes": "Laws of multibody, robotics and granular codes that no paper has under a name of its own, in the "
     "parameters that those codes use. Where no K is given it is that of the Hertz contact, or by the code's own "
     "rule.",
@@ -112,10 +124,12 @@ LEFT_OUT = {
         "Poursina and Nikravesh (2020), optimal damping",
         "Wang and Liu (2020), viscoelastic",
         "Yu, Chu, Li and Guan (2020), piecewise",
-        "Hu and Guo as one public code has it (2016), probably by a slip; `hu-guo-2015` has the other coefficient",
+        "Hu and Guo with 3(1 − e)/(4e), as one public code has it; `hu-guo-2015` has the other coefficient",
+        "Zener (1941), energy lost in waves: no public source of its constant was found",
     ),
     "Elastic-plastic laws": (
-        "Ghaednia, Brake, Berryhill and Jackson (2019), of which only the loading is given",
+        "Ghaednia, Brake, Berryhill and Jackson (2019): its loading is public, with two unloadings of other "
+        "papers",
         "Chang and Ling (1992)",
         "Vu-Quoc and Zhang (1999), with an additive contact radius",
         "Stronge (2000), elasto-plastic indentation",
@@ -129,10 +143,14 @@ LEFT_OUT = {
     ),
     "Options of programs": (
         "Adams POISSON (1990), a penalty with a restitution",
-        "SmoothSphereHalfSpaceForce of OpenSim (2019), whose force is not zero where the contact begins, nor "
-        "before",
-        "the Edinburgh elasto-plastic adhesive law (2014)",
-        "MDR of LAMMPS (2024)",
+        "SmoothSphereHalfSpaceForce of OpenSim (2019), whose constants are public: its force is not zero where "
+        "the "
+        "contact begins, nor before, so that the impact has no begin",
+        "MDR of LAMMPS (2024), whose source is public: its force depends on the whole surface of a particle",
+        "DMT of LAMMPS and YADE, Hertz less a constant: it gives back all energy at every speed, and has no "
+        "sticking "
+        "speed, unless a damping stands beside it",
+        "the option viscous of LIGGGHTS hooke, whose damping depends on the speed of the moment",
     ),
 }
 
@@ -157,7 +175,7 @@ def first_cells(model: ForceModel) -> list[str]:
 
 # the first column is as wide as its picture because its name is not broken
 FIRST = ("restitution&nbsp;curve, key", "equation", "ends at", "n")
-BY_E = (*FIRST, "claimed for", *(f"error below {bound:g}" for bound in BOUNDS), "largest error")
+BY_E = (*FIRST, "said to hold for", *(f"error below {bound:g}" for bound in BOUNDS), "largest error")
 BY_OWN = (*FIRST, "parameters", "e_out of the curve")
 
 
@@ -195,8 +213,10 @@ def source(model: ForceModel) -> str:
     """A law's reference and how far it is known, as an item of a list."""
     doi = f", [doi:{cell(model.doi)}](https://doi.org/{quote(model.doi, safe='/:;')})" if model.doi else ""
     same = f" The same law as `{model.same_as}`." if model.same_as else ""
-    evidence = f" Evidence: {cell(model.evidence)}." if model.evidence else ""
-    return f"- `{model.key}`, {model.title} ({model.year}): {cell(model.reference)}{doi}.{evidence}{same}"
+    evidence = cell(str(model.evidence))
+    return (
+        f"- `{model.key}`, {model.title} ({model.year}): {cell(model.reference)}{doi}. Evidence: {evidence}.{same}"
+    )
 
 
 def family_section(family: str, members: Sequence[ForceModel]) -> str:
@@ -216,6 +236,8 @@ def models_page() -> str:
         balls=f"{BALLS['m1']:g} kg, E = {MATERIAL['E'] / 1e9:g} GPa, ν = {MATERIAL['nu']:g} and "
         f"ρ = {MATERIAL['rho']:g} kg/m³; a yield strength is {MATERIAL['yield_strength'] / 1e6:g} MPa",
         damping=DAMPING,
+        count=len(catalogue()),
+        evidence=summary(model.evidence for model in catalogue().values()),
         families="\n".join(family_section(family, list(members)) for family, members in families),
         claims=claims(),
         left_out="\n".join(left_out),

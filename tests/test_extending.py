@@ -145,7 +145,8 @@ def test_all_is_what_is_built_in_whatever_is_installed(cli: Run, tmp_path: Path)
     site = install(tmp_path, LAWS)
     text = SWEEP.replace(
         '["ours-2026", "hertz"]',
-        '["all", "!*voigt*", "!family:rate-dependent", "!family:elastic-plastic", "!family:codes"]',
+        '["all", "!*voigt*", "!family:rate-dependent", "!family:elastic-plastic", "!family:adhesive", '
+        '"!family:codes"]',
     )
     steel = '[materials.steel]\nE = "210 GPa"\nnu = 0.3\nrho = 7850\n'
     (tmp_path / "all.toml").write_text(text.replace("K = 6e9", 'material = "steel"') + steel, encoding="utf-8")

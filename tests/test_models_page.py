@@ -63,7 +63,7 @@ def test_pictures_are_named_and_stay_in_their_frame(name: str) -> None:
     [
         "| `hunt-crossley-1975` | 0.4877 |",
         "| `lankarani-nikravesh-1990` | 0.6630 |",
-        "| `lankarani-nikravesh-1990` | 0.9 ≤ e ≤ 1 | 0.0132 at 0.9 |",
+        "| `lankarani-nikravesh-1990` | 0.9 ≤ e ≤ 1 (Gharib and Hurmuzlu 2012) | 0.0132 at 0.9 |",
         "| `gharib-hurmuzlu-2012` | 0.5936 |",
         "| `thornton-cummins-cleary-2013` | 0.9846 |",
         "| `lee-wang-1983` | 0.500 | 0.9524 |",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -92,6 +92,7 @@ def _print_models(models: Sequence[ForceModel]) -> None:
     """The catalogue, a line a model, family by family."""
     from rich.text import Text
 
+    from ..contact.evidence import summary
     from .console import console, table
 
     out = console(sys.stdout)
@@ -122,15 +123,8 @@ def _print_models(models: Sequence[ForceModel]) -> None:
         out.print("\nThe columns e=... show the restitution that a model delivers when it is asked for e.")
     out.print('The core is what integrates a law, or a phase of it, where numba is installed (extra "fast").')
     out.print("A law with [parameters] of its own is driven by them; `impact models KEY` describes one in full.")
-    out.print(f"Evidence for the formulas of these {len(models)} entries: {evidence_counts(models)}.")
-
-
-def evidence_counts(models: Iterable[ForceModel]) -> str:
-    """How many models are in each state of evidence, in one line."""
-    from ..contact.evidence import STATES
-
-    states = [model.evidence.state for model in models]
-    return ", ".join(f"{states.count(state)} {state}" for state in STATES if state in states)
+    counts = summary(model.evidence for model in models)
+    out.print(f"Evidence for the formulas of these {len(models)} entries: {counts}.")
 
 
 def _print_model(model: ForceModel) -> None:

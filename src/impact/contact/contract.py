@@ -16,8 +16,7 @@ from .power import Array
 from .status import FIRST_FAILURE, Status
 from .units import dimension
 
-# a strongly damped law that pulls until the gap closes takes tens of thousands of steps
-RTOL, MAX_STEPS = 1e-10, 50_000
+RTOL, MAX_STEPS = 1e-10, 10_000
 # what rounding leaves of an identity, relative to its largest term
 ROUNDING = 1e-12
 

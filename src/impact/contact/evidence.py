@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -46,3 +47,13 @@ class Evidence:
         source = f" in {self.source}" if self.state == "seen" else f": {self.source}" if self.source else ""
         doi = f"; DOI seen in {self.doi}" if self.doi else ""
         return self.state + source + doi + (f"; {self.note}" if self.note else "")
+
+
+def summary(evidence: Iterable[Evidence]) -> str:
+    """How many are in each state.
+
+    >>> summary([Evidence("derived", "here"), Evidence("seen", "there"), Evidence("seen", "there")])
+    '2 seen, 1 derived'
+    """
+    states = [one.state for one in evidence]
+    return ", ".join(f"{states.count(state)} {state}" for state in STATES if state in states)

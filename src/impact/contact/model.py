@@ -38,7 +38,7 @@ class Parameter:
 
     `unit` is an SI unit, whose exponents may contain n ("N/m^n") and dimensionless parameters; `least` and `most`
     are the closed interval of its values; `default` is None where the user has to give it; `typical` is a value
-    in that unit for checks and pictures, where the contact's own units are no measure of it.
+    in that unit for checks, where the contact's own units are no measure of it.
 
     >>> Parameter("c", "N s/m", "damping constant", default=100.0, least=0.0).unit
     'N s/m'

@@ -59,7 +59,8 @@ LIGGGHTS_EDINBURGH = ForceModel(
     equation="F = K δⁿ;  back F = max(k₂(δⁿ − δₚⁿ), −k_a δ^χ),  δₚ = (1 − K/k₂)^(1/n) δₘ,  k_a = f/d^χ,  f = "
     "min((3/2)π "
     "Γ a, k₂ δₚⁿ/2),  a the radius of the spheres' intersection at δₚ;  K = 2E* R* for n = 1, else (4/3)E* √R*",
-    reference="LIGGGHTS-PUBLIC, model edinburgh by Mohanty R and Zorec TM, with coefficientRestitution 1, fixKc "
+    reference="LIGGGHTS-PUBLIC, model edinburgh by Mohanty R and Zorec TM (2017), with coefficientRestitution 1, "
+    "fixKc "
     "off and "
     "no pullOffForce",
     evidence=Evidence(

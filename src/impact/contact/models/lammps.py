@@ -118,7 +118,8 @@ def viscoelastic(exponent: float) -> Maker:
         drag,
         c=lambda eta, m, R1, R2: eta * m * np.sqrt(1 / (1 / R1 + 1 / R2)),
         q=0.5,
-        parameters=VISCOELASTIC,
+        # a linear spring is slow to overcome so strong a damping, which takes steps in proportion to it
+        parameters=(replace(VISCOELASTIC[0], typical=1e3),) if exponent == 1.0 else VISCOELASTIC,
         exponent=exponent,
     )
 

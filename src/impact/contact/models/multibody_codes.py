@@ -376,7 +376,7 @@ MUJOCO_SOLREF_DIRECT = ForceModel(
     evidence=MUJOCO_EVIDENCE,
     parameters=(
         Parameter("k", "1/s^2", "stiffness per effective mass, the negative first number of solref", least=1e-9),
-        Parameter("b", "1/s", "damping per effective mass, the negative second number", default=0.0, least=0.0),
+        Parameter("b", "1/s", "damping per effective mass, the negative second number", least=0.0),
     ),
     stiffness=lambda m, k: m * k,
     force=lambda x, v, m, k, b: m * (k * x + b * v),

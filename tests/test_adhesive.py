@@ -1,0 +1,149 @@
+"""Adhesive laws: the neck, the sticking speed, and LIGGGHTS' Edinburgh law step by step as its source has it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import impact
+from impact.contact.collide import Contact, collide
+from impact.contact.models import find
+from impact.contact.oracles import jkr_root
+from impact.contact.status import Status
+
+from .problems import impacts
+
+GAMMA = 0.2
+# balls of 10 µg, of which adhesion takes much at some centimetres a second
+SMALL = {"m1": 1e-8, "m2": 2e-8, "E1": 2e9, "E2": 56e9}
+
+
+def struck(key: str, n: float = 1.5, **given) -> Contact:
+    return collide(find(key), impacts(n, **given), rtol=1e-10, max_steps=10_000)
+
+
+def sticking_speed(contact: Contact) -> float:
+    """Thornton and Ning (1998), equation (54)."""
+    lanes = contact.lanes
+    R, E = 1 / (1 / lanes.R1[0] + 1 / lanes.R2[0]), 1 / (0.91 / lanes.E1[0] + 0.91 / lanes.E2[0])
+    return float(np.sqrt(14.18 / lanes.m[0]) * (GAMMA**5 * R**4 / E**2) ** (1 / 6))
+
+
+def test_balls_with_a_neck_rebound_by_thornton_and_ning_and_stick_below_a_speed():
+    vs = sticking_speed(struck("jkr-1971", v1=1.0, parameters={"gamma": GAMMA}, **SMALL))
+    ratio = np.array([0.1, 0.5, 0.99, 1.01, 1.1, 2.0, 10.0, 1e3])
+    contact = struck("jkr-1971", v1=ratio * vs, parameters={"gamma": GAMMA}, **SMALL)
+    expected = np.sqrt(np.maximum(1 - 1 / ratio**2, 0.0))
+    # 14.18 has four digits
+    assert contact.e_out == pytest.approx(expected, abs=2e-3)
+    assert contact.oracle_error == pytest.approx(np.zeros(8), abs=1e-9)
+    assert contact.status.tolist() == [Status.LIMIT] * 3 + [Status.OK] * 5
+    assert np.isnan(contact.duration).tolist() == [True] * 3 + [False] * 5
+
+
+def test_a_neck_begins_with_eight_ninths_of_its_pull_and_breaks_at_five_ninths():
+    sweep = {"v1": 1.0, "m1": 1e-8, "m2": 2e-8, "E": 2e9}
+    config = {
+        "models": "jkr-1971",
+        "sweep": {name: value for name, value in sweep.items() if name != "E"} | {"material": "soft"},
+        "materials": {"soft": {"E": 2e9, "nu": 0.3, "rho": 2712.0}},
+        "model": {"jkr-1971": {"gamma": GAMMA}},
+    }
+    shot = impact.run(config)
+    force, delta = shot.history["F"].values, shot.history["delta"].values
+    R1, R2 = ((3 * m / (4 * np.pi * 2712.0)) ** (1 / 3) for m in (1e-8, 2e-8))
+    R, E = R1 * R2 / (R1 + R2), 2e9 / (2 * 0.91)
+    pull = 1.5 * np.pi * GAMMA * R
+    assert force[0] == pytest.approx(-8 / 9 * pull, rel=1e-9)
+    assert force[-1] == pytest.approx(-5 / 9 * pull, rel=1e-4)
+    assert force.min() == pytest.approx(-pull, rel=1e-2)
+    assert delta[-1] == pytest.approx(-0.75 * (np.pi**2 * GAMMA**2 * R / E**2) ** (1 / 3), rel=1e-9)
+    assert shot.values["permanent_indentation"] == pytest.approx(delta[-1], rel=1e-12)
+
+
+def test_without_adhesion_a_neck_is_hertz():
+    neck = struck("jkr-1971", v1=[0.01, 1.0], parameters={"gamma": 0.0})
+    hertz = struck("hertz", v1=[0.01, 1.0])
+    assert neck.e_out == pytest.approx([1.0, 1.0], abs=1e-9)
+    assert neck.peak_indentation == pytest.approx(hertz.peak_indentation, rel=1e-9)
+    assert neck.duration == pytest.approx(hertz.duration, rel=1e-9)
+
+
+def test_the_contact_radius_of_a_neck_is_the_largest_root():
+    b, R = 0.3, 2.0
+    least = -0.75 * b * (0.25 * b * R) ** (1 / 3)
+    x = np.concatenate([least * (1 - np.geomspace(1e-9, 1.0, 50)), np.geomspace(1e-9, 1e6, 100)])
+    y = jkr_root(x, R, b)
+    scale = np.maximum(np.abs(x), -least)
+    assert np.abs(y**4 / R - b * y - x).max(initial=0.0, where=x < 1e3) < 1e-12
+    assert np.all(np.abs(y**4 / R - b * y - x) < 1e-13 * scale + 1e-15)
+    # on the branch where the contact radius grows with the indentation
+    assert np.all(4 * y**3 / R >= b * (1 - 1e-6))
+
+
+def edinburgh(n: float, K: float, k2: float, gamma: float, chi: float, R1: float, R2: float, m: float, v0: float):
+    """The restitution by the steps of normal_model_edinburgh.h, e = 1, fixKc off, in 400,000 steps of leapfrog."""
+    lam = (1 - 1 / k2) ** (1 / n)
+    dt = 2.94 * ((n + 1) * m * v0**2 / (2 * K)) ** (1 / (n + 1)) / v0 / 400_000
+    x, v, p = 0.0, v0, 0.0
+    adhesion = 0.0
+    for _ in range(1_600_000):
+        x += dt * v
+        if x <= 0.0:
+            break
+        if lam * x > p:
+            p = lam * x
+            distance = R1 + R2 - p
+            square = 4 * distance**2 * R1**2 - (distance**2 - R2**2 + R1**2) ** 2
+            pull, most = 1.5 * np.pi * gamma * np.sqrt(max(square, 0.0)) / (2 * distance), K * k2 * p**n / 2
+            depth = p / 2 if pull > most else ((K * k2 * p**n - pull) / (K * k2)) ** (1 / n)
+            adhesion = min(pull, most) / depth**chi
+        force = min(K * x**n, max(K * k2 * (x**n - p**n), -adhesion * x**chi))
+        v -= dt * force / m
+    return max(-v / v0, 0.0) if x <= 0.0 else 0.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("n", [1.0, 1.5])
+@pytest.mark.parametrize(("k2", "chi"), [(2.0, 1.0), (5.0, 1.0), (3.0, 1.5)])
+@pytest.mark.parametrize("gamma", [0.0, 40.0])
+def test_the_edinburgh_law_is_the_one_that_liggghts_steps_through(n, k2, chi, gamma):
+    K, m1, m2, v0, R = 1e5 * 1e3 ** (n - 1), 0.01, 0.02, 0.5, 0.01
+    own = {"k2": k2, "gamma": gamma, "adhesion_exponent": chi}
+    contact = struck("liggghts-edinburgh", n, v1=v0, m1=m1, m2=m2, K=K, R1=R, R2=2 * R, parameters=own)
+    m = m1 * m2 / (m1 + m2)
+    assert contact.e_out[0] == pytest.approx(edinburgh(n, K, k2, gamma, chi, R, 2 * R, m, v0), abs=2e-5)
+    assert abs(contact.oracle_error[0]) < 1e-9
+    # without surface energy a linear one is the bilinear law
+    if gamma == 0.0 and n == 1.0:
+        assert contact.e_out[0] == pytest.approx(np.sqrt(1 / k2), abs=1e-9)
+
+
+def test_the_edinburgh_law_sticks_and_ends_where_its_surface_energy_says():
+    lanes = impacts(1.5, v1=np.geomspace(0.003, 1.0, 12), m1=0.01, m2=0.02, K=1e7)
+    own = {"k2": np.full(12, 3.0), "gamma": np.full(12, 40.0), "adhesion_exponent": np.ones(12)}
+    lanes = impacts(1.5, v1=lanes.v1, m1=0.01, m2=0.02, K=1e7, parameters=own)
+    sticky = collide(find("liggghts-edinburgh"), lanes, rtol=1e-10, max_steps=10_000)
+    assert sticky.status[0] == Status.LIMIT
+    assert sticky.status[-1] == Status.OK
+    assert np.all(np.diff(sticky.e_out) >= 0.0)
+    assert np.abs(sticky.oracle_error).max() < 1e-9
+    parted = sticky.status == Status.OK
+    assert sticky.permanent_indentation[parted] == pytest.approx(0.0, abs=1e-12)
+    dry = struck(
+        "liggghts-edinburgh", v1=0.5, K=1e7, parameters={"k2": 3.0, "gamma": 0.0, "adhesion_exponent": 1.0}
+    )
+    assert dry.permanent_indentation / dry.peak_indentation == pytest.approx([(2 / 3) ** (2 / 3)], rel=1e-9)
+
+
+def test_the_stiffness_of_the_edinburgh_law_depends_on_its_exponent():
+    config = {
+        "models": "liggghts-edinburgh",
+        "sweep": {"v1": 0.1, "m1": 1.0, "m2": 1.0, "R1": 0.02, "R2": 0.06, "material": "soft", "n": [1.0, 1.5]},
+        "materials": {"soft": {"E": 2e9, "nu": 0.3, "rho": 2712.0}},
+        "model": {"liggghts-edinburgh": {"k2": 2.0, "gamma": 1.0}},
+    }
+    R, E = 0.015, 2e9 / (2 * 0.91)
+    assert impact.sweep(config)["stiffness"].values.ravel() == pytest.approx(
+        [2 * E * R, 4 / 3 * E * np.sqrt(R)], rel=1e-12
+    )
