@@ -59,7 +59,7 @@ ENTRIES = (
     Entry(
         "map", "speeds", "",
         "The error of the restitution over restitution and speed. Laws that e drives do not depend on the speed; "
-        "Thornton's yields, so that it gives one restitution at each; Modia3D asks for less at low speed.",
+        "Thornton's yields, so that it gives one restitution at each; Modia3D takes e for 0 up to 0.1 m/s here.",
     ),
     Entry("validity", "speeds", "", "Which of them is closest, and how close."),
     Entry(
