@@ -24,6 +24,7 @@ from impact.contact.model import ForceModel, Parameter
 from impact.contact.models import catalogue
 from impact.errors import ConfigError
 from impact.sweeps.config import Config, Output, Solver, json_schema, parse_config, read_config
+from impact.sweeps.rules import expand_models
 from impact.text import safe_text
 
 ROOT = Path(__file__).parents[1]
@@ -685,6 +686,31 @@ def test_the_schema_refuses(old: str, new: str) -> None:
     text = changed(old, new)
     assert problems(text)
     assert not jsonschema.Draft202012Validator(SCHEMA).is_valid(tomllib.loads(text))
+
+
+@pytest.mark.parametrize(
+    ("models", "accepted"),
+    [
+        ('["all", "!hertz"]', True),
+        ('["all", "!family:hysteresis"]', True),
+        ('["all", "hertz", "!lankarani-*"]', True),
+        ('["hertz", "[l]ankarani-*", "!hertz"]', True),
+        ('"!hertz"', False),
+        ('["!hertz", "all"]', False),
+        ('["all", "!hetrz"]', False),
+        ('["all", "!family:hystersis"]', False),
+        ('["all", "!!hertz"]', False),
+        ('["all", "!!h*"]', False),
+        ('["all", "!"]', False),
+        ('"family:hyst*"', False),
+        ('["all", "!family:hyst*"]', False),
+    ],
+)
+def test_the_schema_accepts_the_models_that_the_reader_accepts(models: str, accepted: bool) -> None:
+    data = tomllib.loads(changed('["lankarani-nikravesh-1990"]', models))
+    faults = expand_models(data["models"], catalogue())[1]
+    assert (not faults) is accepted
+    assert jsonschema.Draft202012Validator(SCHEMA).is_valid(data) is accepted
 
 
 def test_the_schema_names_every_key_with_its_unit() -> None:
