@@ -12,7 +12,7 @@ import typer
 from ..errors import ImpactError, UsageError
 from ..text import safe_text
 from . import door
-from .options import Plugins, Quiet
+from .options import MaxPoints, Plugins, Quiet
 from .words import dump, tolerances
 
 if TYPE_CHECKING:
@@ -101,6 +101,7 @@ def rerun(
     plugins: Plugins = None,
     tol: Tol = None,
     subset: Subset = False,
+    max_points: MaxPoints = 10**9,
     format: Formats = Format.table,
     plot: Plot = None,
     quiet: Quiet = False,
@@ -114,7 +115,7 @@ def rerun(
         _check_plot(plot, result)
         try:
             verdict = api.rerun(
-                result, plugins=plugins or (), tol=tolerances(tol), subset=subset,
+                result, plugins=plugins or (), tol=tolerances(tol), subset=subset, max_points=max_points,
                 execute=lambda plan: summary.execute(plan, stopping, quiet=quiet),
             )  # fmt: skip
         except ImpactError as error:

@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import xarray as xr
+
 from ..errors import ResultError, UsageError
-from ..sweeps.config import Config, parse_config, read_config
+from ..sweeps.config import Axis, Config, parse_config, read_config
+from ..sweeps.grid import MAX_POINTS
 from ..sweeps.plugins import Plugins
 from ..text import safe_text
+from .align import matched
 from .survey import outlined
 
 STARTER = files("impact") / "sweeps" / "starter.toml"
@@ -49,7 +55,11 @@ def _is_result(path: Path) -> bool:
 
 
 def stored_config(
-    attributes: Mapping[str, object], overrides: Sequence[str], plugins: Plugins, name: str
+    attributes: Mapping[str, object],
+    overrides: Sequence[str],
+    plugins: Plugins,
+    name: str,
+    max_points: int = MAX_POINTS,
 ) -> Config:
     """The config of the sweep that a result came from.
 
@@ -59,6 +69,7 @@ def stored_config(
     overrides : changes to its config, after those that it was made with
     plugins : models that are not built in, those that it was made with among them
     name : of the result, for messages
+    max_points : refuse a sweep of more points
 
     Raises
     ------
@@ -72,7 +83,25 @@ def stored_config(
     stored = _json(attributes, "config_set", name)
     if not (isinstance(text, str) and isinstance(stored, list) and all(isinstance(one, str) for one in stored)):
         raise ResultError(f"{safe_text(name)}: its attributes config and config_set are not those of a result")
-    return parse_config(text, [*stored, *overrides], plugins.models, name=name)
+    return parse_config(text, [*stored, *overrides], plugins.models, name, max_points)
+
+
+def part_of(config: Config, dataset: xr.Dataset) -> Config:
+    """The part of a config that a result holds: its axes with the values that are labels there.
+
+    An axis without such a value keeps its first one, at which a comparison shows the difference.
+    """
+    axes = []
+    for axis in config.axes:
+        held = {name: dataset.coords[name] for name in axis.columns if name in dataset.coords}
+        first = next(iter(held.values()), None)
+        names = [name for name, labels in held.items() if first is not None and labels.dims == first.dims]
+        values = [np.asarray(axis.columns[name]) for name in names]
+        labels = [np.ravel(held[name].values) for name in names]
+        places = sorted(matched(values, labels)[0].tolist()) if names else []
+        chosen = np.array(places or [0])
+        axes.append(Axis({name: tuple(np.asarray(v)[chosen].tolist()) for name, v in axis.columns.items()}))
+    return replace(config, axes=tuple(axes))
 
 
 def check_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str) -> None:
