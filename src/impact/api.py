@@ -130,7 +130,8 @@ def run(
     model : key of the model; by default the first of the source
     at : values by config name, such as `{"e": 0.05}`; an axis that is not named takes its first value
     overrides : changes to the config, such as `"sweep.m2=2"`
-    plugins : models of one's own, and paths of Python files; a result made with such wants them again
+    plugins : models of one's own, and paths of Python files; a result made with such needs them again, and
+        a changed one gives a warning with both hashes
 
     Raises
     ------
@@ -164,7 +165,7 @@ def rerun(
     Parameters
     ----------
     result : the file
-    plugins : the models of one's own that it was made with, the same to the byte
+    plugins : the models of one's own that it was made with; a note of the verdict names one that has changed
     tol, subset : see `compare`
     max_points : refuse a config of more points
     execute : runs a plan
@@ -188,7 +189,7 @@ def rerun(
     solver = (f"solver.{name}={stored.attrs.get(name)}" for name in ("rtol", "max_steps"))
     # whichever core is here: they agree
     changes = [f"models={json.dumps(keys)}", *solver, 'solver.core="auto"']
-    config = stored_config(stored.attrs, changes, own, str(result), max_points)
+    config = stored_config(stored.attrs, changes, own, str(result), max_points, allow_changed_plugins=True)
     whole = Plan(config, own.of(config.models))
     plan = replace(whole, config=part_of(config, stored))
     verdict = compare(execute(plan), stored, tol=tol, subset=subset)

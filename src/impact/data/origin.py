@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib.resources import files
@@ -35,7 +36,11 @@ def config_of(
         return read_config(source, overrides, plugins.models)
     path = Path(source)
     if _is_result(path):
-        return stored_config(outlined(path).attrs, overrides, plugins, str(path))
+        attributes = outlined(path).attrs
+        config = stored_config(attributes, overrides, plugins, str(path), allow_changed_plugins=True)
+        for note in changed_plugins(attributes, plugins, str(path)):
+            warnings.warn(note, stacklevel=2)
+        return config
     return read_config(path, overrides, plugins.models)
 
 
@@ -60,6 +65,8 @@ def stored_config(
     plugins: Plugins,
     name: str,
     max_points: int = MAX_POINTS,
+    *,
+    allow_changed_plugins: bool = False,
 ) -> Config:
     """The config of the sweep that a result came from.
 
@@ -70,16 +77,20 @@ def stored_config(
     plugins : models that are not built in, those that it was made with among them
     name : of the result, for messages
     max_points : refuse a sweep of more points
+    allow_changed_plugins : accept another version of a model of one's own; see `changed_plugins`
 
     Raises
     ------
-    UsageError : it is a time history, or was made with a model that is not given
+    UsageError : it is a time history, or was made with a model that is not given, or is another version
     ResultError, ConfigError : what it carries cannot be read, or is no config here
     """
     text = attributes.get("config")
     if text is None:
         raise UsageError(f"{safe_text(name)}: holds no config; it is a time history")
     check_plugins(attributes, plugins, name)
+    changed = () if allow_changed_plugins else changed_plugins(attributes, plugins, name)
+    if changed:
+        raise UsageError(changed[0])
     stored = _json(attributes, "config_set", name)
     if not (isinstance(text, str) and isinstance(stored, list) and all(isinstance(one, str) for one in stored)):
         raise ResultError(f"{safe_text(name)}: its attributes config and config_set are not those of a result")
@@ -105,7 +116,7 @@ def part_of(config: Config, dataset: xr.Dataset) -> Config:
 
 
 def check_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str) -> None:
-    """Refuse if a model of one's own that a result was made with is not given again, the same to the byte.
+    """Refuse if a model of one's own that a result was made with is not given again.
 
     Nothing is imported because a result names it: what it names is compared with what is given, and told.
 
@@ -117,7 +128,7 @@ def check_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str)
 
     Raises
     ------
-    UsageError : one is missing, or is another version
+    UsageError : one is missing
     ResultError : the attribute cannot be read
 
     >>> check_plugins({"plugins": '{"mine": {"file": "my.py", "sha256": "12ab"}}'}, Plugins(), "results.h5")
@@ -136,12 +147,24 @@ def check_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str)
         raise UsageError(
             f"{shown}: made with {safe_text(told)}; give {again} again with {' and '.join(sorted(ways))}"
         )
-    for key, one in made.items():
-        if one["sha256"] != given[key]["sha256"]:
-            raise UsageError(
-                f"{shown}: was made with another version of {safe_text(_origin(one) or f'the model {key}')}: its "
-                f"SHA-256 is {safe_text(str(one['sha256']), 64)}, this one's is {given[key]['sha256']}"
-            )
+
+
+def changed_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str) -> tuple[str, ...]:
+    """A sentence for each model that a result was made with and that is given in another version.
+
+    Parameters
+    ----------
+    attributes : of the result
+    plugins : what is given now, all that the result was made with among them
+    name : of the result, for messages
+    """
+    given = plugins.record
+    return tuple(
+        f"{safe_text(name)}: was made with another version of {safe_text(_origin(one) or f'the model {key}')}: "
+        f"its SHA-256 is {safe_text(str(one['sha256']), 64)}, this one's is {given[key]['sha256']}"
+        for key, one in _made_with(attributes, name).items()
+        if one["sha256"] != given[key]["sha256"]
+    )
 
 
 def _origin(one: Mapping[str, str | None]) -> str | None:
