@@ -27,7 +27,9 @@ def sweep(
     scheduler: Annotated[
         str | None,
         typer.Option(
-            "--scheduler", metavar="ADDRESS", help="Dask's workers integrate: tcp://host:8786, or local."
+            "--scheduler",
+            metavar="ADDRESS",
+            help="Dask's workers integrate: tcp://host:8786, or local (ports on 127.0.0.1 without authentication).",
         ),
     ] = None,
     scheduler_file: Annotated[
@@ -89,7 +91,7 @@ def sweep(
         else:
             for source in (config, *(plugins or ())):
                 store.check_output(output, overwrite=overwrite, source=source)
-            with who.team(quiet=quiet) as team, progress.progress(quiet=quiet) as tell:
+            with who.team(quiet=quiet, should_stop=stopping) as team, progress.progress(quiet=quiet) as tell:
                 found = sweep_into(
                     output, plan, resume=resume, overwrite=overwrite, team=team, tell=tell,
                     stopping=stopping,

@@ -113,11 +113,13 @@ def _finished(
     """Give what is left, as many blocks at a time as there is room for, and take them as they finish."""
     try:
         while left or given:
-            while left and len(given) < room() and not stopping():
+            # asked in every round, also where nothing is left to give: it raises if nobody answers any more
+            most = room()
+            while left and len(given) < most and not stopping():
                 given[give(left[0])] = left[0]
                 left.popleft()
             # what was begun is finished, unless there is nobody left to do it
-            if stopping() and not (given and room()):
+            if stopping() and not (given and most):
                 return
             if not given:
                 # nobody is there yet
