@@ -7,6 +7,7 @@ import hashlib
 import json
 import os
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -391,3 +392,63 @@ def test_the_hash_of_a_value_is_the_same_in_the_next_process(tmp_path: Path) -> 
     told = [subprocess.run(command, capture_output=True, text=True, check=True).stdout.split() for _ in range(2)]
     assert told[0] == told[1]
     assert len(set(told[0])) == 5
+
+
+BRANCHING = """\
+import numpy as np
+from impact import ForceModel, Parameter
+
+def helper(e):
+    if e > 0.5:
+        return 1.0
+    return 2.0
+
+def force(elastic, v, e):
+    return elastic * (1 + helper(e) * v)
+
+def partly(elastic, e):
+    if (e < 0.3).any():
+        raise KeyError("no such e")
+    return np.linalg.solve(np.zeros((2, 2)), np.ones(2)) if (e > 0.7).any() else elastic
+
+BRANCHING = ForceModel("branching", "Branching", 2026, "F", "", force=force)
+PARTLY = ForceModel("partly", "Partly", 2026, "F", "", force=partly)
+# enough trajectories that others integrate too
+MANY = ForceModel(
+    "many", "Many", 2026, "F", "", force=lambda elastic, e, c: elastic + 0 * e * c,
+    parameters=(Parameter("c", "1", "c"),),
+)
+"""
+AMBIGUOUS = (
+    "note: branching.py:5: model branching: ValueError: The truth value of an array with more than one element is "
+    "ambiguous. Use a.any() or a.all(); formulas work on arrays: use np.where instead of if"
+)
+
+
+@pytest.mark.parametrize("words", [(), ("--jobs", "2"), ("--threads", "2")])
+def test_an_error_of_a_law_is_printed_once_with_its_place(forked: Forked, folder: Path, words: list[str]) -> None:
+    (folder / "branching.py").write_text(BRANCHING, encoding="utf-8")
+    changes = (
+        'models=["branching", "partly", "many"]', "sweep.e.linspace=[0.01,0.99,20]",
+        "model.many.c.linspace=[1,2,1700]", "solver.rtol=1e-4",
+    )  # fmt: skip
+    sets = [word for change in changes for word in ("--set", change)]
+    done = forked("sweep", "config.toml", *sets, "--plugin", "branching.py", *words, cwd=folder)
+    assert done.returncode == 3
+    notes = sorted(line for line in done.stderr.splitlines() if line.startswith("note: "))
+    assert notes == [
+        "note: branching.py:14: model partly: KeyError: 'no such e'",
+        "note: branching.py:15: model partly: LinAlgError: Singular matrix",
+        AMBIGUOUS,
+    ]
+
+
+def test_the_replay_of_a_law_that_branches_fails_as_the_sweep_did(forked: Forked, folder: Path) -> None:
+    (folder / "branching.py").write_text(BRANCHING, encoding="utf-8")
+    words = ("config.toml", "--set", 'models=["branching"]', "--plugin", "branching.py", "--allow-failed")
+    done = forked("sweep", *words, "--json", cwd=folder)
+    assert done.returncode == 0
+    again = shlex.split(json.loads(done.stdout)["first_failed"][0]["replay"])
+    done = forked(*again[1:], cwd=folder)
+    assert (done.returncode, done.stderr) == (3, AMBIGUOUS + "\n")
+    assert "model_error" in done.stdout or "raised an error" in done.stdout

@@ -29,7 +29,7 @@ def sweep(
         typer.Option(
             "--scheduler",
             metavar="ADDRESS",
-            help="Dask's workers integrate: tcp://host:8786, or local (ports on 127.0.0.1 without authentication).",
+            help="Dask's workers integrate: tcp://host:8786, or local (127.0.0.1, ports without authentication).",
         ),
     ] = None,
     scheduler_file: Annotated[
