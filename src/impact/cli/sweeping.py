@@ -50,11 +50,15 @@ def sweep(
     with door.signals() as stopping:
         from .. import api
         from ..data import store, survey, work
+        from ..data.plausibility import material_notes
         from ..data.sweeping import sweep_into
         from . import progress, summary
 
         who = Who(jobs, threads, scheduler, scheduler_file)
         plan = api.prepare(config, sets or (), plugins or (), max_points)
+        if not quiet:
+            for note in material_notes({name: vars(one) for name, one in plan.materials_used.items()}):
+                door.say(f"note: {safe_text(str(config))}: {note}")
         if shard is not None:
             from .shards import do
 
