@@ -137,7 +137,8 @@ def test_the_fingerprint_sees_what_a_formula_closes_over() -> None:
 def test_a_force_of_the_wrong_shape_is_an_error_of_the_model() -> None:
     texts = {"key": "short", "title": "", "year": 1, "equation": "", "reference": ""}
     short = impact.ForceModel(**texts, force=lambda elastic, e: (elastic * e)[:1])  # type: ignore[arg-type]
-    status = impact.sweep({"models": "short", "sweep": SWEEP}, plugins=[short])["status"].values
+    with pytest.warns(UserWarning, match=r"^model short: the force has the shape \(1,\), wants \(2,\)$"):
+        status = impact.sweep({"models": "short", "sweep": SWEEP}, plugins=[short])["status"].values
     assert status.tolist() == [[Status.MODEL_ERROR, Status.MODEL_ERROR]]
 
 

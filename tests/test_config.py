@@ -19,11 +19,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import impact
 from impact.contact.material import Material
 from impact.contact.model import ForceModel, Parameter
 from impact.contact.models import catalogue
 from impact.errors import ConfigError
 from impact.sweeps.config import Config, Output, Solver, json_schema, parse_config, read_config
+from impact.sweeps.rules import expand_models
 from impact.text import safe_text
 
 ROOT = Path(__file__).parents[1]
@@ -54,6 +56,7 @@ def model(key: str, force: object = lambda elastic: elastic, **more: object) -> 
 PLASTIC = model("test-plastic", lambda elastic, yield_strength1, yield_strength2: elastic + 0 * yield_strength1)
 RADIUS = model("test-radius", lambda elastic, R1: elastic * R1)
 LINEAR = model("test-linear", exponent=1.0)
+SQUARE = model("test-square", exponent=2.0)
 DRIVEN = model(
     "test-driven",
     lambda elastic, S, c: elastic * S * c,
@@ -62,7 +65,7 @@ DRIVEN = model(
         Parameter("c", "1", "ratio", 2.0, 1, 9),
     ),
 )
-PLUGINS = (PLASTIC, RADIUS, LINEAR, DRIVEN)
+PLUGINS = (PLASTIC, RADIUS, LINEAR, SQUARE, DRIVEN)
 
 
 def changed(old: str = "", new: str = "") -> str:
@@ -245,14 +248,21 @@ BAD = [
     ('"steel"', '"steel"\nmaterial2 = "steel"',
      ["x.toml:9: sweep.material2: given beside material, wants either material, or material1 and material2"]),
     ('["lankarani-nikravesh-1990"]\n[sweep]', '["hertz", "test-linear"]\n[sweep]\nK = 1',
-     ["x.toml:4: sweep.K: got a stiffness for n = 1.5, but test-linear has n = 1 of its own; " "wants that law's own K under [model.test-linear], or none"]),
+     ["x.toml:4: sweep.K: got a stiffness for n = 1.5, but test-linear has n = 1; "
+      "expected n = 1 under [sweep], K under [model.test-linear], or no K"]),
+    ('["lankarani-nikravesh-1990"]\n[sweep]', '["test-linear", "test-square"]\n[sweep]\nK = 1',
+     [f"x.toml:4: sweep.K: got a stiffness for n = 1.5, but {key} has n = {n}; expected K under [model.{key}], or no K"
+      for key, n in (("test-linear", 1), ("test-square", 2))]),
     ('["lankarani-nikravesh-1990"]\n[sweep]', '["test-linear"]\n[sweep]\nK = 1\nn = [1, 2]',
      ["x.toml:4: sweep.K: its unit N/m^n depends on n, which is an axis; wants one K for each n, zipped with it",
-      "x.toml:4: sweep.K: got a stiffness for an axis n, but test-linear has n = 1 of its own; " "wants that law's own K under [model.test-linear], or none"]),
+      "x.toml:4: sweep.K: got a stiffness for an axis n, but test-linear has n = 1; " "expected K under [model.test-linear], or no K"]),
     ('["lankarani-nikravesh-1990"]', '["test-plastic"]',
      ["x.toml:9: materials.steel.yield_strength: missing, wants a number above 0 Pa (asked for by test-plastic)"]),
     ('["lankarani-nikravesh-1990"]', '["test-driven"]',
      ["x.toml:1: model.test-driven.S: missing, wants a number of at least 1 N/m^n: stiffness of the test"]),
+    ("rho = 7850\n", "",
+     ["x.toml:9: materials.steel.rho: missing, expected a number > 0 kg/m^3, or R1 and R2 under [sweep]: "
+      "lankarani-nikravesh-1990 needs a radius"]),
     # zip
     ("e = 0.5", "e = [0, 1]\nzip = 3",
      ['x.toml:5: sweep.zip: got 3, wants a list of groups of names, such as [["m1", "m2"]]']),
@@ -344,11 +354,12 @@ OVERRIDDEN = [
      f"--set sweep.e={'[' * 9}{']' * 9}: sweep.e[0][0][0][0][0][0]: nested too deeply, wants at most 8 levels"),
     (["sweep=3"], "--set sweep=3: sweep: got 3, wants a table"),
     (["solver.rtol.x=1"], "--set solver.rtol.x=1: solver.rtol: got a table, wants a number from 1e-13 to 0.0001"),
-    (["materials.\"a.b\"={E=1, nu=0}"],
-     '--set materials."a.b"={E=1, nu=0}: materials."a.b".rho: missing, wants a number above 0 kg/m^3: density'),
+    (["materials.\"a.b\"={E=1}"],
+     '--set materials."a.b"={E=1}: materials."a.b".nu: missing, '
+     "wants a number above -1 and at most 0.5: Poisson's ratio"),
     # a table that an override made is no place for a key that is missing in it
-    (["materials.new.E=1e9", "materials.new.nu=0.1"],
-     "x.toml: materials.new.rho: missing, wants a number above 0 kg/m^3: density"),
+    (["materials.new.E=1e9"],
+     "x.toml: materials.new.nu: missing, wants a number above -1 and at most 0.5: Poisson's ratio"),
 ]  # fmt: skip
 
 
@@ -566,6 +577,27 @@ def test_a_law_that_asks_for_the_material_wants_one_beside_K() -> None:
     assert read(with_radii.replace("lankarani-nikravesh-1990", "test-radius")).scalars["R1"] == 0.1
 
 
+def test_a_density_is_required_only_where_a_radius_is_derived_from_it() -> None:
+    bare = changed("rho = 7850\n")
+    radii = "R1 = 0.1\nR2 = inf"
+    assert read(bare.replace("e = 0.5", f"e = 0.5\n{radii}")).materials["steel"].rho is None
+    assert read(bare.replace("e = 0.5", "e = 0.5\nK = 1e9")).materials["steel"].rho is None
+    # one radius is given, or the law itself depends on one
+    needs = "x.toml:10: materials.steel.rho: missing, expected a number > 0 kg/m^3, or R{} under [sweep]: {} needs a radius"
+    for line, ball, key in (("R1 = 0.1", 2, "hertz"), ("R2 = 0.1", 1, "hertz"), ("K = 1e9", 1, "test-radius")):
+        text = bare.replace("e = 0.5", f"e = 0.5\n{line}").replace("lankarani-nikravesh-1990", key)
+        assert problems(text) == [needs.format(ball, key)]
+    validator = jsonschema.Draft202012Validator(SCHEMA)
+    assert validator.is_valid(tomllib.loads(bare))
+
+
+def test_a_sweep_with_both_radii_has_the_same_bits_without_a_density() -> None:
+    text = changed("e = 0.5", "e = 0.5\nR1 = 0.1\nR2 = inf")
+    both = [impact.sweep(tomllib.loads(one)) for one in (text, text.replace("rho = 7850\n", ""))]
+    assert both[0].drop_attrs().identical(both[1].drop_attrs())
+    assert np.isfinite(both[1]["e_out"]).all()
+
+
 @pytest.mark.parametrize(
     ("entry", "values"),
     [
@@ -685,6 +717,31 @@ def test_the_schema_refuses(old: str, new: str) -> None:
     text = changed(old, new)
     assert problems(text)
     assert not jsonschema.Draft202012Validator(SCHEMA).is_valid(tomllib.loads(text))
+
+
+@pytest.mark.parametrize(
+    ("models", "accepted"),
+    [
+        ('["all", "!hertz"]', True),
+        ('["all", "!family:hysteresis"]', True),
+        ('["all", "hertz", "!lankarani-*"]', True),
+        ('["hertz", "[l]ankarani-*", "!hertz"]', True),
+        ('"!hertz"', False),
+        ('["!hertz", "all"]', False),
+        ('["all", "!hetrz"]', False),
+        ('["all", "!family:hystersis"]', False),
+        ('["all", "!!hertz"]', False),
+        ('["all", "!!h*"]', False),
+        ('["all", "!"]', False),
+        ('"family:hyst*"', False),
+        ('["all", "!family:hyst*"]', False),
+    ],
+)
+def test_the_schema_accepts_the_models_that_the_reader_accepts(models: str, accepted: bool) -> None:
+    data = tomllib.loads(changed('["lankarani-nikravesh-1990"]', models))
+    faults = expand_models(data["models"], catalogue())[1]
+    assert (not faults) is accepted
+    assert jsonschema.Draft202012Validator(SCHEMA).is_valid(data) is accepted
 
 
 def test_the_schema_names_every_key_with_its_unit() -> None:

@@ -21,7 +21,7 @@ from .data.bless import bless as bless
 from .data.compare import compare as compare
 from .data.impact import Impact as Impact
 from .data.impact import impact_of
-from .data.origin import config_of, picked_out, stored_config
+from .data.origin import config_of, part_of, picked_out, stored_config
 from .data.progress import Tell
 from .data.ranking import Ranking, ranking
 from .data.replay import repeats
@@ -131,7 +131,8 @@ def run(
     model : key of the model; by default the first of the source
     at : values by config name, such as `{"e": 0.05}`; an axis that is not named takes its first value
     overrides : changes to the config, such as `"sweep.m2=2"`
-    plugins : models of one's own, and paths of Python files; a result made with such wants them again
+    plugins : models of one's own, and paths of Python files; a result made with such needs them again, and
+        a changed one gives a warning with both hashes
 
     Raises
     ------
@@ -155,15 +156,19 @@ def rerun(
     plugins: Sequence[ForceModel | str | Path] = (),
     tol: float | Tolerances | None = None,
     subset: bool = False,
+    max_points: int = MAX_POINTS,
     execute: Callable[[Plan], xr.Dataset] = execute,
 ) -> Verdict:
     """Repeat the sweep of a result from its file alone, and judge what comes out by what is in it.
 
+    Only the points that the file holds are repeated, also where its config has more.
+
     Parameters
     ----------
     result : the file
-    plugins : the models of one's own that it was made with, the same to the byte
+    plugins : the models of one's own that it was made with; a note of the verdict names one that has changed
     tol, subset : see `compare`
+    max_points : refuse a config of more points
     execute : runs a plan
 
     Raises
@@ -185,8 +190,13 @@ def rerun(
     solver = (f"solver.{name}={stored.attrs.get(name)}" for name in ("rtol", "max_steps"))
     # whichever core is here: they agree
     changes = [f"models={json.dumps(keys)}", *solver, 'solver.core="auto"']
-    config = stored_config(stored.attrs, changes, own, str(result))
-    verdict = compare(execute(Plan(config, own.of(config.models))), stored, tol=tol, subset=subset)
+    config = stored_config(stored.attrs, changes, own, str(result), max_points, allow_changed_plugins=True)
+    whole = Plan(config, own.of(config.models))
+    plan = replace(whole, config=part_of(config, stored))
+    verdict = compare(execute(plan), stored, tol=tol, subset=subset)
+    if plan.points < whole.points:
+        part = f"repeated {plan.points:,} of {whole.points:,} points of the config: the file holds no others"
+        verdict = replace(verdict, notes=(part, *verdict.notes))
     files = [word for one in plugins if isinstance(one, str | Path) for word in ("--plugin", str(one))]
     again = ("impact", "run", str(result), *files) if repeats(str(result), stored) else ()
     return replace(verdict, new="the rerun", baseline=str(result), repeats=again)

@@ -12,7 +12,7 @@ import typer
 from ..errors import ImpactError, UsageError
 from ..text import safe_text
 from . import door
-from .options import Plugins, Quiet
+from .options import MaxPoints, Plugins, Quiet
 from .words import dump, tolerances
 
 if TYPE_CHECKING:
@@ -80,6 +80,9 @@ def bless(
     baseline: Annotated[Path, typer.Argument(help="The baseline to replace, or to make.")],
     reason: Annotated[str, typer.Option("--reason", help="Why the numbers changed; kept in the baseline.")],
     tol: Tol = None,
+    allow_failed: Annotated[
+        bool, typer.Option("--allow-failed", help="Accept a result with failed points.")
+    ] = False,
 ) -> None:
     """Show how a result differs from its baseline, then let it take the baseline's place."""
     from .. import api
@@ -89,7 +92,9 @@ def bless(
         sys.stdout.flush()
 
     try:
-        verdict = api.bless(new, baseline, reason=reason, tol=tolerances(tol), show=show)
+        verdict = api.bless(
+            new, baseline, reason=reason, tol=tolerances(tol), allow_failed=allow_failed, show=show
+        )
     except (BrokenPipeError, SystemExit):
         raise UsageError(f"{safe_text(str(baseline))}: not replaced, nobody read the verdict to its end") from None
     word = "made" if verdict is None else "replaced"
@@ -101,6 +106,7 @@ def rerun(
     plugins: Plugins = None,
     tol: Tol = None,
     subset: Subset = False,
+    max_points: MaxPoints = 10**9,
     format: Formats = Format.table,
     plot: Plot = None,
     quiet: Quiet = False,
@@ -114,7 +120,7 @@ def rerun(
         _check_plot(plot, result)
         try:
             verdict = api.rerun(
-                result, plugins=plugins or (), tol=tolerances(tol), subset=subset,
+                result, plugins=plugins or (), tol=tolerances(tol), subset=subset, max_points=max_points,
                 execute=lambda plan: summary.execute(plan, stopping, quiet=quiet),
             )  # fmt: skip
         except ImpactError as error:

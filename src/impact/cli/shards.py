@@ -45,7 +45,7 @@ def do(
     from .progress import progress
 
     part = Shard.parse(shard)
-    with who.team(quiet=quiet) as team, progress(quiet=quiet) as tell:
+    with who.team(quiet=quiet, should_stop=stopping) as team, progress(quiet=quiet) as tell:
         done = sweep_shard(
             output, plan, part, command, overwrite=overwrite, team=team, tell=tell, stopping=stopping
         )

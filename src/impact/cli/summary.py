@@ -62,11 +62,15 @@ def conclude(survey: Survey, output: Path, *, fresh: bool, quiet: bool, as_json:
     fresh : whether it was stored just now
     quiet, as_json, allow_failed : as the options of those names
     """
+    from ..data.plausibility import result_notes
+
     told = summary(survey, output)
     if not quiet:
         if fresh:
             with door.readers_may_leave(sys.stderr):
                 print_summary(survey, told)
+            for note in result_notes(survey.tally):
+                door.say(f"note: {note}")
         else:
             door.say(f"{safe_text(str(output))}: already holds this sweep; nothing to do")
     if as_json:

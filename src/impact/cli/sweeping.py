@@ -27,7 +27,9 @@ def sweep(
     scheduler: Annotated[
         str | None,
         typer.Option(
-            "--scheduler", metavar="ADDRESS", help="Dask's workers integrate: tcp://host:8786, or local."
+            "--scheduler",
+            metavar="ADDRESS",
+            help="Dask's workers integrate: tcp://host:8786, or local (127.0.0.1, ports without authentication).",
         ),
     ] = None,
     scheduler_file: Annotated[
@@ -48,11 +50,15 @@ def sweep(
     with door.signals() as stopping:
         from .. import api
         from ..data import store, survey, work
+        from ..data.plausibility import material_notes
         from ..data.sweeping import sweep_into
         from . import progress, summary
 
         who = Who(jobs, threads, scheduler, scheduler_file)
         plan = api.prepare(config, sets or (), plugins or (), max_points)
+        if not quiet:
+            for note in material_notes({name: vars(one) for name, one in plan.materials_used.items()}):
+                door.say(f"note: {safe_text(str(config))}: {note}")
         if shard is not None:
             from .shards import do
 
@@ -89,7 +95,7 @@ def sweep(
         else:
             for source in (config, *(plugins or ())):
                 store.check_output(output, overwrite=overwrite, source=source)
-            with who.team(quiet=quiet) as team, progress.progress(quiet=quiet) as tell:
+            with who.team(quiet=quiet, should_stop=stopping) as team, progress.progress(quiet=quiet) as tell:
                 found = sweep_into(
                     output, plan, resume=resume, overwrite=overwrite, team=team, tell=tell,
                     stopping=stopping,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -37,8 +37,8 @@ class Who:
             raise UsageError(f"{asked[0]}: given beside {asked[1]}, wants one of the two")
 
     @contextmanager
-    def team(self, *, quiet: bool) -> Iterator[Team]:
-        """Those who integrate; a cluster is told of on stderr."""
+    def team(self, *, quiet: bool, should_stop: Callable[[], bool]) -> Iterator[Team]:
+        """Those who integrate; a cluster is told of on stderr, and `should_stop` gives up a connection to it."""
         place = self.scheduler if self.scheduler is not None else self.scheduler_file
         if place is None:
             from ..sweeps.teams import team_of
@@ -47,7 +47,7 @@ class Who:
             return
         from ..sweeps.cluster import cluster
 
-        with cluster(place) as (team, dashboard, workers):
+        with cluster(place, should_stop) as (team, dashboard, workers):
             if not quiet:
                 waits = "" if workers else ", waits for some"
                 count = f"{workers} worker{'' if workers == 1 else 's'}{waits}"

@@ -195,7 +195,14 @@ def _but(value: NDArray[Any], where: Mask | None, otherwise: NDArray[Any] | floa
 
 
 def collide(
-    model: ForceModel, lanes: Lanes, *, rtol: float, max_steps: int, collapse: bool = True, core: str = "numpy"
+    model: ForceModel,
+    lanes: Lanes,
+    *,
+    rtol: float,
+    max_steps: int,
+    collapse: bool = True,
+    core: str = "numpy",
+    errors: dict[str, str] | None = None,
 ) -> Contact:
     """Let every pair of balls collide by the law of a model.
 
@@ -207,6 +214,7 @@ def collide(
     max_steps : attempted steps per phase after which an impact is given up
     collapse : integrate impacts that are the same in the contact's own units once; changes no bit
     core : "numpy", or "numba" for what that compiles; they agree within the tolerance
+    errors : receives a line for each distinct error that the law raised, see `impact.contact.formula.explained`
 
     Returns
     -------
@@ -215,8 +223,9 @@ def collide(
     with np.errstate(all="ignore"):
         given, status = own_values(model, lanes), first_look(model, lanes)
     rebound = integrate_all(
-        model, lanes.n, given, status, rtol=rtol, max_steps=max_steps, collapse=collapse, core=core
-    )
+        model, lanes.n, given, status,
+        rtol=rtol, max_steps=max_steps, collapse=collapse, core=core, errors=errors,
+    )  # fmt: skip
     return Contact(model, lanes, rebound, status)
 
 

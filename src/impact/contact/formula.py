@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import inspect
+import traceback
 from collections.abc import Callable, Mapping
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 
 from ..errors import ModelError
+from ..text import safe_text
 from .power import Array
+
+# whose own lines say nothing about where a formula is wrong
+LIBRARIES = (Path(__file__).parents[1], Path(np.__file__).parent)
 
 Formula = Callable[..., object]
 
@@ -40,3 +46,25 @@ def ask(formula: Formula, known: Mapping[str, Array | float]) -> Array:
     except (Exception, SystemExit) as error:
         # a formula that ends the program would take the other impacts with it
         raise ModelError(f"a formula raised {type(error).__name__}: {error}") from error
+
+
+def explained(key: str, error: ModelError) -> tuple[str, str]:
+    """What tells an error of a law from its others, and a line about it: place, type, text, and a hint.
+
+    Parameters
+    ----------
+    key : of the model
+    error : that `ask` raised, or whoever found its answer to be of a wrong shape
+    """
+    cause = error.__cause__
+    if cause is None:
+        return key, safe_text(f"model {key}: {str(error).removeprefix(f'{key}: ')}", 1000)
+    own = [
+        f"{Path(frame.f_code.co_filename).name}:{line}: "
+        for frame, line in traceback.walk_tb(cause.__traceback__)
+        if not any(Path(frame.f_code.co_filename).is_relative_to(folder) for folder in LIBRARIES)
+    ]
+    place, kind = own[-1] if own else "", type(cause).__name__
+    is_branch = isinstance(cause, ValueError) and "truth value of an array" in str(cause)
+    hint = "; formulas work on arrays: use np.where instead of if" if is_branch else ""
+    return f"{place}{key}: {kind}", safe_text(f"{place}model {key}: {kind}: {str(cause).rstrip('.')}{hint}", 1000)

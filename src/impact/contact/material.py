@@ -17,13 +17,13 @@ class Material:
     ----------
     E : Young's modulus [Pa]
     nu : Poisson's ratio [-]
-    rho : density [kg/m3]
+    rho : density [kg/m3], or None where no radius is derived from it
     yield_strength : yield strength [Pa], or None where it is not known
     """
 
     E: float
     nu: float
-    rho: float
+    rho: float | None = None
     yield_strength: float | None = None
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..errors import ModelError
 from ..ode.problem import Columns
 from . import motion
-from .formula import wishes
+from .formula import explained, wishes
 from .model import ForceModel
 from .momentum import is_strong
 from .power import Array, distinct
@@ -33,6 +33,7 @@ def integrate_all(
     max_steps: int,
     collapse: bool = True,
     core: str = "numpy",
+    errors: dict[str, str] | None = None,
 ) -> Rebound:
     """Integrate impacts by the law of a model.
 
@@ -42,7 +43,7 @@ def integrate_all(
     n : their compliance exponents, shape (k,)
     given : what the law asks for, by name, in the contact's own units, each of shape (k,)
     status : what is known of them before; those that are not OK are left alone
-    rtol, max_steps, collapse, core : see `impact.contact.collide.collide`
+    rtol, max_steps, collapse, core, errors : see `impact.contact.collide.collide`
 
     Returns
     -------
@@ -55,7 +56,9 @@ def integrate_all(
             chosen = (status == OK) & (n == one)
             count, where = int(np.count_nonzero(chosen)), places(chosen)
             if count:
-                parts.append((where, _halving(model, float(one), _at(given, where), count, strike_at, collapse)))
+                found = {} if errors is None else errors
+                own = _halving(model, float(one), _at(given, where), count, strike_at, collapse, found)
+                parts.append((where, own))
     return Rebound.joined(n.size, status, parts)
 
 
@@ -70,25 +73,26 @@ def _halving(
     count: int,
     strike_at: Callable[..., Struck],
     collapse: bool,
-    halved: bool = False,
+    errors: dict[str, str],
 ) -> Rebound:
     """What impacts that share n do.
 
-    A law that raises is tried again on the two halves, so that only the impacts that make it raise fail; one that
-    is left alone is tried beside its double, since a result of the wrong shape does not show at one.
+    A law that raises is tried again on the two halves, so that only the impacts that make it raise fail. A single
+    impact is tried beside its double: a result of the wrong shape, or an `if`, does not show at one.
     """
     try:
-        if halved and count == 1:
+        if count == 1:
             double = _at(given, np.array([0, 0]))
             return _struck(model, n, double, 2, strike_at, collapse=False).take(np.array([0]))
         return _struck(model, n, given, count, strike_at, collapse)
-    except ModelError:
+    except ModelError as error:
         rebound = Rebound.blank(count)
         if count == 1:
             rebound.status[:] = Status.MODEL_ERROR
+            errors.setdefault(*explained(model.key, error))
             return rebound
         for half in np.array_split(np.arange(count), 2):
-            part = _halving(model, n, _at(given, half), half.size, strike_at, collapse, halved=True)
+            part = _halving(model, n, _at(given, half), half.size, strike_at, collapse, errors)
             rebound.put(half, part)
         return rebound
 

@@ -56,7 +56,7 @@ def align(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Aligned:
             text = f"what varies along the axis {safe_text(axis)} is {own}, in BASELINE {other}"
             faults.append(Fault("nothing in common", axis, text))
             continue
-        places[axis] = _matched([new[n].values for n in columns[0]], [baseline[n].values for n in columns[0]])
+        places[axis] = matched([new[n].values for n in columns[0]], [baseline[n].values for n in columns[0]])
         # the axis has its first column's name
         names = [*(n for n in columns[0] if n == axis), *(n for n in columns[0] if n != axis)]
         rows = [[dataset[name].values for name in names] for dataset in (new, baseline)]
@@ -131,7 +131,7 @@ def _columns(dataset: xr.Dataset, axis: str) -> list[str]:
     return sorted(name for name in along if is_input(name) and name not in derived)
 
 
-def _matched(new: Sequence[Values], baseline: Sequence[Values]) -> tuple[Places, Places]:
+def matched(new: Sequence[Values], baseline: Sequence[Values]) -> tuple[Places, Places]:
     """The places of equal labels on an axis in both, in the order of the baseline."""
     for rounding in (ROUNDING, 0.0):
         rows = np.stack([_numbered(a, b, rounding) for a, b in zip(new, baseline, strict=True)], axis=1)

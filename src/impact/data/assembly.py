@@ -25,11 +25,13 @@ from .results import outline, stored
 class Part:
     """The values of some points of one model, by variable, each of the box's shape.
 
-    What depends on the axes alone is there once, with the first model.
+    What depends on the axes alone is there once, with the first model. `radius` is that of the smaller ball [m],
+    NaN where it is not known, of a shape that broadcasts to the box's.
     """
 
     box: Box
     values: dict[str, NDArray[Any]]
+    radius: NDArray[Any] | None = None
 
     def where(self, along_model: bool) -> tuple[int | slice, ...]:
         """The place of the values in the whole of a variable."""
@@ -101,7 +103,7 @@ def part_at(plan: Plan, found: Sequence[Trajectories], rows: Rows, box: Box) -> 
             # of a plan without axes the only point has an axis
             natural = getattr(contact, one.name)
             values[one.name][...] = natural if box.shape else natural.reshape(())
-    return Part(box, values)
+    return Part(box, values, np.fmin(contact.lanes.R1, contact.lanes.R2))
 
 
 def assemble(plan: Plan, made: Iterator[Part]) -> xr.Dataset:

@@ -10,9 +10,11 @@ from pathlib import Path
 import xarray as xr
 
 from ..errors import ResultError, UsageError
+from ..text import safe_text
 from .compare import check_result, compare
-from .replay import repeats
+from .replay import described, own, repeats
 from .store import check_output, load, save
+from .tally import tally_of
 from .tolerances import Tolerances, in_effect
 from .verdict import Verdict
 
@@ -23,6 +25,7 @@ def bless(
     *,
     reason: str,
     tol: float | Tolerances | None = None,
+    allow_failed: bool = False,
     show: Callable[[Verdict], None] = lambda verdict: None,
 ) -> Verdict | None:
     """Let a result take the place of a baseline, which then carries the reason and the tolerances it is judged by.
@@ -32,6 +35,7 @@ def bless(
     new, baseline : files; the baseline need not exist yet
     reason : why the numbers changed
     tol : see `compare`; the new baseline carries them, so that a coarser solver does not loosen the guard
+    allow_failed : accept a result with failed points
     show : is told the verdict before anything is written; if it raises an error nothing is
 
     Returns
@@ -41,7 +45,7 @@ def bless(
     Raises
     ------
     ResultError : one of the files is not a readable result
-    UsageError : the reason is empty, a tolerance is not right, or the two are one file
+    UsageError : the reason is empty, a tolerance is not right, the two are one file, or points failed
     StoreError : the disk is full or failed; the baseline is as it was
 
     >>> import impact, tempfile
@@ -57,6 +61,8 @@ def bless(
     check_output(baseline, overwrite=True, source=new)
     result = load(new)
     check_result(result, str(new))
+    if not allow_failed:
+        _check_failed(result, new)
     before = _standing(baseline)
     verdict = None
     if before is not None:
@@ -66,6 +72,17 @@ def bless(
     kept = in_effect(tol, result.attrs if before is None else before.attrs)
     save(result.assign_attrs(reason=reason, tolerances=json.dumps(kept)), baseline, overwrite=True)
     return verdict
+
+
+def _check_failed(result: xr.Dataset, path: Path) -> None:
+    """Refuse a result with failed points, whose NaN every later failure would equal."""
+    tally = tally_of(result)
+    if tally.failed:
+        status, model, places = tally.failed_at[0]
+        point = result["status"].isel(dict(zip(result["status"].dims, (model, *places), strict=True)))
+        at = described(own({str(dim): point[dim].item() for dim in result["status"].dims}))
+        count = f"{tally.failed:,} of {tally.points:,} points failed, the first at {at} ({status.name.lower()})"
+        raise UsageError(f"{safe_text(str(path))}: {count}; expected none, or --allow-failed")
 
 
 def _standing(baseline: Path) -> xr.Dataset | None:

@@ -84,7 +84,7 @@ def estimate(plan: Plan, jobs: int = 1) -> Estimate:
     # the first time loads, or even compiles, what integrates
     for _ in range(2):
         with _timed() as integrating:
-            rebound = integrated(plan.models[chosen.model], block_of(plan, found, chosen), plan.config.solver)
+            rebound, _ = integrated(plan.models[chosen.model], block_of(plan, found, chosen), plan.config.solver)
     with _timed() as driving:
         sent = len(pickle.dumps((block_of(plan, found, chosen), kit_of(plan)), pickle.HIGHEST_PROTOCOL))
         back = pickle.dumps(rebound, pickle.HIGHEST_PROTOCOL)

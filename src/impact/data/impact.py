@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -54,8 +55,11 @@ def impact_of(plan: Plan, first: tuple[str, ...]) -> Impact:
     law = config.models[0]
     lanes = lanes_of(plan, law, ())
     solver = config.solver
-    contact = collide(law, lanes, rtol=solver.rtol, max_steps=solver.max_steps)
+    errors: dict[str, str] = {}
+    contact = collide(law, lanes, rtol=solver.rtol, max_steps=solver.max_steps, errors=errors)
     values = {name: getattr(contact, name)[0].item() for name in OUTPUTS}
+    for error in errors.values():
+        warnings.warn(error, stacklevel=2)
     going = values["status"] == Status.OK
     history = follow(law, lanes, rtol=solver.rtol, max_steps=solver.max_steps) if going else None
     v0 = lanes.v0[0].item()

@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import xarray as xr
+
 from ..errors import ResultError, UsageError
-from ..sweeps.config import Config, parse_config, read_config
+from ..sweeps.config import Axis, Config, parse_config, read_config
+from ..sweeps.grid import MAX_POINTS
 from ..sweeps.plugins import Plugins
 from ..text import safe_text
+from .align import matched
 from .survey import outlined
 
 STARTER = files("impact") / "sweeps" / "starter.toml"
@@ -29,7 +36,11 @@ def config_of(
         return read_config(source, overrides, plugins.models)
     path = Path(source)
     if _is_result(path):
-        return stored_config(outlined(path).attrs, overrides, plugins, str(path))
+        attributes = outlined(path).attrs
+        config = stored_config(attributes, overrides, plugins, str(path), allow_changed_plugins=True)
+        for note in changed_plugins(attributes, plugins, str(path)):
+            warnings.warn(note, stacklevel=2)
+        return config
     return read_config(path, overrides, plugins.models)
 
 
@@ -49,7 +60,13 @@ def _is_result(path: Path) -> bool:
 
 
 def stored_config(
-    attributes: Mapping[str, object], overrides: Sequence[str], plugins: Plugins, name: str
+    attributes: Mapping[str, object],
+    overrides: Sequence[str],
+    plugins: Plugins,
+    name: str,
+    max_points: int = MAX_POINTS,
+    *,
+    allow_changed_plugins: bool = False,
 ) -> Config:
     """The config of the sweep that a result came from.
 
@@ -59,24 +76,47 @@ def stored_config(
     overrides : changes to its config, after those that it was made with
     plugins : models that are not built in, those that it was made with among them
     name : of the result, for messages
+    max_points : refuse a sweep of more points
+    allow_changed_plugins : accept another version of a model of one's own; see `changed_plugins`
 
     Raises
     ------
-    UsageError : it is a time history, or was made with a model that is not given
+    UsageError : it is a time history, or was made with a model that is not given, or is another version
     ResultError, ConfigError : what it carries cannot be read, or is no config here
     """
     text = attributes.get("config")
     if text is None:
         raise UsageError(f"{safe_text(name)}: holds no config; it is a time history")
     check_plugins(attributes, plugins, name)
+    changed = () if allow_changed_plugins else changed_plugins(attributes, plugins, name)
+    if changed:
+        raise UsageError(changed[0])
     stored = _json(attributes, "config_set", name)
     if not (isinstance(text, str) and isinstance(stored, list) and all(isinstance(one, str) for one in stored)):
         raise ResultError(f"{safe_text(name)}: its attributes config and config_set are not those of a result")
-    return parse_config(text, [*stored, *overrides], plugins.models, name=name)
+    return parse_config(text, [*stored, *overrides], plugins.models, name, max_points)
+
+
+def part_of(config: Config, dataset: xr.Dataset) -> Config:
+    """The part of a config that a result holds: its axes with the values that are labels there.
+
+    An axis without such a value keeps its first one, at which a comparison shows the difference.
+    """
+    axes = []
+    for axis in config.axes:
+        held = {name: dataset.coords[name] for name in axis.columns if name in dataset.coords}
+        first = next(iter(held.values()), None)
+        names = [name for name, labels in held.items() if first is not None and labels.dims == first.dims]
+        values = [np.asarray(axis.columns[name]) for name in names]
+        labels = [np.ravel(held[name].values) for name in names]
+        places = sorted(matched(values, labels)[0].tolist()) if names else []
+        chosen = np.array(places or [0])
+        axes.append(Axis({name: tuple(np.asarray(v)[chosen].tolist()) for name, v in axis.columns.items()}))
+    return replace(config, axes=tuple(axes))
 
 
 def check_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str) -> None:
-    """Refuse if a model of one's own that a result was made with is not given again, the same to the byte.
+    """Refuse if a model of one's own that a result was made with is not given again.
 
     Nothing is imported because a result names it: what it names is compared with what is given, and told.
 
@@ -88,7 +128,7 @@ def check_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str)
 
     Raises
     ------
-    UsageError : one is missing, or is another version
+    UsageError : one is missing
     ResultError : the attribute cannot be read
 
     >>> check_plugins({"plugins": '{"mine": {"file": "my.py", "sha256": "12ab"}}'}, Plugins(), "results.h5")
@@ -107,12 +147,24 @@ def check_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str)
         raise UsageError(
             f"{shown}: made with {safe_text(told)}; give {again} again with {' and '.join(sorted(ways))}"
         )
-    for key, one in made.items():
-        if one["sha256"] != given[key]["sha256"]:
-            raise UsageError(
-                f"{shown}: was made with another version of {safe_text(_origin(one) or f'the model {key}')}: its "
-                f"SHA-256 is {safe_text(str(one['sha256']), 64)}, this one's is {given[key]['sha256']}"
-            )
+
+
+def changed_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str) -> tuple[str, ...]:
+    """A sentence for each model that a result was made with and that is given in another version.
+
+    Parameters
+    ----------
+    attributes : of the result
+    plugins : what is given now, all that the result was made with among them
+    name : of the result, for messages
+    """
+    given = plugins.record
+    return tuple(
+        f"{safe_text(name)}: was made with another version of {safe_text(_origin(one) or f'the model {key}')}: "
+        f"its SHA-256 is {safe_text(str(one['sha256']), 64)}, this one's is {given[key]['sha256']}"
+        for key, one in _made_with(attributes, name).items()
+        if one["sha256"] != given[key]["sha256"]
+    )
 
 
 def _origin(one: Mapping[str, str | None]) -> str | None:

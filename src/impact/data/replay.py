@@ -37,6 +37,18 @@ def own(at: Mapping[str, T]) -> dict[str, T]:
     return {name: one for name, one in at.items() if name.rpartition(".")[0] in ("", at.get("model"))}
 
 
+def described(at: Mapping[str, float | str]) -> str:
+    """The inputs of a point in a message, without the digits that rounding left.
+
+    >>> described({"model": "hertz", "e": 0.1 + 0.2})
+    'model=hertz, e=0.3'
+    """
+    return ", ".join(
+        f"{safe_text(name)}={value:.12g}" if isinstance(value, float) else f"{name}={safe_text(str(value), 60)}"
+        for name, value in at.items()
+    )
+
+
 def replay(begin: Sequence[str], at: Mapping[str, object]) -> str:
     """The whole command: how it begins, and the model and the inputs of the point.
 

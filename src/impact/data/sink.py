@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import stat
 from collections.abc import Iterator
 from pathlib import Path
 from secrets import token_hex
@@ -64,6 +65,18 @@ class Sink(io.RawIOBase):
     def flush(self) -> None:
         pass
 
+    def inherit(self, path: Path) -> None:
+        """Take the permissions, and where it is allowed the owner and group, of a file that is to be replaced."""
+        try:
+            before = path.lstat()
+        except FileNotFoundError:
+            return
+        number = self._file.fileno()
+        for uid, gid in ((-1, before.st_gid), (before.st_uid, -1)):
+            with contextlib.suppress(PermissionError):
+                os.fchown(number, uid, gid)
+        os.fchmod(number, stat.S_IMODE(before.st_mode))
+
     def sync(self) -> None:
         """Have everything on the disk.
 
@@ -108,6 +121,8 @@ def appearing(path: Path, *, overwrite: bool, part: Path | None = None) -> Itera
             part.unlink(missing_ok=True)
         sink = Sink(part, "x+")
         try:
+            if overwrite:
+                sink.inherit(path)
             yield sink
             sink.sync()
             _publish(part, path, overwrite=overwrite)

@@ -16,6 +16,8 @@ from .assembly import Part
 # the errors of which the largest is told
 ERRORS = ("e_error", "v1_error", "v2_error", "oracle_error", "residual")
 FAILED_TOLD = 3
+# of the smaller radius, above which an indentation is not small
+MAX_INDENTATION = 0.1
 
 
 @dataclass
@@ -28,12 +30,16 @@ class Tally:
     counts : points by status
     worst : the largest absolute value by error, then by the place of the model; NaN where there is none
     failed_at : the first points that failed: status, place of the model, and places on the axes
+    deep, deepest : how many points have a peak indentation above `MAX_INDENTATION`, and the largest one, in units
+        of the smaller radius; of parts whose radii are known
     """
 
     points: int = 0
     counts: dict[Status, int] = field(default_factory=dict)
     worst: dict[str, dict[int, float]] = field(default_factory=dict)
     failed_at: list[tuple[Status, int, tuple[int, ...]]] = field(default_factory=list)
+    deep: int = 0
+    deepest: float = 0.0
 
     @property
     def failed(self) -> int:
@@ -47,7 +53,15 @@ class Tally:
         for name in ERRORS:
             if name in part.values:
                 self._judge(name, box.model, part.values[name])
+        if part.radius is not None and "peak_indentation" in part.values:
+            self._measure(part.values["peak_indentation"], part.radius)
         return self
+
+    def _measure(self, indentation: NDArray[Any], radius: NDArray[Any]) -> None:
+        if np.isfinite(radius).any():
+            share = indentation / (radius if indentation.shape else radius.reshape(()))
+            self.deep += int(np.count_nonzero(share > MAX_INDENTATION))
+            self.deepest = float(np.fmax.reduce(share, axis=None, initial=self.deepest))
 
     def _count(self, status: NDArray[np.int8], model: int, start: Sequence[int]) -> None:
         self.points += status.size

@@ -10,7 +10,7 @@ import xarray as xr
 
 from ..contact.status import Status
 from ..text import safe_text
-from .replay import replay
+from .replay import described, replay
 
 Kind = Literal["nothing in common", "physics config", "labels", "units", "missing variable", "values"]
 # in the order in which a verdict tells them: what explains the most first
@@ -68,10 +68,7 @@ class Judged:
         >>> steps.place
         'model=hertz, e=0.3'
         """
-        return ", ".join(
-            f"{safe_text(name)}={value:.12g}" if isinstance(value, float) else f"{name}={safe_text(value, 60)}"
-            for name, value in self.at.items()
-        )
+        return described(self.at)
 
     @property
     def text(self) -> str:

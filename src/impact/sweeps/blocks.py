@@ -59,16 +59,18 @@ class Kit:
     hashes: tuple[tuple[str, str], ...] = ()
 
 
-def integrated(model: ForceModel, block: Block, solver: Solver) -> Rebound:
-    """What becomes of a block by the law of its model."""
-    return integrate_all(
+def integrated(model: ForceModel, block: Block, solver: Solver) -> tuple[Rebound, dict[str, str]]:
+    """What becomes of a block by the law of its model, and a line for each distinct error that the law raised."""
+    errors: dict[str, str] = {}
+    rebound = integrate_all(
         model, block.n, block.given, block.status,
-        rtol=solver.rtol, max_steps=solver.max_steps, collapse=solver.collapse, core=solver.core,
+        rtol=solver.rtol, max_steps=solver.max_steps, collapse=solver.collapse, core=solver.core, errors=errors,
     )  # fmt: skip
+    return rebound, errors
 
 
-def work(block: Block, kit: Kit) -> Rebound:
-    """What becomes of a block; a pure function of both, so that it may be done anywhere, and twice.
+def work(block: Block, kit: Kit) -> tuple[Rebound, dict[str, str]]:
+    """What becomes of a block, see `integrated`; a pure function of both, which may be done anywhere, and twice.
 
     Raises
     ------

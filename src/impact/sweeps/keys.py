@@ -103,9 +103,15 @@ def _models(value: object, context: Context) -> list[ForceModel]:
 
 def models_key(known: Mapping[str, ForceModel]) -> Key:
     """The key `models`, of which an editor is told all names."""
-    names = [*known, "all", *sorted({f"family:{model.family}" for model in known.values()})]
-    name = {"anyOf": [{"enum": names}, {"type": "string", "pattern": r"[*?\[]"}]}
-    schema = {"anyOf": [name, {"type": "array", "items": name, "minItems": 1}]}
+    families = {f"family:{model.family}" for model in known.values() if not model.same_as}
+    names = [*known, "all", *sorted(families)]
+    # a pattern holds *, ? or [; no key begins with "!", and "family:" takes no pattern
+    pattern = r"(?!!|family:).*[*?\[]"
+    name = {"anyOf": [{"enum": names}, {"type": "string", "pattern": f"^{pattern}"}]}
+    excluded = [{"enum": [f"!{word}" for word in names]}, {"type": "string", "pattern": f"^!{pattern}"}]
+    # the first entry of a list has no models before it to leave out
+    models = {"type": "array", "prefixItems": [name], "items": {"anyOf": [name, *excluded]}, "minItems": 1}
+    schema = {"anyOf": [name, models]}
     return Key(_models, schema, 'models by name, "all", "family:NAME" or a pattern', required=True)
 
 

@@ -10,6 +10,7 @@ from ..contact.formula import wishes
 from ..contact.material import hertz_stiffness
 from ..contact.model import ForceModel, Parameter
 from ..contact.models import built_in
+from ..contact.values import asked as quantities_of
 from .ranges import MAX_FAULTS
 from .values import MAX_UNIT, Fault, Problem, Quantity, nearest, refuse
 
@@ -38,7 +39,7 @@ MATERIAL = {
     "rho": Quantity("kg/m^3", "density", least=0, above=True),
     "yield_strength": Quantity("Pa", "yield strength", least=0, above=True),
 }
-REQUIRED = ("v1", "m1", "m2", "E", "nu", "rho")
+REQUIRED = ("v1", "m1", "m2", "E", "nu")
 
 # what else a key might be called
 WORDS = {
@@ -134,6 +135,7 @@ def cross_faults(data: Mapping[str, object], models: Sequence[ForceModel], n: fl
         yield from _stiffness(given, _table(data.get("model")), models, n, data.get("models"))
         yield from _materials(given, _table(data.get("model")), models)
         yield from _yield_strengths(given, data.get("materials"), models)
+        yield from _densities(given, _table(data.get("model")), data.get("materials"), models)
     own, asked = _table(data.get("model")), data.get("models")
     for model in models:
         table = _table(own.get(model.key))
@@ -187,10 +189,13 @@ def _stiffness(
     for model in models:
         if model.exponent is not None and model.exponent != n and "K" not in _table(own.get(model.key)):
             sweep = "an axis n" if n is None else f"n = {n:g}"
+            # the sweep's n serves all laws unless another one has a different exponent
+            serves = n is not None and {one.exponent for one in models} <= {None, model.exponent}
+            remedy = f"n = {model.exponent:g} under [sweep], " if serves else ""
             yield (
                 ("sweep", "K"),
-                f"got a stiffness for {sweep}, but {model.key} has n = {model.exponent:g} of its own; "
-                f"wants that law's own K under [model.{model.key}], or none{_or_without(model, models, asked)}",
+                f"got a stiffness for {sweep}, but {model.key} has n = {model.exponent:g}; "
+                f"expected {remedy}K under [model.{model.key}], or no K{_or_without(model, models, asked)}",
             )
 
 
@@ -222,12 +227,43 @@ def _yield_strengths(
     reported: set[str] = set()
     for ball in ("1", "2"):
         asking = _asking(models, f"yield_strength{ball}")
-        named = given.get("material", given.get(f"material{ball}", []))
-        for name in named if isinstance(named, list) else [named]:
-            if not asking or not isinstance(name, str) or not isinstance(materials, dict) or name in reported:
-                continue
-            table = materials.get(name)
-            if isinstance(table, dict) and "yield_strength" not in table:
+        for name in _without(given, materials, ball, "yield_strength") if asking else ():
+            if name not in reported:
                 reported.add(name)
                 wants = MATERIAL["yield_strength"].wants
                 yield ("materials", name, "yield_strength"), f"missing, wants {wants} (asked for by {asking})"
+
+
+def _densities(
+    given: Mapping[str, object], own: Mapping[str, object], materials: object, models: Sequence[ForceModel]
+) -> Iterable[Fault]:
+    """The materials whose density is missing though a radius is derived from it and a mass."""
+    radii: dict[str, list[str]] = {}
+    keys: dict[str, None] = {}
+    for ball in ("1", "2"):
+        radius = f"R{ball}"
+        asking = [model.key for model in models if radius in _depends_on(model, given, own)]
+        if asking and radius not in given:
+            keys |= dict.fromkeys(asking)
+            for name in _without(given, materials, ball, "rho"):
+                radii.setdefault(name, []).append(radius)
+    for name, missing in radii.items():
+        need = f"{next(iter(keys))} needs a radius" if len(keys) == 1 else f"{len(keys)} models need a radius"
+        expected = f"a number > 0 {MATERIAL['rho'].unit}, or {' and '.join(missing)} under [sweep]"
+        yield ("materials", name, "rho"), f"missing, expected {expected}: {need}"
+
+
+def _depends_on(model: ForceModel, given: Mapping[str, object], own: Mapping[str, object]) -> set[str]:
+    """The quantities that a model needs in a sweep, those that its stiffness is derived from among them."""
+    has_stiffness = "K" in given or "K" in _table(own.get(model.key))
+    derived = () if has_stiffness else wishes(model.stiffness or hertz_stiffness)
+    return {*quantities_of(model), *model.domain, *derived}
+
+
+def _without(given: Mapping[str, object], materials: object, ball: str, key: str) -> Iterable[str]:
+    """The materials of a ball whose table lacks a key."""
+    named = given.get("material", given.get(f"material{ball}", []))
+    for name in named if isinstance(named, list) else [named]:
+        table = _table(materials).get(name) if isinstance(name, str) else None
+        if isinstance(table, dict) and key not in table:
+            yield str(name)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import warnings
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
@@ -25,6 +26,9 @@ WORTH = 200_000
 AGAIN = 3
 # seconds after which it is looked again whether to stop, and whether there is room
 MOMENT = 0.2
+
+# what comes back of a block: see `impact.sweeps.blocks.integrated`
+Done = tuple[Rebound, dict[str, str]]
 
 
 def settled(plan: Plan, found: Sequence[Trajectories]) -> Plan:
@@ -78,19 +82,28 @@ def run(
     ------
     UsageError : a model was given as a Python value, which cannot be sent; or those who integrate lack something
     StoreError : they were killed again and again, or cannot be reached any more
+
+    Warns
+    -----
+    UserWarning : a law raised an error; once for each law and distinct error
     """
     integrate = _integrator(plan, team)
     left, trials = deque(todo), Counter[int]()
+    reported: set[str] = set()
     while True:
-        given: dict[Future[Rebound], Stretch] = {}
+        given: dict[Future[Done], Stretch] = {}
         try:
             with team.executor() as executor:
 
-                def give(stretch: Stretch) -> Future[Rebound]:
+                def give(stretch: Stretch) -> Future[Done]:
                     # no more is held of a block than what it is made of
                     return executor.submit(integrate, block_of(plan, found, stretch))
 
-                yield from _finished(give, left, given, team.room, stopping)
+                for stretch, (rebound, errors) in _finished(give, left, given, team.room, stopping):
+                    for error in errors.keys() - reported:
+                        warnings.warn(errors[error], stacklevel=2)
+                    reported |= errors.keys()
+                    yield stretch, rebound
                 return
         except BrokenExecutor:
             # which of the blocks it did not live through cannot be known
@@ -104,33 +117,35 @@ def run(
 
 
 def _finished(
-    give: Callable[[Stretch], Future[Rebound]],
+    give: Callable[[Stretch], Future[Done]],
     left: deque[Stretch],
-    given: dict[Future[Rebound], Stretch],
+    given: dict[Future[Done], Stretch],
     room: Callable[[], int],
     stopping: Callable[[], bool],
-) -> Iterator[tuple[Stretch, Rebound]]:
+) -> Iterator[tuple[Stretch, Done]]:
     """Give what is left, as many blocks at a time as there is room for, and take them as they finish."""
     try:
         while left or given:
-            while left and len(given) < room() and not stopping():
+            # asked in every round, also where nothing is left to give: it raises if nobody answers any more
+            most = room()
+            while left and len(given) < most and not stopping():
                 given[give(left[0])] = left[0]
                 left.popleft()
             # what was begun is finished, unless there is nobody left to do it
-            if stopping() and not (given and room()):
+            if stopping() and not (given and most):
                 return
             if not given:
                 # nobody is there yet
                 time.sleep(MOMENT)
             for future in wait(given, MOMENT, FIRST_COMPLETED).done:
-                rebound = future.result()
-                yield given.pop(future), rebound
+                done = future.result()
+                yield given.pop(future), done
     finally:
         for future in given:
             future.cancel()
 
 
-def _integrator(plan: Plan, team: Team) -> Callable[[Block], Rebound]:
+def _integrator(plan: Plan, team: Team) -> Callable[[Block], Done]:
     """What integrates a block of a plan, where the team is."""
     if team.is_here:
         models = {model.key: model for model in plan.models}

@@ -16,6 +16,7 @@ from ..contact.models import catalogue
 from ..contact.status import FIRST_FAILURE, Status
 from ..data.align import is_input
 from ..data.attributes import json_object, json_table
+from ..data.plausibility import material_notes, result_notes
 from ..data.ranking import Ranked, ranking
 from ..data.replay import own
 from ..data.results import plain_unit
@@ -78,6 +79,8 @@ def _summary(dataset: xr.Dataset, title: str, tally: Tally) -> Iterator[Markup]:
     yield tag("h1", title)
     yield tag("p", f"{models:,} model{_s(models)} of the impact of two balls{over}, judged by the "
                f"impulse-momentum solution: {points:,} point{_s(points)}.")  # fmt: skip
+    for note in (*material_notes(json_table(dataset, "materials")), *result_notes(tally)):
+        yield tag("p", f"Note: {note}")
     ends = (f"{tally.counts[one]:,} {one.name.lower()}: {one.meaning}" for one in sorted(tally.counts))
     yield tag("ul", *(tag("li", end) for end in ends))
 

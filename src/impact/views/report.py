@@ -12,6 +12,8 @@ from ..data.verdict import KINDS, Judged, Verdict
 from ..text import safe_text
 
 PROGRAM = "impact compare"
+# differences that an annotation names
+ANNOTATED = 3
 
 
 @dataclass(frozen=True)
@@ -128,14 +130,15 @@ def as_markdown(report: Report) -> str:
 
 
 def as_github(report: Report) -> str:
-    """Workflow commands of GitHub Actions: an annotation on the baseline for everything that differs."""
-    lines = [_annotation("notice" if report.equal else "error", report.baseline, report.headline)]
-    for case in report.cases:
-        for text in case.texts:
-            more = f"\n{case.replay}" if case.replay else ""
-            lines.append(_annotation("error", report.baseline, f"{text}{more}"))
-    lines += [_annotation("notice", report.baseline, note) for note in report.notes]
-    return "\n".join(lines)
+    """A workflow command of GitHub Actions: one annotation on the baseline, with the worst of what differs."""
+    differing = [case for case in report.cases if case.texts]
+    worst = [(text, case.replay) for case in differing for text in case.texts]
+    lines = [report.headline]
+    for text, replay in worst[:ANNOTATED]:
+        lines += [text, replay] if replay and replay not in lines else [text]
+    lines += [f"and {len(worst) - ANNOTATED} more"] if len(worst) > ANNOTATED else []
+    lines += [f"note: {note}" for note in report.notes]
+    return _annotation("notice" if report.equal else "error", report.baseline, "\n".join(lines))
 
 
 def _annotation(level: str, file: str, text: str) -> str:
