@@ -26,7 +26,8 @@ class Variable:
     """One variable of a result.
 
     `per` says whether it depends on the model or on the axes alone; `judged` how a comparison judges it: by its
-    difference over a scale, by a bound on itself, exactly, or not at all.
+    difference over a scale, by a bound on itself, exactly, or not at all. `by_default` is False for a variable
+    that is stored only where `[output] variables` names it.
     """
 
     name: str
@@ -37,6 +38,7 @@ class Variable:
     meaning: str
     equation: str
     dtype: str = "f8"
+    by_default: bool = True
 
 
 SCHEMA = (
@@ -76,6 +78,17 @@ SCHEMA = (
              "1 inside every claimed interval", "i1"),
     Variable("steps", "1", "model", "reported", "accepted steps of the integrator",
              "approach + restitution", "i4"),
+    Variable("e_kinetic", "1", "model", "scaled by 1",
+             "kinetic restitution; the impulses are the changes of the momentum, so that it is e_out",
+             "τ_r/τ_c  (2)", by_default=False),
+    Variable("e_energetic", "1", "model", "scaled by 1",
+             "energetic restitution, from the integrated works of the two phases", "√(-W_r/W_c)  (3)",
+             by_default=False),
+    Variable("lambda", "N s m-(n+1)", "model", "scaled by itself",
+             "damping factor, where the law has one; n is the coordinate exponent", "λ = χ K/v0  (18)",
+             by_default=False),
+    Variable("separation_time", "s", "model", "scaled by itself", "time until the surfaces part",
+             "duration + remaining indentation/(e_out v0)", by_default=False),
 )  # fmt: skip
 
 PACKAGES = ("numpy", "h5py", "h5netcdf", "xarray")
@@ -83,7 +96,7 @@ PACKAGES = ("numpy", "h5py", "h5netcdf", "xarray")
 
 def stored(plan: Plan) -> tuple[Variable, ...]:
     """The variables of the result of a plan; the status is always there: without it a NaN would have no reason."""
-    chosen = {"status", *(plan.config.output.variables or (variable.name for variable in SCHEMA))}
+    chosen = {"status", *(plan.config.output.variables or (one.name for one in SCHEMA if one.by_default))}
     return tuple(replace(one, dtype=plan.config.output.dtype if one.dtype == "f8" else one.dtype)
                  for one in SCHEMA if one.name in chosen)  # fmt: skip
 
