@@ -108,7 +108,7 @@ def info_json(dataset: xr.Dataset) -> dict[str, Any]:
 
 def print_info(dataset: xr.Dataset, path: Path) -> None:
     """What is in a file."""
-    from ..data.results import plain_unit
+    from ..data.results import exponents_of, plain_unit
     from ..data.tally import counted, tally_of
 
     attributes = dataset.attrs
@@ -124,6 +124,8 @@ def print_info(dataset: xr.Dataset, path: Path) -> None:
             text = f"{values.min():g} … {values.max():g}, {values.size} values"
         else:
             text = ", ".join(shown(one) for one in distinct)
+        if name == "n" and coordinate.ndim == 0:
+            text = exponents_of(dataset) or text
         unit = plain_unit(str(coordinate.attrs.get("units", "1")))
         rows[str(name)] = text + ("" if unit == "1" else f" [{unit}]")
     for name in (

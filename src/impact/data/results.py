@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import re
+from collections import Counter
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from typing import Literal
@@ -18,6 +20,8 @@ from ..sweeps.rules import MATERIALS, SWEEP, own_quantities
 
 SCHEMA_VERSION = 1
 # coordinates along `model` that are texts about it
+# models with another exponent are named in at most so many characters
+MAX_NAMED = 48
 ABOUT_A_MODEL = ("title", "year", "equation", "reference", "doi")
 
 
@@ -179,6 +183,29 @@ def plain_unit(unit: str) -> str:
     ('m/s', 'N/m^1.5', 'kg')
     """
     return re.sub(r" ([A-Za-z]+)-(\S+)", lambda found: f"/{found[1]}" + f"^{found[2]}" * (found[2] != "1"), unit)
+
+
+def exponent_text(by_model: Mapping[str, float]) -> str:
+    """The exponent n of some models, where laws may have their own.
+
+    >>> exponent_text({"hertz": 1.5, "bilinear": 1.0, "lankarani-nikravesh-1990": 1.5})
+    '1.5 (1 for bilinear)'
+    """
+    common = Counter(by_model.values()).most_common(1)[0][0]
+    others = {key: n for key, n in by_model.items() if n != common}
+    told = ", ".join(f"{n:g} for {key}" for key, n in others.items())
+    if len(told) > MAX_NAMED:
+        told = f"{len(others)} of {len(by_model)} models have another one"
+    return f"{common:g}" + (f" ({told})" if told else "")
+
+
+def exponents_of(dataset: xr.Dataset) -> str | None:
+    """The exponent n of the models of a result in words; None where it varies along an axis, or is not known."""
+    exponent = dataset.coords.get("exponent")
+    if exponent is None or not set(exponent.dims) <= {"model"}:
+        return None
+    keys = np.atleast_1d(dataset["model"].values).tolist()
+    return exponent_text(dict(zip(map(str, keys), np.atleast_1d(exponent.values).tolist(), strict=True)))
 
 
 def _exponent(plan: Plan) -> tuple[tuple[str, ...], object, dict[str, str]]:
