@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 RESULTS ?= results
 
 .DEFAULT_GOAL := help
-.PHONY: help figure regress test test-faults test-fast test-peers check docs bench clean
+.PHONY: help figure figures regress test test-faults test-fast test-peers check docs bench clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-11s %s\n", $$1, $$2}'
@@ -15,6 +15,16 @@ figure: $(BIN)/impact  ## sweep configs/figure6.toml and draw Figure 6 of the pa
 	$(BIN)/impact sweep configs/figure6.toml -o $(RESULTS)/figure6.h5 --overwrite
 	$(BIN)/impact plot $(RESULTS)/figure6.h5 -o $(RESULTS)/figure6.png
 	@echo "the picture is $(RESULTS)/figure6.png"
+
+# these follow one impact; figure 6 is a sweep over e
+FIGURES := 2 3 5a 5b 5c
+
+figures: figure $(addprefix figure-,$(FIGURES))  ## draw Figures 2, 3, 5a, 5b, 5c and 6 of the paper
+
+figure-%: $(BIN)/impact
+	@mkdir -p $(RESULTS)
+	$(BIN)/impact sweep configs/figure$*.toml -o $(RESULTS)/figure$*.h5 --overwrite --quiet
+	$(BIN)/impact plot $(RESULTS)/figure$*.h5 --kind $(if $(filter 2,$*),impulse,loop) -o $(RESULTS)/figure$*.png
 
 test: $(VENV)/dev  ## run the tests
 	$(BIN)/python -m pytest -n auto --dist worksteal

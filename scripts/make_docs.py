@@ -17,6 +17,14 @@ from models_page import models_page
 from models_pictures import curves
 
 ROOT = Path(__file__).parent.parent
+# the figures of the paper that follow one impact, and their kinds
+PAPER_FIGURES = {
+    "figure2": "impulse",
+    "figure3": "loop",
+    "figure5a": "loop",
+    "figure5b": "loop",
+    "figure5c": "loop",
+}
 
 
 SCHEMA_PAGE = """\
@@ -33,6 +41,18 @@ on.
 | variable | unit | dimensions | judged by compare | meaning | equation |
 |---|---|---|---|---|---|
 {variables}
+
+{on_request} are stored only where `[output] variables` names them.
+
+`duration` ends with the force. A law that ends at zero force leaves an indentation, `permanent_indentation`,
+which is not permanent in the surfaces: the balls move apart without force at the speed e_out v0, and the surfaces
+part at `separation_time`, later by `permanent_indentation`/(e_out v0). A code that sets a negative force to zero
+counts the contact until the indentation is zero: its contact time is `separation_time`. For a law with a permanent
+indentation and for one that ends at zero indentation, `separation_time` is `duration`.
+
+`e_kinetic` is `e_out` by construction: the impulses of the phases are changes of momentum, and the integration has
+the velocities. `e_energetic` is computed from the works that are integrated with the motion. `impact run` computes
+both again from the history of the force.
 
 How `impact compare` judges: a value may differ by its tolerance times the scale named here, at that point; a
 *bounded* one either stays below its bound or moves by less than it; *exact* ones are the same; *reported* ones are
@@ -90,7 +110,8 @@ def schema_page() -> str:
     statuses = [f"| {status.value} | {status.name.lower()} | {status.meaning} |" for status in Status]
     history = [f"| `{name}` | {unit} | {meaning} |" for name, unit, meaning in HISTORY]
     tables = {"variables": variables, "statuses": statuses, "history": history}
-    return SCHEMA_PAGE.format(**{name: "\n".join(rows) for name, rows in tables.items()})
+    on_request = ", ".join(f"`{one.name}`" for one in SCHEMA if not one.by_default)
+    return SCHEMA_PAGE.format(on_request=on_request, **{name: "\n".join(rows) for name, rows in tables.items()})
 
 
 def write_curves(folder: Path) -> None:
@@ -104,12 +125,21 @@ def write_curves(folder: Path) -> None:
         (folder / name).write_text(picture, encoding="utf-8")
 
 
+def write_paper_figures(folder: Path) -> None:
+    """The pictures of docs/paper.md; that of Figure 6 is the README's."""
+    folder.mkdir(exist_ok=True)
+    for name, kind in PAPER_FIGURES.items():
+        result = impact.sweep(ROOT / "configs" / f"{name}.toml")
+        save_figure(impact.plot(result, kind=kind), folder / f"{name}.svg")
+
+
 def main() -> None:
     (ROOT / "docs" / "schema.md").write_text(schema_page(), encoding="utf-8")
     (ROOT / "docs" / "models.md").write_text(models_page(), encoding="utf-8")
     write_curves(ROOT / "docs" / "models")
     (ROOT / "docs" / "gallery.md").write_text(gallery_page(), encoding="utf-8")
     write_gallery(ROOT / "docs" / "gallery")
+    write_paper_figures(ROOT / "docs" / "paper")
     result = impact.sweep(ROOT / "configs" / "figure6.toml")
     save_figure(impact.plot(result), ROOT / "docs" / "figure6.png")
 

@@ -74,7 +74,7 @@ def swept(config: dict[str, object], *overrides: str) -> xr.Dataset:
 
 
 def same_bits(one: xr.Dataset, other: xr.Dataset) -> None:
-    for variable in SCHEMA:
+    for variable in (one for one in SCHEMA if one.by_default):
         assert one[variable.name].values.tobytes() == other[variable.name].values.tobytes(), variable.name
 
 

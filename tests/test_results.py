@@ -34,14 +34,46 @@ def test_the_schema_names_what_a_collision_gives() -> None:
 def test_variables_dimensions_and_units(wide: xr.Dataset) -> None:
     axes = ("e", "v1", "m1", "material2", "ismail-stronge-2008.gamma")
     assert dict(wide.sizes) == {"model": 4, "e": 3, "v1": 2, "m1": 2, "material2": 2, axes[-1]: 2}
-    assert list(wide.data_vars) == [one.name for one in SCHEMA]
-    for one in SCHEMA:
+    by_default = [one for one in SCHEMA if one.by_default]
+    assert list(wide.data_vars) == [one.name for one in by_default]
+    for one in by_default:
         variable = wide[one.name]
         assert variable.dims == (("model", *axes) if one.per == "model" else axes)
         assert variable.dtype == np.dtype(one.dtype)
         assert variable.attrs["units"] == one.unit
         assert variable.attrs["long_name"]
         assert variable.attrs["equation"]
+
+
+ON_REQUEST = {"e_kinetic": "1", "e_energetic": "1", "lambda": "N s m-(n+1)", "separation_time": "s"}
+
+
+def test_variables_stored_on_request_only() -> None:
+    assert [one.name for one in SCHEMA if not one.by_default] == list(ON_REQUEST)
+    sweep = {"e": [0.0, 0.25, 0.8], "v1": 2.0, "m1": 1.0, "m2": 3.0, "K": 6e9}
+    config = {"models": ["gharib-hurmuzlu-2012", "gharib-hurmuzlu-2012-energetic"], "sweep": sweep}
+    assert not ON_REQUEST.keys() & set(impact.sweep(config).data_vars)
+    result = impact.sweep(config | {"output": {"variables": ["e_out", "duration", *ON_REQUEST]}})
+    assert list(result.data_vars) == ["e_out", "duration", "status", *ON_REQUEST]
+    assert {name: result[name].attrs["units"] for name in ON_REQUEST} == ON_REQUEST
+    for name in ("e_kinetic", "e_energetic"):
+        np.testing.assert_allclose(result[name], result["e_out"], rtol=0.0, atol=1e-9)
+    damped, permanent = (result.sel(model=key) for key in config["models"])
+    # lambda = chi K/v0 = K/(e v0), in N s/m^2.5
+    np.testing.assert_allclose(damped["lambda"], [np.nan, 6e9 / 0.5, 6e9 / 1.6], rtol=1e-14)
+    assert np.isnan(permanent["lambda"]).all()
+    # a permanent indentation, or none at all, is left when the force ends
+    for one in (damped, permanent):
+        np.testing.assert_array_equal(one["separation_time"], one["duration"])
+
+
+def test_variables_stored_on_request_are_in_the_json_schema_and_in_messages() -> None:
+    from impact.sweeps.config import json_schema
+
+    known = json_schema()["$defs"]["output"]["properties"]["variables"]["items"]["enum"]  # type: ignore[index]
+    assert ON_REQUEST.keys() <= set(known)
+    with pytest.raises(impact.ImpactError, match='did you mean "separation_time"'):
+        impact.sweep({"models": "hertz", "sweep": TABLE1, "output": {"variables": ["separation_tim"]}})
 
 
 def test_coordinates(wide: xr.Dataset) -> None:

@@ -5,12 +5,15 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.table import Table
 
+from ..contact.units import with_numbers
+from ..sweeps.rules import MATERIAL, SWEEP, own_quantities
 from .console import cell, console, shown, table
 from .summary import worst_errors
 
@@ -36,44 +39,59 @@ def run_json(impact: Impact) -> dict[str, Any]:
         "model": impact.model.key, "inputs": dict(impact.point), "first_value_of": list(impact.first),
         "exponent": impact.exponent, "closing_speed": impact.closing_speed,
         "outputs": {**impact.values, "status": impact.status.name.lower()},
-        "damping": impact.damping, "e_kinematic": impact.e_kinematic, "e_kinetic": impact.e_kinetic,
-        "e_energetic": impact.e_energetic,
+        "materials": {name: asdict(material) for name, material in impact.materials.items()},
+        "derived": dict(impact.derived), "damping": impact.damping, "e_kinematic": impact.e_kinematic,
+        "e_kinetic": impact.e_kinetic, "e_energetic": impact.e_energetic,
     }  # fmt: skip
 
 
 def print_run(impact: Impact) -> None:
     """One impact: inputs, outputs, the three restitutions, and how far they can be trusted."""
-    from ..data.results import SCHEMA
-    from ..sweeps.rules import SWEEP
+    from ..data.impact import DERIVED
+    from ..data.results import SCHEMA, plain_unit
 
-    n = f"{impact.exponent:g}"
     rows: dict[str, Any] = {"model": impact.model.key, "equation": impact.model.equation}
     for name, value in impact.point.items():
-        unit = SWEEP[name].unit if name in SWEEP else "1"
         note = "  (first value of its axis)" if name in impact.first else ""
-        rows[name] = _quantity(value, unit.replace("^n", f"^{impact.point['n']:g}")) + note
+        rows[name] = _quantity(value, _unit_at(impact, _unit_of(impact, name))) + note
+    for name, material in impact.materials.items():
+        known = {field: value for field, value in asdict(material).items() if value is not None}
+        about = (f"{field} = {_quantity(value, MATERIAL[field].unit)}" for field, value in known.items())
+        rows[f"[materials.{name}]"] = ", ".join(about)
+    for name, unit, meaning in DERIVED:
+        if impact.derived[name] == impact.derived[name] and name not in impact.point:
+            rows[name] = f"{_quantity(impact.derived[name], _unit_at(impact, plain_unit(unit)))}  {meaning}"
     rows["status"] = f"{impact.status.name.lower()}: {impact.status.meaning}"
     for one in SCHEMA:
-        if one.dtype == "f8" and one.name != "damping_ratio":
-            rows[one.name] = _quantity(impact.values[one.name], one.unit.replace("m-n", f"m-{n}"))
-    rows["chi = lambda v0/K"] = _quantity(impact.values["damping_ratio"], "1")
-    rows["lambda"] = _quantity(impact.damping, f"N s/m^{impact.exponent + 1:g}")
-    rows["e kinematic (1)"] = _quantity(impact.e_kinematic, "1", 12) + "  from the velocities"
-    rows["e kinetic (2)"] = _quantity(impact.e_kinetic, "1", 12) + "  from the impulses of the two phases"
-    rows["e energetic (3)"] = _quantity(impact.e_energetic, "1", 12) + "  from their works"
+        if one.dtype == "f8" and one.name not in ("e_kinetic", "e_energetic"):
+            rows[one.name] = _quantity(impact.values[one.name], _unit_at(impact, plain_unit(one.unit)))
+    rows["e_kinematic"] = _quantity(impact.e_kinematic, "1", 12) + "  (1), from the velocities"
+    rows["e_kinetic"] = _quantity(impact.e_kinetic, "1", 12) + "  (2), tau_r/tau_c"
+    rows["e_energetic"] = _quantity(impact.e_energetic, "1", 12) + "  (3), the root of -W_r/W_c"
     rows["in the claimed domain"] = "yes" if impact.values["in_domain"] else f"no: {impact.model.domain_text}"
     rows["steps"] = impact.values["steps"]
     print_rows(rows)
 
 
-def _quantity(value: Any, unit: str, digits: int = 10) -> str:
-    from ..data.results import plain_unit
+def _unit_of(impact: Impact, name: str) -> str:
+    """The unit of an input, which may be a parameter of the model."""
+    key, _, parameter = name.rpartition(".")
+    known = own_quantities(impact.model) if key == impact.model.key else SWEEP
+    return known[parameter].unit if parameter in known else "1"
 
+
+def _unit_at(impact: Impact, unit: str) -> str:
+    """A unit with the values of n and of the parameters that its exponents have."""
+    own = {name.rpartition(".")[2]: value for name, value in impact.point.items() if isinstance(value, float)}
+    return with_numbers(unit, {**own, "n": impact.exponent})
+
+
+def _quantity(value: Any, unit: str, digits: int = 10) -> str:
     if not isinstance(value, float):
         return str(value)
     if value != value:
         return "–"
-    return f"{value:.{digits}g}" + ("" if unit == "1" else f" {plain_unit(unit)}")
+    return f"{value:.{digits}g}" + ("" if unit == "1" else f" {unit}")
 
 
 def info_json(dataset: xr.Dataset) -> dict[str, Any]:
@@ -90,7 +108,7 @@ def info_json(dataset: xr.Dataset) -> dict[str, Any]:
 
 def print_info(dataset: xr.Dataset, path: Path) -> None:
     """What is in a file."""
-    from ..data.results import plain_unit
+    from ..data.results import exponents_of, plain_unit
     from ..data.tally import counted, tally_of
 
     attributes = dataset.attrs
@@ -106,6 +124,8 @@ def print_info(dataset: xr.Dataset, path: Path) -> None:
             text = f"{values.min():g} … {values.max():g}, {values.size} values"
         else:
             text = ", ".join(shown(one) for one in distinct)
+        if name == "n" and coordinate.ndim == 0:
+            text = exponents_of(dataset) or text
         unit = plain_unit(str(coordinate.attrs.get("units", "1")))
         rows[str(name)] = text + ("" if unit == "1" else f" [{unit}]")
     for name in (

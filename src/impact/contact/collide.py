@@ -13,7 +13,7 @@ from .impulse import velocities_after
 from .lanes import Lanes
 from .model import ForceModel
 from .power import Array, all_within
-from .status import FIRST_FAILURE, NO_IMPACT, OK, Status
+from .status import FIRST_FAILURE, LIMIT, NO_IMPACT, OK, Status
 from .strike import Rebound
 from .trajectories import integrate_all
 from .values import own_values
@@ -25,6 +25,7 @@ OUTPUTS = (
     "v1_post", "v2_post", "v1_reference", "v2_reference", "v1_error", "v2_error", "e_out", "e_error",
     "peak_indentation", "permanent_indentation", "peak_force", "duration", "energy_loss", "stiffness",
     "damping_ratio", "residual", "oracle_error", "status", "in_domain", "steps",
+    "e_kinetic", "e_energetic", "lambda", "separation_time",
 )  # fmt: skip
 quiet = np.errstate(all="ignore")
 
@@ -163,7 +164,8 @@ class Contact:
     @quiet
     def residual(self) -> Array:
         rebound = self.rebound
-        return _but(rebound.work - (1.0 - rebound.e_out * rebound.e_out), self._unknown, np.nan)
+        work = rebound.approach_work + rebound.restitution_work
+        return _but(work - (1.0 - rebound.e_out * rebound.e_out), self._unknown, np.nan)
 
     @cached_property
     @quiet
@@ -182,6 +184,40 @@ class Contact:
     @cached_property
     def steps(self) -> NDArray[np.int32]:
         return _but(self.rebound.steps, self._left_alone, np.int32(0))
+
+    @property
+    def e_kinetic(self) -> Array:
+        """tau_r/tau_c, equation (2): the phases change the momentum by m v0 and e_out m v0, so this is e_out."""
+        return self.e_out
+
+    @cached_property
+    @quiet
+    def e_energetic(self) -> Array:
+        """sqrt(-W_r/W_c), equation (3), from the works that were integrated; 0 where the balls stay together."""
+        rebound = self.rebound
+        e = np.sqrt(np.maximum(-rebound.restitution_work, 0.0) / rebound.approach_work)
+        return _but(_but(e, _if_any(rebound.status == LIMIT), 0.0), self._unknown, np.nan)
+
+    @cached_property
+    @quiet
+    def damping(self) -> Array:
+        """lambda = chi K/v0 [N s/m^(n+1)]."""
+        return self.damping_ratio * self.stiffness / self.lanes.v0
+
+    @cached_property
+    @quiet
+    def separation_time(self) -> Array:
+        """Time until the surfaces part: after the force has ended they move at e_out v0. NaN if they never do."""
+        rebound = self.rebound
+        if self.model.is_permanent:
+            # a permanent indentation stays in the surfaces, which part at the release
+            return self.duration
+        rest = np.where(rebound.permanent > 0.0, rebound.permanent / rebound.e_out, 0.0)
+        return self._si(rebound.duration + np.where(np.isinf(rest), np.nan, rest), self.lanes.time)
+
+
+# the name in the result file is a keyword of Python
+setattr(Contact, "lambda", Contact.damping)
 
 
 def _if_any(found: Mask) -> Mask | None:

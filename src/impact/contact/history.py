@@ -25,9 +25,10 @@ SAMPLES, GAUSS = 4, 5
 class History:
     """The time history of one impact, in SI; arrays of shape (k,).
 
-    `x1`, `x2` are the displacements of the balls since first contact, so that delta = x1 - x2. `e_kinetic` is
-    the ratio of the impulses of the two phases, equation (2), and `e_energetic` the root of that of their
-    works, equation (3).
+    `x1`, `x2` are the displacements of the balls since first contact, so that delta = x1 - x2. `tau_c` and `tau_r`
+    [N s] are the impulses of approach and restitution, `W_c` and `W_r` [J] the works done against the force in
+    them (the latter negative), by quadrature of the force. `e_kinetic` is tau_r/tau_c, equation (2), and
+    `e_energetic` the root of -W_r/W_c, equation (3).
     """
 
     t: Array
@@ -38,6 +39,10 @@ class History:
     x2: Array
     v1: Array
     v2: Array
+    tau_c: float
+    tau_r: float
+    W_c: float
+    W_r: float
     e_kinetic: float
     e_energetic: float
 
@@ -78,6 +83,7 @@ def follow(model: ForceModel, lanes: Lanes, *, rtol: float, max_steps: int) -> H
     # the phases meet at the peak, and a landing can be shorter than rounding: each moment is told once
     later = np.append(np.minimum.accumulate(t[::-1])[::-1][1:], np.inf)
     t, delta, v, force = (row[t < later] for row in (t, delta, v, force))
+    momentum, energy = (lanes.m * lanes.v0).item(), lanes.energy.item()
     share1, share2 = lanes.m / lanes.m1, lanes.m / lanes.m2
     return History(
         t=t,
@@ -88,6 +94,10 @@ def follow(model: ForceModel, lanes: Lanes, *, rtol: float, max_steps: int) -> H
         x2=lanes.v2 * t + share2 * (lanes.v0 * t - delta),
         v1=lanes.v1 - share1 * (lanes.v0 - v),
         v2=lanes.v2 + share2 * (lanes.v0 - v),
+        tau_c=inward.impulse * momentum,
+        tau_r=outward.impulse * momentum,
+        W_c=inward.work * energy,
+        W_r=outward.work * energy,
         e_kinetic=outward.impulse / inward.impulse,
         e_energetic=math.sqrt(-outward.work / inward.work) if outward.work <= 0.0 else math.nan,
     )

@@ -40,8 +40,9 @@ def places(chosen: NDArray[np.bool_]) -> Places:
 class Rebound:
     """What a law does with impacts, in the contact's own units; arrays of shape (n,).
 
-    `work` is twice the work done against the force over both phases, 1 - e_out^2 up to the solver's error; `chi`
-    is the law's damping ratio and `exact` its restitution in closed form, where it has them.
+    `approach_work` and `restitution_work` are twice the works done against the force in the two phases, 1 and
+    -e_out^2 up to the solver's error; `chi` is the law's damping ratio and `exact` its restitution in closed form,
+    where it has them.
     """
 
     e_out: Array
@@ -49,7 +50,8 @@ class Rebound:
     permanent: Array
     force: Array
     duration: Array
-    work: Array
+    approach_work: Array
+    restitution_work: Array
     steps: NDArray[np.int32]
     status: NDArray[np.int8]
     chi: Array
@@ -64,7 +66,8 @@ class Rebound:
             permanent=np.full(n, np.nan),
             force=np.full(n, np.nan),
             duration=np.full(n, np.nan),
-            work=np.full(n, np.nan),
+            approach_work=np.full(n, np.nan),
+            restitution_work=np.full(n, np.nan),
             steps=np.zeros(n, np.int32),
             status=np.full(n, Status.OK, np.int8),
             chi=np.full(n, np.nan),
@@ -144,8 +147,8 @@ def strike(
     unknown = np.full(n, np.nan)
     rebound = Rebound(
         e_out=unknown.copy(), peak=peak, permanent=residual.copy(), force=np.maximum(inward.maximum, at_peak),
-        duration=inward.state[2].copy(), work=2.0 * inward.state[3], steps=inward.steps.copy(),
-        status=_status(inward), chi=unknown, exact=unknown,
+        duration=inward.state[2].copy(), approach_work=2.0 * inward.state[3], restitution_work=np.zeros(n),
+        steps=inward.steps.copy(), status=_status(inward), chi=unknown, exact=unknown,
     )  # fmt: skip
 
     # nothing is given back where the balls stay at their peak
@@ -171,7 +174,7 @@ def strike(
         e_out[held], work[held], status[held] = 0.0, 0.0, LIMIT
     rebound.e_out[parts] = e_out
     rebound.duration[parts] += outward.state[2]
-    rebound.work[parts] += work
+    rebound.restitution_work[parts] = work
     rebound.steps[parts] += outward.steps
     rebound.status[parts] = status
     if law.model.release == "force":

@@ -31,7 +31,8 @@ SYMBOLS = {
     "Hz": Dimension(0, 0, -1),
 }
 
-FACTOR = re.compile(r"\s*([*/]?)\s*(1|[A-Za-z]+)(?:\^(-?[\d.]+|[A-Za-z]\w*|\([^()]*(?:\([^()]*\)[^()]*)*\)))?")
+EXPONENT = r"\^(-?[\d.]+|[A-Za-z]\w*|\([^()]*(?:\([^()]*\)[^()]*)*\))"
+FACTOR = re.compile(rf"\s*([*/]?)\s*(1|[A-Za-z]+)(?:{EXPONENT})?")
 
 
 def dimension(unit: str, given: Mapping[str, Array | float]) -> Dimension:
@@ -63,6 +64,20 @@ def dimension(unit: str, given: Mapping[str, Array | float]) -> Dimension:
             total[axis] += one * exponent if one else 0.0
         place = factor.end()
     return Dimension(*total)
+
+
+def with_numbers(unit: str, given: Mapping[str, float]) -> str:
+    """The unit with numbers for the names in its exponents.
+
+    >>> with_numbers("N s^p/m^(n+p)", {"n": 1.5, "p": 2.0})
+    'N s^2/m^3.5'
+    """
+
+    def power(found: re.Match[str]) -> str:
+        exponent = _value(found[1], given, unit)
+        return "" if exponent == 1.0 else f"^{exponent:g}"
+
+    return re.sub(EXPONENT, power, unit)
 
 
 @cache

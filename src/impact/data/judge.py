@@ -19,7 +19,7 @@ from .verdict import Judged
 Array = NDArray[Any]
 
 # what a law may not have, or a sweep without e: NaN where all went well
-OPTIONAL = ("damping_ratio", "oracle_error", "e_error", "v1_error", "v2_error")
+OPTIONAL = ("damping_ratio", "lambda", "oracle_error", "e_error", "v1_error", "v2_error")
 
 
 def judge(one: Variable, new: xr.Dataset, baseline: xr.Dataset, tol: float) -> tuple[Judged, xr.Variable]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import re
+from collections import Counter
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from typing import Literal
@@ -18,6 +20,8 @@ from ..sweeps.rules import MATERIALS, SWEEP, own_quantities
 
 SCHEMA_VERSION = 1
 # coordinates along `model` that are texts about it
+# models with another exponent are named in at most so many characters
+MAX_NAMED = 48
 ABOUT_A_MODEL = ("title", "year", "equation", "reference", "doi")
 
 
@@ -26,7 +30,8 @@ class Variable:
     """One variable of a result.
 
     `per` says whether it depends on the model or on the axes alone; `judged` how a comparison judges it: by its
-    difference over a scale, by a bound on itself, exactly, or not at all.
+    difference over a scale, by a bound on itself, exactly, or not at all. `by_default` is False for a variable
+    that is stored only where `[output] variables` names it.
     """
 
     name: str
@@ -37,6 +42,7 @@ class Variable:
     meaning: str
     equation: str
     dtype: str = "f8"
+    by_default: bool = True
 
 
 SCHEMA = (
@@ -76,6 +82,17 @@ SCHEMA = (
              "1 inside every claimed interval", "i1"),
     Variable("steps", "1", "model", "reported", "accepted steps of the integrator",
              "approach + restitution", "i4"),
+    Variable("e_kinetic", "1", "model", "scaled by 1",
+             "kinetic restitution; the impulses are the changes of the momentum, so that it is e_out",
+             "τ_r/τ_c  (2)", by_default=False),
+    Variable("e_energetic", "1", "model", "scaled by 1",
+             "energetic restitution, from the integrated works of the two phases", "√(-W_r/W_c)  (3)",
+             by_default=False),
+    Variable("lambda", "N s m-(n+1)", "model", "scaled by itself",
+             "damping factor, where the law has one; n is the coordinate exponent", "λ = χ K/v0  (18)",
+             by_default=False),
+    Variable("separation_time", "s", "model", "scaled by itself", "time until the surfaces part",
+             "duration + remaining indentation/(e_out v0)", by_default=False),
 )  # fmt: skip
 
 PACKAGES = ("numpy", "h5py", "h5netcdf", "xarray")
@@ -83,7 +100,7 @@ PACKAGES = ("numpy", "h5py", "h5netcdf", "xarray")
 
 def stored(plan: Plan) -> tuple[Variable, ...]:
     """The variables of the result of a plan; the status is always there: without it a NaN would have no reason."""
-    chosen = {"status", *(plan.config.output.variables or (variable.name for variable in SCHEMA))}
+    chosen = {"status", *(plan.config.output.variables or (one.name for one in SCHEMA if one.by_default))}
     return tuple(replace(one, dtype=plan.config.output.dtype if one.dtype == "f8" else one.dtype)
                  for one in SCHEMA if one.name in chosen)  # fmt: skip
 
@@ -166,6 +183,29 @@ def plain_unit(unit: str) -> str:
     ('m/s', 'N/m^1.5', 'kg')
     """
     return re.sub(r" ([A-Za-z]+)-(\S+)", lambda found: f"/{found[1]}" + f"^{found[2]}" * (found[2] != "1"), unit)
+
+
+def exponent_text(by_model: Mapping[str, float]) -> str:
+    """The exponent n of some models, where laws may have their own.
+
+    >>> exponent_text({"hertz": 1.5, "bilinear": 1.0, "lankarani-nikravesh-1990": 1.5})
+    '1.5 (1 for bilinear)'
+    """
+    common = Counter(by_model.values()).most_common(1)[0][0]
+    others = {key: n for key, n in by_model.items() if n != common}
+    told = ", ".join(f"{n:g} for {key}" for key, n in others.items())
+    if len(told) > MAX_NAMED:
+        told = f"{len(others)} of {len(by_model)} models have another one"
+    return f"{common:g}" + (f" ({told})" if told else "")
+
+
+def exponents_of(dataset: xr.Dataset) -> str | None:
+    """The exponent n of the models of a result in words; None where it varies along an axis, or is not known."""
+    exponent = dataset.coords.get("exponent")
+    if exponent is None or not set(exponent.dims) <= {"model"}:
+        return None
+    keys = np.atleast_1d(dataset["model"].values).tolist()
+    return exponent_text(dict(zip(map(str, keys), np.atleast_1d(exponent.values).tolist(), strict=True)))
 
 
 def _exponent(plan: Plan) -> tuple[tuple[str, ...], object, dict[str, str]]:

@@ -178,7 +178,7 @@ OUTPUT_KEYS = {
     "variables": Key(
         lambda value, _: read_names(value, OUTPUTS, "a variable of the result").given,
         {"type": "array", "items": {"enum": list(OUTPUTS)}, "minItems": 1},
-        "variables of the result, else all; the status is always among them",
+        "variables of the result, else all but those stored on request; the status is always among them",
     ),
     "dtype": _word_key(DTYPES, "of the floating-point variables; coordinates are float64"),
     "compression": _word_key(COMPRESSIONS, "of the variables"),

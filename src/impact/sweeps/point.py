@@ -43,6 +43,8 @@ def one_point(
     asked = {} if model is None else {f"models={json.dumps([model])}": f"--model {model}"}
     config = _read(read, asked)
     varied = {name for axis in config.axes for name in axis.columns}
+    if at and {"e", "alpha"} <= at.keys():
+        raise UsageError("--at alpha: got alpha beside e, expected one of the two")
     at = {**{name: value for name, value in (picked or {}).items() if name in varied}, **(at or {})}
     zipped = {name for axis in config.axes if len(axis.columns) > 1 for name in axis.columns}
     known = [*(name for axis in config.axes for name in axis.columns), *config.scalars]

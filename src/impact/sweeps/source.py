@@ -140,8 +140,9 @@ def apply_overrides(
         overridden = {old: by for old, by in overridden.items() if old[: len(start)] != start}
         overridden[start] = (which, path)
         other = "alpha" if path[:2] == ("sweep", "e") else "e" if path[:2] == ("sweep", "alpha") else None
-        if other and ("sweep", other) not in overridden:
-            # each says what the other would: what is set takes the place of what the file gives
+        if other:
+            # each says what the other would: what is set last takes the place of what was there before
+            overridden = {old: by for old, by in overridden.items() if old[:2] != ("sweep", other)}
             data = {**data, "sweep": {k: v for k, v in _table(data["sweep"]).items() if k != other}}
     return data, overridden, problems
 

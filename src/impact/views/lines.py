@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from textwrap import fill
-from typing import Any
+from typing import Any, Literal
 
 import matplotlib
 import numpy as np
@@ -34,10 +34,20 @@ class Curve:
 
 
 @dataclass(frozen=True)
+class Mark:
+    """A point of a curve with a name, such as tau_c, which stands at the foot of its line to the axis `along`."""
+
+    label: str
+    x: float
+    y: float
+    along: Literal["x", "y"]
+
+
+@dataclass(frozen=True)
 class Panel:
     """Curves over one pair of axes; the numbers along an axis show its unit with a prefix, where it is given.
 
-    `bands` are distances from zero that are shaded, the widest first.
+    `bands` are distances from zero that are shaded, the widest first; `marks` are points with names.
     """
 
     x_label: str
@@ -48,6 +58,7 @@ class Panel:
     x_log: bool = False
     y_log: bool = False
     bands: tuple[float, ...] = ()
+    marks: tuple[Mark, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -136,8 +147,24 @@ def _draw(axes: Axes, panel: Panel, models: Sequence[str | None], letters: int) 
         if unit and not is_log:
             axis.set_major_formatter(EngFormatter(unit))
             axis.set_major_locator(MaxNLocator(5))
-    axes.margins(x=0.02)
+    # the names of marks need room at the ends of the axes
+    axes.margins(x=0.06 if panel.marks else 0.02, y=0.12 if panel.marks else None)
+    for mark in panel.marks:
+        _mark(axes, mark)
     _name_ends(axes, panel.curves)
+
+
+def _mark(axes: Axes, mark: Mark) -> None:
+    """A point, a dashed line from it to its axis, and its name at the foot of the line."""
+    low = axes.get_xlim()[0] if mark.along == "y" else axes.get_ylim()[0]
+    foot = (mark.x, low) if mark.along == "x" else (low, mark.y)
+    dashes: dict[str, Any] = {"color": "#777777", "linewidth": 0.8, "linestyle": (0, (4, 2)), "zorder": 1.2}
+    limits = axes.get_xlim(), axes.get_ylim()
+    axes.plot((mark.x, foot[0]), (mark.y, foot[1]), label="_", **dashes)
+    axes.plot([mark.x], [mark.y], "o", color="black", markersize=3.5, label="_", zorder=3)
+    axes.set(xlim=limits[0], ylim=limits[1])
+    letter = mark.label.replace("delta", r"\delta").replace("tau", r"\tau")
+    axes.annotate(f"${letter}$", foot, (4, 3), textcoords="offset points", fontsize=10.5, va="bottom", ha="left")
 
 
 def _name_ends(axes: Axes, curves: Sequence[Curve]) -> None:

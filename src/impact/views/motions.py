@@ -10,16 +10,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..contact.models import catalogue
-from ..data.results import plain_unit
+from ..data.results import exponent_text, plain_unit
 from ..errors import UsageError
 from ..sweeps.rules import SWEEP
 from ..text import safe_text
-from .lines import Curve, Lines, Panel
+from .lines import Curve, Lines, Mark, Panel
 from .over import title_of
 
 if TYPE_CHECKING:
     import xarray as xr
 
+# an indentation that is left is marked above this part of the largest one; forces as near as this are the same
+VISIBLE, SAME = 0.02, 1e-6
 IMPULSE_MOMENTUM = "Impulse-momentum (8), (9)"
 
 
@@ -30,7 +32,23 @@ def loop(histories: Sequence[xr.Dataset]) -> Lines:
     ----------
     histories : time histories of one impact by several models, as `impact.run(...).history` is
     """
-    return _lines("Force over indentation", histories, [("delta", "F", "")])
+    lines = _lines("Force over indentation", histories, [("delta", "F", "")])
+    if len(histories) > 1:
+        return lines
+    (panel,) = lines.panels
+    return replace(lines, panels=(replace(panel, marks=_of_loop(panel.curves[0])),))
+
+
+def _of_loop(curve: Curve) -> tuple[Mark, ...]:
+    """The largest indentation, the force there if no other is larger, and the indentation that is left."""
+    peak = int(np.argmax(curve.x))
+    deepest, force, left = curve.x[peak], curve.y[peak], curve.x[-1]
+    marks = [Mark("delta_m", deepest, force, "x")]
+    if force > (1.0 - SAME) * max(curve.y):
+        marks.append(Mark("f_m", deepest, force, "y"))
+    if left > VISIBLE * deepest:
+        marks.append(Mark("delta_p", left, 0.0, "x"))
+    return tuple(marks)
 
 
 def history(histories: Sequence[xr.Dataset]) -> Lines:
@@ -48,8 +66,25 @@ def impulse(histories: Sequence[xr.Dataset]) -> Lines:
         _with_reference(panel, histories[0], name) for panel, name in zip(found.panels, ("v1", "v2"), strict=True)
     ]
     curves = tuple(curve for panel in panels for curve in panel.curves)
-    both = Panel(panels[0].x_label, "velocities of the balls, v1 and v2 [m/s]", curves, panels[0].x_unit)
+    marks = _of_impulse(histories)
+    both = Panel(
+        panels[0].x_label, "velocities of the balls, v1 and v2 [m/s]", curves, panels[0].x_unit, marks=marks
+    )
     return Lines(found.title, found.conditions, (both,))
+
+
+def _of_impulse(histories: Sequence[xr.Dataset]) -> tuple[Mark, ...]:
+    """The impulse of the approach, where the lines of the balls meet, and that of the whole impact."""
+    one = histories[0]
+    tau = np.asarray(_values(one, "tau"))
+    if not np.isfinite(tau).all():
+        return ()
+    m1 = float(_inputs(one)["m1"])
+    tau_c = _mass(_inputs(one)) * float(one["v"][0])
+    marks = [Mark("tau_c", tau_c, float(one["v1"][0]) - tau_c / m1, "x")]
+    if len(histories) == 1:
+        marks.append(Mark("tau_f", float(tau[-1]), float(one["v2"][-1]), "x"))
+    return tuple(marks)
 
 
 def _with_reference(panel: Panel, one: xr.Dataset, name: str) -> Panel:
@@ -78,7 +113,7 @@ def _lines(title: str, histories: Sequence[xr.Dataset], pairs: Sequence[tuple[st
         ]
         (x_label, x_unit), (y_label, y_unit) = _axis(histories[0], x), _axis(histories[0], y)
         panels.append(Panel(x_label, y_label, tuple(curves), x_unit, y_unit))
-    return Lines(title, _conditions(histories[0]), tuple(panels))
+    return Lines(title, _conditions(histories), tuple(panels))
 
 
 def _values(one: xr.Dataset, name: str) -> tuple[float, ...]:
@@ -119,10 +154,14 @@ def _mass(at: Mapping[str, float | str]) -> float:
         return float("nan")
 
 
-def _conditions(one: xr.Dataset) -> str:
+def _conditions(histories: Sequence[xr.Dataset]) -> str:
     """The inputs in words."""
     parts = []
-    for name, value in _inputs(one).items():
+    inputs = dict(_inputs(histories[0]))
+    exponents = {str(one["model"].item()): _inputs(one).get("n") for one in histories}
+    if all(isinstance(n, float) for n in exponents.values()):
+        inputs["n"] = exponent_text(exponents)  # type: ignore[arg-type]
+    for name, value in inputs.items():
         unit = SWEEP[name].unit if name in SWEEP else "1"
         unit = "" if unit == "1" or "n" in unit else f" {plain_unit(unit)}"
         parts.append(

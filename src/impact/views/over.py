@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..data.results import plain_unit
+from ..data.results import exponents_of, plain_unit
 from ..errors import UsageError
 from ..text import safe_text
 from .lines import Curve, Lines, Panel
@@ -184,6 +184,8 @@ def conditions_of(data: xr.Dataset, *drawn: str) -> str:
             value = coordinate.values.item()
             unit = plain_unit(str(coordinate.attrs.get("units", "1")))
             text = f"{value:g}" if isinstance(value, float) else str(value)
+            if name == "n":
+                text = exponents_of(data) or text
             parts.append(safe_text(f"{name} = {text}" + (f" {unit}" if unit != "1" else ""), 60))
     # each stays on its line
     return ", ".join(part.replace(" ", "\u00a0") for part in parts)

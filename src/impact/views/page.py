@@ -19,7 +19,7 @@ from ..data.attributes import json_object, json_table
 from ..data.plausibility import material_notes, result_notes
 from ..data.ranking import Ranked, ranking
 from ..data.replay import own
-from ..data.results import plain_unit
+from ..data.results import exponents_of, plain_unit
 from ..data.tally import Tally, tally_of
 from ..errors import UsageError
 from ..sweeps.rules import MATERIAL
@@ -94,7 +94,8 @@ def _swept(dataset: xr.Dataset) -> Iterator[Markup]:
     for name, one in dataset.coords.items():
         if one.ndim == 0 and is_input(str(name)):
             meaning, unit = _about(one)
-            single.append((str(name), f"{_shown(one.values.item())} {unit}".removesuffix(" –"), meaning))
+            value = (exponents_of(dataset) if name == "n" else None) or _shown(one.values.item())
+            single.append((str(name), f"{value} {unit}".removesuffix(" –"), meaning))
     units = {key: one.unit.removesuffix("1") for key, one in MATERIAL.items()}
     for name, material in json_table(dataset, "materials").items():
         given = (f"{key} = {_shown(value)} {units.get(key, '')}".strip() for key, value in material.items()

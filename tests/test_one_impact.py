@@ -1,0 +1,188 @@
+"""One impact shows its radii, stiffnesses, impulses and works, at any e, with the law's own n."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import impact
+from impact.contact.collide import collide
+from impact.contact.models import find
+from impact.contact.status import Status
+
+from .conftest import Run
+from .problems import LAWS, impacts, with_parameters
+
+RTOL = 1e-10
+# Table 1: radius [m], stiffness [N/m^1.5], peak indentation [m]
+RADIUS, STIFFNESS, PEAK = 0.0444843486, 6.118486349e9, 1.008542975e-4
+
+
+@pytest.mark.parametrize("e", [0.2, 0.9])
+def test_the_three_restitutions_of_every_law_are_one_number(e: float) -> None:
+    apart = {}
+    for key in LAWS:
+        lanes = with_parameters(find(key), impacts(find(key).exponent or 1.5, e=e), 0.5)
+        contact = collide(find(key), lanes, rtol=RTOL, max_steps=100_000)
+        three = [getattr(contact, name)[0] for name in ("e_out", "e_kinetic", "e_energetic")]
+        if contact.status[0] in (Status.OK, Status.LIMIT):
+            apart[key] = np.ptp(three)
+    assert len(apart) > 0.9 * len(LAWS)
+    assert max(apart.values()) <= 10 * RTOL, max(apart, key=lambda key: apart[key])
+
+
+# m = 1/2 kg, K = 1 MN/m and v0 = 2 m/s: damping constants of 5 to 95 % of the critical one
+@pytest.mark.parametrize("damped", [0.05, 0.5, 0.95])
+def test_surfaces_part_after_the_force_of_a_dashpot_has_ended(damped: float) -> None:
+    m, K = 0.5, 1e6
+    omega, c = math.sqrt(K / m), 2.0 * damped * math.sqrt(K * m)
+    dashpot = impact.ForceModel(
+        key="dashpot", title="", year=2026, equation="", reference="", exponent=1.0, release="force",
+        force=lambda K, x, v, c: K * x + c * v, parameters=(impact.Parameter("c", "N s/m", "damping"),),
+    )  # fmt: skip
+    config = {
+        "models": "dashpot",
+        "sweep": {"v1": 2.0, "m1": 1.0, "m2": 1.0, "K": K, "n": 1.0},
+        "model": {"dashpot": {"c": c}},
+        "output": {"variables": ["e_out", "e_energetic", "duration", "separation_time"]},
+    }
+    result = impact.sweep(config, plugins=[dashpot])
+    # the damped sine has no force at 2 acos(damped), where 2 (damped/omega) e v0 = (c/K) e v0 of it is left
+    phase, free = 2.0 * math.acos(damped), math.sqrt(1.0 - damped**2)
+    e = math.exp(-damped / free * phase)
+    assert result["e_out"].item() == pytest.approx(e, rel=0, abs=1e-9)
+    assert result["e_energetic"].item() == pytest.approx(e, rel=0, abs=1e-9)
+    assert result["duration"].item() == pytest.approx(phase / (omega * free), rel=1e-8)
+    assert result["separation_time"].item() == pytest.approx(phase / (omega * free) + c / K, rel=1e-8)
+
+
+def test_an_overdamped_law_leaves_an_indentation_that_takes_its_time() -> None:
+    config = {"v1": 2.0, "m1": 1.0, "m2": 1.0, "K": 1e6, "n": 1.0}
+    shot = impact.run(
+        {"models": "kelvin-voigt-no-tension", "sweep": config, "model": {"kelvin-voigt-no-tension": {"C": 3e3}}}
+    )
+    rest = shot.values["permanent_indentation"] / (shot.values["v2_post"] - shot.values["v1_post"])
+    assert shot.values["separation_time"] == pytest.approx(shot.values["duration"] + rest, rel=1e-14)
+    assert rest > 0.5 * shot.values["duration"]
+
+
+def test_table_1_is_printed(cli: Run) -> None:
+    done = cli("run")
+    lines = {line.split()[0]: line.split(None, 1)[1].strip() for line in done.stdout.splitlines()}
+    assert lines["[materials.table1]"] == "E = 5.6e+10 Pa, nu = 0.3, rho = 2712 kg/m^3"
+    assert lines["R1"] == lines["R2"].replace("ball 2", "ball 1") == "0.04448434857 m  radius of ball 1"
+    assert lines["m"] == "0.5 kg  effective mass (17)"
+    assert lines["stiffness"] == "6118486349 N/m^1.5"
+    assert lines["tau_c"].startswith("0.5 N s ")
+    assert lines["tau_r"].startswith("0.25 N s ")
+    assert lines["W_c"].startswith("0.25 J ")
+    assert lines["W_r"].startswith("-0.0625 J ")
+
+
+@pytest.mark.parametrize("key", ["lankarani-nikravesh-1994", "gharib-hurmuzlu-2012-energetic"])
+def test_unloading_stiffness(key: str) -> None:
+    derived = impact.run(model=key, at={"e": 0.4}).derived
+    assert derived["K_r"] == pytest.approx(STIFFNESS / 0.4**3, rel=1e-8)
+    assert math.isnan(derived["rebound_speed_bound"])
+    assert impact.run(model=key, at={"e": 0.0}).derived["K_r"] == math.inf
+
+
+@pytest.mark.parametrize("e", [0.1, 0.5, 1.0])
+def test_the_rebound_is_slower_than_its_bound(e: float) -> None:
+    shot = impact.run(model="gharib-hurmuzlu-2012", at={"e": e, "v1": 2.0})
+    # (28) makes the bound (26) the rebound speed asked for
+    assert shot.derived["rebound_speed_bound"] == pytest.approx(e * 2.0, rel=1e-14)
+    assert shot.values["v2_post"] - shot.values["v1_post"] < e * 2.0
+    assert shot.damping == shot.values["lambda"] == pytest.approx(STIFFNESS / (e * 2.0), rel=1e-9)
+
+
+def test_impulses_and_works_balance_momentum_and_energy() -> None:
+    for key in ("hertz", "gharib-hurmuzlu-2012", "bilinear", "tsuji-1992"):
+        shot = impact.run(model=key, at={"e": 0.3, "m2": 3.0, "v1": 2.0})
+        derived, values, energy = shot.derived, shot.values, 0.5 * 0.75 * 2.0**2
+        assert derived["tau_c"] == pytest.approx(0.75 * 2.0, rel=1e-8)
+        assert derived["tau_c"] + derived["tau_r"] == pytest.approx(2.0 - values["v1_post"], rel=1e-8)
+        assert derived["W_c"] == pytest.approx(energy, rel=1e-8)
+        # the integrator's own work, energy_loss + residual, is that of the two phases together
+        work = values["energy_loss"] + values["residual"] * energy
+        assert derived["W_c"] + derived["W_r"] == pytest.approx(work, rel=0, abs=1e-8 * energy)
+        assert shot.e_energetic**2 == pytest.approx(-derived["W_r"] / derived["W_c"], rel=1e-14)
+        assert shot.e_kinetic == pytest.approx(derived["tau_r"] / derived["tau_c"], rel=1e-14)
+
+
+@pytest.mark.parametrize("key", ["exact-hysteresis", "gharib-hurmuzlu-2012", "lankarani-nikravesh-1994"])
+def test_limits_of_restitutions_impulses_and_works_at_e_0(key: str) -> None:
+    shot = impact.run(model=key, at={"e": 0.0})
+    assert shot.status == Status.LIMIT
+    assert (shot.e_kinematic, shot.e_kinetic, shot.e_energetic) == (0.0, 0.0, 0.0)
+    assert [shot.derived[name] for name in ("tau_c", "tau_r", "W_c", "W_r")] == [0.5, 0.0, 0.25, 0.0]
+    if key in ("exact-hysteresis", "gharib-hurmuzlu-2012"):
+        assert shot.derived["rebound_speed_bound"] == 0.0
+
+
+def test_text_and_json_have_the_same_names(cli: Run) -> None:
+    words = ("run", "--model", "gharib-hurmuzlu-2012", "--at", "e=0.2")
+    text = cli(*words).stdout
+    found = json.loads(cli(*words, "--json").stdout)
+    shown = {line.split()[0] for line in text.splitlines()}
+    numbers = {name for name, value in {**found["outputs"], **found["derived"]}.items() if value is not None}
+    assert numbers - {"in_domain"} <= shown
+    assert {"e_kinematic", "e_kinetic", "e_energetic", *found["inputs"]} <= shown
+    assert found["materials"]["table1"] == {"E": 56e9, "nu": 0.3, "rho": 2712.0, "yield_strength": None}
+
+
+def test_parameters_have_units(cli: Run) -> None:
+    lines = cli("run", "--model", "bordbar-hyppanen-2007", "--set", "model.bordbar-hyppanen-2007.C=1e5").stdout
+    assert "bordbar-hyppanen-2007.C  100000 N s/m^1.65" in " ".join(lines.split()).replace("C ", "C  ")
+    words = ("--set", "model.adams-impact.c=1e5", "--set", "model.adams-impact.d=1e-5")
+    lines = " ".join(cli("run", "--model", "adams-impact", *words).stdout.split())
+    assert "adams-impact.c 100000 N s/m " in lines
+    assert "adams-impact.d 1e-05 m " in lines
+    assert "n 1.5 " in lines
+
+
+# ---- a law's own n
+
+
+@pytest.mark.parametrize("key", ["bilinear", "ismail-stronge-2008"])
+def test_a_linear_law_shows_its_own_exponent(cli: Run, key: str) -> None:
+    shot = impact.run(model=key)
+    assert shot.point["n"] == shot.exponent == 1.0
+    assert json.loads(shot.history.attrs["inputs"])["n"] == 1.0  # type: ignore[union-attr]
+    lines = [line.split() for line in cli("run", "--model", key).stdout.splitlines()]
+    assert ["n", "1"] in lines
+    assert ["stiffness", "61445658.07", "N/m"] in lines
+
+
+# ---- e and alpha
+
+
+def test_alpha_takes_the_place_of_e_and_e_that_of_alpha(cli: Run) -> None:
+    done = cli("run", "--at", "alpha=0.3", "--at", "v1=2", "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert (found["inputs"]["alpha"], found["inputs"]["e"]) == (0.3, 0.4)
+    sweep = {"alpha": [0.1, 0.2], "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6e9}
+    shot = impact.run({"models": "bilinear", "sweep": {**sweep, "n": 1.0}}, at={"e": 0.7})
+    assert "alpha" not in shot.point
+    assert shot.values["e_out"] == pytest.approx(0.7, abs=1e-9)
+    set_before = impact.run(model="bilinear", overrides=["sweep.e=0.9"], at={"alpha": 0.25})
+    assert set_before.point["e"] == 0.75
+
+
+def test_alpha_takes_the_place_of_the_e_of_a_stored_sweep(tmp_path: Path) -> None:
+    config = {
+        "models": "bilinear",
+        "sweep": {"e": [0.2, 0.4], "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6e9, "n": 1.0},
+    }
+    impact.save(impact.sweep(config, overrides=["sweep.e=0.5"]), tmp_path / "stored.h5")
+    assert impact.run(tmp_path / "stored.h5", at={"alpha": 0.25}).point["e"] == 0.75
+
+
+def test_alpha_beside_e_is_refused(cli: Run) -> None:
+    done = cli("run", "--at", "alpha=0.3", "--at", "e=0.5")
+    assert (done.returncode, done.stderr) == (2, "--at alpha: got alpha beside e, expected one of the two\n")
