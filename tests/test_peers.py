@@ -66,7 +66,7 @@ class Entry:
     """A catalogue entry, and how `code` is made to run the same law.
 
     `parameters` returns what the runner needs beyond masses, radii and velocities. `holds` says whether the entry
-    is that of a version of the code.
+    is that of a version of the code. `slack` is how exactly the code itself finds its damping from e.
     """
 
     key: str
@@ -74,6 +74,7 @@ class Entry:
     parameters: Callable[[Values], Values]
     collisions: tuple[Values, ...]
     holds: Callable[[str], bool] = every
+    slack: float = 0.0
 
 
 # three pairs of balls: equal ones, unequal ones that meet, and a light one behind a heavy one
@@ -101,9 +102,12 @@ RESTITUTIONS = (0.5, 0.1, 0.9)
 E_HOOKE = collisions(e=RESTITUTIONS, K=1e6, n=1.0)
 E_HERTZ = collisions(e=RESTITUTIONS, K=1e8, n=1.5)
 
+MATERIALS = {"soft": {"E": 1e9, "nu": 0.3, "rho": 1000.0}, "hard": {"E": 5e9, "nu": 0.2, "rho": 1000.0}}
+MATERIAL = MATERIALS["soft"]
+
 # ---- LAMMPS
 
-LAMMPS = Code("LAMMPS", "run_lammps.py")
+LAMMPS = Code("LAMMPS", "run_lammps.py", steps_per_contact=500)
 
 
 def lammps(spring: str, damping: str, strength: str, limit: str) -> Callable[[Values], Values]:
@@ -133,12 +137,16 @@ ENTRIES = [
         ("coeff-restitution-hertz", "hertz", "coeff_restitution", "e", E_HERTZ, every),
         ("tsuji-without-root", "hertz", "tsuji", "e", E_HERTZ, before_root),
         ("tsuji", "hertz", "tsuji", "e", E_HERTZ, after_root),
+        ("tsuji-hooke-without-root", "hooke", "tsuji", "e", E_HOOKE, before_root),
+        ("tsuji-hooke", "hooke", "tsuji", "e", E_HOOKE, after_root),
         ("velocity-hooke", "hooke", "velocity", "C", collisions(C=(300.0, 900.0, 50.0), K=1e6, n=1.0), every),
         ("velocity-hertz", "hertz", "velocity", "C", collisions(C=(300.0, 600.0, 50.0), K=1e8, n=1.5), every),
         ("mass-velocity-hooke", "hooke", "mass_velocity", "gamma",
          collisions(gamma=(600.0, 1500.0, 300.0), K=1e6, n=1.0), every),
         ("mass-velocity-hertz", "hertz", "mass_velocity", "gamma",
          collisions(gamma=(600.0, 900.0, 300.0), K=1e8, n=1.5), every),
+        ("viscoelastic-hooke", "hooke", "viscoelastic", "eta",
+         collisions(eta=(1e5, 3e5, 3e4), K=1e6, n=1.0), every),
         ("viscoelastic-hertz", "hertz", "viscoelastic", "eta",
          collisions(eta=(3e5, 1e6, 1e5), K=1e8, n=1.5), every),
     )
@@ -149,19 +157,23 @@ ENTRIES = [
 
 MUJOCO = Code("MuJoCo", "run_mujoco.py", steps_per_contact=250)
 
-ENTRIES += [
-    Entry(
-        "mujoco-solref", MUJOCO,
-        lambda c, integrator=integrator: {"solref": f"{c['timeconst']} {c['dampratio']}", "integrator": integrator},
-        collisions(timeconst=(0.02, 0.005, 0.01), dampratio=(0.3, 1.0, 0.1), K=1e6, n=1.0),
-    )
-    for integrator in ("Euler", "RK4")
-]  # fmt: skip
+for integrator in ("Euler", "RK4"):
+    ENTRIES += [
+        Entry(
+            "mujoco-solref", MUJOCO,
+            lambda c, name=integrator: {"solref": f"{c['timeconst']} {c['dampratio']}", "integrator": name},
+            collisions(timeconst=(0.02, 0.005, 0.01), dampratio=(0.3, 1.0, 0.1), K=1e6, n=1.0),
+        ),
+        Entry(
+            "mujoco-solref-direct", MUJOCO,
+            lambda c, name=integrator: {"solref": f"{-c['k']} {-c['b']}", "integrator": name},
+            collisions(k=(1e6, 1e5, 1e7), b=(500.0, 800.0, 200.0), K=1e6, n=1.0),
+        ),
+    ]  # fmt: skip
 
 # ---- LIGGGHTS
 
 LIGGGHTS = Code("LIGGGHTS", "run_liggghts.py", needs="liggghts", install=DEBIAN)
-MATERIAL = {"E": 1e9, "nu": 0.3, "rho": 1000.0}
 
 ENTRIES += [
     Entry(
@@ -178,31 +190,154 @@ ENTRIES += [
 
 # ---- YADE
 
-YADE = Code("YADE", "run_yade.py", ("yade", "-n", "-x"), needs="yade", install=DEBIAN, steps_per_contact=250)
+YADE = Code(
+    "YADE", "run_yade.py", ("yade", "-j1", "-n", "-x"), needs="yade", install=DEBIAN, steps_per_contact=250
+)
 
 
-def yade_mindlin(damping: str, value: Callable[[Values], float]) -> Callable[[Values], Values]:
-    return lambda c: {"law": "mindlin", "options": MATERIAL | {damping: value(c)}}
+def mindlin(name: str, value: Callable[[Values], float]) -> Callable[[Values], Values]:
+    """Ip2_FrictMat_FrictMat_MindlinPhys with en or betan."""
+    return lambda c: {"law": "mindlin", "options": MATERIAL | {name: value(c)}}
+
+
+def betan(c: Values) -> float:
+    """By the traditional formula of a linear spring."""
+    return -math.log(c["e"]) / math.hypot(math.pi, math.log(c["e"]))
+
+
+def two_springs(c: Values) -> Values:
+    """ViscElMat of one ball; two of them act in series."""
+    return {"law": "viscoelastic", "options": {"kn": 2 * c["K"], "cn": 2 * c["C"], "ks": 0.0, "cs": 0.0}}
+
+
+def viscoelastic_en(c: Values) -> Values:
+    options = {"young": MATERIAL["E"], "poisson": MATERIAL["nu"], "en": c["e"], "et": c["e"]}
+    return {"law": "viscoelastic", "options": options}
+
+
+def since_thornton(version: str) -> bool:
+    """En has had the coefficients of Thornton and others since 2023.02a."""
+    return version >= "2023.02a"
+
+
+def before_thornton(version: str) -> bool:
+    return not since_thornton(version)
+
+
+E_SOFT = collisions(e=RESTITUTIONS, material="soft")
+
+ENTRIES += [
+    Entry("yade-en", YADE, mindlin("en", lambda c: c["e"]), E_SOFT, since_thornton),
+    Entry("yade-en-clamped", YADE, mindlin("en", lambda c: c["e"]), E_SOFT, before_thornton),
+    Entry("yade-betan", YADE, mindlin("betan", betan), E_SOFT),
+    Entry(
+        "yade-betan-direct", YADE, mindlin("betan", lambda c: c["betan"]),
+        collisions(betan=(0.2, 0.6, 0.03), material="soft"),
+    ),
+    Entry("yade-viscoelastic", YADE, two_springs, collisions(C=(300.0, 900.0, 50.0), K=1e6, n=1.0)),
+    # YADE finds the damping of en to 1 %
+    Entry("yade-viscoelastic-en", YADE, viscoelastic_en, E_SOFT, slack=0.01),
+]  # fmt: skip
+
+# ---- Drake
+
+DRAKE = Code("Drake", "run_drake.py", steps_per_contact=100)
+
+for scheme in ("semi_explicit_euler", "tamsi"):
+    ENTRIES += [
+        Entry(
+            "drake-point-contact", DRAKE,
+            lambda c, name=scheme: {"scheme": name, "k": (c["k1"], c["k2"]), "d": (c["d"], c["d"])},
+            collisions(d=(0.5, 3.0, 0.1), k1=2e6, k2=2e6, K=1e6, n=1.0),
+        ),
+        Entry(
+            "drake-point-contact-mixed", DRAKE,
+            lambda c, name=scheme: {"scheme": name, "k": (c["k1"], c["k2"]), "d": (c["d1"], c["d2"])},
+            collisions(d1=(0.5, 3.0, 0.1), d2=(2.0, 0.3, 0.0), k1=2e6, k2=5e6, K=1e6, n=1.0),
+        ),
+    ]  # fmt: skip
+
+# ---- Simbody, in OpenSim; its stiffness is the modulus of plane strain
+
+SIMBODY = Code("Simbody", "run_simbody.py", steps_per_contact=100)
+
+
+def plane_strain(*names: str) -> float:
+    return tuple(MATERIALS[name]["E"] / (1 - MATERIALS[name]["nu"] ** 2) for name in names)
 
 
 ENTRIES += [
     Entry(
-        "yade-betan", YADE, yade_mindlin("betan", lambda c: -math.log(c["e"]) / math.hypot(math.pi, math.log(c["e"]))),
-        collisions(e=RESTITUTIONS, material="soft"),
+        "simbody-hunt-crossley", SIMBODY,
+        lambda c: {"stiffness": plane_strain("soft", "soft"), "c": (c["c"], c["c"])},
+        collisions(c=(0.3, 3.0, 0.05), material="soft"),
     ),
-    Entry("yade-en", YADE, yade_mindlin("en", lambda c: c["e"]), collisions(e=RESTITUTIONS, material="soft")),
-    # two materials of the same kn are springs in series
     Entry(
-        "yade-viscoelastic", YADE,
-        lambda c: {"law": "viscoelastic", "options": {"kn": 2 * c["K"], "cn": 2 * c["C"], "ks": 0.0, "cs": 0.0}},
+        "simbody-hunt-crossley-mixed", SIMBODY,
+        lambda c: {"stiffness": plane_strain("soft", "hard"), "c": (c["c1"], c["c2"])},
+        collisions(c1=(0.3, 3.0, 0.05), c2=(1.0, 0.5, 0.0), material1="soft", material2="hard"),
+    ),
+]  # fmt: skip
+
+# ---- OpenSees, materials of pounding
+
+OPENSEES = Code("OpenSees", "run_opensees.py", steps_per_contact=250)
+
+
+def hertzdamp(c: Values) -> Values:
+    """Kh and xiNorm, as the documentation recommends."""
+    return {"material": "Hertzdamp", "before_gap": (c["K"], 8 * (1 - c["e"]) / (5 * c["e"])), "after_gap": (1.5,)}
+
+
+def jankowski(c: Values) -> Values:
+    """Kh, xi as the documentation has it, and the effective mass."""
+    e = c["e"]
+    xi = 9 * math.sqrt(5) / 2 * (1 - e**2) / (e * (e * (9 * math.pi - 16) + 16))
+    mass = 1 / (1 / c["m1"] + 1 / c["m2"])
+    return {"material": "JankowskiImpact", "before_gap": (c["K"], xi, mass), "after_gap": (1.5,)}
+
+
+def impact_material(c: Values) -> Values:
+    """K1, K2 and the yield displacement, a tenth of the indentation that the law is designed for."""
+    base = c["K"] * math.sqrt(c["d"])
+    loss = (1 - c["e"] ** 2) / 2.5
+    stiffness = (base * (1 + 10 * loss), base * (1 - 10 * loss / 9), -0.1 * c["d"])
+    return {"material": "ImpactMaterial", "before_gap": stiffness, "after_gap": ()}
+
+
+ENTRIES += [
+    Entry("opensees-hertzdamp", OPENSEES, hertzdamp, E_HERTZ),
+    Entry("opensees-jankowski-impact", OPENSEES, jankowski, E_HERTZ),
+    Entry(
+        "opensees-impact-material", OPENSEES, impact_material,
+        collisions(e=RESTITUTIONS, d=(5e-4, 4e-4, 5e-4), K=1e8, n=1.5),
+    ),
+    Entry(
+        "kelvin-voigt", OPENSEES,
+        lambda c: {"material": "ViscoelasticGap", "before_gap": (c["K"], c["C"]), "after_gap": ()},
         collisions(C=(300.0, 900.0, 50.0), K=1e6, n=1.0),
     ),
 ]  # fmt: skip
 
+# ---- Kratos
+
+KRATOS = Code("Kratos DEM", "run_kratos.py", steps_per_contact=250)
+
+
+def kratos(law: str) -> Callable[[Values], Values]:
+    return lambda c: {"law": law, "E": MATERIAL["E"], "nu": MATERIAL["nu"], "e": c["e"]}
+
+
+ENTRIES += [
+    Entry("kratos-hertz", KRATOS, kratos("DEM_D_Hertz_viscous_Coulomb"), E_SOFT),
+    # Kratos finds the damping ratio by bisection to 1e-4
+    Entry("kratos-linear", KRATOS, kratos("DEM_D_Linear_viscous_Coulomb"), E_SOFT, slack=1e-4),
+]
+
 # ---- the comparison
 
 # what goes into the sweep; anything else is a parameter of the law
-SWEPT = {"e", "v1", "v2", "m1", "m2", "R1", "R2", "K", "n", "material"}
+SWEPT = {"e", "v1", "v2", "m1", "m2", "R1", "R2", "K", "n", "material", "material1", "material2"}
 
 
 def by_impact(key: str, collision: Values) -> tuple[float, float]:
@@ -210,7 +345,7 @@ def by_impact(key: str, collision: Values) -> tuple[float, float]:
     config = {
         "models": key,
         "sweep": {name: value for name, value in collision.items() if name in SWEPT},
-        "materials": {"soft": MATERIAL},
+        "materials": MATERIALS,
         "model": {key: {name: value for name, value in collision.items() if name not in SWEPT}},
     }
     result = impact.sweep(config)
@@ -268,8 +403,8 @@ def test_a_code_gives_the_restitution_of_its_entry(
     difference = theirs - ours
     worst = int(np.argmax(np.abs(difference)))
     record_property(
-        "peer", (entry.code.name, version, entry.key, len(ours), difference[worst], uncertainty.max())
+        "peer", (entry.code.name, version, entry.key, len(ours), float(difference[worst]), float(uncertainty.max()))
     )
     print("impact", ours, "code", theirs, "difference", difference, "uncertainty", uncertainty)
     assert (uncertainty <= MAX_UNCERTAINTY).all()
-    assert (np.abs(difference) <= np.maximum(uncertainty, FLOOR)).all()
+    assert (np.abs(difference) <= np.maximum(uncertainty + entry.slack, FLOOR)).all()

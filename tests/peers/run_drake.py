@@ -19,8 +19,8 @@ from runner import serve
 
 
 def collide(
-    scheme: str, k: float, d: float, m1: float, m2: float, R1: float, R2: float, v1: float, v2: float, gap: float,
-    step: float, count: int,
+    scheme: str, k: list[float], d: list[float], m1: float, m2: float, R1: float, R2: float, v1: float, v2: float,
+    gap: float, step: float, count: int,
 ) -> tuple[float, float]:  # fmt: skip
     discrete = scheme == "tamsi"
     builder = DiagramBuilder()
@@ -30,16 +30,16 @@ def collide(
         plant.set_discrete_contact_approximation(DiscreteContactApproximation.kTamsi)
     plant.mutable_gravity_field().set_gravity_vector([0, 0, 0])
     joints = []
-    for name, mass, radius in (("1", m1, R1), ("2", m2, R2)):
-        body = plant.AddRigidBody(name, SpatialInertia.SolidSphereWithMass(mass, radius))
+    for i, mass, radius in ((0, m1, R1), (1, m2, R2)):
+        body = plant.AddRigidBody(f"body{i}", SpatialInertia.SolidSphereWithMass(mass, radius))
         joints.append(
-            plant.AddJoint(PrismaticJoint(f"joint{name}", plant.world_frame(), body.body_frame(), [1, 0, 0]))
+            plant.AddJoint(PrismaticJoint(f"joint{i}", plant.world_frame(), body.body_frame(), [1, 0, 0]))
         )
         properties = ProximityProperties()
         AddContactMaterial(
-            dissipation=d, point_stiffness=k, friction=CoulombFriction(0, 0), properties=properties
+            dissipation=d[i], point_stiffness=k[i], friction=CoulombFriction(0, 0), properties=properties
         )
-        plant.RegisterCollisionGeometry(body, RigidTransform(), Sphere(radius), f"sphere{name}", properties)
+        plant.RegisterCollisionGeometry(body, RigidTransform(), Sphere(radius), f"sphere{i}", properties)
     plant.Finalize()
     diagram = builder.Build()
     simulator = Simulator(diagram)
