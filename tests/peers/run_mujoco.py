@@ -22,7 +22,9 @@ def collide(
     step: float, count: int,
 ) -> tuple[float, float]:  # fmt: skip
     model = mujoco.MjModel.from_xml_string(
-        WORLD.format(x1=-R1 - gap, x2=R2, R1=R1, R2=R2, m1=m1, m2=m2, solref=solref, integrator=integrator, step=step)
+        WORLD.format(
+            x1=-R1 - gap, x2=R2, R1=R1, R2=R2, m1=m1, m2=m2, solref=solref, integrator=integrator, step=step
+        )
     )
     data = mujoco.MjData(model)
     data.qvel[:] = v1, v2

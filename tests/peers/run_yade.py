@@ -6,18 +6,30 @@ import sys
 from pathlib import Path
 
 from yade import (
-    Bo1_Sphere_Aabb, ForceResetter, FrictMat, Ig2_Sphere_Sphere_ScGeom, InsertionSortCollider, InteractionLoop,
-    Ip2_FrictMat_FrictMat_MindlinPhys, Ip2_ViscElMat_ViscElMat_ViscElPhys, Law2_ScGeom_MindlinPhys_Mindlin,
-    Law2_ScGeom_ViscElPhys_Basic, NewtonIntegrator, O, ViscElMat, config, utils,
+    Bo1_Sphere_Aabb,
+    ForceResetter,
+    FrictMat,
+    Ig2_Sphere_Sphere_ScGeom,
+    InsertionSortCollider,
+    InteractionLoop,
+    Ip2_FrictMat_FrictMat_MindlinPhys,
+    Ip2_ViscElMat_ViscElMat_ViscElPhys,
+    Law2_ScGeom_MindlinPhys_Mindlin,
+    Law2_ScGeom_ViscElPhys_Basic,
+    NewtonIntegrator,
+    O,
+    ViscElMat,
+    config,
+    utils,
 )  # fmt: skip
 
 sys.path.insert(0, str(Path(sys.argv[0]).parent))
-from runner import serve  # noqa: E402
+from runner import serve
 
 
 def collide(
-    law: str, options: dict[str, float], m1: float, m2: float, R1: float, R2: float, v1: float, v2: float, gap: float,
-    step: float, count: int,
+    law: str, options: dict[str, float], m1: float, m2: float, R1: float, R2: float, v1: float, v2: float,
+    gap: float, step: float, count: int,
 ) -> tuple[float, float]:  # fmt: skip
     O.reset()
     if law == "mindlin":
