@@ -107,7 +107,8 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
         for name, value in report.user_properties
     ]
     peers = [value for name, value in properties if name == "peer"]
-    if not peers:
+    without_peer = [item for name, value in properties if name == "without peer" for item in value.items()]
+    if not peers and not without_peer:
         return
     terminalreporter.section("restitution by other codes")
     row = "{:10}  {:23}  {:37}  {:19}  {:>10}  {:>10}  {:>11}".format
@@ -116,5 +117,5 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
         terminalreporter.line(row(*labels, collisions, f"{difference:.1e}", f"{uncertainty:.1e}"))
     for reason in sorted({report.longrepr[2].removeprefix("Skipped: ") for report in stats.get("skipped", ())}):
         terminalreporter.line(f"skipped  {reason}")
-    for key, reason in (item for name, value in properties if name == "without peer" for item in value.items()):
+    for key, reason in without_peer:
         terminalreporter.line(f"no peer  {key}: {reason}")

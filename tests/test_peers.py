@@ -1,12 +1,12 @@
 """Two balls collide in other codes, and the catalogue entry of the same law gives the same restitution.
 
 Each collision runs in the real code at steps h, h/2 and h/4, and at each of them with several phases: the part of
-a step by which the balls overlap when the code first sees the contact. The mean over the phases is extrapolated to a
-step of zero, from h and h/2 and again from h/2 and h/4. The code's own uncertainty is the difference of the two
+a step by which the balls overlap when the code first sees the contact. The mean over the phases is extrapolated to
+a step of zero, from h and h/2 and again from h/2 and h/4. The code's own uncertainty is the difference of the two
 extrapolations plus half the spread over the phases at h/4.
 
-`tests/peers` has a script for each code, which runs in a child process. The table at the end of `make test-peers` has
-the largest difference and the largest uncertainty over the collisions of an entry.
+`tests/peers` has a script for each code, which runs in a child process. The table at the end of `make test-peers`
+has the largest difference and the largest uncertainty over the collisions of an entry.
 """
 
 from __future__ import annotations
