@@ -96,3 +96,26 @@ def wide(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
     path = tmp_path_factory.mktemp("wide") / "wide.toml"
     path.write_text(WIDE, encoding="utf-8")
     return impact.sweep(path)
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Print what the codes of test_peers.py gave, and what was skipped."""
+    stats = terminalreporter.stats
+    properties = [
+        (name, value)
+        for report in (*stats.get("passed", ()), *stats.get("failed", ()))
+        for name, value in report.user_properties
+    ]
+    peers = [value for name, value in properties if name == "peer"]
+    without_peer = [item for name, value in properties if name == "without peer" for item in value.items()]
+    if not peers and not without_peer:
+        return
+    terminalreporter.section("restitution by other codes")
+    row = "{:10}  {:23}  {:37}  {:19}  {:>10}  {:>10}  {:>11}".format
+    terminalreporter.line(row("code", "version", "entry", "variant", "collisions", "difference", "uncertainty"))
+    for *labels, collisions, difference, uncertainty in sorted(map(tuple, peers)):
+        terminalreporter.line(row(*labels, collisions, f"{difference:.1e}", f"{uncertainty:.1e}"))
+    for reason in sorted({report.longrepr[2].removeprefix("Skipped: ") for report in stats.get("skipped", ())}):
+        terminalreporter.line(f"skipped  {reason}")
+    for key, reason in without_peer:
+        terminalreporter.line(f"no peer  {key}: {reason}")

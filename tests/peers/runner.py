@@ -1,0 +1,30 @@
+"""What every runner shares: it reads collisions from one JSON file and writes the rebounds to another."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from typing import Any
+
+
+def serve(version: str, collide: Callable[..., tuple[float, float]]) -> None:
+    """Run every collision of `sys.argv[-2]` and write the version and the restitutions to `sys.argv[-1]`.
+
+    Parameters
+    ----------
+    version
+        Version of the code.
+    collide
+        Returns the velocities [m/s] of both balls after the contact. It gets what the entry passes to the code and
+        m1, m2 [kg], R1, R2, gap [m], v1, v2 [m/s], step [s] and count, the number of steps. The balls lie on one
+        line, ball 1 on the left, and `gap` apart at the start.
+    """
+    with open(sys.argv[-2], encoding="utf-8") as stream:
+        collisions: list[dict[str, Any]] = json.load(stream)
+    restitutions = []
+    for collision in collisions:
+        v1, v2 = collide(**collision)
+        restitutions.append((v2 - v1) / (collision["v1"] - collision["v2"]))
+    with open(sys.argv[-1], "w", encoding="utf-8") as stream:
+        json.dump({"version": version, "restitutions": restitutions}, stream)
