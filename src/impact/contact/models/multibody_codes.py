@@ -214,7 +214,7 @@ DRAKE_POINT_CONTACT_MIXED = of_code(
 
 MODELICA_ELASTOGAP = ForceModel(
     key="modelica-elastogap",
-    title="Modelica ElastoGap (4.1.0, 2026)",
+    title="Modelica ElastoGap (state of 2026)",
     year=2008,
     equation="F = max(0, K δⁿ + min(d δ̇, K δⁿ))",
     reference="Modelica Standard Library, Mechanics.Translational.Components.ElastoGap",
@@ -345,7 +345,7 @@ MUJOCO_EVIDENCE = Evidence(
 
 MUJOCO_SOLREF = ForceModel(
     key="mujoco-solref",
-    title="MuJoCo solref, standard format (2.0 to 3.12)",
+    title="MuJoCo solref, standard format (since 2.0)",
     year=2014,
     equation="F = m(δ/(τ ζ)² + 2 δ̇/τ), to F = 0",
     reference=TODOROV,
@@ -368,7 +368,7 @@ MUJOCO_SOLREF = ForceModel(
 
 MUJOCO_SOLREF_DIRECT = ForceModel(
     key="mujoco-solref-direct",
-    title="MuJoCo solref, direct format (2.0 to 3.12)",
+    title="MuJoCo solref, direct format (since 2.0)",
     year=2018,
     equation="F = m(k δ + b δ̇), to F = 0",
     reference=TODOROV,
