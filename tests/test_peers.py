@@ -200,6 +200,33 @@ ENTRIES += [
     for key, options in (("", ""), ("-limit-force", "limitForce on"))
 ]  # fmt: skip
 
+
+def edinburgh(c: Values) -> Values:
+    """The elasto-plastic adhesive model, without its dashpot."""
+    pair = {
+        "UnloadingStiffness": c["k2"], "surfaceEnergy": c["gamma"], "pullOffForce": 0.0,
+        "coefficientAdhesionStiffness": 0.0,
+    }  # fmt: skip
+    scalars = {"overlapExponent": c["n"], "adhesionExponent": c["adhesion_exponent"]}
+    return {
+        "model": "edinburgh", "options": "", "E": MATERIAL["E"], "nu": MATERIAL["nu"], "e": 1.0, "vc": 1.0,
+        "properties": [
+            *(f"{name} scalar {value}" for name, value in scalars.items()),
+            *(f"{name} peratomtypepair 2 {value} {value} {value} {value}" for name, value in pair.items()),
+        ],
+    }  # fmt: skip
+
+
+ENTRIES += [
+    Entry(
+        "liggghts-edinburgh", LIGGGHTS, edinburgh,
+        collisions(k2=(2.0, 4.0, 1.5), gamma=gamma, adhesion_exponent=(1.0, 1.0, 1.5), n=n, material="soft"),
+        variant=f"n={n:g} {'adhesive' if max(gamma) else 'dry'}",
+    )
+    for n in (1.0, 1.5)
+    for gamma in ((0.0, 0.0, 0.0), (2e3, 5e3, 3e3))
+]  # fmt: skip
+
 # ---- YADE
 
 YADE = Code(

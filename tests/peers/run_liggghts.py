@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import subprocess
+from collections.abc import Sequence
 from pathlib import Path
 
 from runner import serve
@@ -27,6 +28,7 @@ fix 2 all property/global poissonsRatio peratomtype {nu} {nu}
 fix 3 all property/global coefficientRestitution peratomtypepair 2 {e} {e} {e} {e}
 fix 4 all property/global coefficientFriction peratomtypepair 2 0 0 0 0
 fix 5 all property/global characteristicVelocity scalar {vc}
+{properties}
 pair_style gran model {model} tangential no_history {options}
 pair_coeff * *
 timestep {step}
@@ -44,10 +46,12 @@ run {count}
 def collide(
     model: str, options: str, E: float, nu: float, e: float, vc: float,
     m1: float, m2: float, R1: float, R2: float, v1: float, v2: float, gap: float, step: float, count: int,
+    properties: Sequence[str] = (),
 ) -> tuple[float, float]:  # fmt: skip
+    more = "\n".join(f"fix p{i} all property/global {words}" for i, words in enumerate(properties))
     script = SCRIPT.format(
         model=model, options=options, E=E, nu=nu, e=e, vc=vc, x1=-R1 - gap, x2=R2, d1=2 * R1, d2=2 * R2,
-        m1=m1, m2=m2, v1=v1, v2=v2, step=step, count=count,
+        m1=m1, m2=m2, v1=v1, v2=v2, step=step, count=count, properties=more,
     )  # fmt: skip
     process = subprocess.run(
         ["liggghts", "-log", "none"], input=script, capture_output=True, text=True, check=False, env=ENVIRONMENT

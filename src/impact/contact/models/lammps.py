@@ -127,8 +127,8 @@ def viscoelastic(exponent: float) -> Maker:
 OLD = "releases from March 2019 to mid-2026"
 WITHOUT_ROOT = "delivers 0.616 with hertz and 0.581 with hooke where 0.5 is asked for"
 WITH_ROOT = (
-    "the source credits the polynomial to Marshall (2009), equation 53; the factor √2 came with pull request 5113, and "
-    "the first release with it was not seen"
+    "the source credits the polynomial to Marshall (2009), equation 53; the factor √2 is of pull request 5113, "
+    "and the first release with it was not seen"
 )
 SPRING, HERTZ = "F = K δ", "F = K δ^(3/2)"
 LOGARITHM = "−ln e/√(π² + ln² e)"
