@@ -191,7 +191,7 @@ BAD = [
     ("e = 0.5", "e = { arange = [0, 1, 1e-320] }",
      [f"x.toml:4: sweep.e.arange: got {MANY} values, wants at most 10,000,000 on an axis"]),
     ("e = 0.5\nv1 = 1.0", "e = { linspace = [0, 1, 50000] }\nv1 = { geomspace = [1, 2, 50000] }",
-     ["x.toml:3: sweep: got 2,500,000,000 points (axes times models), up to 480 GB, wants at most 1,000,000,000 "
+     ["x.toml:3: sweep: got 2,500,000,000 points (axes times models), up to 400 GB, wants at most 1,000,000,000 "
       "points (--max-points)"]),
     # names
     ('title = "Good"', "title = 3", ["x.toml:1: title: got 3, wants text"]),

@@ -145,6 +145,16 @@ def test_parameters_have_units(cli: Run) -> None:
     assert "n 1.5 " in lines
 
 
+@pytest.mark.parametrize("key", ["bilinear", "gharib-hurmuzlu-2012"])
+def test_balls_that_miss_each_other_have_no_phases(cli: Run, key: str) -> None:
+    derived = impact.run(model=key, at={"v1": -1.0}).derived
+    assert derived["m"] == 0.5
+    assert all(math.isnan(value) for name, value in derived.items() if name not in ("R1", "R2", "m"))
+    done = cli("run", "--model", key, "--at", "v1=-1")
+    assert done.returncode == 0, done.stderr
+    assert not {"tau_c", "W_c", "K_r"} & {line.split()[0] for line in done.stdout.splitlines()}
+
+
 # ---- a law's own n
 
 

@@ -20,13 +20,13 @@ from .values import own_values
 
 Mask = NDArray[np.bool_]
 
-# the outputs of an impact, in the order of the result file
-OUTPUTS = (
+# the outputs of an impact that a result has by default, in its order, and those that it has on request
+BY_DEFAULT = (
     "v1_post", "v2_post", "v1_reference", "v2_reference", "v1_error", "v2_error", "e_out", "e_error",
     "peak_indentation", "permanent_indentation", "peak_force", "duration", "energy_loss", "stiffness",
     "damping_ratio", "residual", "oracle_error", "status", "in_domain", "steps",
-    "e_kinetic", "e_energetic", "lambda", "separation_time",
 )  # fmt: skip
+OUTPUTS = (*BY_DEFAULT, "e_kinetic", "e_energetic", "lambda", "separation_time")
 quiet = np.errstate(all="ignore")
 
 

@@ -112,7 +112,7 @@ def _derived(
 ) -> dict[str, float]:
     """The quantities of DERIVED."""
     found = {name: getattr(lanes, name)[0].item() for name in ("R1", "R2", "m")}
-    if law.unloading in (returning, stiffer):
+    if law.unloading in (returning, stiffer) and values["status"] in (Status.OK, Status.LIMIT):
         recovered = values["peak_indentation"] - values["permanent_indentation"]
         found["K_r"] = values["peak_force"] / recovered ** lanes.n[0].item() if recovered else math.inf
     if history is not None:

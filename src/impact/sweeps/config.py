@@ -19,6 +19,7 @@ from pydantic import (
     create_model,
 )
 
+from ..contact.collide import BY_DEFAULT
 from ..contact.material import Material
 from ..contact.model import ForceModel
 from ..contact.models import catalogue
@@ -209,7 +210,9 @@ def _read(
     grid = lay_out(entries, SWEEP | chosen, context.groups, swept, len(models), max_points)
     faults += grid.faults
     if not faults:
-        faults += chunk_faults(_values(parsed["output"]).get("chunks") or {}, grid.axes, len(models))
+        output = _values(parsed["output"])
+        stored = {"status", *(output.get("variables") or BY_DEFAULT)}
+        faults += chunk_faults(output.get("chunks") or {}, grid.axes, len(models), len(stored))
     if faults:
         return None, faults
     defaults = DEFAULTS | {

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from ..contact.collide import OUTPUTS
+from ..contact.collide import BY_DEFAULT
 from .ranges import MAX_FAULTS, Entry, written_out
 from .values import Fault, KeyPath, Problem, Quantity, nearest, show
 
@@ -14,8 +14,8 @@ from .values import Fault, KeyPath, Problem, Quantity, nearest, show
 MAX_POINTS = 10**9
 # pieces of a result, and points of a piece: a reader opens each, and holds it as a whole
 MOST_PIECES, MOST_OF_A_PIECE = 100_000, 2**22
-# bytes that all outputs of a point take at most
-WIDTH = 8 * len(OUTPUTS)
+# bytes that the outputs of a point take at most, by default
+WIDTH = 8 * len(BY_DEFAULT)
 
 Values = tuple[float, ...] | tuple[str, ...]
 
@@ -93,13 +93,14 @@ def lay_out(
     return Grid(scalars, axes, tuple(faults))
 
 
-def chunk_faults(chunks: Mapping[str, int], axes: Sequence[Axis], models: int) -> list[Fault]:
+def chunk_faults(chunks: Mapping[str, int], axes: Sequence[Axis], models: int, variables: int) -> list[Fault]:
     """What is wrong with the pieces that a result is to be stored in: no such axis, too small or too large.
 
     Parameters
     ----------
     chunks : their lengths, by axis; along the others they are whole
     axes, models : of the grid
+    variables : number of those that are stored
     """
     sizes, path = {axis.name: axis.size for axis in axes}, ("output", "chunks")
     unknown = [name for name in chunks if name not in sizes]
@@ -107,7 +108,7 @@ def chunk_faults(chunks: Mapping[str, int], axes: Sequence[Axis], models: int) -
         return [((*path, name), f"no axis of this sweep; {nearest(name, list(sizes))}") for name in unknown]
     size = math.prod(min(chunks.get(name, whole), whole) for name, whole in sizes.items())
     count = math.prod(-(-whole // chunks.get(name, whole)) for name, whole in sizes.items())
-    count *= models * len(OUTPUTS)
+    count *= models * variables
     if size > MOST_OF_A_PIECE or count > MOST_PIECES:
         wants = f"wants at most {MOST_PIECES:,} of at most {MOST_OF_A_PIECE:,}"
         return [(path, f"got {count:,} pieces of {size:,} points, {wants}")]
