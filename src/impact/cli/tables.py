@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -44,14 +45,17 @@ def run_json(impact: Impact) -> dict[str, Any]:
 def print_run(impact: Impact) -> None:
     """One impact: inputs, outputs, the three restitutions, and how far they can be trusted."""
     from ..data.results import SCHEMA
-    from ..sweeps.rules import SWEEP
+    from ..sweeps.rules import SWEEP, own_quantities
 
     n = f"{impact.exponent:g}"
     rows: dict[str, Any] = {"model": impact.model.key, "equation": impact.model.equation}
+    own = {f"{impact.model.key}.{name}": one for name, one in own_quantities(impact.model).items()}
     for name, value in impact.point.items():
-        unit = SWEEP[name].unit if name in SWEEP else "1"
+        unit = own[name].unit if name in own else SWEEP[name].unit if name in SWEEP else "1"
         note = "  (first value of its axis)" if name in impact.first else ""
-        rows[name] = _quantity(value, unit.replace("^n", f"^{impact.point['n']:g}")) + note
+        # the sweep's K is of the sweep's n, a law's parameters are of its own
+        exponent = impact.exponent if name in own else impact.point["n"]
+        rows[name] = _quantity(value, re.sub(r"\bn\b", f"{exponent:g}", unit).removesuffix("^1")) + note
     rows["status"] = f"{impact.status.name.lower()}: {impact.status.meaning}"
     for one in SCHEMA:
         if one.dtype == "f8" and one.name != "damping_ratio":
