@@ -197,6 +197,28 @@ def test_run_one_impact(cli: Run, tmp_path: Path) -> None:
     )
 
 
+def test_a_history_at_uniform_times(cli: Run, tmp_path: Path) -> None:
+    words = ["run", "--model", "kelvin-voigt", "--set", "model.kelvin-voigt.C=2000", "--set", "sweep.n=1"]
+    done = cli(*words, "--times", "200", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (2, "--times 200: expected --history FILE beside it\n")
+    done = cli(*words, "--history", "h.h5", "--times", "1", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (2, "times: got 1, expected a whole number >= 2\n")
+    done = cli(*words, "--at", "K=1e8", "--history", "h.h5", "--times", "200", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "h.h5: 200 points in time\n")
+    # parameters of the law have their units
+    assert re.search(r"^kelvin-voigt.C +2000 N s/m *$", done.stdout, re.MULTILINE)
+    assert re.search(r"^K +100000000 N/m *$", done.stdout, re.MULTILINE)
+    history = impact.load(tmp_path / "h.h5")
+    t = history["t"].values
+    np.testing.assert_allclose(np.diff(t), t[-1] / 199, rtol=1e-12)
+    # the damped oscillation in closed form: m x'' + C x' + K x = 0, x(0) = 0, x'(0) = v0
+    rate, m = 2000 / (2 * 0.5), 0.5
+    omega = np.sqrt(1e8 / m - rate**2)
+    assert t[-1] == pytest.approx(np.pi / omega, rel=1e-9)
+    exact = np.exp(-rate * t) * np.sin(omega * t) / omega
+    np.testing.assert_allclose(history["delta"], exact, rtol=0, atol=1e-8 * exact.max())
+
+
 def test_run_reads_a_result(cli: Run, tmp_path: Path) -> None:
     (tmp_path / "wide.toml").write_text(WIDE, encoding="utf-8")
     cli("sweep", "wide.toml", "--set", "sweep.v2=-2.0", cwd=tmp_path)

@@ -31,6 +31,7 @@ from .data.sweeping import in_memory
 from .data.tolerances import Tolerances
 from .data.verdict import Verdict as Verdict
 from .errors import ImpactError as ImpactError
+from .errors import UsageError
 from .sweeps.config import read_config
 from .sweeps.grid import MAX_POINTS
 from .sweeps.plan import Plan
@@ -122,6 +123,7 @@ def run(
     at: Mapping[str, float | str] | None = None,
     overrides: Sequence[str] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
+    times: int | None = None,
 ) -> Impact:
     """Run one impact and follow it through time.
 
@@ -133,6 +135,8 @@ def run(
     overrides : changes to the config, such as `"sweep.m2=2"`
     plugins : models of one's own, and paths of Python files; a result made with such needs them again, and
         a changed one gives a warning with both hashes
+    times : how many points in time the history has, uniform from first contact to release; by default those of the
+        integrator
 
     Raises
     ------
@@ -143,11 +147,13 @@ def run(
     >>> round(shot.values["e_out"], 6), round(shot.e_energetic, 6)
     (0.41072, 0.41072)
     """
+    if times is not None and times < 2:
+        raise UsageError(f"times: got {times}, expected a whole number >= 2")
     own = read_plugins(plugins)
     config, first = one_point(
         lambda more: config_of(source, [*overrides, *more], own), model, at, picked_out(source)
     )
-    return impact_of(Plan(config, own.of(config.models)), first)
+    return impact_of(Plan(config, own.of(config.models)), first, times)
 
 
 def rerun(

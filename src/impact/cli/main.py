@@ -15,7 +15,7 @@ from ..errors import UsageError
 from ..text import safe_text
 from . import advice, catalogue, door, pictures, regression, reporting, shards, sweeping
 from .options import Json, Overwrite, Plugins, Sets
-from .words import dump, pairs
+from .words import dump, pairs, whole_number
 
 app = typer.Typer(
     name="impact",
@@ -76,6 +76,15 @@ def run(
     history: Annotated[
         Path | None, typer.Option("--history", metavar="FILE", help="Keep the time history in this file.")
     ] = None,
+    times: Annotated[
+        int | None,
+        typer.Option(
+            "--times",
+            metavar="N",
+            parser=whole_number,
+            help="Points in time of the history, uniform from contact to release. \\[default: the integrator's]",
+        ),
+    ] = None,
     overwrite: Overwrite = False,
     as_json: Json = False,
 ) -> None:
@@ -85,10 +94,14 @@ def run(
     from ..data import store
     from . import tables
 
+    if times is not None and history is None:
+        raise UsageError(f"--times {times}: expected --history FILE beside it")
     if history is not None:
         for one in (source, *(plugins or ())):
             store.check_output(history, overwrite=overwrite, source=one)
-    impact = api.run(source, model=model, at=pairs("--at", at), overrides=sets or (), plugins=plugins or ())
+    impact = api.run(
+        source, model=model, at=pairs("--at", at), overrides=sets or (), plugins=plugins or (), times=times
+    )
     if as_json:
         print(dump(tables.run_json(impact)))
     else:

@@ -19,6 +19,8 @@ from .values import own_values, with_coefficients, with_units
 
 # points at which a step is shown, and at which it is integrated again
 SAMPLES, GAUSS = 4, 5
+# halvings of a step after which a moment in it is known to the last bit
+BISECTIONS = 54
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,9 @@ class History:
     e_energetic: float
 
 
-def follow(model: ForceModel, lanes: Lanes, *, rtol: float, max_steps: int) -> History | None:
+def follow(
+    model: ForceModel, lanes: Lanes, *, rtol: float, max_steps: int, times: int | None = None
+) -> History | None:
     """Follow a single impact through time.
 
     Parameters
@@ -55,6 +59,7 @@ def follow(model: ForceModel, lanes: Lanes, *, rtol: float, max_steps: int) -> H
     model : the law
     lanes : one impact
     rtol, max_steps : see `impact.contact.collide.collide`
+    times : how many points in time, uniform from first contact to release; by default some in each step
 
     Returns
     -------
@@ -68,9 +73,13 @@ def follow(model: ForceModel, lanes: Lanes, *, rtol: float, max_steps: int) -> H
         struck = strike(law, columns, 1, rtol, max_steps, record=True)
     if struck.outward is None or struck.rebound.status[0] != Status.OK:
         return None
-    inward = _phase(law, motion.approach(law), struck.inward.recorded, columns)
+    turn, end = float(struck.inward.state[2, 0]), float(struck.outward.state[2, 0])
+    grid = None if times is None else np.linspace(0.0, turn + end, times)
+    before = None if grid is None else grid[grid <= turn]
+    after = None if grid is None else np.minimum(grid[grid > turn] - turn, end)
+    inward = _phase(law, motion.approach(law), struck.inward.recorded, columns, before)
     back = motion.of_restitution(law)
-    outward = _phase(back, motion.restitution(back), struck.outward.recorded, struck.columns)
+    outward = _phase(back, motion.restitution(back), struck.outward.recorded, struck.columns, after)
 
     residual = (
         struck.columns[motion.BRANCH.index("residual") - len(motion.BRANCH)] if model.unloading else np.zeros(1)
@@ -115,15 +124,17 @@ class _Phase:
     work: float
 
 
-def _phase(law: motion.Law, problem: Problem, steps: tuple[Step, ...], columns: Columns) -> _Phase:
+def _phase(
+    law: motion.Law, problem: Problem, steps: tuple[Step, ...], columns: Columns, times: Array | None
+) -> _Phase:
     """Sample the interpolant of a phase, and integrate force and power over it by Gauss points."""
     nodes, weights = np.polynomial.legendre.leggauss(GAUSS)
     rows: list[Array] = []
     impulse, work = [], []
-    for place, step in enumerate(steps):
-        last = place == len(steps) - 1
-        for part in range(SAMPLES + last):
-            y = step.at(step.end * part / SAMPLES)
+    fractions = _fractions(steps) if times is None else _fractions_at(steps, times)
+    for step, within in zip(steps, fractions, strict=True):
+        for theta in within:
+            y = step.at(theta)
             rates = problem.rates(y[:2], columns)
             rows.append(np.array([y[2], motion.indentation(law, y[0]), law.velocity(y, columns), rates[4]]))
         for node, weight in zip(nodes, weights, strict=True):
@@ -131,5 +142,32 @@ def _phase(law: motion.Law, problem: Problem, steps: tuple[Step, ...], columns: 
             share = 0.5 * weight * (step.end * step.length)[0]
             impulse.append(share * (rates[4] * rates[2])[0])
             work.append(share * rates[3][0])
-    t, x, v, force = np.array(rows)[:, :, 0].T
+    t, x, v, force = np.array(rows).reshape(-1, 4).T
     return _Phase(t, x, v, force, math.fsum(impulse), math.fsum(work))
+
+
+def _fractions(steps: tuple[Step, ...]) -> list[Array]:
+    """Some fractions of each step, with the end of the last."""
+    inner = np.arange(SAMPLES) / SAMPLES
+    return [step.end * (inner if step is not steps[-1] else np.append(inner, 1.0)) for step in steps]
+
+
+def _fractions_at(steps: tuple[Step, ...], times: Array) -> list[Array]:
+    """The fractions of each step at which the interpolated time is one of some times, which increase."""
+    ends = np.array([step.at(step.end)[2, 0] for step in steps])
+    place = np.minimum(np.searchsorted(ends, times), len(steps) - 1)
+    found = []
+    for at, step in enumerate(steps):
+        wanted = times[place == at]
+        many = wanted.size
+        low, high = np.zeros(many), np.full(many, step.end[0])
+        beside = Step(
+            np.repeat(step.start, many, 1), np.repeat(step.length, many), np.repeat(step.stages, many, 2), high
+        )
+        # the time grows with the fraction: bisect to the last bit
+        for _ in range(BISECTIONS if many else 0):
+            middle = 0.5 * (low + high)
+            is_early = beside.at(middle)[2] < wanted
+            low, high = np.where(is_early, middle, low), np.where(is_early, high, middle)
+        found.append(high)
+    return found

@@ -71,8 +71,11 @@ class Impact:
         return Status(int(self.values["status"]))
 
 
-def impact_of(plan: Plan, first: tuple[str, ...]) -> Impact:
-    """The only impact of a plan; `first` are axes of its source that are at their first value."""
+def impact_of(plan: Plan, first: tuple[str, ...], times: int | None = None) -> Impact:
+    """The only impact of a plan; `first` are axes of its source that are at their first value.
+
+    `times` is how many points in time its history has, see `impact.contact.history.follow`.
+    """
     config = plan.config
     law = config.models[0]
     lanes = lanes_of(plan, law, ())
@@ -83,7 +86,7 @@ def impact_of(plan: Plan, first: tuple[str, ...]) -> Impact:
     for error in errors.values():
         warnings.warn(error, stacklevel=2)
     going = values["status"] == Status.OK
-    history = follow(law, lanes, rtol=solver.rtol, max_steps=solver.max_steps) if going else None
+    history = follow(law, lanes, rtol=solver.rtol, max_steps=solver.max_steps, times=times) if going else None
     v0 = lanes.v0[0].item()
     # a law may have an n of its own, in place of the one given
     point = {**config.scalars, "n": lanes.n[0].item()}

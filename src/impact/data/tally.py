@@ -38,8 +38,9 @@ class Tally:
     counts: dict[Status, int] = field(default_factory=dict)
     worst: dict[str, dict[int, float]] = field(default_factory=dict)
     failed_at: list[tuple[Status, int, tuple[int, ...]]] = field(default_factory=list)
-    deep: int = 0
-    deepest: float = 0.0
+    # a file does not hold the radii, so that these are known after a sweep only
+    deep: int = field(default=0, compare=False)
+    deepest: float = field(default=0.0, compare=False)
 
     @property
     def failed(self) -> int:
