@@ -16,7 +16,7 @@ from typing import TextIO
 
 from typer import TyperException
 
-from ..errors import ImpactError, InUseError, StoreError, UnfinishedError
+from ..errors import ImpactError, InUseError, Interruption, StoreError, UnfinishedError
 from ..text import safe_text
 
 # the exit codes; a shell sees 130 and 143 for the signals of the same meaning
@@ -25,7 +25,7 @@ INTERNAL, INTERRUPTED, TERMINATED = 70, 130, 143
 CODES = {StoreError: STORAGE, InUseError: IN_USE}
 
 
-class Interrupted(BaseException):
+class Interrupted(Interruption):
     """A signal came; the message says what it found done."""
 
     def __init__(self, number: int, done: str) -> None:

@@ -8,7 +8,7 @@ from functools import cache
 
 import numpy as np
 
-from ..errors import ModelError
+from ..errors import NOT_OF_A_PLUGIN, ModelError
 from .power import Array
 
 Formula = Callable[..., object]
@@ -28,15 +28,39 @@ def wishes(formula: Formula | None) -> tuple[str, ...]:
 
 
 def ask(formula: Formula, known: Mapping[str, Array | float]) -> Array:
-    """The value of a formula, given what it asks for by name.
+    """The value of a formula, given what it asks for by name, in arrays that it cannot write to.
 
     Raises
     ------
-    ModelError : the formula raised an error, whatever it was
+    ModelError : the formula raised an error, whatever it was, or returned something other than real numbers
     """
-    given = [known[wish] for wish in wishes(formula)]
+    given = [_read_only(known[wish]) for wish in wishes(formula)]
     try:
-        return np.asarray(formula(*given), dtype=float)
-    except (Exception, SystemExit) as error:
+        return _real(formula(*given))
+    except NOT_OF_A_PLUGIN:
+        raise
+    except BaseException as error:
         # a formula that ends the program would take the other impacts with it
         raise ModelError(f"a formula raised {type(error).__name__}: {error}") from error
+
+
+def _read_only(value: Array | float) -> Array | float:
+    """The value; an array as a view that cannot be written to."""
+    if not isinstance(value, np.ndarray):
+        return value
+    view = value.view()
+    view.setflags(write=False)
+    return view
+
+
+def _real(value: object) -> Array:
+    """The value as an array of float64; no text, date or complex number is taken for a real one."""
+    array = np.asarray(value)
+    if array.dtype == float:
+        return array
+    if array.dtype.kind == "O":
+        # NumPy takes None for NaN
+        return np.array([float(element) for element in array.flat]).reshape(array.shape)
+    if array.dtype.kind not in "fiub":
+        raise TypeError(f"it returned {array.dtype}, expected real numbers")
+    return array.astype(float)
