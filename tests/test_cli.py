@@ -313,8 +313,8 @@ LAW = ForceModel("lacks", title="", year=2026, equation="", reference="", force=
 def test_lack_of_memory_keeps_what_is_finished_and_is_a_storage_error(cli: Run, tmp_path: Path) -> None:
     (tmp_path / "law.py").write_text(LACKS_MEMORY, encoding="utf-8")
     (tmp_path / "c.toml").write_text(
-        'models = ["lacks"]\n[sweep]\ne = { linspace = [0.5, 1.0, 40000] }\nv1 = 1.0\nm1 = 1.0\nm2 = 1.0\nK = 6e9\n'
-        "[solver]\nrtol = 1e-4\n",
+        'models = ["lacks"]\n[sweep]\ne = { linspace = [0.5, 1.0, 40000] }\nv1 = 1.0\nm1 = 1.0\nm2 = 1.0\n'
+        "K = 6e9\n[solver]\nrtol = 1e-4\n",
         encoding="utf-8",
     )
     done = cli("sweep", "c.toml", "--plugin", "law.py", "--quiet", cwd=tmp_path)

@@ -18,7 +18,7 @@ from typing import TextIO
 
 from typer import TyperException
 
-from ..errors import ImpactError, InUseError, Interruption, StoreError, UnfinishedError
+from ..errors import ImpactError, Interruption, InUseError, StoreError, UnfinishedError
 from ..text import safe_text
 
 # the exit codes; a shell sees 130 and 143 for the signals of the same meaning

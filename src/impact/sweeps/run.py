@@ -6,10 +6,13 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import partial
 
+import numpy as np
+
 from ..contact.compiled import is_installed, serves
+from ..contact.status import Status
 from ..contact.strike import Rebound
 from ..errors import StoreError, UsageError
 from ..text import safe_text
@@ -25,6 +28,8 @@ WORTH = 200_000
 AGAIN = 3
 # seconds after which it is looked again whether to stop, and whether there is room
 MOMENT = 0.2
+
+STATUSES = [int(status) for status in Status]
 
 
 def settled(plan: Plan, found: Sequence[Trajectories]) -> Plan:
@@ -77,7 +82,7 @@ def run(
     Raises
     ------
     UsageError : a model was given as a Python value, which cannot be sent; or those who integrate lack something
-    StoreError : they were killed again and again, or cannot be reached any more
+    StoreError : they were killed again and again, cannot be reached any more, or return what is no block
     """
     integrate = _integrator(plan, team)
     left, trials = deque(todo), Counter[int]()
@@ -123,11 +128,40 @@ def _finished(
                 # nobody is there yet
                 time.sleep(MOMENT)
             for future in wait(given, MOMENT, FIRST_COMPLETED).done:
-                rebound = future.result()
-                yield given.pop(future), rebound
+                stretch, rebound = given[future], future.result()
+                _check(stretch, rebound)
+                del given[future]
+                yield stretch, rebound
     finally:
         for future in given:
             future.cancel()
+
+
+def _check(stretch: Stretch, rebound: object) -> None:
+    """Refuse a block that cannot be what its trajectories came to: an executor may return anything.
+
+    Raises
+    ------
+    StoreError : it is no block, or its arrays have another shape or dtype, or hold an unknown status
+    """
+    where = f"executor: block {stretch.number}"
+    if not isinstance(rebound, Rebound):
+        raise StoreError(f"{where}: got {safe_text(type(rebound).__name__)}, expected Rebound")
+    blank = Rebound.blank(stretch.size)
+    for field in fields(Rebound):
+        got, expected = (_form(getattr(one, field.name)) for one in (rebound, blank))
+        if got != expected:
+            raise StoreError(f"{where}: {field.name}: got {got}, expected {expected}")
+    unknown = np.setdiff1d(rebound.status, STATUSES)
+    if unknown.size:
+        raise StoreError(f"{where}: status: got {unknown[0]}, expected one of {STATUSES}")
+
+
+def _form(array: object) -> str:
+    """The dtype and shape of an array."""
+    if not isinstance(array, np.ndarray):
+        return safe_text(type(array).__name__)
+    return f"{array.dtype} of shape {array.shape}"
 
 
 def _integrator(plan: Plan, team: Team) -> Callable[[Block], Rebound]:
