@@ -8,12 +8,14 @@ import json
 import re
 import subprocess
 import sys
+from typing import Any
 
 import numpy as np
 import pytest
 
 import impact
 from impact.contact.status import Status
+from impact.errors import ModelError
 from impact.sweeps.config import read_config
 from impact.sweeps.plan import Plan
 from impact.sweeps.plugins import read_plugins
@@ -140,6 +142,108 @@ def test_a_force_of_the_wrong_shape_is_an_error_of_the_model() -> None:
     with pytest.warns(UserWarning, match=r"^model short: the force has the shape \(1,\), wants \(2,\)$"):
         status = impact.sweep({"models": "short", "sweep": SWEEP}, plugins=[short])["status"].values
     assert status.tolist() == [[Status.MODEL_ERROR, Status.MODEL_ERROR]]
+
+
+def _in_place(e: Any) -> Any:
+    e *= 0.999
+    return e
+
+
+ROLES: dict[str, dict[str, Any]] = {
+    "force": {"force": lambda elastic, e: elastic * _in_place(e)},
+    "force of the motion": {"force": lambda elastic, e: _in_place(elastic)},
+    "coefficient": {"coefficients": {"chi": _in_place}, "force": lambda elastic, chi: elastic},
+    "unloading": {"unloading": lambda elastic, e: elastic * _in_place(e)},
+    "unloading of the peak": {"unloading": lambda elastic, peak: elastic * _in_place(peak)},
+    "residual": {"residual": lambda peak: 0.1 * _in_place(peak)},
+    "recovered": {"recovered": lambda peak: _in_place(peak)},
+    "bend": {"bends": (lambda e: 0.1 * _in_place(e),)},
+    "bend of the motion": {"bends": (lambda x, e: x - 0.1 * _in_place(e),)},
+    "unloading bend": {
+        "unloading": lambda elastic: elastic,
+        "unloading_bends": (lambda peak: 0.1 * _in_place(peak),),
+    },
+    "oracle": {"oracle": _in_place},
+}
+
+
+@pytest.mark.parametrize("formulas", ROLES.values(), ids=ROLES)
+def test_a_formula_that_writes_to_its_arguments_is_an_error_of_the_model(formulas: dict[str, Any]) -> None:
+    texts = {"key": "writes", "title": "", "year": 1, "equation": "", "reference": ""}
+    law = impact.ForceModel(**{**texts, "force": lambda elastic, e: elastic, **formulas})
+    result = impact.sweep({"models": ["writes", "hertz"], "sweep": SWEEP}, plugins=[law])
+    assert result["status"].sel(model="writes").values.tolist() == [Status.MODEL_ERROR] * 2
+    assert result["status"].sel(model="hertz").values.tolist() == [Status.OK] * 2
+
+
+def test_a_stiffness_that_writes_to_its_arguments_is_refused() -> None:
+    texts = {"key": "writes", "title": "", "year": 1, "equation": "", "reference": ""}
+    law = impact.ForceModel(**texts, force=lambda elastic: elastic, stiffness=_in_place_E1)  # type: ignore[arg-type]
+    steel = {"E": 2e11, "nu": 0.3, "rho": 7850.0}
+    sweep = {"v1": 1.0, "m1": 1.0, "m2": 1.0, "material": "steel"}
+    with pytest.raises(ModelError, match="read-only"):
+        impact.sweep({"models": "writes", "sweep": sweep, "materials": {"steel": steel}}, plugins=[law])
+
+
+def _in_place_E1(E1: Any) -> Any:
+    return _in_place(E1)
+
+
+WRONG_TYPES = {
+    "nothing": lambda elastic: None,
+    "nothing in a list": lambda elastic: [None] * elastic.size,
+    "text": lambda elastic: "1.0",
+    "complex": lambda elastic: elastic + 1j,
+    "date": lambda elastic: np.full(elastic.shape, "2026-01-01", "datetime64[D]"),
+}
+
+
+@pytest.mark.parametrize("force", WRONG_TYPES.values(), ids=WRONG_TYPES)
+def test_a_force_that_returns_no_real_numbers_is_an_error_of_the_model(force: Any) -> None:
+    texts = {"key": "odd", "title": "", "year": 1, "equation": "", "reference": ""}
+    law = impact.ForceModel(**texts, force=force)  # type: ignore[arg-type]
+    status = impact.sweep({"models": "odd", "sweep": SWEEP}, plugins=[law])["status"].values
+    assert status.tolist() == [[Status.MODEL_ERROR, Status.MODEL_ERROR]]
+
+
+def test_numbers_of_any_real_type_are_a_force() -> None:
+    texts = {"title": "", "year": 1, "equation": "", "reference": ""}
+    laws = [
+        impact.ForceModel(key, force=force, **texts)  # type: ignore[arg-type]
+        for key, force in {
+            "plain": lambda elastic: elastic,
+            "objects": lambda elastic: elastic.astype(object),
+            "longdouble": lambda elastic: elastic.astype(np.longdouble),
+            "list": lambda elastic: elastic.tolist(),
+        }.items()
+    ]
+    result = impact.sweep({"models": [law.key for law in laws], "sweep": SWEEP}, plugins=laws)
+    assert len({result["e_out"].sel(model=law.key).values.tobytes() for law in laws}) == 1
+
+
+class _Panic(BaseException):
+    """As extensions written in Rust raise it."""
+
+
+def test_an_exception_of_any_class_is_an_error_of_the_model() -> None:
+    def panics(elastic: Any) -> Any:
+        raise _Panic("called `Option::unwrap()` on a `None` value")
+
+    texts = {"key": "panics", "title": "", "year": 1, "equation": "", "reference": ""}
+    law = impact.ForceModel(**texts, force=panics)  # type: ignore[arg-type]
+    status = impact.sweep({"models": ["panics", "hertz"], "sweep": SWEEP}, plugins=[law])["status"].values
+    assert status.tolist() == [[Status.MODEL_ERROR] * 2, [Status.OK] * 2]
+
+
+@pytest.mark.parametrize("error", [MemoryError, KeyboardInterrupt])
+def test_lack_of_memory_and_an_interrupt_are_no_errors_of_the_model(error: type[BaseException]) -> None:
+    def ends(elastic: Any) -> Any:
+        raise error
+
+    texts = {"key": "ends", "title": "", "year": 1, "equation": "", "reference": ""}
+    law = impact.ForceModel(**texts, force=ends)  # type: ignore[arg-type]
+    with pytest.raises(error):
+        impact.sweep({"models": "ends", "sweep": SWEEP}, plugins=[law])
 
 
 def test_a_mistake_of_the_program_is_not_taken_for_one_of_the_model(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -280,6 +280,106 @@ def test_a_full_standard_output_is_a_storage_error(cli: Run) -> None:
     assert (done.returncode, done.stderr) == (4, "cannot write: No space left on device\n")
 
 
+NO_REBOUND = """models = ["mujoco-solref"]
+[sweep]
+v1 = 1.0
+m1 = 1.0
+m2 = 1.0
+K = 1e6
+n = 1.0
+[solver]
+max_steps = 2
+"""
+
+
+@pytest.mark.parametrize(
+    ("words", "code"),
+    [
+        (["compare", "missing.h5", "missing.h5"], 2),
+        (["compare", "missing.h5", "missing.h5", "--format", "json"], 2),
+        (["info"], 2),
+        (["sweep", "c.toml", "--set", "sweep.m1=-1"], 2),
+        (["sweep", "c.toml", "--set", "solver.max_steps=10000"], 0),
+        (["sweep", "c.toml", "-o", "failed.h5"], 3),
+    ],
+)
+def test_a_full_standard_error_does_not_change_the_exit_code(tmp_path: Path, words: list[str], code: int) -> None:
+    (tmp_path / "c.toml").write_text(NO_REBOUND, encoding="utf-8")
+    command = [sys.executable, "-m", "impact", *words]
+    with open("/dev/full", "w", encoding="utf-8") as full:
+        done = subprocess.run(command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=full, check=False)
+        assert done.returncode == code
+        if code == 2:
+            # where the report itself was to go there, that is what went wrong
+            done = subprocess.run(
+                command, cwd=tmp_path, stdout=full, stderr=subprocess.PIPE, text=True, check=False
+            )
+            assert done.returncode == (4 if "json" in words else code)
+            assert "Traceback" not in done.stderr
+            assert "Exception ignored" not in done.stderr
+
+
+LACKS_MEMORY = """
+import numpy as np
+from impact import ForceModel
+
+def force(elastic, e):
+    if np.any(e > 0.9):
+        raise MemoryError("no room for 1 GiB")
+    return elastic * e
+
+LAW = ForceModel("lacks", title="", year=2026, equation="", reference="", force=force)
+"""
+
+
+def test_lack_of_memory_keeps_what_is_finished_and_is_a_storage_error(cli: Run, tmp_path: Path) -> None:
+    (tmp_path / "law.py").write_text(LACKS_MEMORY, encoding="utf-8")
+    (tmp_path / "c.toml").write_text(
+        'models = ["lacks"]\n[sweep]\ne = { linspace = [0.5, 1.0, 40000] }\nv1 = 1.0\nm1 = 1.0\nm2 = 1.0\n'
+        "K = 6e9\n[solver]\nrtol = 1e-4\n",
+        encoding="utf-8",
+    )
+    done = cli("sweep", "c.toml", "--plugin", "law.py", "--quiet", cwd=tmp_path)
+    assert done.returncode == 4
+    assert done.stderr == (
+        "out of memory; no room for 1 GiB; 20,000 of 40,000 trajectories are kept in results.h5.work; "
+        "--resume goes on\n"
+    )
+
+
+SHORT_OF_MEMORY = """
+import resource, sys
+import impact.cli.summary
+from impact.api import sweep
+from impact.cli.main import main
+pages = int(open("/proc/self/statm").read().split()[0])
+resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + 2**25,) * 2)
+sys.argv = ["impact", "sweep", "c.toml", "--set", "sweep.v1={ linspace = [1.0, 2.0, 10000000] }"]
+main()
+"""
+
+
+def test_a_sweep_too_large_for_the_memory_is_a_storage_error(tmp_path: Path) -> None:
+    (tmp_path / "c.toml").write_text(NO_REBOUND, encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-c", SHORT_OF_MEMORY],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+    assert done.returncode == 4
+    assert done.stderr.startswith("out of memory")
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_a_plug_in_that_ends_in_a_panic_is_one_line(cli: Run, tmp_path: Path) -> None:
+    (tmp_path / "law.py").write_text("class Panic(BaseException): pass\nraise Panic('at src/lib.rs:7')\n")
+    done = cli("models", "--plugin", "law.py", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (2, "law.py:2: Panic: at src/lib.rs:7\n")
+
+
 def test_the_catalogue(cli: Run) -> None:
     listed = cli("models").stdout
     for key in impact.models():

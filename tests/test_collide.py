@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import impact
 from impact.contact.collide import OUTPUTS, Contact, collide
 from impact.contact.lanes import Lanes
 from impact.contact.model import ForceModel, Parameter
@@ -353,3 +354,66 @@ def test_built_in_laws_scale_as_well(key):
     assert contact.duration * lanes.v0 / lanes.length == pytest.approx(
         np.full(len(lanes), contact.duration[0] * lanes.v0[0] / lanes.length[0]), rel=1e-12
     )
+
+
+# ---- laws that never part
+
+DAMPING = impact.Parameter("c", "N s/m", "damping", least=0.0)
+OVERDAMPED = {
+    # law, the c at which balls part, and at which they creep apart for ever
+    "linear": (
+        {"force": lambda elastic, v, c: elastic + c * v, "exponent": 1.0},
+        [1.0, 1.9],
+        [2.0, 2.1, 10.0, 1e3],
+    ),
+    "Hertz": ({"force": lambda elastic, v, c: elastic + c * v, "exponent": 1.5}, [0.1, 1.0], [3.0, 30.0, 1e3]),
+    "constant ratio": (
+        {"force": lambda elastic, x, v, c: elastic + c * np.sqrt(np.sqrt(x)) * v, "exponent": 1.5},
+        [1.0, 2.2],
+        [2.3, 3.0, 100.0],
+    ),
+    "unloading branch": (
+        {
+            "force": lambda elastic: elastic,
+            "unloading": lambda stretch, v, c: stretch + c * v,
+            "residual": lambda peak: 0.3 * peak,
+            "exponent": 1.0,
+        },
+        [1.0, 1.9],
+        [2.1, 10.0],
+    ),
+    # the force vanishes before the indentation does
+    "to zero force": (
+        {"force": lambda elastic, v, c: elastic + c * v, "exponent": 1.0, "release": "force"},
+        [1.0, 3.0, 30.0],
+        [],
+    ),
+}
+
+
+@pytest.mark.parametrize(("formulas", "part", "creep"), OVERDAMPED.values(), ids=OVERDAMPED)
+def test_overdamped_laws_of_ones_own_are_not_separated(formulas, part, creep):
+    texts = {"title": "", "year": 2026, "equation": "", "reference": ""}
+    model = impact.ForceModel("overdamped", parameters=(DAMPING,), **texts, **formulas)
+    sweep = {"v1": 1.0, "m1": 2.0, "m2": 2.0}
+    # K of the sweep is for its n, which is 3/2
+    own = {"K": 1.0} if model.exponent == 1.0 else {}
+    source = {"models": "overdamped", "sweep": sweep if own else {**sweep, "K": 1.0},
+              "model": {"overdamped": {"c": [*part, *creep], **own}},
+              "solver": {"max_steps": 1000}}  # fmt: skip
+    status = impact.sweep(source, plugins=[model])["status"].values[0].tolist()
+    assert status == [Status.OK] * len(part) + [Status.NOT_SEPARATED] * len(creep)
+
+
+def test_balls_that_part_slowly_only_lack_steps():
+    # below an indentation of (c/2)^-2 the spring is stronger than the drag
+    texts = {"title": "", "year": 2026, "equation": "", "reference": ""}
+    model = impact.ForceModel(
+        "slow", force=lambda elastic, x, v: elastic + 100.0 * np.sqrt(x) * v, exponent=1.0, **texts
+    )
+    source = {"models": "slow", "sweep": {"v1": 1.0, "m1": 2.0, "m2": 2.0, "n": 1.0, "K": 1.0}}
+    few, many = (
+        impact.sweep({**source, "solver": {"max_steps": steps}}, plugins=[model]) for steps in (100, 100_000)
+    )
+    assert (few["status"].item(), many["status"].item()) == (Status.MAX_STEPS, Status.OK)
+    assert 0.0 < many["e_out"].item() < 1e-3

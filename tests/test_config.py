@@ -491,6 +491,13 @@ def test_axes_come_in_config_order() -> None:
     ]
 
 
+@pytest.mark.parametrize("value", ["-2.0", "nan", "true", '"2 m"', "[3.0]"])
+def test_a_wrong_value_in_a_later_axis_of_a_zip_group_is_the_error_of_that_value(value: str) -> None:
+    text = changed("m1 = 1.0\nm2 = 2.0", f'm1 = [1.0, 2.0]\nm2 = [1.0, {value}]\nzip = [["m1", "m2"]]')
+    (problem,) = problems(text)
+    assert problem.startswith("x.toml:7: sweep.m2[1]: got ")
+
+
 def test_columns_behind_the_first_of_a_zip_group_may_repeat_themselves() -> None:
     text = changed("e = 0.5\nv1 = 1.0", 'e = [0, 1]\nv1 = [1, 1]\nzip = [["e", "v1"]]')
     assert read(text).axes[0].columns == {"e": (0, 1), "v1": (1, 1)}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -239,3 +240,55 @@ def test_what_is_compiled_is_there_for_the_next_process(tmp_path: Path) -> None:
 def test_as_plain_python_it_is_the_same() -> None:
     program = FORMS.format(count=3, rtol=1e-6) + "print(any(hasattr(one, 'stats') for one in KERNELS.values()))"
     assert child(program, NUMBA_DISABLE_JIT="1").split() == ["False"]
+
+
+# the cache of the kernels, of a function that is compiled in no time; without its capabilities root may write
+# only where others may
+TWICE = """
+import ctypes
+ctypes.CDLL(None).capset((ctypes.c_uint32 * 2)(0x20080522, 0), (ctypes.c_uint32 * 6)())
+from impact.contact.compile_cache import compiled
+
+@compiled()
+def twice(x):
+    return 2.0 * x
+
+assert (twice(2.0), twice(3)) == (4.0, 6.0)
+print(sum(twice.stats.cache_hits.values()))
+"""
+
+
+def compiling(folder: Path, home: str = "/dev/null") -> tuple[int, str, list[str]]:
+    """The exit code of a process that compiles, what it found in its cache, and its notes."""
+    (folder / "twice.py").exists() or (folder / "twice.py").write_text(TWICE, encoding="utf-8")
+    environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    done = subprocess.run(
+        [sys.executable, "twice.py"], cwd=folder, capture_output=True, text=True,
+        env={**environment, "HOME": home, "XDG_CACHE_HOME": f"{home}/cache"},
+    )  # fmt: skip
+    return done.returncode, done.stdout.strip(), [line for line in done.stderr.splitlines() if "Warning: " in line]
+
+
+@compiled
+def test_without_a_folder_for_its_cache_it_compiles_and_notes_that_once(tmp_path: Path) -> None:
+    assert compiling(tmp_path)[:2] == (0, "0")
+    shutil.rmtree(tmp_path / "__pycache__")
+    tmp_path.chmod(0o555)
+    code, hits, notes = compiling(tmp_path)
+    tmp_path.chmod(0o755)
+    assert (code, hits, len(notes)) == (0, "0", 1)
+    assert "compiled code is not kept: no folder for it can be written to" in notes[0]
+
+
+@compiled
+@pytest.mark.parametrize(("suffix", "how"), [(".nbc", "truncated"), (".nbc", "flipped"), (".nbi", "truncated")])
+def test_damaged_compiled_code_is_compiled_again_with_a_note(tmp_path: Path, suffix: str, how: str) -> None:
+    assert compiling(tmp_path) == (0, "0", [])
+    for path in tmp_path.rglob(f"*{suffix}"):
+        content = bytearray(path.read_bytes())
+        content[len(content) // 2] ^= 0x10
+        path.write_bytes(content if how == "flipped" else content[: len(content) // 2])
+    code, hits, notes = compiling(tmp_path)
+    assert (code, hits, len(notes)) == (0, "0", 1)
+    assert "is damaged and is compiled again" in notes[0]
+    assert compiling(tmp_path) == (0, "2", [])

@@ -761,6 +761,16 @@ def test_bless_replaces_nothing_where_nobody_reads_the_verdict(folder: Path, tmp
         assert baseline.read_bytes() == (folder / "base.h5").read_bytes()
 
 
+def test_bless_refuses_a_reason_that_is_not_text(folder: Path, tmp_path: Path) -> None:
+    for reason in (b"caf\xe9", "a lone \ud800 surrogate"):
+        with pytest.raises(UsageError, match="--reason: got"):
+            impact.bless(folder / "equal.h5", tmp_path / "new.h5", reason=os.fsdecode(reason))
+    command = [sys.executable, "-m", "impact", "bless", f"{folder}/equal.h5", "new.h5", "--reason", b"caf\xe9"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
+    assert not (tmp_path / "new.h5").exists()
+
+
 def test_a_narrow_terminal_shows_sentences_and_no_table(folder: Path) -> None:
     command = [sys.executable, "-m", "impact", "compare", str(folder / "different.h5"), str(folder / "base.h5")]
     in_terminal = [sys.executable, "-c", f"import pty; pty.spawn({command!r})"]

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import shutil
+import stat
 import subprocess
+import sys
 from pathlib import Path
 
 import h5py
@@ -16,6 +19,8 @@ import xarray as xr
 import impact
 from impact.data.store import write_whole
 from impact.errors import ResultError, StoreError, UsageError
+
+from .conftest import ROOT
 
 
 def test_what_was_saved_is_loaded(stored: Path, figure6: xr.Dataset) -> None:
@@ -92,6 +97,48 @@ def test_a_file_that_appears_meanwhile_is_kept(tmp_path: Path, monkeypatch: pyte
         write_whole(path, b"ours", overwrite=False)
     assert path.read_text() == "somebody else's"
     assert [p.name for p in tmp_path.iterdir()] == ["out.h5"]
+
+
+def test_a_folder_that_cannot_be_synced_is_a_note(
+    figure6: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fsync = os.fsync
+
+    def of_files(number: int) -> None:
+        if stat.S_ISDIR(os.fstat(number).st_mode):
+            raise OSError(errno.EINVAL, os.strerror(errno.EINVAL))
+        fsync(number)
+
+    monkeypatch.setattr(os, "fsync", of_files)
+    with pytest.warns(UserWarning, match=r"folders cannot be synced here \(Invalid argument\)"):
+        impact.save(figure6, tmp_path / "out.h5")
+    assert impact.load(tmp_path / "out.h5").identical(figure6)
+
+
+UNREADABLE = """
+import ctypes, sys
+# without its capabilities root may open no more than others; 0x20080522 is the version of the call
+ctypes.CDLL(None).capset((ctypes.c_uint32 * 2)(0x20080522, 0), (ctypes.c_uint32 * 6)())
+from impact.cli.main import main
+sys.argv = ["impact", "sweep", "c.toml", "--quiet"]
+main()
+"""
+
+
+def test_a_folder_that_may_be_written_to_and_not_read_holds_the_result(tmp_path: Path) -> None:
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    text = (ROOT / "configs" / "figure6.toml").read_text(encoding="utf-8")
+    # so many points are integrated beside a work folder
+    (folder / "c.toml").write_text(text.replace("101", "40000"), encoding="utf-8")
+    folder.chmod(0o300)
+    done = subprocess.run([sys.executable, "-c", UNREADABLE], cwd=folder, capture_output=True, text=True)
+    folder.chmod(0o700)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == (
+        "note: folders cannot be synced here (Permission denied): a power cut may undo what was just written\n"
+    )
+    assert impact.load(folder / "results.h5").sizes["e"] == 40000
 
 
 def test_a_disk_that_fails_leaves_nothing_behind(tmp_path: Path) -> None:

@@ -10,8 +10,10 @@ import re
 import shlex
 import subprocess
 import sys
+from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import nullcontext
+from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -293,6 +295,33 @@ def test_an_executor_that_stays_broken_is_told() -> None:
 
     with pytest.raises(StoreError, match="killed 4 times"):
         impact.sweep(ROOT / "configs" / "figure6.toml", executor=Broken())
+
+
+def _changed(**arrays: Any) -> Callable[[Any], Any]:
+    return lambda rebound: replace(
+        rebound, **{name: change(getattr(rebound, name)) for name, change in arrays.items()}
+    )
+
+
+ODD_BLOCKS = {
+    "e_out: got float64 of shape (300,)": _changed(e_out=lambda values: values[:-1]),
+    "peak: got float64 of shape (301, 1)": _changed(peak=lambda values: values[:, None]),
+    "work: got float32 of shape (301,)": _changed(work=lambda values: values.astype(np.float32)),
+    "steps: got list": _changed(steps=lambda values: values.tolist()),
+    "status: got 77, expected one of": _changed(status=lambda values: np.full_like(values, 77)),
+    "got NoneType, expected Rebound": lambda rebound: None,
+}
+
+
+@pytest.mark.parametrize("message", ODD_BLOCKS)
+def test_what_an_executor_returns_is_checked(message: str) -> None:
+    class Odd(ThreadPoolExecutor):
+        def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+            return super().submit(lambda: ODD_BLOCKS[message](fn(*args, **kwargs)))
+
+    point = {"e": {"linspace": [0.1, 1.0, 301]}, "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6e9}
+    with Odd(1) as executor, pytest.raises(StoreError, match=re.escape(message)):
+        impact.sweep({"models": "gharib-hurmuzlu-2012", "sweep": point}, executor=executor)
 
 
 @pytest.mark.slow

@@ -65,6 +65,14 @@ class UnfinishedError(ImpactError):
     """A sweep was told to stop; what it has finished is kept, as the message says."""
 
 
+class Interruption(BaseException):
+    """A signal ends the program at once; the message says what is kept."""
+
+
+# exceptions that are never the fault of a plug-in, whatever it was doing when they were raised
+NOT_OF_A_PLUGIN = (KeyboardInterrupt, GeneratorExit, MemoryError, Interruption)
+
+
 def did_you_mean(word: str, known: Sequence[str]) -> str:
     """The end of a message about an unknown name: the nearest known one, else all of them.
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import mmap
 import os
+import re
 import signal
 import sys
 import tempfile
@@ -16,16 +18,20 @@ from typing import TextIO
 
 from typer import TyperException
 
-from ..errors import ImpactError, InUseError, StoreError, UnfinishedError
+from ..errors import ImpactError, Interruption, InUseError, StoreError, UnfinishedError
 from ..text import safe_text
 
 # the exit codes; a shell sees 130 and 143 for the signals of the same meaning
 OK, NOT_EQUAL, USAGE, LANES_FAILED, STORAGE, IN_USE = 0, 1, 2, 3, 4, 5
 INTERNAL, INTERRUPTED, TERMINATED = 70, 130, 143
 CODES = {StoreError: STORAGE, InUseError: IN_USE}
+# bytes that a process can always get which is not short of memory
+ROOM = 2**26
+# what a write fails with on a disk that is full or broken, and over a quota or a limit
+NOT_WRITTEN = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
 
 
-class Interrupted(BaseException):
+class Interrupted(Interruption):
     """A signal came; the message says what it found done."""
 
     def __init__(self, number: int, done: str) -> None:
@@ -63,8 +69,8 @@ def say(line: str, *, error: bool = False) -> None:
     red = error and sys.stderr.isatty() and not os.environ.get("NO_COLOR")
     try:
         print(f"\x1b[31m{line}\x1b[0m" if red else line, file=sys.stderr, flush=True)
-    except BrokenPipeError:
-        # nobody listens, which is no reason to stop
+    except OSError:
+        # nobody listens, or the disk is full: no reason to stop, or to end otherwise
         _let_go(sys.stderr)
 
 
@@ -78,6 +84,17 @@ def enter(command: Callable[[], object], *, debug: bool) -> int:
             # a locale that cannot show a formula shows its escapes, not a traceback
             stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
     warnings.showwarning = _note
+    code = _code_of(command, debug=debug)
+    try:
+        # what is left in the buffer would fail at the exit of the interpreter, which has a code of its own
+        sys.stdout.flush()
+    except OSError:
+        _let_go(sys.stdout)
+    return code
+
+
+def _code_of(command: Callable[[], object], *, debug: bool) -> int:
+    """The exit code of the command line, whose errors are printed."""
     try:
         code = _run(command)
         sys.stdout.flush()
@@ -98,16 +115,43 @@ def enter(command: Callable[[], object], *, debug: bool) -> int:
         _let_go(sys.stdout)
         return OK
     except Exception as error:
-        if isinstance(error, OSError) and error.errno == errno.ENOSPC:
+        if _is_out_of_memory(error):
+            say(_out_of_memory(error), error=True)
+            return STORAGE
+        if isinstance(error, OSError) and error.errno in NOT_WRITTEN:
             say(f"cannot write: {error.strerror}", error=True)
-            _let_go(sys.stdout)
             return STORAGE
         if debug:
-            traceback.print_exc()
+            for line in traceback.format_exc().splitlines():
+                say(line)
         else:
             what = safe_text(f"{type(error).__name__}: {error}")
             say(f"internal error: {what}; report: {_report()}; --debug shows it", error=True)
         return INTERNAL
+
+
+def _is_out_of_memory(error: BaseException) -> bool:
+    """Whether an exception, or one that it came from, is of a lack of memory."""
+    chain: BaseException | None = error
+    while chain is not None:
+        if isinstance(chain, MemoryError) or (isinstance(chain, OSError) and chain.errno == errno.ENOMEM):
+            return True
+        # a library that the loader has no room for
+        if isinstance(chain, ImportError) and re.search("failed to map|[Cc]annot (allocate|apply)", str(chain)):
+            return True
+        chain = chain.__cause__ or chain.__context__
+    # libraries fail in many ways where there is no room
+    try:
+        mmap.mmap(-1, ROOM).close()
+    except (OSError, MemoryError):
+        return True
+    return False
+
+
+def _out_of_memory(error: Exception) -> str:
+    """One line about a lack of memory; NumPy says how much it asked for."""
+    what = safe_text(str(error)) if isinstance(error, MemoryError) else ""
+    return "out of memory" + (f": {what}" if what else "")
 
 
 def _note(message: Warning | str, *_: object, **__: object) -> None:
@@ -144,7 +188,10 @@ def readers_may_leave(stream: TextIO | None = None) -> Iterator[None]:
     try:
         yield
         stream.flush()
-    except BrokenPipeError:
+    except OSError as error:
+        # of stderr nothing is missed that the exit code does not say
+        if stream is not sys.stderr and not isinstance(error, BrokenPipeError):
+            raise
         _let_go(stream)
     except SystemExit as leaving:
         # rich leaves by this when the reader has gone
@@ -159,7 +206,10 @@ def _let_go(stream: TextIO) -> None:
 
 
 def _report() -> str:
-    """The traceback in a file of its own; its name."""
-    with tempfile.NamedTemporaryFile("w", prefix="impact-error-", suffix=".txt", delete=False) as file:
-        traceback.print_exc(file=file)
+    """The traceback in a file of its own; its name, or why there is none."""
+    try:
+        with tempfile.NamedTemporaryFile("w", prefix="impact-error-", suffix=".txt", delete=False) as file:
+            traceback.print_exc(file=file)
+    except OSError as error:
+        return f"not written ({error.strerror})"
     return file.name

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..ode.problem import Mask
+from ..errors import ModelError
+from ..ode.problem import Columns, Mask, Rates
 from .model import ForceModel
 from .power import Array, power
 
@@ -41,3 +42,54 @@ def creeps(x: Array, speed: Array, c: Array, n: float, q: float) -> Mask:
 def creeping_speed(c: Array, n: float, q: float) -> Array:
     """What a speed of balls that part with none is below, over x^(q+1), where n = 2q + 1; -inf where none is."""
     return np.where(CRITICAL * c * c >= 4.0 * (q + 1.0), c / (2.0 * (q + 1.0)), -np.inf)
+
+
+# bounds B x^k of a speed that are tried: the exponents k, and B peak^(k-1) in units of v0/length; and the
+# indentations, relative to the peak, at which each has to hold
+BOUND_EXPONENTS = (1.0, 1.25, 1.5, 2.0)
+BOUND_RATES = np.geomspace(1e-4, 1e4, 65)
+BOUND_INDENTATIONS = 10.0 ** -np.linspace(0.0, 40.0, 81)
+# trajectories that are judged together
+MAX_TOGETHER = 4096
+
+
+def never_part(rates: Rates, columns: Columns, peak: Array, smooth: int) -> Mask:
+    """Which balls at rest at their peak never part, by any law whose contact ends at zero indentation.
+
+    If F(x, -B x^k) <= -k B^2 x^(2k-1) for all x from 0 to the peak, with some B and some k >= 1, the speed w of
+    the rebound cannot grow beyond B x^k: at w = B x^k it falls faster than that bound does. Then
+    dx/dt >= -B x^k, and x stays above zero for ever. Where no such bound is found nothing is claimed.
+
+    Parameters
+    ----------
+    rates : of the restitution phase in s and v
+    columns : what the rates need, each of shape (n,)
+    peak : indentation at the begin of the phase, above the permanent one, shape (n,)
+    smooth : p of x = s^p
+    """
+    found = np.zeros(peak.size, bool)
+    for first in range(0, peak.size, MAX_TOGETHER):
+        part = slice(first, first + MAX_TOGETHER)
+        found[part] = _never_part(rates, tuple(column[part] for column in columns), peak[part], smooth)
+    return found
+
+
+def _never_part(rates: Rates, columns: Columns, peak: Array, smooth: int) -> Mask:
+    found = np.zeros(peak.size, bool)
+    x = (peak[:, None] * BOUND_INDENTATIONS).reshape(-1)
+    s = power(x, 1.0 / smooth)
+    repeated = tuple(np.repeat(column, BOUND_INDENTATIONS.size) for column in columns)
+    for k in BOUND_EXPONENTS:
+        for rate in BOUND_RATES:
+            bound = np.repeat(rate * power(peak, 1.0 - k), BOUND_INDENTATIONS.size)
+            try:
+                force = rates(np.array([s, -bound * power(x, k)]), repeated)[4]
+            except ModelError:
+                # a formula need not know such a state
+                return found
+            falls = k * bound * bound * power(x, 2.0 * k - 1.0)
+            holds = force + falls <= (CRITICAL - 1.0) * falls
+            found |= holds.reshape(peak.size, -1).all(axis=1)
+        if found.all():
+            break
+    return found

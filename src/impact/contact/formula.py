@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import ModelError
+from ..errors import NOT_OF_A_PLUGIN, ModelError
 from ..text import safe_text
 from .power import Array
 
@@ -34,16 +34,18 @@ def wishes(formula: Formula | None) -> tuple[str, ...]:
 
 
 def ask(formula: Formula, known: Mapping[str, Array | float]) -> Array:
-    """The value of a formula, given what it asks for by name.
+    """The value of a formula, given what it asks for by name, in arrays that it cannot write to.
 
     Raises
     ------
-    ModelError : the formula raised an error, whatever it was
+    ModelError : the formula raised an error, whatever it was, or returned something other than real numbers
     """
-    given = [known[wish] for wish in wishes(formula)]
+    given = [_read_only(known[wish]) for wish in wishes(formula)]
     try:
-        return np.asarray(formula(*given), dtype=float)
-    except (Exception, SystemExit) as error:
+        return _real(formula(*given))
+    except NOT_OF_A_PLUGIN:
+        raise
+    except BaseException as error:
         # a formula that ends the program would take the other impacts with it
         raise ModelError(f"a formula raised {type(error).__name__}: {error}") from error
 
@@ -68,3 +70,25 @@ def explained(key: str, error: ModelError) -> tuple[str, str]:
     is_branch = isinstance(cause, ValueError) and "truth value of an array" in str(cause)
     hint = "; formulas work on arrays: use np.where instead of if" if is_branch else ""
     return f"{place}{key}: {kind}", safe_text(f"{place}model {key}: {kind}: {str(cause).rstrip('.')}{hint}", 1000)
+
+
+def _read_only(value: Array | float) -> Array | float:
+    """The value; an array as a view that cannot be written to."""
+    if not isinstance(value, np.ndarray):
+        return value
+    view = value.view()
+    view.setflags(write=False)
+    return view
+
+
+def _real(value: object) -> Array:
+    """The value as an array of float64; no text, date or complex number is taken for a real one."""
+    array = np.asarray(value)
+    if array.dtype == float:
+        return array
+    if array.dtype.kind == "O":
+        # NumPy takes None for NaN
+        return np.array([float(element) for element in array.flat]).reshape(array.shape)
+    if array.dtype.kind not in "fiub":
+        raise TypeError(f"it returned {array.dtype}, expected real numbers")
+    return array.astype(float)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import partial
 
 import numpy as np
@@ -13,7 +13,8 @@ from ..ode.problem import Columns, End, Outcome
 from ..ode.rk45 import integrate
 from ..ode.step import Space
 from . import compiled, motion
-from .creeping import may_creep
+from .creeping import may_creep, never_part
+from .momentum import Momentum
 from .phases import in_parts
 from .power import Array
 from .status import LIMIT, OK, Status
@@ -25,7 +26,7 @@ STATUS_OF_END[End.LOST] = Status.NOT_SEPARATED
 STATUS_OF_END[End.MAX_STEPS] = Status.MAX_STEPS
 STATUS_OF_END[End.STEP_UNDERFLOW] = Status.STEP_UNDERFLOW
 STATUS_OF_END[End.NOT_FINITE] = Status.NOT_FINITE
-LANDED, LOST = int(End.LANDED), int(End.LOST)
+LANDED, LOST, MAX_STEPS, STEP_UNDERFLOW = map(int, (End.LANDED, End.LOST, End.MAX_STEPS, End.STEP_UNDERFLOW))
 
 # places of impacts; a slice where it is all of them, so that nothing is copied
 Places = NDArray[np.intp] | slice
@@ -166,6 +167,7 @@ def strike(
     else:
         among, bends = motion.bends(back, columns, start, residual[parts])
         outward = in_parts(run, motion.restitution(back), bends, start, among)
+    _judge_unfinished(back, outward, columns, recovered[parts])
     e_out, work, status = -back.velocity(outward.state, columns), 2.0 * outward.state[3], _status(outward)
     # held, or parting with no speed in an infinite time: all the energy of such balls is lost
     held = outward.end == LOST
@@ -180,6 +182,16 @@ def strike(
     if law.model.release == "force":
         rebound.permanent[parts] += motion.indentation(law, outward.state[0])
     return Struck(rebound, inward, outward, columns)
+
+
+def _judge_unfinished(law: motion.Law, outward: Outcome, columns: Columns, recovered: Array) -> None:
+    """Tell the balls that never part from those that only take too many steps."""
+    left = np.flatnonzero((outward.end == MAX_STEPS) | (outward.end == STEP_UNDERFLOW))
+    if not left.size or law.model.release != "gap":
+        return
+    rates = motion.restitution(replace(law, momentum=Momentum())).rates
+    never = never_part(rates, tuple(column[left] for column in columns), recovered[left], law.model.smooth)
+    outward.end[left[never]] = LOST
 
 
 def _status(outcome: Outcome) -> NDArray[np.int8]:

@@ -8,9 +8,11 @@ import numpy as np
 from numba import njit, types
 from numba.extending import intrinsic
 
+from .compile_cache import compiled
+
 # products and sums may be fused, which only makes them more exact; the arithmetic is else that of IEEE
 inlined = njit(fastmath={"contract"}, error_model="numpy", forceinline=True)
-kept_on_disk = njit(fastmath={"contract"}, error_model="numpy", nogil=True, cache=True)
+kept_on_disk = compiled(fastmath={"contract"}, error_model="numpy", nogil=True)
 
 
 def _reinterpreted(there, here):

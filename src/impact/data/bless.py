@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -57,6 +58,8 @@ def bless(
     """
     if not reason.strip():
         raise UsageError("--reason: empty, wants why the numbers changed")
+    if re.search("[\0\ud800-\udfff]", reason):
+        raise UsageError(f'--reason: got "{safe_text(reason, 60)}", expected UTF-8 text without NUL')
     new, baseline = Path(new), Path(baseline)
     check_output(baseline, overwrite=True, source=new)
     result = load(new)

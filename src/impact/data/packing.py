@@ -32,6 +32,8 @@ def unpack(path: Path, of: str, size: int) -> Rebound | None:
             if stored["of"].item() != of:
                 return None
             arrays = {name: stored[name] for name in FIELDS}
+    except MemoryError:
+        raise
     # numpy and zipfile raise almost anything on a damaged file
     except Exception:
         return None

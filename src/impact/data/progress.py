@@ -70,7 +70,9 @@ def kept(folder: Path, gauge: Gauge, again: str, more: Callable[[Exception], lis
     """
     try:
         yield
-    except (StoreError, UnfinishedError, UsageError) as error:
+    except (StoreError, UnfinishedError, UsageError, MemoryError) as error:
         of = f"{gauge.at.trajectories:,} of {gauge.at.of_trajectories:,} trajectories"
         left = f"{of} are kept in {safe_text(str(folder))}; {again} goes on"
-        raise type(error)("; ".join(filter(None, [str(error), *more(error), left]))) from error
+        is_memory = isinstance(error, MemoryError)
+        lines = ["out of memory" if is_memory else "", str(error), *more(error), left]
+        raise (StoreError if is_memory else type(error))("; ".join(filter(None, lines))) from error

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import io
 import os
 import stat
+import warnings
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from secrets import token_hex
 from typing import Any
 
 from ..errors import StoreError, UsageError
 from ..text import safe_text
+
+# what opening or syncing a folder fails with although files in it can be written and synced
+NO_SYNC = {errno.EINVAL, errno.EACCES, errno.EPERM, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS, errno.EISDIR}
 
 
 class Sink(io.RawIOBase):
@@ -138,12 +144,30 @@ def appearing(path: Path, *, overwrite: bool, part: Path | None = None) -> Itera
 
 
 def sync_folder(folder: Path) -> None:
-    """Have the names in a folder on the disk."""
-    number = os.open(folder, os.O_RDONLY)
+    """Have the names in a folder on the disk.
+
+    Warns
+    -----
+    UserWarning : the file system cannot sync a folder, or this user may not open it; the names are there anyway
+    """
     try:
-        os.fsync(number)
-    finally:
-        os.close(number)
+        number = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(number)
+        finally:
+            os.close(number)
+    except OSError as error:
+        if error.errno not in NO_SYNC:
+            raise
+        _note_unsynced(error.strerror)
+
+
+@cache
+def _note_unsynced(reason: str) -> None:
+    """Warn once in a process, however many blocks it stores."""
+    warnings.warn(
+        f"folders cannot be synced here ({reason}): a power cut may undo what was just written", stacklevel=3
+    )
 
 
 def _publish(part: Path, path: Path, *, overwrite: bool) -> None:

@@ -161,6 +161,8 @@ def reading(path: Path, most: float = guard.MAX_BYTES) -> Iterator[tuple[h5py.Fi
             yield file, stream, guard.vet(file, stream, most)
     except ResultError as error:
         raise ResultError(f"{shown}: {error}") from None
+    except MemoryError:
+        raise
     except Exception as error:
         # h5py and xarray raise almost anything on a damaged file
         raise ResultError(f"{shown}: is not a readable result ({safe_text(str(error), 80)})") from error

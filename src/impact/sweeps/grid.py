@@ -89,7 +89,10 @@ def lay_out(
                 columns[name] = written_out(entry, quantities[name])
             except Problem as problem:
                 faults += problem.under(*path_of(name))
-    axes = () if faults else tuple(Axis({m: columns[m] for m in member_of.get(n, (n,))}) for n in leaders)
+    members = [member_of.get(name, (name,)) for name in leaders]
+    # a member whose entry could not be read has no column; its fault is reported where it was read
+    is_complete = not faults and all(name in columns for group in members for name in group)
+    axes = tuple(Axis({name: columns[name] for name in group}) for group in members) if is_complete else ()
     return Grid(scalars, axes, tuple(faults))
 
 

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 from ..contact.model import ForceModel
 from ..contact.models import catalogue
-from ..errors import ModelError
+from ..errors import NOT_OF_A_PLUGIN, ModelError
 from ..text import safe_text
 
 GROUP = "impact.models"
@@ -56,7 +56,9 @@ def _of_point(point: EntryPoint) -> list[Installed]:
     where = safe_text(f"{package}: entry point {point.name} = {point.value}")
     try:
         loaded = point.load()
-    except (Exception, SystemExit) as error:
+    except NOT_OF_A_PLUGIN:
+        raise
+    except BaseException as error:
         told = safe_text(f"{type(error).__name__}: {error}", 300)
         raise ModelError(f"{where}: {told}; wants a package that works, or none") from None
     held = vars(loaded).values() if isinstance(loaded, ModuleType) else [loaded]

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from ..contact.model import ForceModel
 from ..contact.models import catalogue
-from ..errors import ImpactError, ModelError, UsageError
+from ..errors import NOT_OF_A_PLUGIN, ImpactError, ModelError, UsageError
 from ..text import safe_text
 from .installed import installed
 from .values import show
@@ -196,7 +196,9 @@ def _executed(source: Source, name: str, sha256: str) -> ModuleType:
     sys.modules[module.__name__] = module
     try:
         exec(code, module.__dict__)
-    except (Exception, SystemExit) as error:
+    except NOT_OF_A_PLUGIN:
+        raise
+    except BaseException as error:
         sys.modules.pop(module.__name__, None)
         frames = traceback.walk_tb(error.__traceback__)
         line = [number for frame, number in frames if frame.f_code.co_filename == file][-1]

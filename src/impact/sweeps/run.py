@@ -7,10 +7,13 @@ import warnings
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import partial
 
+import numpy as np
+
 from ..contact.compiled import is_installed, serves
+from ..contact.status import Status
 from ..contact.strike import Rebound
 from ..errors import StoreError, UsageError
 from ..text import safe_text
@@ -29,6 +32,7 @@ MOMENT = 0.2
 
 # what comes back of a block: see `impact.sweeps.blocks.integrated`
 Done = tuple[Rebound, dict[str, str]]
+STATUSES = [int(status) for status in Status]
 
 
 def settled(plan: Plan, found: Sequence[Trajectories]) -> Plan:
@@ -81,7 +85,7 @@ def run(
     Raises
     ------
     UsageError : a model was given as a Python value, which cannot be sent; or those who integrate lack something
-    StoreError : they were killed again and again, or cannot be reached any more
+    StoreError : they were killed again and again, cannot be reached any more, or return what is no block
 
     Warns
     -----
@@ -138,11 +142,43 @@ def _finished(
                 # nobody is there yet
                 time.sleep(MOMENT)
             for future in wait(given, MOMENT, FIRST_COMPLETED).done:
-                done = future.result()
-                yield given.pop(future), done
+                stretch, done = given[future], future.result()
+                _check(stretch, done)
+                del given[future]
+                yield stretch, done
     finally:
         for future in given:
             future.cancel()
+
+
+def _check(stretch: Stretch, done: object) -> None:
+    """Refuse a block that cannot be what its trajectories came to: an executor may return anything.
+
+    Raises
+    ------
+    StoreError : it is no block, or its arrays have another shape or dtype, or hold an unknown status
+    """
+    where = f"executor: block {stretch.number}"
+    rebound, errors = done if isinstance(done, tuple) and len(done) == 2 else (done, {})
+    if not isinstance(rebound, Rebound):
+        raise StoreError(f"{where}: got {safe_text(type(rebound).__name__)}, expected Rebound")
+    if not isinstance(errors, dict):
+        raise StoreError(f"{where}: got {safe_text(type(errors).__name__)}, expected a dict of errors")
+    blank = Rebound.blank(stretch.size)
+    for field in fields(Rebound):
+        got, expected = (_form(getattr(one, field.name)) for one in (rebound, blank))
+        if got != expected:
+            raise StoreError(f"{where}: {field.name}: got {got}, expected {expected}")
+    unknown = np.setdiff1d(rebound.status, STATUSES)
+    if unknown.size:
+        raise StoreError(f"{where}: status: got {unknown[0]}, expected one of {STATUSES}")
+
+
+def _form(array: object) -> str:
+    """The dtype and shape of an array."""
+    if not isinstance(array, np.ndarray):
+        return safe_text(type(array).__name__)
+    return f"{array.dtype} of shape {array.shape}"
 
 
 def _integrator(plan: Plan, team: Team) -> Callable[[Block], Done]:

@@ -1,0 +1,102 @@
+"""Compiled code on disk: numba's cache of functions, with checksums, and without where nothing can be stored."""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+import warnings
+from contextlib import suppress
+from functools import cache
+
+from numba import njit
+from numba.core.caching import FunctionCache, IndexDataCacheFile
+
+DIGEST_BYTES = hashlib.sha256().digest_size
+
+
+class DamagedError(Exception):
+    """A file of the cache does not hold what was written to it."""
+
+
+class CheckedFile(IndexDataCacheFile):
+    """The files of a function, each with the SHA-256 of its content: damaged machine code can end the process."""
+
+    def _dump(self, obj):
+        content = super()._dump(obj)
+        return hashlib.sha256(content).digest() + content
+
+    def _load_index(self):
+        try:
+            with open(self._index_path, "rb") as file:
+                version, content = pickle.load(file), file.read()
+        except FileNotFoundError:
+            return {}
+        except Exception as error:
+            raise DamagedError from error
+        if version != self._version:
+            return {}
+        stamp, overloads = _checked(content)
+        return overloads if stamp == self._source_stamp else {}
+
+    def _load_data(self, name):
+        with open(self._data_path(name), "rb") as file:
+            return _checked(file.read())
+
+
+def _checked(content):
+    if hashlib.sha256(content[DIGEST_BYTES:]).digest() != content[:DIGEST_BYTES]:
+        raise DamagedError
+    return pickle.loads(content[DIGEST_BYTES:])
+
+
+class CheckedCache(FunctionCache):
+    """A cache of a function that never fails: what is damaged is compiled again, what cannot be stored is not."""
+
+    def __init__(self, function):
+        super().__init__(function)
+        # other names than those of files without a checksum
+        self._cache_file = CheckedFile(
+            cache_path=self._cache_path,
+            filename_base=f"{self._impl.filename_base}-sha256",
+            source_stamp=self._impl.locator.get_source_stamp(),
+        )
+
+    def load_overload(self, sig, target_context):
+        try:
+            return super().load_overload(sig, target_context)
+        except DamagedError:
+            _note(f"compiled code in {self._cache_path} is damaged and is compiled again")
+            with suppress(OSError):
+                self.flush()
+        except OSError as error:
+            _note(f"compiled code in {self._cache_path} cannot be read ({error.strerror}) and is compiled again")
+        return None
+
+    def save_overload(self, sig, data):
+        try:
+            super().save_overload(sig, data)
+        except (DamagedError, OSError) as error:
+            _note(f"compiled code is not kept in {self._cache_path}: {getattr(error, 'strerror', 'damaged')}")
+
+
+def compiled(**options):
+    """As `numba.njit`, and the machine code is kept on disk where that can be done."""
+
+    def decorate(function):
+        dispatcher = njit(**options)(function)
+        # with NUMBA_DISABLE_JIT=1 it is the function itself
+        if dispatcher is function:
+            return function
+        try:
+            dispatcher._cache = CheckedCache(function)
+        except (RuntimeError, OSError):
+            _note("compiled code is not kept: no folder for it can be written to; NUMBA_CACHE_DIR names one")
+        return dispatcher
+
+    return decorate
+
+
+@cache
+def _note(text):
+    """Warn once in a process."""
+    warnings.warn(text, stacklevel=2)
