@@ -239,3 +239,15 @@ def test_the_digest_sees_every_number_name_and_dimension(figure6: xr.Dataset) ->
     assert content_digest(figure6.rename(v1_post="v1_pre")) != base
     assert content_digest(figure6.rename(e="f")) != base
     assert content_digest(figure6.drop_vars("steps")) != base
+
+
+def test_pieces_are_counted_by_the_variables_that_are_stored() -> None:
+    from impact.sweeps.config import read_config
+
+    def read(*variables: str) -> None:
+        sweep = {**TABLE1, "v1": {"linspace": [1.0, 2.0, 50_000]}}
+        read_config({"models": "hertz", "sweep": sweep, "output": {"variables": variables, "chunks": {"v1": 1}}})
+
+    read("e_out")
+    with pytest.raises(impact.ImpactError, match="got 150,000 pieces of 1 points"):
+        read("e_out", "separation_time")
