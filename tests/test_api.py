@@ -171,7 +171,8 @@ ROLES: dict[str, dict[str, Any]] = {
 def test_a_formula_that_writes_to_its_arguments_is_an_error_of_the_model(formulas: dict[str, Any]) -> None:
     texts = {"key": "writes", "title": "", "year": 1, "equation": "", "reference": ""}
     law = impact.ForceModel(**{**texts, "force": lambda elastic, e: elastic, **formulas})
-    result = impact.sweep({"models": ["writes", "hertz"], "sweep": SWEEP}, plugins=[law])
+    with pytest.warns(UserWarning, match="model writes: ValueError: .*read-only"):
+        result = impact.sweep({"models": ["writes", "hertz"], "sweep": SWEEP}, plugins=[law])
     assert result["status"].sel(model="writes").values.tolist() == [Status.MODEL_ERROR] * 2
     assert result["status"].sel(model="hertz").values.tolist() == [Status.OK] * 2
 
@@ -202,7 +203,8 @@ WRONG_TYPES = {
 def test_a_force_that_returns_no_real_numbers_is_an_error_of_the_model(force: Any) -> None:
     texts = {"key": "odd", "title": "", "year": 1, "equation": "", "reference": ""}
     law = impact.ForceModel(**texts, force=force)  # type: ignore[arg-type]
-    status = impact.sweep({"models": "odd", "sweep": SWEEP}, plugins=[law])["status"].values
+    with pytest.warns(UserWarning, match="model odd: "):
+        status = impact.sweep({"models": "odd", "sweep": SWEEP}, plugins=[law])["status"].values
     assert status.tolist() == [[Status.MODEL_ERROR, Status.MODEL_ERROR]]
 
 
@@ -231,7 +233,8 @@ def test_an_exception_of_any_class_is_an_error_of_the_model() -> None:
 
     texts = {"key": "panics", "title": "", "year": 1, "equation": "", "reference": ""}
     law = impact.ForceModel(**texts, force=panics)  # type: ignore[arg-type]
-    status = impact.sweep({"models": ["panics", "hertz"], "sweep": SWEEP}, plugins=[law])["status"].values
+    with pytest.warns(UserWarning, match="model panics: _Panic: called"):
+        status = impact.sweep({"models": ["panics", "hertz"], "sweep": SWEEP}, plugins=[law])["status"].values
     assert status.tolist() == [[Status.MODEL_ERROR] * 2, [Status.OK] * 2]
 
 

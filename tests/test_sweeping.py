@@ -298,18 +298,20 @@ def test_an_executor_that_stays_broken_is_told() -> None:
 
 
 def _changed(**arrays: Any) -> Callable[[Any], Any]:
-    return lambda rebound: replace(
-        rebound, **{name: change(getattr(rebound, name)) for name, change in arrays.items()}
+    return lambda done: (
+        replace(done[0], **{name: change(getattr(done[0], name)) for name, change in arrays.items()}),
+        done[1],
     )
 
 
 ODD_BLOCKS = {
     "e_out: got float64 of shape (300,)": _changed(e_out=lambda values: values[:-1]),
     "peak: got float64 of shape (301, 1)": _changed(peak=lambda values: values[:, None]),
-    "work: got float32 of shape (301,)": _changed(work=lambda values: values.astype(np.float32)),
+    "approach_work: got float32 of shape (301,)": _changed(approach_work=lambda values: values.astype(np.float32)),
     "steps: got list": _changed(steps=lambda values: values.tolist()),
     "status: got 77, expected one of": _changed(status=lambda values: np.full_like(values, 77)),
-    "got NoneType, expected Rebound": lambda rebound: None,
+    "got NoneType, expected Rebound": lambda done: None,
+    "got list, expected a dict of errors": lambda done: (done[0], []),
 }
 
 
