@@ -145,12 +145,12 @@ LEFT_OUT = {
         "Adams POISSON (1990), a penalty with a restitution",
         "SmoothSphereHalfSpaceForce of OpenSim (2019), whose constants are public: its force is not zero where "
         "the "
-        "contact begins, nor before, so that the impact has no begin",
+        "contact begins, nor before, so that the contact has no defined start",
         "MDR of LAMMPS (2024), whose source is public: its force depends on the whole surface of a particle",
         "DMT of LAMMPS and YADE, Hertz less a constant: it gives back all energy at every speed, and has no "
         "sticking "
         "speed, unless a damping stands beside it",
-        "the option viscous of LIGGGHTS hooke, whose damping depends on the speed of the moment",
+        "the option viscous of LIGGGHTS hooke, whose damping depends on the current speed",
     ),
 }
 

@@ -156,7 +156,7 @@ def in_coordinate(log: bool) -> Struck:
     return strike(law, (chi,), chi.size, DEFAULT_RTOL, 100_000)
 
 
-@pytest.mark.parametrize("name", ["e_out", "peak", "force", "duration", "work"])
+@pytest.mark.parametrize("name", ["e_out", "peak", "force", "duration", "approach_work", "restitution_work"])
 def test_both_momentum_coordinates_agree(name):
     plain, log = (getattr(in_coordinate(which).rebound, name) for which in (False, True))
     assert not np.array_equal(plain, log)

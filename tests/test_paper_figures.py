@@ -112,4 +112,5 @@ def test_make_figures_draws_all_of_them() -> None:
     )
     for figure in (*MARKS, "6"):
         assert f"impact sweep configs/figure{figure}.toml -o results/figure{figure}.h5" in done.stdout
-        assert f"-o results/figure{figure}.png" in done.stdout
+        kind = {"2": "--kind impulse ", "6": ""}.get(figure, "--kind loop ")
+        assert f"impact plot results/figure{figure}.h5 {kind}-o results/figure{figure}.png" in done.stdout

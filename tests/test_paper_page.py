@@ -109,7 +109,7 @@ def test_the_limits() -> None:
         assert f"{shot.values['e_out']:.3f}" == value
 
 
-def test_pictures_are_those_of_the_configs() -> None:
+def test_pictures_are_there_and_small() -> None:
     for figure in ("2", "3", "5a", "5b", "5c"):
         assert f"(paper/figure{figure}.svg)" in PAGE
         assert (ROOT / "docs" / "paper" / f"figure{figure}.svg").stat().st_size < 62_000

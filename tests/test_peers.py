@@ -133,7 +133,7 @@ def lammps(spring: str, damping: str, strength: str, limit: str) -> Callable[[Va
 
 
 def before_root(version: str) -> bool:
-    """Tsuji is without the factor √2 until pull request 5113 of July 2026."""
+    """Tsuji is without the factor √2 in releases before pull request 5113, last discussed on 29 July 2026."""
     return version < "20260729"
 
 
@@ -302,7 +302,7 @@ for scheme in ("semi_explicit_euler", "tamsi"):
 SIMBODY = Code("Simbody", "run_simbody.py", steps_per_contact=100)
 
 
-def plane_strain(*names: str) -> float:
+def plane_strain(*names: str) -> tuple[float, ...]:
     return tuple(MATERIALS[name]["E"] / (1 - MATERIALS[name]["nu"] ** 2) for name in names)
 
 

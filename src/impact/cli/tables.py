@@ -68,7 +68,7 @@ def print_run(impact: Impact) -> None:
     rows["e_kinematic"] = _quantity(impact.e_kinematic, "1", 12) + "  (1), from the velocities"
     rows["e_kinetic"] = _quantity(impact.e_kinetic, "1", 12) + "  (2), tau_r/tau_c"
     rows["e_energetic"] = _quantity(impact.e_energetic, "1", 12) + "  (3), the root of -W_r/W_c"
-    rows["in the claimed domain"] = "yes" if impact.values["in_domain"] else f"no: {impact.model.domain_text}"
+    rows["in the stated domain"] = "yes" if impact.values["in_domain"] else f"no: {impact.model.domain_text}"
     rows["steps"] = impact.values["steps"]
     print_rows(rows)
 

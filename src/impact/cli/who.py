@@ -38,7 +38,7 @@ class Who:
 
     @contextmanager
     def team(self, *, quiet: bool, should_stop: Callable[[], bool]) -> Iterator[Team]:
-        """Those who integrate; a cluster is told of on stderr, and `should_stop` gives up a connection to it."""
+        """Those who integrate; prints the cluster to stderr, and `should_stop` gives up a connection to it."""
         place = self.scheduler if self.scheduler is not None else self.scheduler_file
         if place is None:
             from ..sweeps.teams import team_of

@@ -51,7 +51,7 @@ def ask(formula: Formula, known: Mapping[str, Array | float]) -> Array:
 
 
 def explained(key: str, error: ModelError) -> tuple[str, str]:
-    """What tells an error of a law from its others, and a line about it: place, type, text, and a hint.
+    """A key that identifies an error of a law, and one line about it: place, type, text, and a hint.
 
     Parameters
     ----------

@@ -87,7 +87,7 @@ class ForceModel:
     equation : the law in one line of Unicode
     evidence : where the formula and the DOI were read, derived, or that they were not verified
     domain : closed intervals by the name of an input or derived quantity, where the law is said to hold
-    domain_source : who says so, where it is not the authors themselves
+    domain_source : who says so
     force : contact force of the whole contact, or of the approach phase where `unloading` is given
     unloading : contact force of the restitution phase
     residual : permanent indentation, from `peak`, `force_at_peak` and the quantities of the contact

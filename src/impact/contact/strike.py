@@ -185,7 +185,7 @@ def strike(
 
 
 def _judge_unfinished(law: motion.Law, outward: Outcome, columns: Columns, recovered: Array) -> None:
-    """Tell the balls that never part from those that only take too many steps."""
+    """Mark trajectories that never separate, unlike those that only take too many steps."""
     left = np.flatnonzero((outward.end == MAX_STEPS) | (outward.end == STEP_UNDERFLOW))
     if not left.size or law.model.release != "gap":
         return

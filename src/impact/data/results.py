@@ -78,8 +78,8 @@ SCHEMA = (
     Variable("oracle_error", "1", "model", "bounded by 10 rtol", "distance from the closed form, where one exists",
              "e_out - exact e_out"),
     Variable("status", "1", "model", "exact", "how the point ended", "see flag_meanings", "i1"),
-    Variable("in_domain", "1", "model", "exact", "1 where the authors claim the model",
-             "1 inside every claimed interval", "i1"),
+    Variable("in_domain", "1", "model", "exact", "1 where the law is said to hold",
+             "1 inside every stated interval", "i1"),
     Variable("steps", "1", "model", "reported", "accepted steps of the integrator",
              "approach + restitution", "i4"),
     Variable("e_kinetic", "1", "model", "scaled by 1",
@@ -193,10 +193,10 @@ def exponent_text(by_model: Mapping[str, float]) -> str:
     """
     common = Counter(by_model.values()).most_common(1)[0][0]
     others = {key: n for key, n in by_model.items() if n != common}
-    told = ", ".join(f"{n:g} for {key}" for key, n in others.items())
-    if len(told) > MAX_NAMED:
-        told = f"{len(others)} of {len(by_model)} models have another one"
-    return f"{common:g}" + (f" ({told})" if told else "")
+    text = ", ".join(f"{n:g} for {key}" for key, n in others.items())
+    if len(text) > MAX_NAMED:
+        text = f"{len(others)} of {len(by_model)} models have another n"
+    return f"{common:g}" + (f" ({text})" if text else "")
 
 
 def exponents_of(dataset: xr.Dataset) -> str | None:

@@ -77,11 +77,15 @@ class Sink(io.RawIOBase):
             before = path.lstat()
         except FileNotFoundError:
             return
+        if not stat.S_ISREG(before.st_mode):
+            return
         number = self._file.fileno()
+        # a file system that keeps neither is no reason to lose the output
         for uid, gid in ((-1, before.st_gid), (before.st_uid, -1)):
-            with contextlib.suppress(PermissionError):
+            with contextlib.suppress(OSError):
                 os.fchown(number, uid, gid)
-        os.fchmod(number, stat.S_IMODE(before.st_mode))
+        with contextlib.suppress(OSError):
+            os.fchmod(number, stat.S_IMODE(before.st_mode))
 
     def sync(self) -> None:
         """Have everything on the disk.

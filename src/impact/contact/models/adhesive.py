@@ -26,7 +26,7 @@ JKR_1971 = ForceModel(
         "lammps/lammps, doc/src/pair_granular.rst @02dde6e35f (2019), whose γ is Γ/2; the restitution in a public "
         "digest (2026) of Thornton and Ning (1998), equations (49) to (57)",
         doi="the same digest",
-        note="elastic: all that is lost is the work of the neck",
+        note="the DOI is that of Thornton and Ning; elastic: all that is lost is the work of the neck",
     ),
     parameters=(Parameter("gamma", "N/m", "work of adhesion Γ", least=0.0, typical=0.01),),
     coefficients={
@@ -65,7 +65,9 @@ LIGGGHTS_EDINBURGH = ForceModel(
     "no pullOffForce",
     evidence=Evidence(
         "seen", "CFDEMproject/LIGGGHTS-PUBLIC, src/normal_model_edinburgh.h @84ba3d76 (3.8.0, 2017)",
-        note="without the dashpot that may stand beside it",
+        note="without the dashpot that may stand beside it; a wall is the limit of two spheres, LIGGGHTS takes "
+        "another "
+        "radius of the intersection there",
     ),
     parameters=(
         Parameter("k2", "1", "unloading stiffness k₂ over K, UnloadingStiffness", least=1.0),

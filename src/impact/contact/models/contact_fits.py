@@ -32,7 +32,8 @@ JACKSON_GREEN_2010 = ForceModel(
         "seen",
         "tmd-lab/microslip-rough-contact, SPHERE_PLASTIC_PRE2.m and test_plastic_contact_unload.m @21706045 "
         "(2022)",
-        note="no loss below w = 1.9, where the fit of e in the paper has one from w = 1 on: this is up to 0.04 "
+        note="the year of Jackson, Chusoipin and Green was not seen; no loss below w = 1.9, where the fit of e in "
+        "the paper has one from w = 1 on: this is up to 0.04 "
         "above that fit there, and within 0.009 of it beyond",
     ),
     coefficients={
@@ -80,7 +81,7 @@ KOGUT_ETSION_2005 = ForceModel(
     "contact. Int. J. Solids Struct. 42, 3716",
     evidence=Evidence(
         "not verified",
-        "the loading was seen in TaoYang1999/SCHC-framework, asperity_f_cal.m @98b786e (2024), which goes on with "
+        "the loading was seen in TaoYang1999/SCHC-framework, asperity_f_cal.m @98b786e, which goes on with "
         "2π R w H beyond w = 110",
         note="the unloading was not seen, public code has another one under the names of Etsion, Kligerman and "
         "Kadin; printed is a second branch from w = 1, where it lies 3 % above the first, and more energy would "

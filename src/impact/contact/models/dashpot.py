@@ -16,7 +16,7 @@ from ..formula import Formula
 from ..model import About, ForceModel, Parameter
 from ..oracles import force_damping, force_restitution, gap_damping, gap_restitution
 from ..power import Array, power
-from .sources import LIGGGHTS, YADE_2025
+from .sources import CHRONO, DEMLAB_VISCOELASTIC, LIGGGHTS, MAPLESIM_HELP, YADE_2025, YADE_BIBLIOGRAPHY
 
 
 def dashpot(key: str, *, zeta: Formula, release: Literal["gap", "force"], **about: Unpack[About]) -> ForceModel:
@@ -79,7 +79,7 @@ KELVIN_VOIGT = dashpot(
     evidence=Evidence(
         "seen",
         "OpenSees/OpenSees, SRC/material/uniaxial/ViscoelasticGap.cpp @2890cb36f (2026), after Goldsmith (1960)",
-        doi="rlrangel/DEMLab, src/interactions/force @23e741d (2024)",
+        doi=DEMLAB_VISCOELASTIC,
     ),
     parameters=CONSTANT,
     zeta=lambda C, m, K: C / (2 * np.sqrt(m * K)),
@@ -96,8 +96,8 @@ KELVIN_VOIGT_NO_TENSION = dashpot(
     doi="10.1680/geot.1979.29.1.47",
     evidence=Evidence(
         "seen",
-        "the MapleSim help, Multibody Contact Modes (2026)",
-        doi="rlrangel/DEMLab, src/interactions/force @23e741d (2024)",
+        MAPLESIM_HELP,
+        doi=DEMLAB_VISCOELASTIC,
     ),
     parameters=CONSTANT,
     zeta=lambda C, m, K: C / (2 * np.sqrt(m * K)),
@@ -134,7 +134,7 @@ ANAGNOSTOPOULOS_1988_NO_TENSION = dashpot(
     doi="10.1002/eqe.4290160311",
     evidence=Evidence(
         "seen",
-        "projectchrono/chrono, src/chrono/physics/ChContactSMC.cpp @7689fbc02d (2026)",
+        CHRONO,
         doi="koreascience.or.kr, JAKO201832853252619, references",
         note="the end at zero force is that of codes",
     ),
@@ -162,7 +162,7 @@ TSUJI_1992 = dashpot(
         "seen",
         f"{LIGGGHTS}normal_model_hertz.h; equations (10) and (17) of Antypov and Elliott (2011) in "
         "Azeko2xo/woodem, pkg/dem/Hertz.cpp @f94485c (2015)",
-        doi="rlrangel/DEMLab, ContactForceN_ViscoElasticNonlinear.m @23e741d (2024)",
+        doi=DEMLAB_VISCOELASTIC,
     ),
     zeta=lambda e: gap_damping(e),
     release="gap",
@@ -180,7 +180,7 @@ TSUJI_1992_NO_TENSION = dashpot(
         "seen",
         "Azeko2xo/woodem, pkg/dem/Hertz.cpp @f94485c (2015), noAttraction; projectchrono/chrono, ChContactSMC.cpp "
         "@7689fbc02d (2026)",
-        doi="rlrangel/DEMLab, ContactForceN_ViscoElasticNonlinear.m @23e741d (2024)",
+        doi=DEMLAB_VISCOELASTIC,
         note="the end at zero force is that of codes",
     ),
     zeta=lambda e: gap_damping(e),
@@ -199,7 +199,7 @@ SCHWAGER_POSCHEL_2007 = dashpot(
     evidence=Evidence(
         "seen",
         f"{YADE_2025}, ViscoelasticPM.cpp, after equation (21) of the paper, whose sign it corrects",
-        doi="YADE, doc/references.bib @f1486c0 (2025)",
+        doi=YADE_BIBLIOGRAPHY,
     ),
     zeta=lambda e: force_damping(e),
     release="force",
@@ -217,7 +217,7 @@ THORNTON_CUMMINS_CLEARY_2013 = dashpot(
     evidence=Evidence(
         "seen",
         f"{YADE_2025}, HertzMindlin.cpp, after (B6), (B7) and Table 2 of the paper",
-        doi="YADE, doc/references.bib @f1486c0 (2025)",
+        doi=YADE_BIBLIOGRAPHY,
     ),
     zeta=lambda e: thornton_zeta(e),
     release="force",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..evidence import Evidence
 from ..forms import spring
 from ..model import ForceModel
-from .sources import GHARIB_HURMUZLU
+from .sources import DEMLAB_VISCOELASTIC, GHARIB_HURMUZLU
 
 HERTZ = ForceModel(
     key="hertz",
@@ -13,12 +13,12 @@ HERTZ = ForceModel(
     year=1882,
     equation="F = K δⁿ  (10)",
     reference="Hertz H (1882) Über die Berührung fester elastischer Körper. J. reine angew. Math. 92, 156",
-    domain_source="no loss",
+    domain_source="by definition",
     doi="10.1515/crll.1882.92.156",
     evidence=Evidence(
         "seen",
         f"{GHARIB_HURMUZLU}, equation (10)",
-        doi="rlrangel/DEMLab, ContactForceN_ViscoElasticNonlinear.m @23e741d (2024)",
+        doi=DEMLAB_VISCOELASTIC,
     ),
     force=spring,
     domain={"e": (1.0, 1.0)},

@@ -14,6 +14,7 @@ from ..formula import Formula
 from ..model import ForceModel, Parameter
 from ..oracles import luding_restitution, thornton_restitution
 from ..power import Array, power
+from .sources import DEMLAB_PLASTIC, YADE_BIBLIOGRAPHY
 
 # E*, R* and the yield strength, for the laws that are written in them
 CONTACT: dict[str, Formula] = {
@@ -39,8 +40,8 @@ WALTON_BRAUN_VARIABLE = ForceModel(
     doi="10.1122/1.549893",
     evidence=Evidence(
         "seen",
-        "rlrangel/DEMLab, ContactForceN_ElastoPlasticLinear.m @23e741d (2024)",
-        doi="the same file",
+        DEMLAB_PLASTIC,
+        doi=DEMLAB_PLASTIC,
         note="that code keeps the residual of e, so that its force may jump at the peak",
     ),
     parameters=(Parameter("S", "1/m", "growth of the unloading stiffness with the force", least=0.0),),
@@ -64,7 +65,7 @@ LUDING_2008 = ForceModel(
     evidence=Evidence(
         "seen",
         "CFDEMproject/LIGGGHTS-PUBLIC @3d5c00f2 (3.8.0, 2024), src/normal_model_hooke_hysteresis.h",
-        doi="YADE, doc/references.bib @f1486c0 (2025)",
+        doi=YADE_BIBLIOGRAPHY,
         note="without the dashpot that may stand beside it",
     ),
     parameters=(

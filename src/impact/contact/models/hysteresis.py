@@ -69,9 +69,9 @@ LEE_WANG_1983 = hysteresis(
     year=1983,
     equation="F = K δⁿ (1 + χ δ̇/v₀),  χ = 3(1 − e)/4  (21)",
     reference="Lee TW, Wang AC (1983) On the dynamics of intermittent-motion mechanisms, part 1: Dynamic model "
-    "and response. "
-    "J. Mech. Transm. Autom. Des. 105, 534",
-    evidence=Evidence("seen", f"{GHARIB_HURMUZLU}, equation (21)"),
+    "and "
+    "response. J. Mech. Transm. Autom. Des. 105, 534",
+    evidence=Evidence("seen", f"{GHARIB_HURMUZLU}, equation (21); {DYS}", note="the paper's title was not seen"),
     chi=lambda e: 0.75 * (1 - e),
 )
 
@@ -95,13 +95,15 @@ EXACT_HYSTERESIS = hysteresis(
     year=2002,
     equation="F = K δⁿ (1 + χ δ̇/v₀),  χ(1 + e) = ln[(1 + χ)/(1 − e χ)]  (23)",
     reference="Gonthier Y, McPhee J, Lange C, Piedboeuf JC (2002) CSME Forum, Queen's University; Gonthier and "
-    "others (2004) "
-    "Multibody Syst. Dyn. 11, 209",
+    "others "
+    "(2004) Multibody Syst. Dyn. 11, 209",
     evidence=Evidence(
         "derived",
         "the first integral of the motion, docs/paper.md",
         note="equation (23) as printed in Gharib and Hurmuzlu (2012), who give it to their reference 14, lacks a "
-        "factor v₀; Zhang and Sharf (2004) were not seen",
+        "factor v₀; of that entry only the end was seen, its authors are inferred; Zhang and Sharf (2004) were "
+        "not "
+        "seen",
     ),
     chi=lambda e: exact_damping_ratio(e),
 )
@@ -179,9 +181,11 @@ HU_GUO_2015 = hysteresis(
     doi="10.1007/s11044-015-9453-z",
     evidence=Evidence(
         "disputed",
-        "3(1 − e)/(2e) here and in a wheel-rail code (Multi_Con_250812, 2025), with the right slope at e = 1; "
+        "3(1 − e)/(2e) in a Python port of Multi_Con_250812.m, a wheel-rail code whose repository is not known, "
+        "and by "
+        "the slope at e = 1; "
         f"3(1 − e)/(4e) in {DYS}",
-        doi="the address of a page of the publisher's text",
+        doi="the address of a page whose title was not shown",
         note="the formula of the paper was not seen",
     ),
     chi=lambda e: np.divide(1.5 * (1 - e), e),
@@ -213,7 +217,7 @@ SAFAEIFAR_FARSHIDIANFAR_2020 = hysteresis(
     doi="10.1007/s11044-020-09732-2",
     evidence=Evidence(
         "not verified",
-        doi="the address of a page of the publisher's text",
+        doi="the address of a page whose title was not shown",
         note="its slope at e = 1 is 0.833, which is wrong for small losses",
     ),
     chi=lambda e: np.divide(5 * (1 - e), 4 * e),

@@ -5,6 +5,7 @@ By default the force pulls until the gap closes; with limit_damping the contact 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
@@ -74,7 +75,8 @@ def entries(
     make : the law by where the contact ends
     source, note : see `Evidence`
     """
-    limited = f"since April {LIMIT_YEAR}" if year < LIMIT_YEAR and since.startswith("since") else since
+    # limit_damping came later than the oldest of these
+    limited = re.sub(r"(March )?2019", f"April {LIMIT_YEAR}", since)
     for release, suffix, words, end, years, first in (
         ("gap", "", option, "δ = 0", since, year),
         ("force", "-limit", f"{option}, limit_damping", "F = 0", limited, max(year, LIMIT_YEAR)),
@@ -125,7 +127,7 @@ def viscoelastic(exponent: float) -> Maker:
 
 
 OLD = "releases from March 2019 to mid-2026"
-WITHOUT_ROOT = "delivers 0.616 with hertz and 0.581 with hooke where 0.5 is asked for"
+WITHOUT_ROOT = "where e = 0.5 is asked for LAMMPS itself delivers 0.616 with hertz, 0.581 with hooke, by default"
 WITH_ROOT = (
     "the source credits the polynomial to Marshall (2009), equation 53; the factor √2 is of pull request 5113, "
     "and the first release with it was not seen"
@@ -161,7 +163,8 @@ MODELS: tuple[ForceModel, ...] = (
         f"{HERTZ} + η m √(R* δ) δ̇", viscoelastic(1.5), note="pair style gran/hertz/history has it too",
     ),
     *entries(
-        "lammps-tsuji-hooke", "tsuji, hooke", "since July 2026", 2026, f"{SPRING} + α √(m K) δ̇,  α = √2 p(e)",
+        "lammps-tsuji-hooke", "tsuji, hooke", "sources of July 2026", 2026, f"{SPRING} + α √(m K) δ̇,  α = √2 "
+        "p(e)",
         tsuji(np.sqrt(2.0), 1.0), DAMPING, WITH_ROOT,
     ),
     *entries(
@@ -169,7 +172,7 @@ MODELS: tuple[ForceModel, ...] = (
         tsuji(1.0, 1.0), DAMPING_2024, WITHOUT_ROOT,
     ),
     *entries(
-        "lammps-tsuji", "tsuji, hertz", "since July 2026", 2026,
+        "lammps-tsuji", "tsuji, hertz", "sources of July 2026", 2026,
         f"{HERTZ} + α √(m K) δ^(1/4) δ̇,  α = √2 p(e), p of degree six",
         tsuji(np.sqrt(2.0), 1.5), DAMPING, WITH_ROOT,
     ),

@@ -17,7 +17,7 @@ from ..power import Array, power, powers
 from .aliases import same_law
 from .dashpot import KELVIN_VOIGT_NO_TENSION
 from .hysteresis import FLORES_2011, HUNT_CROSSLEY_1975, LANKARANI_NIKRAVESH_1990, hysteresis
-from .sources import CHRONO_MULTICORE, DRAKE, MBDYN, MODIA3D, MUJOCO, SIMBODY
+from .sources import CHRONO_MULTICORE, DRAKE, MAPLESIM_HELP, MBDYN, MODIA3D, MUJOCO, SIMBODY
 
 LINEAR_DAMPING = "F = K δⁿ (1 + χ δ̇/v₀)"
 
@@ -69,6 +69,7 @@ ADAMS_IMPACT = ForceModel(
 RECURDYN_EVIDENCE = Evidence(
     "not verified",
     "the RecurDyn help and FAQ name k, c, m₁, m₂ and m₃, but show the formula as a picture that was not stored",
+    note="its first year was not seen",
 )
 
 RECURDYN = of_code(
@@ -231,8 +232,6 @@ MODELICA_ELASTOGAP = ForceModel(
     family="codes",
 )
 
-MAPLESIM_HELP = "the MapleSim help, Multibody Contact Modes (read in November 2026)"
-
 MAPLESIM_LINEAR = of_code(
     same_law(
         KELVIN_VOIGT_NO_TENSION,
@@ -345,7 +344,7 @@ MUJOCO_EVIDENCE = Evidence(
 
 MUJOCO_SOLREF = ForceModel(
     key="mujoco-solref",
-    title="MuJoCo solref, standard format (since 2.0)",
+    title="MuJoCo solref, standard format (2.1 to 3.12)",
     year=2014,
     equation="F = m(δ/(τ ζ)² + 2 δ̇/τ), to F = 0",
     reference=TODOROV,

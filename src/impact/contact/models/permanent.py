@@ -8,7 +8,7 @@ from ..evidence import Evidence
 from ..forms import returning, spring, stiffer
 from ..model import ForceModel, Parameter
 from ..power import power
-from .sources import GHARIB_HURMUZLU
+from .sources import DEMLAB_PLASTIC, GHARIB_HURMUZLU
 
 LANKARANI_NIKRAVESH_1994 = ForceModel(
     key="lankarani-nikravesh-1994",
@@ -64,7 +64,7 @@ BILINEAR = ForceModel(
     evidence=Evidence(
         "seen",
         f"{GHARIB_HURMUZLU}, equation (43); rlrangel/DEMLab, ContactForceN_ElastoPlasticLinear.m @23e741d (2024)",
-        doi="rlrangel/DEMLab, ContactForceN_ElastoPlasticLinear.m @23e741d (2024)",
+        doi=DEMLAB_PLASTIC,
     ),
     exponent=1.0,
     force=spring,

@@ -10,6 +10,7 @@ from ..formula import Formula
 from ..model import About, ForceModel, Parameter
 from ..oracles import pade_damping
 from ..power import power, powers
+from .sources import DEMLAB_VISCOELASTIC
 
 
 def drag(
@@ -49,7 +50,7 @@ KUWABARA_KONO_1987 = drag(
         "seen",
         "kuwt/MercuryDPM_fork, HertzianBSHPViscoelasticInteraction.cc @e548763b (2023); rlrangel/DEMLab @23e741d "
         "(2024)",
-        doi="rlrangel/DEMLab, ContactForceN_ViscoElasticNonlinear.m @23e741d (2024)",
+        doi=DEMLAB_VISCOELASTIC,
     ),
     parameters=(Parameter("A", "s", "dissipative constant of the material", least=0.0),),
     exponent=1.5,
@@ -67,9 +68,7 @@ LEE_HERRMANN_1993 = drag(
     "granular "
     "particles. J. Phys. A 26, 373",
     doi="10.1088/0305-4470/26/2/021",
-    evidence=Evidence(
-        "seen", "rlrangel/DEMLab, ContactForceN_ViscoElasticNonlinear.m @23e741d (2024)", doi="the same file"
-    ),
+    evidence=Evidence("seen", DEMLAB_VISCOELASTIC, doi=DEMLAB_VISCOELASTIC),
     parameters=(Parameter("gamma", "1/s", "damping γ per effective mass", least=0.0),),
     exponent=1.5,
     c=lambda gamma, m: gamma * m,

@@ -5,8 +5,8 @@ DYS = "ladisk/DyS, MBD_system/contact_model/contact_model.py @5e6a54d (2018)"
 OPENSEES_HERTZDAMP = "the OpenSees documentation, uniaxialMaterials/HertzDamp.rst @72fd8c5 (2023)"
 OPENSEES_JANKOWSKI = "the OpenSees documentation, uniaxialMaterials/JankowskiImpact.rst @72fd8c5 (2023)"
 IMPACT_MATERIAL = "the OpenSees wiki, Impact Material"
-MBDYN = "MBDyn, modules/module-cont-contact/module-cont-contact.cc @1727489e5 (2021)"
-MBDYN_BIBLIOGRAPHY = "the manual of MBDyn, mybib.bib @db248e0 (2025)"
+MBDYN = "alex-marinov/mbdyn, modules/module-cont-contact/module-cont-contact.cc @1727489e5 (2021)"
+MBDYN_BIBLIOGRAPHY = "Rahuldrabit/MBDyn, manual/mybib.bib @db248e0 (2025)"
 SIMBODY = "simbody/simbody, Simbody/src/HuntCrossleyForce.cpp and HuntCrossleyForce.h @f312d0dd (2026)"
 DRAKE = (
     "RobotLocomotion/drake, multibody/plant/contact_model_doxygen.h and geometry/scene_graph_config.h @be259df724 "
@@ -22,3 +22,9 @@ RIGID_BODY_DYNAMICS = "JuliaRobotics/RigidBodyDynamics.jl, src/contact.jl @d6df4
 RAILWAY = "sflabbe/railway-impact-simulator, src/railway_simulator/core/contact.py @9f35904 (2026)"
 LIGGGHTS = "CFDEMproject/LIGGGHTS-PUBLIC @3d5c00f2 (3.8.0, 2024), src/"
 YADE_2025 = "c61292558/yade4deepin, a copy of YADE 2025.2.0, pkg/dem/ @f1486c0 (2025)"
+DEMLAB_VISCOELASTIC = (
+    "rlrangel/DEMLab, src/interactions/force/ContactForceN_ViscoElasticNonlinear.m @23e741d (2024)"
+)
+DEMLAB_PLASTIC = "rlrangel/DEMLab, src/interactions/force/ContactForceN_ElastoPlasticLinear.m @23e741d (2024)"
+YADE_BIBLIOGRAPHY = "c61292558/yade4deepin, doc/references.bib @f1486c0 (2025)"
+MAPLESIM_HELP = "the MapleSim help, Multibody Contact Modes (read in November 2026)"
