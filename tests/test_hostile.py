@@ -20,6 +20,9 @@ from impact.errors import ResultError
 from .forked import Done, Forked
 from .malicious import CHANGES, HARMLESS, NOT_HDF5, PATCHES, SECRET
 
+# it starts many processes or reads many files: `make test-faults` runs it
+pytestmark = pytest.mark.slow
+
 FILE = "FILE"
 COMMANDS = (
     ("info", FILE),

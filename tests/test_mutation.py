@@ -19,6 +19,9 @@ from impact.contact.status import Status
 
 from .forked import Forked
 
+# it starts many processes or reads many files: `make test-faults` runs it
+pytestmark = pytest.mark.slow
+
 # how far each variable may be off, written again here from the text of docs/schema.md
 OF_SPEED = ("v1_post", "v2_post", "v1_reference", "v2_reference", "v1_error", "v2_error")
 OF_PEAK = ("peak_indentation", "permanent_indentation")

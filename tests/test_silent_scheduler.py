@@ -14,6 +14,9 @@ import pytest
 
 from .clusters import CONFIG, PATIENCE, dask, in_group, sweep
 
+# it starts many processes or reads many files: `make test-faults` runs it
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("distributed")
 # dask's own setting of how long it waits
 TIMEOUT = "DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT"

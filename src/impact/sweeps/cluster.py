@@ -123,7 +123,7 @@ def _within(limit: float, action: Callable[[], Result], should_stop: Callable[[]
     deadline = time.monotonic() + limit
     while not wait([future], 0.1).done:
         if should_stop():
-            raise UnfinishedError("nothing was integrated since the start")
+            raise UnfinishedError("nothing was integrated")
         if time.monotonic() > deadline:
             raise TimeoutError
     return future.result()
