@@ -14,6 +14,7 @@ import numpy as np
 from impact.contact.evidence import summary
 from impact.contact.model import ForceModel, Parameter
 from impact.contact.models import catalogue
+from impact.text import with_year
 from models_claims import claims
 from models_measured import (
     BALLS,
@@ -213,10 +214,8 @@ def source(model: ForceModel) -> str:
     """A law's reference and how far it is known, as an item of a list."""
     doi = f", [doi:{cell(model.doi)}](https://doi.org/{quote(model.doi, safe='/:;')})" if model.doi else ""
     same = f" The same law as `{model.same_as}`." if model.same_as else ""
-    evidence = cell(str(model.evidence))
-    return (
-        f"- `{model.key}`, {model.title} ({model.year}): {cell(model.reference)}{doi}. Evidence: {evidence}.{same}"
-    )
+    name = f"- `{model.key}`, {with_year(model.title, model.year)}: {cell(model.reference)}{doi}."
+    return f"{name} Evidence: {cell(str(model.evidence))}.{same}"
 
 
 def family_section(family: str, members: Sequence[ForceModel]) -> str:

@@ -8,6 +8,15 @@ from unicodedata import category
 UNSAFE = frozenset({"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"})
 
 
+def with_year(title: str, year: int | str) -> str:
+    """The title of a model with its year; the versions at the end of a title stand for it.
+
+    >>> with_year("Hertz", 1882), with_year("Modia3D (v0.4.0 to v0.5.2, 2019 to 2021)", 2019)
+    ('Hertz (1882)', 'Modia3D (v0.4.0 to v0.5.2, 2019 to 2021)')
+    """
+    return title if title.endswith(")") else f"{title} ({year})"
+
+
 def safe_text(text: str, limit: int = 200) -> str:
     r"""The text with characters that steer a terminal, or are not seen, escaped; at most `limit` characters.
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import UsageError, did_you_mean
-from ..text import safe_text
+from ..text import safe_text, with_year
 from . import door
 from .options import Json, Plugins
 from .words import dump
@@ -132,7 +132,7 @@ def _print_model(model: ForceModel) -> None:
     from .tables import print_rows
 
     rows = {
-        "model": model.key, "same law as": model.same_as, "title": f"{model.title} ({model.year})",
+        "model": model.key, "same law as": model.same_as, "title": with_year(model.title, model.year),
         "family": model.family, "equation": model.equation, "reference": model.reference, "doi": model.doi,
         "evidence": str(model.evidence), "said to hold for": model.domain_text or "not stated",
         "exponent": "the sweep's n" if model.exponent is None else f"n = {model.exponent:g}, its own",

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..data.results import exponents_of, plain_unit
 from ..errors import UsageError
-from ..text import safe_text
+from ..text import safe_text, with_year
 from .lines import Curve, Lines, Panel
 from .look import axis_label, is_geometric
 from .slices import take_slice
@@ -170,7 +170,7 @@ def label_of(one: xr.Dataset) -> str:
 def title_of(title: str, year: int, equation: str) -> str:
     """Title, year and equation number of a model."""
     number = re.search(r"\(\d+\)(?:-\(\d+\))?$", equation)
-    name = f"{title} ({year})"
+    name = with_year(title, year)
     return safe_text(f"{name}, {number[0]}" if number else name, 80)
 
 

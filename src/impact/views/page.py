@@ -23,7 +23,7 @@ from ..data.results import exponents_of, plain_unit
 from ..data.tally import Tally, tally_of
 from ..errors import UsageError
 from ..sweeps.rules import MATERIAL
-from ..text import safe_text
+from ..text import safe_text, with_year
 from .kinds import Choice, Numbers
 from .markup import Markup, doi_link, table, tag
 from .page_figures import figures_of, varying
@@ -224,7 +224,7 @@ def _models(dataset: xr.Dataset) -> Iterator[Markup]:
         if known is not None and known.equation == equation:
             about += [tag("p", f"Said to hold for {known.domain_text}.")] if known.domain_text else []
             about += [tag("p", f"Evidence: {known.evidence}.", class_="soft")]
-        yield tag("article", tag("h3", f"{title} ({year}) ", tag("span", key, class_="soft")), *about)
+        yield tag("article", tag("h3", f"{with_year(title, year)} ", tag("span", key, class_="soft")), *about)
 
 
 def _config(dataset: xr.Dataset) -> Iterator[Markup]:

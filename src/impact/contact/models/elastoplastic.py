@@ -78,15 +78,16 @@ LUDING_2008 = ForceModel(
     bends=(lambda shallow: np.divide(1, shallow),),
     force=lambda x, K, k2, shallow: K * (x + (k2 - 1) * np.maximum(x - np.divide(1, shallow), 0)),
     unloading=lambda x, peak, force_at_peak, K, k2, kc, shallow: np.maximum(
-        force_at_peak - K * stiffer(peak, k2, shallow) * (peak - x), -kc * K * x
+        force_at_peak - K * unloading_ratio(peak, k2, shallow) * (peak - x), -kc * K * x
     ),
     # where nothing pulls, the balls part at δ₀
     residual=lambda peak, force_at_peak, K, k2, kc, shallow: np.where(
-        kc > 0, 0, peak - force_at_peak / (K * stiffer(peak, k2, shallow))
+        kc > 0, 0, peak - force_at_peak / (K * unloading_ratio(peak, k2, shallow))
     ),
     unloading_bends=(
         lambda peak, force_at_peak, K, k2, kc, shallow: (
-            (stiffer(peak, k2, shallow) * peak - force_at_peak / K) / (stiffer(peak, k2, shallow) + kc)
+            (unloading_ratio(peak, k2, shallow) * peak - force_at_peak / K)
+            / (unloading_ratio(peak, k2, shallow) + kc)
         ),
     ),
     oracle=lambda K, m, v0, k2, kc, shallow: luding_restitution(v0 * np.sqrt(m / K), k2, kc, shallow),
@@ -95,7 +96,7 @@ LUDING_2008 = ForceModel(
 )
 
 
-def stiffer(peak: Array, k2: Array, shallow: Array) -> Array:
+def unloading_ratio(peak: Array, k2: Array, shallow: Array) -> Array:
     """The unloading stiffness of Luding's law over K, which grows with the peak up to k₂."""
     return 1 + (k2 - 1) * np.minimum(peak * shallow, 1)
 

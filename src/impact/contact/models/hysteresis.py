@@ -94,16 +94,14 @@ EXACT_HYSTERESIS = hysteresis(
     title="Exact hysteresis",
     year=2002,
     equation="F = K δⁿ (1 + χ δ̇/v₀),  χ(1 + e) = ln[(1 + χ)/(1 − e χ)]  (23)",
-    reference="Gonthier Y, McPhee J, Lange C, Piedboeuf JC (2002) CSME Forum, Queen's University; Gonthier and "
-    "others "
-    "(2004) Multibody Syst. Dyn. 11, 209",
+    reference="Gonthier Y, McPhee J, Lange C, Piedboeuf JC (2002) CSME Forum, Queen's University; Gonthier "
+    "and others (2004) Multibody Syst. Dyn. 11, 209",
     evidence=Evidence(
         "derived",
         "the first integral of the motion, docs/paper.md",
         note="equation (23) as printed in Gharib and Hurmuzlu (2012), who give it to their reference 14, lacks a "
         "factor v₀; of that entry only the end was seen, its authors are inferred; Zhang and Sharf (2004) were "
-        "not "
-        "seen",
+        "not seen",
     ),
     chi=lambda e: exact_damping_ratio(e),
 )
