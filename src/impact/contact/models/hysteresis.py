@@ -228,11 +228,6 @@ ZHANG_2020 = hysteresis(
     equation="F = K δⁿ (1 + χ δ̇/v₀),  χ = 3(1 − e)/(2 e^0.89)",
     reference="Zhang J, Li W, Zhao L, He G (2020) A continuous contact force model for impact analysis in "
     "multibody dynamics. Mech. Mach. Theory 153, 103946",
-    doi="10.1016/j.mechmachtheory.2020.103946",
-    evidence=Evidence(
-        "not verified",
-        doi="a list of references of the index OUCI, with the title",
-        note="the formula agrees with the exact law to 0.0083",
-    ),
+    evidence=Evidence("not verified", note="the formula agrees with the exact law to 0.0083"),
     chi=lambda e: np.divide(1.5 * (1 - e), power(e, 0.89)),
 )
