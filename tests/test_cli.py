@@ -310,13 +310,15 @@ def test_a_full_standard_error_does_not_change_the_exit_code(tmp_path: Path, wor
         done = subprocess.run(command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=full, check=False)
         assert done.returncode == code
         if code == 2:
-            # where the report itself was to go there, that is what went wrong
-            done = subprocess.run(
-                command, cwd=tmp_path, stdout=full, stderr=subprocess.PIPE, text=True, check=False
-            )
-            assert done.returncode == (4 if "json" in words else code)
-            assert "Traceback" not in done.stderr
-            assert "Exception ignored" not in done.stderr
+            # where the report itself was to go there, that is what went wrong, at once or at the end
+            for unbuffered in ("", "1"):
+                done = subprocess.run(
+                    command, cwd=tmp_path, stdout=full, stderr=subprocess.PIPE, text=True, check=False,
+                    env=os.environ | {"PYTHONUNBUFFERED": unbuffered},
+                )  # fmt: skip
+                assert done.returncode == (4 if "json" in words else code)
+                assert "Traceback" not in done.stderr
+                assert "Exception ignored" not in done.stderr
 
 
 LACKS_MEMORY = """

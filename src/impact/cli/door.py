@@ -88,8 +88,11 @@ def enter(command: Callable[[], object], *, debug: bool) -> int:
     try:
         # what is left in the buffer would fail at the exit of the interpreter, which has a code of its own
         sys.stdout.flush()
-    except OSError:
+    except OSError as error:
         _let_go(sys.stdout)
+        if error.errno in NOT_WRITTEN:
+            say(f"cannot write: {error.strerror}", error=True)
+            return STORAGE
     return code
 
 
