@@ -41,8 +41,8 @@ from impact.contact.compiled import is_installed
 from impact.contact.lanes import Lanes
 from impact.contact.model import ForceModel
 from impact.contact.oracles import delivered_restitution
-from impact.sweeps.teams import team_of
-from impact.sweeps.trajectories import BLOCK, even
+from impact.engine.executors import team_of
+from impact.engine.trajectories import BLOCK, even
 
 # those of the paper whose restitution is e's alone: (10), (19)-(23), (28), (29), (33) and (43)
 PAPER = (
@@ -83,7 +83,7 @@ def core(
     def outputs(block: tuple[ForceModel, Lanes]) -> tuple[float, int]:
         contact = collide(*block, rtol=rtol, max_steps=10_000, collapse=False, core=by)
         found = {name: getattr(contact, name) for name in OUTPUTS}
-        return float(np.max(np.abs(found["oracle_error"]))), int(found["steps"].sum())
+        return float(np.max(np.abs(found["closed_form_error"]))), int(found["steps"].sum())
 
     with team_of(1, threads).executor() as pool:
         begun = time.perf_counter()

@@ -33,14 +33,14 @@ from rich.console import Console
 from rich.table import Table
 
 from impact.api import prepare
-from impact.data.progress import Progress
-from impact.data.sweeping import sweep_into
-from impact.sweeps.blocks import Block, integrated, work
-from impact.sweeps.cluster import cluster
-from impact.sweeps.plan import Plan
-from impact.sweeps.run import kit_of, settled
-from impact.sweeps.teams import AHEAD, Team, team_of
-from impact.sweeps.trajectories import block_of, stretches, trajectories
+from impact.engine.blocks import Block, integrated, work
+from impact.engine.dask import cluster
+from impact.engine.execute import kit_of, settled
+from impact.engine.executors import AHEAD, Team, team_of
+from impact.engine.plan import Plan
+from impact.engine.progress import Progress
+from impact.engine.trajectories import block_of, stretches, trajectories
+from impact.results.sweep import sweep_into
 
 IDLE = 5.0  # s
 LAWS = ("lankarani-nikravesh-1990", "gharib-hurmuzlu-2012")

@@ -37,7 +37,7 @@ def main() -> None:
         for place, asked in enumerate(e):
             chi = contact.damping_ratio[place]
             exact, time, force = quadratures(chi, 1.5)
-            own = contact.duration[place] / unit[place]
+            own = contact.contact_time[place] / unit[place]
             pushed = contact.peak_force[place] * lanes.length[place] / (lanes.m[place] * lanes.v0[place] ** 2)
             table.add_row(
                 key, f"{asked:.0e}", f"{chi:.3g}", str(contact.steps[place]),

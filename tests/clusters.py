@@ -23,7 +23,7 @@ collapse = false
 core = "numpy"
 rtol = 1e-8
 [output]
-variables = ["v1_post", "duration", "status"]
+variables = ["v1_post", "contact_time", "status"]
 [sweep]
 e = { linspace = [0.01, 0.99, 200000] }
 v1 = 1.0

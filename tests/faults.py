@@ -35,7 +35,7 @@ models = ["hertz", "lankarani-nikravesh-1990"]
 [solver]
 rtol = 1e-4
 [output]
-variables = ["v1_post", "duration"]
+variables = ["v1_post", "contact_time"]
 [sweep]
 e = { linspace = [0.1, 0.9, 100] }
 v1 = 1.0
@@ -155,7 +155,8 @@ def _tell(note: int, *words: Any) -> None:
 
 def _watched(note: int) -> None:
     """Tell when the sweep begins and ends, and each block that is kept."""
-    from impact.data import sweeping, work
+    from impact.engine import checkpoint as work
+    from impact.results import sweep as sweeping
 
     sweep_into, store = sweeping.sweep_into, work.Work.store
 
@@ -189,7 +190,7 @@ def serve() -> None:
 
 def _warm_up() -> None:
     """Make blocks and boxes small before anything takes their sizes, and import what a sweep imports."""
-    from impact.sweeps import points, trajectories
+    from impact.engine import points, trajectories
 
     trajectories.BLOCK, trajectories.stretches.__defaults__ = BLOCK, (BLOCK,)
     points.boxes.__defaults__ = (BOX,)

@@ -36,9 +36,9 @@ def test_balls_with_a_neck_rebound_by_thornton_and_ning_and_stick_below_a_speed(
     expected = np.sqrt(np.maximum(1 - 1 / ratio**2, 0.0))
     # 14.18 has four digits
     assert contact.e_out == pytest.approx(expected, abs=2e-3)
-    assert contact.oracle_error == pytest.approx(np.zeros(8), abs=1e-9)
+    assert contact.closed_form_error == pytest.approx(np.zeros(8), abs=1e-9)
     assert contact.status.tolist() == [Status.LIMIT] * 3 + [Status.OK] * 5
-    assert np.isnan(contact.duration).tolist() == [True] * 3 + [False] * 5
+    assert np.isnan(contact.contact_time).tolist() == [True] * 3 + [False] * 5
 
 
 def test_a_neck_begins_with_eight_ninths_of_its_pull_and_breaks_at_five_ninths():
@@ -66,7 +66,7 @@ def test_without_adhesion_a_neck_is_hertz():
     hertz = struck("hertz", v1=[0.01, 1.0])
     assert neck.e_out == pytest.approx([1.0, 1.0], abs=1e-9)
     assert neck.peak_indentation == pytest.approx(hertz.peak_indentation, rel=1e-9)
-    assert neck.duration == pytest.approx(hertz.duration, rel=1e-9)
+    assert neck.contact_time == pytest.approx(hertz.contact_time, rel=1e-9)
 
 
 def test_the_contact_radius_of_a_neck_is_the_largest_root():
@@ -113,7 +113,7 @@ def test_the_edinburgh_law_is_the_one_that_liggghts_steps_through(n, k2, chi, ga
     contact = struck("liggghts-edinburgh", n, v1=v0, m1=m1, m2=m2, K=K, R1=R, R2=2 * R, parameters=own)
     m = m1 * m2 / (m1 + m2)
     assert contact.e_out[0] == pytest.approx(edinburgh(n, K, k2, gamma, chi, R, 2 * R, m, v0), abs=2e-5)
-    assert abs(contact.oracle_error[0]) < 1e-9
+    assert abs(contact.closed_form_error[0]) < 1e-9
     # without surface energy a linear one is the bilinear law
     if gamma == 0.0 and n == 1.0:
         assert contact.e_out[0] == pytest.approx(np.sqrt(1 / k2), abs=1e-9)
@@ -127,7 +127,7 @@ def test_the_edinburgh_law_sticks_and_ends_where_its_surface_energy_says():
     assert sticky.status[0] == Status.LIMIT
     assert sticky.status[-1] == Status.OK
     assert np.all(np.diff(sticky.e_out) >= 0.0)
-    assert np.abs(sticky.oracle_error).max() < 1e-9
+    assert np.abs(sticky.closed_form_error).max() < 1e-9
     parted = sticky.status == Status.OK
     assert sticky.permanent_indentation[parted] == pytest.approx(0.0, abs=1e-12)
     dry = struck(

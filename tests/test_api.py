@@ -15,10 +15,10 @@ import pytest
 
 import impact
 from impact.contact.status import Status
+from impact.engine.plan import Plan
+from impact.engine.plugins import read_plugins
 from impact.errors import ModelError
 from impact.sweeps.config import read_config
-from impact.sweeps.plan import Plan
-from impact.sweeps.plugins import read_plugins
 
 SWEEP = {"e": [0.2, 0.8], "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6e9}
 
@@ -47,7 +47,7 @@ def test_importing_loads_no_numpy() -> None:
 
 def test_a_model_of_ones_own() -> None:
     result = impact.sweep({"models": ["mine-2026", "exact-hysteresis"], "sweep": SWEEP}, plugins=[_mine()])
-    assert np.abs(result["oracle_error"]).max() < 1e-9
+    assert np.abs(result["closed_form_error"]).max() < 1e-9
     recorded = json.loads(result.attrs["plugins"])["mine-2026"]
     assert recorded["file"] is None
     assert re.fullmatch("[0-9a-f]{64}", recorded["sha256"])
@@ -116,7 +116,7 @@ def test_a_stiffness_of_a_laws_own() -> None:
     assert linear["stiffness"].values.tolist() == [1e6, 4e6]
     # half the period of a linear oscillator on approach, half of that again, times e, on restitution
     half = np.pi / 2 * np.sqrt(0.5 / linear["stiffness"].values)
-    np.testing.assert_allclose(linear["duration"].values, half * 1.5, rtol=1e-8)
+    np.testing.assert_allclose(linear["contact_time"].values, half * 1.5, rtol=1e-8)
     assert result.sel(model="hertz")["stiffness"].values.tolist() == [6e9, 6e9]
 
 

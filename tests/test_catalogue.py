@@ -232,7 +232,7 @@ def own_units(contact: Contact) -> dict[str, np.ndarray]:
         "peak": contact.peak_indentation / lanes.length,
         "at_end": contact.permanent_indentation / lanes.length,
         "force": contact.peak_force * lanes.length / (lanes.m * lanes.v0**2),
-        "duration": contact.duration * lanes.v0 / lanes.length,
+        "contact_time": contact.contact_time * lanes.v0 / lanes.length,
     }
 
 
@@ -261,7 +261,7 @@ def test_a_linear_dashpot_to_the_end_of_the_gap_moves_by_its_closed_form():
     assert np.abs(own["e_out"] - gap_restitution(zeta)).max() <= 1e-9
     assert own["peak"] == pytest.approx(np.exp(-zeta * time_to_peak(zeta)), rel=1e-8)
     assert own["force"] == pytest.approx(largest_force(zeta), rel=1e-8)
-    assert own["duration"] == pytest.approx(np.pi / np.sqrt(1.0 - zeta * zeta), rel=1e-8)
+    assert own["contact_time"] == pytest.approx(np.pi / np.sqrt(1.0 - zeta * zeta), rel=1e-8)
 
 
 def test_a_linear_dashpot_of_critical_damping_and_above_creeps_for_ever():
@@ -270,7 +270,7 @@ def test_a_linear_dashpot_of_critical_damping_and_above_creeps_for_ever():
     own = own_units(contact)
     assert contact.status.tolist() == [Status.LIMIT] * zeta.size
     assert own["e_out"].tolist() == [0.0] * zeta.size
-    assert np.all(np.isnan(contact.duration))
+    assert np.all(np.isnan(contact.contact_time))
     assert own["peak"] == pytest.approx(np.exp(-zeta * time_to_peak(zeta)), rel=1e-8)
     assert own["force"] == pytest.approx(2.0 * zeta, rel=1e-8)
 
@@ -285,7 +285,7 @@ def test_a_linear_dashpot_without_tension_moves_by_its_closed_form():
     assert own["force"] == pytest.approx(largest_force(zeta), rel=1e-8)
     # y + 2 zeta v = 0
     assert own["at_end"] == pytest.approx(2.0 * zeta * exact, rel=1e-8, abs=1e-8)
-    assert own["duration"] == pytest.approx(2.0 * time_to_peak(zeta), rel=1e-9)
+    assert own["contact_time"] == pytest.approx(2.0 * time_to_peak(zeta), rel=1e-9)
 
 
 # exponent of the damping, and the parameter for a dimensionless damping g of contacts of given K/m, v0 and m
@@ -332,7 +332,7 @@ def integrated(q: float, g: float) -> dict[str, float]:
     least = minimize_scalar(
         lambda t: -force(*found.sol(t)), bounds=tuple(near), method="bounded", options={"xatol": 1e-12}
     )
-    return {"e_out": -v, "peak": found.sol(turn)[0], "force": max(forces[0], -least.fun), "duration": end}
+    return {"e_out": -v, "peak": found.sol(turn)[0], "force": max(forces[0], -least.fun), "contact_time": end}
 
 
 @pytest.mark.parametrize("key", RATE_DEPENDENT)
@@ -342,7 +342,7 @@ def test_a_law_without_a_closed_form_agrees_with_a_second_integration(key):
     own = own_units(contact)
     second = [integrated(RATE_DEPENDENT[key][0], g) for g in DAMPING.tolist()]
     assert np.abs(own["e_out"] - [one["e_out"] for one in second]).max() <= 1e-9
-    for name in ("peak", "force", "duration"):
+    for name in ("peak", "force", "contact_time"):
         assert own[name] == pytest.approx([one[name] for one in second], rel=1e-8), name
 
 
@@ -437,7 +437,7 @@ def test_a_damping_of_ones_own_is_the_law_that_has_its_exponent(q, key, name, ow
     )  # fmt: skip
     assert np.all(general.status == Status.OK)
     assert np.abs(general.e_out - special.e_out).max() < 1e-9
-    assert general.duration == pytest.approx(special.duration, rel=1e-8)
+    assert general.contact_time == pytest.approx(special.contact_time, rel=1e-8)
 
 
 CALIBRATED = (

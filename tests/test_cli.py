@@ -186,7 +186,7 @@ def test_run_one_impact(cli: Run, tmp_path: Path) -> None:
     assert max(three) - min(three) < 1e-9
     history = impact.load(tmp_path / "out.h5")
     assert list(history.data_vars) == ["delta", "v", "F", "x1", "x2", "v1", "v2"]
-    assert float(history["t"][-1]) == pytest.approx(found["outputs"]["duration"], rel=1e-12)
+    assert float(history["t"][-1]) == pytest.approx(found["outputs"]["contact_time"], rel=1e-12)
     assert float(history["v1"][-1]) == pytest.approx(found["outputs"]["v1_post"], abs=1e-9)
     assert np.all(np.diff(history["t"].values) > 0.0)
     assert float(history["delta"].sel(t=1e-5, method="nearest")) > 0.0
@@ -396,7 +396,7 @@ def test_the_catalogue(cli: Run) -> None:
 
 def test_info(cli: Run, stored: Path) -> None:
     told = cli("info", stored).stdout
-    for words in ("model 3 × e 101", "oracle_error", "301 ok, 2 limit", "0 … 1, 101 values"):
+    for words in ("model 3 × e 101", "closed_form_error", "301 ok, 2 limit", "0 … 1, 101 values"):
         assert words in told
     found = json.loads(cli("info", stored, "--json").stdout)
     assert found["dimensions"] == {"model": 3, "e": 101}
@@ -551,7 +551,7 @@ def test_a_signal_leaves_nothing_half_written(tmp_path: Path, number: signal.Sig
 
 SAVING = """
 import os, signal, sys
-from impact.data import sink
+from impact import atomic as sink
 whole, number = sink._publish, getattr(signal, sys.argv[1])
 
 def signalled(*words, **more):

@@ -14,9 +14,9 @@ import pytest
 
 import impact
 from impact.api import prepare
-from impact.sweeps.blocks import work
-from impact.sweeps.run import kit_of, settled
-from impact.sweeps.trajectories import block_of, stretches, trajectories
+from impact.engine.blocks import work
+from impact.engine.execute import kit_of, settled
+from impact.engine.trajectories import block_of, stretches, trajectories
 
 from .clusters import BLOCKS, CONFIG, Dask, dask, digest, in_group, sweep, until
 from .conftest import ROOT

@@ -120,7 +120,7 @@ def test_a_release_is_located_where_the_force_hardly_falls_below_zero():
         collide(find("lammps-tsuji-without-root-limit"), lanes, rtol=rtol, max_steps=10**5)
         for rtol in (1e-10, 1e-12)
     )
-    assert coarse.duration == pytest.approx(fine.duration, rel=1e-11)
+    assert coarse.contact_time == pytest.approx(fine.contact_time, rel=1e-11)
     assert coarse.permanent_indentation == pytest.approx(fine.permanent_indentation, rel=1e-6)
 
 
@@ -134,7 +134,7 @@ def test_elastogap_locates_where_its_damping_stops_to_be_limited(n):
         )
         for rtol in (1e-10, 1e-12)
     ]
-    for name in ("e_out", "duration", "peak_indentation", "peak_force"):
+    for name in ("e_out", "contact_time", "peak_indentation", "peak_force"):
         coarse, fine = (getattr(contact, name) for contact in contacts)
         assert coarse == pytest.approx(fine, rel=1e-9), name
 
@@ -155,7 +155,7 @@ def test_a_limited_damper_on_a_linear_spring_has_a_closed_form():
     lanes = impacts(1.0, e=np.full(zeta.size, 0.5))
     contact = struck("maplesim-linear-limited", 1.0, e=np.full(zeta.size, 0.5),
                      parameters={"d": 2.0 * zeta * np.sqrt(lanes.m * lanes.K)})  # fmt: skip
-    assert np.abs(contact.oracle_error).max() <= 1e-9
+    assert np.abs(contact.closed_form_error).max() <= 1e-9
     # the damping that is cut off at the start would have taken part of the energy
     assert np.all(contact.e_out >= force_restitution(zeta) - 1e-9)
 
@@ -216,7 +216,7 @@ def test_a_damping_that_does_not_fade_with_the_gap_lets_no_ball_out_from_some_st
     assert held[-3:].all()
     assert np.all(np.diff(contact.e_out[~held]) < 0.0)
     assert np.all(contact.e_out[held] == 0.0)
-    assert np.all(np.isnan(contact.duration[held]))
+    assert np.all(np.isnan(contact.contact_time[held]))
     # a ball that is held is still inside after a thousand times of the contact, by another integrator
     slow = solve_ivp(lambda t, y: (y[1], -(max(y[0], 0.0) ** 1.5) - g[held][0] * y[1]), (0.0, 3e3), (0.0, 1.0),
                      "LSODA", rtol=1e-10, atol=1e-14)  # fmt: skip
@@ -371,7 +371,7 @@ def test_mujoco_depends_on_its_damping_ratio_alone(ratio):
         assert contact.e_out == pytest.approx(np.full(SPEEDS.size, force_restitution(ratio)), abs=1e-9)
         # the spring is its own: the time is that of τ, whatever K is
         other = struck("mujoco-solref", 1.0, v1=SPEEDS, K=1e7, parameters=own)
-        assert other.duration == pytest.approx(contact.duration, rel=1e-7)
+        assert other.contact_time == pytest.approx(contact.contact_time, rel=1e-7)
         assert other.peak_indentation == pytest.approx(contact.peak_indentation, rel=1e-7)
 
 
@@ -389,7 +389,7 @@ def test_mujoco_direct_is_a_spring_and_a_damping_per_mass(k, b):
     assert contact.e_out == pytest.approx(np.full(SPEEDS.size, expected), abs=1e-9)
     # damping = 2 √stiffness is the dampratio of 1
     if b == 0.0:
-        assert contact.duration == pytest.approx(np.full(SPEEDS.size, np.pi / np.sqrt(k)), rel=1e-8)
+        assert contact.contact_time == pytest.approx(np.full(SPEEDS.size, np.pi / np.sqrt(k)), rel=1e-8)
 
 
 def test_mujoco_with_its_defaults_gives_back_e_to_the_minus_2():
@@ -543,5 +543,5 @@ def test_points_collapse_by_what_a_stiffness_comes_from():
     config = {"models": models, "sweep": sweep, "materials": {"hard": BALLS, "soft": SOFT},
               "model": {"simbody-hunt-crossley": {"c": 0.1}}}  # fmt: skip
     once, each = impact.sweep(config), impact.sweep(config, overrides=["solver.collapse=false"])
-    for name in ("stiffness", "peak_indentation", "duration", "e_out", "peak_force"):
+    for name in ("stiffness", "peak_indentation", "contact_time", "e_out", "peak_force"):
         assert once[name].values.tobytes() == each[name].values.tobytes()

@@ -13,13 +13,13 @@ from hypothesis import strategies as st
 import impact
 from impact.api import prepare
 from impact.contact.lanes import Lanes
-from impact.data.estimate import estimate
-from impact.data.results import SCHEMA
-from impact.sweeps import trajectories as module
+from impact.engine import trajectories as module
+from impact.engine.build_impacts import lanes_of
+from impact.engine.plan import Plan
+from impact.engine.trajectories import trajectories
+from impact.results.estimate import estimate
+from impact.results.schema import SCHEMA
 from impact.sweeps.config import read_config
-from impact.sweeps.impacts import lanes_of
-from impact.sweeps.plan import Plan
-from impact.sweeps.trajectories import trajectories
 
 from .conftest import ROOT
 

@@ -13,9 +13,9 @@ import pytest
 import xarray as xr
 
 import impact
-from impact.data.results import SCHEMA
-from impact.data.verdict import Verdict
+from impact.comparison.verdict import Verdict
 from impact.errors import ResultError, UsageError
+from impact.results.schema import SCHEMA
 
 from .forked import Forked
 
@@ -82,7 +82,7 @@ def test_a_result_is_equal_to_itself(figure6: xr.Dataset, wide: xr.Dataset, stor
 @pytest.mark.parametrize("axis", ["model", "e", "v1", "m1", "material2", GAMMA])
 def test_the_order_of_labels_does_not_count(wide: xr.Dataset, axis: str) -> None:
     backwards = wide.isel({axis: slice(None, None, -1)})
-    assert any((backwards[name].values != wide[name].values).any() for name in ("v1_post", "duration"))
+    assert any((backwards[name].values != wide[name].values).any() for name in ("v1_post", "contact_time"))
     for new, baseline in ((backwards, wide), (wide, backwards)):
         verdict = impact.compare(new, baseline)
         assert verdict.equal, verdict
@@ -279,7 +279,7 @@ def test_nothing_in_common(figure6: xr.Dataset, wide: xr.Dataset, geometric: xr.
                 assert verdict.variables == ()
     coordinates_only = figure6.drop_vars(list(figure6.data_vars))
     assert _faults(impact.compare(coordinates_only, coordinates_only)) == [("nothing in common", "")]
-    assert _faults(impact.compare(figure6[["e_out"]], figure6[["duration"]], subset=True)) == [
+    assert _faults(impact.compare(figure6[["e_out"]], figure6[["contact_time"]], subset=True)) == [
         ("nothing in common", "")
     ]
 
@@ -334,12 +334,12 @@ def test_parameters_of_models_that_only_one_has(wide: xr.Dataset) -> None:
 SCALES = {
     "v1_post": 3.0, "v2_post": 3.0, "v1_reference": 3.0, "v2_reference": 3.0, "v1_error": 3.0, "v2_error": 3.0,
     "e_out": 1.0, "e_error": 1.0, "peak_indentation": 0.004, "permanent_indentation": 0.004,
-    "peak_force": 500.0, "duration": 2e-4, "energy_loss": 3.375, "stiffness": 6e9, "damping_ratio": 0.75,
-    "residual": 1.0, "oracle_error": 1.0, "e_kinetic": 1.0, "e_energetic": 1.0, "lambda": 4.5e9,
+    "peak_force": 500.0, "contact_time": 2e-4, "energy_loss": 3.375, "stiffness": 6e9, "damping_ratio": 0.75,
+    "energy_residual": 1.0, "closed_form_error": 1.0, "e_kinetic": 1.0, "e_energetic": 1.0, "lambda": 4.5e9,
     "separation_time": 2e-4,
 }  # fmt: skip
 ITSELF = {
-    "peak_indentation", "peak_force", "duration", "stiffness", "damping_ratio", "lambda", "separation_time",
+    "peak_indentation", "peak_force", "contact_time", "stiffness", "damping_ratio", "lambda", "separation_time",
 }  # fmt: skip
 
 
@@ -351,7 +351,7 @@ def test_every_variable_is_judged_by_hand_here() -> None:
 def test_just_below_the_tolerance_is_equal_and_just_above_is_not(by_hand: xr.Dataset, name: str) -> None:
     tol, scale = 1e-4, SCALES[name]
     by_hand["peak_indentation"][:] = 0.004
-    bounded = name in ("residual", "oracle_error")
+    bounded = name in ("energy_residual", "closed_form_error")
     value = scale if name in ITSELF else 0.0 if bounded else 0.25
     by_hand[name][..., 0] = value
     # the other point has another scale, which must not matter
@@ -391,7 +391,7 @@ def test_the_scale_is_that_of_each_point() -> None:
 
 
 def test_residuals_are_judged_by_their_bound(by_hand: xr.Dataset) -> None:
-    for name in ("residual", "oracle_error"):
+    for name in ("energy_residual", "closed_form_error"):
         # both below the bound, on either side of zero
         a, b = _with(by_hand, name, 0.9e-6), _with(by_hand, name, -0.9e-6)
         assert impact.compare(a, b, tol=1e-6).equal
@@ -598,12 +598,12 @@ def test_counts_and_the_worst_point(figure6: xr.Dataset) -> None:
     assert ratios.sel(e=[0.05, 0.5, 0.9, 0.96]).values == pytest.approx([160, 40, 2, 0.5], rel=1e-5)
     assert float(ratios.sum()) == pytest.approx(202.5, rel=1e-5)
     # the worst variable is told first
-    moved["duration"].loc[{"model": key, "e": 0.3}] *= 2
-    assert [one.name for one in impact.compare(moved, figure6).differing] == ["duration", "v1_post"]
+    moved["contact_time"].loc[{"model": key, "e": 0.3}] *= 2
+    assert [one.name for one in impact.compare(moved, figure6).differing] == ["contact_time", "v1_post"]
 
 
 def test_the_first_line_tells_every_kind_and_a_few_names(figure6: xr.Dataset) -> None:
-    other = figure6.isel(e=slice(1, None)).drop_vars(["steps", "residual"])
+    other = figure6.isel(e=slice(1, None)).drop_vars(["steps", "energy_residual"])
     other = _relabelled(other, "m1", 2.0) * 1.01
     other.attrs = figure6.attrs
     for name in other.variables:
@@ -613,7 +613,7 @@ def test_the_first_line_tells_every_kind_and_a_few_names(figure6: xr.Dataset) ->
         other.assign(status=figure6["status"], in_domain=figure6["in_domain"]), figure6
     ).headline
     assert headline.startswith("not equal: physics config (m1), labels (e), units (e_error), missing variable (")
-    assert "missing variable (residual, steps), values (" in headline
+    assert "missing variable (energy_residual, steps), values (" in headline
     assert headline.endswith(" more)")
 
 
@@ -689,10 +689,10 @@ def test_the_command_runs_the_worst_point_again(forked: Forked, tmp_path: Path, 
     result = impact.sweep(tmp_path / "a config.toml")
     impact.save(result, tmp_path / "base line.h5")
     random = np.random.default_rng(1)
-    for variable in ("v1_post", "v1_reference", "duration"):
+    for variable in ("v1_post", "v1_reference", "contact_time"):
         flat = int(random.integers(result[variable].size))
         place = dict(zip(result[variable].dims, np.unravel_index(flat, result[variable].shape), strict=True))
-        if variable == "duration":
+        if variable == "contact_time":
             # the last of everything: what is first by default is not
             place = {dim: size - 1 for dim, size in result[variable].sizes.items()}
         value = float(result[variable][place])

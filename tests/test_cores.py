@@ -19,9 +19,9 @@ from impact.contact.lanes import Lanes
 from impact.contact.model import ForceModel
 from impact.contact.models import catalogue, find
 from impact.contact.status import FIRST_FAILURE
+from impact.engine.execute import WORTH, settled
+from impact.engine.trajectories import trajectories
 from impact.errors import ConfigError, UsageError
-from impact.sweeps.run import WORTH, settled
-from impact.sweeps.trajectories import trajectories
 
 from .conftest import ROOT, Run
 from .problems import impacts, with_parameters
@@ -59,9 +59,10 @@ def of(key: str, n: float, e: np.ndarray) -> Lanes:
 def off(contact: Contact, other: Contact) -> dict[str, np.ndarray]:
     """How far the outputs of impacts are from one another, each in a unit of its own."""
     lanes = contact.lanes
-    size = {"peak_indentation": lanes.length, "permanent_indentation": lanes.length, "duration": contact.duration,
-            "peak_force": contact.peak_force, "energy_loss": 0.5 * lanes.m * lanes.v0**2}  # fmt: skip
-    names = ("e_out", "v1_post", "v2_post", "residual", "oracle_error", *size)
+    size = {"peak_indentation": lanes.length, "permanent_indentation": lanes.length,
+            "contact_time": contact.contact_time, "peak_force": contact.peak_force,
+            "energy_loss": 0.5 * lanes.m * lanes.v0**2}  # fmt: skip
+    names = ("e_out", "v1_post", "v2_post", "energy_residual", "closed_form_error", *size)
     return {name: np.abs(getattr(contact, name) - getattr(other, name)) / size.get(name, 1.0) for name in names}
 
 

@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 import impact
+from impact.engine.installed import installed
+from impact.engine.plugins import read_plugins
 from impact.errors import ModelError
-from impact.sweeps.installed import installed
-from impact.sweeps.plugins import read_plugins
 
 from .conftest import ROOT, Run
 
@@ -62,7 +62,7 @@ def test_the_commands_of_the_page(cli: Run, folder: Path) -> None:
         done = cli(*words, cwd=folder)
         assert done.returncode == 0, (line, done.stderr)
     result = impact.load(folder / "results.h5")
-    assert result["oracle_error"].sel(model="mine-2026").max() < 1e-9
+    assert result["closed_form_error"].sel(model="mine-2026").max() < 1e-9
     assert (folder / "results.png").exists()
 
 

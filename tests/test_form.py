@@ -12,8 +12,8 @@ import xarray as xr
 from h5netcdf.utils import CompatibilityError
 
 import impact
-from impact.data import store
 from impact.errors import ResultError, UsageError
+from impact.results import store
 
 Change = Callable[[xr.Dataset], xr.Dataset]
 DEEP = "[" * 100_000

@@ -320,7 +320,7 @@ def test_nothing_covers_a_text(many: xr.Dataset, kind: str, count: int, width: f
         "validity": lambda: validity(many, models=models),
         "force": lambda: field_map(many, variable="peak_force", models=models, x="v1", y="m2"),
         "log": lambda: field_map(many, models=models, log="xy"),
-        "swapped": lambda: field_map(many, variable="residual", models=models, x="m2", y="e"),
+        "swapped": lambda: field_map(many, variable="energy_residual", models=models, x="m2", y="e"),
     }[kind]()
     figure = draw_grids(numbers, width)
     assert figure.get_size_inches()[0] == width

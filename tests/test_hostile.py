@@ -14,8 +14,8 @@ import xarray as xr
 
 import impact
 from impact.api import prepare
-from impact.data.sweeping import sweep_into
 from impact.errors import ResultError
+from impact.results.sweep import sweep_into
 
 from .forked import Done, Forked
 from .malicious import CHANGES, HARMLESS, NOT_HDF5, PATCHES, SECRET

@@ -196,7 +196,7 @@ def test_another_sweep_is_not_resumed(sweeps: Sweeps, old: str, new: str, told: 
     check_refused(sweeps, folder, "--resume", told=told)
 
 
-@pytest.mark.parametrize(("old", "new"), [("Small", "Other"), ('"v1_post", "duration"', '"e_out"')])
+@pytest.mark.parametrize(("old", "new"), [("Small", "Other"), ('"v1_post", "contact_time"', '"e_out"')])
 def test_what_changes_no_trajectory_is_resumed(sweeps: Sweeps, old: str, new: str) -> None:
     folder = sweeps.copied(other(TEXT, (old, new)))
     tally = Tally(f"{old} changed to {new}", sweeps)

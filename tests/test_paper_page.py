@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import impact
-from impact.data.history import HISTORY
-from impact.data.impact import DERIVED
-from impact.data.results import SCHEMA
+from impact.results.history import HISTORY
+from impact.results.impact import DERIVED
+from impact.results.schema import SCHEMA
 from impact.sweeps.rules import SWEEP
 
 from .conftest import ROOT, Run

@@ -389,7 +389,7 @@ def by_impact(key: str, collision: Values) -> tuple[float, float]:
         "model": {key: {name: value for name, value in collision.items() if name not in SWEPT}},
     }
     result = impact.sweep(config)
-    return float(result["e_out"].item()), float(result["duration"].item())
+    return float(result["e_out"].item()), float(result["contact_time"].item())
 
 
 def by_code(entry: Entry, contact_times: list[float], folder: Path) -> tuple[str, np.ndarray]:

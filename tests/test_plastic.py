@@ -307,7 +307,7 @@ def test_parts_of_a_phase_depend_on_no_company(key):
     for place in (0, 5, 11):
         alone = struck(find(key), lanes[np.array([place])])
         assert alone.e_out.tobytes() == contact.e_out[place : place + 1].tobytes()
-        assert alone.duration.tobytes() == contact.duration[place : place + 1].tobytes()
+        assert alone.contact_time.tobytes() == contact.contact_time[place : place + 1].tobytes()
 
 
 @pytest.mark.parametrize("key", PLASTIC)
@@ -315,5 +315,5 @@ def test_time_goes_on_across_bends(key):
     # a contact in parts takes as long at a tighter tolerance, and as in history
     lanes = with_parameters(find(key), impacts(find(key).exponent or 1.5, v1=3.0), 0.3)
     loose, tight = struck(find(key), lanes), struck(find(key), lanes, 1e-13)
-    assert loose.duration == pytest.approx(tight.duration, rel=1e-8)
-    assert loose.residual == pytest.approx(0.0, abs=1e-9)
+    assert loose.contact_time == pytest.approx(tight.contact_time, rel=1e-8)
+    assert loose.energy_residual == pytest.approx(0.0, abs=1e-9)

@@ -18,9 +18,9 @@ import xarray as xr
 
 import impact
 from impact.contact.models import catalogue
-from impact.data.origin import check_plugins
+from impact.engine.plugins import Plugins, read_plugins
 from impact.errors import ModelError, ResultError, UsageError
-from impact.sweeps.plugins import Plugins, read_plugins
+from impact.results.provenance import check_plugins
 
 from .forked import Forked
 
@@ -363,7 +363,7 @@ def test_a_failed_plug_in_is_forgotten(tmp_path: Path) -> None:
 
 HASHES = """
 import functools, impact
-from impact.sweeps.plugins import read_plugins
+from impact.engine.plugins import read_plugins
 
 def scaled(e, factor):
     return factor * (1 - e)

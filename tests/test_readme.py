@@ -58,12 +58,12 @@ def test_generated_pages_are_fresh() -> None:
 
 
 def test_the_page_on_sweeps_says_what_is_so() -> None:
-    from impact.data.sweeping import FEW
-    from impact.data.writer import PIECE
+    from impact.engine.trajectories import BLOCK, MOST_CELLS
+    from impact.results.sweep import FEW
+    from impact.results.writer import PIECE
     from impact.sweeps.config import parse_config
     from impact.sweeps.grid import MAX_POINTS
     from impact.sweeps.ranges import MAX_AXIS
-    from impact.sweeps.trajectories import BLOCK, MOST_CELLS
 
     page = (ROOT / "docs" / "sweeps.md").read_text(encoding="utf-8")
     for number in (FEW, PIECE, MAX_AXIS, BLOCK, MOST_CELLS):

@@ -14,8 +14,8 @@ import xarray as xr
 
 import impact
 from impact.contact.status import FIRST_FAILURE, Status
-from impact.data.ranking import Ranked
 from impact.errors import UsageError
+from impact.results.ranking import Ranked
 
 from .conftest import Run
 

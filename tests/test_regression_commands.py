@@ -25,8 +25,8 @@ import pytest
 import xarray as xr
 
 import impact
-from impact.data.digest import content_digest
 from impact.errors import ResultError, StoreError, UsageError
+from impact.results.digest import content_digest
 
 from .conftest import ROOT
 from .forked import Done, Forked
@@ -51,7 +51,7 @@ def folder(figure6: xr.Dataset, tmp_path_factory: pytest.TempPathFactory) -> Pat
     for e, by in ((0.05, 160e-9), (0.5, -40e-9)):
         moved["v1_post"].loc[{"model": KEY, "e": e}] += by
     impact.save(moved, folder / "different.h5")
-    impact.save(moved.drop_vars("duration"), folder / "faulty.h5")
+    impact.save(moved.drop_vars("contact_time"), folder / "faulty.h5")
     impact.save(figure6.isel(e=slice(50)), folder / "low.h5")
     impact.save(figure6.isel(e=slice(50, None)), folder / "high.h5")
 
@@ -150,8 +150,8 @@ def test_different_in_five_formats(forked: Forked, folder: Path) -> None:
         done = forked("compare", "faulty.h5", "base.h5", "--format", name, cwd=folder)
         assert (done.returncode, done.stderr) == (1, "")
         told[name] = done.stdout
-    headline = "not equal: missing variable (duration), values (v1_post)"
-    missing = "duration is in BASELINE only"
+    headline = "not equal: missing variable (contact_time), values (v1_post)"
+    missing = "contact_time is in BASELINE only"
     replay = f"impact run faulty.h5 --model {KEY} --at e=0.05"
     lines = told["table"].splitlines()
     assert lines[:4] == [headline, f"missing variable: {missing}", WORST, f"  {replay}"]
@@ -174,7 +174,9 @@ def test_different_in_five_formats(forked: Forked, folder: Path) -> None:
     assert cases["missing variable"][0].attrib["message"] == missing
     assert headline in ElementTree.fromstring(told["junit"].encode()).findtext("testsuite/system-out", "")
 
-    assert told["markdown"].startswith("### ❌ impact compare: not equal: missing variable (duration), values (v1")
+    assert told["markdown"].startswith(
+        "### ❌ impact compare: not equal: missing variable (contact_time), values (v1"
+    )
     assert _table_rows(told["markdown"])[0][:2] == ["variable", "differ"]
     assert _table_rows(told["markdown"])[2][:2] == ["`v1_post`", "2 of 303"]
     assert f"````sh\n{replay}\n````\n" in told["markdown"]
@@ -185,7 +187,7 @@ def test_github_gets_one_annotation_with_the_worst_three(
     forked: Forked, figure6: xr.Dataset, folder: Path, tmp_path: Path
 ) -> None:
     moved = figure6.copy(deep=True)
-    for place, name in enumerate(("v1_post", "v2_post", "e_out", "energy_loss", "duration"), 1):
+    for place, name in enumerate(("v1_post", "v2_post", "e_out", "energy_loss", "contact_time"), 1):
         moved[name].loc[{"model": KEY, "e": 0.5}] *= 1 + 1e-7 * place
     impact.save(moved, tmp_path / "moved.h5")
     done = forked("compare", tmp_path / "moved.h5", "base.h5", "--format", "github", cwd=folder)
@@ -343,7 +345,7 @@ def test_hostile_strings_in_every_format(forked: Forked, tmp_path: Path) -> None
 @pytest.mark.slow
 def test_pictures_of_every_kind_of_verdict(forked: Forked, folder: Path, wide: xr.Dataset, tmp_path: Path) -> None:
     moved = wide.copy(deep=True)
-    moved["duration"] *= 1 + 1e-7 * np.arange(moved["duration"].size).reshape(moved["duration"].shape)
+    moved["contact_time"] *= 1 + 1e-7 * np.arange(moved["contact_time"].size).reshape(moved["contact_time"].shape)
     moved["e_out"][1, 1, 1, 1, 1, 1] = np.nan
     impact.save(wide, tmp_path / "wide.h5")
     impact.save(moved, tmp_path / "moved.h5")
@@ -437,7 +439,7 @@ def test_bless_makes_and_replaces_a_baseline(forked: Forked, folder: Path, tmp_p
     assert stat.S_IMODE(baseline.stat().st_mode) == 0o640
     done = forked("bless", "faulty.h5", baseline, "--reason", "less", "--tol", "1e-9", cwd=folder)
     assert done.returncode == 0
-    assert done.stdout.startswith("not equal: missing variable (duration), values (v1_post)\n")
+    assert done.stdout.startswith("not equal: missing variable (contact_time), values (v1_post)\n")
     assert json.loads(impact.load(baseline).attrs["tolerances"]) == {"all": 1e-9}
     assert sorted(p.name for p in tmp_path.iterdir()) == ["baseline.h5"]
 

@@ -22,8 +22,8 @@ import xarray as xr
 import impact
 from impact import api
 from impact.contact.models import catalogue
-from impact.data.ranking import ranking
 from impact.errors import UsageError
+from impact.results.ranking import ranking
 from impact.views.page import POLICY, page
 from impact.views.page_figures import FIGURES
 

@@ -12,15 +12,15 @@ import xarray as xr
 import impact
 from impact.contact.collide import OUTPUTS
 from impact.contact.status import Status
-from impact.data.assembly import assemble, parts
-from impact.data.digest import content_digest
-from impact.data.results import SCHEMA, outline
+from impact.engine.execute import run, settled
+from impact.engine.finished import Finished
+from impact.engine.plan import Plan
+from impact.engine.points import boxes, boxes_of
+from impact.engine.trajectories import stretches, trajectories
+from impact.results.assembly import assemble, parts
+from impact.results.digest import content_digest
+from impact.results.schema import SCHEMA, outline
 from impact.sweeps.config import parse_config
-from impact.sweeps.finished import Finished
-from impact.sweeps.plan import Plan
-from impact.sweeps.points import boxes, boxes_of
-from impact.sweeps.run import run, settled
-from impact.sweeps.trajectories import stretches, trajectories
 
 from .conftest import WIDE
 
@@ -53,8 +53,8 @@ def test_variables_stored_on_request_only() -> None:
     sweep = {"e": [0.0, 0.25, 0.8], "v1": 2.0, "m1": 1.0, "m2": 3.0, "K": 6e9}
     config = {"models": ["gharib-hurmuzlu-2012", "gharib-hurmuzlu-2012-energetic"], "sweep": sweep}
     assert not ON_REQUEST.keys() & set(impact.sweep(config).data_vars)
-    result = impact.sweep(config | {"output": {"variables": ["e_out", "duration", *ON_REQUEST]}})
-    assert list(result.data_vars) == ["e_out", "duration", "status", *ON_REQUEST]
+    result = impact.sweep(config | {"output": {"variables": ["e_out", "contact_time", *ON_REQUEST]}})
+    assert list(result.data_vars) == ["e_out", "contact_time", "status", *ON_REQUEST]
     assert {name: result[name].attrs["units"] for name in ON_REQUEST} == ON_REQUEST
     for name in ("e_kinetic", "e_energetic"):
         np.testing.assert_allclose(result[name], result["e_out"], rtol=0.0, atol=1e-9)
@@ -64,7 +64,7 @@ def test_variables_stored_on_request_only() -> None:
     assert np.isnan(permanent["lambda"]).all()
     # a permanent indentation, or none at all, is left when the force ends
     for one in (damped, permanent):
-        np.testing.assert_array_equal(one["separation_time"], one["duration"])
+        np.testing.assert_array_equal(one["separation_time"], one["contact_time"])
 
 
 def test_variables_stored_on_request_are_in_the_json_schema_and_in_messages() -> None:
@@ -131,7 +131,15 @@ def test_alpha_gives_e_from_the_speed() -> None:
     status = result["status"].sel(model="bilinear").values
     assert status.tolist() == [[1, 1, 1], [1, Status.LIMIT, Status.INVALID_PARAMETER]]
     failed = result.sel(model="bilinear", alpha=0.5, v1=3.0)
-    for name in ("v1_post", "v1_reference", "v1_error", "e_out", "duration", "energy_loss", "oracle_error"):
+    for name in (
+        "v1_post",
+        "v1_reference",
+        "v1_error",
+        "e_out",
+        "contact_time",
+        "energy_loss",
+        "closed_form_error",
+    ):
         assert np.isnan(failed[name]), name
 
 
@@ -155,7 +163,7 @@ def test_balls_that_do_not_approach_keep_their_velocities() -> None:
     assert one["status"].values.tolist() == [Status.NO_IMPACT, Status.NO_IMPACT, Status.OK]
     assert one["v1_post"].values[:2].tolist() == [1.0, 2.0]
     assert one["v2_post"].values[:2].tolist() == [2.0, 2.0]
-    for name in ("peak_indentation", "peak_force", "duration", "energy_loss", "v1_error"):
+    for name in ("peak_indentation", "peak_force", "contact_time", "energy_loss", "v1_error"):
         assert one[name].values[:2].tolist() == [0.0, 0.0], name
     assert np.isnan(one["e_out"].values[:2]).all()
 
@@ -188,8 +196,8 @@ def test_sizes_and_order_change_no_bit(wide: xr.Dataset, size: int, collapse: st
 
 
 def test_chosen_variables_and_always_the_status() -> None:
-    config = {"models": "hertz", "sweep": {"e": 1.0, **TABLE1}, "output": {"variables": ["duration", "e_out"]}}
-    assert list(impact.sweep(config).data_vars) == ["e_out", "duration", "status"]
+    config = {"models": "hertz", "sweep": {"e": 1.0, **TABLE1}, "output": {"variables": ["contact_time", "e_out"]}}
+    assert list(impact.sweep(config).data_vars) == ["e_out", "contact_time", "status"]
 
 
 def test_attributes(figure6: xr.Dataset) -> None:

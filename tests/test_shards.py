@@ -167,7 +167,7 @@ def test_shards_that_overlap_are_one_where_their_bits_are(cli: Run, folder: Path
     path = found[2] / "00000000.npz"
     with np.load(path) as stored:
         arrays = {name: stored[name] for name in stored.files}
-    arrays["duration"] = np.nextafter(arrays["duration"], 1.0)
+    arrays["contact_time"] = np.nextafter(arrays["contact_time"], 1.0)
     np.savez(path, **arrays)
     done = cli("merge", *found, "--overwrite", cwd=folder)
     assert done.returncode == 2

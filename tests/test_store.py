@@ -17,8 +17,8 @@ import pytest
 import xarray as xr
 
 import impact
-from impact.data.store import write_whole
 from impact.errors import ResultError, StoreError, UsageError
+from impact.results.store import write_whole
 
 from .conftest import ROOT
 

@@ -26,16 +26,16 @@ import xarray as xr
 import impact
 from impact.api import execute, prepare
 from impact.cli.progress import Pace
-from impact.data.guard import is_in_pieces
-from impact.data.progress import Progress
-from impact.data.survey import held
-from impact.data.sweeping import sweep_into
-from impact.data.tally import tally_of
+from impact.engine.blocks import work
+from impact.engine.execute import kit_of, run
+from impact.engine.executors import Team, team_of
+from impact.engine.progress import Progress
+from impact.engine.trajectories import block_of, stretches, trajectories
 from impact.errors import ConfigError, StoreError, UsageError
-from impact.sweeps.blocks import work
-from impact.sweeps.run import kit_of, run
-from impact.sweeps.teams import Team, team_of
-from impact.sweeps.trajectories import block_of, stretches, trajectories
+from impact.results.guard import is_in_pieces
+from impact.results.summary import tally_of
+from impact.results.survey import held
+from impact.results.sweep import sweep_into
 
 from .conftest import ROOT, WIDE, Run
 from .forked import Forked

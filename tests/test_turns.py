@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 
 from impact.contact.turns import aside
-from impact.sweeps.teams import team_of
+from impact.engine.executors import team_of
 
 THREADS = 4
 

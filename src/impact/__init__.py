@@ -8,11 +8,11 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from .api import bless, compare, load, models, plot, recommend, report, rerun, run, save, sweep
+    from .comparison.verdict import Verdict
     from .contact.evidence import Evidence
     from .contact.model import ForceModel, Parameter
     from .contact.models.hysteresis import hysteresis
     from .contact.power import power
-    from .data.verdict import Verdict
     from .errors import ImpactError
 
 __all__ = [

@@ -9,6 +9,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from .comparison.bless import bless as bless
+from .comparison.compare import compare as compare
+from .comparison.tolerances import Tolerances
+from .comparison.verdict import Verdict as Verdict
+
 # a name imported "as itself" is public: `impact.__all__` hands it on
 from .contact.evidence import Evidence as Evidence
 from .contact.model import ForceModel as ForceModel
@@ -16,29 +21,25 @@ from .contact.model import Parameter as Parameter
 from .contact.models import catalogue
 from .contact.models.hysteresis import hysteresis as hysteresis
 from .contact.power import power as power
-from .data.again import histories
-from .data.bless import bless as bless
-from .data.compare import compare as compare
-from .data.impact import Impact as Impact
-from .data.impact import impact_of
-from .data.origin import config_of, part_of, picked_out, stored_config
-from .data.progress import Tell
-from .data.ranking import Ranking, ranking
-from .data.replay import repeats
-from .data.store import load as load
-from .data.store import save as save
-from .data.sweeping import in_memory
-from .data.tolerances import Tolerances
-from .data.verdict import Verdict as Verdict
+from .engine.execute import never
+from .engine.executors import ALONE, Team, team_of
+from .engine.plan import Plan
+from .engine.plugins import read_plugins
+from .engine.progress import Tell
 from .errors import ImpactError as ImpactError
 from .errors import UsageError
+from .results.again import histories
+from .results.impact import Impact as Impact
+from .results.impact import impact_of
+from .results.provenance import config_of, part_of, picked_out, stored_config
+from .results.ranking import Ranking, ranking
+from .results.replay import repeats
+from .results.store import load as load
+from .results.store import save as save
+from .results.sweep import in_memory
 from .sweeps.config import read_config
 from .sweeps.grid import MAX_POINTS
-from .sweeps.plan import Plan
-from .sweeps.plugins import read_plugins
 from .sweeps.point import one_point
-from .sweeps.run import never
-from .sweeps.teams import ALONE, Team, team_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -66,7 +67,7 @@ def execute(
     tell: Tell | None = None,
     stopping: Callable[[], bool] = never,
 ) -> xr.Dataset:
-    """The result of a plan, in memory; for the parameters see `impact.data.sweeping.sweep_into`."""
+    """The result of a plan, in memory; for the parameters see `impact.results.sweep.sweep_into`."""
     return in_memory(plan, team=team, tell=tell or (lambda progress: None), stopping=stopping)
 
 

@@ -12,7 +12,7 @@ from .options import Json
 from .words import dump, number, pairs
 
 if TYPE_CHECKING:
-    from ..data.ranking import Ranked, Ranking
+    from ..results.ranking import Ranked, Ranking
 
 # of a longer ranking the table shows the beginning
 ROWS = 30

@@ -41,7 +41,7 @@ def models(
 ) -> None:
     """The catalogue of contact force models: equations, references, domains, delivered restitution."""
     from ..contact.models import catalogue, find
-    from ..sweeps.plugins import read_plugins
+    from ..engine.plugins import read_plugins
 
     if check is not None:
         own = [one.model for one in read_plugins([check]).items if one.source is not None]

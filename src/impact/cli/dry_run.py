@@ -5,8 +5,8 @@ from __future__ import annotations
 import sys
 from dataclasses import asdict
 
-from ..data.estimate import estimate
-from ..sweeps.plan import Plan
+from ..engine.plan import Plan
+from ..results.estimate import estimate
 from .console import cell, console, table
 from .progress import clock
 from .words import dump

@@ -91,7 +91,7 @@ def run(
     """Run one impact: what goes in, what comes out, and how far it can be trusted."""
     from .. import api
     from ..contact.status import FIRST_FAILURE
-    from ..data import store
+    from ..results import store
     from . import tables
 
     if times is not None and history is None:
@@ -145,7 +145,8 @@ def init(
     overwrite: Overwrite = False,
 ) -> None:
     """Write a commented starter config, ready to sweep."""
-    from ..data import origin, store
+    from ..results import provenance as origin
+    from ..results import store
 
     store.write_whole(path, origin.STARTER.read_bytes(), overwrite=overwrite)
     door.say(f"{safe_text(str(path))}: written; next: impact sweep {safe_text(str(path))}")
@@ -157,7 +158,7 @@ def schema(
     overwrite: Overwrite = False,
 ) -> None:
     """The JSON Schema of the config, from which editors complete and check it."""
-    from ..data import store
+    from ..results import store
     from ..sweeps.config import json_schema
 
     text = json.dumps(json_schema(), indent=2, ensure_ascii=False) + "\n"

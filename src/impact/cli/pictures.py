@@ -70,7 +70,7 @@ def plot(
     loop, history and impulse follow a point of the result through time again; --sel chooses it.
     """
     from .. import api
-    from ..data import store
+    from ..results import store
     from ..views.kinds import Choice, as_csv, draw
     from ..views.look import check_picture, save_figure
 

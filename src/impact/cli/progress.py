@@ -16,7 +16,7 @@ from .console import console
 from .door import say
 
 if TYPE_CHECKING:
-    from ..data.progress import Progress
+    from ..engine.progress import Progress
 
 # seconds after which something is told, and between two lines where there is no terminal
 PATIENCE, PAUSE = 1.0, 10.0

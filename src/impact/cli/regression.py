@@ -16,7 +16,7 @@ from .options import MaxPoints, Plugins, Quiet
 from .words import dump, tolerances
 
 if TYPE_CHECKING:
-    from ..data.verdict import Verdict
+    from ..comparison.verdict import Verdict
     from ..views.report import Report
 
 
@@ -132,7 +132,7 @@ def rerun(
 def _check_plot(plot: Path | None, *sources: Path) -> None:
     """Refuse a picture that cannot be stored before any work is done."""
     if plot is not None:
-        from ..data.store import check_output
+        from ..results.store import check_output
         from ..views.look import check_picture
 
         check_picture(plot)

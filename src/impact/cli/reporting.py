@@ -27,7 +27,7 @@ def report(
     It is one file, opens without a network, and has nothing that runs.
     """
     from .. import api
-    from ..data import store
+    from ..results import store
 
     output = output or result.with_suffix(ENDINGS[0])
     shown = safe_text(str(output))

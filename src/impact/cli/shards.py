@@ -18,7 +18,7 @@ from .who import Who
 from .words import dump
 
 if TYPE_CHECKING:
-    from ..sweeps.plan import Plan
+    from ..engine.plan import Plan
 
 
 def do(
@@ -41,7 +41,7 @@ def do(
     shard : which, such as "3/16"
     command : words that sweep the whole into the output
     """
-    from ..data.shards import Shard, sweep_shard
+    from ..results.shards import Shard, sweep_shard
     from .progress import progress
 
     part = Shard.parse(shard)
@@ -74,8 +74,8 @@ def merge(
 ) -> None:
     """Make the result of a sweep from all of its shards; their folders stay."""
     with door.signals() as stopping:
-        from ..data import merging
-        from ..sweeps.plugins import read_plugins
+        from ..engine.plugins import read_plugins
+        from ..results import merging
         from . import progress, summary
 
         with progress.progress(quiet=quiet) as tell:

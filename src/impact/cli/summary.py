@@ -20,8 +20,8 @@ from .words import dump
 if TYPE_CHECKING:
     import xarray as xr
 
-    from ..data.tally import Survey, Tally
-    from ..sweeps.plan import Plan
+    from ..engine.plan import Plan
+    from ..results.summary import Survey, Tally
 
 
 def execute(plan: Plan, stopping: Callable[[], bool], *, quiet: bool) -> xr.Dataset:
@@ -34,8 +34,8 @@ def execute(plan: Plan, stopping: Callable[[], bool], *, quiet: bool) -> xr.Data
 
 def summary(survey: Survey, output: Path) -> dict[str, Any]:
     """Points, counts per status, and the first failed points with their coordinates and the command for each."""
-    from ..data.replay import own, repeats, replay
-    from ..data.tally import counted
+    from ..results.replay import own, repeats, replay
+    from ..results.summary import counted
 
     outline, tally = survey.outline, survey.tally
     begin = repeats(str(output), outline)
@@ -62,7 +62,7 @@ def conclude(survey: Survey, output: Path, *, fresh: bool, quiet: bool, as_json:
     fresh : whether it was stored just now
     quiet, as_json, allow_failed : as the options of those names
     """
-    from ..data.plausibility import result_notes
+    from ..results.plausibility import result_notes
 
     told = summary(survey, output)
     if not quiet:
@@ -111,7 +111,7 @@ def worst_errors(outline: xr.Dataset, tally: Tally) -> Table:
     """The largest errors per model, as far as the result has them."""
     columns = {
         "e_error": "max |e_out − e|", "v1_error": "max |v1 error|", "v2_error": "max |v2 error|",
-        "oracle_error": "max |e_out − exact|", "residual": "max |residual|",
+        "closed_form_error": "max |e_out − exact|", "energy_residual": "max |residual|",
     }  # fmt: skip
     held = [name for name in columns if name in tally.worst]
     rows = table("model", *(columns[name] for name in held))

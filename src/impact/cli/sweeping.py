@@ -49,9 +49,10 @@ def sweep(
     """Run every model over a sweep and store post-impact velocities and their errors."""
     with door.signals() as stopping:
         from .. import api
-        from ..data import store, survey, work
-        from ..data.plausibility import material_notes
-        from ..data.sweeping import sweep_into
+        from ..engine import checkpoint as work
+        from ..results import store, survey
+        from ..results.plausibility import material_notes
+        from ..results.sweep import sweep_into
         from . import progress, summary
 
         who = Who(jobs, threads, scheduler, scheduler_file)

@@ -47,8 +47,8 @@ def run_json(impact: Impact) -> dict[str, Any]:
 
 def print_run(impact: Impact) -> None:
     """One impact: inputs, outputs, the three restitutions, and how far they can be trusted."""
-    from ..data.impact import DERIVED
-    from ..data.results import SCHEMA, plain_unit
+    from ..results.impact import DERIVED
+    from ..results.schema import SCHEMA, plain_unit
 
     rows: dict[str, Any] = {"model": impact.model.key, "equation": impact.model.equation}
     for name, value in impact.point.items():
@@ -108,8 +108,8 @@ def info_json(dataset: xr.Dataset) -> dict[str, Any]:
 
 def print_info(dataset: xr.Dataset, path: Path) -> None:
     """What is in a file."""
-    from ..data.results import exponents_of, plain_unit
-    from ..data.tally import counted, tally_of
+    from ..results.schema import exponents_of, plain_unit
+    from ..results.summary import counted, tally_of
 
     attributes = dataset.attrs
     tally = tally_of(dataset) if "model" in dataset.dims else None

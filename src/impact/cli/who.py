@@ -13,7 +13,7 @@ from ..text import safe_text
 from .door import say
 
 if TYPE_CHECKING:
-    from ..sweeps.teams import Team
+    from ..engine.executors import Team
 
 
 @dataclass(frozen=True)
@@ -41,11 +41,11 @@ class Who:
         """Those who integrate; prints the cluster to stderr, and `should_stop` gives up a connection to it."""
         place = self.scheduler if self.scheduler is not None else self.scheduler_file
         if place is None:
-            from ..sweeps.teams import team_of
+            from ..engine.executors import team_of
 
             yield team_of(self.jobs, self.threads)
             return
-        from ..sweeps.cluster import cluster
+        from ..engine.dask import cluster
 
         with cluster(place, should_stop) as (team, dashboard, workers):
             if not quiet:

@@ -23,8 +23,8 @@ Mask = NDArray[np.bool_]
 # the outputs of an impact that a result has by default, in its order, and those that it has on request
 BY_DEFAULT = (
     "v1_post", "v2_post", "v1_reference", "v2_reference", "v1_error", "v2_error", "e_out", "e_error",
-    "peak_indentation", "permanent_indentation", "peak_force", "duration", "energy_loss", "stiffness",
-    "damping_ratio", "residual", "oracle_error", "status", "in_domain", "steps",
+    "peak_indentation", "permanent_indentation", "peak_force", "contact_time", "energy_loss", "stiffness",
+    "damping_ratio", "energy_residual", "closed_form_error", "status", "in_domain", "steps",
 )  # fmt: skip
 OUTPUTS = (*BY_DEFAULT, "e_kinetic", "e_energetic", "lambda", "separation_time")
 quiet = np.errstate(all="ignore")
@@ -143,8 +143,8 @@ class Contact:
 
     @cached_property
     @quiet
-    def duration(self) -> Array:
-        return self._si(self.rebound.duration, self.lanes.time)
+    def contact_time(self) -> Array:
+        return self._si(self.rebound.contact_time, self.lanes.time)
 
     @cached_property
     @quiet
@@ -162,14 +162,14 @@ class Contact:
 
     @cached_property
     @quiet
-    def residual(self) -> Array:
+    def energy_residual(self) -> Array:
         rebound = self.rebound
         work = rebound.approach_work + rebound.restitution_work
         return _but(work - (1.0 - rebound.e_out * rebound.e_out), self._unknown, np.nan)
 
     @cached_property
     @quiet
-    def oracle_error(self) -> Array:
+    def closed_form_error(self) -> Array:
         return self.e_out - self.rebound.exact
 
     @cached_property
@@ -211,9 +211,9 @@ class Contact:
         rebound = self.rebound
         if self.model.is_permanent:
             # a permanent indentation stays in the surfaces, which part at the release
-            return self.duration
+            return self.contact_time
         rest = np.where(rebound.permanent > 0.0, rebound.permanent / rebound.e_out, 0.0)
-        return self._si(rebound.duration + np.where(np.isinf(rest), np.nan, rest), self.lanes.time)
+        return self._si(rebound.contact_time + np.where(np.isinf(rest), np.nan, rest), self.lanes.time)
 
 
 # the name in the result file is a keyword of Python

@@ -99,9 +99,9 @@ def contract(model: ForceModel) -> Iterator[Finding]:
     scale = 1.0 + (np.abs(lanes.v1) + np.abs(lanes.v2)) / lanes.v0
     yield Finding("velocities part by e_out v0 (5)", worst(rebound / scale), ROUNDING)
     yield Finding("no energy is gained", float(np.max(base.e_out[ended], initial=0.0) - 1.0), 10 * RTOL)
-    yield Finding("work balances energy", worst(base.residual), 10 * RTOL)
+    yield Finding("work balances energy", worst(base.energy_residual), 10 * RTOL)
     if model.oracle is not None:
-        yield Finding("agrees with its closed form", worst(base.oracle_error), 10 * RTOL)
+        yield Finding("agrees with its closed form", worst(base.closed_form_error), 10 * RTOL)
 
     other = _collide(model, in_other_units(model, lanes))
     yield Finding("a change of units changes nothing", worst(other.e_out - base.e_out), 10 * RTOL)

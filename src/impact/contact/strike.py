@@ -50,7 +50,7 @@ class Rebound:
     peak: Array
     permanent: Array
     force: Array
-    duration: Array
+    contact_time: Array
     approach_work: Array
     restitution_work: Array
     steps: NDArray[np.int32]
@@ -66,7 +66,7 @@ class Rebound:
             peak=np.full(n, np.nan),
             permanent=np.full(n, np.nan),
             force=np.full(n, np.nan),
-            duration=np.full(n, np.nan),
+            contact_time=np.full(n, np.nan),
             approach_work=np.full(n, np.nan),
             restitution_work=np.full(n, np.nan),
             steps=np.zeros(n, np.int32),
@@ -148,7 +148,7 @@ def strike(
     unknown = np.full(n, np.nan)
     rebound = Rebound(
         e_out=unknown.copy(), peak=peak, permanent=residual.copy(), force=np.maximum(inward.maximum, at_peak),
-        duration=inward.state[2].copy(), approach_work=2.0 * inward.state[3], restitution_work=np.zeros(n),
+        contact_time=inward.state[2].copy(), approach_work=2.0 * inward.state[3], restitution_work=np.zeros(n),
         steps=inward.steps.copy(), status=_status(inward), chi=unknown, exact=unknown,
     )  # fmt: skip
 
@@ -175,7 +175,7 @@ def strike(
         held &= may_creep(back.model) | np.broadcast_to(sticks, n)[parts]
         e_out[held], work[held], status[held] = 0.0, 0.0, LIMIT
     rebound.e_out[parts] = e_out
-    rebound.duration[parts] += outward.state[2]
+    rebound.contact_time[parts] += outward.state[2]
     rebound.restitution_work[parts] = work
     rebound.steps[parts] += outward.steps
     rebound.status[parts] = status

@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ..data.verdict import Judged, Verdict
+from ..comparison.verdict import Judged, Verdict
 from ..errors import UsageError
 from ..text import safe_text
 from .look import COLOURS, MARKERS, STYLE, axis_label, is_geometric

@@ -13,9 +13,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..contact.models import catalogue
-from ..data.results import plain_unit
-from ..data.store import write_whole
 from ..errors import UsageError
+from ..results.schema import plain_unit
+from ..results.store import write_whole
 from ..text import safe_text
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..contact.models import catalogue
-from ..data.results import exponent_text, plain_unit
 from ..errors import UsageError
+from ..results.schema import exponent_text, plain_unit
 from ..sweeps.rules import SWEEP
 from ..text import safe_text
 from .lines import Curve, Lines, Mark, Panel

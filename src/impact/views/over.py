@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..data.results import exponents_of, plain_unit
 from ..errors import UsageError
+from ..results.schema import exponents_of, plain_unit
 from ..text import safe_text, with_year
 from .lines import Curve, Lines, Panel
 from .look import axis_label, is_geometric

@@ -14,14 +14,13 @@ from numpy.typing import NDArray
 
 from ..contact.models import catalogue
 from ..contact.status import FIRST_FAILURE, Status
-from ..data.align import is_input
-from ..data.attributes import json_object, json_table
-from ..data.plausibility import material_notes, result_notes
-from ..data.ranking import Ranked, ranking
-from ..data.replay import own
-from ..data.results import exponents_of, plain_unit
-from ..data.tally import Tally, tally_of
 from ..errors import UsageError
+from ..results.attributes import json_object, json_table
+from ..results.plausibility import material_notes, result_notes
+from ..results.ranking import Ranked, ranking
+from ..results.replay import own
+from ..results.schema import exponents_of, is_input, plain_unit
+from ..results.summary import Tally, tally_of
 from ..sweeps.rules import MATERIAL
 from ..text import safe_text, with_year
 from .kinds import Choice, Numbers

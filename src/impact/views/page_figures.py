@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..contact.status import FIRST_FAILURE, NO_IMPACT
-from ..data.align import is_input
 from ..errors import ImpactError
+from ..results.schema import is_input
 from ..text import safe_text
 from .kinds import Choice, Numbers, draw
 from .look import METADATA, STYLE

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..data.selecting import places_of, select
 from ..errors import UsageError, did_you_mean
+from ..results.select import places_of, select
 from ..text import safe_text
 from .look import axis_label, is_geometric
 from .over import conditions_of, label_of
@@ -172,7 +172,7 @@ def _numbers(
         x_log="x" in log or is_geometric(data[x].values),
         y_log="y" in log or is_geometric(data[y].values),
         # errors, and what has values of both signs, not by rounding alone
-        signed=variable.endswith(("_error", "residual")) or bool(-finite.min() > 1e-3 * finite.max() > 0.0),
+        signed=variable.endswith(("_error", "energy_residual")) or bool(-finite.min() > 1e-3 * finite.max() > 0.0),
         panels=tuple(Panel(*name, _rows(one)) for name, one in zip(names, values, strict=True)),
         not_drawn=not_drawn,
     )  # fmt: skip

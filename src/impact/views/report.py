@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 from xml.etree import ElementTree
 
-from ..data.verdict import KINDS, Judged, Verdict
+from ..comparison.verdict import KINDS, Judged, Verdict
 from ..text import safe_text
 
 PROGRAM = "impact compare"

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ..data.selecting import places_of, select
 from ..errors import UsageError, did_you_mean
+from ..results.select import places_of, select
 from ..text import safe_text
 
 if TYPE_CHECKING:

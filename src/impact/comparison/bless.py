@@ -1,0 +1,98 @@
+"""A new baseline in the place of an old one, with the reason why."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import xarray as xr
+
+from ..errors import ResultError, UsageError
+from ..results.replay import described, own, repeats
+from ..results.store import check_output, load, save
+from ..results.summary import tally_of
+from ..text import safe_text
+from .compare import check_result, compare
+from .tolerances import Tolerances, in_effect
+from .verdict import Verdict
+
+
+def bless(
+    new: str | Path,
+    baseline: str | Path,
+    *,
+    reason: str,
+    tol: float | Tolerances | None = None,
+    allow_failed: bool = False,
+    show: Callable[[Verdict], None] = lambda verdict: None,
+) -> Verdict | None:
+    """Let a result take the place of a baseline, which then carries the reason and the tolerances it is judged by.
+
+    Parameters
+    ----------
+    new, baseline : files; the baseline need not exist yet
+    reason : why the numbers changed
+    tol : see `compare`; the new baseline carries them, so that a coarser solver does not loosen the guard
+    allow_failed : accept a result with failed points
+    show : is told the verdict before anything is written; if it raises an error nothing is
+
+    Returns
+    -------
+    Verdict, or None : how the two differed; None where there was no baseline
+
+    Raises
+    ------
+    ResultError : one of the files is not a readable result
+    UsageError : the reason is empty, a tolerance is not right, the two are one file, or points failed
+    StoreError : the disk is full or failed; the baseline is as it was
+
+    >>> import impact, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     impact.save(impact.sweep("configs/figure6.toml"), f"{folder}/new.h5")
+    ...     impact.bless(f"{folder}/new.h5", f"{folder}/baseline.h5", reason="first")
+    ...     impact.load(f"{folder}/baseline.h5").attrs["reason"]
+    'first'
+    """
+    if not reason.strip():
+        raise UsageError("--reason: empty, wants why the numbers changed")
+    if re.search("[\0\ud800-\udfff]", reason):
+        raise UsageError(f'--reason: got "{safe_text(reason, 60)}", expected UTF-8 text without NUL')
+    new, baseline = Path(new), Path(baseline)
+    check_output(baseline, overwrite=True, source=new)
+    result = load(new)
+    check_result(result, str(new))
+    if not allow_failed:
+        _check_failed(result, new)
+    before = _standing(baseline)
+    verdict = None
+    if before is not None:
+        found = compare(result, before, tol=tol)
+        verdict = replace(found, new=str(new), baseline=str(baseline), repeats=repeats(str(new), result))
+        show(verdict)
+    kept = in_effect(tol, result.attrs if before is None else before.attrs)
+    save(result.assign_attrs(reason=reason, tolerances=json.dumps(kept)), baseline, overwrite=True)
+    return verdict
+
+
+def _check_failed(result: xr.Dataset, path: Path) -> None:
+    """Refuse a result with failed points, whose NaN every later failure would equal."""
+    tally = tally_of(result)
+    if tally.failed:
+        status, model, places = tally.failed_at[0]
+        point = result["status"].isel(dict(zip(result["status"].dims, (model, *places), strict=True)))
+        at = described(own({str(dim): point[dim].item() for dim in result["status"].dims}))
+        count = f"{tally.failed:,} of {tally.points:,} points failed, the first at {at} ({status.name.lower()})"
+        raise UsageError(f"{safe_text(str(path))}: {count}; expected none, or --allow-failed")
+
+
+def _standing(baseline: Path) -> xr.Dataset | None:
+    """The baseline as it is, if there is one; what is no result is not written over."""
+    if not baseline.exists():
+        return None
+    try:
+        return load(baseline)
+    except ResultError as error:
+        raise ResultError(f"{error}; it is left alone, remove it to make a new baseline") from None

@@ -1,0 +1,185 @@
+"""What a comparison of two results comes to: a frozen value that says it in a sentence, and where to look."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import xarray as xr
+
+from ..contact.status import Status
+from ..results.replay import described, replay
+from ..text import safe_text
+
+Kind = Literal["nothing in common", "physics config", "labels", "units", "missing variable", "values"]
+# in the order in which a verdict tells them: what explains the most first
+KINDS: tuple[Kind, ...] = (
+    "nothing in common", "physics config", "labels", "units", "missing variable", "values",
+)  # fmt: skip
+NAMED = 4  # of the things of one kind that the first line names
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One thing, other than a value, in which two results differ: of what kind, its name, a sentence."""
+
+    kind: Kind
+    name: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One variable, compared at all common points.
+
+    Parameters
+    ----------
+    name : of the variable
+    judged : how, see `impact.results.schema.SCHEMA`
+    tolerance : relative to the scale of a point; NaN where there is none (exact, reported)
+    points, different : common points, and those of them that differ
+    worst : |new - baseline| at the worst point, in the variable's unit
+    times : the same in tolerances of that point; inf where nothing is allowed, or one of the two is NaN
+    at : the inputs of the worst point by config name, and its model; empty where all are the same
+    new, baseline : the values there
+    """
+
+    name: str
+    judged: str
+    tolerance: float
+    points: int
+    different: int
+    worst: float
+    times: float
+    at: Mapping[str, float | str]
+    new: float
+    baseline: float
+
+    @property
+    def is_equal(self) -> bool:
+        return self.different == 0 or self.judged == "reported"
+
+    @property
+    def place(self) -> str:
+        """The coordinates of the worst point.
+
+        >>> steps = Judged("steps", "reported", 0.0, 9, 1, 2.0, 0.0, {"model": "hertz", "e": 0.1 + 0.2}, 5, 7)
+        >>> steps.place
+        'model=hertz, e=0.3'
+        """
+        return described(self.at)
+
+    @property
+    def text(self) -> str:
+        """How many of how many differ, and the worst case with its coordinates."""
+        if not self.different:
+            return f"{self.name}: none of {self.points} differ"
+        many = f"{self.name}: {self.different} of {self.points} differ"
+        at = f" at {self.place}" if self.place else ""
+        if self.judged == "exact" or self.worst != self.worst:
+            words = (_word(self.name, value) for value in (self.new, self.baseline))
+            both = self.new != self.new and self.baseline != self.baseline
+            which = "first" if self.judged == "exact" else "worst"
+            told = f"{many}, the {which}{at}: {', baseline '.join(words)}"
+            return f"{told}, which their statuses do not explain" if both else told
+        if self.judged == "reported":
+            return f"{many}, by {self.worst:g} at most{at} (not judged)"
+        times = f"{self.times:.3g} x tolerance" if self.times < float("inf") else "where none is allowed"
+        return f"{many}, worst {self.worst:.2g} = {times}{at}"
+
+
+def _word(name: str, value: float) -> str:
+    if name == "status" and value in set(Status):
+        return Status(int(value)).name.lower()
+    return f"{value:.10g}".replace("nan", "NaN")
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether a result is equal to its baseline, in what it is not, and where.
+
+    `str(verdict)` is the report, so that `assert verdict.equal, str(verdict)` is a test.
+
+    Parameters
+    ----------
+    new, baseline : what was compared, by the names of their files
+    faults : what differs besides values
+    variables : the variables that both have
+    notes : what is said but not judged
+    ratios : |new - baseline| in tolerances, for every judged variable at every common point
+    repeats : how a command that runs one of the points again begins; empty where there is none
+
+    >>> import impact
+    >>> result = impact.sweep("configs/figure6.toml")
+    >>> moved = result.assign(e_out=result["e_out"] + 2e-9)
+    >>> verdict = impact.compare(moved, result)
+    >>> verdict.equal, [one.name for one in verdict.differing]
+    (False, ['e_out'])
+    """
+
+    new: str
+    baseline: str
+    faults: tuple[Fault, ...]
+    variables: tuple[Judged, ...]
+    notes: tuple[str, ...] = ()
+    repeats: tuple[str, ...] = ()
+    ratios: xr.Dataset = field(default_factory=xr.Dataset, repr=False, compare=False)
+
+    @property
+    def equal(self) -> bool:
+        return not self.faults and not self.differing
+
+    @property
+    def differing(self) -> tuple[Judged, ...]:
+        """The variables whose values differ, the worst first."""
+        # among equals a status is told first, which explains the NaNs of the others
+        found = (one for one in self.variables if not one.is_equal)
+        return tuple(sorted(found, key=lambda one: (-one.times, one.judged != "exact")))
+
+    @property
+    def ranked(self) -> tuple[Judged, ...]:
+        """All variables: those whose values differ, the worst first, then the others."""
+        return (*self.differing, *(one for one in self.variables if one.is_equal))
+
+    @property
+    def headline(self) -> str:
+        """The first line: equal and how closely, or not equal in what."""
+        if self.equal:
+            judged = [one for one in self.variables if one.judged != "reported"]
+            values = sum(one.points for one in judged)
+            said = f"equal: {len(judged)} variables, {values:,} values"
+            closest = max(judged, key=lambda one: one.times, default=None)
+            if closest is None or not closest.times:
+                return f"{said}, none differs"
+            at = f" at {closest.place}" if closest.place else ""
+            return f"{said}, largest difference {closest.times:.2g} x tolerance: {closest.name}{at}"
+        named = [(fault.kind, fault.name) for fault in self.faults]
+        named += [("values", one.name) for one in self.differing]
+        told = []
+        for kind in KINDS:
+            names = list(dict.fromkeys(safe_text(name, 60) for own, name in named if own == kind and name))
+            more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+            shown = f" ({', '.join(names[:NAMED])}{more})" if names else ""
+            told += [f"{kind}{shown}"] if any(own == kind for own, _ in named) else []
+        return f"not equal: {', '.join(told)}"
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """What differs, a line each; after a value's the command that repeats its worst point."""
+        faults = sorted(self.faults, key=lambda fault: KINDS.index(fault.kind))
+        found = [f"{fault.kind}: {fault.text}" for fault in faults]
+        for one in self.differing:
+            repeats = f"  {self.replay(one)}"
+            # several variables are often worst at one point
+            found += [one.text, repeats] if repeats.strip() and repeats not in found else [one.text]
+        return tuple(found)
+
+    def replay(self, one: Judged) -> str:
+        """The command that runs the worst point of a variable again; empty where there is none."""
+        if not self.repeats or not one.at:
+            return ""
+        return replay(self.repeats, one.at)
+
+    def __str__(self) -> str:
+        return "\n".join([self.headline, *self.lines, *(f"note: {note}" for note in self.notes)])

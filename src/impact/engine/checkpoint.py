@@ -1,0 +1,234 @@
+"""The work folder: what a sweep has finished, kept block by block, so that nothing completed is ever lost.
+
+Beside the output `results.h5` stands `results.h5.work/` while a sweep runs: the plan, a lock, and a file for each
+finished block, written to another name, synced, renamed. It goes when the result is whole.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from filelock import FileLock, Timeout
+
+from ..atomic import appearing, sync_folder
+from ..contact.strike import Rebound
+from ..errors import ImpactError, InUseError, StoreError, UsageError
+from ..text import safe_text
+from .apart import differences
+from .execute import settled
+from .packing import FIELDS, pack, unpack
+from .plan import Plan
+from .trajectories import BLOCK, Stretch, trajectories
+
+PLAN, LOCK = "plan.json", "lock"
+ELSE = "give the sweep that it is of, another output, or --overwrite to begin anew"
+TOLD = 3  # differences
+
+
+def folder_of(output: Path) -> Path:
+    """The work folder of an output."""
+    return output.with_name(f"{output.name}.work")
+
+
+def part_of(output: Path) -> Path:
+    """The name of an output while it is assembled."""
+    return output.with_name(f"{output.name}.part")
+
+
+@dataclass(frozen=True)
+class Work:
+    """A work folder that this process has locked; `key` tells what its blocks are of."""
+
+    folder: Path
+    key: str
+
+    def path(self, number: int) -> Path:
+        return self.folder / f"{number:08d}.npz"
+
+    def _of(self, stretch: Stretch) -> str:
+        """What a block says of itself."""
+        return f"{stretch.number} {stretch.model} {stretch.start} {stretch.stop} {self.key}"
+
+    def store(self, stretch: Stretch, rebound: Rebound) -> None:
+        """Keep a finished block.
+
+        Raises
+        ------
+        StoreError : the disk is full or failed
+        """
+        with appearing(self.path(stretch.number), overwrite=True, part=self.folder / "block.part") as sink:
+            pack(sink, self._of(stretch), rebound)
+
+    def load(self, stretch: Stretch) -> Rebound | None:
+        """A finished block; None if it is not there, or not whole."""
+        # what is no regular file might never end
+        if not self.path(stretch.number).is_file():
+            return None
+        return unpack(self.path(stretch.number), self._of(stretch), stretch.size)
+
+
+@contextlib.contextmanager
+def working(folder: Path, plan: Plan, *, resume: bool, overwrite: bool) -> Iterator[Work]:
+    """A work folder, locked.
+
+    Parameters
+    ----------
+    folder : where
+    plan : what it runs
+    resume : go on with what a leftover folder holds
+    overwrite : throw away what a leftover folder holds, unless it is resumed
+
+    Raises
+    ------
+    InUseError : another process works there
+    UsageError : a leftover folder is neither to be resumed nor overwritten, or is of another sweep
+    StoreError : the disk is full or failed
+    """
+    _check(folder)
+    record = _record(plan)
+    lock = FileLock(folder / LOCK, timeout=0)
+    try:
+        _lock(lock, folder)
+        _prepare(folder, record, resume=resume, overwrite=overwrite)
+        yield Work(folder, _key(record))
+    finally:
+        lock.release()
+
+
+@contextlib.contextmanager
+def held(folder: Path, plan: Plan) -> Iterator[Work]:
+    """A work folder of a plan as it is, locked.
+
+    Raises
+    ------
+    InUseError, StoreError : see `working`
+    UsageError : it is of another sweep
+    """
+    record = _record(plan)
+    told = _told_apart(folder, record)
+    if told:
+        raise UsageError(f"{safe_text(str(folder))}: {told}; wants the folders of one sweep")
+    lock = FileLock(folder / LOCK, timeout=0)
+    try:
+        _lock(lock, folder)
+        yield Work(folder, _key(record))
+    finally:
+        lock.release()
+
+
+def tidy(output: Path, plan: Plan) -> None:
+    """Remove what a sweep has left that was killed when its result was whole, if nobody works there."""
+    folder = folder_of(output)
+    with contextlib.suppress(ImpactError, Timeout, OSError):
+        if folder.is_dir():
+            _check(folder)
+            plan = settled(plan, trajectories(plan))
+            with FileLock(folder / LOCK, timeout=0):
+                if not os.path.lexists(folder / PLAN) or _is_of(folder, _record(plan), resume=True):
+                    part_of(output).unlink(missing_ok=True)
+                    remove(folder)
+
+
+def _check(folder: Path) -> None:
+    """Refuse what has the name of a work folder, and is none."""
+    shown = safe_text(str(folder))
+    if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
+        raise UsageError(f"{shown}: is not a folder, and is left alone")
+    if folder.is_dir() and not os.path.lexists(folder / PLAN):
+        strange = [one.name for one in folder.iterdir() if one.name != LOCK and not one.name.endswith(".part")]
+        if strange:
+            raise UsageError(f"{shown}: holds {safe_text(strange[0])}, and no {PLAN}; it is left alone")
+
+
+def remove(folder: Path) -> None:
+    """Remove a folder whose result is whole; what cannot be, and what others have put there, does no harm."""
+    with contextlib.suppress(OSError):
+        _clear(folder, plan=True)
+        (folder / LOCK).unlink()
+        folder.rmdir()
+
+
+def _lock(lock: FileLock, folder: Path) -> None:
+    try:
+        folder.mkdir(exist_ok=True)
+        sync_folder(folder.parent)
+        lock.acquire()
+    except Timeout:
+        raise InUseError(
+            f"{safe_text(str(folder.with_suffix('')))}: is being written by another process"
+        ) from None
+    except OSError as error:
+        raise StoreError(f"{safe_text(str(folder))}: {error.strerror}") from error
+
+
+def _prepare(folder: Path, record: Mapping[str, Any], *, resume: bool, overwrite: bool) -> None:
+    """Have a folder with the plan, and with the blocks of it that are to be gone on with."""
+    shown = safe_text(str(folder))
+    try:
+        left = any(one.name != LOCK for one in folder.iterdir())
+        if left and not resume and not overwrite:
+            raise UsageError(
+                f"{shown}: is left of an interrupted sweep; --resume goes on with it, --overwrite begins anew"
+            )
+        if left and _is_of(folder, record, resume=resume):
+            return
+        _clear(folder)
+        # what is removed must not come back beside another plan
+        sync_folder(folder)
+        with appearing(folder / PLAN, overwrite=True) as sink:
+            sink.write(json.dumps(record).encode())
+    except OSError as error:
+        raise StoreError(f"{shown}: {error.strerror}") from error
+
+
+def _record(plan: Plan) -> dict[str, Any]:
+    """What a folder is of: all that the finished blocks depend on."""
+    solver = plan.config.solver
+    return {"schema": FIELDS, "block": BLOCK, "collapse": solver.collapse, "core": solver.core,
+            "physics": plan.physics}  # fmt: skip
+
+
+def _key(record: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(record).encode()).hexdigest()
+
+
+def _clear(folder: Path, plan: bool = False) -> None:
+    """Remove the finished blocks, and what was left half written."""
+    for one in (*folder.glob("*.npz"), *folder.glob("*.part"), *([folder / PLAN] if plan else [])):
+        one.unlink(missing_ok=True)
+
+
+def _is_of(folder: Path, record: Mapping[str, Any], *, resume: bool) -> bool:
+    """Whether a folder has finished blocks of a sweep to go on with.
+
+    Raises
+    ------
+    UsageError : it is to be resumed, and is of another sweep, which is told
+    """
+    if not resume or not os.path.lexists(folder / PLAN):
+        # without a plan it was interrupted before anything was done
+        return False
+    told = _told_apart(folder, record)
+    if told:
+        raise UsageError(f"{safe_text(str(folder))}: {told}; {ELSE}")
+    return True
+
+
+def _told_apart(folder: Path, record: Mapping[str, Any]) -> str | None:
+    """In what a folder is of another sweep; None if it is of this one."""
+    try:
+        if not (folder / PLAN).is_file():
+            raise ValueError
+        stored = json.loads((folder / PLAN).read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return f"its {PLAN} cannot be read"
+    told = list(differences(stored, json.loads(json.dumps(record))))
+    more = f" and {len(told) - TOLD} more" if len(told) > TOLD else ""
+    return f"is of another sweep: {'; '.join(told[:TOLD])}{more}" if told else None

@@ -1,0 +1,78 @@
+"""How far a sweep is, and what is said of it where it ends before it is whole."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ..contact.status import FIRST_FAILURE
+from ..contact.strike import Rebound
+from ..errors import StoreError, UnfinishedError, UsageError
+from ..text import safe_text
+from .trajectories import Stretch
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a sweep is: trajectories integrated, and points stored, of all; and how many of either failed."""
+
+    trajectories: int
+    of_trajectories: int
+    points: int
+    of_points: int
+    failed: int
+
+
+Tell = Callable[[Progress], None]
+
+
+@dataclass
+class Gauge:
+    """Counts what is finished, and tells it."""
+
+    at: Progress
+    tell: Tell
+
+    @classmethod
+    def begin(cls, trajectories: int, points: int, tell: Tell) -> Gauge:
+        return cls(Progress(0, trajectories, 0, points, 0), tell)
+
+    @property
+    def is_full(self) -> bool:
+        """Whether all trajectories are integrated."""
+        return self.at.trajectories == self.at.of_trajectories
+
+    def count(self, stretch: Stretch, rebound: Rebound) -> None:
+        """One more block is finished."""
+        failed = int(np.count_nonzero(rebound.status >= FIRST_FAILURE))
+        self.at = replace(
+            self.at, trajectories=self.at.trajectories + stretch.size, failed=self.at.failed + failed
+        )
+
+    def say(self) -> None:
+        self.tell(self.at)
+
+
+@contextmanager
+def kept(folder: Path, gauge: Gauge, again: str, more: Callable[[Exception], list[str]]) -> Iterator[None]:
+    """Have an error say what is kept nevertheless.
+
+    Parameters
+    ----------
+    folder : where
+    gauge : how much
+    again : what goes on with it
+    more : what else there is to say of an error
+    """
+    try:
+        yield
+    except (StoreError, UnfinishedError, UsageError, MemoryError) as error:
+        of = f"{gauge.at.trajectories:,} of {gauge.at.of_trajectories:,} trajectories"
+        left = f"{of} are kept in {safe_text(str(folder))}; {again} goes on"
+        is_memory = isinstance(error, MemoryError)
+        lines = ["out of memory" if is_memory else "", str(error), *more(error), left]
+        raise (StoreError if is_memory else type(error))("; ".join(filter(None, lines))) from error

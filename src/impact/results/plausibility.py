@@ -1,0 +1,38 @@
+"""Plausibility: values that are allowed, and most likely not what was meant."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from ..contact.status import Status
+from ..text import safe_text
+from .summary import MAX_INDENTATION, Tally
+
+# Young's moduli outside are most likely in another unit: gels have 1e3 Pa, diamond has 1e12 Pa
+MIN_MODULUS_PA, MAX_MODULUS_PA = 1e3, 1e13
+
+
+def material_notes(materials: Mapping[str, Mapping[str, object]]) -> Iterator[str]:
+    """A sentence for each material whose Young's modulus E [Pa] is implausible.
+
+    >>> list(material_notes({"steel": {"E": 210.0}, "rubber": {"E": 5e6}}))
+    ['materials.steel.E: got 210 Pa; did you mean 210 GPa?']
+    """
+    for name, material in materials.items():
+        modulus = material.get("E")
+        if isinstance(modulus, float) and not MIN_MODULUS_PA <= modulus <= MAX_MODULUS_PA:
+            hint = f"did you mean {modulus:g} GPa?" if modulus < MIN_MODULUS_PA else "no material is as stiff"
+            yield f"materials.{safe_text(name)}.E: got {modulus:g} Pa; {hint}"
+
+
+def result_notes(tally: Tally) -> Iterator[str]:
+    """A sentence for each thing that is implausible in what came out of a sweep."""
+    if tally.points and tally.counts.keys() == {Status.NO_IMPACT}:
+        yield f"none of {tally.points:,} points is an impact: v1 <= v2, the balls do not approach"
+    if tally.deep:
+        many = f"{tally.deep:,} of {tally.points:,} points"
+        limit = f"{MAX_INDENTATION:.0%} of the smaller radius"
+        yield (
+            f"peak indentation above {limit} at {many}, at most {tally.deepest:.0%}; Hertz theory assumes small "
+            "indentation"
+        )

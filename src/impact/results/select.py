@@ -1,0 +1,113 @@
+"""Which part of a result is asked for: models by their keys, points by values of the axes."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import UsageError, did_you_mean
+from ..text import safe_text
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Mask = NDArray[np.bool_]
+
+# a value given by hand matches one that was computed when it differs by rounding only
+SAME = 1e-9
+# two labels are the same when they differ by the rounding of a range at most: powers and logarithms differ in
+# their last bits from one processor to another
+ROUNDING = 1e-12
+NUMBERS = "fiu"
+
+Values = NDArray[Any]
+Places = NDArray[np.intp]
+
+
+def places_of(models: Sequence[str], dataset: xr.Dataset) -> list[int]:
+    """The places of models along `model`, in the order of their keys; one that is named twice counts once.
+
+    Raises
+    ------
+    UsageError : a model is not in the result
+    """
+    known = [str(key) for key in dataset["model"].values]
+    for key in models:
+        if key not in known:
+            raise UsageError(f'no model "{safe_text(key)}" in this result; {did_you_mean(key, known)}')
+    return [known.index(key) for key in dict.fromkeys(models)]
+
+
+def select(dataset: xr.Dataset, sel: Mapping[str, float | str]) -> xr.Dataset:
+    """The result at values of axes, or of coordinates along an axis; several along one have to agree.
+
+    Parameters
+    ----------
+    dataset : a result
+    sel : the values, by name; an axis that has its value is none any more
+
+    Raises
+    ------
+    UsageError : an axis or a value is not in the result
+    """
+    axes = [str(dim) for dim in dataset.sizes if dim != "model"]
+    masks: dict[Hashable, Mask] = {}
+    for name, value in sel.items():
+        if name not in dataset.coords or len(dataset[name].dims) != 1 or dataset[name].dims == ("model",):
+            raise UsageError(f'no axis "{safe_text(name)}" in this result; {did_you_mean(name, axes)}')
+        (dim,) = dataset[name].dims
+        values = dataset[name].values
+        same = _same(values, value)
+        if dim in masks and same.any():
+            same &= masks[dim]
+        if not same.any():
+            shown = ", ".join(f"{one:g}" if values.dtype.kind == "f" else str(one) for one in values[:8].tolist())
+            has = safe_text(shown + (", ..." if values.size > 8 else ""))
+            raise UsageError(f"no {safe_text(f'{name} = {value}')} in this result; {safe_text(name)} is {has}")
+        masks[dim] = same
+    return dataset.isel({dim: int(np.argmax(same)) for dim, same in masks.items()})
+
+
+def _same(values: np.ndarray, value: float | str) -> Mask:
+    """Which values are the one asked for."""
+    if values.dtype.kind != "f":
+        return np.asarray(values.astype(str) == str(value))
+    number = _number(value)
+    return np.asarray(np.isclose(values, np.nan if number is None else number, rtol=SAME, atol=0.0))
+
+
+def _number(value: float | str) -> float | None:
+    try:
+        return float(value)
+    except ValueError:
+        return None
+
+
+def matched(new: Sequence[Values], baseline: Sequence[Values]) -> tuple[Places, Places]:
+    """The places of equal labels on an axis in both, in the order of the baseline."""
+    for rounding in (ROUNDING, 0.0):
+        rows = np.stack([_numbered(a, b, rounding) for a, b in zip(new, baseline, strict=True)], axis=1)
+        # only a column of labels with a row for each is unique on an axis: what rounding would merge is told apart
+        _, row = np.unique(rows, axis=0, return_inverse=True)
+        own, other = row[: len(new[0])], row[len(new[0]) :]
+        if len(np.unique(own)) == len(own) and len(np.unique(other)) == len(other):
+            break
+    else:
+        raise UsageError("an axis has two points of the same labels; compare takes results of a sweep")
+    _, here, there = np.intersect1d(own, other, return_indices=True)
+    order = np.argsort(there, kind="stable")
+    return here[order], there[order]
+
+
+def _numbered(new: Values, baseline: Values, rounding: float) -> Places:
+    """A number for each label of both, equal where the labels are."""
+    numbers = new.dtype.kind in NUMBERS and baseline.dtype.kind in NUMBERS
+    new, baseline = (one.astype(float if numbers else str) for one in (new, baseline))
+    values, number = np.unique(np.concatenate([new, baseline]), return_inverse=True)
+    if numbers:
+        another = ~np.isclose(values[1:], values[:-1], rtol=rounding, atol=0.0)
+        number = np.concatenate([[0], np.cumsum(another)])[number]
+    return np.asarray(number, np.intp)

@@ -1,0 +1,99 @@
+"""Slabs of a result of any size, and the axes along which each of its variables varies.
+
+The variables of a large result are computed, or read, when they are indexed. A variable that is computed says in
+`encoding["varies_along"]`, by model, along which axes it varies: along the others it has the same value everywhere,
+so that a count over all points is a count over these axes, times the size of the others.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+
+import numpy as np
+import xarray as xr
+
+# points of a slab: enough to pay for the interpreter, few enough to stay in cache and in little memory
+SLAB_POINTS = 2**17
+# points up to which something is computed in full that nothing but a summary asks for: a few seconds
+MAX_SUMMARY_POINTS = 2**26
+VARIES_ALONG = "varies_along"
+
+Where = dict[Hashable, slice]
+
+
+def slabs(sizes: Mapping[Hashable, int], points: int = SLAB_POINTS) -> Iterator[Where]:
+    """All points in C order, in slabs of at most so many, or of one place along all axes but the last.
+
+    >>> list(slabs({"e": 2, "v1": 3}, 2))[:2]
+    [{'e': slice(0, 1, None), 'v1': slice(0, 2, None)}, {'e': slice(0, 1, None), 'v1': slice(2, 3, None)}]
+    >>> list(slabs({}))
+    [{}]
+    """
+    shape = tuple(sizes.values())
+    # the axes after `split` are whole in every slab, those before it have one place
+    split = next((axis for axis in range(len(shape)) if math.prod(shape[axis + 1 :]) <= points), 0)
+    step = max(1, points // math.prod(shape[split + 1 :]))
+    lengths = (*(1 for _ in shape[:split]), step, *shape[split + 1 :])
+    yield from _tiles(sizes, lengths[: len(shape)])
+
+
+def aligned_slabs(
+    sizes: Mapping[Hashable, int], lengths: Sequence[int], points: int = SLAB_POINTS
+) -> Iterator[Where]:
+    """All points, in slabs of whole chunks of some lengths along the axes, as many chunks as make up about `points`.
+
+    >>> [where["v1"] for where in aligned_slabs({"e": 2, "v1": 4}, (2, 2), 4)]
+    [slice(0, 2, None), slice(2, 4, None)]
+    """
+    shape, wide = tuple(sizes.values()), list(lengths)
+    for axis in reversed(range(len(shape))):
+        wide[axis] = min(wide[axis] * max(1, points // math.prod(wide)), shape[axis])
+    yield from _tiles(sizes, wide)
+
+
+def _tiles(sizes: Mapping[Hashable, int], lengths: Sequence[int]) -> Iterator[Where]:
+    steps = [range(0, size, length) for size, length in zip(sizes.values(), lengths, strict=True)]
+    for starts in itertools.product(*steps):
+        yield {
+            dim: slice(start, min(start + length, size))
+            for (dim, size), start, length in zip(sizes.items(), starts, lengths, strict=True)
+        }
+
+
+def is_lazy(variable: xr.Variable) -> bool:
+    """Whether the values of a variable are computed, or read, when they are indexed."""
+    return not variable._in_memory
+
+
+def varying_dims(dataset: xr.Dataset, name: str) -> tuple[Hashable, ...]:
+    """The dimensions along which a variable varies, as far as it is known; all of one that is in memory.
+
+    That depends on the models: ask for one after the other, `dataset.isel(model=place)`.
+    """
+    variable = dataset.variables[name]
+    if not is_lazy(variable) or VARIES_ALONG not in variable.encoding or "model" not in dataset.coords:
+        return variable.dims
+    by_model = variable.encoding[VARIES_ALONG]
+    keys = [str(key) for key in np.ravel(dataset["model"].values)]
+    along = {"model", *(dim for key in keys for dim in by_model[key])}
+    return tuple(dim for dim in variable.dims if dim in along)
+
+
+def factored(dataset: xr.Dataset, names: Sequence[str], *more: Hashable) -> tuple[xr.Dataset, int]:
+    """Some variables over the dimensions along which any of them varies, and how often each point of that counts.
+
+    The other dimensions are at their first place.
+
+    Parameters
+    ----------
+    dataset : a result
+    names : of the variables
+    more : dimensions that are kept in any case
+    """
+    kept = {*more, *(dim for name in names for dim in varying_dims(dataset, name))}
+    dims = dict.fromkeys(dim for name in names for dim in dataset.variables[name].dims)
+    fixed = [dim for dim in dims if dim not in kept]
+    weight = math.prod(dataset.sizes[dim] for dim in fixed)
+    return dataset[list(names)].isel(dict.fromkeys(fixed, 0)), weight
