@@ -26,17 +26,18 @@ from .engine.executors import ALONE, Team, team_of
 from .engine.plan import Plan
 from .engine.plugins import read_plugins
 from .engine.progress import Tell
+from .engine.trajectories import check_count
 from .errors import ImpactError as ImpactError
 from .errors import UsageError
 from .results.again import histories
+from .results.backend import load as load
+from .results.backend import save as save
 from .results.impact import Impact as Impact
 from .results.impact import impact_of
 from .results.provenance import config_of, part_of, picked_out, stored_config
 from .results.ranking import Ranking, ranking
 from .results.replay import repeats
-from .results.store import load as load
-from .results.store import save as save
-from .results.sweep import in_memory
+from .results.sweep import sweep_in_memory
 from .sweeps.config import read_config
 from .sweeps.grid import MAX_POINTS
 from .sweeps.point import one_point
@@ -54,21 +55,29 @@ def prepare(
     plugins: Sequence[ForceModel | str | Path] = (),
     max_points: int = MAX_POINTS,
 ) -> Plan:
-    """The plan of a config: a TOML file, or a mapping of the same shape."""
+    """The plan of a config: a TOML file, or a mapping of the same shape.
+
+    Raises
+    ------
+    ConfigError : with all problems of the config
+    UsageError : more than `max_points` trajectories would be integrated
+    """
     source = Path(source) if isinstance(source, str) else source
     own = read_plugins(plugins)
     config = read_config(source, overrides, own.models, max_points)
-    return Plan(config, own.of(config.models))
+    plan = Plan(config, own.of(config.models))
+    check_count(plan, max_points, str(source) if isinstance(source, Path) else "config")
+    return plan
 
 
 def execute(
     plan: Plan,
     team: Team = ALONE,
     tell: Tell | None = None,
-    stopping: Callable[[], bool] = never,
+    should_stop: Callable[[], bool] = never,
 ) -> xr.Dataset:
     """The result of a plan, in memory; for the parameters see `impact.results.sweep.sweep_into`."""
-    return in_memory(plan, team=team, tell=tell or (lambda progress: None), stopping=stopping)
+    return sweep_in_memory(plan, team=team, tell=tell or (lambda progress: None), should_stop=should_stop)
 
 
 def sweep(

@@ -91,14 +91,14 @@ def run(
     """Run one impact: what goes in, what comes out, and how far it can be trusted."""
     from .. import api
     from ..contact.status import FIRST_FAILURE
-    from ..results import store
+    from ..results import backend
     from . import tables
 
     if times is not None and history is None:
         raise UsageError(f"--times {times}: expected --history FILE beside it")
     if history is not None:
         for one in (source, *(plugins or ())):
-            store.check_output(history, overwrite=overwrite, source=one)
+            backend.check_output(history, overwrite=overwrite, source=one)
     impact = api.run(
         source, model=model, at=pairs("--at", at), overrides=sets or (), plugins=plugins or (), times=times
     )
@@ -145,10 +145,10 @@ def init(
     overwrite: Overwrite = False,
 ) -> None:
     """Write a commented starter config, ready to sweep."""
+    from ..results import backend
     from ..results import provenance as origin
-    from ..results import store
 
-    store.write_whole(path, origin.STARTER.read_bytes(), overwrite=overwrite)
+    backend.write_whole(path, origin.STARTER.read_bytes(), overwrite=overwrite)
     door.say(f"{safe_text(str(path))}: written; next: impact sweep {safe_text(str(path))}")
 
 
@@ -158,14 +158,14 @@ def schema(
     overwrite: Overwrite = False,
 ) -> None:
     """The JSON Schema of the config, from which editors complete and check it."""
-    from ..results import store
+    from ..results import backend
     from ..sweeps.config import json_schema
 
     text = json.dumps(json_schema(), indent=2, ensure_ascii=False) + "\n"
     if output is None:
         print(text, end="")
     else:
-        store.write_whole(output, text.encode(), overwrite=overwrite)
+        backend.write_whole(output, text.encode(), overwrite=overwrite)
         door.say(f"{safe_text(str(output))}: written")
 
 

@@ -70,7 +70,7 @@ def plot(
     loop, history and impulse follow a point of the result through time again; --sel chooses it.
     """
     from .. import api
-    from ..results import store
+    from ..results import backend
     from ..views.kinds import Choice, as_csv, draw
     from ..views.look import check_picture, save_figure
 
@@ -96,11 +96,11 @@ def plot(
         picture, table = (_named(path, one, len(kinds)) for path in (output, data))
         for path in (picture, table):
             if path is not None:
-                store.check_output(path, overwrite=True, source=result)
+                backend.check_output(path, overwrite=True, source=result)
         assert picture is not None
         save_figure(draw(numbers, WIDTHS[width]), picture)
         if table is not None:
-            store.write_whole(table, as_csv(numbers).encode(), overwrite=True)
+            backend.write_whole(table, as_csv(numbers).encode(), overwrite=True)
         door.say(_told(picture, numbers))
     if as_json:
         from dataclasses import asdict

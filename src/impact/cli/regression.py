@@ -132,7 +132,7 @@ def rerun(
 def _check_plot(plot: Path | None, *sources: Path) -> None:
     """Refuse a picture that cannot be stored before any work is done."""
     if plot is not None:
-        from ..results.store import check_output
+        from ..results.backend import check_output
         from ..views.look import check_picture
 
         check_picture(plot)

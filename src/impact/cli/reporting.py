@@ -27,16 +27,16 @@ def report(
     It is one file, opens without a network, and has nothing that runs.
     """
     from .. import api
-    from ..results import store
+    from ..results import backend
 
     output = output or result.with_suffix(ENDINGS[0])
     shown = safe_text(str(output))
     if output.suffix.lower() not in ENDINGS:
         raise UsageError(f"{shown}: wants a name that ends in {ENDINGS[0]}")
     for source in (result, *(plugin or ())):
-        store.check_output(output, overwrite=True, source=source)
+        backend.check_output(output, overwrite=True, source=source)
     page = api.report(api.load(result), plugins=plugin or ())
     content = page.encode()
-    store.write_whole(output, content, overwrite=True)
+    backend.write_whole(output, content, overwrite=True)
     figures = page.count("<figure>")
     door.say(f"{shown}: {figures} figure{'' if figures == 1 else 's'}, {len(content) / 1000:,.0f} kB")

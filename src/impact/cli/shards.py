@@ -31,7 +31,7 @@ def do(
     overwrite: bool,
     quiet: bool,
     as_json: bool,
-    stopping: Callable[[], bool],
+    should_stop: Callable[[], bool],
 ) -> None:
     """Do a shard of a plan.
 
@@ -45,11 +45,11 @@ def do(
     from .progress import progress
 
     part = Shard.parse(shard)
-    with who.team(quiet=quiet, should_stop=stopping) as team, progress(quiet=quiet) as tell:
+    with who.team(quiet=quiet, should_stop=should_stop) as team, progress(quiet=quiet) as tell:
         done = sweep_shard(
-            output, plan, part, command, overwrite=overwrite, team=team, tell=tell, stopping=stopping
+            output, plan, part, command, overwrite=overwrite, team=team, tell=tell, should_stop=should_stop
         )
-    if stopping():
+    if should_stop():
         raise UnfinishedError(f"{safe_text(str(done.folder))} has the whole shard")
     if as_json:
         print(dump({**asdict(done), "folder": str(done.folder), "shard": str(part)}))
@@ -75,12 +75,12 @@ def merge(
     """Make the result of a sweep from all of its shards; their folders stay."""
     with door.signals() as stopping:
         from ..engine.plugins import read_plugins
-        from ..results import merging
+        from ..results.shards import merge as merge_shards
         from . import progress, summary
 
         with progress.progress(quiet=quiet) as tell:
-            found, twice = merging.merge(
-                folders, output, read_plugins(plugins or ()), overwrite=overwrite, tell=tell, stopping=stopping
+            found, twice = merge_shards(
+                folders, output, read_plugins(plugins or ()), overwrite=overwrite, tell=tell, should_stop=stopping
             )
         if stopping():
             raise UnfinishedError(f"{safe_text(str(output))} was stored whole")

@@ -29,7 +29,7 @@ def execute(plan: Plan, stopping: Callable[[], bool], *, quiet: bool) -> xr.Data
     from .. import api
 
     with progress(quiet=quiet) as tell:
-        return api.execute(plan, tell=tell, stopping=stopping)
+        return api.execute(plan, tell=tell, should_stop=stopping)
 
 
 def summary(survey: Survey, output: Path) -> dict[str, Any]:
@@ -48,7 +48,7 @@ def summary(survey: Survey, output: Path) -> dict[str, Any]:
     return {
         "output": str(output), "points": tally.points, "models": outline.sizes["model"],
         "trajectories": survey.trajectories, "status": counted(tally.counts), "failed": tally.failed,
-        "first_failed": failures, "content_digest": outline.attrs["content_digest"],
+        "first_failed": failures, "layout": outline.encoding.get("layout"), "seal": outline.encoding.get("seal"),
     }  # fmt: skip
 
 

@@ -49,10 +49,10 @@ def sweep(
     """Run every model over a sweep and store post-impact velocities and their errors."""
     with door.signals() as stopping:
         from .. import api
-        from ..engine import checkpoint as work
-        from ..results import store, survey
+        from ..engine import checkpoint
+        from ..results import backend
         from ..results.plausibility import material_notes
-        from ..results.sweep import sweep_into
+        from ..results.sweep import finished, sweep_into
         from . import progress, summary
 
         who = Who(jobs, threads, scheduler, scheduler_file)
@@ -77,7 +77,7 @@ def sweep(
                 overwrite=overwrite,
                 quiet=quiet,
                 as_json=as_json,
-                stopping=stopping,
+                should_stop=stopping,
             )
             return
         if dry_run:
@@ -87,19 +87,19 @@ def sweep(
             if stopping():
                 raise UnfinishedError("nothing was written")
             return
-        found = None if overwrite else survey.held(output, plan)
+        found = None if overwrite else finished(output, plan)
         fresh = found is None
         if found is not None:
-            work.tidy(output, plan)
+            checkpoint.tidy(output, plan)
             if stopping():
                 raise UnfinishedError(f"{safe_text(str(output))} already holds this sweep")
         else:
             for source in (config, *(plugins or ())):
-                store.check_output(output, overwrite=overwrite, source=source)
+                backend.check_output(output, overwrite=overwrite, source=source)
             with who.team(quiet=quiet, should_stop=stopping) as team, progress.progress(quiet=quiet) as tell:
                 found = sweep_into(
                     output, plan, resume=resume, overwrite=overwrite, team=team, tell=tell,
-                    stopping=stopping,
+                    should_stop=stopping,
                 )  # fmt: skip
             if stopping():
                 raise UnfinishedError(f"{safe_text(str(output))} was stored whole")

@@ -11,8 +11,8 @@ from pathlib import Path
 import xarray as xr
 
 from ..errors import ResultError, UsageError
+from ..results.backend import check_output, load, save
 from ..results.replay import described, own, repeats
-from ..results.store import check_output, load, save
 from ..results.summary import tally_of
 from ..text import safe_text
 from .compare import check_result, compare

@@ -10,9 +10,9 @@ import xarray as xr
 
 from ..errors import UsageError
 from ..results.attributes import json_object, json_table
+from ..results.backend import load
 from ..results.replay import repeats
 from ..results.schema import ABOUT_A_MODEL, SCHEMA, SCHEMA_VERSION, is_input
-from ..results.store import load
 from ..text import safe_text
 from .align import align, along
 from .judge import judge

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from .impulse import velocities_after
 from .lanes import Lanes
-from .model import ForceModel
+from .model import ForceModel, Law
 from .power import Array, all_within
 from .status import FIRST_FAILURE, LIMIT, NO_IMPACT, OK, Status
 from .strike import Rebound
@@ -28,6 +28,8 @@ BY_DEFAULT = (
 )  # fmt: skip
 OUTPUTS = (*BY_DEFAULT, "e_kinetic", "e_energetic", "lambda", "separation_time")
 quiet = np.errstate(all="ignore")
+# what of an impact is checked before it is integrated, see `first_look`
+CHECKS = frozenset({"e", "v0", "length"})
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,7 @@ class Contact:
     known : what `first_look` says of them, where it has been asked
     """
 
-    model: ForceModel
+    model: Law
     lanes: Lanes
     rebound: Rebound
     known: NDArray[np.int8] | None = None
@@ -174,11 +176,11 @@ class Contact:
 
     @cached_property
     def in_domain(self) -> NDArray[np.int8]:
-        inside = np.ones(self.lanes.shape, bool)
+        inside = np.ones((1,) * max(1, len(self.lanes.shape)), bool)
         for name, (low, high) in self.model.domain.items():
             value = self.damping_ratio if name == "chi" else self.lanes.quantity(name)
             # what is not known, such as an e that was not asked for, is not claimed
-            inside &= (value >= low) & (value <= high)
+            inside = inside & (value >= low) & (value <= high)
         return inside.astype(np.int8)
 
     @cached_property
@@ -265,27 +267,25 @@ def collide(
     return Contact(model, lanes, rebound, status)
 
 
-def first_look(
-    model: ForceModel, lanes: Lanes, known: frozenset[str] = frozenset({"e", "v0", "length"})
-) -> NDArray[np.int8]:
+def first_look(model: Law, lanes: Lanes, checks: frozenset[str] = CHECKS) -> NDArray[np.int8]:
     """What can be said of impacts before they are integrated; of a shape that broadcasts to theirs.
 
     Parameters
     ----------
     model : the law
     lanes : the impacts
-    known : what may be looked at: the restitution, the closing speed, and the sizes of the contact, whose unit of
-        length comes from all of them
+    checks : what is looked at: the restitution "e", the closing speed "v0", and the sizes of the contact, "length",
+        the unit of which comes from all of them
     """
     status = np.asarray(Status.OK, np.int8)
-    if "length" in known:
+    if "length" in checks:
         sizes = [lanes.m, lanes.K, lanes.length, lanes.energy, lanes.time]
         least, most = np.nextafter(0.0, 1.0), np.finfo(float).max
         for size in sizes:
             status = _unless(size, least, most, status, Status.OUT_OF_RANGE)
-    if "e" in known and "e" in model.quantities:
+    if "e" in checks and "e" in model.quantities:
         status = _unless(lanes.e, 0.0, 1.0, status, Status.INVALID_PARAMETER)
-    if "v0" in known or "length" in known:
+    if "v0" in checks or "length" in checks:
         status = _unless(lanes.v0, np.nextafter(0.0, 1.0), np.inf, status, Status.NO_IMPACT)
     return status.astype(np.int8)
 

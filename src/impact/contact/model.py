@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal, NotRequired, TypedDict
+from typing import Literal, NotRequired, Protocol, TypedDict
 
 from ..errors import ModelError, did_you_mean
 from .evidence import Evidence
@@ -51,6 +51,28 @@ class Parameter:
     least: float = float("-inf")
     most: float = float("inf")
     typical: float | None = None
+
+
+class Law(Protocol):
+    """What the outputs of a collision depend on besides its trajectory: all of a law but its formulas.
+
+    A `ForceModel` is one; a result keeps one of each model, so that it can be read without the formulas.
+    """
+
+    @property
+    def key(self) -> str: ...
+    @property
+    def exponent(self) -> float | None: ...
+    @property
+    def parameters(self) -> tuple[Parameter, ...]: ...
+    @property
+    def domain(self) -> Mapping[str, tuple[float, float]]: ...
+    @property
+    def quantities(self) -> frozenset[str]: ...
+    @property
+    def is_permanent(self) -> bool: ...
+    @property
+    def stiffness(self) -> Formula | None: ...
 
 
 class About(TypedDict):

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ModelError
-from ..ode.problem import Columns
 from . import motion
+from .deduplicate import deduplicate
 from .formula import explained, wishes
 from .model import ForceModel
 from .momentum import is_strong
@@ -113,7 +113,8 @@ def _struck(
         where = places(chosen)
         law = motion.Law.of(model, n, side)
         columns = tuple(np.asarray(values[name])[where] for name in law.names)
-        first, back = _distinct(columns, int(np.count_nonzero(chosen))) if collapse else (slice(None), slice(None))
+        count_chosen = int(np.count_nonzero(chosen))
+        first, back = deduplicate(columns, (count_chosen,)) if collapse else (slice(None), slice(None))
         sticks = exact[where][first] == 0.0
         struck = strike_at(law, tuple(c[first] for c in columns), sticks.size, sticks=sticks)
         parts.append((where, struck.rebound.take(back)))
@@ -140,12 +141,3 @@ def _second_look(model: ForceModel, values: Values, given: Given, count: int) ->
     for name in coefficients.keys() & wishes(model.force):
         status[np.isinf(coefficients[name]) & plastic] = Status.LIMIT
     return status
-
-
-def _distinct(columns: Columns, n: int) -> tuple[Places, Places]:
-    """Places of one impact of each kind, and for every impact the number of its kind."""
-    if not columns:
-        return np.zeros(1, np.intp), np.zeros(n, np.intp)
-    rows = columns[0] if len(columns) == 1 else np.array(columns).T
-    _, first, back = np.unique(rows, axis=0, return_index=True, return_inverse=True)
-    return first, back.reshape(-1)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
 from ..errors import ModelError
 from .formula import ask, wishes
-from .lanes import Lanes, in_own_units
+from .lanes import Lanes
 from .model import QUANTITIES, ForceModel
 from .power import Array
 from .units import names_in
@@ -26,23 +26,14 @@ def asked(model: ForceModel) -> list[str]:
     return sorted(names.union(*exponents) - {"K", "m", "v0", "n"})
 
 
-def made_of(model: ForceModel, n: Iterable[float]) -> frozenset[str]:
-    """What the values of a law come from: quantities and parameters, and the units they are converted by.
-
-    Parameters
-    ----------
-    model : the law
-    n : the exponents it is asked at
+def exponent_names(model: ForceModel) -> frozenset[str]:
+    """The names that the exponents of the units of a law's values are made of, such as n of N/m^n.
 
     >>> from impact.contact.models import find
-    >>> sorted(made_of(find("gharib-hurmuzlu-2012"), [1.5]))
-    ['e', 'n']
+    >>> sorted(exponent_names(find("hertz")))
+    []
     """
-    names = asked(model)
-    # an exponent that a parameter has a part in is not known here, and NaN is not zero
-    unknown = dict.fromkeys(names, np.nan)
-    used = (in_own_units(model, name, {**unknown, "n": one}).items() for name in names for one in n)
-    return frozenset({"n", *names, *(unit for units in used for unit, exponent in units if exponent)})
+    return frozenset(name for value in asked(model) for name in names_in(model.unit_of(value)))
 
 
 def own_values(model: ForceModel, lanes: Lanes) -> dict[str, Array]:

@@ -1,33 +1,46 @@
-"""The impacts of a plan: what stands at a place of the grid as what goes into a law, and what that comes from."""
+"""The impacts of a plan: what goes into a law at some cells of the grid."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from ..contact.formula import ask, wishes
-from ..contact.lanes import Lanes, stiffness
+from ..contact.lanes import Lanes
+from ..contact.lanes import stiffness as hertz_or_secant
 from ..contact.material import effective_mass, hertz_stiffness, sphere_radius
-from ..contact.model import QUANTITIES, ForceModel
+from ..contact.model import Law
 from ..contact.power import Array
-from .plan import Index, Plan, dimensions
+from .plan import Index, Inputs, dimensions
+
+# K of a law at some cells of the grid [N/m^n]
+Stiffness = Callable[[Index], Array]
 
 
-def lanes_of(plan: Plan, model: ForceModel, index: Index) -> Lanes:
-    """The impacts of a model at some cells of the grid; what does not vary along an axis has length one there."""
-    given = set(plan.names())
+def build_impacts(inputs: Inputs, model: Law, index: Index, stiffness: Stiffness | None = None) -> Lanes:
+    """The impacts of a model at some cells of the grid; what does not vary along an axis has length one there.
+
+    Parameters
+    ----------
+    inputs : of the sweep
+    model : the law, or what is known of it
+    index : the cells
+    stiffness : K at some cells [N/m^n], where the law has a rule for it; by default its formula
+    """
+    given = set(inputs.names())
     missing = np.full((1,) * dimensions(index), np.nan)
 
     def value(name: str) -> Array:
-        return np.asarray(plan.column(name, index), float) if name in given else missing
+        return np.asarray(inputs.column(name, index), float) if name in given else missing
 
     def of_material(ball: str, field: str) -> Array:
         name = "material" if "material" in given else f"material{ball}"
         if name not in given:
             return missing
-        table = {key: getattr(material, field) for key, material in plan.config.materials.items()}
-        chosen, where = np.unique(plan.column(name, index), return_inverse=True)
+        table = {key: getattr(material, field) for key, material in inputs.materials.items()}
+        chosen, where = np.unique(inputs.column(name, index), return_inverse=True)
         return np.array([table[str(key)] for key in chosen], dtype=float)[where]
 
     v1, v2, m1, m2 = (value(name) for name in ("v1", "v2", "m1", "m2"))
@@ -41,8 +54,10 @@ def lanes_of(plan: Plan, model: ForceModel, index: Index) -> Lanes:
         own_K = f"{model.key}.K"
         if own_K in given or "K" in given:
             K = value(own_K if own_K in given else "K")
+        elif stiffness is not None:
+            K = stiffness(index)
         else:
-            K = stiffness(n, hertz_stiffness(E1, nu1, E2, nu2, R1, R2), effective_mass(m1, m2), v1 - v2)
+            K = hertz_or_secant(n, hertz_stiffness(E1, nu1, E2, nu2, R1, R2), effective_mass(m1, m2), v1 - v2)
         e = value("e") if "e" in given else 1.0 - value("alpha") * (v1 - v2)
     own = {parameter.name: value(f"{model.key}.{parameter.name}") for parameter in model.parameters}
     lanes = Lanes(
@@ -50,50 +65,21 @@ def lanes_of(plan: Plan, model: ForceModel, index: Index) -> Lanes:
         yield_strength1=of_material("1", "yield_strength"), yield_strength2=of_material("2", "yield_strength"),
         parameters=own,
     )  # fmt: skip
-    if model.stiffness is None or own_K in given or "K" in given:
+    if not has_stiffness_rule(inputs, model) or stiffness is not None:
         return lanes
+    assert model.stiffness is not None
     with np.errstate(all="ignore"):
         known = {name: lanes.quantity(name) for name in wishes(model.stiffness)}
         return replace(lanes, K=ask(model.stiffness, known))
 
 
-def origins(plan: Plan, model: ForceModel, quantity: str) -> set[str]:
-    """The names of the config that a quantity or parameter of an impact comes from."""
-    given = set(plan.names())
-    own_K = f"{model.key}.K"
-
-    def material(ball: str) -> set[str]:
-        return {"material", f"material{ball}"} & given
-
-    match quantity:
-        case "e":
-            return {"e"} if "e" in given else {"alpha", "v1", "v2"}
-        case "v0":
-            return {"v1", "v2"}
-        case "m":
-            return {"m1", "m2"}
-        case "n":
-            return {"n"} if model.exponent is None else set()
-        case "R1" | "R2":
-            ball = quantity[1]
-            return {quantity} if quantity in given else {f"m{ball}", *material(ball)}
-        case "K" if own_K in given or "K" in given:
-            return {own_K if own_K in given else "K"}
-        case "K" if model.stiffness is not None:
-            return {name for part in wishes(model.stiffness) for name in origins(plan, model, part)}
-        case "K":
-            secant = ("n", "m", "v0") if exponents(plan, model) != (1.5,) else ()
-            parts = ("R1", "R2", *secant)
-            return material("1") | material("2") | {n for part in parts for n in origins(plan, model, part)}
-        case "length":
-            return {name for part in ("m", "v0", "K", "n") for name in origins(plan, model, part)}
-    if quantity in QUANTITIES:
-        return material(quantity[-1])
-    return {f"{model.key}.{quantity}"}
+def has_stiffness_rule(inputs: Inputs, model: Law) -> bool:
+    """Whether K comes from a formula of the law's own: it has one, and no K is given."""
+    return model.stiffness is not None and {"K", f"{model.key}.K"}.isdisjoint(inputs.names())
 
 
-def exponents(plan: Plan, model: ForceModel) -> tuple[float, ...]:
+def exponents(inputs: Inputs, model: Law) -> tuple[float, ...]:
     """The compliance exponents that a model is asked at."""
     if model.exponent is not None:
         return (model.exponent,)
-    return tuple(np.unique(np.asarray(plan.values("n"), float)).tolist())
+    return tuple(np.unique(np.asarray(inputs.values("n"), float)).tolist())

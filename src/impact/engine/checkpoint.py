@@ -11,22 +11,22 @@ import hashlib
 import json
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from filelock import FileLock, Timeout
 
 from ..atomic import appearing, sync_folder
 from ..contact.strike import Rebound
 from ..errors import ImpactError, InUseError, StoreError, UsageError
 from ..text import safe_text
-from .apart import differences
-from .execute import settled
-from .packing import FIELDS, pack, unpack
+from .execute import with_core
 from .plan import Plan
-from .trajectories import BLOCK, Stretch, trajectories
+from .trajectories import RANGE_TRAJECTORIES, TrajectoryRange, trajectory_maps
 
+FIELDS = tuple(one.name for one in fields(Rebound))
 PLAN, LOCK = "plan.json", "lock"
 ELSE = "give the sweep that it is of, another output, or --overwrite to begin anew"
 TOLD = 3  # differences
@@ -52,30 +52,30 @@ class Work:
     def path(self, number: int) -> Path:
         return self.folder / f"{number:08d}.npz"
 
-    def _of(self, stretch: Stretch) -> str:
+    def _of(self, part: TrajectoryRange) -> str:
         """What a block says of itself."""
-        return f"{stretch.number} {stretch.model} {stretch.start} {stretch.stop} {self.key}"
+        return f"{part.number} {part.model} {part.start} {part.stop} {self.key}"
 
-    def store(self, stretch: Stretch, rebound: Rebound) -> None:
+    def store(self, part: TrajectoryRange, rebound: Rebound) -> None:
         """Keep a finished block.
 
         Raises
         ------
         StoreError : the disk is full or failed
         """
-        with appearing(self.path(stretch.number), overwrite=True, part=self.folder / "block.part") as sink:
-            pack(sink, self._of(stretch), rebound)
+        with appearing(self.path(part.number), overwrite=True, part=self.folder / "block.part") as sink:
+            pack(sink, self._of(part), rebound)
 
-    def load(self, stretch: Stretch) -> Rebound | None:
+    def load(self, part: TrajectoryRange) -> Rebound | None:
         """A finished block; None if it is not there, or not whole."""
         # what is no regular file might never end
-        if not self.path(stretch.number).is_file():
+        if not self.path(part.number).is_file():
             return None
-        return unpack(self.path(stretch.number), self._of(stretch), stretch.size)
+        return unpack(self.path(part.number), self._of(part), part.size)
 
 
 @contextlib.contextmanager
-def working(folder: Path, plan: Plan, *, resume: bool, overwrite: bool) -> Iterator[Work]:
+def working(folder: Path, plan: Plan, *, resume: bool, overwrite: bool, extends: str = "") -> Iterator[Work]:
     """A work folder, locked.
 
     Parameters
@@ -84,6 +84,7 @@ def working(folder: Path, plan: Plan, *, resume: bool, overwrite: bool) -> Itera
     plan : what it runs
     resume : go on with what a leftover folder holds
     overwrite : throw away what a leftover folder holds, unless it is resumed
+    extends : the seal of the result that is extended, if one is: the folder then lacks what that holds
 
     Raises
     ------
@@ -92,7 +93,7 @@ def working(folder: Path, plan: Plan, *, resume: bool, overwrite: bool) -> Itera
     StoreError : the disk is full or failed
     """
     _check(folder)
-    record = _record(plan)
+    record = _record(plan, extends)
     lock = FileLock(folder / LOCK, timeout=0)
     try:
         _lock(lock, folder)
@@ -129,7 +130,7 @@ def tidy(output: Path, plan: Plan) -> None:
     with contextlib.suppress(ImpactError, Timeout, OSError):
         if folder.is_dir():
             _check(folder)
-            plan = settled(plan, trajectories(plan))
+            plan = with_core(plan, trajectory_maps(plan))
             with FileLock(folder / LOCK, timeout=0):
                 if not os.path.lexists(folder / PLAN) or _is_of(folder, _record(plan), resume=True):
                     part_of(output).unlink(missing_ok=True)
@@ -188,11 +189,11 @@ def _prepare(folder: Path, record: Mapping[str, Any], *, resume: bool, overwrite
         raise StoreError(f"{shown}: {error.strerror}") from error
 
 
-def _record(plan: Plan) -> dict[str, Any]:
+def _record(plan: Plan, extends: str = "") -> dict[str, Any]:
     """What a folder is of: all that the finished blocks depend on."""
     solver = plan.config.solver
-    return {"schema": FIELDS, "block": BLOCK, "collapse": solver.collapse, "core": solver.core,
-            "physics": plan.physics}  # fmt: skip
+    return {"schema": FIELDS, "block": RANGE_TRAJECTORIES, "collapse": solver.collapse, "core": solver.core,
+            "physics": plan.physics, **({"extends": extends} if extends else {})}  # fmt: skip
 
 
 def _key(record: Mapping[str, Any]) -> str:
@@ -232,3 +233,53 @@ def _told_apart(folder: Path, record: Mapping[str, Any]) -> str | None:
     told = list(differences(stored, json.loads(json.dumps(record))))
     more = f" and {len(told) - TOLD} more" if len(told) > TOLD else ""
     return f"is of another sweep: {'; '.join(told[:TOLD])}{more}" if told else None
+
+
+def pack(file: Any, of: str, rebound: Rebound) -> None:
+    """Write a block.
+
+    Parameters
+    ----------
+    file : a binary one, to be written to
+    of : what it says of itself
+    rebound : what is in it
+    """
+    np.savez(file, of=of, **{name: getattr(rebound, name) for name in FIELDS})
+
+
+def unpack(path: Path, of: str, size: int) -> Rebound | None:
+    """A block of so many trajectories; None if it is of something else, or not whole."""
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            if stored["of"].item() != of:
+                return None
+            arrays = {name: stored[name] for name in FIELDS}
+    except MemoryError:
+        raise
+    # numpy and zipfile raise almost anything on a damaged file
+    except Exception:
+        return None
+    blank = Rebound.blank(size)
+    right = all(
+        (one.shape, one.dtype) == (getattr(blank, name).shape, getattr(blank, name).dtype)
+        for name, one in arrays.items()
+    )
+    return Rebound(**arrays) if right else None
+
+
+def differences(there: object, here: object, path: str = "") -> Iterator[str]:
+    """In what two records differ, each with its place."""
+    if isinstance(there, dict) and isinstance(here, dict):
+        for key in dict.fromkeys((*there, *here)):
+            name = key if path in ("", "physics") else f"{path}.{key}"
+            yield from differences(there.get(key), here.get(key), str(name))
+    elif isinstance(there, list) and isinstance(here, list) and len(there) == len(here):
+        for place, (one, other) in enumerate(zip(there, here, strict=True)):
+            yield from differences(one, other, f"{path}[{place}]")
+    elif there != here and not (there != there and here != here):
+        yield f"{safe_text(path)}: {_shown(there)} there, {_shown(here)} here"
+
+
+def _shown(value: object) -> str:
+    text = f"{len(value)} values" if isinstance(value, list) else json.dumps(value)
+    return safe_text(text, 60)

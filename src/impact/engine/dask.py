@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from ..errors import ImpactError, StoreError, UnfinishedError, UsageError
 from ..text import safe_text
-from .blocks import other_version
-from .execute import never
+from .execute import never, other_version
 from .executors import AHEAD, Team
 
 if TYPE_CHECKING:

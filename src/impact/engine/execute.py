@@ -1,62 +1,141 @@
-"""Run a plan: a generator of finished blocks, from which progress, storage and pictures fall out."""
+"""Run a plan: a generator of finished ranges of trajectories, from which progress and storage follow.
+
+A range is integrated here or anywhere else, from numbers, names and source alone, and no more is loaded there than
+it needs.
+"""
 
 from __future__ import annotations
 
+import socket
 import time
 import warnings
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
-from dataclasses import fields, replace
-from functools import partial
+from dataclasses import dataclass, fields, replace
+from functools import lru_cache, partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..contact.compiled import is_installed, serves
+from ..contact.model import ForceModel
+from ..contact.models import catalogue
 from ..contact.status import Status
 from ..contact.strike import Rebound
+from ..contact.trajectories import integrate_all
 from ..errors import StoreError, UsageError
+from ..sweeps.settings import Solver
 from ..text import safe_text
-from .blocks import Block, Kit, integrated, work
 from .build_impacts import exponents
 from .executors import ALONE, Team
 from .plan import Plan
-from .trajectories import Stretch, Trajectories, block_of
+from .trajectories import Columns, TrajectoryMap, TrajectoryRange, columns_of
 
-# impacts of compiled forms from which on numba is sooner done, though it has to be loaded
-WORTH = 200_000
-# how often a block is given out again
-AGAIN = 3
+# trajectories of compiled forms from which on numba is faster, though it has to be loaded
+NUMBA_MIN_TRAJECTORIES = 200_000
+# how often a range is submitted again whose process was killed
+MAX_RETRIES = 3
 # seconds after which it is looked again whether to stop, and whether there is room
-MOMENT = 0.2
+POLL_INTERVAL_S = 0.2
 
-# what comes back of a block: see `impact.engine.blocks.integrated`
-Done = tuple[Rebound, dict[str, str]]
+# what a range comes to, and a line for each distinct error that the law raised
+Integrated = tuple[Rebound, dict[str, str]]
+# which trajectories of a range are known already, and what they come to; None where none is
+Known = Callable[[TrajectoryRange], tuple[NDArray[np.bool_], Rebound] | None]
 STATUSES = [int(status) for status in Status]
 
 
-def settled(plan: Plan, found: Sequence[Trajectories]) -> Plan:
-    """The plan with its core decided, by what there is to integrate.
+@dataclass(frozen=True)
+class WorkerContext:
+    """What a range is integrated with where nothing of its sweep is known: numbers, names and source.
+
+    Parameters
+    ----------
+    version : of this package
+    solver : how
+    sources : name and content of the Python files that plug-in models are in
+    hashes : key and SHA-256 of the models that are not built in
+    """
+
+    version: str
+    solver: Solver
+    sources: tuple[tuple[str, bytes], ...] = ()
+    hashes: tuple[tuple[str, str], ...] = ()
+
+
+def integrate(model: ForceModel, columns: Columns, solver: Solver) -> Integrated:
+    """Integrate some trajectories of a model; see `impact.engine.trajectories.columns_of`."""
+    errors: dict[str, str] = {}
+    values = {name: column for name, column in columns.items() if name not in ("n", "status")}
+    rebound = integrate_all(
+        model, columns["n"], values, columns["status"],
+        rtol=solver.rtol, max_steps=solver.max_steps, collapse=solver.collapse, core=solver.core, errors=errors,
+    )  # fmt: skip
+    return rebound, errors
+
+
+def work(key: str, columns: Columns, context: WorkerContext) -> Integrated:
+    """Integrate some trajectories of the model of a key; a pure function, which may run anywhere, and twice.
+
+    Raises
+    ------
+    UsageError : this place has another version, no numba where that is wanted, or not the same models
+    """
+    return integrate(_models(context)[key], columns, context.solver)
+
+
+# the models of the sweeps of which this place was sent something last
+@lru_cache(maxsize=4)
+def _models(context: WorkerContext) -> Mapping[str, ForceModel]:
+    from .. import __version__
+
+    here = socket.gethostname()
+    if context.version != __version__:
+        raise UsageError(other_version(here, __version__, context.version))
+    if context.solver.core == "numba" and not is_installed():
+        raise UsageError(
+            f'{here}: has no numba, by which the sweep is integrated; install it there, or set solver.core = "numpy"'
+        )
+    if not context.hashes:
+        return catalogue()
+    from .plugins import Source, read_plugins
+
+    plugins = read_plugins([Source(*source) for source in context.sources])
+    lacking = [key for key, sha256 in context.hashes if plugins.hashes.get(key) != sha256]
+    if lacking:
+        raise UsageError(
+            f"{here}: {safe_text(', '.join(lacking))}: expected the package that has it, in the version that is here"
+        )
+    return catalogue(plugins.models)
+
+
+def other_version(place: str, there: str, here: str) -> str:
+    """The message about a place that has another version."""
+    return f"{place}: has impact {safe_text(there)}, this is {here}; expected the same"
+
+
+def with_core(plan: Plan, maps: Sequence[TrajectoryMap]) -> Plan:
+    """The plan with `core = "auto"` replaced, by what there is to integrate.
 
     >>> from impact.api import prepare
-    >>> from impact.engine.trajectories import trajectories
+    >>> from impact.engine.trajectories import trajectory_maps
     >>> plan = prepare("configs/figure6.toml")
-    >>> settled(plan, trajectories(plan)).config.solver.core
+    >>> with_core(plan, trajectory_maps(plan)).config.solver.core
     'numpy'
     """
     solver = plan.config.solver
     if solver.core != "auto":
         return plan
-    is_worth = is_installed() and sum(one.count for one in found if _is_served(plan, one)) >= WORTH
-    return replace(
-        plan, config=replace(plan.config, solver=replace(solver, core="numba" if is_worth else "numpy"))
-    )
+    count = sum(own.count for own in maps if _is_compiled(plan, own))
+    core = "numba" if is_installed() and count >= NUMBA_MIN_TRAJECTORIES else "numpy"
+    return replace(plan, config=replace(plan.config, solver=replace(solver, core=core)))
 
 
-def _is_served(plan: Plan, own: Trajectories) -> bool:
+def _is_compiled(plan: Plan, own: TrajectoryMap) -> bool:
     """Whether a compiled core integrates some phase of a model, at all of its exponents."""
     model = plan.models[own.model]
-    return all(any(serves(model, n)) for n in exponents(plan, model))
+    return all(any(serves(model, n)) for n in exponents(plan.inputs, model))
 
 
 def never() -> bool:
@@ -66,107 +145,128 @@ def never() -> bool:
 
 def run(
     plan: Plan,
-    found: Sequence[Trajectories],
-    todo: Iterable[Stretch],
+    maps: Sequence[TrajectoryMap],
+    todo: Iterable[TrajectoryRange],
     *,
     team: Team = ALONE,
-    stopping: Callable[[], bool] = never,
-) -> Iterator[tuple[Stretch, Rebound]]:
-    """Integrate block after block; alone in order, with others as they finish.
+    should_stop: Callable[[], bool] = never,
+    known: Known = lambda part: None,
+) -> Iterator[tuple[TrajectoryRange, Rebound]]:
+    """Integrate range after range; alone in order, with others as they finish.
 
     Parameters
     ----------
     plan : what to run
-    found : its trajectories
-    todo : the stretches of them to be integrated
+    maps : its trajectories
+    todo : the ranges of them to be integrated
     team : who integrates
-    stopping : whether no more are to be begun; those that were are finished
+    should_stop : whether no more are to be begun; those that were are finished
+    known : what is known already, and is not integrated again
 
     Raises
     ------
     UsageError : a model was given as a Python value, which cannot be sent; or those who integrate lack something
-    StoreError : they were killed again and again, cannot be reached any more, or return what is no block
+    StoreError : they were killed again and again, cannot be reached any more, or return something else
 
     Warns
     -----
     UserWarning : a law raised an error; once for each law and distinct error
     """
-    integrate = _integrator(plan, team)
+    submit = _submitter(plan, team)
     left, trials = deque(todo), Counter[int]()
     reported: set[str] = set()
     while True:
-        given: dict[Future[Done], Stretch] = {}
+        running: dict[Future[Integrated], TrajectoryRange] = {}
         try:
             with team.executor() as executor:
 
-                def give(stretch: Stretch) -> Future[Done]:
-                    # no more is held of a block than what it is made of
-                    return executor.submit(integrate, block_of(plan, found, stretch))
+                def start(part: TrajectoryRange) -> Future[Integrated]:
+                    # no more is held of a range than what it is made of
+                    columns = columns_of(plan, maps, part)
+                    before = known(part)
+                    if before is not None:
+                        columns = {name: values[~before[0]] for name, values in columns.items()}
+                    return submit(executor, plan.models[part.model].key, columns)
 
-                for stretch, (rebound, errors) in _finished(give, left, given, team.room, stopping):
+                for part, (rebound, errors) in _finished(start, left, running, known, team.room, should_stop):
                     for error in errors.keys() - reported:
                         warnings.warn(errors[error], stacklevel=2)
                     reported |= errors.keys()
-                    yield stretch, rebound
+                    yield part, rebound
                 return
         except BrokenExecutor:
-            # which of the blocks it did not live through cannot be known
-            left.extendleft(given.values())
-            trials.update(stretch.number for stretch in given.values() or left)
-            if max(trials.values()) > AGAIN:
+            # which of the ranges it did not live through cannot be known
+            left.extendleft(running.values())
+            trials.update(part.number for part in running.values() or left)
+            if max(trials.values()) > MAX_RETRIES:
                 raise StoreError(
-                    f"processes were killed {AGAIN + 1} times at the same trajectories: memory is short; or, of a "
+                    f"processes were killed {MAX_RETRIES + 1} times at the same trajectories: memory is short; or, of a "
                     'program of your own, it lacks its if __name__ == "__main__":'
                 ) from None
 
 
 def _finished(
-    give: Callable[[Stretch], Future[Done]],
-    left: deque[Stretch],
-    given: dict[Future[Done], Stretch],
+    start: Callable[[TrajectoryRange], Future[Integrated]],
+    left: deque[TrajectoryRange],
+    running: dict[Future[Integrated], TrajectoryRange],
+    known: Known,
     room: Callable[[], int],
-    stopping: Callable[[], bool],
-) -> Iterator[tuple[Stretch, Done]]:
-    """Give what is left, as many blocks at a time as there is room for, and take them as they finish."""
+    should_stop: Callable[[], bool],
+) -> Iterator[tuple[TrajectoryRange, Integrated]]:
+    """Submit what is left, as many ranges at a time as there is room for, and take them as they finish."""
     try:
-        while left or given:
-            # asked in every round, also where nothing is left to give: it raises if nobody answers any more
+        while left or running:
+            # asked in every round, also where nothing is left to submit: it raises if nobody answers any more
             most = room()
-            while left and len(given) < most and not stopping():
-                given[give(left[0])] = left[0]
+            while left and len(running) < most and not should_stop():
+                before = known(left[0])
+                if before is not None and before[0].all():
+                    yield left.popleft(), (before[1], {})
+                    continue
+                running[start(left[0])] = left[0]
                 left.popleft()
             # what was begun is finished, unless there is nobody left to do it
-            if stopping() and not (given and most):
+            if should_stop() and not (running and most):
                 return
-            if not given:
+            if not running:
                 # nobody is there yet
-                time.sleep(MOMENT)
-            for future in wait(given, MOMENT, FIRST_COMPLETED).done:
-                stretch, done = given[future], future.result()
-                _check(stretch, done)
-                del given[future]
-                yield stretch, done
+                time.sleep(POLL_INTERVAL_S if left else 0.0)
+            for future in wait(running, POLL_INTERVAL_S, FIRST_COMPLETED).done:
+                part, done = running[future], future.result()
+                before = known(part)
+                _check(part, done, part.size if before is None else int(np.count_nonzero(~before[0])))
+                del running[future]
+                yield part, done if before is None else (_merged(before, done[0]), done[1])
     finally:
-        for future in given:
+        for future in running:
             future.cancel()
 
 
-def _check(stretch: Stretch, done: object) -> None:
-    """Refuse a block that cannot be what its trajectories came to: an executor may return anything.
+def _merged(known: tuple[NDArray[np.bool_], Rebound], integrated: Rebound) -> Rebound:
+    """A range of which some trajectories were known."""
+    is_known, before = known
+    whole = before.take(slice(None))
+    whole = Rebound(**{name: values.copy() for name, values in vars(whole).items()})
+    whole.put(~is_known, integrated)
+    return whole
+
+
+def _check(part: TrajectoryRange, done: object, size: int) -> None:
+    """Refuse what cannot be what so many trajectories came to: an executor may return anything.
 
     Raises
     ------
-    StoreError : it is no block, or its arrays have another shape or dtype, or hold an unknown status
+    StoreError : it has another type, or its arrays another shape or dtype, or hold an unknown status
     """
-    where = f"executor: block {stretch.number}"
+    where = f"executor: range {part.number}"
     rebound, errors = done if isinstance(done, tuple) and len(done) == 2 else (done, {})
     if not isinstance(rebound, Rebound):
         raise StoreError(f"{where}: got {safe_text(type(rebound).__name__)}, expected Rebound")
     if not isinstance(errors, dict):
         raise StoreError(f"{where}: got {safe_text(type(errors).__name__)}, expected a dict of errors")
-    blank = Rebound.blank(stretch.size)
+    blank = Rebound.blank(size)
     for field in fields(Rebound):
-        got, expected = (_form(getattr(one, field.name)) for one in (rebound, blank))
+        got, expected = (_form(getattr(result, field.name)) for result in (rebound, blank))
         if got != expected:
             raise StoreError(f"{where}: {field.name}: got {got}, expected {expected}")
     unknown = np.setdiff1d(rebound.status, STATUSES)
@@ -181,28 +281,33 @@ def _form(array: object) -> str:
     return f"{array.dtype} of shape {array.shape}"
 
 
-def _integrator(plan: Plan, team: Team) -> Callable[[Block], Done]:
-    """What integrates a block of a plan, where the team is."""
+def _submitter(plan: Plan, team: Team) -> Callable[..., Future[Integrated]]:
+    """What submits the trajectories of a plan to an executor of a team."""
     if team.is_here:
         models = {model.key: model for model in plan.models}
-        return lambda block: integrated(models[block.key], block, plan.config.solver)
-    values = [one.model.key for one in plan.plugins.items if one.is_value]
+
+        def integrate_here(key: str, columns: Columns) -> Integrated:
+            return integrate(models[key], columns, plan.config.solver)
+
+        return lambda executor, key, columns: executor.submit(integrate_here, key, columns)
+    values = [plugin.model.key for plugin in plan.plugins.items if plugin.is_value]
     if values:
         raise UsageError(
             f"{safe_text(', '.join(values))} is given as a Python value, which cannot be sent to other processes; "
-            "wants the file that it is in, or jobs=1"
+            "expected the file that it is in, or jobs=1"
         )
-    return partial(work, kit=kit_of(plan))
+    integrate_there = partial(work, context=context_of(plan))
+    return lambda executor, key, columns: executor.submit(integrate_there, key, columns)
 
 
-def kit_of(plan: Plan) -> Kit:
-    """What the blocks of a plan are integrated with elsewhere."""
+def context_of(plan: Plan) -> WorkerContext:
+    """What the trajectories of a plan are integrated with elsewhere."""
     from .. import __version__
 
     plugins = plan.plugins
-    return Kit(
+    return WorkerContext(
         __version__,
         plan.config.solver,
-        tuple((one.name, one.content) for one in plugins.sources),
+        tuple((source.name, source.content) for source in plugins.sources),
         tuple(plugins.hashes.items()),
     )

@@ -13,7 +13,7 @@ from ..contact.status import FIRST_FAILURE
 from ..contact.strike import Rebound
 from ..errors import StoreError, UnfinishedError, UsageError
 from ..text import safe_text
-from .trajectories import Stretch
+from .trajectories import TrajectoryRange
 
 
 @dataclass(frozen=True)
@@ -46,12 +46,10 @@ class Gauge:
         """Whether all trajectories are integrated."""
         return self.at.trajectories == self.at.of_trajectories
 
-    def count(self, stretch: Stretch, rebound: Rebound) -> None:
+    def count(self, part: TrajectoryRange, rebound: Rebound) -> None:
         """One more block is finished."""
         failed = int(np.count_nonzero(rebound.status >= FIRST_FAILURE))
-        self.at = replace(
-            self.at, trajectories=self.at.trajectories + stretch.size, failed=self.at.failed + failed
-        )
+        self.at = replace(self.at, trajectories=self.at.trajectories + part.size, failed=self.at.failed + failed)
 
     def say(self) -> None:
         self.tell(self.at)

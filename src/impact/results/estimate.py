@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
 import pickle
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from typing import Literal
 
-from ..engine.blocks import integrated
-from ..engine.execute import kit_of, settled
-from ..engine.packing import pack
+import numpy as np
+
+from ..engine.checkpoint import pack
+from ..engine.execute import context_of, integrate, with_core
 from ..engine.plan import Plan
-from ..engine.points import boxes
-from ..engine.trajectories import Trajectories, block_of, stretches, trajectories
-from .assembly import part_at
-from .digest import Taken
-from .schema import outline
+from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryMap, columns_of, trajectory_maps, trajectory_ranges
+from .expand import expanded_slabs, table_of
+from .schema import outline, stored
 
 # numbers of workers of which the time is told
 WORKERS = (1, 2, 8, 32, 128, 512)
@@ -75,37 +75,43 @@ def estimate(plan: Plan, jobs: int = 1) -> Estimate:
     plan : the sweep
     jobs : processes or threads that integrate
     """
-    found = trajectories(plan)
-    plan = settled(plan, found)
-    total = sum(one.count for one in found)
-    blocks = list(stretches(found))
+    maps = trajectory_maps(plan)
+    plan = with_core(plan, maps)
+    total = sum(own.count for own in maps)
+    ranges = list(trajectory_ranges(maps))
     # one in the middle is neither the first values nor the last
-    chosen = blocks[len(blocks) // 2]
+    chosen = ranges[len(ranges) // 2]
+    model = plan.models[chosen.model]
     # the first time loads, or even compiles, what integrates
     for _ in range(2):
         with _timed() as integrating:
-            rebound, _ = integrated(plan.models[chosen.model], block_of(plan, found, chosen), plan.config.solver)
+            rebound, _ = integrate(model, columns_of(plan, maps, chosen), plan.config.solver)
     with _timed() as driving:
-        sent = len(pickle.dumps((block_of(plan, found, chosen), kit_of(plan)), pickle.HIGHEST_PROTOCOL))
+        sent = len(pickle.dumps((columns_of(plan, maps, chosen), context_of(plan)), pickle.HIGHEST_PROTOCOL))
         back = pickle.dumps(rebound, pickle.HIGHEST_PROTOCOL)
         pickle.loads(back)
         pack(io.BytesIO(), "", rebound)
-    # what became of the trajectories of a box does not matter for its time: those of the block, again and again
-    box = replace(next(boxes(1, plan.shape)), model=chosen.model)
+    # what became of the trajectories of a slab does not matter for its time: those of the range, again and again
+    places = np.arange(RANGE_TRAJECTORIES) % chosen.size
+    table = table_of(plan, maps, lambda _, start, stop: rebound.take(places[: stop - start]))
     with _timed() as assembling:
-        part = part_at(plan, found, lambda _, numbers: rebound.take(numbers % chosen.size), box)
-        for values in part.values.values():
-            Taken().add(values)
+        _, _, _, values = next(expanded_slabs(table, stored(plan)))
+        for array in values.values():
+            hashlib.sha256(array.tobytes())
+    slab = values["status"].size
+    is_full = plan.layout == "full"
     each, own = integrating() / chosen.size, DASK * driving() / chosen.size
-    after = assembling() / box.size * plan.points
-    busy = min(max(round(each / own), 1), len(blocks))
+    after = assembling() / slab * plan.points if is_full else 0.0
+    busy = min(max(round(each / own), 1), len(ranges))
+    kept = total * sum(getattr(rebound, column.name).itemsize for column in fields(rebound))
+    cells = sum(4 * own_map.cells for own_map in maps if own_map.is_shared)
     counts = [*(count for count in WORKERS if count < busy), busy]
     return Estimate(
         plan.points,
         total,
-        tuple(_collapse(plan, one) for one in found),
-        outline(plan).nbytes,
-        total * sum(getattr(rebound, one.name).itemsize for one in fields(rebound)),
+        tuple(_collapse(plan, own_map) for own_map in maps),
+        outline(plan).nbytes if is_full else kept + cells,
+        kept,
         each * total / jobs + after,
         plan.config.solver.core,
         round((sent + len(back)) / chosen.size * total),
@@ -122,9 +128,9 @@ def _timed() -> Iterator[Callable[[], float]]:
     ended = time.perf_counter()
 
 
-def _collapse(plan: Plan, own: Trajectories) -> Collapse:
+def _collapse(plan: Plan, own: TrajectoryMap) -> Collapse:
     axes = tuple(plan.config.axes[axis].name for axis in own.axes)
-    within: Literal["plan", "block", "not"] = "block" if own.first is None else "plan"
+    within: Literal["plan", "block", "not"] = "block" if not own.is_shared else "plan"
     if not plan.config.solver.collapse:
         within = "not"
-    return Collapse(plan.models[own.model].key, plan.grid, own.cells, own.count, axes, within)
+    return Collapse(plan.models[own.model].key, plan.inputs.cells, own.cells, own.count, axes, within)

@@ -9,7 +9,6 @@ import xarray as xr
 
 from .. import __version__
 from ..contact.history import History
-from .digest import content_digest
 from .schema import SCHEMA_VERSION
 
 # name, unit, meaning
@@ -48,5 +47,4 @@ def history_dataset(history: History, model: str, point: Mapping[str, float | st
         "e_kinetic": history.e_kinetic,
         "e_energetic": history.e_energetic,
     }
-    dataset.attrs["content_digest"] = content_digest(dataset)
     return dataset

@@ -16,7 +16,7 @@ from ..contact.lanes import Lanes
 from ..contact.material import Material
 from ..contact.model import ForceModel
 from ..contact.status import Status
-from ..engine.build_impacts import lanes_of
+from ..engine.build_impacts import build_impacts
 from ..engine.plan import Plan
 from .history import history_dataset
 
@@ -78,7 +78,7 @@ def impact_of(plan: Plan, first: tuple[str, ...], times: int | None = None) -> I
     """
     config = plan.config
     law = config.models[0]
-    lanes = lanes_of(plan, law, ())
+    lanes = build_impacts(plan.inputs, law, ())
     solver = config.solver
     errors: dict[str, str] = {}
     contact = collide(law, lanes, rtol=solver.rtol, max_steps=solver.max_steps, errors=errors)

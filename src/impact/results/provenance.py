@@ -18,11 +18,11 @@ from ..errors import ResultError, UsageError
 from ..sweeps.config import Axis, Config, parse_config, read_config
 from ..sweeps.grid import MAX_POINTS
 from ..text import safe_text
+from .backend import open_result
+from .sealed import is_result
 from .select import matched
-from .survey import outlined
 
 STARTER = files("impact") / "sweeps" / "starter.toml"
-HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 
 
 def config_of(
@@ -35,8 +35,8 @@ def config_of(
     if isinstance(source, Mapping):
         return read_config(source, overrides, plugins.models)
     path = Path(source)
-    if _is_result(path):
-        attributes = outlined(path).attrs
+    if is_result(path):
+        attributes = open_result(path).attrs
         config = stored_config(attributes, overrides, plugins, str(path), allow_changed_plugins=True)
         for note in changed_plugins(attributes, plugins, str(path)):
             warnings.warn(note, stacklevel=2)
@@ -46,17 +46,10 @@ def config_of(
 
 def picked_out(source: str | Path | Mapping[str, object] | None) -> dict[str, float | str]:
     """The single values of a result; where its sweep varied one of them, the result is the part at that value."""
-    if not isinstance(source, str | Path) or not _is_result(Path(source)):
+    if not isinstance(source, str | Path) or not is_result(Path(source)):
         return {}
-    single = {str(name): one for name, one in outlined(Path(source)).coords.items() if one.ndim == 0}
+    single = {str(name): one for name, one in open_result(Path(source)).coords.items() if one.ndim == 0}
     return {name: one.values.item() for name, one in single.items() if name != "model"}
-
-
-def _is_result(path: Path) -> bool:
-    if not path.is_file():
-        return False
-    with path.open("rb") as file:
-        return file.read(len(HDF5_MAGIC)) == HDF5_MAGIC
 
 
 def stored_config(

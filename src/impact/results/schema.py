@@ -18,7 +18,7 @@ from ..contact.status import Status
 from ..engine.plan import Plan
 from ..sweeps.rules import MATERIALS, SWEEP, own_quantities
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 # coordinates along `model` that are texts about it
 # models with another exponent are named in at most so many characters
 MAX_NAMED = 48
@@ -116,11 +116,11 @@ def outline(plan: Plan) -> xr.Dataset:
         dims, shape = (
             (axes, plan.shape) if one.per == "axes" else (("model", *axes), (len(plan.models), *plan.shape))
         )
-        dataset[one.name] = (dims, np.broadcast_to(np.zeros((), one.dtype), shape), _attributes(one))
+        dataset[one.name] = (dims, np.broadcast_to(np.zeros((), one.dtype), shape), attributes_of(one))
     return dataset
 
 
-def _attributes(variable: Variable) -> dict[str, object]:
+def attributes_of(variable: Variable) -> dict[str, object]:
     found: dict[str, object] = {
         "units": variable.unit, "long_name": variable.meaning, "equation": variable.equation,
     }  # fmt: skip
@@ -150,7 +150,7 @@ def _coordinates(plan: Plan) -> dict[str, object]:
     for name, value in plan.config.scalars.items():
         found[name] = ((), value, _about(plan, name))
     found["exponent"] = _exponent(plan)
-    if "alpha" in plan.names():
+    if "alpha" in plan.inputs.names():
         found["e"] = _restitution(plan)
     return found
 
@@ -217,7 +217,7 @@ def _exponent(plan: Plan) -> tuple[tuple[str, ...], object, dict[str, str]]:
     """The compliance exponent of each model: its own, or the sweep's, which may be an axis."""
     about = {"units": "1", "long_name": "compliance exponent n"}
     own = np.array([np.nan if model.exponent is None else model.exponent for model in plan.models])
-    axes = plan.axes_of("n")
+    axes = plan.inputs.axes_of("n")
     if not axes:
         return ("model",), np.where(np.isnan(own), plan.config.scalars["n"], own), about
     axis = plan.config.axes[axes[0]]
@@ -228,12 +228,12 @@ def _exponent(plan: Plan) -> tuple[tuple[str, ...], object, dict[str, str]]:
 def _restitution(plan: Plan) -> tuple[tuple[str, ...], object, dict[str, str]]:
     """e = 1 - alpha (v1 - v2), equation (24), over the axes that it depends on."""
     config = plan.config
-    places = sorted({place for name in ("alpha", "v1", "v2") for place in plan.axes_of(name)})
+    places = sorted({place for name in ("alpha", "v1", "v2") for place in plan.inputs.axes_of(name)})
 
     def column(name: str) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
         if name in config.scalars:
             return np.asarray(config.scalars[name], float)
-        (own,) = plan.axes_of(name)
+        (own,) = plan.inputs.axes_of(name)
         values = np.asarray(config.axes[own].columns[name], float)
         return values.reshape([-1 if place == own else 1 for place in places])
 

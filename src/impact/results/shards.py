@@ -1,31 +1,40 @@
 """Shards: a sweep in parts that know nothing of each other, for job arrays without a scheduler of our own.
 
-Shard K of N has the blocks K, K + N, K + 2N, ... in a work folder that stays; those of all shards make the result.
-A block is a pure function of its plan, so that it may be in several folders: it has the same bits.
+Shard K of N has the ranges K, K + N, K + 2N, ... of trajectories in a work folder that stays; those of all shards
+make the result. A range is a pure function of its plan, so that it may be in several folders: it has the same bits.
 """
 
 from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+import shlex
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from ..atomic import appearing
-from ..engine.checkpoint import working
-from ..engine.execute import never, settled
+from ..engine.checkpoint import Work, held, part_of, working
+from ..engine.execute import never, with_core
 from ..engine.executors import ALONE, Team
 from ..engine.plan import Plan
+from ..engine.plugins import Plugins
 from ..engine.progress import Gauge, Tell, kept
-from ..engine.trajectories import Stretch, stretches, trajectories
-from ..errors import UsageError
+from ..engine.trajectories import TrajectoryRange, trajectory_maps, trajectory_ranges
+from ..errors import ResultError, StoreError, UnfinishedError, UsageError
+from ..sweeps.settings import CORES
 from ..text import safe_text
+from .backend import check_output
+from .expand import table_of
+from .provenance import stored_config
 from .schema import outline
-from .sweep import fill
+from .summary import Survey
+from .sweep import fill, loaded_again, reader, store_result
 
 # what a folder says of its shard, beside the plan
 FILE = "shard.json"
+MAX_MISSING = 5  # shards that are named
 ATTRIBUTES = ("config", "config_set", "plugins", "fingerprint")
 
 
@@ -53,8 +62,8 @@ class Shard:
             raise UsageError(f"--shard {safe_text(text)}: wants K/N with K from 1 to N, such as 3/16")
         return shard
 
-    def has(self, stretch: Stretch) -> bool:
-        return stretch.number % self.of == self.number - 1
+    def has(self, part: TrajectoryRange) -> bool:
+        return part.number % self.of == self.number - 1
 
     def folder(self, output: Path) -> Path:
         """Its work folder."""
@@ -84,7 +93,7 @@ def sweep_shard(
     overwrite: bool = False,
     team: Team = ALONE,
     tell: Tell = lambda progress: None,
-    stopping: Callable[[], bool] = never,
+    should_stop: Callable[[], bool] = never,
 ) -> Share:
     """Integrate a shard of a plan into its work folder, and go on with what is there.
 
@@ -95,15 +104,15 @@ def sweep_shard(
     shard : which part
     command : words that sweep the whole; what makes a shard that is missing is told by them
     overwrite : begin anew
-    team, tell, stopping : see `impact.results.sweep.sweep_into`
+    team, tell, should_stop : see `impact.results.sweep.sweep_into`
 
     Raises
     ------
     UsageError, InUseError, StoreError, UnfinishedError : see there
     """
-    found = trajectories(plan)
-    plan = settled(plan, found)
-    blocks = list(stretches(found))
+    maps = trajectory_maps(plan)
+    plan = with_core(plan, maps)
+    blocks = list(trajectory_ranges(maps))
     own = [one for one in blocks if shard.has(one)]
     gauge = Gauge.begin(sum(one.size for one in own), plan.points, tell)
     folder = shard.folder(output)
@@ -118,5 +127,155 @@ def sweep_shard(
         with appearing(folder / FILE, overwrite=True) as sink:
             sink.write(json.dumps(about).encode())
         with kept(folder, gauge, "the same command", lambda error: []):
-            fill(work, plan, found, own, gauge, team, stopping)
+            fill(work, plan, maps, own, gauge, team, should_stop)
     return Share(folder, len(own), len(blocks), gauge.at.trajectories, gauge.at.failed)
+
+
+@dataclass(frozen=True)
+class _Told:
+    """What a folder says of its shard."""
+
+    shard: Shard
+    command: tuple[str, ...]
+    core: str
+    attributes: Mapping[str, Any]
+
+
+def merge(
+    folders: Sequence[Path],
+    output: Path,
+    plugins: Plugins,
+    *,
+    overwrite: bool = False,
+    tell: Tell = lambda progress: None,
+    should_stop: Callable[[], bool] = never,
+) -> tuple[Survey, int]:
+    """Store the result that shards make; their folders stay as they are.
+
+    Parameters
+    ----------
+    folders : of the shards, in any order
+    output : the file
+    plugins : the models of one's own that they were made with
+    overwrite : replace the file if it exists
+    tell, should_stop : see `impact.results.sweep.sweep_into`
+
+    Returns
+    -------
+    The result, and how many blocks were in more than one folder, where they have the same bits.
+
+    Raises
+    ------
+    UsageError : a folder is no shard, or of another sweep; or shards are missing or unfinished, each of which is
+        told with the command that makes it
+    ResultError : a block is in two folders, and they differ
+    InUseError : a shard is still being made
+    StoreError, UnfinishedError : nothing was stored; the folders have all of it
+    """
+    check_output(output, overwrite=overwrite)
+    told = {folder: _told(folder) for folder in {one.resolve(): one for one in folders}.values()}
+    first, about = next(iter(told.items()))
+    config = stored_config(about.attributes, [], plugins, str(first))
+    # the core that it was settled on, whichever is here
+    config = replace(config, solver=replace(config.solver, core=about.core))
+    plan = Plan(config, plugins.of(config.models))
+    maps = trajectory_maps(plan)
+    blocks = list(trajectory_ranges(maps))
+    gauge = Gauge.begin(sum(own.count for own in maps), plan.points, tell)
+    for folder, one in told.items():
+        if one.attributes["fingerprint"] != about.attributes["fingerprint"]:
+            raise UsageError(
+                f"{safe_text(str(folder))}: its title or output is not that of {safe_text(str(first))}; expected "
+                "the folders of one sweep"
+            )
+    # a folder is locked while it is looked at, one after the other: there may be more of them than open files
+    where, twice = _places([*told], plan, blocks, gauge, should_stop)
+    lacking = [part for part in blocks if part.number not in where]
+    if lacking:
+        raise UsageError("\n".join(_missing(output, lacking, told)))
+    table = table_of(plan, maps, reader(maps, lambda number: loaded_again(where[number], blocks[number])))
+    try:
+        return store_result(output, plan, table, part_of(output), overwrite, gauge, should_stop), twice
+    except (StoreError, UnfinishedError) as error:
+        raise type(error)(
+            "; ".join(filter(None, [str(error), "the folders have all that is finished"]))
+        ) from error
+
+
+def _told(folder: Path) -> _Told:
+    """What a folder says of its shard; it may come from anywhere.
+
+    Raises
+    ------
+    UsageError : it is no shard
+    """
+    try:
+        if not (folder / FILE).is_file():
+            raise ValueError
+        found = json.loads((folder / FILE).read_text(encoding="utf-8"))
+        number, of = found["shard"]
+        command, core, attributes = found["command"], found["core"], found["attributes"]
+        right = (
+            isinstance(number, int) and isinstance(of, int) and 1 <= number <= of
+            and isinstance(command, list) and all(isinstance(one, str) for one in command)
+            and core in CORES and {*ATTRIBUTES} <= attributes.keys()
+        )  # fmt: skip
+        if not right:
+            raise ValueError
+    except (OSError, ValueError, TypeError, AttributeError, KeyError, RecursionError):
+        shown = safe_text(str(folder))
+        raise UsageError(f"{shown}: is no shard, wants a folder that impact sweep --shard K/N makes") from None
+    return _Told(Shard(number, of), tuple(command), core, attributes)
+
+
+def _places(
+    folders: Sequence[Path],
+    plan: Plan,
+    blocks: Sequence[TrajectoryRange],
+    gauge: Gauge,
+    should_stop: Callable[[], bool],
+) -> tuple[dict[int, Work], int]:
+    """In which folder each range is, and how many are in several."""
+    where: dict[int, Work] = {}
+    repeated: set[int] = set()
+    for folder in folders:
+        with held(folder, plan) as work:
+            for part in blocks:
+                if should_stop():
+                    raise UnfinishedError("nothing was written")
+                found = work.load(part)
+                if found is None:
+                    continue
+                if part.number not in where:
+                    where[part.number] = work
+                    gauge.count(part, found)
+                    gauge.say()
+                    continue
+                repeated.add(part.number)
+                other = loaded_again(where[part.number], part)
+                if any(values.tobytes() != vars(other)[name].tobytes() for name, values in vars(found).items()):
+                    raise ResultError(
+                        f"{safe_text(str(work.path(part.number)))}: differs from "
+                        f"{safe_text(str(where[part.number].path(part.number)))}; expected both to be of processors of "
+                        "one kind"
+                    )
+    return where, len(repeated)
+
+
+def _missing(output: Path, lacking: Sequence[TrajectoryRange], told: Mapping[Path, _Told]) -> list[str]:
+    """A line for each shard that is missing or unfinished, with what makes it."""
+    about = next(iter(told.values()))
+    folders = {one.shard: folder for folder, one in told.items()}
+    blocks: dict[Shard, int] = {}
+    for part in lacking:
+        shard = Shard(part.number % about.shard.of + 1, about.shard.of)
+        blocks[shard] = blocks.get(shard, 0) + 1
+    lines = []
+    for shard in sorted(blocks, key=lambda one: one.number)[:MAX_MISSING]:
+        again = safe_text(shlex.join([*about.command, "--shard", str(shard)]), 500)
+        lacks = f"lacks {blocks[shard]:,} block{'' if blocks[shard] == 1 else 's'}"
+        if shard in folders:
+            lines.append(f"{safe_text(str(folders[shard]))}: shard {shard} {lacks}; {again} finishes it")
+        else:
+            lines.append(f"{safe_text(str(output))}: shard {shard} is missing; {again} makes it")
+    return [*lines, f"and {len(blocks) - MAX_MISSING:,} more shards"] if len(blocks) > MAX_MISSING else lines

@@ -6,34 +6,63 @@ import errno
 import os
 import shutil
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from ..atomic import appearing
 from ..contact.strike import Rebound
 from ..engine.checkpoint import Work, folder_of, part_of, remove, working
-from ..engine.execute import never, run, settled
+from ..engine.execute import Known, never, run, with_core
 from ..engine.executors import ALONE, Team
-from ..engine.finished import Finished
 from ..engine.plan import Plan
-from ..engine.points import Rows, boxes_of
 from ..engine.progress import Gauge, Tell, kept
-from ..engine.trajectories import BLOCK, Stretch, Trajectories, stretches, trajectories
-from ..errors import StoreError, UnfinishedError
+from ..engine.trajectories import (
+    RANGE_TRAJECTORIES,
+    TrajectoryMap,
+    TrajectoryRange,
+    even,
+    trajectory_maps,
+    trajectory_ranges,
+)
+from ..errors import ResultError, StoreError, UnfinishedError, UsageError
 from ..text import safe_text
-from .assembly import Part, assemble, parts, parts_as_finished
-from .digest import Taken, content_digest
-from .schema import outline
-from .store import check_output, vet_own
-from .summary import Survey, Tally
-from .writer import writing
+from .backend import SMALL_BYTES, check_output, check_readable, open_result, write
+from .expand import TrajectoryTable, expanded_slabs, in_memory, lazy_dataset, table_of
+from .factored import factored_outline, table_values
+from .netcdf import MAX_LETTERS, is_text, letters
+from .schema import outline, stored
+from .summary import Survey, Tally, tally_of
 
 # bytes that a result takes besides its values, about
 OVERHEAD = 2**16
-# points up to which a sweep of one block keeps nothing: it is done again sooner than it is read
-FEW = 2**20
+# points up to which a sweep of one range keeps nothing: it is repeated faster than it is read
+NO_CHECKPOINT_POINTS = 2**20
+
+Values = dict[str, NDArray[Any]]
+
+
+@dataclass(frozen=True)
+class Extension:
+    """What of a sweep is known from a smaller one, see `impact.results.extend`.
+
+    Parameters
+    ----------
+    seal : of the result that is extended
+    note : what the new one says of it
+    known : the trajectories that are not integrated again
+    fill : puts known values into those of a slab, given the model, the place and the values; None where all are
+        computed from the trajectories
+    """
+
+    seal: str
+    note: str
+    known: Known
+    fill: Callable[[int, tuple[slice, ...], Values], None] | None = None
 
 
 def sweep_into(
@@ -44,7 +73,8 @@ def sweep_into(
     overwrite: bool = False,
     team: Team = ALONE,
     tell: Tell = lambda progress: None,
-    stopping: Callable[[], bool] = never,
+    should_stop: Callable[[], bool] = never,
+    extension: Extension | None = None,
 ) -> Survey:
     """Run a plan, and store its result.
 
@@ -52,46 +82,52 @@ def sweep_into(
     ----------
     output : the file
     plan : what to run
-    resume : go on with the work folder that an interrupted sweep left
+    resume : continue with the work folder that an interrupted sweep left
     overwrite : replace the file if it exists, and a work folder if it is not to be resumed
     team : who integrates
-    tell : is told how far it is, now and then
-    stopping : whether to stop; what was begun is finished and kept
+    tell : receives the progress, now and then
+    should_stop : whether to stop; what was begun is finished and kept
+    extension : what is known already
 
     Raises
     ------
     UsageError : the output, or the work folder, is not to be touched
     InUseError : another process writes the output
     StoreError : the disk is full or failed, or processes were killed; what is finished is kept
-    UnfinishedError : it was told to stop; likewise
+    UnfinishedError : it was stopped; likewise
     """
     check_output(output, overwrite=overwrite)
-    found = trajectories(plan)
-    plan = settled(plan, found)
-    blocks = list(stretches(found))
-    total = sum(one.count for one in found)
+    check_labels(plan)
+    maps = trajectory_maps(plan)
+    plan = with_core(plan, maps)
+    ranges = list(trajectory_ranges(maps))
+    total = sum(own.count for own in maps)
     gauge = Gauge.begin(total, plan.points, tell)
-    if total <= BLOCK and plan.points <= FEW and not os.path.lexists(folder_of(output)):
+    known = extension.known if extension else lambda part: None
+    few = plan.points <= NO_CHECKPOINT_POINTS or plan.layout == "factored"
+    if total <= RANGE_TRAJECTORIES and few and not os.path.lexists(folder_of(output)):
         finished = {}
-        for stretch, rebound in run(plan, found, blocks):
-            finished[stretch.number] = rebound
-            gauge.count(stretch, rebound)
-        rows = Finished(found, finished.__getitem__).rows
+        for part, rebound in run(plan, maps, ranges, known=known):
+            finished[part.number] = rebound
+            gauge.count(part, rebound)
+        table = table_of(plan, maps, reader(maps, finished.__getitem__))
         try:
-            return assembled(output, plan, found, rows, None, overwrite, gauge, stopping)
+            return store_result(output, plan, table, None, overwrite, gauge, should_stop, extension)
         except UnfinishedError:
             raise UnfinishedError("nothing was written") from None
 
     folder = folder_of(output)
-    with working(folder, plan, resume=resume, overwrite=overwrite) as work:
+    with working(
+        folder, plan, resume=resume, overwrite=overwrite, extends=extension.seal if extension else ""
+    ) as work:
         # another may have stored it since
         check_output(output, overwrite=overwrite)
         # without the other word a result that is to be replaced would be in the way
-        again = "--resume --overwrite" if os.path.lexists(output) else "--resume"
+        again = "--resume --overwrite" if os.path.lexists(output) and not extension else "--resume"
         with kept(folder, gauge, again, lambda error: _room(error, output, plan, gauge)):
-            fill(work, plan, found, blocks, gauge, team, stopping)
-            rows = Finished(found, lambda number: again_loaded(work, blocks[number])).rows
-            survey = assembled(output, plan, found, rows, part_of(output), overwrite, gauge, stopping)
+            fill(work, plan, maps, ranges, gauge, team, should_stop, known)
+            table = table_of(plan, maps, reader(maps, lambda number: loaded_again(work, ranges[number])))
+            survey = store_result(output, plan, table, part_of(output), overwrite, gauge, should_stop, extension)
         remove(folder)
     return survey
 
@@ -99,68 +135,113 @@ def sweep_into(
 def fill(
     work: Work,
     plan: Plan,
-    found: Sequence[Trajectories],
-    blocks: Sequence[Stretch],
+    maps: Sequence[TrajectoryMap],
+    ranges: Sequence[TrajectoryRange],
     gauge: Gauge,
     team: Team,
-    stopping: Callable[[], bool],
+    should_stop: Callable[[], bool],
+    known: Known = lambda part: None,
 ) -> None:
-    """Have all of some blocks in a work folder.
+    """Have all of some ranges in a work folder.
 
     Raises
     ------
     StoreError, UsageError : see `sweep_into`
-    UnfinishedError : it was told to stop
+    UnfinishedError : it was stopped
     """
-    todo: list[Stretch] = []
-    for stretch in blocks:
-        one = None if stopping() else work.load(stretch)
-        if one is None:
-            todo.append(stretch)
+    todo: list[TrajectoryRange] = []
+    for part in ranges:
+        before = None if should_stop() else work.load(part)
+        if before is None:
+            todo.append(part)
         else:
-            gauge.count(stretch, one)
+            gauge.count(part, before)
     gauge.say()
-    for stretch, rebound in run(plan, found, todo, team=team, stopping=stopping):
-        work.store(stretch, rebound)
-        gauge.count(stretch, rebound)
+    for part, rebound in run(plan, maps, todo, team=team, should_stop=should_stop, known=known):
+        work.store(part, rebound)
+        gauge.count(part, rebound)
         gauge.say()
     if not gauge.is_full:
         raise UnfinishedError
 
 
-def in_memory(plan: Plan, *, team: Team = ALONE, tell: Tell, stopping: Callable[[], bool]) -> xr.Dataset:
-    """Run a plan, and hold its result; for the parameters see `sweep_into`.
+def sweep_in_memory(plan: Plan, *, team: Team = ALONE, tell: Tell, should_stop: Callable[[], bool]) -> xr.Dataset:
+    """Run a plan; its result is in memory if it is small, else it is computed when it is indexed.
+
+    For the parameters see `sweep_into`.
 
     Raises
     ------
-    UnfinishedError : it was told to stop; nothing is kept
+    UnfinishedError : it was stopped; nothing is kept
     """
-    found = trajectories(plan)
-    plan = settled(plan, found)
-    gauge = Gauge.begin(sum(one.count for one in found), plan.points, tell)
+    check_labels(plan)
+    maps = trajectory_maps(plan)
+    plan = with_core(plan, maps)
+    gauge = Gauge.begin(sum(own.count for own in maps), plan.points, tell)
+    finished: dict[int, Rebound] = {}
+    for part, rebound in run(plan, maps, trajectory_ranges(maps), team=team, should_stop=should_stop):
+        finished[part.number] = rebound
+        gauge.count(part, rebound)
+        gauge.say()
+    if not gauge.is_full or should_stop():
+        raise UnfinishedError("nothing was written")
+    table, variables = table_of(plan, maps, reader(maps, finished.__getitem__)), stored(plan)
+    dataset = lazy_dataset(outline(plan), table, variables)
+    return in_memory(dataset, table, variables) if dataset.nbytes <= SMALL_BYTES else dataset
 
-    def finished() -> Iterator[tuple[Stretch, Rebound]]:
-        for stretch, rebound in run(plan, found, stretches(found), team=team, stopping=stopping):
-            gauge.count(stretch, rebound)
-            gauge.say()
-            yield stretch, rebound
-        if not gauge.is_full or stopping():
-            raise UnfinishedError("nothing was written")
 
-    return assemble(plan, parts_as_finished(plan, found, finished()))
+def reader(maps: Sequence[TrajectoryMap], load: Callable[[int], Rebound]) -> Callable[[int, int, int], Rebound]:
+    """The finished ranges of a plan as what a `TrajectoryTable` reads; `load` gives the one of a number."""
+    before = np.cumsum([0, *(-(-own.count // RANGE_TRAJECTORIES) for own in maps)])
+
+    def read(model: int, start: int, stop: int) -> Rebound:
+        return load(int(before[model]) + start // even(maps[model].count, RANGE_TRAJECTORIES))
+
+    return read
 
 
-def again_loaded(work: Work, stretch: Stretch) -> Rebound:
-    """A block that was finished.
+def loaded_again(work: Work, part: TrajectoryRange) -> Rebound:
+    """A range that was finished.
 
     Raises
     ------
     StoreError : it is damaged
     """
-    rebound = work.load(stretch)
+    rebound = work.load(part)
     if rebound is None:
-        raise StoreError(f"{safe_text(str(work.path(stretch.number)))}: cannot be read any more")
+        raise StoreError(f"{safe_text(str(work.path(part.number)))}: cannot be read any more")
     return rebound
+
+
+def check_labels(plan: Plan) -> None:
+    """Refuse a plan whose labels would not be read again, before anything is integrated.
+
+    Raises
+    ------
+    UsageError : they are too long
+    """
+    size = sum(letters(one).size for one in outline(plan).coords.values() if is_text(one))
+    if size > MAX_LETTERS:
+        raise UsageError(
+            f"its labels take {size:,} bytes, expected at most {MAX_LETTERS:,}: give materials shorter names"
+        )
+
+
+def finished(path: Path, plan: Plan) -> Survey | None:
+    """What a file holds, if it is the whole result of a plan."""
+    if path.is_symlink() or not path.is_file():
+        return None
+    try:
+        dataset = open_result(path)
+    except ResultError:
+        return None
+    if dataset.attrs.get("fingerprint") != plan.fingerprint:
+        dataset.close()
+        return None
+    axes = dict(zip((axis.name for axis in plan.config.axes), plan.shape, strict=True))
+    if dict(dataset.sizes) != {"model": len(plan.models), **axes}:
+        return None
+    return Survey(dataset, tally_of(dataset), sum(own.count for own in trajectory_maps(plan)))
 
 
 def _room(error: Exception, output: Path, plan: Plan, gauge: Gauge) -> list[str]:
@@ -168,59 +249,60 @@ def _room(error: Exception, output: Path, plan: Plan, gauge: Gauge) -> list[str]
     cause = error.__cause__
     if not isinstance(cause, OSError) or cause.errno not in (errno.ENOSPC, errno.EDQUOT):
         return []
-    wanted = (
-        outline(plan).nbytes
-        + OVERHEAD
-        + (gauge.at.of_trajectories - gauge.at.trajectories)
-        * sum(getattr(Rebound.blank(1), one.name).nbytes for one in fields(Rebound))
-    )
+    row = sum(getattr(Rebound.blank(1), column.name).nbytes for column in fields(Rebound))
+    result = gauge.at.of_trajectories * row if plan.layout == "factored" else outline(plan).nbytes
+    wanted = result + OVERHEAD + (gauge.at.of_trajectories - gauge.at.trajectories) * row
     free = shutil.disk_usage(output.parent).free
     return [f"it takes {wanted:,} bytes more, {free:,} are free"]
 
 
-def assembled(
+def store_result(
     output: Path,
     plan: Plan,
-    found: Sequence[Trajectories],
-    rows: Rows,
+    table: TrajectoryTable,
     part: Path | None,
     overwrite: bool,
     gauge: Gauge,
-    stopping: Callable[[], bool],
+    should_stop: Callable[[], bool],
+    extension: Extension | None = None,
 ) -> Survey:
-    """Write the result of finished trajectories, and give it its name."""
-    at = gauge.at
-    made, output_of = outline(plan), plan.config.output
-    tally, digests = Tally(), {str(name): Taken() for name in made.data_vars}
-    along_model = {name for name in digests if "model" in made[name].dims}
+    """Write the result of a trajectory table in the layout of its plan, and give it its name."""
+    at, variables, tally = gauge.at, stored(plan), Tally()
+    whole = outline(plan)
+    if extension:
+        whole = whole.assign_attrs(extended=extension.note)
+
+    def check(points: int) -> None:
+        gauge.tell(replace(at, points=points, failed=max(tally.failed, at.failed)))
+        if should_stop():
+            raise UnfinishedError
+
+    def full() -> Iterator[tuple[str, tuple[int | slice, ...], NDArray[Any]]]:
+        points = 0
+        chunks = plan.config.output.chunks
+        lengths = [chunks.get(axis.name, axis.size) for axis in plan.config.axes] if chunks else []
+        for model, where, contact, values in expanded_slabs(table, variables, lengths):
+            if extension and extension.fill:
+                extension.fill(model, where, values)
+            for name, array in values.items():
+                yield name, (model, *where) if "model" in whole[name].dims else where, array
+            radius = np.fmin(contact.lanes.R1, contact.lanes.R2)
+            tally.add(values, model, [place.start for place in where], radius)
+            points += values["status"].size
+            check(points)
+
+    def factored() -> Iterator[tuple[str, tuple[slice], NDArray[Any]]]:
+        for name, where, array in table_values(table, variables):
+            yield name, (where,), array
+            check(0)
+
+    is_full = plan.layout == "full"
+    made = whole if is_full else factored_outline(whole, table, variables)
     with appearing(output, overwrite=overwrite, part=part) as sink:
-        with writing(sink, made, output_of) as (put, seal):
-
-            def store(one: Part) -> None:
-                for name, values in one.values.items():
-                    put(name, one.where(name in along_model), values)
-
-            def check() -> None:
-                gauge.tell(replace(at, points=max(tally.points, stored), failed=tally.failed or at.failed))
-                if stopping():
-                    raise UnfinishedError
-
-            stored = 0
-            if output_of.chunks:
-                # each piece is packed once; the digest is of another order, and what it is of is made again
-                lengths = [output_of.chunks.get(axis.name, axis.size) for axis in plan.config.axes]
-                for one in parts(plan, found, rows, boxes_of(len(plan.models), plan.shape, lengths)):
-                    store(one)
-                    stored += one.box.size
-                    check()
-            for one in parts(plan, found, rows):
-                if not output_of.chunks:
-                    store(one)
-                for name, values in one.values.items():
-                    digests[name].add(values)
-                tally.add(one)
-                check()
-            digest = content_digest(made, {name: taken.hexdigest() for name, taken in digests.items()})
-            seal(digest)
-        vet_own(sink, output)
-    return Survey(made.assign_attrs(content_digest=digest), tally, at.of_trajectories)
+        seal = write(sink, made, full() if is_full else factored(), plan.config.output)
+        check_readable(sink, output)
+    if not is_full:
+        whole = lazy_dataset(whole, table, variables)
+        tally = tally_of(whole)
+    whole.encoding = {"source": str(output), "seal": seal, "layout": plan.layout}
+    return Survey(whole, tally, at.of_trajectories)

@@ -207,12 +207,20 @@ def _read(
         *(name for key in own for name in (f"{key}.{one}" for one in _dict(own[key])) if name in chosen),
     ]
     entries = {name: context.entries[name] for name in names if name in context.entries}
-    grid = lay_out(entries, SWEEP | chosen, context.groups, swept, len(models), max_points)
+    stored = _dict(data.get("output"))
+    in_full = stored.get("layout") == "full" or (
+        stored.get("layout", "auto") == "auto" and bool(stored.get("chunks"))
+    )
+    grid = lay_out(entries, SWEEP | chosen, context.groups, swept, len(models), max_points, in_full=in_full)
     faults += grid.faults
     if not faults:
         output = _values(parsed["output"])
-        stored = {"status", *(output.get("variables") or BY_DEFAULT)}
-        faults += chunk_faults(output.get("chunks") or {}, grid.axes, len(models), len(stored))
+        count = len({"status", *(output.get("variables") or BY_DEFAULT)})
+        faults += chunk_faults(output.get("chunks") or {}, grid.axes, len(models), count)
+        if output.get("chunks") and output.get("layout") == "factored":
+            faults.append(
+                (("output", "chunks"), 'got chunks beside layout = "factored", expected layout = "full"')
+            )
     if faults:
         return None, faults
     defaults = DEFAULTS | {

@@ -12,6 +12,11 @@ from .values import Fault, KeyPath, Problem, Quantity, nearest, show
 
 # of all models together, where nothing else is said
 MAX_POINTS = 10**9
+# that can be counted, where they are not stored one by one
+MOST_POINTS = 2**62
+# HDF5 has arrays of 32 dimensions, one of which is that of the models
+MAX_AXES = 31
+FULL = ' in layout "full" (--max-points); layout = "factored" stores any number'
 # pieces of a result, and points of a piece: a reader opens each, and holds it as a whole
 MOST_PIECES, MOST_OF_A_PIECE = 100_000, 2**22
 # bytes that the outputs of a point take at most, by default
@@ -55,6 +60,8 @@ def lay_out(
     given: Sequence[str],
     models: int,
     max_points: int = MAX_POINTS,
+    *,
+    in_full: bool = True,
 ) -> Grid:
     """The grid of some entries.
 
@@ -66,6 +73,7 @@ def lay_out(
     given : the names under [sweep], whether their entries could be read or not
     models : how many there are
     max_points : how many points are allowed
+    in_full : whether all of them are to be stored; else only what is integrated is bounded, see `impact.api.prepare`
     """
     member_of, faults = _zipped(groups, entries, given)
     scalars = {name: entry.given[0] for name, entry in entries.items() if entry.kind == "scalar"}
@@ -73,9 +81,12 @@ def lay_out(
     # a group stands where its first member does
     leaders = [name for name in swept if member_of.get(name, (name,))[0] == name]
     points = math.prod(entries[name].size for name in leaders) * models
-    if points > max_points:
+    if len(leaders) > MAX_AXES:
+        faults.append((("sweep",), f"got {len(leaders)} axes, expected at most {MAX_AXES}"))
+    most = max_points if in_full else MOST_POINTS
+    if points > most:
         size = f"{points:,} points (axes times models), up to {WIDTH * points / 1e9:,.0f} GB"
-        faults.append((("sweep",), f"got {size}, wants at most {max_points:,} points (--max-points)"))
+        faults.append((("sweep",), f"got {size}, expected at most {most:,} points" + FULL * in_full))
     columns: dict[str, Values] = {}
     for name in swept:
         entry = entries[name]
@@ -84,7 +95,7 @@ def lay_out(
             # the first column names the points of the axis; the others may repeat themselves
             if name in leaders:
                 faults += _repeated(name, entry.given)
-        elif points <= max_points:
+        elif points <= most:
             try:
                 columns[name] = written_out(entry, quantities[name])
             except Problem as problem:

@@ -12,7 +12,7 @@ from ..contact.compiled import is_installed
 from ..contact.model import ForceModel
 from .ranges import MAX_AXIS, Entry, entry_schema, number_schema, read_entry, read_groups, read_names
 from .rules import DEFAULTS, MATERIAL, MATERIALS, REQUIRED, SWEEP, expand_models, own_quantities
-from .settings import COMPRESSIONS, CORES, DTYPES
+from .settings import COMPRESSIONS, CORES, DTYPES, LAYOUTS
 from .values import Problem, Quantity, read_number, read_switch, read_whole, refuse
 
 DEFAULT_TITLE = "Impact sweep"
@@ -182,6 +182,9 @@ OUTPUT_KEYS = {
     ),
     "dtype": _word_key(DTYPES, "of the floating-point variables; coordinates are float64"),
     "compression": _word_key(COMPRESSIONS, "of the variables"),
+    "layout": _word_key(
+        LAYOUTS, "all values, or the trajectories from which they are computed when they are read"
+    ),
     "chunks": Key(_chunks, CHUNKS, "lengths along axes, by name, of the pieces in which variables are stored"),
 }
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Literal
 
 DTYPES = ("float64", "float32")
 COMPRESSIONS = ("none", "gzip")
+LAYOUTS = ("auto", "full", "factored")
 CORES = ("auto", "numpy", "numba")
 DEFAULT_RTOL = 1e-10
 
@@ -38,10 +40,13 @@ class Output:
     variables : of the result, or None for all
     dtype : of its floating-point numbers, "float64" or "float32"; coordinates are float64
     compression : "none" or "gzip"
-    chunks : the lengths along the axes, by name, of the pieces in which it is stored; empty for one piece
+    chunks : the lengths along the axes, by name, of the chunks in which it is stored; empty for one piece
+    layout : "full", all values; "factored", the trajectories, from which they are computed when they are read; or
+        "auto", in full up to 10^7 points
     """
 
     variables: tuple[str, ...] | None = None
     dtype: str = "float64"
     compression: str = "none"
     chunks: Mapping[str, int] = field(default_factory=dict)
+    layout: Literal["auto", "full", "factored"] = "auto"

@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 
 from ..contact.models import catalogue
 from ..errors import UsageError
+from ..results.backend import write_whole
 from ..results.schema import plain_unit
-from ..results.store import write_whole
 from ..text import safe_text
 
 if TYPE_CHECKING:

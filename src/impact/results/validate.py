@@ -1,17 +1,52 @@
-"""What a result has to be like for the commands to make sense of it, checked when it is stored and when read."""
+"""The names that a result, or a time history, may have, and what it has to be like for the commands to make sense of it.
+
+`load` passes over other names, `save` refuses them.
+"""
 
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator, Mapping
+from dataclasses import fields
 
 import numpy as np
 import xarray as xr
 
 from ..contact.status import Status
+from ..contact.strike import Rebound
+from ..sweeps.rules import MATERIALS, SWEEP
 from ..text import safe_text
-from .names import ABOUT_MODELS, TEXTS, is_name
-from .schema import SCHEMA
+from .history import HISTORY
+from .schema import ABOUT_A_MODEL, SCHEMA
+from .slabs import VARIES_ALONG, is_lazy, slabs
+
+COMPUTED = frozenset(one.name for one in SCHEMA)
+FOLLOWED = frozenset(name for name, _, _ in HISTORY)  # over the time t
+TEXTS = frozenset({"model", *ABOUT_A_MODEL, *MATERIALS} - {"year"})
+# the table of a factored file, see `impact.results.factored`
+TABLE = frozenset({
+    *(f"trajectory_{column.name}" for column in fields(Rebound)), "trajectory_of_cell", "law_stiffness",
+    "witness_index", *(f"witness_{name}" for name in COMPUTED),
+})  # fmt: skip
+NAMES = COMPUTED | FOLLOWED | TEXTS | TABLE | {"t", "year", "exponent", *SWEEP}
+# a parameter of a model's own: the key of the model, and a name of Python
+OWN = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*\.[^\W\d]\w*")
+
+
+def is_name(name: str) -> bool:
+    """Whether a variable of a result may be called this.
+
+    >>> is_name("e_out"), is_name("ismail-stronge-2008.gamma"), is_name("twice")
+    (True, True, False)
+    """
+    return name in NAMES or OWN.fullmatch(name) is not None
+
+
+def is_quantity(name: str, axes: tuple[str, ...]) -> bool:
+    """Whether it was computed; what was given is a coordinate. A velocity of a ball is one or the other."""
+    return name in COMPUTED or (name in FOLLOWED and axes == ("t",))
+
 
 # attributes of a result that the program reads: text, numbers, and text that is JSON of a kind
 TEXT = ("title", "config", "config_set", "fingerprint", "impact_version", "packages", "plugins")
@@ -19,10 +54,17 @@ NUMBERS = ("rtol", "max_steps")
 JSON: Mapping[str, type] = {
     "config_set": list, "packages": dict, "plugins": dict, "materials": dict, "tolerances": dict, "inputs": dict,
 }  # fmt: skip
+# statuses that are looked at at a time
+MAX_STATUS = 2**22
 KNOWN = [int(status) for status in Status]
+# of a variable of a result
+DTYPES = {
+    variable.name: [np.dtype(variable.dtype)] if variable.dtype != "f8" else [np.dtype("f8"), np.dtype("f4")]
+    for variable in SCHEMA
+}
 
 
-def misfit(dataset: xr.Dataset) -> str | None:
+def schema_violation(dataset: xr.Dataset) -> str | None:
     """The first reason why a dataset is no result and no time history, or None."""
     checks = (_names, _axes, _kinds, _json, _history if "t" in dataset.dims else _result)
     return next((safe_text(fault) for check in checks for fault in check(dataset)), None)
@@ -41,10 +83,13 @@ def _axes(dataset: xr.Dataset) -> Iterator[str]:
 
 
 def _kinds(dataset: xr.Dataset) -> Iterator[str]:
-    for name, one in dataset.variables.items():
-        if one.dtype.kind not in ("UO" if name in TEXTS else "iuf"):
+    for name, variable in dataset.variables.items():
+        if variable.dtype.kind not in ("UO" if name in TEXTS else "iuf"):
             yield f"{name}: neither numbers nor labels, or one for the other"
-        if not all(isinstance(one.attrs.get(about, ""), str) for about in ("units", "long_name")):
+        wrong = name in DTYPES and variable.dtype not in DTYPES[str(name)]
+        if wrong:
+            yield f"{name}: got {variable.dtype}, expected {' or '.join(map(str, DTYPES[str(name)]))}"
+        if not all(isinstance(variable.attrs.get(about, ""), str) for about in ("units", "long_name")):
             yield f"{name}: units or long_name that are no text"
 
 
@@ -72,13 +117,13 @@ def _result(dataset: xr.Dataset) -> Iterator[str]:
         yield "model is no axis; select models as a list, sel(model=[...])"
     elif not dataset.indexes["model"].is_unique:
         yield "a model stands twice in it"
-    for name in ABOUT_MODELS:
+    for name in ABOUT_A_MODEL:
         if name not in dataset or dataset[name].dims != ("model",):
             yield f"{name} of the models is missing"
     for one in SCHEMA:
         if one.name in dataset and one.per == "axes" and "model" in dataset[one.name].dims:
             yield f"{one.name}: lies along model"
-    if "status" in dataset and not np.isin(dataset["status"].values, KNOWN).all():
+    if "status" in dataset and _has_unknown_status(dataset["status"]):
         yield "status: a number without a meaning"
     for key in TEXT:
         if not isinstance(dataset.attrs.get(key), str):
@@ -86,3 +131,11 @@ def _result(dataset: xr.Dataset) -> Iterator[str]:
     for key in NUMBERS:
         if not isinstance(dataset.attrs.get(key), int | float | np.number):
             yield f"no {key}, or not as a number"
+
+
+def _has_unknown_status(status: xr.DataArray) -> bool:
+    """Whether a status has no meaning; one that is computed always has."""
+    if is_lazy(status.variable) and VARIES_ALONG in status.encoding:
+        return False
+    parts = (status.isel(where).values for where in slabs(status.sizes, MAX_STATUS))
+    return any(not np.isin(np.unique(part), KNOWN).all() for part in parts)

@@ -1,0 +1,322 @@
+"""Results on disk: written whole or not at all, and opened as datasets that are read, or computed, when they are
+indexed.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+import warnings
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from xarray.backends import BackendEntrypoint
+
+from ..atomic import Sink, appearing
+from ..errors import ResultError, UsageError
+from ..sweeps.settings import Output
+from ..text import safe_text
+from .expand import lazy_dataset
+from .factored import check_witnesses, stored_table, variables_of
+from .netcdf import StoredArray, read_variables, writing
+from .sealed import MAGIC, check_seal, write_seal
+from .slabs import slabs
+from .validate import TABLE, is_quantity, schema_violation
+
+PLAIN = Output()
+# bytes up to which a result is held in memory
+SMALL_BYTES = 2**29
+# what is copied of a file at a time
+COPIED_BYTES = 2**22
+
+
+def check_output(path: Path, *, overwrite: bool, source: Path | None = None) -> None:
+    """Refuse an output that cannot be written, before any work is done; and one that is its own source.
+
+    Raises
+    ------
+    UsageError : it exists and is not to be overwritten, is no regular file, or its folder cannot be written to
+    """
+    shown = safe_text(str(path))
+    folder = path.parent
+    if not folder.is_dir():
+        raise UsageError(f"{shown}: the folder {safe_text(str(folder))} does not exist")
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise UsageError(f"{shown}: the folder {safe_text(str(folder))} cannot be written to")
+    _check_name(path)
+    try:
+        mode = path.lstat().st_mode
+    except FileNotFoundError:
+        return
+    except OSError as error:
+        raise UsageError(f"{shown}: {error.strerror}") from None
+    if not stat.S_ISREG(mode):
+        raise UsageError(f"{shown}: is not a regular file, and is left alone")
+    if source is not None and source.exists() and path.samefile(source):
+        raise UsageError(f"{shown}: is what is read from, and is left alone")
+    if not overwrite:
+        raise UsageError(f"{shown}: exists; give another name, or overwrite it (--overwrite)")
+
+
+def _check_name(path: Path) -> None:
+    """Refuse a name with which the files beside it, such as RESULT.12345678.part, would be too long."""
+    try:
+        most = os.pathconf(path.parent, "PC_NAME_MAX")
+    except (OSError, ValueError, AttributeError):
+        return
+    room = len(".12345678.part")
+    length = len(os.fsencode(path.name))
+    if length > most - room:
+        shown = safe_text(str(path), 60)
+        raise UsageError(f"{shown}: got a name of {length} bytes, expected at most {most - room}")
+
+
+def write_whole(path: Path, content: bytes | memoryview, *, overwrite: bool) -> None:
+    """Write a file so that its name appears only when it is complete, and stays after a power cut.
+
+    Raises
+    ------
+    UsageError : see `check_output`
+    StoreError : the disk is full or failed; nothing is left under the name
+    """
+    check_output(path, overwrite=overwrite)
+    with appearing(path, overwrite=overwrite) as sink:
+        sink.write(content)
+
+
+def write(
+    sink: Sink,
+    outline: xr.Dataset,
+    values: Iterable[tuple[str, tuple[int | slice, ...], NDArray[Any]]],
+    output: Output = PLAIN,
+) -> str:
+    """Write and seal a dataset.
+
+    Parameters
+    ----------
+    sink : the file
+    outline : the dataset; the values of its variables do not count
+    values : those, as name, place and values
+    output : how they are stored
+
+    Returns
+    -------
+    str : the seal
+    """
+    with writing(sink, outline, output) as put:
+        for name, where, part in values:
+            put(name, where, part)
+    seal = write_seal(sink)
+    sink.check()
+    return seal
+
+
+def save(dataset: xr.Dataset, path: str | Path, *, overwrite: bool = False, output: Output = PLAIN) -> None:
+    """Store a dataset as a sealed netCDF-4 file, with all of its values.
+
+    Parameters
+    ----------
+    dataset : a result, or a part of one; of one that is computed or read when it is indexed no more than a little is
+        held at a time
+    path : the file
+    overwrite : replace a file that exists
+    output : how it is stored
+
+    Raises
+    ------
+    UsageError : the file exists, its folder cannot be written to, or the dataset is no result
+    StoreError : the disk is full or failed
+
+    >>> import impact, tempfile
+    >>> result = impact.sweep("configs/figure6.toml")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     impact.save(result.sel(model=["gharib-hurmuzlu-2012"]), f"{folder}/one.h5")
+    ...     impact.load(f"{folder}/one.h5").sizes["model"]
+    1
+    """
+    path = Path(path)
+    if "schema_version" not in dataset.attrs:
+        raise UsageError(
+            f"{safe_text(str(path))}: this dataset is not a result of impact: it has no schema_version"
+        )
+    odd = schema_violation(dataset)
+    if odd:
+        raise UsageError(f"{safe_text(str(path))}: {odd}; dataset.to_netcdf(path) stores anything")
+    check_output(path, overwrite=overwrite)
+    parts = (
+        (str(name), tuple(where.values()), variable.isel(where).values)
+        for name, variable in dataset.data_vars.items()
+        for where in slabs(variable.sizes)
+    )
+    with appearing(path, overwrite=overwrite) as sink:
+        write(sink, dataset, parts, output)
+        check_readable(sink, path)
+
+
+def save_with(source: Path, path: Path, attributes: Mapping[str, str]) -> None:
+    """Copy a result with other attributes, in the layout that it has; a file that exists is replaced.
+
+    Raises
+    ------
+    StoreError : the disk is full or failed
+    """
+    with appearing(path, overwrite=True) as sink, source.open("rb") as file:
+        while content := file.read(COPIED_BYTES):
+            sink.write(content)
+        sink.check()
+        # what is stored of an attribute depends on what stood there before: they are written anew
+        with h5py.File(sink, "r+") as stored:
+            for name, text in attributes.items():
+                encoded = text.encode()
+                kind = h5py.string_dtype("utf-8", max(len(encoded), 1))
+                stored.attrs.create(name, np.array(encoded, kind))
+        write_seal(sink)
+        check_readable(sink, path)
+
+
+def check_readable(sink: Sink, path: Path) -> None:
+    """Refuse to give its name to a file that would not be read again."""
+    try:
+        with h5py.File(sink, "r") as file:
+            read_variables(file)
+    except ResultError as error:
+        raise UsageError(f"{safe_text(str(path))}: would not be read again: {error}") from None
+
+
+def open_result(path: str | Path) -> xr.Dataset:
+    """Open a result, whose values are read or computed when they are indexed.
+
+    Its seal is checked at once. `dataset.encoding` has the layout ("full" or "factored") and the seal.
+
+    Parameters
+    ----------
+    path : a file that `impact sweep` or `impact run --history` wrote
+
+    Raises
+    ------
+    ResultError : it does not exist, is no result, is damaged, or is of another schema version
+
+    Warns
+    -----
+    UserWarning : it holds more than a result does, which is passed over
+    """
+    path = Path(path)
+    shown = safe_text(str(path))
+    try:
+        seal = check_seal(path)
+        # by its path: a signal that comes while h5py calls a Python stream is lost
+        file = h5py.File(path, "r", driver="sec2")
+    except ResultError as error:
+        raise ResultError(f"{shown}: {error}") from None
+    except OSError as error:
+        raise ResultError(f"{shown}: is not a readable result ({safe_text(str(error), 80)})") from error
+    try:
+        dataset, unknown = _dataset(file)
+        odd = schema_violation(dataset)
+        if odd:
+            raise ResultError(f"is not a readable result ({odd})")
+    except ResultError as error:
+        file.close()
+        raise ResultError(f"{shown}: {error}") from None
+    except MemoryError:
+        file.close()
+        raise
+    except Exception as error:
+        file.close()
+        # h5py and xarray raise almost anything on an odd file
+        raise ResultError(f"{shown}: is not a readable result ({safe_text(str(error), 80)})") from error
+    if unknown:
+        names = safe_text(", ".join(unknown))
+        warnings.warn(f"{shown}: passed over what is no part of a result: {names}", stacklevel=2)
+    dataset.encoding = {"source": str(path), "seal": seal, "layout": dataset.encoding["layout"]}
+    dataset.set_close(file.close)
+    return dataset
+
+
+def load(path: str | Path) -> xr.Dataset:
+    """Open a result, and read or compute all of its values if they are few: at most 512 MB.
+
+    Of a larger one they are read or computed when they are indexed; see `open_result`.
+
+    Parameters
+    ----------
+    path : a file that `impact sweep` or `impact run --history` wrote
+
+    Raises
+    ------
+    ResultError : it does not exist, is no result, is damaged, or is of another schema version
+
+    Warns
+    -----
+    UserWarning : it holds more than a result does, which is passed over
+
+    >>> import impact
+    >>> impact.load("README.md")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    impact.errors.ResultError: README.md: is not a readable result ...
+    """
+    dataset = open_result(path)
+    if dataset.nbytes > SMALL_BYTES:
+        return dataset
+    with dataset:
+        try:
+            return dataset.load()
+        except MemoryError:
+            raise
+        except Exception as error:
+            raise ResultError(
+                f"{safe_text(str(path))}: is not a readable result ({safe_text(str(error), 80)})"
+            ) from error
+
+
+def _dataset(file: h5py.File) -> tuple[xr.Dataset, tuple[str, ...]]:
+    """The dataset in a file, and the names in it that are no part of a result."""
+    variables, attributes, unknown = read_variables(file)
+    given = [name for name, variable in variables.items() if not is_quantity(name, tuple(map(str, variable.dims)))]
+    table = {name for name in variables if name in TABLE}
+    coordinates = {name: variables[name].load() for name in given if name not in table}
+    if "laws" not in attributes:
+        computed = {name: variable for name, variable in variables.items() if name not in coordinates}
+        dataset = xr.Dataset(computed, coordinates, attributes)
+        dataset.encoding = {"layout": "full"}
+        return dataset, unknown
+    witnesses = {name: variables[name].load() for name in table if name.startswith("witness_")}
+    stored = xr.Dataset(witnesses, coordinates, attributes)
+
+    def read(name: str, part: slice) -> NDArray[Any]:
+        return np.asarray(StoredArray(name, file[name])._read((part,)))
+
+    found = stored_table(stored, read)
+    quantities = variables_of(stored)
+    check_witnesses(found, quantities, stored)
+    outline = stored.drop_vars(witnesses).drop_attrs(deep=False)
+    kept = {name: value for name, value in attributes.items() if name not in ("axes", "laws")}
+    dataset = lazy_dataset(outline.assign_attrs(kept), found, quantities)
+    dataset.encoding = {"layout": "factored"}
+    return dataset, unknown
+
+
+class ImpactBackend(BackendEntrypoint):
+    """`xarray.open_dataset(path, engine="impact")`: a result of either layout, read or computed when it is indexed."""
+
+    description = "Open results of impact, of any size, in xarray"
+    open_dataset_parameters = ("filename_or_obj", "drop_variables")
+
+    def open_dataset(
+        self, filename_or_obj: Any, *, drop_variables: str | Iterable[str] | None = None
+    ) -> xr.Dataset:
+        dataset = open_result(filename_or_obj)
+        dropped = [drop_variables] if isinstance(drop_variables, str) else list(drop_variables or ())
+        return dataset.drop_vars(dropped, errors="ignore")
+
+    def guess_can_open(self, filename_or_obj: Any) -> bool:
+        try:
+            with Path(filename_or_obj).open("rb") as file:
+                return file.read(len(MAGIC)) == MAGIC
+        except (OSError, TypeError, ValueError):
+            return False

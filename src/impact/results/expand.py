@@ -1,0 +1,372 @@
+"""Expand: from the trajectory table of a sweep to the outputs of any part of its grid.
+
+What is integrated is a table of distinct trajectories per model, in the contact's own units. All else in a result is
+a pure function of the inputs, this table and a place of the grid, and is computed here and nowhere else.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Hashable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from xarray.backends import BackendArray
+from xarray.core import indexing
+
+from ..contact.collide import CHECKS, Contact, first_look
+from ..contact.model import Law
+from ..contact.power import Array
+from ..contact.status import Status
+from ..contact.strike import Rebound
+from ..engine.build_impacts import Stiffness, build_impacts, has_stiffness_rule
+from ..engine.plan import Index, Inputs, Plan, dimensions
+from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryMap, axes_of_arrays, even, probe_index
+from ..sweeps.grid import Axis
+from .schema import Variable, attributes_of
+from .slabs import VARIES_ALONG, aligned_slabs, slabs
+
+# values up to which a law's rule of K is looked at as a whole, and stored in a file
+MAX_STIFFNESS_VALUES = 10**6
+# sizes of a contact within these are far from what a floating-point number can hold, whatever rounding adds
+SAFE_SIZES = (1e-250, 1e250)
+# bytes that are computed or read at once, at most
+MAX_BYTES = 16 * 2**30
+
+
+@dataclass(frozen=True)
+class Rows:
+    """The integrated trajectories of each model, of which no more is held than what is asked for needs.
+
+    Parameters
+    ----------
+    maps : which trajectory each cell takes, by model
+    read : the trajectories of a model from one to another
+    segment : how many are read at a time, at most
+    """
+
+    maps: Sequence[TrajectoryMap]
+    read: Callable[[int, int, int], Rebound]
+    segment: int = RANGE_TRAJECTORIES
+    # those of the model that was asked for last, where its cells share them
+    _whole: dict[int, Rebound] = field(default_factory=dict)
+
+    def take(self, model: int, rows: NDArray[np.intp]) -> Rebound:
+        """Some trajectories of a model, arrays of the shape of `rows`."""
+        own = self.maps[model]
+        if not own.is_shared:
+            flat = self._segments(model, rows.reshape(-1))
+            return flat.take(np.arange(rows.size).reshape(rows.shape))
+        if model not in self._whole:
+            # any of them may be needed at any time
+            whole = self._segments(model, np.arange(own.count))
+            self._whole.clear()
+            self._whole[model] = whole
+        return self._whole[model].take(rows)
+
+    def _segments(self, model: int, rows: NDArray[np.intp]) -> Rebound:
+        count = self.maps[model].count
+        size = even(count, self.segment)
+        found, segment = Rebound.blank(rows.size), rows // size
+        for number in np.unique(segment).tolist():
+            where = np.flatnonzero(segment == number)
+            start = number * size
+            found.put(where, self.read(model, start, min(start + size, count)).take(rows[where] - start))
+        return found
+
+
+@dataclass(frozen=True)
+class TrajectoryTable:
+    """The trajectories of a sweep, and all that their outputs depend on besides.
+
+    Parameters
+    ----------
+    inputs : of the sweep
+    laws : the models, or what is known of them without their formulas
+    maps : which trajectory each point takes, by model
+    rows : the trajectories
+    stiffness : K of each law that has a rule for it and no formula here; None otherwise
+    """
+
+    inputs: Inputs
+    laws: tuple[Law, ...]
+    maps: tuple[TrajectoryMap, ...]
+    rows: Rows
+    stiffness: tuple[Stiffness | None, ...]
+
+    @cached_property
+    def checks(self) -> tuple[frozenset[str], ...]:
+        """What has to be checked at each point of a model; see `impact.contact.collide.first_look`."""
+        return tuple(
+            checks_that_may_fail(self.inputs, law, stiffness)
+            for law, stiffness in zip(self.laws, self.stiffness, strict=True)
+        )
+
+
+def table_of(
+    plan: Plan, maps: Sequence[TrajectoryMap], read: Callable[[int, int, int], Rebound]
+) -> TrajectoryTable:
+    """The trajectory table of a plan; for `read` see `Rows`."""
+    return TrajectoryTable(plan.inputs, plan.models, tuple(maps), Rows(maps, read), (None,) * len(plan.models))
+
+
+def expand(table: TrajectoryTable, model: int, index: Index, names: Sequence[str]) -> dict[str, NDArray[Any]]:
+    """Outputs of a model at some cells of the grid.
+
+    Parameters
+    ----------
+    table : of the sweep
+    model : place of the model
+    index : the cells, integer arrays that broadcast against each other, one for each axis
+    names : of the outputs, see docs/schema.md
+
+    Returns
+    -------
+    dict : by name, arrays that broadcast to the shape of the index; what does not vary along an axis has length one
+        there. A plan without axes has one cell.
+    """
+    contact = contact_at(table, model, index)
+    return {name: getattr(contact, name) for name in names}
+
+
+def contact_at(table: TrajectoryTable, model: int, index: Index) -> Contact:
+    """The collisions of a model at some cells of the grid; see `expand`."""
+    law = table.laws[model]
+    lanes = build_impacts(table.inputs, law, index, table.stiffness[model])
+    with np.errstate(all="ignore"):
+        status = first_look(law, lanes, table.checks[model])
+    return Contact(law, lanes, table.rows.take(model, table.maps[model].rows(index)), status)
+
+
+def varies_along(table: TrajectoryTable, model: int, names: Sequence[str]) -> dict[str, tuple[int, ...]]:
+    """The axes of the grid along which outputs of a model vary, at most."""
+    law, inputs = table.laws[model], table.inputs
+    # K may depend on n by its value: Hertz's for n = 3/2
+    index = probe_index(inputs, {"n"})
+    lanes = build_impacts(inputs, law, index, table.stiffness[model])
+    # where something may fail, something does: masks then have all the axes that they may have
+    with np.errstate(all="ignore"):
+        looked_at = {
+            "e": [lanes.e],
+            "v0": [lanes.v0],
+            "length": [lanes.v0, lanes.length, lanes.energy, lanes.time],
+        }
+    shapes = [array.shape for check in table.checks[model] for array in looked_at[check]]
+    status = _some(np.broadcast_shapes((1,) * dimensions(index), *shapes), Status.NO_IMPACT)
+    shape = table.maps[model].rows(index).shape
+    rebound = Rebound.blank(1).take(np.zeros(shape, np.intp))
+    contact = Contact(law, lanes, replace(rebound, status=_some(shape, Status.MAX_STEPS)), status)
+    return {name: tuple(sorted(axes_of_arrays([getattr(contact, name)]))) for name in names}
+
+
+def _some(shape: tuple[int, ...], status: Status) -> NDArray[np.int8]:
+    """A status at every second place, where there are several."""
+    found = np.full(shape, Status.OK, np.int8)
+    if found.size > 1:
+        found.reshape(-1)[::2] = status
+    return found
+
+
+def checks_that_may_fail(inputs: Inputs, law: Law, stiffness: Stiffness | None = None) -> frozenset[str]:
+    """The checks of `first_look` that may fail at some point of the grid; the others hold at all of them.
+
+    The sizes of a contact are monotonic in the closing speed, the masses, the radii, K and n each: they are safe at
+    all points if they are so at the ends of what each of these may be, in any combination.
+    """
+    slowest, fastest, slowest_approach = _closing_speeds(inputs)
+    if not fastest > 0.0:
+        return CHECKS
+    speeds = np.array([slowest_approach, fastest])
+    failing = {"v0"} if slowest <= 0.0 else set()
+    ends: dict[str, tuple[Any, ...]] = {"v1": tuple(speeds.tolist())}
+    for axis in inputs.axes:
+        for name, values in axis.columns.items():
+            if name not in ("v1", "v2", "e", "alpha"):
+                is_text = isinstance(values[0], str)
+                ends[name] = tuple(sorted({*values})) if is_text else tuple({min(values), max(values)})
+    if stiffness is not None or has_stiffness_rule(inputs, law):
+        K = whole_stiffness(inputs, law, stiffness)[1]
+        if K is None:
+            return CHECKS
+        ends[f"{law.key}.K"] = (float(K.min()), float(K.max()))
+    if math.prod(map(len, ends.values())) > MAX_STIFFNESS_VALUES:
+        return CHECKS
+    scalars = {**inputs.scalars, "v2": 0.0, "e": 1.0}
+    axes = tuple(Axis({name: values}) for name, values in ends.items())
+    corners = Inputs({name: scalars[name] for name in scalars.keys() - ends.keys()}, axes, inputs.materials)
+    with np.errstate(all="ignore"):
+        lanes = build_impacts(corners, law, corners.index())
+        sizes = [lanes.m, lanes.K, lanes.length, lanes.energy, lanes.time]
+        if not all(np.all((size > SAFE_SIZES[0]) & (size < SAFE_SIZES[1])) for size in sizes):
+            failing.add("length")
+        if "alpha" in inputs.names():
+            asked = 1.0 - np.multiply.outer(
+                np.asarray(inputs.values("alpha"), float), np.array([slowest, fastest])
+            )
+        else:
+            asked = np.asarray(inputs.values("e") if "e" in inputs.names() else np.nan, float)
+    if "e" in law.quantities and not np.all((asked >= 0.0) & (asked <= 1.0)):
+        failing.add("e")
+    return frozenset(failing)
+
+
+def _closing_speeds(inputs: Inputs) -> tuple[float, float, float]:
+    """The least and greatest closing speed v1 - v2 [m/s] of a sweep, and a bound from below of the positive ones."""
+    v1, v2 = (np.asarray(inputs.values(name), float) for name in ("v1", "v2"))
+    slowest, fastest = float(v1.min() - v2.max()), float(v1.max() - v2.min())
+    known = np.abs(np.concatenate([v1.reshape(-1), v2.reshape(-1)]))
+    # the difference of two numbers is no smaller than the spacing of the smaller one
+    bound = float(known[known > 0.0].min(initial=np.inf)) * float(np.finfo(float).eps) / 2.0
+    return slowest, fastest, slowest if slowest > 0.0 else bound
+
+
+def whole_stiffness(
+    inputs: Inputs, law: Law, stiffness: Stiffness | None = None
+) -> tuple[tuple[int, ...], Array | None]:
+    """K by a law's own rule over the axes that it depends on [N/m^n]; no values where they are too many.
+
+    Returns
+    -------
+    axes : the axes
+    K : of the shape of the grid, with length one along the others
+    """
+    probed = build_impacts(inputs, law, probe_index(inputs, {"n"}), stiffness).K
+    axes = tuple(sorted(axes_of_arrays([probed])))
+    if math.prod(inputs.shape[axis] for axis in axes) > MAX_STIFFNESS_VALUES:
+        return axes, None
+    where = [slice(None) if axis in axes else slice(1) for axis in range(len(inputs.shape))]
+    return axes, build_impacts(inputs, law, inputs.index(where), stiffness).K
+
+
+class ExpandedArray(BackendArray):
+    """A variable of a result that is computed when it is indexed.
+
+    Parameters
+    ----------
+    table : of the sweep
+    variable : which
+    """
+
+    def __init__(self, table: TrajectoryTable, variable: Variable) -> None:
+        self.table, self.variable = table, variable
+        self.shape = ((len(table.laws),) if variable.per == "model" else ()) + table.inputs.shape
+        self.dtype = np.dtype(variable.dtype)
+
+    def __getitem__(self, key: indexing.ExplicitIndexer) -> Any:
+        return indexing.explicit_indexing_adapter(key, self.shape, indexing.IndexingSupport.OUTER, self._read)
+
+    def _read(self, key: tuple[Any, ...]) -> NDArray[Any]:
+        places = [np.atleast_1d(np.arange(size)[part]) for size, part in zip(self.shape, key, strict=True)]
+        shape = tuple(part.size for part in places)
+        check_memory(self.variable.name, shape, self.dtype)
+        values = np.empty(shape, self.dtype)
+        of_models = self.variable.per == "model"
+        models, axes = (places[0], places[1:]) if of_models else (np.zeros(1, np.intp), places)
+        for row, model in enumerate(models.tolist()):
+            out = values[row] if of_models else values
+            for where in slabs(dict(enumerate(out.shape))):
+                part = tuple(where.values())
+                index = np.ix_(*(axis[chosen] for axis, chosen in zip(axes, part, strict=True)))
+                out[part or ...] = _one(
+                    expand(self.table, model, index, [self.variable.name])[self.variable.name], part
+                )
+        kept = tuple(0 if isinstance(part, int | np.integer) else slice(None) for part in key)
+        return np.asarray(values[kept])
+
+
+def _one(values: NDArray[Any], where: tuple[slice, ...]) -> NDArray[Any]:
+    """Values of a slab; of a plan without axes the only cell has an axis."""
+    return values if where else values.reshape(())
+
+
+def check_memory(name: str, shape: Sequence[int], dtype: np.dtype[Any]) -> None:
+    """Refuse to compute or read more than the memory may hold, before it is begun.
+
+    Raises
+    ------
+    MemoryError : so it is
+    """
+    size, most = math.prod(shape) * dtype.itemsize, max_bytes()
+    if size > most:
+        raise MemoryError(
+            f"{name}: {math.prod(shape):,} values take {size:,} bytes, expected at most {most:,}; select a part first, "
+            "such as result.isel(...) or result.sel(...)"
+        )
+
+
+def max_bytes() -> int:
+    """The bytes that may be computed or read at once: half of this machine's memory, at most 16 GiB."""
+    try:
+        whole = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (ValueError, OSError, AttributeError):
+        return MAX_BYTES
+    return min(MAX_BYTES, whole // 2)
+
+
+def lazy_dataset(outline: xr.Dataset, table: TrajectoryTable, variables: Sequence[Variable]) -> xr.Dataset:
+    """A result whose variables are computed when they are read.
+
+    Parameters
+    ----------
+    outline : its coordinates and attributes
+    table : of the sweep
+    variables : those that it has
+    """
+    axes = [axis.name for axis in table.inputs.axes]
+    names = [variable.name for variable in variables]
+    along = [varies_along(table, model, names) for model in range(len(table.laws))]
+    computed = {}
+    for variable in variables:
+        dims = ["model", *axes] if variable.per == "model" else axes
+        by_model = {
+            law.key: tuple(axes[axis] for axis in own[variable.name])
+            for law, own in zip(table.laws, along, strict=True)
+        }
+        array = indexing.LazilyIndexedArray(ExpandedArray(table, variable))
+        computed[variable.name] = xr.Variable(dims, array, attributes_of(variable), {VARIES_ALONG: by_model})
+    dataset = outline.drop_vars(list(outline.data_vars)).assign(computed)
+    for dim in map(str, dataset.dims):
+        dataset = dataset if dim in dataset.xindexes else dataset.set_xindex(dim)
+    return dataset
+
+
+def expanded_slabs(
+    table: TrajectoryTable, variables: Sequence[Variable], lengths: Sequence[int] = ()
+) -> Iterator[tuple[int, tuple[slice, ...], Contact, dict[str, NDArray[Any]]]]:
+    """All values of a result, slab by slab: the model, the place, the collisions, and values by name.
+
+    What depends on the axes alone is there once, with the first model.
+
+    Parameters
+    ----------
+    table, variables : see `lazy_dataset`
+    lengths : of chunks along the axes, which are then whole in every slab
+    """
+    sizes: dict[Hashable, int] = dict(enumerate(table.inputs.shape))
+    for model in range(len(table.laws)):
+        for places in aligned_slabs(sizes, lengths) if lengths else slabs(sizes):
+            where = tuple(places.values())
+            contact = contact_at(table, model, table.inputs.index(where))
+            values = {}
+            for variable in variables:
+                if variable.per == "model" or model == 0:
+                    values[variable.name] = np.empty(tuple(p.stop - p.start for p in where), variable.dtype)
+                    values[variable.name][...] = _one(getattr(contact, variable.name), where)
+            yield model, where, contact, values
+
+
+def in_memory(dataset: xr.Dataset, table: TrajectoryTable, variables: Sequence[Variable]) -> xr.Dataset:
+    """A result with all of its values in memory."""
+    arrays = {variable.name: np.empty(dataset[variable.name].shape, variable.dtype) for variable in variables}
+    for model, where, _, values in expanded_slabs(table, variables):
+        for name, part in values.items():
+            place: tuple[Any, ...] = (model, *where) if "model" in dataset[name].dims else where
+            arrays[name][place or ...] = part
+    return dataset.assign(
+        {name: (dataset[name].dims, array, dataset[name].attrs) for name, array in arrays.items()}
+    )

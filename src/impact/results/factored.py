@@ -1,0 +1,352 @@
+"""The factored layout: a result as its axes, its trajectory table and what its laws say, for any number of points.
+
+Some points, the witnesses, are stored in full. When a file is opened they are computed again: where they come to other
+numbers, the file belongs to another version, and is refused.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from .. import __version__
+from ..contact.formula import Formula
+from ..contact.material import Material
+from ..contact.model import Parameter
+from ..contact.power import Array
+from ..contact.strike import Rebound
+from ..engine.build_impacts import Stiffness, has_stiffness_rule
+from ..engine.plan import Index, Inputs
+from ..engine.trajectories import TrajectoryMap
+from ..errors import ResultError, UsageError
+from ..sweeps.grid import Axis
+from ..text import safe_text
+from .expand import MAX_STIFFNESS_VALUES, Rows, TrajectoryTable, expand, whole_stiffness
+from .scales import scale_of
+from .schema import SCHEMA, Variable, attributes_of, is_input
+
+WITNESSES = 1_000
+# how far a witness may be from what is stored, of the scale that `compare` uses for its variable
+WITNESS_TOLERANCE = 1e-12
+COLUMNS = tuple(column.name for column in fields(Rebound))
+SLAB_ROWS = 2**16
+
+Read = Callable[[str, slice], NDArray[Any]]
+
+
+@dataclass(frozen=True)
+class StoredLaw:
+    """What a file keeps of a law: all that outputs depend on besides the trajectory, and no formula."""
+
+    key: str
+    exponent: float | None
+    parameters: tuple[Parameter, ...]
+    domain: Mapping[str, tuple[float, float]]
+    quantities: frozenset[str]
+    is_permanent: bool
+    stiffness: Formula | None = None
+
+
+def factored_outline(outline: xr.Dataset, table: TrajectoryTable, variables: Sequence[Variable]) -> xr.Dataset:
+    """What a factored file holds: coordinates, attributes, and variables whose values do not count yet.
+
+    Parameters
+    ----------
+    outline : coordinates and attributes of the result
+    table : of the sweep
+    variables : of the result
+
+    Raises
+    ------
+    UsageError : a law's rule of K takes too many values to be stored
+    """
+    laws, stiffness = {}, 0
+    for law, own, rule in zip(table.laws, table.maps, table.stiffness, strict=True):
+        about: dict[str, Any] = {
+            "exponent": law.exponent, "parameters": [parameter.name for parameter in law.parameters],
+            "domain": {name: list(ends) for name, ends in law.domain.items()}, "asks_for_e": "e" in law.quantities,
+            "is_permanent": law.is_permanent, "has_chi": "chi" in law.domain,
+            "axes": [table.inputs.axes[axis].name for axis in own.axes], "trajectories": own.count,
+            "is_shared": own.is_shared, "stiffness_axes": None,
+        }  # fmt: skip
+        if rule is not None or has_stiffness_rule(table.inputs, law):
+            axes, K = whole_stiffness(table.inputs, law, rule)
+            if K is None:
+                raise UsageError(
+                    f"output.layout: {law.key} has a rule of K that takes more than {MAX_STIFFNESS_VALUES:,} values "
+                    'here, expected at most so many to be factored; set output.layout = "full"'
+                )
+            about["stiffness_axes"] = [table.inputs.axes[axis].name for axis in axes]
+            stiffness += K.size
+        laws[law.key] = about
+    rows, cells = (
+        sum(sizes) for sizes in zip(*((own.count, own.cells * own.is_shared) for own in table.maps), strict=True)
+    )
+    witnesses = len(witness_places(len(table.laws) * table.inputs.cells))
+    blank = Rebound.blank(1)
+    held: dict[str, Any] = {
+        f"trajectory_{name}": _blank("trajectory", rows, getattr(blank, name).dtype, f"{name} of a trajectory")
+        for name in COLUMNS
+    }
+    if cells:
+        held["trajectory_of_cell"] = _blank("cell", cells, np.dtype("i4"), "number of the trajectory of a cell")
+    if stiffness:
+        held["law_stiffness"] = _blank("stiffness_value", stiffness, np.dtype("f8"), "K by the rules of the laws")
+    held["witness_index"] = _blank("witness", witnesses, np.dtype("i8"), "place in C order of (model, axes)")
+    for variable in variables:
+        attributes = attributes_of(variable)
+        held[f"witness_{variable.name}"] = (
+            "witness", np.broadcast_to(np.zeros((), variable.dtype), witnesses), attributes,
+        )  # fmt: skip
+    order = [axis.name for axis in table.inputs.axes]
+    made = xr.Dataset(held, outline.coords, {**outline.attrs, "axes": json.dumps(order), "laws": json.dumps(laws)})
+    # without a variable that names them, the coordinates would be variables to a reader of netCDF
+    names = [str(name) for name in outline.coords if name not in outline.dims]
+    return made.assign_attrs(coordinates=" ".join(names))
+
+
+def _blank(dim: str, size: int, dtype: np.dtype[Any], meaning: str) -> tuple[Any, ...]:
+    return dim, np.broadcast_to(np.zeros((), dtype), size), {"long_name": meaning}
+
+
+def table_values(
+    table: TrajectoryTable, variables: Sequence[Variable]
+) -> Iterator[tuple[str, slice, NDArray[Any]]]:
+    """The values of a factored file: name, place and values, no more than a little at a time."""
+    start = cell = 0
+    for model, own in enumerate(table.maps):
+        for first in range(0, own.count, SLAB_ROWS):
+            rows = np.arange(first, min(first + SLAB_ROWS, own.count))
+            part = table.rows.take(model, rows)
+            for name in COLUMNS:
+                yield f"trajectory_{name}", slice(start + first, start + first + rows.size), getattr(part, name)
+        start += own.count
+        if own.of_cell is not None:
+            yield "trajectory_of_cell", slice(cell, cell + own.cells), own.of_cell
+            cell += own.cells
+    value = 0
+    for law, rule in zip(table.laws, table.stiffness, strict=True):
+        if rule is not None or has_stiffness_rule(table.inputs, law):
+            K = whole_stiffness(table.inputs, law, rule)[1]
+            assert K is not None
+            yield "law_stiffness", slice(value, value + K.size), K.reshape(-1)
+            value += K.size
+    places = witness_places(len(table.laws) * table.inputs.cells)
+    yield "witness_index", slice(0, len(places)), places
+    for name, values in witnesses_of(table, variables, places).items():
+        yield f"witness_{name}", slice(0, len(places)), values
+
+
+def witness_places(points: int) -> NDArray[np.int64]:
+    """Places of witnesses, spread over all points: multiples of the golden section, the first and the last.
+
+    >>> witness_places(3).tolist()
+    [0, 1, 2]
+    """
+    if points <= WITNESSES:
+        return np.arange(points)
+    step = int(points * 0.6180339887498949) | 1
+    return np.array(sorted({points - 1, *(place * step % points for place in range(WITNESSES - 1))}), np.int64)
+
+
+def witnesses_of(
+    table: TrajectoryTable, variables: Sequence[Variable], places: NDArray[np.int64]
+) -> dict[str, NDArray[Any]]:
+    """The values of some points of a result, by name; arrays of shape (places,)."""
+    models, cells = np.divmod(places, table.inputs.cells)
+    found = {variable.name: np.empty(places.size, variable.dtype) for variable in variables}
+    for model in np.unique(models).tolist():
+        where = np.flatnonzero(models == model)
+        values = expand(table, model, _cells(table.inputs, cells[where]), list(found))
+        for name, array in found.items():
+            array[where] = np.broadcast_to(values[name], where.shape)
+    return found
+
+
+def _cells(inputs: Inputs, cells: NDArray[np.int64]) -> Index:
+    """The places of some cells along each axis."""
+    index = []
+    for size in reversed(inputs.shape):
+        cells, place = np.divmod(cells, size)
+        index.append(place)
+    return tuple(reversed(index))
+
+
+def stored_table(dataset: xr.Dataset, read: Read) -> TrajectoryTable:
+    """The trajectory table of a factored file.
+
+    Parameters
+    ----------
+    dataset : its coordinates and attributes
+    read : values of a variable of the table, from one place to another
+
+    Raises
+    ------
+    ResultError : what it says of its laws does not fit what it holds
+    """
+    laws = _laws(dataset)
+    inputs = inputs_of(dataset)
+    places = {axis.name: place for place, axis in enumerate(inputs.axes)}
+    maps, rules, stored = [], [], []
+    starts = [0]
+    cell = value = 0
+    try:
+        for model, (key, about) in enumerate(laws.items()):
+            axes = tuple(places[name] for name in about["axes"])
+            shape = tuple(inputs.shape[axis] for axis in axes)
+            own = TrajectoryMap(model, axes, shape)
+            if about["is_shared"]:
+                of_cell = read("trajectory_of_cell", slice(cell, cell + own.cells))
+                count = int(about["trajectories"])
+                # the cell from which a trajectory was taken is not needed to read it
+                own = TrajectoryMap(model, axes, shape, np.broadcast_to(np.intp(0), count), of_cell)
+                cell += own.cells
+                if of_cell.shape != (own.cells,) or of_cell.min() < 0 or of_cell.max() >= count:
+                    raise ValueError
+            maps.append(own)
+            starts.append(starts[-1] + own.count)
+            rule = None
+            if about["stiffness_axes"] is not None:
+                chosen = tuple(places[name] for name in about["stiffness_axes"])
+                size = math.prod(inputs.shape[axis] for axis in chosen)
+                rule = _rule(inputs, chosen, read("law_stiffness", slice(value, value + size)))
+                value += size
+            rules.append(rule)
+            stored.append(_law(key, about))
+    except (KeyError, TypeError, ValueError, IndexError):
+        raise ResultError("is not a readable result (its laws do not fit its table)") from None
+
+    def rows(model: int, start: int, stop: int) -> Rebound:
+        part = slice(starts[model] + start, starts[model] + stop)
+        return Rebound(**{name: read(f"trajectory_{name}", part) for name in COLUMNS})
+
+    return TrajectoryTable(inputs, tuple(stored), tuple(maps), Rows(maps, rows), tuple(rules))
+
+
+def _laws(dataset: xr.Dataset) -> dict[str, dict[str, Any]]:
+    try:
+        laws: dict[str, dict[str, Any]] = json.loads(str(dataset.attrs["laws"]))
+        if list(laws) != [str(key) for key in dataset["model"].values]:
+            raise ValueError
+    except (KeyError, ValueError, TypeError, RecursionError):
+        raise ResultError("is not a readable result (laws: not those of its models)") from None
+    return laws
+
+
+def _law(key: str, about: Mapping[str, Any]) -> StoredLaw:
+    return StoredLaw(
+        key=key,
+        exponent=None if about["exponent"] is None else float(about["exponent"]),
+        parameters=tuple(Parameter(str(name), "1", "") for name in about["parameters"]),
+        domain={str(name): (float(low), float(high)) for name, (low, high) in about["domain"].items()},
+        quantities=frozenset({"e"} if about["asks_for_e"] else ()),
+        is_permanent=bool(about["is_permanent"]),
+    )
+
+
+def _rule(inputs: Inputs, axes: tuple[int, ...], values: Array) -> Stiffness:
+    """K at some cells, from its values over the axes that it depends on."""
+    K = values.reshape([size if axis in axes else 1 for axis, size in enumerate(inputs.shape)] or (1,))
+
+    def at(index: Index) -> Array:
+        if not index:
+            return K
+        zero = np.zeros((1,) * index[0].ndim, np.intp)
+        return np.asarray(K[tuple(place if axis in axes else zero for axis, place in enumerate(index))])
+
+    return at
+
+
+def inputs_of(dataset: xr.Dataset) -> Inputs:
+    """What a sweep gave a value to, from the coordinates of its result."""
+    derived = {"e"} if "alpha" in dataset.coords else set()
+    scalars: dict[str, Any] = {}
+    axes: dict[str, dict[str, Any]] = {name: {} for name in axis_names(dataset)}
+    for name, variable in dataset.coords.items():
+        if not is_input(str(name)) or name in derived:
+            continue
+        if variable.ndim == 0:
+            scalars[str(name)] = variable.values.item()
+        elif variable.dims[0] in axes and variable.ndim == 1:
+            axes[str(variable.dims[0])][str(name)] = tuple(variable.values.tolist())
+        else:
+            raise ResultError(
+                f"is not a readable result ({safe_text(str(name), 40)}: does not lie along one axis)"
+            )
+    try:
+        materials = {
+            name: Material(**about) for name, about in json.loads(str(dataset.attrs["materials"])).items()
+        }
+    except (KeyError, ValueError, TypeError, AttributeError, RecursionError):
+        raise ResultError("is not a readable result (materials: no JSON of the right kind)") from None
+    # an axis is named by its first column
+    ordered = (Axis({name: columns[name], **columns}) for name, columns in axes.items() if name in columns)
+    return Inputs(scalars, tuple(ordered), materials)
+
+
+def axis_names(dataset: xr.Dataset) -> list[str]:
+    """The axes of the grid of a factored file, in their order."""
+    try:
+        names = json.loads(str(dataset.attrs["axes"]))
+        if not isinstance(names, list) or any(dataset.coords[name].dims != (name,) for name in names):
+            raise ValueError
+    except (KeyError, ValueError, TypeError, RecursionError):
+        raise ResultError("is not a readable result (axes: not those of its grid)") from None
+    return names
+
+
+def check_witnesses(table: TrajectoryTable, variables: Sequence[Variable], stored: xr.Dataset) -> None:
+    """Refuse a file whose witnesses expand to other numbers than it holds.
+
+    Parameters
+    ----------
+    table : of the file
+    variables : of the result
+    stored : the variables of the witnesses, and the attributes of the result
+
+    Raises
+    ------
+    ResultError : so it is; with both versions
+    """
+    places = np.asarray(stored["witness_index"].values, np.int64)
+    points = len(table.laws) * table.inputs.cells
+    if not np.array_equal(places, witness_places(points)):
+        raise ResultError("is not a readable result (its witnesses are not spread as they have to be)")
+    here = witnesses_of(table, variables, places)
+    cells = places % table.inputs.cells
+    index = _cells(table.inputs, cells)
+    known = {name: np.asarray(table.inputs.column(name, index)) for name in ("v1", "v2", "m1", "m2")}
+    for variable in variables:
+        expected, got = stored[f"witness_{variable.name}"].values, here[variable.name]
+        columns = {**known, variable.name: expected}
+        if "witness_peak_indentation" in stored:
+            columns["peak_indentation"] = stored["witness_peak_indentation"].values
+        with np.errstate(all="ignore"):
+            scale = np.broadcast_to(scale_of(variable, columns), expected.shape)
+            rounding = float(np.finfo(expected.dtype).eps) if expected.dtype.kind == "f" else 0.0
+            allowed = np.maximum(WITNESS_TOLERANCE, 2.0 * rounding) * np.abs(scale)
+            same = (got == expected) | (np.isnan(got) & np.isnan(expected)) | (np.abs(got - expected) <= allowed)
+        if not same.all():
+            at = int(np.argmin(same))
+            version = safe_text(str(stored.attrs.get("impact_version", "unknown")), 40)
+            raise ResultError(
+                f"its witnesses expand to other numbers: {variable.name} is {got[at]:.12g}, the file has "
+                f"{expected[at]:.12g}; it was made by impact {version}, this is {__version__}: sweep its config again, or "
+                "expand it with that version (impact expand)"
+            )
+
+
+def variables_of(stored: xr.Dataset) -> tuple[Variable, ...]:
+    """The variables of a result of which a file has witnesses, with the dtypes that these have."""
+    return tuple(
+        replace(variable, dtype=stored[f"witness_{variable.name}"].dtype.str[1:])
+        for variable in SCHEMA
+        if f"witness_{variable.name}" in stored
+    )

@@ -1,0 +1,339 @@
+"""A result as netCDF-4 in HDF5: written slab by slab, and read only where it has the structure of a result.
+
+HDF5 can name other files as the place of its data, can declare what it does not hold, and can hold a little under
+many names. A result does none of that: datasets of numbers and letters in one group, and small attributes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+import h5netcdf
+import h5py
+import numpy as np
+import xarray as xr
+from h5py import h5a, h5d, h5l, h5o, h5t, h5z
+from numpy.typing import NDArray
+from xarray.backends import BackendArray
+from xarray.core import indexing
+
+from ..atomic import Sink
+from ..errors import ResultError
+from ..sweeps.settings import Output
+from ..text import safe_text
+from .expand import check_memory
+from .schema import SCHEMA_VERSION
+from .sealed import USER_BLOCK
+from .validate import TABLE, is_name
+
+Where = tuple[int | slice, ...]
+Put = Callable[[str, Where, NDArray[Any]], None]
+# values of a chunk of a compressed variable, where none is asked for
+CHUNK_VALUES = 2**16
+# what no result comes near
+MAX_DATASETS = 1_000
+MAX_ATTRIBUTES = 10_000
+MAX_NUMBERS = 64  # of an attribute
+MAX_TEXT = 80_000_000  # bytes of all attributes; a config may have 64 MB
+MAX_LETTERS = 4_000_000  # bytes of all labels
+MAX_CHUNKS = 200_000  # of all datasets together
+# what is compressed may be so many times the file, which is as much as deflate can, where it is more than little
+EXPANSION, SMALL = 1_100, 2**26
+# what netCDF writes for other readers
+INTERNAL = frozenset({
+    "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_NCProperties", "coordinates", "CLASS", "_Netcdf4Dimid",
+    "_Netcdf4Coordinates", "_Encoding",
+})  # fmt: skip
+UNREAD = frozenset({"NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_NCProperties", "coordinates"})
+
+
+@contextmanager
+def writing(sink: Sink, outline: xr.Dataset, output: Output) -> Iterator[Put]:
+    """Write a dataset into a file: its coordinates and attributes at once, its variables as they come.
+
+    Parameters
+    ----------
+    sink : the file
+    outline : the dataset; the values of its variables do not count
+    output : how it is stored
+
+    Yields
+    ------
+    put : writes the values of a variable at a place
+    """
+    # variables in the order in which they are made
+    with (
+        h5py.File(sink, "w", track_order=True, userblock_size=USER_BLOCK) as plain,
+        h5netcdf.File(plain, "w") as file,
+    ):
+        texts = {str(name): letters(variable) for name, variable in outline.coords.items() if is_text(variable)}
+        widths = dict.fromkeys(sorted(values.shape[-1] for values in texts.values()))
+        file.dimensions = {
+            **{str(name): size for name, size in outline.sizes.items()},
+            **{f"string{width}": width for width in widths},
+        }
+        coordinates = [str(name) for name in outline.coords if name not in outline.dims]
+        for name, variable in outline.coords.items():
+            if name in texts:
+                values = texts[str(name)]
+                dims = (*variable.dims, f"string{values.shape[-1]}")
+                added = file.create_variable(str(name), dims, values.dtype, data=values)
+                _describe(added, {**variable.attrs, "_Encoding": "utf-8"})
+            else:
+                added = file.create_variable(str(name), variable.dims, variable.dtype, data=variable.values)
+                _describe(added, variable.attrs)
+        for name, variable in outline.data_vars.items():
+            storage = _storage(variable, output)
+            added = file.create_variable(str(name), variable.dims, variable.dtype, **storage)
+            near = [other for other in coordinates if {*outline[other].dims} <= {*variable.dims}]
+            _describe(
+                added, variable.attrs if name in TABLE else {**variable.attrs, "coordinates": " ".join(near)}
+            )
+        _describe(file, dict(outline.attrs))
+        sink.check()
+
+        # written to by h5py itself, which asks less each time
+        made = {str(name): plain[str(name)] for name in outline.data_vars}
+
+        def put(name: str, where: Where, values: NDArray[Any]) -> None:
+            made[name][where or ...] = values
+            sink.check()
+
+        yield put
+    sink.check()
+
+
+def is_text(variable: xr.DataArray | xr.Variable) -> bool:
+    return variable.dtype.kind not in "fiub"
+
+
+def letters(variable: xr.DataArray) -> NDArray[np.bytes_]:
+    """Texts as letters, the netCDF classic convention: an array of single bytes with one more axis."""
+    encoded = [str(text).encode() for text in np.asarray(variable.values, object).reshape(-1)]
+    width = max(1, *map(len, encoded)) if encoded else 1
+    return np.array(encoded, f"S{width}").reshape(variable.shape)[..., np.newaxis].view("S1")
+
+
+def _describe(holder: Any, attributes: Mapping[Any, Any]) -> None:
+    """Attributes, those of text as so many bytes, a number that a reader knows beforehand."""
+    for name, value in attributes.items():
+        if isinstance(value, str):
+            written = value.encode()
+            value = np.array(written, h5py.string_dtype("utf-8", max(len(written), 1)))
+        holder.attrs[str(name)] = value
+
+
+def _storage(variable: xr.DataArray, output: Output) -> dict[str, Any]:
+    """How a variable is stored: in one piece unless it is compressed, or chunks are asked for."""
+    if not variable.ndim or (output.compression == "none" and not output.chunks):
+        return {}
+    if output.chunks:
+        lengths = {"model": 1, **output.chunks}
+        chunks = tuple(min(lengths.get(str(dim), size), size) for dim, size in variable.sizes.items())
+    else:
+        # whole along the last axes, one place along the first
+        chunks, room = (), CHUNK_VALUES
+        for dim, size in reversed(list(variable.sizes.items())):
+            length = 1 if dim == "model" else max(min(size, room), 1)
+            chunks = (length, *chunks)
+            room //= size
+    packed = (
+        {"compression": "gzip", "compression_opts": 4, "shuffle": True} if output.compression == "gzip" else {}
+    )
+    return {"chunks": chunks, **packed}
+
+
+class StoredArray(BackendArray):
+    """A variable of a file that is read when it is indexed."""
+
+    def __init__(self, name: str, dataset: h5py.Dataset) -> None:
+        self.name, self.dataset = name, dataset
+        self.shape, self.dtype = dataset.shape, dataset.dtype
+
+    def __getitem__(self, key: indexing.ExplicitIndexer) -> Any:
+        support = indexing.IndexingSupport.OUTER_1VECTOR
+        return indexing.explicit_indexing_adapter(key, self.shape, support, self._read)
+
+    def _read(self, key: tuple[Any, ...]) -> NDArray[Any]:
+        counts = (np.size(np.arange(size)[part]) for size, part in zip(self.shape, key, strict=True))
+        check_memory(self.name, tuple(counts), self.dtype)
+        return np.asarray(self.dataset[key])
+
+
+def read_variables(file: h5py.File) -> tuple[dict[str, xr.Variable], dict[str, object], tuple[str, ...]]:
+    """What is in a file whose seal holds: variables, of which those of numbers are read later; attributes; and the
+    names that are no part of a result.
+
+    Numbers are as they are stored, whatever an attribute says of scales, fill values and times.
+
+    Raises
+    ------
+    ResultError : it holds what a result never does
+    """
+    _check_schema(file)
+    datasets = {name: h5py.Dataset(dataset) for name, dataset in _datasets(file).items()}
+    dims = _check_data(file, datasets)
+    known = {name: dataset for name, dataset in datasets.items() if is_name(name)}
+    # a dimension without values of its own stands in the file as well
+    unknown = [name for name in datasets if name not in known and not _is_bare(datasets[name], name, dims)]
+    holders = {"": file, **known}
+    if sum(h5a.get_num_attrs(holder.id) for holder in holders.values()) > MAX_ATTRIBUTES:
+        raise _odd(f"more than {MAX_ATTRIBUTES:,} attributes")
+    if sum(_text(name, holder) for name, holder in holders.items()) > MAX_TEXT:
+        raise _odd(f"more than {MAX_TEXT:,} bytes of text")
+    variables = {}
+    for name, dataset in known.items():
+        if not dataset.id.get_storage_size():
+            raise _odd("declares what the file does not hold", name)
+        attributes = _attributes(dataset)
+        if dataset.dtype.kind == "S":
+            values = np.asarray(dataset[()])
+            texts = values.view(f"S{values.shape[-1]}")[..., 0]
+            variables[name] = xr.Variable(dims[name][:-1], np.char.decode(texts, "utf-8"), attributes)
+        else:
+            array = indexing.LazilyIndexedArray(StoredArray(name, dataset))
+            variables[name] = xr.Variable(dims[name], array, attributes)
+    return variables, _attributes(file), tuple(sorted(unknown))
+
+
+def _odd(what: str, name: str = "") -> ResultError:
+    return ResultError(f"is not a readable result ({safe_text(name, 40)}{': ' if name else ''}{what})")
+
+
+def _check_schema(file: h5py.File) -> None:
+    if not h5a.exists(file.id, b"schema_version"):
+        raise ResultError("is not a result of impact")
+    attribute = h5a.open(file.id, b"schema_version")
+    if not _is_number(attribute.get_type()) or attribute.shape not in ((), (1,)):
+        raise _odd("schema_version: not a number")
+    found = np.ravel(file.attrs["schema_version"])[0]
+    if found != SCHEMA_VERSION:
+        raise ResultError(f"has schema version {found}, this program reads {SCHEMA_VERSION}")
+
+
+def _datasets(file: h5py.File) -> dict[str, h5d.DatasetID]:
+    """The datasets of the file, by name; no link is followed out of it, or to the same thing twice."""
+    root = file.id
+    if root.get_num_objs() > MAX_DATASETS:
+        raise _odd(f"more than {MAX_DATASETS:,} datasets")
+    found: dict[str, h5d.DatasetID] = {}
+    objects = set()
+    for link in root:
+        name = link.decode(errors="surrogateescape")
+        info = root.links.get_info(link)
+        if info.type != h5l.TYPE_HARD:
+            raise _odd("a link to somewhere else", name)
+        objects.add(info.u)
+        found[name] = h5o.open(root, link)
+        if not isinstance(found[name], h5d.DatasetID):
+            raise _odd("not a dataset", name)
+    if len(objects) < len(found):
+        raise _odd("a dataset of two names")
+    return found
+
+
+def _check_data(file: h5py.File, datasets: Mapping[str, h5py.Dataset]) -> dict[str, tuple[str, ...]]:
+    """The dimensions of each dataset, all of which the file itself holds."""
+    size = file.id.get_filesize()
+    chunks = compressed = plain = text = 0
+    for name, dataset in datasets.items():
+        declared = _declared(name, dataset.id)
+        if dataset.chunks:
+            chunks += math.prod(-(-n // c) for n, c in zip(dataset.shape, dataset.chunks, strict=True))
+            compressed += declared
+        else:
+            plain += declared
+        text += declared if dataset.dtype.kind == "S" else 0
+    if plain > size or compressed > max(SMALL, EXPANSION * size):
+        raise _odd("more data than such a file may hold")
+    if chunks > MAX_CHUNKS:
+        raise _odd(f"more than {MAX_CHUNKS:,} chunks")
+    if text > MAX_LETTERS:
+        raise _odd(f"more than {MAX_LETTERS:,} bytes of labels")
+    return _dimensions(datasets)
+
+
+def _is_number(kind: h5t.TypeID) -> bool:
+    """Whether it is an integer or floating-point number of the usual bits."""
+    plain = isinstance(kind, h5t.TypeIntegerID | h5t.TypeFloatID) and kind.get_size() <= 8
+    return plain and h5t.py_create(kind.dtype).equal(kind)
+
+
+def _is_letter(kind: h5t.TypeID) -> bool:
+    return isinstance(kind, h5t.TypeStringID) and not kind.is_variable_str() and kind.get_size() == 1
+
+
+def _declared(name: str, dataset: h5d.DatasetID) -> int:
+    """The bytes of a dataset, which is stored in the file in one piece, or in chunks of one size."""
+    kind, shape = dataset.get_type(), dataset.shape
+    if not (_is_number(kind) or (_is_letter(kind) and shape)):
+        raise _odd("neither numbers nor labels", name)
+    plist = dataset.get_create_plist()
+    declared = math.prod(shape) * kind.get_size() if shape is not None else 0
+    if plist.get_layout() == h5d.CHUNKED:
+        filters = {plist.get_filter(place)[0] for place in range(plist.get_nfilters())}
+        whole = shape == dataset.get_space().get_simple_extent_dims(maxdims=True)
+        # a chunk that is larger than the whole would be unpacked to its own size
+        fits = whole and all(c <= n for c, n in zip(plist.get_chunk(), shape, strict=True))
+        stored = fits and filters <= {h5z.FILTER_DEFLATE, h5z.FILTER_SHUFFLE}
+    else:
+        # the dataset of a dimension without values is never written
+        held = dataset.get_storage_size() in (0, declared)
+        stored = plist.get_layout() == h5d.CONTIGUOUS and not plist.get_external_count() and held
+    if not stored or not declared:
+        raise _odd("not stored in this file, in one piece or in chunks of one size", name)
+    return declared if dataset.get_storage_size() else 0
+
+
+def _dimensions(datasets: Mapping[str, h5py.Dataset]) -> dict[str, tuple[str, ...]]:
+    """The dimensions of each dataset, by the numbers that netCDF gives to them and to the datasets of their values."""
+    numbers = {
+        name: np.ravel(dataset.attrs.get("_Netcdf4Coordinates", ())).tolist() for name, dataset in datasets.items()
+    }
+    scales: dict[int, str] = {}
+    for name, dataset in datasets.items():
+        if dataset.attrs.get("CLASS") == b"DIMENSION_SCALE":
+            ids = np.ravel(dataset.attrs.get("_Netcdf4Dimid", numbers[name])).tolist()
+            scales |= dict.fromkeys(ids[:1], name)
+    sizes = {name: datasets[name].shape[0] for name in scales.values() if datasets[name].shape}
+    dims = {}
+    for name, dataset in datasets.items():
+        own = tuple(scales.get(number, "") for number in numbers[name])
+        if not own and name in sizes:
+            own = (name,)
+        if len({*own}) != len(own) or tuple(sizes.get(dim) for dim in own) != dataset.shape:
+            raise _odd("its axes are not those of the file", name)
+        dims[name] = own
+    return dims
+
+
+def _is_bare(dataset: h5py.Dataset, name: str, dims: Mapping[str, tuple[str, ...]]) -> bool:
+    """Whether it is a dimension without values of its own."""
+    return dims[name] == (name,) and not dataset.id.get_storage_size()
+
+
+def _text(name: str, holder: h5py.File | h5py.Dataset) -> int:
+    """The bytes of text of the attributes that are read; each has a kind and a size that one may read."""
+    total = 0
+    for key in (key for key in holder.attrs if key not in UNREAD):
+        attribute = holder.attrs.get_id(key)
+        kind, shape = attribute.get_type(), attribute.shape
+        if isinstance(kind, h5t.TypeStringID) and not kind.is_variable_str() and shape == ():
+            total += kind.get_size()
+        elif not _is_number(kind) or shape is None or math.prod(shape) > MAX_NUMBERS:
+            raise _odd("an attribute of an unusual kind or size", f"{name}@{key}")
+    return total
+
+
+def _attributes(holder: h5py.File | h5py.Dataset) -> dict[str, object]:
+    """Attributes as they were before they were stored."""
+    found: dict[str, object] = {}
+    for name in holder.attrs:
+        if name not in INTERNAL:
+            value = holder.attrs[name]
+            array = np.ravel(value)
+            found[name] = value.decode() if isinstance(value, bytes) else array[0] if array.size == 1 else value
+    return found

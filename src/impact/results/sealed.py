@@ -1,0 +1,85 @@
+"""Sealed files: 512 bytes that name the format and hold the SHA-256 of everything after them.
+
+The seal is checked before the HDF5 library parses a byte, so that every changed bit and every truncation is found. It
+is also the identity of a result: equal inputs give equal files within one installation.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from ..errors import ResultError
+from .schema import SCHEMA_VERSION
+
+# HDF5 leaves so many bytes at the beginning of a file to others: its "user block"
+USER_BLOCK = 512
+MAGIC = b"impact result\n"
+HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
+AGAIN = "sweep its config again: impact sweep CONFIG.toml -o RESULT --overwrite"
+
+
+def header(seal: str) -> bytes:
+    """The first bytes of a sealed file.
+
+    >>> header("0" * 64)[:24], len(header("0" * 64))
+    (b'impact result\\nschema 2\\ns', 512)
+    """
+    return MAGIC + f"schema {SCHEMA_VERSION}\nsha256 {seal}\n".encode().ljust(USER_BLOCK - len(MAGIC), b"\0")
+
+
+def write_seal(file: Any) -> str:
+    """Seal a file that is open to read and write, and whose user block is empty so far; returns the seal."""
+    seal = _digest(file)
+    file.seek(0)
+    file.write(header(seal))
+    return seal
+
+
+def check_seal(path: Path) -> str:
+    """The seal of a file, which holds.
+
+    Raises
+    ------
+    ResultError : the file does not exist, is no sealed result, is of another schema version, or is damaged
+    """
+    with opened(path) as file:
+        found = file.read(USER_BLOCK)
+        if found.startswith(HDF5_MAGIC):
+            raise ResultError(
+                f"is of schema version 1, or no result of impact; expected version {SCHEMA_VERSION}: {AGAIN}"
+            )
+        if not found.startswith(MAGIC):
+            raise ResultError("is not a readable result (it does not begin as a sealed file of impact does)")
+        version = found[len(MAGIC) :].partition(b"\n")[0].removeprefix(b"schema ")
+        if version.isdigit() and int(version) != SCHEMA_VERSION and len(version) < 5:
+            raise ResultError(f"has schema version {int(version)}, this program reads {SCHEMA_VERSION}; {AGAIN}")
+        seal = _digest(file)
+    if found != header(seal):
+        raise ResultError("is damaged: its content does not have the SHA-256 that it was sealed with")
+    return seal
+
+
+def is_result(path: Path) -> bool:
+    """Whether a file begins as a result does, of this version or of the first."""
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return file.read(len(MAGIC)).startswith((MAGIC, HDF5_MAGIC))
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[BinaryIO]:
+    """A regular file, opened to read."""
+    if not path.is_file():
+        raise ResultError("is not a regular file" if path.exists() else "does not exist")
+    with path.open("rb") as file:
+        yield file
+
+
+def _digest(file: Any) -> str:
+    file.seek(USER_BLOCK)
+    return hashlib.file_digest(file, "sha256").hexdigest()
