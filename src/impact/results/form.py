@@ -12,6 +12,7 @@ from ..contact.status import Status
 from ..text import safe_text
 from .names import ABOUT_MODELS, TEXTS, is_name
 from .schema import SCHEMA
+from .slabs import MAX_SUMMARY_POINTS, distinct, is_computed, slabs
 
 # attributes of a result that the program reads: text, numbers, and text that is JSON of a kind
 TEXT = ("title", "config", "config_set", "fingerprint", "impact_version", "packages", "plugins")
@@ -78,7 +79,7 @@ def _result(dataset: xr.Dataset) -> Iterator[str]:
     for one in SCHEMA:
         if one.name in dataset and one.per == "axes" and "model" in dataset[one.name].dims:
             yield f"{one.name}: lies along model"
-    if "status" in dataset and not np.isin(dataset["status"].values, KNOWN).all():
+    if "status" in dataset and not _has_known_statuses(dataset):
         yield "status: a number without a meaning"
     for key in TEXT:
         if not isinstance(dataset.attrs.get(key), str):
@@ -86,3 +87,15 @@ def _result(dataset: xr.Dataset) -> Iterator[str]:
     for key in NUMBERS:
         if not isinstance(dataset.attrs.get(key), int | float | np.number):
             yield f"no {key}, or not as a number"
+
+
+def _has_known_statuses(dataset: xr.Dataset) -> bool:
+    """Whether each status has a meaning, as far as it is read from a file, or evaluated for a summary."""
+    models = [dataset.isel(model=model) for model in range(dataset.sizes.get("model", 0))] or [dataset]
+    variables = (distinct(of_model, "status")[0] for of_model in models)
+    return all(
+        np.isin(variable.isel(where).values, KNOWN).all()
+        for variable in variables
+        if variable.size <= MAX_SUMMARY_POINTS or not is_computed(variable)
+        for where in slabs(variable.sizes)
+    )

@@ -34,7 +34,8 @@ def slabs(sizes: Mapping[Hashable, int], points: int = SLAB_POINTS) -> Iterator[
     shape = tuple(sizes.values())
     # the axes after `split` are whole in every slab, those before it have one place
     split = next((axis for axis in range(len(shape)) if math.prod(shape[axis + 1 :]) <= points), 0)
-    step = max(1, points // math.prod(shape[split + 1 :]))
+    # an axis without values has no slab
+    step = max(1, points // max(1, math.prod(shape[split + 1 :])))
     lengths = (*(1 for _ in shape[:split]), step, *shape[split + 1 :])
     yield from _tiles(sizes, lengths[: len(shape)])
 
@@ -67,18 +68,37 @@ def is_lazy(variable: xr.Variable) -> bool:
     return not variable._in_memory
 
 
+def is_computed(variable: xr.Variable) -> bool:
+    """Whether the values of a variable are computed when they are indexed, by the axes along which it varies."""
+    return is_lazy(variable) and VARIES_ALONG in variable.encoding
+
+
 def varying_dims(dataset: xr.Dataset, name: str) -> tuple[Hashable, ...]:
     """The dimensions along which a variable varies, as far as it is known; all of one that is in memory.
 
     That depends on the models: ask for one after the other, `dataset.isel(model=place)`.
     """
     variable = dataset.variables[name]
-    if not is_lazy(variable) or VARIES_ALONG not in variable.encoding or "model" not in dataset.coords:
+    if not is_computed(variable) or "model" not in dataset.coords:
         return variable.dims
     by_model = variable.encoding[VARIES_ALONG]
     keys = [str(key) for key in np.ravel(dataset["model"].values)]
-    along = {"model", *(dim for key in keys for dim in by_model[key])}
+    # of a model that was given another key nothing is known
+    along = {"model", *(dim for key in keys for dim in by_model.get(key, variable.dims))}
     return tuple(dim for dim in variable.dims if dim in along)
+
+
+def distinct(dataset: xr.Dataset, name: str) -> tuple[xr.Variable, int]:
+    """A variable with one place, the first, along each dimension on which it does not vary.
+
+    Returns
+    -------
+    (xarray.Variable, int) : with all dimensions of the variable, and how often each of its points counts
+    """
+    kept, variable = varying_dims(dataset, name), dataset.variables[name]
+    fixed = [dim for dim in variable.dims if dim not in kept]
+    weight = math.prod(variable.sizes[dim] for dim in fixed)
+    return variable.isel(dict.fromkeys(fixed, slice(0, 1))), weight
 
 
 def factored(dataset: xr.Dataset, names: Sequence[str], *more: Hashable) -> tuple[xr.Dataset, int]:

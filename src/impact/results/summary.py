@@ -1,21 +1,22 @@
-"""What came out of a sweep in few numbers, taken part after part: counts, worst errors, first failures."""
+"""What came out of a sweep in few numbers, taken slab after slab: counts, worst errors, first failures, extremes."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
 from ..contact.status import FIRST_FAILURE, Status
-from .assembly import Part
+from .slabs import MAX_SUMMARY_POINTS, distinct, is_computed, slabs
 
 # the errors of which the largest is told
 ERRORS = ("e_error", "v1_error", "v2_error", "closed_form_error", "energy_residual")
-FAILED_TOLD = 3
+MAX_FAILED_AT = 3
 # of the smaller radius, above which an indentation is not small
 MAX_INDENTATION = 0.1
 
@@ -28,16 +29,21 @@ class Tally:
     ----------
     points : how many
     counts : points by status
-    worst : the largest absolute value by error, then by the place of the model; NaN where there is none
+    worst : the largest absolute value by error, then by the place of the model; NaN where there is none, and
+        missing where it was not evaluated
     failed_at : the first points that failed: status, place of the model, and places on the axes
+    max_failed_at : how many of these are kept
+    not_counted : how many points have a status that was not evaluated
     deep, deepest : how many points have a peak indentation above `MAX_INDENTATION`, and the largest one, in units
-        of the smaller radius; of parts whose radii are known
+        of the smaller radius; of points whose radii are known
     """
 
     points: int = 0
     counts: dict[Status, int] = field(default_factory=dict)
     worst: dict[str, dict[int, float]] = field(default_factory=dict)
     failed_at: list[tuple[Status, int, tuple[int, ...]]] = field(default_factory=list)
+    max_failed_at: int = field(default=MAX_FAILED_AT, compare=False)
+    not_counted: int = 0
     # a file does not hold the radii, so that these are known after a sweep only
     deep: int = field(default=0, compare=False)
     deepest: float = field(default=0.0, compare=False)
@@ -46,52 +52,116 @@ class Tally:
     def failed(self) -> int:
         return sum(count for status, count in self.counts.items() if status >= FIRST_FAILURE)
 
-    def add(self, part: Part) -> Tally:
-        """Count the points of a part."""
-        box = part.box
-        if "status" in part.values:
-            self._count(part.values["status"], box.model, [one.start for one in box.where])
+    def add(
+        self,
+        values: Mapping[str, NDArray[Any]],
+        model: int,
+        start: Sequence[int],
+        radius: NDArray[Any] | None = None,
+        weight: int = 1,
+    ) -> Tally:
+        """Count some points of one model.
+
+        Parameters
+        ----------
+        values : by variable, all of one shape; without a status nothing is counted but the errors
+        model : place of the model
+        start : place of the first point along each axis
+        radius : of the smaller ball [m], NaN where it is not known, of a shape that broadcasts to that of the values
+        weight : how many points of the result each of these stands for
+        """
+        if "status" in values:
+            self._count(values["status"], model, start, weight)
         for name in ERRORS:
-            if name in part.values:
-                self._judge(name, box.model, part.values[name])
-        if part.radius is not None and "peak_indentation" in part.values:
-            self._measure(part.values["peak_indentation"], part.radius)
+            if name in values:
+                self._judge(name, model, values[name])
+        if radius is not None and "peak_indentation" in values:
+            self._measure(values["peak_indentation"], radius, weight)
         return self
 
-    def _measure(self, indentation: NDArray[Any], radius: NDArray[Any]) -> None:
+    def _measure(self, indentation: NDArray[Any], radius: NDArray[Any], weight: int) -> None:
         if np.isfinite(radius).any():
             share = indentation / (radius if indentation.shape else radius.reshape(()))
-            self.deep += int(np.count_nonzero(share > MAX_INDENTATION))
+            self.deep += weight * int(np.count_nonzero(share > MAX_INDENTATION))
             self.deepest = float(np.fmax.reduce(share, axis=None, initial=self.deepest))
 
-    def _count(self, status: NDArray[np.int8], model: int, start: Sequence[int]) -> None:
-        self.points += status.size
+    def _count(self, status: NDArray[np.int8], model: int, start: Sequence[int], weight: int) -> None:
+        self.points += weight * status.size
         times = np.bincount(status.reshape(-1))
         for number in np.flatnonzero(times).tolist():
-            one = Status(number)
-            self.counts[one] = self.counts.get(one, 0) + int(times[number])
-        if times[FIRST_FAILURE:].any() and len(self.failed_at) < FAILED_TOLD:
-            for at in np.argwhere(status >= FIRST_FAILURE)[: FAILED_TOLD - len(self.failed_at)].tolist():
-                places = tuple(first + own for first, own in zip(start, at, strict=True))
+            known = Status(number)
+            self.counts[known] = self.counts.get(known, 0) + weight * int(times[number])
+        if times[FIRST_FAILURE:].any() and len(self.failed_at) < self.max_failed_at:
+            for at in np.argwhere(status >= FIRST_FAILURE)[: self.max_failed_at - len(self.failed_at)].tolist():
+                places = tuple(first + offset for first, offset in zip(start, at, strict=True))
                 self.failed_at.append((Status(int(status[tuple(at)])), model, places))
 
     def _judge(self, name: str, model: int, values: NDArray[Any]) -> None:
         largest = float(np.fmax.reduce(np.abs(values), axis=None, initial=np.nan))
-        own = self.worst.setdefault(name, {})
-        own[model] = float(np.fmax(own.get(model, np.nan), largest))
+        by_model = self.worst.setdefault(name, {})
+        by_model[model] = float(np.fmax(by_model.get(model, np.nan), largest))
 
 
-def tally_of(dataset: xr.Dataset) -> Tally:
-    """What came out, of a result in memory."""
-    tally = Tally()
+def tally_of(
+    dataset: xr.Dataset, max_failed_at: int = MAX_FAILED_AT, max_points: float = MAX_SUMMARY_POINTS
+) -> Tally:
+    """What came out, of a result of any size.
+
+    Each variable is evaluated over the axes along which it varies, one model after another, and each of its points
+    counts as often as it occurs. One that is computed and varies over more than `max_points` points is not evaluated:
+    a worst error is then missing, and the points are `not_counted`. What is read from a file is read in any case.
+
+    Parameters
+    ----------
+    dataset : a result
+    max_failed_at : how many of the first failed points are kept: in C order, those that differ, at the first place
+        along each axis on which the status does not vary
+    max_points : of a variable that is computed, for one model
+    """
+    tally = Tally(max_failed_at=max_failed_at)
+    names = [name for name in ("status", *ERRORS) if name in dataset]
     for model in range(dataset.sizes["model"]):
-        one = dataset.isel(model=model)
-        if "status" in one:
-            tally._count(one["status"].values, model, [0] * one["status"].ndim)
-        for name in ERRORS:
-            if name in one:
-                tally._judge(name, model, one[name].values)
+        of_model = dataset.isel(model=model)
+        for name in names:
+            variable, weight = distinct(of_model, name)
+            if variable.size <= max_points or not is_computed(variable):
+                for where in slabs(variable.sizes):
+                    start = [where[dim].start for dim in variable.dims]
+                    tally.add({name: variable.isel(where).values}, model, start, weight=weight)
+            elif name == "status":
+                tally.points += weight * variable.size
+                tally.not_counted += weight * variable.size
     return tally
+
+
+class Extremes(NamedTuple):
+    """The smallest and the largest finite value of a variable, NaN where it has none, and how many are not finite."""
+
+    smallest: float
+    largest: float
+    missing: int
+
+
+def extremes_of(dataset: xr.Dataset, name: str) -> Extremes | None:
+    """The extremes of a variable of a result of any size, over the axes along which it varies.
+
+    None of one that is computed, and varies over more than `MAX_SUMMARY_POINTS` points of all models together.
+    """
+    models = range(dataset.sizes["model"]) if "model" in dataset.variables[name].dims else ()
+    parts = [distinct(dataset.isel(model=model), name) for model in models] or [distinct(dataset, name)]
+    evaluations = sum(variable.size for variable, _ in parts)
+    if evaluations > MAX_SUMMARY_POINTS and is_computed(dataset.variables[name]):
+        return None
+    smallest, largest, missing = math.nan, math.nan, 0
+    for variable, weight in parts:
+        for where in slabs(variable.sizes):
+            values = variable.isel(where).values
+            finite = values[np.isfinite(values)]
+            missing += weight * (values.size - finite.size)
+            if finite.size:
+                smallest = float(np.fmin(smallest, finite.min()))
+                largest = float(np.fmax(largest, finite.max()))
+    return Extremes(smallest, largest, missing)
 
 
 @dataclass(frozen=True)

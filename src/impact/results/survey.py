@@ -76,7 +76,7 @@ def _verify(file: h5py.File, stream: BinaryIO, outline: xr.Dataset) -> Tally:
             part.values[str(name)] = np.asarray(file[name][where] if whole is None else whole[where])
             taken.add(part.values[str(name)])
             if has_model:
-                tally.add(part)
+                tally.add(part.values, box.model, [along.start for along in box.where])
         digests[str(name)] = taken.hexdigest()
     check(outline, content_digest(outline, digests))
     return tally

@@ -218,7 +218,8 @@ def assembled(
                     store(one)
                 for name, values in one.values.items():
                     digests[name].add(values)
-                tally.add(one)
+                start = [along.start for along in one.box.where]
+                tally.add(one.values, one.box.model, start, one.radius)
                 check()
             digest = content_digest(made, {name: taken.hexdigest() for name, taken in digests.items()})
             seal(digest)
