@@ -18,7 +18,7 @@ from ..text import safe_text
 from .replay import own
 from .schema import is_input
 from .select import places_of, select
-from .slabs import factored, is_computed, slabs
+from .slabs import Where, factored, is_computed, slabs
 
 Mask = NDArray[np.bool_]
 # points up to which variables that are computed are ranked: some minutes
@@ -236,13 +236,12 @@ def _ranked(of_model: xr.Dataset, tol: float) -> Ranked:
         at = {**_inputs(of_model, {dim: worst.get(dim, 0) for dim in axes}), "e": float(asked_there)}
     served = _served(e.values, asked_at, missed_at) if e.ndim == 1 else None
     return Ranked(
-        str(of_model["model"].item()), points, within_points, failed_points, mean_error, max_error, at, e_out, served
+        str(of_model["model"].item()), points, within_points, failed_points, mean_error, max_error, at, e_out,
+        served,
     )  # fmt: skip
 
 
-def _laid_out(
-    variable: xr.Variable, where: Mapping[Hashable, slice], sizes: Mapping[Hashable, int]
-) -> NDArray[Any]:
+def _laid_out(variable: xr.Variable, where: Where, sizes: Mapping[Hashable, int]) -> NDArray[Any]:
     """The values of a slab, with all dimensions in the order of `sizes`."""
     part = variable.isel({dim: where[dim] for dim in variable.dims})
     shape = {dim: where[dim].stop - where[dim].start for dim in sizes}

@@ -1,4 +1,4 @@
-"""What came out of a sweep in few numbers, taken slab after slab: counts, worst errors, first failures, extremes."""
+"""What came out of a sweep in few numbers, slab after slab: counts, worst errors, first failures, extremes."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class Tally:
         values : by variable, all of one shape; without a status nothing is counted but the errors
         model : place of the model
         start : place of the first point along each axis
-        radius : of the smaller ball [m], NaN where it is not known, of a shape that broadcasts to that of the values
+        radius : of the smaller ball [m], NaN where it is not known; its shape broadcasts to that of the values
         weight : how many points of the result each of these stands for
         """
         if "status" in values:
@@ -108,8 +108,9 @@ def tally_of(
     """What came out, of a result of any size.
 
     Each variable is evaluated over the axes along which it varies, one model after another, and each of its points
-    counts as often as it occurs. One that is computed and varies over more than `max_points` points is not evaluated:
-    a worst error is then missing, and the points are `not_counted`. What is read from a file is read in any case.
+    counts as often as it occurs. One that is computed and varies over more than `max_points` points is not
+    evaluated: a worst error is then missing, and of a status the points are `not_counted`. What is read from a
+    file is read in any case.
 
     Parameters
     ----------
@@ -135,7 +136,7 @@ def tally_of(
 
 
 class Extremes(NamedTuple):
-    """The smallest and the largest finite value of a variable, NaN where it has none, and how many are not finite."""
+    """The smallest and the largest finite value, NaN where there is none, and how many are not finite."""
 
     smallest: float
     largest: float
