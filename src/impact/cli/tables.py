@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -21,6 +22,10 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from ..api import Impact
+
+
+# how a result is stored, where it was read from a file
+STORED = ("layout", "seal")
 
 
 def print_rows(rows: Mapping[str, Any]) -> None:
@@ -95,8 +100,10 @@ def _quantity(value: Any, unit: str, digits: int = 10) -> str:
 
 
 def info_json(dataset: xr.Dataset) -> dict[str, Any]:
-    """What is in a file as plain data."""
+    """What is in a file as plain data; its layout and its seal are null where they are not known."""
     return {
+        "points": math.prod(dataset.sizes.values()),
+        **{name: dataset.encoding.get(name) for name in STORED},
         "dimensions": {str(name): size for name, size in dataset.sizes.items()},
         "coordinates": [str(name) for name in dataset.coords],
         "variables": {str(n): {"units": v.attrs.get("units"), "dims": list(v.dims)} for n, v in dataset.items()},
@@ -107,30 +114,27 @@ def info_json(dataset: xr.Dataset) -> dict[str, Any]:
 
 
 def print_info(dataset: xr.Dataset, path: Path) -> None:
-    """What is in a file."""
+    """What is in a file, of any size; "–" where more would have to be evaluated than a summary is worth."""
     from ..results.schema import exponents_of, plain_unit
-    from ..results.summary import counted, tally_of
+    from ..results.summary import counted, extremes_of, tally_of
 
     attributes = dataset.attrs
     tally = tally_of(dataset) if "model" in dataset.dims else None
     sizes = " × ".join(f"{name} {size}" for name, size in dataset.sizes.items())
     rows: dict[str, Any] = {"file": path, "title": attributes.get("title", ""), "dimensions": sizes}
+    rows["points"] = f"{math.prod(dataset.sizes.values()):,}"
+    rows |= {name: dataset.encoding[name] for name in STORED if dataset.encoding.get(name) is not None}
     for name, coordinate in dataset.coords.items():
         if name in ("title", "equation", "reference", "doi", "year"):
             continue
-        values = coordinate.values.reshape(-1)
-        distinct = list(dict.fromkeys(values.tolist()))
-        if values.dtype.kind == "f" and len(distinct) > 4:
-            text = f"{values.min():g} … {values.max():g}, {values.size} values"
-        else:
-            text = ", ".join(shown(one) for one in distinct)
+        text = _values_text(dataset, str(name))
         if name == "n" and coordinate.ndim == 0:
             text = exponents_of(dataset) or text
         unit = plain_unit(str(coordinate.attrs.get("units", "1")))
         rows[str(name)] = text + ("" if unit == "1" else f" [{unit}]")
     for name in (
-        "rtol", "materials", "impact_version", "schema_version", "fingerprint", "content_digest", "plugins",
-        "tolerances", "reason",
+        "rtol", "materials", "impact_version", "schema_version", "fingerprint", "plugins", "tolerances",
+        "reason",
     ):  # fmt: skip
         if attributes.get(name, "{}") != "{}":
             rows[name] = attributes[name]
@@ -138,19 +142,37 @@ def print_info(dataset: xr.Dataset, path: Path) -> None:
         rows["config_set"] = attributes["config_set"]
     if tally and tally.counts:
         rows["status"] = ", ".join(f"{count:,} {name}" for name, count in counted(tally.counts).items())
+    if tally and tally.not_counted:
+        rows["not evaluated"] = f"the status of {tally.not_counted:,} points"
     print_rows(rows)
     out = console(sys.stdout)
     out.print()
     listed = table("variable", "unit", "dimensions", "smallest", "largest", "missing")
     for name, variable in dataset.items():
-        values = variable.values
-        finite = values[np.isfinite(values)]
-        ends = (f"{finite.min():.6g}", f"{finite.max():.6g}") if finite.size else ("–", "–")
+        extremes = extremes_of(dataset, str(name))
+        ends = [f"{end:.6g}" if end == end else "–" for end in extremes[:2]] if extremes else ["–", "–"]
         listed.add_row(
             cell(name), cell(variable.attrs.get("units", "")), cell(", ".join(map(str, variable.dims))), *ends,
-            str(values.size - finite.size),
+            str(extremes.missing) if extremes else "–",
         )  # fmt: skip
     out.print(listed)
     if tally and tally.worst:
         out.print()
         out.print(worst_errors(dataset, tally))
+
+
+def _values_text(dataset: xr.Dataset, name: str) -> str:
+    """The values of a coordinate: few of them one by one, of many numbers the ends and how many there are."""
+    from ..results.slabs import is_lazy
+    from ..results.summary import extremes_of
+
+    coordinate = dataset[name]
+    if is_lazy(coordinate.variable):
+        extremes = extremes_of(dataset, name)
+        ends = f"{extremes.smallest:g} … {extremes.largest:g}, " if extremes else ""
+        return f"{ends}{coordinate.size} values"
+    values = coordinate.values.reshape(-1)
+    distinct = list(dict.fromkeys(values.tolist()))
+    if values.dtype.kind == "f" and len(distinct) > 4:
+        return f"{values.min():g} … {values.max():g}, {values.size} values"
+    return ", ".join(shown(value) for value in distinct)

@@ -27,7 +27,7 @@ def material_notes(materials: Mapping[str, Mapping[str, object]]) -> Iterator[st
 
 def result_notes(tally: Tally) -> Iterator[str]:
     """A sentence for each thing that is implausible in what came out of a sweep."""
-    if tally.points and tally.counts.keys() == {Status.NO_IMPACT}:
+    if tally.points and not tally.not_counted and tally.counts.keys() == {Status.NO_IMPACT}:
         yield f"none of {tally.points:,} points is an impact: v1 <= v2, the balls do not approach"
     if tally.deep:
         many = f"{tally.deep:,} of {tally.points:,} points"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -17,8 +18,14 @@ from ..text import safe_text
 from .replay import own
 from .schema import is_input
 from .select import places_of, select
+from .slabs import Where, factored, is_computed, slabs
 
 Mask = NDArray[np.bool_]
+# points up to which variables that are computed are ranked: some minutes
+MAX_RANKED_POINTS = 2**30
+JUDGED = ("e_error", "status")
+# bits of a double, and of the upper part in which it is summed
+MANTISSA_BITS, UPPER_BITS = 53, 27
 
 
 @dataclass(frozen=True)
@@ -36,6 +43,9 @@ class Ranked:
     e_out : the restitution delivered there
     served : the ranges of e, least and greatest, in which all points are within the tolerance; None where e does
         not vary along one axis
+
+    A mean error is the exact mean of its numbers, rounded once: it does not depend on their order, nor on whether
+    they are in memory.
     """
 
     model: str
@@ -110,11 +120,14 @@ def ranking(
     tol: float = 0.01,
     sel: Mapping[str, float | str] | None = None,
     models: Sequence[str] | None = None,
+    max_points: int = MAX_RANKED_POINTS,
 ) -> Ranking:
     """Rank the models of a result by how well they give the restitution asked for.
 
     Judged is |e_out - e| at all points where an e was asked for and the balls meet. A point that failed, or that
     no restitution can have (1 - alpha v0 below 0), is judged too: it is not within the tolerance.
+    The result may be of any size: points that differ along axes on which nothing varies are evaluated once, and
+    count as often as they occur.
 
     Parameters
     ----------
@@ -122,19 +135,27 @@ def ranking(
     tol : what |e_out - e| may be
     sel : values of axes, by name; all points of the others are judged
     models : keys of the models to rank; by default all
+    max_points : how many points may be evaluated, where variables are computed when they are indexed
 
     Raises
     ------
-    UsageError : the result has no errors of e to judge by, or has not got what is asked for; tol is not positive
+    UsageError : the result has no errors of e to judge by, or has not got what is asked for; tol is not positive;
+        too many points would have to be evaluated
     """
     _check(dataset, tol)
     chosen = places_of(models, dataset) if models else range(dataset.sizes["model"])
-    # one model after another: what is computed of all together would take several times their memory
-    held = select(dataset[["e_error", "status"]], sel or {})
-    found = [_ranked(held.isel(model=place), tol) for place in chosen]
-    if not any(one.points for one in found):
+    selected = select(dataset[list(JUDGED)], sel or {})
+    by_model = [selected.isel(model=place) for place in chosen]
+    evaluated = [_evaluated(of_model)[0] for of_model in by_model if is_computed(of_model.variables["e_error"])]
+    points = sum(math.prod(of_model.sizes.values()) for of_model in evaluated)
+    if points > max_points:
+        raise UsageError(
+            f"got {points:,} different points to rank, expected at most {max_points:,}; select values of axes"
+        )
+    ranked = [_ranked(of_model, tol) for of_model in by_model]
+    if not any(one.points for one in ranked):
         raise UsageError("there is nothing to judge: at no point is an e asked for of balls that meet")
-    return Ranking(tol, tuple(sorted(found, key=_order)))
+    return Ranking(tol, tuple(sorted(ranked, key=_order)))
 
 
 def _check(dataset: xr.Dataset, tol: float) -> None:
@@ -145,10 +166,10 @@ def _check(dataset: xr.Dataset, tol: float) -> None:
         raise UsageError("this is a time history; models are ranked by the result of a sweep")
     if "model" not in dataset.dims:
         raise UsageError("model is no axis of this result; select models as a list, sel(model=[...])")
-    missing = [name for name in ("e_error", "status") if name not in dataset]
+    missing = [name for name in JUDGED if name not in dataset]
     if missing:
         raise UsageError(f"this result has no {', '.join(missing)}; sweep without [output] variables, or add them")
-    if "e" not in dataset.coords or np.isnan(dataset["e"].values).all():
+    if "e" not in dataset.coords or not _asks_for_e(dataset.variables["e"]):
         raise UsageError("this sweep asks for no e, by which models are ranked; give it e or alpha")
     dims = set(dataset["e_error"].dims)
     if "model" not in dims or dims != set(dataset["status"].dims) or not dims.issuperset(dataset["e"].dims):
@@ -160,56 +181,113 @@ def _order(one: Ranked) -> tuple[float, ...]:
     return (-one.share, *(math.inf if math.isnan(error) else error for error in (one.max_error, one.mean_error)))
 
 
-def _ranked(one: xr.Dataset, tol: float) -> Ranked:
+def _asks_for_e(e: xr.Variable) -> bool:
+    """Whether there is a point at which an e is asked for."""
+    return any(not np.isnan(e.isel(where).values).all() for where in slabs(e.sizes))
+
+
+def _evaluated(of_model: xr.Dataset) -> tuple[xr.Dataset, int]:
+    """What is judged of a model, over the axes along which it or e varies, and how often each point counts."""
+    return factored(of_model, JUDGED, *of_model.variables["e"].dims)
+
+
+def _ranked(of_model: xr.Dataset, tol: float) -> Ranked:
     """How well a model does, from its e_error and status, of the shape of the axes, and the e asked for."""
-    error = one.variables["e_error"]
-
-    def laid_out(name: str) -> NDArray[Any]:
-        return np.asarray(one.variables[name].set_dims(dict(error.sizes)).values)  # type: ignore[no-untyped-call]
-
-    asked, status = laid_out("e"), laid_out("status")
-    distance = np.abs(np.asarray(error.values, float))
-    judged = ~np.isnan(asked) & (status != Status.NO_IMPACT)
-    failed = judged & (status >= FIRST_FAILURE)
-    known = judged & ~failed & ~np.isnan(distance)
-    within = known & (distance <= tol)
+    axes = of_model.variables["e_error"].dims
+    evaluated, weight = _evaluated(of_model)
+    sizes = {dim: evaluated.sizes[dim] for dim in evaluated.variables["e_error"].dims}
+    e = evaluated.variables["e"]
+    # along e, where it varies along one axis: whether there is a point to judge, and one that is not within tol
+    asked_at, missed_at = np.zeros(e.shape, bool), np.zeros(e.shape, bool)
+    points = known_points = within_points = failed_points = 0
+    total, max_error, e_out = Fraction(), math.nan, math.nan
+    worst: dict[Hashable, int] | None = None
+    for where in slabs(sizes):
+        error, status, asked = (
+            _laid_out(evaluated.variables[name], where, sizes) for name in ("e_error", "status", "e")
+        )
+        distance = np.abs(np.asarray(error, float))
+        judged = ~np.isnan(asked) & (status != Status.NO_IMPACT)
+        failed = judged & (status >= FIRST_FAILURE)
+        known = judged & ~failed & ~np.isnan(distance)
+        within = known & (distance <= tol)
+        points += weight * int(judged.sum())
+        known_points += weight * int(known.sum())
+        within_points += weight * int(within.sum())
+        failed_points += weight * int(failed.sum())
+        if known.any():
+            total += weight * _exact_sum(distance[known & np.isfinite(distance)])
+            index = np.unravel_index(int(np.argmax(np.where(known, distance, -1.0))), distance.shape)
+            if worst is None or distance[index] > max_error:
+                max_error = float(distance[index])
+                e_out = float(asked[index]) + float(error[index])
+                worst = {dim: where[dim].start + int(at) for dim, at in zip(sizes, index, strict=True)}
+        if e.ndim == 1:
+            others = tuple(place for place, dim in enumerate(sizes) if dim not in e.dims)
+            along = where[e.dims[0]]
+            asked_at[along] |= np.logical_or.reduce(judged, axis=others)
+            missed_at[along] |= np.logical_or.reduce(judged & ~within, axis=others)
     at: dict[str, float | str] = {}
-    mean_error = max_error = e_out = math.nan
-    if known.any():
-        index = np.unravel_index(int(np.argmax(np.where(known, distance, -1.0))), distance.shape)
-        mean_error, max_error = float(distance.mean(where=known)), float(distance[index])
-        e = float(asked[index])
-        e_out = e + float(error.values[index])
-        at = {**_inputs(one, dict(zip(error.dims, index, strict=True))), "e": e}
+    mean_error = math.nan
+    if worst is not None:
+        # an error without bound comes from a file that was not written by a sweep
+        mean_error = max_error if math.isinf(max_error) else float(total / known_points)
+        asked_there = e.isel({dim: worst[dim] for dim in e.dims}).values.item()
+        at = {**_inputs(of_model, {dim: worst.get(dim, 0) for dim in axes}), "e": float(asked_there)}
+    served = _served(e.values, asked_at, missed_at) if e.ndim == 1 else None
     return Ranked(
-        str(one["model"].item()), int(judged.sum()), int(within.sum()), int(failed.sum()), mean_error, max_error,
-        at, e_out, _served(one.variables["e"], error.dims, judged, within),
+        str(of_model["model"].item()), points, within_points, failed_points, mean_error, max_error, at, e_out,
+        served,
     )  # fmt: skip
 
 
-def _inputs(one: xr.Dataset, places: Mapping[Hashable, np.intp]) -> dict[str, float | str]:
+def _laid_out(variable: xr.Variable, where: Where, sizes: Mapping[Hashable, int]) -> NDArray[Any]:
+    """The values of a slab, with all dimensions in the order of `sizes`."""
+    part = variable.isel({dim: where[dim] for dim in variable.dims})
+    shape = {dim: where[dim].stop - where[dim].start for dim in sizes}
+    return np.asarray(xr.Variable(part.dims, part.values).set_dims(shape).values)  # type: ignore[no-untyped-call]
+
+
+def _exact_sum(values: NDArray[np.float64]) -> Fraction:
+    """The sum of finite numbers that are not negative, without rounding; at most 2**26 of them.
+
+    >>> _exact_sum(np.array([1e16, 1.0, 1e-16])) == Fraction(1e16) + 1 + Fraction(1e-16)
+    True
+    """
+    if not values.size:
+        return Fraction()
+    mantissas, exponents = np.frexp(values)
+    # whole numbers in two parts, whose sums are exact in double
+    scaled = np.ldexp(mantissas, UPPER_BITS)
+    upper = np.floor(scaled)
+    lower = np.ldexp(scaled - upper, MANTISSA_BITS - UPPER_BITS)
+    least = int(exponents.min())
+    sums = (np.bincount(exponents - least, part).tolist() for part in (upper, lower))
+    total = sum(
+        ((int(up) << (MANTISSA_BITS - UPPER_BITS)) + int(low)) << power
+        for power, (up, low) in enumerate(zip(*sums, strict=True))
+    )
+    return total * Fraction(2) ** (least - MANTISSA_BITS)
+
+
+def _inputs(of_model: xr.Dataset, places: Mapping[Hashable, int]) -> dict[str, float | str]:
     """What is swept, at a place along each axis, without the parameters of other models."""
-    found = {
-        str(name): one.variables[name].values[place].item()
+    variables = of_model.variables
+    inputs = {
+        str(name): variables[name].values[place].item()
         for dim, place in places.items()
-        for name in (dim, *(name for name in one.coords if name != dim and is_input(str(name))))
-        if one.variables[name].dims == (dim,)
+        for name in (dim, *(name for name in of_model.coords if name != dim and is_input(str(name))))
+        if variables[name].dims == (dim,)
     }
-    found = own({"model": str(one["model"].item()), **found})
-    del found["model"]
-    return found
+    inputs = own({"model": str(of_model["model"].item()), **inputs})
+    del inputs["model"]
+    return inputs
 
 
-def _served(
-    e: xr.Variable, dims: tuple[Hashable, ...], judged: Mask, within: Mask
-) -> tuple[tuple[float, float], ...] | None:
+def _served(e: NDArray[Any], asked: Mask, missed: Mask) -> tuple[tuple[float, float], ...]:
     """The ranges of neighbouring values of e at which every judged point is within the tolerance."""
-    if e.ndim != 1:
-        return None
-    others = tuple(place for place, dim in enumerate(dims) if dim not in e.dims)
-    asked, missed = (np.logical_or.reduce(mask, axis=others) for mask in (judged, judged & ~within))
     # in order, each value once: that of alpha and of speeds that vary with it may come again
-    values, place = np.unique(e.values[asked], return_inverse=True)
+    values, place = np.unique(e[asked], return_inverse=True)
     served = np.bincount(place, missed[asked], values.size) == 0
     edges = np.diff(np.concatenate(([0], served, [0])))
     return tuple(zip(values[edges[:-1] == 1].tolist(), values[edges[1:] == -1].tolist(), strict=True))

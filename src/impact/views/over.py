@@ -15,7 +15,7 @@ from ..results.schema import exponents_of, plain_unit
 from ..text import safe_text, with_year
 from .lines import Curve, Lines, Panel
 from .look import axis_label, is_geometric
-from .slices import take_slice
+from .slices import read, sorted_along, take_slice
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -104,22 +104,20 @@ def _along(
     x: str | None,
     sel: Mapping[str, float | str] | None,
     models: Sequence[str] | None,
-    *wanted: str,
+    *names: str,
 ) -> tuple[xr.Dataset, str, tuple[str, ...]]:
-    """The line of a result that is drawn, sorted; over what; and values of it that have no place on an axis."""
+    """The line of a result that is drawn, sorted, with its variables in memory; over what; what is not drawn."""
     if "model" not in dataset.dims:
         raise UsageError("this is a time history, not the result of a sweep; draw it with --kind loop, or history")
-    missing = [name for name in wanted if name not in dataset]
+    missing = [name for name in names if name not in dataset]
     if missing:
         raise UsageError(f"this result has no {', '.join(missing)}; sweep without [output] variables, or add them")
-    line = take_slice(dataset, x, sel, models)
-    # a wall, or a plane, has no place on an axis
-    along = line.dataset[line.x].values
-    order = np.argsort(along, kind="stable")
-    data = line.dataset.isel({line.dataset[line.x].dims[0]: order[np.isfinite(along[order])]})
-    if not data[line.x].size:
-        raise UsageError(f"{safe_text(line.x)} has no finite value to draw over")
-    return data, line.x, tuple(f"{line.x} = {value}" for value in along.tolist() if not np.isfinite(value))
+    line, x = take_slice(dataset, x, sel, models)
+    along = line[x].values
+    data = sorted_along(line, x)
+    if not data[x].size:
+        raise UsageError(f"{safe_text(x)} has no finite value to draw over")
+    return read(data, names), x, tuple(f"{x} = {value}" for value in along[~np.isfinite(along)].tolist())
 
 
 def _models(data: xr.Dataset) -> list[xr.Dataset]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Callable, Iterator
 from html import escape
@@ -13,14 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..contact.models import catalogue
-from ..contact.status import FIRST_FAILURE, Status
 from ..errors import UsageError
 from ..results.attributes import json_object, json_table
 from ..results.plausibility import material_notes, result_notes
 from ..results.ranking import Ranked, ranking
 from ..results.replay import own
 from ..results.schema import exponents_of, is_input, plain_unit
-from ..results.summary import Tally, tally_of
+from ..results.slabs import MAX_SUMMARY_POINTS, is_lazy
+from ..results.summary import Tally, extremes_of, tally_of
 from ..sweeps.rules import MATERIAL
 from ..text import safe_text, with_year
 from .kinds import Choice, Numbers
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'"
 CSS = files(__package__) / "page.css"
 # at most so many failed points and values are shown
-FAILED, VALUES = 20, 8
+MAX_FAILED_AT, VALUES = 20, 8
 
 
 def page(dataset: xr.Dataset, figures: Callable[[str, Choice], Numbers]) -> str:
@@ -52,11 +53,12 @@ def page(dataset: xr.Dataset, figures: Callable[[str, Choice], Numbers]) -> str:
     """
     if "model" not in dataset.dims:
         raise UsageError("this is a time history; a report is made of the result of a sweep")
-    title, tally = str(dataset.attrs.get("title", "")) or "Impact of two balls", tally_of(dataset)
+    title = str(dataset.attrs.get("title", "")) or "Impact of two balls"
+    tally = tally_of(dataset, MAX_FAILED_AT)
     keys, answer = _answer(dataset)
     sections = {
         "What was swept": _swept(dataset), "The answer": answer, "Figures": figures_of(dataset, keys, figures),
-        "Failed points": _failed(dataset, tally.failed), "How it was computed": _computed(dataset),
+        "Failed points": _failed(dataset, tally), "How it was computed": _computed(dataset),
         "The models": _models(dataset), "The config": _config(dataset),
     }  # fmt: skip
     return "\n".join([
@@ -74,13 +76,15 @@ def page(dataset: xr.Dataset, figures: Callable[[str, Choice], Numbers]) -> str:
 def _summary(dataset: xr.Dataset, title: str, tally: Tally) -> Iterator[Markup]:
     """The title, what this is, and how the points ended."""
     models, axes = dataset.sizes["model"], [str(dim) for dim in dataset.sizes if dim != "model"]
-    points, over = int(np.prod(list(dataset.sizes.values()))), f" over {', '.join(axes)}" if axes else ""
+    points, over = math.prod(dataset.sizes.values()), f" over {', '.join(axes)}" if axes else ""
     yield tag("h1", title)
     yield tag("p", f"{models:,} model{_s(models)} of the impact of two balls{over}, judged by the "
                f"impulse-momentum solution: {points:,} point{_s(points)}.")  # fmt: skip
     for note in (*material_notes(json_table(dataset, "materials")), *result_notes(tally)):
         yield tag("p", f"Note: {note}")
-    ends = (f"{tally.counts[one]:,} {one.name.lower()}: {one.meaning}" for one in sorted(tally.counts))
+    ends = [f"{tally.counts[status]:,} {status.name.lower()}: {status.meaning}" for status in sorted(tally.counts)]
+    if tally.not_counted:
+        ends.append(f"{tally.not_counted:,} not evaluated: too many different points to count them for a report")
     yield tag("ul", *(tag("li", end) for end in ends))
 
 
@@ -113,13 +117,17 @@ def _about(coordinate: xr.DataArray) -> tuple[str, str]:
 
 def _range(coordinate: xr.DataArray) -> tuple[str, str, str, str]:
     """From, to, how many, and how the values are spaced."""
-    values, ends = coordinate.values.ravel(), ("–", "–")
-    if values.dtype.kind == "f":
-        ends = _shown(float(np.fmin.reduce(values))), _shown(float(np.fmax.reduce(values)))
-    spacing = str(coordinate.attrs.get("equation", "")) or _spacing(values)
+    ends, lazy = ("–", "–"), is_lazy(coordinate.variable)
+    if lazy:
+        extremes = extremes_of(coordinate.to_dataset(name="values"), "values")
+        ends = (_shown(extremes.smallest), _shown(extremes.largest)) if extremes else ends
+    elif coordinate.dtype.kind == "f":
+        smallest, largest = (end.reduce(coordinate.values, axis=None) for end in (np.fmin, np.fmax))
+        ends = _shown(float(smallest)), _shown(float(largest))
+    spacing = str(coordinate.attrs.get("equation", "")) or ("–" if lazy else _spacing(coordinate.values.ravel()))
     if coordinate.name not in coordinate.dims:
         spacing = f"varies with {' and '.join(map(str, coordinate.dims))}: {spacing}"
-    return *ends, f"{values.size:,}", spacing
+    return *ends, f"{coordinate.size:,}", spacing
 
 
 def _spacing(values: NDArray[Any]) -> str:
@@ -143,7 +151,7 @@ def _answer(dataset: xr.Dataset) -> tuple[list[str], list[Markup]]:
     """The keys of the models, the best first if they can be ranked, and the answer in a sentence and a table."""
     keys = [str(key) for key in dataset["model"].values]
     try:
-        ranked = ranking(dataset)
+        ranked = ranking(dataset, max_points=MAX_SUMMARY_POINTS)
     except UsageError as error:
         return keys, [tag("p", f"The models are not ranked: {error}.")]
     rows = [
@@ -172,25 +180,27 @@ def _served(one: Ranked) -> str:
     return ", ".join(ranges[:VALUES]) + more or "nowhere"
 
 
-def _failed(dataset: xr.Dataset, failed: int) -> Iterator[Markup]:
+def _failed(dataset: xr.Dataset, tally: Tally) -> Iterator[Markup]:
     """The first points that failed, and how many more there are."""
-    if not failed:
-        yield tag(
-            "p", "No point failed." if "status" in dataset else "The result does not tell which points failed."
-        )
+    if "status" not in dataset:
+        yield tag("p", "The result does not tell which points failed.")
+        return
+    if tally.not_counted:
+        yield tag("p", f"The status of {tally.not_counted:,} points was not evaluated.")
+    if not tally.failed:
+        yield tag("p", "No other point failed." if tally.not_counted else "No point failed.")
         return
     rows: list[tuple[str, str, str]] = []
     columns = [name for name in varying(dataset) if {*dataset[name].dims} <= {*dataset["status"].dims}]
-    for model in range(dataset.sizes["model"]):
-        status = dataset.isel(model=model)["status"]
-        for places in np.argwhere(status.values >= FIRST_FAILURE)[: FAILED - len(rows)].tolist():
-            point = status.isel(dict(zip(status.dims, places, strict=True)))
-            at = own({"model": point["model"].item(), **{name: point[name].item() for name in columns}})
-            where = ", ".join(f"{name}\u00a0=\u00a0{_shown(at[name])}" for name in at if name != "model")
-            rows.append((at["model"], where or "–", Status(int(point.item())).meaning))
+    axes = [dim for dim in dataset["status"].dims if dim != "model"]
+    for status, model, places in tally.failed_at:
+        point = dataset.isel(model=model)["status"].isel(dict(zip(axes, places, strict=True)))
+        at = own({"model": point["model"].item(), **{name: point[name].item() for name in columns}})
+        where = ", ".join(f"{name}\u00a0=\u00a0{_shown(at[name])}" for name in at if name != "model")
+        rows.append((at["model"], where or "–", status.meaning))
     yield table("Failed points", ("model", "where", "why"), rows)
-    if failed > len(rows):
-        yield tag("p", f"and {failed - len(rows):,} more")
+    if tally.failed > len(rows):
+        yield tag("p", f"and {tally.failed - len(rows):,} more")
 
 
 def _computed(dataset: xr.Dataset) -> Iterator[Markup]:
@@ -202,7 +212,7 @@ def _computed(dataset: xr.Dataset) -> Iterator[Markup]:
         "solver": ", ".join(f"{name} {attributes[name]:g}" for name in settings if name in attributes),
         "core": attributes.get("core", ""),
         "fingerprint": attributes.get("fingerprint", ""),
-        "content digest": attributes.get("content_digest", ""),
+        "seal": dataset.encoding.get("seal") or "",
         "reason": attributes.get("reason", ""),
         **{f"plug-in {key}": ", ".join(f"{name} {text}" for name, text in one.items() if text is not None)
            for key, one in json_table(dataset, "plugins").items()},

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from ..contact.status import FIRST_FAILURE, NO_IMPACT
 from ..errors import ImpactError
 from ..results.schema import is_input
+from ..results.select import places_of
+from ..results.slabs import MAX_SUMMARY_POINTS, distinct, is_computed, slabs
 from ..text import safe_text
 from .kinds import Choice, Numbers, draw
 from .look import METADATA, STYLE
@@ -82,10 +84,36 @@ def _answered(dataset: xr.Dataset, keys: list[str], drawn: Sequence[Hashable]) -
     """Values of the axes that are not drawn over: the first at which the balls meet and a model has an answer."""
     if "status" not in dataset:
         return {}
-    status = dataset.sel(model=keys)["status"]
-    found = ((status < FIRST_FAILURE) & (status != NO_IMPACT)).any({"model", *drawn} & {*status.dims})
-    places = np.unravel_index(int(np.argmax(found.values)), found.shape) if found.ndim else ()
-    return {str(dim): dataset[dim].values[at].item() for dim, at in zip(found.dims, places, strict=True)}
+    axes = [dim for dim in dataset["status"].dims if dim not in ("model", *drawn)]
+    first: tuple[int, ...] | None = None
+    for place in places_of(keys, dataset):
+        answered = _first_answered(dataset.isel(model=place), axes)
+        first = min(filter(None, (first, answered)), default=None)
+        if first is not None and not any(first):
+            break
+    places = first or (0,) * len(axes)
+    return {str(dim): dataset[dim].values[at].item() for dim, at in zip(axes, places, strict=True)}
+
+
+def _first_answered(of_model: xr.Dataset, axes: Sequence[Hashable]) -> tuple[int, ...] | None:
+    """The first place along some axes at which a model has an answer for balls that meet; None where it has none.
+
+    Of a status that is computed no more is looked at than a summary is worth.
+    """
+    status, _ = distinct(of_model, "status")
+    ordered = [*axes, *(dim for dim in status.dims if dim not in axes)]
+    points = 0
+    for where in slabs({dim: status.sizes[dim] for dim in ordered}):
+        part = status.isel(where)
+        answered = (part.values < FIRST_FAILURE) & (part.values != NO_IMPACT)
+        if answered.any():
+            answered = answered.transpose([part.dims.index(dim) for dim in ordered])
+            places = np.unravel_index(int(np.argmax(answered)), answered.shape)
+            return tuple(where[dim].start + int(at) for dim, at in zip(axes, places, strict=False))
+        points += part.size
+        if points >= MAX_SUMMARY_POINTS and is_computed(status):
+            break
+    return None
 
 
 def _figure(kind: str, numbers: Numbers, title: str) -> Markup:

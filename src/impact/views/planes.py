@@ -15,7 +15,7 @@ from ..results.select import places_of, select
 from ..text import safe_text
 from .look import axis_label, is_geometric
 from .over import conditions_of, label_of
-from .slices import x_axis
+from .slices import read, sorted_along, x_axis
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -102,12 +102,11 @@ def field_map(
     ------
     UsageError : the result has not got what is asked for, or not two axes
     """
-    numbers = _numbers("map", dataset, variable, x, y, sel, models, log)
-    left_out = tuple(str(panel.model) for panel in numbers.panels[PANELS:])
-    if not left_out:
+    numbers = _numbers("map", dataset, variable, x, y, sel, models, log, PANELS)
+    if not numbers.left_out:
         return numbers
-    told = "; ".join(filter(None, (numbers.conditions, f"the first {PANELS} of {len(numbers.panels)} models")))
-    return replace(numbers, panels=numbers.panels[:PANELS], conditions=told, left_out=left_out)
+    count = f"the first {PANELS} of {PANELS + len(numbers.left_out)} models"
+    return replace(numbers, conditions="; ".join(filter(None, (numbers.conditions, count))))
 
 
 def validity(
@@ -136,9 +135,9 @@ def _rows(values: NDArray[Any]) -> tuple[Any, ...]:
 
 def _numbers(
     kind: str, dataset: xr.Dataset, variable: str, x: str | None, y: str | None,
-    sel: Mapping[str, float | str] | None, models: Sequence[str] | None, log: str,
+    sel: Mapping[str, float | str] | None, models: Sequence[str] | None, log: str, most: int | None = None,
 ) -> Grids:  # fmt: skip
-    """The panels of all models."""
+    """The panels of the models, at most so many; of the others nothing is read."""
     if "model" not in dataset.dims:
         raise UsageError("this is a time history, not the result of a sweep; draw it with --kind loop, or history")
     if variable not in dataset.data_vars:
@@ -146,11 +145,16 @@ def _numbers(
         raise UsageError(f'no variable "{safe_text(variable)}" in this result; {known}')
     data, x, y, not_drawn = take_plane(dataset, kind, x, y, sel, models)
     field, plane = data[variable], (*data[y].dims, *data[x].dims)
+    left_out: tuple[str, ...] = ()
+    if "model" in field.dims:
+        left_out = tuple(map(str, field["model"].values[most:].tolist())) if most is not None else ()
+        field = field.isel(model=slice(most))
     what = safe_text(f"{variable} over {x} and {y}")
     if field.dtype.kind not in "iuf" or not set(plane) <= set(field.dims):
         raise UsageError(f"no picture of {what}: it is not a number at each point")
     # of shape (models, y, x); the reference has no models
-    values = np.asarray(field.transpose(..., *plane).values, float)
+    in_memory = read(field.to_dataset(name=variable), [variable])[variable]
+    values = np.asarray(in_memory.transpose(..., *plane).values, float)
     values = values.reshape(-1, *values.shape[-2:])
     finite = values[np.isfinite(values)]
     if not finite.size:
@@ -160,8 +164,8 @@ def _numbers(
             raise UsageError(f"--log {letter}: {safe_text(name)} has values that are not above 0")
     names: list[tuple[str, str | None]] = [("Impulse-momentum (6), (7)", None)]
     if "model" in field.dims:
-        ones = (data.isel(model=place) for place in range(data.sizes["model"]))
-        names = [(label_of(one), str(one["model"].item())) for one in ones]
+        by_model = (data.isel(model=place) for place in range(field.sizes["model"]))
+        names = [(label_of(of_model), str(of_model["model"].item())) for of_model in by_model]
     title = what if kind == "map" else safe_text(f"Closest model over {x} and {y}")
     own = safe_text(str(dataset.attrs.get("title", "")), 140)
     return Grids(
@@ -175,6 +179,7 @@ def _numbers(
         signed=variable.endswith(("_error", "energy_residual")) or bool(-finite.min() > 1e-3 * finite.max() > 0.0),
         panels=tuple(Panel(*name, _rows(one)) for name, one in zip(names, values, strict=True)),
         not_drawn=not_drawn,
+        left_out=left_out,
     )  # fmt: skip
 
 
@@ -203,17 +208,16 @@ def take_plane(
         dims.append(dataset[along[-1]].dims[0])
     if dims[0] == dims[1]:
         raise UsageError(f"{kind} wants two axes; {safe_text(f'{along[0]} and {along[1]} vary together')}")
+    dataset = dataset.isel({dim: 0 for dim in dataset.sizes if dim not in ("model", *dims)})
     not_drawn: list[str] = []
-    for name, dim in zip(along, dims, strict=True):
+    for name in along:
         values = dataset[name].values
-        # a wall, or a plane, has no place on an axis
-        kept = np.flatnonzero(np.isfinite(values))
-        not_drawn += [f"{name} = {value}" for value in values.tolist() if not np.isfinite(value)]
-        different = np.unique(values[kept]).size
-        if different < max(2, kept.size):
+        finite = np.isfinite(values)
+        not_drawn += [f"{name} = {value}" for value in values[~finite].tolist()]
+        different = np.unique(values[finite]).size
+        if different < max(2, int(finite.sum())):
             has = "has a value twice" if different > 1 else f"has {different} that can be drawn"
             raise UsageError(f"{kind} wants different values along each axis; {safe_text(name)} {has}")
-        dataset = dataset.isel({dim: kept[np.argsort(values[kept])]})
-    dataset = dataset.isel({dim: 0 for dim in dataset.sizes if dim not in ("model", *dims)})
+        dataset = sorted_along(dataset, name)
     first, second = along if x is not None or y is None else along[::-1]
     return dataset, first, second, tuple(not_drawn)

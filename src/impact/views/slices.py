@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from ..errors import UsageError, did_you_mean
 from ..results.select import places_of, select
@@ -14,13 +15,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-@dataclass(frozen=True)
-class Slice:
-    """One line through a result: the dataset along it, the coordinate drawn over, and the values of the rest."""
-
-    dataset: xr.Dataset
-    x: str
-    fixed: Mapping[str, float | str]
+# numbers of a picture: enough for any that can be looked at, few enough to be held one by one
+MAX_DRAWN = 2**24
 
 
 def take_slice(
@@ -28,8 +24,8 @@ def take_slice(
     x: str | None = None,
     sel: Mapping[str, float | str] | None = None,
     models: Sequence[str] | None = None,
-) -> Slice:
-    """Cut a line through a result.
+) -> tuple[xr.Dataset, str]:
+    """Cut a line through a result: the dataset along it, of which nothing is read yet, and what to draw over.
 
     Parameters
     ----------
@@ -44,14 +40,39 @@ def take_slice(
     """
     if models:
         dataset = dataset.isel(model=places_of(models, dataset))
-    axes = [str(dim) for dim in dataset.sizes if dim != "model"]
     dataset = select(dataset, sel or {})
     x = x_axis(dataset, x)
     (along,) = dataset[x].dims
     others = [dim for dim in dataset.sizes if dim not in ("model", along)]
-    dataset = dataset.isel(dict.fromkeys(others, 0))
-    fixed = {name: dataset[name].values.item() for name in axes if name != along}
-    return Slice(dataset, x, fixed)
+    return dataset.isel(dict.fromkeys(others, 0)), x
+
+
+def sorted_along(dataset: xr.Dataset, name: str) -> xr.Dataset:
+    """The part of a result at the finite values of a coordinate along one axis, in their order.
+
+    A wall, or a plane, has no place on an axis.
+    """
+    values = dataset[name].values
+    order = np.argsort(values, kind="stable")
+    order = order[np.isfinite(values[order])]
+    # a file is read in one go where nothing is left out or moved
+    in_order = np.array_equal(order, np.arange(values.size))
+    return dataset if in_order else dataset.isel({dataset[name].dims[0]: order})
+
+
+def read(data: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
+    """Some variables of a slice or a plane, in memory, with the coordinates.
+
+    Raises
+    ------
+    UsageError : they are more than a picture shows
+    """
+    numbers = sum(data[name].size for name in names)
+    if numbers > MAX_DRAWN:
+        raise UsageError(
+            f"got {numbers:,} numbers to draw, expected at most {MAX_DRAWN:,}; take a shorter axis or fewer models"
+        )
+    return data.assign({name: data[name].compute() for name in names})
 
 
 def x_axis(dataset: xr.Dataset, x: str | None) -> str:
