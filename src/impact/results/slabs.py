@@ -1,8 +1,8 @@
 """Slabs of a result of any size, and the axes along which each of its variables varies.
 
 The variables of a large result are computed, or read, when they are indexed. A variable that is computed says in
-`encoding["varies_along"]`, by model, along which axes it varies: along the others it has the same value everywhere,
-so that a count over all points is a count over these axes, times the size of the others.
+`encoding["varies_along"]`, by model, along which axes it varies: along the others it has the same value
+everywhere, so that a count over all points is a count over these axes, times the size of the others.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def slabs(sizes: Mapping[Hashable, int], points: int = SLAB_POINTS) -> Iterator[
 def aligned_slabs(
     sizes: Mapping[Hashable, int], lengths: Sequence[int], points: int = SLAB_POINTS
 ) -> Iterator[Where]:
-    """All points, in slabs of whole chunks of some lengths along the axes, as many chunks as make up about `points`.
+    """All points, in slabs of whole chunks of some lengths along the axes, as many as make up about `points`.
 
     >>> [where["v1"] for where in aligned_slabs({"e": 2, "v1": 4}, (2, 2), 4)]
     [slice(0, 2, None), slice(2, 4, None)]
