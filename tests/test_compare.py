@@ -594,9 +594,10 @@ def test_counts_and_the_worst_point(figure6: xr.Dataset) -> None:
     (found,) = verdict.differing
     assert found.new == float(moved["v1_post"].sel(model=key, e=0.05))
     assert found.baseline == float(figure6["v1_post"].sel(model=key, e=0.05))
-    ratios = verdict.ratios["v1_post"].sel(model=key)
-    assert ratios.sel(e=[0.05, 0.5, 0.9, 0.96]).values == pytest.approx([160, 40, 2, 0.5], rel=1e-5)
-    assert float(ratios.sum()) == pytest.approx(202.5, rel=1e-5)
+    along_e, along_model = (verdict.worst_along[axis]["v1_post"] for axis in ("e", "model"))
+    assert along_e.sel(e=[0.05, 0.5, 0.9, 0.96]).values == pytest.approx([160, 40, 2, 0.5], rel=1e-5)
+    assert float(along_e.sum()) == pytest.approx(202.5, rel=1e-5)
+    assert float(along_model.sel(model=key)) == float(along_model.sum()) == float(along_e.max())
     # the worst variable is told first
     moved["contact_time"].loc[{"model": key, "e": 0.3}] *= 2
     assert [one.name for one in impact.compare(moved, figure6).differing] == ["contact_time", "v1_post"]

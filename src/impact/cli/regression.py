@@ -149,7 +149,7 @@ def _tell(verdict: Verdict, format: Format, plot: Path | None) -> None:
             print_verdict(verdict)
         else:
             _print(report.report_of(verdict), format)
-    if plot is not None and not verdict.ratios.data_vars:
+    if plot is not None and not verdict.worst_along:
         # the verdict stands without a picture
         door.say("no picture: there is no point to draw at")
     elif plot is not None:

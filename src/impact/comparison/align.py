@@ -2,35 +2,88 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from ..results.schema import is_input
+from ..results.schema import ABOUT_A_MODEL, SCHEMA, Variable, is_input
 from ..results.select import NUMBERS, ROUNDING, Places, Values, matched
 from ..text import safe_text
 from .verdict import Fault, Kind
 
 NAMED = 3  # labels of one side that a message names
+# coordinates that vary with the model
+OF_A_MODEL = ("model", "exponent", *ABOUT_A_MODEL)
+
+
+@dataclass(frozen=True)
+class Side:
+    """One of two results, at the points that both have.
+
+    Parameters
+    ----------
+    dataset : the result; the values of its variables are read when they are asked for
+    coords : its coordinates at the common points, in memory; what only the other result varies is an axis of
+        length one
+    places : by axis, the places of the common points in the result, in the order of the baseline
+    """
+
+    dataset: xr.Dataset
+    coords: xr.Dataset
+    places: Mapping[str, Places]
+
+    def read(self, name: str, where: Mapping[str, slice]) -> Values:
+        """The values of a variable or a coordinate at some of the common points.
+
+        Parameters
+        ----------
+        name : of the variable
+        where : the part of each axis of the values; along one that the variable has not got they have length one
+        """
+        if name in self.coords:
+            variable = self.coords.variables[name]
+            index: dict[Hashable, Any] = {dim: where[str(dim)] for dim in variable.dims}
+        else:
+            variable = self.dataset.variables[name]
+            index = {dim: _as_slice(self.places[str(dim)][where[str(dim)]]) for dim in variable.dims}
+        # in memory before it is transposed: a lazy array would then be read point by point
+        values = np.asarray(variable.isel(index).values)
+        values = values.transpose([variable.dims.index(dim) for dim in where if dim in variable.dims])
+        return values[tuple(slice(None) if dim in variable.dims else np.newaxis for dim in where)]
+
+
+def _as_slice(places: Places) -> Places | slice:
+    """Neighbouring places as a slice, which files and computed variables read faster."""
+    first = int(places[0])
+    is_range = np.array_equal(places, np.arange(first, first + len(places)))
+    return slice(first, first + len(places)) if is_range else places
 
 
 @dataclass(frozen=True)
 class Aligned:
-    """Two results at their common points, in the order of the baseline, and in what their inputs differ.
+    """Two results at their common points, and in what their inputs differ.
 
-    Both are empty where they have no point in common.
+    Parameters
+    ----------
+    new, baseline : the two
+    sizes : by axis, the number of common points
+    dims : by variable that both have, its axes in the order of the baseline; those that vary along different axes
+        are left out; empty where the two have no point in common
+    faults : in what the inputs differ
     """
 
-    new: xr.Dataset
-    baseline: xr.Dataset
+    new: Side
+    baseline: Side
+    sizes: Mapping[str, int]
+    dims: Mapping[str, tuple[str, ...]]
     faults: tuple[Fault, ...]
 
 
 def align(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Aligned:
-    """Lay two results point on point; what only one of them varies is an axis of length one in the other.
+    """Lay two results point on point by their coordinates; no value of a variable is read.
 
     Parameters
     ----------
@@ -38,75 +91,94 @@ def align(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Aligned:
     subset : points that only one of them has are no fault
     """
     new, baseline = _without_foreign_axes(new, baseline), _without_foreign_axes(baseline, new)
-    new, baseline = _stretched(new, baseline), _stretched(baseline, new)
-    faults = _inputs_of_one_side(new, baseline)
+    a, b = _coordinates(new, baseline), _coordinates(baseline, new)
+    faults = _inputs_of_one_side(a, b)
     places: dict[str, tuple[Places, Places]] = {}
-    for axis in map(str, dict.fromkeys((*baseline.dims, *new.dims))):
-        columns = _columns(new, axis), _columns(baseline, axis)
+    for axis in map(str, dict.fromkeys((*b.dims, *baseline.dims, *a.dims, *new.dims))):
+        columns = _columns(a, axis), _columns(b, axis)
         if columns[0] != columns[1] or not columns[0]:
-            own, other = _listed(columns[0]), _listed(columns[1])
-            text = f"what varies along the axis {safe_text(axis)} is {own}, in BASELINE {other}"
-            faults.append(Fault("nothing in common", axis, text))
+            text = f"what varies along the axis {safe_text(axis)} is {_listed(columns[0])}"
+            faults.append(Fault("nothing in common", axis, f"{text}, in BASELINE {_listed(columns[1])}"))
             continue
-        places[axis] = matched([new[n].values for n in columns[0]], [baseline[n].values for n in columns[0]])
+        places[axis] = matched([a[name].values for name in columns[0]], [b[name].values for name in columns[0]])
         # the axis has its first column's name
         names = [*(n for n in columns[0] if n == axis), *(n for n in columns[0] if n != axis)]
-        rows = [[dataset[name].values for name in names] for dataset in (new, baseline)]
-        faults += _labels(rows[0], rows[1], names, places[axis], subset=subset)
-    for name in sorted(str(name) for name in new.coords.keys() & baseline.coords.keys() if is_input(str(name))):
-        if new[name].ndim == baseline[name].ndim == 0 and not _same(new[name].values, baseline[name].values):
+        labels = [[coords[name].values for name in names] for coords in (a, b)]
+        faults += _labels(labels[0], labels[1], names, places[axis], subset=subset)
+    for name in sorted(str(name) for name in a.coords.keys() & b.coords.keys() if is_input(str(name))):
+        if a[name].ndim == b[name].ndim == 0 and not _same(a[name].values, b[name].values):
             kind: Kind = "nothing in common" if subset else "physics config"
-            text = f"{safe_text(name)} is {_shown(new[name].values)}, in BASELINE {_shown(baseline[name].values)}"
+            text = f"{safe_text(name)} is {_shown(a[name].values)}, in BASELINE {_shown(b[name].values)}"
             faults.append(Fault(kind, name, text))
     if any(fault.kind == "nothing in common" for fault in faults):
-        return Aligned(xr.Dataset(), xr.Dataset(), tuple(faults))
-    new = new.isel({axis: own for axis, (own, _) in places.items()})
-    baseline = baseline.isel({axis: other for axis, (_, other) in places.items()})
-    return Aligned(new.transpose(*baseline.dims), baseline, (*faults, *_derived(new, baseline)))
+        nowhere = Side(new, xr.Dataset(), {}), Side(baseline, xr.Dataset(), {})
+        return Aligned(*nowhere, {}, {}, tuple(faults))
+    here, there = ({axis: pair[side] for axis, pair in places.items()} for side in (0, 1))
+    a, b = a.isel(here), b.isel(there)
+    faults += _derived(a, b)
+    dims = {}
+    for variable in SCHEMA:
+        if variable.name in new and variable.name in baseline:
+            axes = _axes(variable, baseline, new)
+            if set(axes) == set(_axes(variable, new, baseline)):
+                dims[variable.name] = axes
+            else:
+                faults.append(Fault("labels", variable.name, f"{variable.name} varies along other axes"))
+    sizes = {axis: len(pair[0]) for axis, pair in places.items()}
+    return Aligned(Side(new, a, here), Side(baseline, b, there), sizes, dims, tuple(faults))
 
 
-def _without_foreign_axes(own: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
+def _without_foreign_axes(result: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
     """A result without the parameters of models that the other has not got; the others do not vary with them."""
     models = {str(key) for key in np.ravel(other["model"].values)}
-    foreign = [str(n) for n in own.coords if "." in str(n) and str(n).rpartition(".")[0] not in models]
-    return own.isel({name: 0 for name in foreign if name in own.dims}).drop_vars(foreign)
+    foreign = [str(n) for n in result.coords if "." in str(n) and str(n).rpartition(".")[0] not in models]
+    return result.isel({name: 0 for name in foreign if name in result.dims}).drop_vars(foreign)
 
 
-def _stretched(own: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
-    """A result in which a single value that the other varies is an axis of length one."""
+def _coordinates(result: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
+    """The coordinates of a result, in memory; a single value that the other varies is an axis of length one."""
+    coords = result.coords.to_dataset().compute()
+    if "model" not in result.dims:
+        # one model was picked out; it is still a label
+        coords = _with_axis(coords, "model", OF_A_MODEL)
     for axis in map(str, other.dims):
-        if axis not in own.dims and axis in own.coords and own[axis].ndim == 0:
-            varying = [n for n in own.variables if n in other.variables and axis in other.variables[n].dims]
-            own = along(own, axis, varying)
+        if axis not in coords.dims and axis in coords and coords[axis].ndim == 0:
+            coords = _with_axis(coords, axis, [n for n in other.coords if axis in other.variables[n].dims])
     # a member of a zip group in the other, which here does not vary along their common axis
-    constant = {
-        name: other[name].dims
-        for name in own.coords.keys() & other.coords.keys()
-        if own[name].ndim == 0 and other[name].ndim == 1 and other[name].dims[0] in own.dims
-    }
     repeated = {
-        n: (dims, np.repeat(own[n].values, own.sizes[dims[0]]), own[n].attrs) for n, dims in constant.items()
+        name: (
+            other[name].dims,
+            np.repeat(coords[name].values, coords.sizes[other[name].dims[0]]),
+            coords[name].attrs,
+        )
+        for name in coords.coords.keys() & other.coords.keys()
+        if coords[name].ndim == 0 and other[name].ndim == 1 and other[name].dims[0] in coords.dims
     }
-    return own.assign_coords(repeated)
+    return coords.assign_coords(repeated)
 
 
-def along(own: xr.Dataset, axis: str, names: Iterable[Hashable]) -> xr.Dataset:
-    """A result in which some variables have one more axis, of length one."""
-    changed = {
-        n: xr.Variable((axis, *own.variables[n].dims), own.variables[n].values[np.newaxis], own.variables[n].attrs)
-        for n in names
-    }
-    own = own.assign_coords({n: v for n, v in changed.items() if n in own.coords})
-    return own.assign({n: v for n, v in changed.items() if n not in own.coords})
+def _with_axis(coords: xr.Dataset, axis: str, names: Iterable[Hashable]) -> xr.Dataset:
+    """Coordinates of which some have one more axis, of length one."""
+    variables = {name: coords.variables[name] for name in names if name in coords}
+    return coords.assign_coords(
+        {n: xr.Variable((axis, *v.dims), v.values[np.newaxis], v.attrs) for n, v in variables.items()}
+    )
+
+
+def _axes(variable: Variable, result: xr.Dataset, other: xr.Dataset) -> tuple[str, ...]:
+    """The axes of a variable of a result, those of length one that only the other varies before its own."""
+    added = [str(dim) for dim in dict.fromkeys(("model", *other.dims)) if dim not in result.dims]
+    of_variable = [dim for dim in added if dim != "model" or variable.per == "model"]
+    return (*reversed(of_variable), *map(str, result.variables[variable.name].dims))
 
 
 def _inputs_of_one_side(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
-    found = []
+    faults = []
     for name in sorted(str(name) for name in new.coords.keys() ^ baseline.coords.keys()):
         if is_input(name):
             side = "NEW" if name in new.coords else "BASELINE"
-            found.append(Fault("physics config", name, f"{safe_text(name)} is given in {side} only"))
-    return found
+            faults.append(Fault("physics config", name, f"{safe_text(name)} is given in {side} only"))
+    return faults
 
 
 def _columns(dataset: xr.Dataset, axis: str) -> list[str]:
@@ -114,7 +186,7 @@ def _columns(dataset: xr.Dataset, axis: str) -> list[str]:
     if axis == "model":
         return ["model"]
     derived = {"e"} if "alpha" in dataset.coords else set()
-    along = [str(name) for name, one in dataset.coords.items() if one.dims == (axis,)]
+    along = [str(name) for name in dataset.coords if dataset.variables[name].dims == (axis,)]
     return sorted(name for name in along if is_input(name) and name not in derived)
 
 
@@ -133,25 +205,25 @@ def _labels(
         return [Fault("nothing in common", axis, f"no value of {safe_text(axis)} is in both: {sides}")]
     if subset:
         return []
-    told = []
-    for columns, own, side in ((new, places[0], "NEW"), (baseline, places[1], "BASELINE")):
-        alone = [np.delete(values, own) for values in columns]
-        if len(alone[0]):
-            told.append(f"{len(alone[0])} of {len(columns[0])} in {side} only: {_some(alone, names)}")
-    return [Fault("labels", axis, f"{safe_text(axis)}: {'; '.join(told)}")] if told else []
+    texts = []
+    for columns, common, side in ((new, places[0], "NEW"), (baseline, places[1], "BASELINE")):
+        unmatched = [np.delete(values, common) for values in columns]
+        if len(unmatched[0]):
+            texts.append(f"{len(unmatched[0])} of {len(columns[0])} in {side} only: {_some(unmatched, names)}")
+    return [Fault("labels", axis, f"{safe_text(axis)}: {'; '.join(texts)}")] if texts else []
 
 
 def _derived(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
     """Coordinates along several axes, or along models, that have other values: e by alpha, the exponent."""
-    found = []
+    faults = []
     for name in sorted(str(name) for name in new.coords.keys() & baseline.coords.keys()):
         if name == "exponent" or (is_input(name) and baseline[name].ndim):
             a, b = new[name], baseline[name]
             # e = 1 - alpha v0 is rounded as 1 is
             rounding = ROUNDING if name == "e" else 0.0
             if set(a.dims) != set(b.dims) or not _same(a.transpose(*b.dims).values, b.values, rounding):
-                found.append(Fault("labels", name, f"the coordinate {safe_text(name)} has other values"))
-    return found
+                faults.append(Fault("labels", name, f"the coordinate {safe_text(name)} has other values"))
+    return faults
 
 
 def _same(a: Values, b: Values, rounding: float = 0.0) -> bool:

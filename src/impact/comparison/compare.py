@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +15,10 @@ from ..results.backend import load
 from ..results.replay import repeats
 from ..results.schema import ABOUT_A_MODEL, SCHEMA, SCHEMA_VERSION, is_input
 from ..text import safe_text
-from .align import align, along
-from .judge import judge
+from .align import OF_A_MODEL, align
+from .judge import boxes_of, group_size, judge
 from .tolerances import ALL, Tolerances, in_effect
 from .verdict import Fault, Judged, Verdict
-
-# what varies with the model
-OF_A_MODEL = ("model", "exponent", *ABOUT_A_MODEL, *(one.name for one in SCHEMA if one.per == "model"))
 
 
 def compare(
@@ -35,6 +33,14 @@ def compare(
     A value is equal where |new - baseline| <= tolerance x scale, the scale being that of the baseline's point. NaN
     equals NaN where both points have the same status and no such answer, or the law has no such quantity.
 
+    Datasets may be lazy and of any size: they are read in slabs. If one says along which axes its variables vary
+    (`impact.results.slabs`), only points that represent the others are read, and each counts for all that it
+    represents. Per model, these are the points along the axes along which the variable, its scale or the status
+    varies in either result. If they are more than 2^26, and the scale is v0, the peak, the value itself or
+    m v0^2/2, they are the points along the axes along which e_out varies, at the first place of the others: then
+    |new - baseline|/scale depends on the trajectory only. For v1_post it is (m/m1) |difference of e_out|, which is
+    at most |difference of e_out|.
+
     Parameters
     ----------
     new, baseline : results, or their files
@@ -45,7 +51,8 @@ def compare(
     Raises
     ------
     ResultError : a file is not a readable result
-    UsageError : a dataset is no result of a sweep, or a tolerance is not right
+    UsageError : a dataset is no result of a sweep, a tolerance is not right, or a variable has more than 10^10
+        points to read
 
     >>> import impact
     >>> result = impact.sweep("configs/figure6.toml")
@@ -55,43 +62,54 @@ def compare(
     not equal: labels (e)
     labels: e: 51 of 101 in BASELINE only: 0.5, 0.51, 0.52, ...
     """
-    files = [str(one) if isinstance(one, str | Path) else "" for one in (new, baseline)]
+    files = [str(source) if isinstance(source, str | Path) else "" for source in (new, baseline)]
     names = files[0] or "NEW", files[1] or "BASELINE"
-    a, b = (load(one) if isinstance(one, str | Path) else one for one in (new, baseline))
+    a, b = (load(source) if isinstance(source, str | Path) else source for source in (new, baseline))
     for dataset, name in zip((a, b), names, strict=True):
         check_result(dataset, name)
     strange = sorted({*_strange(a), *_strange(b)})
-    a, b = _known(a), _known(b)
+    a, b = a.drop_vars(_strange(a)), b.drop_vars(_strange(b))
     tolerances = in_effect(tol, b.attrs)
     aligned = align(a, b, subset=subset)
     faults = [*aligned.faults, *_materials(a, b), *_units(a, b)]
-    notes = [*_notes(a, b), *_texts(aligned.new, aligned.baseline)]
+    notes = [*_notes(a, b), *_texts(aligned.new.coords, aligned.baseline.coords)]
     notes += [safe_text(f"not judged: {', '.join(strange)}")] if strange else []
     if any(fault.kind == "labels" for fault in faults) and not subset:
         notes.append("--subset judges what both have")
-    judged: list[Judged] = []
-    ratios: dict[str, xr.Variable] = {}
-    for one in SCHEMA:
-        sides = [side for side, dataset in (("NEW", a), ("BASELINE", b)) if one.name in dataset]
+    for name in (variable.name for variable in SCHEMA):
+        sides = [side for side, dataset in (("NEW", a), ("BASELINE", b)) if name in dataset]
         if len(sides) == 1 and subset:
-            notes.append(f"{one.name} is in {sides[0]} only")
+            notes.append(f"{name} is in {sides[0]} only")
         elif len(sides) == 1:
-            faults.append(Fault("missing variable", one.name, f"{one.name} is in {sides[0]} only"))
-        elif one.name not in aligned.baseline:
-            continue
-        elif set(aligned.new[one.name].dims) != set(aligned.baseline[one.name].dims):
-            faults.append(Fault("labels", one.name, f"{one.name} varies along other axes"))
-        else:
-            found, ratio = judge(one, aligned.new, aligned.baseline, tolerances.get(one.name, tolerances[ALL]))
-            judged.append(found)
-            ratios[one.name] = ratio
+            faults.append(Fault("missing variable", name, f"{name} is in {sides[0]} only"))
+    judged: list[Judged] = []
+    largest: dict[str, Mapping[str, np.ndarray]] = {}
+    common = [variable for variable in SCHEMA if variable.name in aligned.dims]
+    # for all before the first is judged: a refusal comes at once
+    boxes = boxes_of(common, aligned)
+    for variable in common:
+        tolerance = tolerances.get(variable.name, tolerances[ALL])
+        outcome, largest[variable.name] = judge(variable, aligned, tolerance, boxes[variable.name])
+        judged.append(outcome)
     if not judged and not faults:
         faults.append(Fault("nothing in common", "", "the two have no variable in common"))
     return Verdict(
         new=names[0], baseline=names[1], faults=tuple(faults), variables=tuple(judged), notes=tuple(notes),
         repeats=repeats(files[0], a) or repeats(files[1], b),
-        ratios=xr.Dataset(ratios, aligned.baseline.coords),
+        worst_along=_along_axes(largest, aligned.baseline.coords),
     )  # fmt: skip
+
+
+def _along_axes(largest: Mapping[str, Mapping[str, np.ndarray]], coords: xr.Dataset) -> dict[str, xr.Dataset]:
+    """The largest ratios along each axis, by variable, with the labels of the baseline."""
+    along = {}
+    for axis in dict.fromkeys(axis for by_axis in largest.values() for axis in by_axis):
+        columns = {name: (axis, by_axis[axis]) for name, by_axis in largest.items() if axis in by_axis}
+        # of a group of neighbours, the label of the first
+        first = {axis: slice(None, None, group_size(coords.sizes[axis]))}
+        labels = {n: v.isel(first) for n, v in coords.variables.items() if v.dims == (axis,)}
+        along[axis] = xr.Dataset(columns, labels)
+    return along
 
 
 def check_result(dataset: xr.Dataset, name: str) -> None:
@@ -112,66 +130,59 @@ def check_result(dataset: xr.Dataset, name: str) -> None:
         if coordinate != "model" and dataset[coordinate].dtype.kind not in "fiu":
             raise UsageError(f"{shown}: {coordinate} holds {dataset[coordinate].dtype}, wants numbers")
     axes = {dim for name, v in dataset.variables.items() if is_input(str(name)) for dim in v.dims}
-    for one in SCHEMA:
-        if one.name in dataset and dataset[one.name].dtype.kind not in "fiu":
-            raise UsageError(f"{shown}: {one.name} holds {dataset[one.name].dtype}, wants numbers")
-        if one.name in dataset and not axes <= set(dataset[one.name].dims):
-            raise UsageError(f"{shown}: {one.name} does not vary along all axes; compare takes whole results")
+    for name in (variable.name for variable in SCHEMA):
+        if name in dataset and dataset[name].dtype.kind not in "fiu":
+            raise UsageError(f"{shown}: {name} holds {dataset[name].dtype}, wants numbers")
+        if name in dataset and not axes <= set(dataset[name].dims):
+            raise UsageError(f"{shown}: {name} does not vary along all axes; compare takes whole results")
 
 
 def _strange(dataset: xr.Dataset) -> list[str]:
     """The variables that no result has."""
-    known = {*OF_A_MODEL, *(one.name for one in SCHEMA)}
+    known = {*OF_A_MODEL, *(variable.name for variable in SCHEMA)}
     return [str(name) for name in dataset.variables if name not in known and not is_input(str(name))]
-
-
-def _known(dataset: xr.Dataset) -> xr.Dataset:
-    """A result without what no result has, and with an axis of models, also where one model was picked out."""
-    dataset = dataset.drop_vars(_strange(dataset))
-    if "model" in dataset.dims:
-        return dataset
-    return along(dataset, "model", [name for name in OF_A_MODEL if name in dataset.variables])
 
 
 def _materials(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
     """Properties that differ between materials of the same name."""
-    own, other = (json_table(dataset, "materials") for dataset in (new, baseline))
-    found = []
-    for name in own.keys() & other.keys():
-        for field in own[name].keys() | other[name].keys():
-            a, b = own[name].get(field), other[name].get(field)
-            if a != b:
+    materials = [json_table(dataset, "materials") for dataset in (new, baseline)]
+    faults = []
+    for name in materials[0].keys() & materials[1].keys():
+        a, b = (table[name] for table in materials)
+        for field in a.keys() | b.keys():
+            if a.get(field) != b.get(field):
                 path = f"materials.{name}.{field}"
-                a, b = (f"{one:.12g}" if isinstance(one, float) else one for one in (a, b))
-                found.append(Fault("physics config", path, safe_text(f"{path} is {a}, in BASELINE {b}")))
-    return sorted(found, key=lambda fault: fault.name)
+                shown = [f"{v:.12g}" if isinstance(v, float) else v for v in (a.get(field), b.get(field))]
+                text = f"{path} is {shown[0]}, in BASELINE {shown[1]}"
+                faults.append(Fault("physics config", path, safe_text(text)))
+    return sorted(faults, key=lambda fault: fault.name)
 
 
 def _units(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
-    found = []
+    faults = []
     for name in [str(name) for name in baseline.variables if name in new.variables]:
         a, b = (dataset.variables[name].attrs.get("units") for dataset in (new, baseline))
         if not _alike(a, b):
             text = f"{name} is in {a}, in BASELINE in {b}"
-            found.append(Fault("units", name, safe_text(text)))
-    return found
+            faults.append(Fault("units", name, safe_text(text)))
+    return faults
 
 
 def _notes(new: xr.Dataset, baseline: xr.Dataset) -> list[str]:
     """What may explain a difference, and is no difference by itself."""
-    found = []
+    notes = []
     for name in ("rtol", "max_steps", "impact_version"):
         a, b = (dataset.attrs.get(name) for dataset in (new, baseline))
         if not _alike(a, b):
-            found.append(safe_text(f"{name} is {a}, in BASELINE {b}", 400))
+            notes.append(safe_text(f"{name} is {a}, in BASELINE {b}", 400))
     for name in ("packages", "plugins"):
-        own, other = (json_object(dataset, name) for dataset in (new, baseline))
-        found += [
-            safe_text(f"{key} is {own.get(key)}, in BASELINE {other.get(key)}", 400)
-            for key in sorted(own.keys() | other.keys())
-            if own.get(key) != other.get(key)
+        a, b = (json_object(dataset, name) for dataset in (new, baseline))
+        notes += [
+            safe_text(f"{key} is {a.get(key)}, in BASELINE {b.get(key)}", 400)
+            for key in sorted(a.keys() | b.keys())
+            if a.get(key) != b.get(key)
         ]
-    return found
+    return notes
 
 
 def _alike(a: Any, b: Any) -> bool:
@@ -181,11 +192,11 @@ def _alike(a: Any, b: Any) -> bool:
 
 def _texts(new: xr.Dataset, baseline: xr.Dataset) -> list[str]:
     """Models about which another thing is said."""
-    found = []
+    notes = []
     for name in ABOUT_A_MODEL:
         if name in new.coords and name in baseline.coords:
-            told = (np.ravel(one) for one in (baseline["model"], new[name], baseline[name]))
-            for key, a, b in zip(*told, strict=True):
+            columns = (np.ravel(column) for column in (baseline["model"], new[name], baseline[name]))
+            for key, a, b in zip(*columns, strict=True):
                 if a != b:
-                    found.append(safe_text(f"the {name} of {key} reads {a}, in BASELINE {b}", 600))
-    return found
+                    notes.append(safe_text(f"the {name} of {key} reads {a}, in BASELINE {b}", 600))
+    return notes

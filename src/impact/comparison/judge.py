@@ -1,8 +1,10 @@
-"""One variable of two aligned results: how many tolerances apart at every point, and where it is worst."""
+"""One variable of two aligned results: how many tolerances apart, slab by slab, and where it is worst."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,36 +13,222 @@ from numpy.typing import NDArray
 
 from ..contact.material import effective_mass
 from ..contact.status import Status
+from ..errors import UsageError
 from ..results.replay import own
 from ..results.schema import Variable, is_input
+from ..results.slabs import (
+    MAX_SUMMARY_POINTS,
+    SLAB_POINTS,
+    VARIES_ALONG,
+    aligned_slabs,
+    is_lazy,
+    slabs,
+    varying_dims,
+)
+from .align import Aligned, Side
 from .verdict import Judged
 
 Array = NDArray[Any]
+# a part of the common points, by axis; along the axes that are not in it, the first place stands for all
+Box = Mapping[str, slice]
 
+# points of one variable that are compared at most: an hour
+MAX_POINTS = 10**10
+# an axis with more places has its largest ratios by groups of neighbours: a picture shows no more
+MAX_PLACES = 2**14
 # what a law may not have, or a sweep without e: NaN where all went well
 OPTIONAL = ("damping_ratio", "lambda", "closed_form_error", "e_error", "v1_error", "v2_error")
+# |difference|/scale is that of a trajectory: |Delta v1_post|/v0 = (m/m1) |Delta e_out| <= |Delta e_out|
+DIMENSIONLESS = ("scaled by v0", "scaled by the peak", "scaled by itself", "scaled by m v0^2/2")
+# coordinates that the scale of a point is computed from
+SCALE_INPUTS = {"scaled by v0": ("v1", "v2"), "scaled by m v0^2/2": ("v1", "v2", "m1", "m2")}
 
 
-def judge(one: Variable, new: xr.Dataset, baseline: xr.Dataset, tol: float) -> tuple[Judged, xr.Variable]:
-    """One variable at all points: |new - baseline| in tolerances, inf where nothing is allowed."""
-    # bare variables, because a DataArray carries all its coordinates along at every step
-    reference = baseline.variables[one.name]
-    dims = tuple(map(str, reference.dims))
-    a, b = new.variables[one.name].transpose(*dims).values, reference.values
+def boxes_of(variables: Sequence[Variable], aligned: Aligned) -> dict[str, list[Box]]:
+    """By variable, the parts of the common points that stand for all of them; see `compare` for the rule.
+
+    Raises
+    ------
+    UsageError : a variable has more than `MAX_POINTS` points that none of the others stands for
+    """
+    boxes: dict[str, list[Box]] = {}
+    for variable in variables:
+        if any(_says_how_it_varies(side, variable.name) for side in (aligned.new, aligned.baseline)):
+            boxes[variable.name] = []
+        else:
+            boxes[variable.name] = [_box(aligned.dims[variable.name], aligned.sizes, slice(None))]
+    reduced = [variable for variable in variables if not boxes[variable.name]]
+    for model in range(aligned.sizes.get("model", 0)) if reduced else ():
+        sides = [_of_model(side, model) for side in (aligned.new, aligned.baseline)]
+        for variable in reduced:
+            if "model" in aligned.dims[variable.name]:
+                dims = _representative_dims(variable, aligned, sides)
+                boxes[variable.name].append(_box(dims, aligned.sizes, slice(model, model + 1)))
+    for variable in reduced:
+        if "model" not in aligned.dims[variable.name]:
+            dims = _representative_dims(variable, aligned, [aligned.new.dataset, aligned.baseline.dataset])
+            boxes[variable.name].append(_box(dims, aligned.sizes, slice(None)))
+    for name, parts in boxes.items():
+        points = sum(math.prod(part.stop - part.start for part in box.values()) for box in parts)
+        if points > MAX_POINTS:
+            expected = f"expected at most {MAX_POINTS:,}; select a part of the results"
+            raise UsageError(f"{name}: got {points:,} points to compare, {expected}")
+    return boxes
+
+
+def _says_how_it_varies(side: Side, name: str) -> bool:
+    variable = side.dataset.variables[name]
+    return is_lazy(variable) and VARIES_ALONG in variable.encoding
+
+
+def _of_model(side: Side, model: int) -> xr.Dataset:
+    """The whole result of the model at a common place."""
+    place = int(side.places["model"][model])
+    return side.dataset.isel(model=slice(place, place + 1)) if "model" in side.dataset.dims else side.dataset
+
+
+def _box(dims: Iterable[str], sizes: Mapping[str, int], models: slice) -> Box:
+    return {dim: slice(*(models if dim == "model" else slice(None)).indices(sizes[dim])[:2]) for dim in dims}
+
+
+def _representative_dims(variable: Variable, aligned: Aligned, sides: Sequence[xr.Dataset]) -> tuple[str, ...]:
+    """The axes of a variable whose points stand for all the others.
+
+    Parameters
+    ----------
+    variable : in both results
+    aligned : the results
+    sides : the two, of one model
+    """
+
+    def varying(*names: str) -> set[Hashable]:
+        return {dim for side in sides for name in names if name in side for dim in varying_dims(side, name)}
+
+    scale: set[Hashable] = set()
+    for name in SCALE_INPUTS.get(variable.judged, ()):
+        scale |= set(aligned.baseline.coords.variables[name].dims)
+    if variable.judged == "scaled by the peak" and "peak_indentation" in sides[1]:
+        scale |= set(varying_dims(sides[1], "peak_indentation"))
+    full = varying(variable.name) | scale
+    candidates = [full]
+    if variable.per == "model" and variable.judged not in ("exact", "reported"):
+        # the status says whether a NaN is an answer
+        candidates.insert(0, full | varying("status"))
+    if variable.judged in DIMENSIONLESS and all("e_out" in side for side in sides):
+        candidates.append(varying("e_out"))
+    chosen = []
+    for dims in candidates:
+        chosen.append(tuple(dim for dim in aligned.dims[variable.name] if dim in dims or dim == "model"))
+        if _points(chosen[-1], aligned.sizes) <= MAX_SUMMARY_POINTS:
+            return chosen[-1]
+    return min(chosen, key=lambda dims: _points(dims, aligned.sizes))
+
+
+def _points(dims: Iterable[str], sizes: Mapping[str, int]) -> int:
+    """Points of one model."""
+    return math.prod(sizes[dim] for dim in dims if dim != "model")
+
+
+@dataclass(frozen=True)
+class Worst:
+    """A point that differs: in how many tolerances, in what is compared among equals, where, and its values."""
+
+    times: float
+    size: float
+    index: tuple[int, ...]
+    difference: float
+    new: float
+    baseline: float
+
+
+def judge(
+    variable: Variable, aligned: Aligned, tol: float, boxes: Iterable[Box]
+) -> tuple[Judged, dict[str, Array]]:
+    """One variable at all common points: |new - baseline| in tolerances, inf where nothing is allowed.
+
+    Parameters
+    ----------
+    variable : that both have, along the same axes
+    aligned : the two results
+    tol : relative to the scale of a point
+    boxes : the points to read, see `boxes_of`; each counts for all that it stands for
+
+    Returns
+    -------
+    Judged : the numbers
+    dict : by axis, the largest ratio at each of its places, or in groups of neighbours if they are more than
+        `MAX_PLACES`; constant along an axis of which the first place stands for all
+    """
+    dims = aligned.dims[variable.name]
+    shape = tuple(aligned.sizes[dim] for dim in dims)
+    largest = {dim: np.zeros(-(-size // group_size(size))) for dim, size in zip(dims, shape, strict=True)}
+    different, worst = 0, None
+    for box in boxes:
+        weight = math.prod(aligned.sizes[dim] for dim in dims if dim not in box)
+        for slab in _slabs(variable.name, aligned, box):
+            where = {dim: slab.get(dim, slice(0, 1)) for dim in dims}
+            a, b = aligned.new.read(variable.name, where), aligned.baseline.read(variable.name, where)
+            ratio, difference = _ratio(variable, aligned, where, a, b, tol)
+            different += int(np.count_nonzero(ratio > 1.0)) * weight
+            if not ratio.max():
+                continue
+            worst = _worse(worst, _worst(variable, where, ratio, difference, a, b), shape)
+            for axis, dim in enumerate(dims):
+                maxima = ratio.max(axis=tuple(other for other in range(len(dims)) if other != axis))
+                size, part = aligned.sizes[dim], slab.get(dim)
+                if part is None:
+                    np.maximum(largest[dim], maxima, out=largest[dim])
+                else:
+                    np.maximum.at(largest[dim], np.arange(part.start, part.stop) // group_size(size), maxima)
+    return Judged(
+        name=variable.name, judged=variable.judged,
+        tolerance=math.nan if variable.judged in ("exact", "reported") else tol,
+        points=math.prod(shape), different=different,
+        worst=worst.difference if worst else 0.0, times=worst.times if worst else 0.0,
+        at=_labels(aligned.new.coords, dict(zip(dims, worst.index, strict=True))) if worst else {},
+        new=worst.new if worst else math.nan, baseline=worst.baseline if worst else math.nan,
+    ), largest  # fmt: skip
+
+
+def group_size(places: int) -> int:
+    """How many neighbouring places of an axis have one largest ratio.
+
+    >>> group_size(101), group_size(10**6)
+    (1, 62)
+    """
+    return -(-places // MAX_PLACES)
+
+
+def _slabs(name: str, aligned: Aligned, box: Box) -> Iterator[dict[str, slice]]:
+    """A box in slabs; of a file with chunks, in such of whole chunks, so that each is read once."""
+    sizes: dict[Hashable, int] = {dim: part.stop - part.start for dim, part in box.items()}
+    variable = aligned.baseline.dataset.variables[name]
+    chunks = dict(zip(variable.dims, variable.encoding.get("chunksizes") or (), strict=False))
+    if is_lazy(variable) and chunks and math.prod(chunks.values()) <= SLAB_POINTS:
+        parts = aligned_slabs(sizes, [chunks.get(dim, 1) for dim in sizes])
+    else:
+        parts = slabs(sizes)
+    for slab in parts:
+        yield {dim: slice(part.start + slab[dim].start, part.start + slab[dim].stop) for dim, part in box.items()}
+
+
+def _ratio(
+    variable: Variable, aligned: Aligned, where: Mapping[str, slice], a: Array, b: Array, tol: float
+) -> tuple[Array, Array]:
+    """The difference of the values of a slab, in tolerances and in the variable's unit."""
     with np.errstate(all="ignore"):
         difference = np.where(a == b, 0.0, np.abs(a.astype(float) - b.astype(float)))
-        scale = np.broadcast_to(_scale(one, baseline), b.shape)
+        scale = np.broadcast_to(_scale(variable, aligned.baseline, where, b), b.shape)
         # what was stored in fewer digits has lost the others
         lost = sum(float(np.finfo(values.dtype).eps) for values in (a, b) if values.dtype == np.float32)
         allowed = tol * scale + (lost * np.maximum(np.abs(a), np.abs(b)) if lost else 0.0)
-        if one.judged == "bounded by 10 rtol":
+        if variable.judged == "bounded by 10 rtol":
             # a residual is noise: it is fine below its bound, wherever it was
             counted = np.minimum(difference, np.maximum(np.abs(a), np.abs(b)))
         else:
             counted = difference
-        if one.judged in ("exact", "reported"):
+        if variable.judged in ("exact", "reported"):
             ratio = np.where(difference == 0.0, 0.0, np.inf)
-            tol = math.nan
         else:
             # of an infinite scale every difference would be a small part
             has_measure = (allowed > 0.0) & np.isfinite(scale) & np.isfinite(counted)
@@ -48,65 +236,68 @@ def judge(one: Variable, new: xr.Dataset, baseline: xr.Dataset, tol: float) -> t
     missing = np.isnan(a.astype(float)), np.isnan(b.astype(float))
     ratio = np.where(missing[0] | missing[1], np.inf, ratio)
     if (missing[0] & missing[1]).any():
-        ratio = np.where(missing[0] & missing[1] & _may_be_missing(one, new, baseline), 0.0, ratio)
-    different = ratio > 1.0
-    judged = Judged(
-        name=one.name, judged=one.judged, tolerance=tol, points=b.size, different=int(different.sum()),
-        **_worst(one, dims, ratio, difference, new, a, b),
-    )  # fmt: skip
-    return judged, xr.Variable(dims, ratio)
+        ratio = np.where(missing[0] & missing[1] & _may_be_missing(variable, aligned, where), 0.0, ratio)
+    return ratio, difference
+
+
+def _scale(variable: Variable, baseline: Side, where: Mapping[str, slice], values: Array) -> Array:
+    """What a variable's tolerance is relative to, at every point of a slab, in its own unit."""
+
+    def read(name: str) -> Array:
+        return baseline.read(name, where).astype(float)
+
+    match variable.judged:
+        case "scaled by v0":
+            return np.asarray(np.abs(read("v1") - read("v2")))
+        case "scaled by m v0^2/2":
+            v0 = read("v1") - read("v2")
+            return np.asarray(0.5 * effective_mass(read("m1"), read("m2")) * v0 * v0)
+        case "scaled by the peak" if "peak_indentation" in baseline.dataset:
+            return np.asarray(np.abs(read("peak_indentation")))
+        case "scaled by itself" | "scaled by the peak":
+            return np.asarray(np.abs(values))
+    return np.ones(())
+
+
+def _may_be_missing(variable: Variable, aligned: Aligned, where: Mapping[str, slice]) -> Array | bool:
+    """Where NaN in both is no difference: both points ended alike, and not with an answer that has this value."""
+    if variable.per == "axes" or not all("status" in side.dataset for side in (aligned.new, aligned.baseline)):
+        return True
+    new, baseline = (side.read("status", where) for side in (aligned.new, aligned.baseline))
+    return np.asarray((new == baseline) & ((baseline != Status.OK) | (variable.name in OPTIONAL)))
 
 
 def _worst(
-    one: Variable, dims: tuple[str, ...], ratio: Array, difference: Array, new: xr.Dataset, a: Array, b: Array
-) -> dict[str, Any]:
-    """The point with the largest ratio, among equals the one with the largest difference.
+    variable: Variable, where: Mapping[str, slice], ratio: Array, difference: Array, a: Array, b: Array
+) -> Worst:
+    """The point of a slab with the largest ratio, among equals the first with the largest difference.
 
-    Of flags, which are not more or less different, the first. Its labels are those of the new result: with them a
-    config, read again here, has the point.
+    Of flags, which are not more or less different, the first.
     """
-    if not ratio.size or not ratio.max():
-        return {"worst": 0.0, "times": 0.0, "at": {}, "new": math.nan, "baseline": math.nan}
-    sizes = np.ones_like(ratio) if one.judged == "exact" else np.nan_to_num(difference, nan=np.inf)
+    sizes = np.ones_like(ratio) if variable.judged == "exact" else np.nan_to_num(difference, nan=np.inf)
     index = np.unravel_index(int(np.argmax(np.where(ratio == ratio.max(), sizes, -1.0))), ratio.shape)
+    return Worst(
+        float(ratio[index]), float(sizes[index]),
+        tuple(part.start + int(place) for part, place in zip(where.values(), index, strict=True)),
+        float(difference[index]), float(a[index]), float(b[index]),
+    )  # fmt: skip
+
+
+def _worse(first: Worst | None, second: Worst, shape: Sequence[int]) -> Worst:
+    """The worse of two points, among equals the first in the order of the baseline."""
+    if first is None:
+        return second
+    return max(first, second, key=lambda point: (point.times, point.size, [-place for place in point.index]))
+
+
+def _labels(coords: xr.Dataset, index: Mapping[str, int]) -> dict[str, float | str]:
+    """The inputs of a point of the new result: with them a config, read again here, has the point."""
     at = {
-        name: new.variables[name].values[place].item()
-        for dim, place in zip(dims, index, strict=True)
-        for name in [dim, *(str(n) for n in new.coords if n != dim and is_input(str(n)))]
-        if new.variables[name].dims == (dim,) and not (name == "e" and "alpha" in new.coords)
+        name: coords.variables[name].values[place].item()
+        for dim, place in index.items()
+        for name in [dim, *(str(n) for n in coords.coords if n != dim and is_input(str(n)))]
+        if coords.variables[name].dims == (dim,) and not (name == "e" and "alpha" in coords)
     }
-    plain = {name: float(one) if isinstance(one, int | float) else str(one) for name, one in own(at).items()}
     return {
-        "worst": float(difference[index]), "times": float(ratio[index]), "at": plain,
-        "new": float(a[index]), "baseline": float(b[index]),
-    }  # fmt: skip
-
-
-def _scale(one: Variable, baseline: xr.Dataset) -> Array:
-    """What a variable's tolerance is relative to, at every point, in its own unit."""
-    template = baseline.variables[one.name]
-
-    def along(name: str) -> Array:
-        laid_out = baseline.variables[name].set_dims(dict(template.sizes))  # type: ignore[no-untyped-call]
-        return np.asarray(laid_out.values, float)
-
-    match one.judged:
-        case "scaled by v0":
-            return np.asarray(np.abs(along("v1") - along("v2")))
-        case "scaled by m v0^2/2":
-            v0 = along("v1") - along("v2")
-            return np.asarray(0.5 * effective_mass(along("m1"), along("m2")) * v0 * v0)
-        case "scaled by the peak" if "peak_indentation" in baseline:
-            return np.asarray(np.abs(along("peak_indentation")))
-        case "scaled by itself" | "scaled by the peak":
-            return np.asarray(np.abs(template.values))
-    return np.ones(template.shape)
-
-
-def _may_be_missing(one: Variable, new: xr.Dataset, baseline: xr.Dataset) -> Array | bool:
-    """Where NaN in both is no difference: both points ended alike, and not with an answer that has this value."""
-    if one.per == "axes" or "status" not in new or "status" not in baseline:
-        return True
-    dims = baseline.variables[one.name].dims
-    ours, others = (dataset.variables["status"].transpose(*dims).values for dataset in (new, baseline))
-    return np.asarray((ours == others) & ((others != Status.OK) | (one.name in OPTIONAL)))
+        name: float(value) if isinstance(value, int | float) else str(value) for name, value in own(at).items()
+    }

@@ -107,7 +107,9 @@ class Verdict:
     faults : what differs besides values
     variables : the variables that both have
     notes : what is said but not judged
-    ratios : |new - baseline| in tolerances, for every judged variable at every common point
+    worst_along : by axis, the largest |new - baseline| in tolerances at each of its places, for every judged
+        variable that has the axis, with the labels of the baseline; neighbours on a very long axis are grouped
+        under the label of the first
     repeats : how a command that runs one of the points again begins; empty where there is none
 
     >>> import impact
@@ -124,7 +126,7 @@ class Verdict:
     variables: tuple[Judged, ...]
     notes: tuple[str, ...] = ()
     repeats: tuple[str, ...] = ()
-    ratios: xr.Dataset = field(default_factory=xr.Dataset, repr=False, compare=False)
+    worst_along: Mapping[str, xr.Dataset] = field(default_factory=dict, repr=False, compare=False)
 
     @property
     def equal(self) -> bool:

@@ -88,6 +88,11 @@ def _number(value: float | str) -> float | None:
 
 def matched(new: Sequence[Values], baseline: Sequence[Values]) -> tuple[Places, Places]:
     """The places of equal labels on an axis in both, in the order of the baseline."""
+    pairs = list(zip(new, baseline, strict=True))
+    if all(np.array_equal(a, b) for a, b in pairs) and any(_is_increasing(a) for a, _ in pairs):
+        # as of most pairs; sorting a long axis takes ten times its memory
+        places = np.arange(len(new[0]))
+        return places, places
     for rounding in (ROUNDING, 0.0):
         rows = np.stack([_numbered(a, b, rounding) for a, b in zip(new, baseline, strict=True)], axis=1)
         # only a column of labels with a row for each is unique on an axis: what rounding would merge is told apart
@@ -100,6 +105,10 @@ def matched(new: Sequence[Values], baseline: Sequence[Values]) -> tuple[Places, 
     _, here, there = np.intersect1d(own, other, return_indices=True)
     order = np.argsort(there, kind="stable")
     return here[order], there[order]
+
+
+def _is_increasing(values: Values) -> bool:
+    return values.dtype.kind in NUMBERS and bool((values[1:] > values[:-1]).all())
 
 
 def _numbered(new: Values, baseline: Values, rounding: float) -> Places:

@@ -54,19 +54,20 @@ def differences(verdict: Verdict) -> Differences:
     ------
     UsageError : the two have no point in common
     """
-    ratios = verdict.ratios
-    if not ratios.data_vars:
+    if not verdict.worst_along:
         raise UsageError("no picture: there is no point to draw at")
-    judged = [one for one in verdict.variables if one.judged != "reported"]
-    wanted = verdict.differing or tuple(sorted((one for one in judged if one.times), key=_nearest_first))
-    shown = [one.name for one in wanted[: len(COLOURS)]]
-    sizes = ratios[shown].sizes if shown else ratios.sizes
-    axes = [str(dim) for dim, size in sizes.items() if size > 1] or [str(dim) for dim in list(sizes)[:1]]
+    judged = [variable for variable in verdict.variables if variable.judged != "reported"]
+    wanted = verdict.differing or tuple(sorted((v for v in judged if v.times), key=_nearest_first))
+    shown = [variable.name for variable in wanted[: len(COLOURS)]]
+    along = {
+        axis: worst
+        for axis, worst in verdict.worst_along.items()
+        if not shown or not worst.keys().isdisjoint(shown)
+    }
+    axes = [axis for axis, worst in along.items() if worst.sizes[axis] > 1] or list(along)[:1]
     panels = []
     for axis in axes:
-        along = {name: ratios[name] for name in shown if axis in ratios[name].dims}
-        worst = {name: one.max([dim for dim in one.dims if dim != axis]) for name, one in along.items()}
-        coordinate = ratios[axis]
+        coordinate = along[axis][axis]
         numbers = coordinate.dtype.kind == "f" and bool(np.isfinite(coordinate.values).all())
         order = np.argsort(coordinate.values, kind="stable") if numbers else np.arange(coordinate.size)
         values = coordinate.values[order]
@@ -76,14 +77,14 @@ def differences(verdict: Verdict) -> Differences:
                 label=axis_label(coordinate),
                 values=tuple(values.tolist()) if numbers else tuple(range(len(values))),
                 names=names,
-                ratios={name: tuple(one.values[order].tolist()) for name, one in worst.items()},
+                ratios={n: tuple(along[axis][n].values[order].tolist()) for n in shown if n in along[axis]},
             )
         )
     return Differences(verdict.headline, tuple(panels), max(0, len(wanted) - len(shown)))
 
 
-def _nearest_first(one: Judged) -> float:
-    return -one.times
+def _nearest_first(variable: Judged) -> float:
+    return -variable.times
 
 
 def _name(value: float | str) -> str:
