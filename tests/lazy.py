@@ -77,7 +77,7 @@ def stretched(
     axes: Mapping[str, Sequence[float]],
     *,
     known: bool = True,
-    added: Mapping[str, str] | None = None,
+    added: Mapping[str, Sequence[str]] | None = None,
     order: Sequence[str] | None = None,
 ) -> tuple[xr.Dataset, Reads]:
     """A small result over more axes, along which nothing varies, with its values computed when they are indexed.
@@ -87,8 +87,7 @@ def stretched(
     small : a result, whose inputs of these names have a single value
     axes : name and values of each axis that is added
     known : whether each variable says along which axes it varies
-    added : for some variables, the added axis along which they vary all the same: 1e-3 is added to e_error at its
-        second half
+    added : for some variables, the added axes along which they vary: by 0.25 at the second half of each
     order : of all axes but the model; by default those that are added come first
     """
     reads, added = Reads(), added or {}
@@ -103,18 +102,21 @@ def stretched(
         along = [dim for dim in dims if dim == "model" or dim in sizes]
         if "model" not in variable.dims:
             along.remove("model")
-        extra = added.get(str(name))
+        extras = added.get(str(name), ())
 
         def values(
-            *places: Values, along: list[str] = along, variable: xr.DataArray = variable, extra: str | None = extra
+            *places: Values,
+            along: list[str] = along,
+            variable: xr.DataArray = variable,
+            extras: Sequence[str] = extras,
         ) -> Values:
             at = dict(zip(along, places, strict=True))
             found = variable.values[tuple(at[str(dim)] for dim in variable.dims)]
-            if extra is None:
-                return found
-            return found + 1e-3 * (at[extra] >= sizes[extra] // 2)
+            for extra in extras:
+                found = found + 0.25 * (at[extra] >= sizes[extra] // 2)
+            return found
 
-        varies = [*own_axes, *([extra] if extra else [])]
+        varies = [*own_axes, *extras]
         variables[str(name)] = computed(
             str(name), {dim: sizes[dim] for dim in along}, values, reads, dtype=variable.dtype,
             varies_along={str(key): varies for key in small["model"].values} if known else None,

@@ -153,7 +153,7 @@ def print_info(dataset: xr.Dataset, path: Path) -> None:
         ends = [f"{end:.6g}" if end == end else "–" for end in extremes[:2]] if extremes else ["–", "–"]
         listed.add_row(
             cell(name), cell(variable.attrs.get("units", "")), cell(", ".join(map(str, variable.dims))), *ends,
-            str(extremes.missing) if extremes else "–",
+            f"{extremes.missing:,}" if extremes else "–",
         )  # fmt: skip
     out.print(listed)
     if tally and tally.worst:

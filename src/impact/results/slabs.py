@@ -34,7 +34,6 @@ def slabs(sizes: Mapping[Hashable, int], points: int = SLAB_POINTS) -> Iterator[
     shape = tuple(sizes.values())
     # the axes after `split` are whole in every slab, those before it have one place
     split = next((axis for axis in range(len(shape)) if math.prod(shape[axis + 1 :]) <= points), 0)
-    # an axis without values has no slab
     step = max(1, points // max(1, math.prod(shape[split + 1 :])))
     lengths = (*(1 for _ in shape[:split]), step, *shape[split + 1 :])
     yield from _tiles(sizes, lengths[: len(shape)])
@@ -55,7 +54,8 @@ def aligned_slabs(
 
 
 def _tiles(sizes: Mapping[Hashable, int], lengths: Sequence[int]) -> Iterator[Where]:
-    steps = [range(0, size, length) for size, length in zip(sizes.values(), lengths, strict=True)]
+    # an axis without values has no slab
+    steps = [range(0, size, max(1, length)) for size, length in zip(sizes.values(), lengths, strict=True)]
     for starts in itertools.product(*steps):
         yield {
             dim: slice(start, min(start + length, size))

@@ -59,12 +59,9 @@ def differences(verdict: Verdict) -> Differences:
     judged = [variable for variable in verdict.variables if variable.judged != "reported"]
     wanted = verdict.differing or tuple(sorted((v for v in judged if v.times), key=_nearest_first))
     shown = [variable.name for variable in wanted[: len(COLOURS)]]
-    along = {
-        axis: worst
-        for axis, worst in verdict.worst_along.items()
-        if not shown or not worst.keys().isdisjoint(shown)
-    }
-    axes = [axis for axis, worst in along.items() if worst.sizes[axis] > 1] or list(along)[:1]
+    along = verdict.worst_along
+    known = [axis for name in shown for axis, worst in along.items() if name in worst] if shown else list(along)
+    axes = [axis for axis in dict.fromkeys(known) if along[axis].sizes[axis] > 1] or known[:1]
     panels = []
     for axis in axes:
         coordinate = along[axis][axis]

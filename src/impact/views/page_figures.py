@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +15,7 @@ from ..contact.status import FIRST_FAILURE, NO_IMPACT
 from ..errors import ImpactError
 from ..results.schema import is_input
 from ..results.select import places_of
-from ..results.slabs import MAX_SUMMARY_POINTS, distinct, is_computed, slabs
+from ..results.slabs import distinct, is_computed, slabs
 from ..text import safe_text
 from .kinds import Choice, Numbers, draw
 from .look import METADATA, STYLE
@@ -36,6 +37,8 @@ FIGURES = {
     "loop": "Force over indentation at one point: the area of a loop is the energy that is lost.",
 }
 PLANES = ("map", "validity")
+# points of which a figure's conditions are the first with an answer
+MAX_SEARCHED = 2**18
 
 
 def figures_of(
@@ -98,21 +101,24 @@ def _answered(dataset: xr.Dataset, keys: list[str], drawn: Sequence[Hashable]) -
 def _first_answered(of_model: xr.Dataset, axes: Sequence[Hashable]) -> tuple[int, ...] | None:
     """The first place along some axes at which a model has an answer for balls that meet; None where it has none.
 
-    Of a status that is computed no more is looked at than a summary is worth.
+    Where the status of more than MAX_SEARCHED points would have to be computed, those of a coarser grid are.
     """
     status, _ = distinct(of_model, "status")
     ordered = [*axes, *(dim for dim in status.dims if dim not in axes)]
-    points = 0
+    steps = dict.fromkeys(ordered, 1)
+    if is_computed(status):
+        while math.prod(-(-status.sizes[dim] // step) for dim, step in steps.items()) > MAX_SEARCHED:
+            steps[max(steps, key=lambda dim: status.sizes[dim] / steps[dim])] *= 2
+    status = status.isel({dim: slice(None, None, step) for dim, step in steps.items()})
     for where in slabs({dim: status.sizes[dim] for dim in ordered}):
         part = status.isel(where)
-        answered = (part.values < FIRST_FAILURE) & (part.values != NO_IMPACT)
+        values = part.values.transpose([part.dims.index(dim) for dim in ordered])
+        answered = (values < FIRST_FAILURE) & (values != NO_IMPACT)
         if answered.any():
-            answered = answered.transpose([part.dims.index(dim) for dim in ordered])
-            places = np.unravel_index(int(np.argmax(answered)), answered.shape)
-            return tuple(where[dim].start + int(at) for dim, at in zip(axes, places, strict=False))
-        points += part.size
-        if points >= MAX_SUMMARY_POINTS and is_computed(status):
-            break
+            first = np.unravel_index(int(np.argmax(answered)), answered.shape)
+            return tuple(
+                (where[dim].start + int(place)) * steps[dim] for dim, place in zip(axes, first, strict=False)
+            )
     return None
 
 
