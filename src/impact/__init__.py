@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from .api import bless, compare, load, models, plot, recommend, report, rerun, run, save, sweep
+    from .api import bless, compare, extend, load, models, plot, recommend, report, rerun, run, save, sweep
     from .comparison.verdict import Verdict
     from .contact.evidence import Evidence
     from .contact.model import ForceModel, Parameter
@@ -23,6 +23,7 @@ __all__ = [
     "Verdict",
     "bless",
     "compare",
+    "extend",
     "hysteresis",
     "load",
     "models",

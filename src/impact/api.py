@@ -32,6 +32,7 @@ from .errors import UsageError
 from .results.again import histories
 from .results.backend import load as load
 from .results.backend import save as save
+from .results.extend import extend as extend_result
 from .results.impact import Impact as Impact
 from .results.impact import impact_of
 from .results.provenance import config_of, part_of, picked_out, stored_config
@@ -164,6 +165,48 @@ def run(
         lambda more: config_of(source, [*overrides, *more], own), model, at, picked_out(source)
     )
     return impact_of(Plan(config, own.of(config.models)), first, times)
+
+
+def extend(
+    result: str | Path,
+    overrides: Sequence[str],
+    *,
+    output: str | Path | None = None,
+    overwrite: bool = False,
+    plugins: Sequence[ForceModel | str | Path] = (),
+    max_points: int = MAX_POINTS,
+) -> xr.Dataset:
+    """Add values to the axes of a stored result, or models to it, and integrate only what is new.
+
+    Parameters
+    ----------
+    result : the file
+    overrides : changes to its config, such as `"sweep.m2=[1.0, 2.0]"`; values that it has are kept in any case
+    output : the file of the larger result; by default it takes the place of the smaller one
+    overwrite : replace the output if it exists
+    plugins : models of one's own, those that it was made with among them
+    max_points : how many points it may have, of all models together
+
+    Returns
+    -------
+    xarray.Dataset : the larger result, in all variables and coordinates that of the sweep done at once
+
+    Raises
+    ------
+    ResultError : the file is not a readable result, or of another version of this program
+    UsageError : what is changed is more than values of axes and models
+    StoreError : the disk is full or failed
+
+    >>> import impact, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     impact.save(impact.sweep("configs/figure6.toml"), f"{folder}/r.h5")
+    ...     impact.extend(f"{folder}/r.h5", ["sweep.m2=[1.0, 2.0]"]).sizes["m2"]
+    2
+    """
+    path = Path(result)
+    target = path if output is None else Path(output)
+    extend_result(path, target, overrides, read_plugins(plugins), overwrite=overwrite, max_points=max_points)
+    return load(target)
 
 
 def rerun(

@@ -13,7 +13,7 @@ import typer
 from .. import __version__
 from ..errors import UsageError
 from ..text import safe_text
-from . import advice, catalogue, door, pictures, regression, reporting, shards, sweeping
+from . import advice, catalogue, door, enlarging, pictures, regression, reporting, shards, sweeping
 from .options import Json, Overwrite, Plugins, Sets
 from .words import dump, pairs, whole_number
 
@@ -49,6 +49,9 @@ def common(
 
 app.command(epilog="Example: impact sweep configs/figure6.toml -o results.h5 --set sweep.m2=2.0")(sweeping.sweep)
 app.command(epilog="Example: impact merge results.h5.*-of-16.work -o results.h5")(shards.merge)
+
+app.command(epilog="Example: impact expand results.h5 -o full.h5 --sel m2=1.0")(enlarging.expand)
+app.command(epilog="Example: impact extend results.h5 --set 'sweep.m2=[1.0, 2.0]'")(enlarging.extend)
 
 
 app.command(epilog="Example: impact plot results.h5 -k restitution -k loop --sel m2=1.0 -o results.svg")(

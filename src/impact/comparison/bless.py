@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 from collections.abc import Callable
 from dataclasses import replace
@@ -12,7 +11,7 @@ from pathlib import Path
 import xarray as xr
 
 from ..errors import ResultError, UsageError
-from ..results.backend import check_output, load, save
+from ..results.backend import check_output, load, save_with
 from ..results.replay import described, own, repeats
 from ..results.summary import tally_of
 from ..text import safe_text
@@ -74,14 +73,16 @@ def bless(
         verdict = replace(found, new=str(new), baseline=str(baseline), repeats=repeats(str(new), result))
         show(verdict)
     kept = in_effect(tol, result.attrs if before is None else before.attrs)
-    save(result.assign_attrs(reason=reason, tolerances=json.dumps(kept)), baseline, overwrite=True)
+    save_with(new, baseline, {"reason": reason, "tolerances": json.dumps(kept)})
     return verdict
 
 
 def _check_failed(result: xr.Dataset, path: Path) -> None:
     """Refuse a result with failed points, whose NaN every later failure would equal."""
-    # all of them, however many: one that is not counted could be a failure
-    tally = tally_of(result[["status"]] if "status" in result else result, max_points=math.inf)
+    tally = tally_of(result[["status"]] if "status" in result else result)
+    if tally.not_counted:
+        count = f"{tally.not_counted:,} points are too many to look for failures"
+        raise UsageError(f"{safe_text(str(path))}: {count}; expected fewer, or --allow-failed")
     if tally.failed:
         status, model, places = tally.failed_at[0]
         point = result["status"].isel(dict(zip(result["status"].dims, (model, *places), strict=True)))

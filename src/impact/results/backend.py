@@ -7,7 +7,7 @@ from __future__ import annotations
 import os
 import stat
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from xarray.backends import BackendEntrypoint
 
 from ..atomic import Sink, appearing
-from ..errors import ResultError, UsageError
+from ..errors import ResultError, UnfinishedError, UsageError
 from ..sweeps.settings import Output
 from ..text import safe_text
-from .expand import lazy_dataset
+from .expand import TrajectoryTable, lazy_dataset
 from .factored import check_witnesses, stored_table, variables_of
 from .netcdf import StoredArray, read_variables, writing
 from .sealed import MAGIC, check_seal, write_seal
@@ -116,7 +116,14 @@ def write(
     return seal
 
 
-def save(dataset: xr.Dataset, path: str | Path, *, overwrite: bool = False, output: Output = PLAIN) -> None:
+def save(
+    dataset: xr.Dataset,
+    path: str | Path,
+    *,
+    overwrite: bool = False,
+    output: Output = PLAIN,
+    should_stop: Callable[[], bool] = lambda: False,
+) -> None:
     """Store a dataset as a sealed netCDF-4 file, with all of its values.
 
     Parameters
@@ -126,11 +133,13 @@ def save(dataset: xr.Dataset, path: str | Path, *, overwrite: bool = False, outp
     path : the file
     overwrite : replace a file that exists
     output : how it is stored
+    should_stop : whether to stop, asked now and then
 
     Raises
     ------
     UsageError : the file exists, its folder cannot be written to, or the dataset is no result
     StoreError : the disk is full or failed
+    UnfinishedError : it was stopped; nothing was written
 
     >>> import impact, tempfile
     >>> result = impact.sweep("configs/figure6.toml")
@@ -148,13 +157,16 @@ def save(dataset: xr.Dataset, path: str | Path, *, overwrite: bool = False, outp
     if odd:
         raise UsageError(f"{safe_text(str(path))}: {odd}; dataset.to_netcdf(path) stores anything")
     check_output(path, overwrite=overwrite)
-    parts = (
-        (str(name), tuple(where.values()), variable.isel(where).values)
-        for name, variable in dataset.data_vars.items()
-        for where in slabs(variable.sizes)
-    )
+
+    def parts() -> Iterator[tuple[str, tuple[slice, ...], NDArray[Any]]]:
+        for name, variable in dataset.data_vars.items():
+            for where in slabs(variable.sizes):
+                if should_stop():
+                    raise UnfinishedError("nothing was written")
+                yield str(name), tuple(where.values()), variable.isel(where).values
+
     with appearing(path, overwrite=overwrite) as sink:
-        write(sink, dataset, parts, output)
+        write(sink, dataset, parts(), output)
         check_readable(sink, path)
 
 
@@ -205,6 +217,11 @@ def open_result(path: str | Path) -> xr.Dataset:
     -----
     UserWarning : it holds more than a result does, which is passed over
     """
+    return open_with_table(path)[0]
+
+
+def open_with_table(path: str | Path) -> tuple[xr.Dataset, TrajectoryTable | None]:
+    """The same, and the trajectory table of a factored file."""
     path = Path(path)
     shown = safe_text(str(path))
     try:
@@ -216,7 +233,7 @@ def open_result(path: str | Path) -> xr.Dataset:
     except OSError as error:
         raise ResultError(f"{shown}: is not a readable result ({safe_text(str(error), 80)})") from error
     try:
-        dataset, unknown = _dataset(file)
+        dataset, table, unknown = _dataset(file)
         odd = schema_violation(dataset)
         if odd:
             raise ResultError(f"is not a readable result ({odd})")
@@ -235,7 +252,7 @@ def open_result(path: str | Path) -> xr.Dataset:
         warnings.warn(f"{shown}: passed over what is no part of a result: {names}", stacklevel=2)
     dataset.encoding = {"source": str(path), "seal": seal, "layout": dataset.encoding["layout"]}
     dataset.set_close(file.close)
-    return dataset
+    return dataset, table
 
 
 def load(path: str | Path) -> xr.Dataset:
@@ -274,8 +291,8 @@ def load(path: str | Path) -> xr.Dataset:
             ) from error
 
 
-def _dataset(file: h5py.File) -> tuple[xr.Dataset, tuple[str, ...]]:
-    """The dataset in a file, and the names in it that are no part of a result."""
+def _dataset(file: h5py.File) -> tuple[xr.Dataset, TrajectoryTable | None, tuple[str, ...]]:
+    """The dataset in a file, its trajectory table if it has one, and names that are no part of a result."""
     variables, attributes, unknown = read_variables(file)
     given = [name for name, variable in variables.items() if not is_quantity(name, tuple(map(str, variable.dims)))]
     table = {name for name in variables if name in TABLE}
@@ -284,7 +301,7 @@ def _dataset(file: h5py.File) -> tuple[xr.Dataset, tuple[str, ...]]:
         computed = {name: variable for name, variable in variables.items() if name not in coordinates}
         dataset = xr.Dataset(computed, coordinates, attributes)
         dataset.encoding = {"layout": "full"}
-        return dataset, unknown
+        return dataset, None, unknown
     witnesses = {name: variables[name].load() for name in table if name.startswith("witness_")}
     stored = xr.Dataset(witnesses, coordinates, attributes)
 
@@ -298,7 +315,7 @@ def _dataset(file: h5py.File) -> tuple[xr.Dataset, tuple[str, ...]]:
     kept = {name: value for name, value in attributes.items() if name not in ("axes", "laws")}
     dataset = lazy_dataset(outline.assign_attrs(kept), found, quantities)
     dataset.encoding = {"layout": "factored"}
-    return dataset, unknown
+    return dataset, found, unknown
 
 
 class ImpactBackend(BackendEntrypoint):

@@ -1,0 +1,292 @@
+"""Extend: more values on the axes of a result, of which only what is new is integrated."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from ..contact.strike import Rebound
+from ..engine.execute import never
+from ..engine.executors import ALONE, Team
+from ..engine.plan import Inputs, Plan
+from ..engine.plugins import Plugins
+from ..engine.progress import Tell
+from ..engine.trajectories import TrajectoryMap, TrajectoryRange, check_count, trajectory_maps
+from ..errors import ResultError, UsageError
+from ..sweeps.grid import MAX_POINTS, Axis, path_of
+from ..text import safe_text
+from .backend import open_with_table
+from .expand import TrajectoryTable
+from .provenance import stored_config
+from .select import matched
+from .summary import Survey
+from .sweep import Extension, Values, sweep_into
+
+Places = NDArray[np.intp]
+
+
+def extend(
+    source: Path,
+    output: Path,
+    overrides: Sequence[str],
+    plugins: Plugins,
+    *,
+    resume: bool = False,
+    overwrite: bool = False,
+    max_points: int = MAX_POINTS,
+    team: Team = ALONE,
+    tell: Tell = lambda progress: None,
+    should_stop: Callable[[], bool] = never,
+) -> tuple[Survey, int]:
+    """Add values to the axes of a result, or models to it.
+
+    Parameters
+    ----------
+    source : the result
+    output : the file of the larger one, which may be the same
+    overrides : changes to its config, such as "sweep.m2=[1.0, 2.0]"; values that the result has are kept in any case
+    plugins : models that are not built in, those that it was made with among them
+    resume, overwrite, team, tell, should_stop : see `impact.results.sweep.sweep_into`
+    max_points : refuse a sweep of more points
+
+    Returns
+    -------
+    The larger result, in all variables and coordinates what a sweep of its config at once gives, and how many
+    trajectories were integrated for it.
+
+    Raises
+    ------
+    ResultError : the source is not a readable result, or of another version of this program
+    UsageError : what is changed is more than values of axes and models; see also `sweep_into`
+    """
+    name = safe_text(str(source))
+    before, table = open_with_table(source)
+    with before:
+        config = stored_config(before.attrs, [], plugins, str(source), max_points)
+        old = Plan(config, plugins.of(config.models))
+        _check_whole(before, old, name)
+        new = _extended_plan(before, old, overrides, plugins, source, max_points)
+        _check_same(old, new, name)
+        check_count(new, max_points, str(source))
+        axes = tuple(_axis_places(axis, old.inputs, name) for axis in new.config.axes)
+        seal = str(before.encoding["seal"])
+        history = [*json.loads(str(before.attrs.get("extended", "[]"))), {"seal": seal, "set": list(overrides)}]
+        places = _Places(old, new, trajectory_maps(new), axes)
+        counted: dict[int, int] = {}
+
+        def known(part: TrajectoryRange) -> tuple[NDArray[np.bool_], Rebound] | None:
+            found = places.from_table(part, table) if table is not None else places.not_needed(part)
+            counted[part.number] = part.size - (0 if found is None else int(np.count_nonzero(found[0])))
+            return found
+
+        extension = Extension(
+            seal, json.dumps(history), known, None if table is not None else places.filler(before)
+        )
+        survey = sweep_into(
+            output, new, resume=resume, overwrite=overwrite or output == source, team=team, tell=tell,
+            should_stop=should_stop, extension=extension,
+        )  # fmt: skip
+    return survey, sum(counted.values())
+
+
+def _check_whole(before: xr.Dataset, old: Plan, name: str) -> None:
+    """Refuse what is no whole result of a sweep of this version."""
+    from .. import __version__
+
+    version = safe_text(str(before.attrs.get("impact_version")), 40)
+    if version != __version__:
+        raise ResultError(f"{name}: was made by impact {version}, this is {__version__}; sweep its config again")
+    sizes = {"model": len(old.models), **{axis.name: axis.size for axis in old.config.axes}}
+    if before.attrs.get("fingerprint") != old.fingerprint or dict(before.sizes) != sizes:
+        raise UsageError(f"{name}: is a part of the result of its config, expected the whole")
+
+
+def _extended_plan(
+    before: xr.Dataset, old: Plan, overrides: Sequence[str], plugins: Plugins, source: Path, max_points: int
+) -> Plan:
+    """The plan with the overrides, in which the values and models that the result has are kept."""
+    asked = stored_config(before.attrs, overrides, plugins, str(source), max_points)
+    more = []
+    for axis in asked.axes:
+        name = axis.name
+        was = np.atleast_1d(old.inputs.values(name)) if name in old.inputs.names() else np.array([])
+        is_there = len(matched([np.asarray(axis.columns[name])], [was])[0]) == was.size if was.size else True
+        if len(axis.columns) == 1 and not is_there:
+            values = [*was.tolist(), *(value for value in axis.columns[name] if value not in was.tolist())]
+            more.append(f"{'.'.join(path_of(name))}={_toml(values)}")
+    missing = [model.key for model in old.models if model not in asked.models]
+    if missing:
+        keys = [*(model.key for model in old.models), *(m.key for m in asked.models if m not in old.models)]
+        more.append(f"models={json.dumps(keys)}")
+    if more:
+        asked = stored_config(before.attrs, [*overrides, *more], plugins, str(source), max_points)
+    return Plan(asked, plugins.of(asked.models))
+
+
+def _toml(values: Sequence[object]) -> str:
+    return "[" + ", ".join(json.dumps(v) if isinstance(v, str) else repr(v) for v in values) + "]"
+
+
+def _check_same(old: Plan, new: Plan, name: str) -> None:
+    """Refuse changes of anything but values of axes and models."""
+    before, after = dict(old.physics), dict(new.physics)
+    free = ("models", "axes", "scalars", "materials", "plugins")
+    changed = [key for key in before if key not in free and before[key] != after[key]]
+    changed += [
+        f"model {key}" for key in old.plugins.hashes if old.plugins.hashes[key] != new.plugins.hashes.get(key)
+    ]
+    used = new.materials_used
+    changed += [f"materials.{key}" for key, one in old.materials_used.items() if used.get(key, one) != one]
+    changed += [key for key in old.inputs.names() if key not in new.inputs.names()]
+    changed += [key for key in new.inputs.names() if key not in old.inputs.names() and "." not in key]
+    moved = [
+        key for key in old.inputs.scalars
+        if key in new.inputs.scalars and old.inputs.scalars[key] != new.inputs.scalars[key]
+    ]  # fmt: skip
+    if changed or moved:
+        raise UsageError(
+            f"{name}: --set changes {safe_text(', '.join([*changed, *moved]))}, expected more values of an axis, such as "
+            "--set 'sweep.m2=[1.0, 2.0]', or more models"
+        )
+    if old.models == new.models and old.config.axes == new.config.axes:
+        raise UsageError(f"{name}: has all of that already; expected more values of an axis, or more models")
+
+
+@dataclass(frozen=True)
+class _AxisPlaces:
+    """Where the values of an axis stand in the old result: its axis there, if it has one, and places; -1 is new."""
+
+    axis: int | None
+    places: Places
+
+
+def _axis_places(axis: Axis, old: Inputs, name: str) -> _AxisPlaces:
+    """Where the values of an axis stood.
+
+    Raises
+    ------
+    UsageError : its columns were axes of their own
+    """
+    axes = {place for column in axis.columns for place in old.axes_of(column)}
+    if len(axes) > 1:
+        shown = safe_text(", ".join(map(str, axis.columns)))
+        raise UsageError(f"{name}: {shown} vary together now and did not before; sweep the new config")
+    columns = [np.atleast_1d(old.values(column)).tolist() for column in axis.columns]
+    size = max(map(len, columns))
+    rows = zip(*(values * size if len(values) == 1 else values for values in columns), strict=True)
+    place = {row: number for number, row in enumerate(rows)}
+    found = [place.get(row, -1) for row in zip(*axis.columns.values(), strict=True)]
+    return _AxisPlaces(next(iter(axes), None), np.array(found, np.intp))
+
+
+@dataclass(frozen=True)
+class _Places:
+    """Where the trajectories and points of the larger sweep stand in the smaller one."""
+
+    old: Plan
+    new: Plan
+    maps: Sequence[TrajectoryMap]
+    axes: tuple[_AxisPlaces, ...]
+    # by model, for each trajectory the one that it was before, or -1
+    _rows: dict[int, Places] = field(default_factory=dict)
+
+    def model(self, model: int) -> int | None:
+        """The place that a model had."""
+        keys = [one.key for one in self.old.models]
+        key = self.new.models[model].key
+        return keys.index(key) if key in keys else None
+
+    def from_table(
+        self, part: TrajectoryRange, table: TrajectoryTable
+    ) -> tuple[NDArray[np.bool_], Rebound] | None:
+        """The trajectories of a range that the smaller result has in its table."""
+        model = self.model(part.model)
+        if model is None:
+            return None
+        before = self._old_rows(part, table.maps[model])
+        is_known = before >= 0
+        rebound = Rebound.blank(part.size)
+        rebound.put(np.flatnonzero(is_known), table.rows.take(model, before[is_known]))
+        return is_known, rebound
+
+    def not_needed(self, part: TrajectoryRange) -> tuple[NDArray[np.bool_], Rebound] | None:
+        """The trajectories of a range that only points have which the smaller result holds in full."""
+        own = self.maps[part.model]
+        others = [axis for axis in range(len(self.axes)) if axis not in own.axes]
+        if self.model(part.model) is None or any((self.axes[axis].places < 0).any() for axis in others):
+            return None
+        if own.of_cell is None:
+            is_old = self._is_old(own, np.arange(part.start, part.stop))
+        else:
+            needed = np.zeros(own.count, bool)
+            needed[own.of_cell[~self._is_old(own, np.arange(own.cells))]] = True
+            is_old = ~needed[part.start : part.stop]
+        return is_old, Rebound.blank(part.size)
+
+    def _is_old(self, own: TrajectoryMap, cells: Places) -> NDArray[np.bool_]:
+        along = np.unravel_index(cells, own.shape) if own.shape else ()
+        is_old = np.ones(cells.shape, bool)
+        for axis, place in zip(own.axes, along, strict=True):
+            is_old &= self.axes[axis].places[place] >= 0
+        return is_old
+
+    def _old_rows(self, part: TrajectoryRange, before: TrajectoryMap) -> Places:
+        own = self.maps[part.model]
+        if own.of_cell is None:
+            return self._rows_of_cells(own, before, np.arange(part.start, part.stop))
+        if part.model not in self._rows:
+            rows = np.full(own.count, -1, np.intp)
+            of_cells = self._rows_of_cells(own, before, np.arange(own.cells))
+            rows[own.of_cell[of_cells >= 0]] = of_cells[of_cells >= 0]
+            self._rows[part.model] = rows
+        return self._rows[part.model][part.start : part.stop]
+
+    def _rows_of_cells(self, own: TrajectoryMap, before: TrajectoryMap, cells: Places) -> Places:
+        """The trajectory that each cell had, or -1."""
+        along = dict(zip(own.axes, np.unravel_index(cells, own.shape) if own.shape else (), strict=True))
+        index = [np.zeros(cells.shape, np.intp) for _ in self.old.config.axes]
+        for axis, place in along.items():
+            was = self.axes[axis].axis
+            if was is not None:
+                index[was] = np.maximum(self.axes[axis].places[place], 0)
+        covered = {self.axes[axis].axis for axis in own.axes}
+        if not set(before.axes) <= covered:
+            return np.full(cells.shape, -1, np.intp)
+        rows = before.rows(tuple(index)) if index else np.zeros(cells.shape, np.intp)
+        return np.where(self._is_old(own, cells), rows, -1)
+
+    def filler(self, before: xr.Dataset) -> Callable[[int, tuple[slice, ...], Values], None]:
+        """What puts the values that the smaller result holds into those of a slab."""
+        names = [axis.name for axis in self.old.config.axes]
+
+        def fill(model: int, where: tuple[slice, ...], values: Values) -> None:
+            old_model = self.model(model)
+            if old_model is None:
+                return
+            parts = [axis.places[place] for axis, place in zip(self.axes, where, strict=True)]
+            inside = np.ix_(*(np.flatnonzero(part >= 0) for part in parts))
+            if any(part.size == 0 for part in inside):
+                return
+            chosen: Mapping[Any, Any] = {
+                names[axis.axis]: part[part >= 0]
+                for axis, part in zip(self.axes, parts, strict=True)
+                if axis.axis is not None
+            }
+            # where the axes of the smaller result stand among those of this slab
+            order = [axis.axis for axis in self.axes if axis.axis is not None]
+            for name, array in values.items():
+                variable = before[name]
+                if "model" not in variable.dims:
+                    continue
+                held = variable.isel(model=old_model, **chosen).transpose(*(names[axis] for axis in order)).values
+                shape = tuple(part.size for part in inside)
+                array[inside or ...] = held.reshape(shape) if array.shape else held
+
+        return fill
