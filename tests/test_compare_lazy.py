@@ -178,6 +178,9 @@ def test_two_results_with_differences_in_several_slabs() -> None:
     assert new["e_out"].size > 5 * SLAB_POINTS
     verdict = impact.compare(new, baseline)
     same(verdict, impact.compare(new.compute(), baseline.compute()))
+    # a file is read chunk by chunk, in another order
+    baseline["e_out"].encoding["chunksizes"] = (1, 2, 30, 20, 5)
+    same(verdict, impact.compare(new, baseline))
     (judged,) = verdict.variables
     assert (judged.points, judged.different) == (new["e_out"].size, 3)
     # of equal differences the first
@@ -285,6 +288,16 @@ def test_a_value_that_is_the_same_everywhere_is_judged_with_the_status_of_every_
     assert judged["stiffness"].at["e"] == pytest.approx(400 / 999)
     assert judged["status"].different == 0
     assert impact.compare(result(1000), result(1000)).differing == ()
+
+
+def test_a_constant_value_is_judged_at_every_scale() -> None:
+    baseline = _large(Reads(), lambda model, e: 0.5, v1_post=lambda *where: 1.0)
+    moved = _large(Reads(), lambda model, e: 0.5, v1_post=lambda *where: 1.0 + 1.5e-9)
+    for dataset in (baseline, moved):
+        dataset["v1_post"].encoding[VARIES_ALONG] = dict.fromkeys("abc", ())
+    (found,) = impact.compare(moved, baseline).differing
+    # tolerance 1e-9 x v0, and v0 is from 1 to 2 m/s in 1000 steps
+    assert (found.name, found.different, found.at["v1"]) == ("v1_post", 3 * 500 * 10**9, 1.0)
 
 
 def test_a_part_of_a_large_result_is_judged_by_the_whole() -> None:

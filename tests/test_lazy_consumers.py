@@ -6,6 +6,7 @@ import math
 import re
 from itertools import islice
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 import pytest
@@ -19,9 +20,10 @@ from impact.results.slabs import SLAB_POINTS, distinct, slabs, varying_dims
 from impact.results.summary import extremes_of, tally_of
 from impact.views.kinds import Choice
 from impact.views.names import KINDS
+from impact.views.page_figures import figures_of
 from impact.views.slices import MAX_DRAWN
 
-from .lazy import Reads, stretched
+from .lazy import Reads, computed, stretched
 
 MODELS = ["hertz", "lankarani-nikravesh-1990", "exact-hysteresis", "broken"]
 BIG = {
@@ -202,6 +204,72 @@ def test_a_report_reads_the_few_points_that_differ(small: xr.Dataset) -> None:
     assert max(reads.largest.values()) <= 4 * 10 * 1_000
     # v2 = 2 m/s is no impact, so that the figures are at the next one
     assert "v2\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}0" in page
+
+
+def test_the_figures_of_a_report_are_at_a_point_with_an_answer(big: tuple[xr.Dataset, Reads]) -> None:
+    dataset, reads = big
+
+    def status(model: np.ndarray, m1: np.ndarray, *others: np.ndarray) -> np.ndarray:
+        return np.where(m1 < 7_000, int(Status.NOT_FINITE), int(Status.OK))
+
+    sizes = {str(dim): dataset.sizes[dim] for dim in dataset["status"].dims}
+    about = {"dtype": np.dtype(np.int8), "attrs": dataset["status"].attrs}
+    chosen: list[Choice] = []
+
+    def refuse(kind: str, choice: Choice) -> NoReturn:
+        chosen.append(choice)
+        raise UsageError("not drawn")
+
+    # along m1 alone each point is looked at; along m2 too, those of a coarse grid
+    for along, last in ((["m1"], 7_000), (["m1", "m2"], 7_100)):
+        varies_along = dict.fromkeys(MODELS, along)
+        late = dataset.assign(status=computed("status", sizes, status, reads, varies_along=varies_along, **about))
+        chosen.clear()
+        list(figures_of(late, MODELS, refuse))
+        assert chosen[0].x == "e"
+        assert BIG["m1"][7_000] <= chosen[0].sel["m1"] <= BIG["m1"][last]
+
+
+def test_an_e_that_varies_over_many_axes_is_evaluated_like_the_rest(
+    small: xr.Dataset, capsys: pytest.CaptureFixture[str]
+) -> None:
+    dataset, reads = stretched(small, BIG, order=["m1", "e", "v2", "m2", "K"])
+
+    def e(m1: np.ndarray, alpha: np.ndarray, v2: np.ndarray) -> np.ndarray:
+        return small["e"].values[alpha]
+
+    sizes = {"m1": 10_000, "alpha": 10, "v2": 3}
+    attrs = {"equation": "e = 1 - alpha (v1 - v2)  (24)", "units": "1"}
+    asked = computed(
+        "e", sizes, e, reads, dtype=np.dtype(float), attrs=attrs, varies_along=dict.fromkeys(MODELS, ("alpha",))
+    )
+    dataset = dataset.rename(e="alpha").assign_coords(alpha=np.linspace(0.9, 0.0, 10), e=asked)
+    for variable in dataset.data_vars.values():
+        variable.encoding["varies_along"] = dict.fromkeys(MODELS, ("alpha", "v2"))
+    ranked = {one.model: one for one in impact.recommend(dataset, tol=0.05).models}
+    assert max(reads.total.values()) <= 2 * OWN
+    for few in impact.recommend(small, tol=0.05).models:
+        same = ranked[few.model]
+        assert (same.points, same.mean_error, same.e_out) == (WEIGHT * few.points, few.mean_error, few.e_out)
+        assert (same.at["e"], same.served) == (few.at["e"], None)
+    print_info(dataset, Path("big.h5"))
+    assert re.search(r"^e +0\.1 … 1, 300000 values", capsys.readouterr().out, re.MULTILINE)
+    page = impact.report(dataset, plugins=[BROKEN])
+    assert "varies with m1 and alpha and v2: e = 1 - alpha (v1 - v2)  (24)" in page
+    assert max(reads.largest.values()) <= 4 * 10 * 10_000
+
+
+def test_coordinates_of_a_file_need_not_be_in_memory(
+    figure6: xr.Dataset, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lazy = figure6.assign_coords(
+        v1=computed("v1", {}, lambda: figure6["v1"].values, Reads(), dtype=np.dtype(float),
+                    varies_along=None, attrs=figure6["v1"].attrs)
+    )  # fmt: skip
+    print_info(figure6, Path("f.h5"))
+    expected = capsys.readouterr().out
+    print_info(lazy, Path("f.h5"))
+    assert sorted(capsys.readouterr().out.splitlines()) == sorted(expected.splitlines())
 
 
 @pytest.mark.parametrize("kind", list(KINDS))

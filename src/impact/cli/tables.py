@@ -162,12 +162,12 @@ def print_info(dataset: xr.Dataset, path: Path) -> None:
 
 
 def _values_text(dataset: xr.Dataset, name: str) -> str:
-    """The values of a coordinate: few of them one by one, of many numbers the ends and how many there are."""
-    from ..results.slabs import is_lazy
+    """The values of a coordinate: few of them one by one, of many the ends and how many there are."""
+    from ..results.slabs import is_large
     from ..results.summary import extremes_of
 
     coordinate = dataset[name]
-    if is_lazy(coordinate.variable):
+    if is_large(coordinate.variable):
         extremes = extremes_of(dataset, name)
         ends = f"{extremes.smallest:g} … {extremes.largest:g}, " if extremes else ""
         return f"{ends}{coordinate.size} values"

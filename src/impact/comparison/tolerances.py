@@ -19,7 +19,7 @@ Tolerances = Mapping[str, float]
 ALL = "all"
 # without one, a value may differ by this many tolerances of the solver
 SOLVER_TOLERANCES = 10.0
-JUDGED = {one.name: one.judged for one in SCHEMA}
+JUDGED = {variable.name: variable.judged for variable in SCHEMA}
 WITH_TOLERANCE = [name for name, judged in JUDGED.items() if judged not in ("exact", "reported")]
 
 

@@ -81,8 +81,8 @@ class Judged:
             words = (_word(self.name, value) for value in (self.new, self.baseline))
             both = self.new != self.new and self.baseline != self.baseline
             which = "first" if self.judged == "exact" else "worst"
-            told = f"{many}, the {which}{at}: {', baseline '.join(words)}"
-            return f"{told}, which their statuses do not explain" if both else told
+            text = f"{many}, the {which}{at}: {', baseline '.join(words)}"
+            return f"{text}, which their statuses do not explain" if both else text
         if self.judged == "reported":
             return f"{many}, by {self.worst:g} at most{at} (not judged)"
         times = f"{self.times:.3g} x tolerance" if self.times < float("inf") else "where none is allowed"
@@ -136,52 +136,54 @@ class Verdict:
     def differing(self) -> tuple[Judged, ...]:
         """The variables whose values differ, the worst first."""
         # among equals a status is told first, which explains the NaNs of the others
-        found = (one for one in self.variables if not one.is_equal)
-        return tuple(sorted(found, key=lambda one: (-one.times, one.judged != "exact")))
+        different = (variable for variable in self.variables if not variable.is_equal)
+        return tuple(sorted(different, key=lambda variable: (-variable.times, variable.judged != "exact")))
 
     @property
     def ranked(self) -> tuple[Judged, ...]:
         """All variables: those whose values differ, the worst first, then the others."""
-        return (*self.differing, *(one for one in self.variables if one.is_equal))
+        return (*self.differing, *(variable for variable in self.variables if variable.is_equal))
 
     @property
     def headline(self) -> str:
         """The first line: equal and how closely, or not equal in what."""
         if self.equal:
-            judged = [one for one in self.variables if one.judged != "reported"]
-            values = sum(one.points for one in judged)
-            said = f"equal: {len(judged)} variables, {values:,} values"
-            closest = max(judged, key=lambda one: one.times, default=None)
+            judged = [variable for variable in self.variables if variable.judged != "reported"]
+            values = sum(variable.points for variable in judged)
+            count = f"equal: {len(judged)} variables, {values:,} values"
+            closest = max(judged, key=lambda variable: variable.times, default=None)
             if closest is None or not closest.times:
-                return f"{said}, none differs"
+                return f"{count}, none differs"
             at = f" at {closest.place}" if closest.place else ""
-            return f"{said}, largest difference {closest.times:.2g} x tolerance: {closest.name}{at}"
-        named = [(fault.kind, fault.name) for fault in self.faults]
-        named += [("values", one.name) for one in self.differing]
-        told = []
-        for kind in KINDS:
-            names = list(dict.fromkeys(safe_text(name, 60) for own, name in named if own == kind and name))
+            return f"{count}, largest difference {closest.times:.2g} x tolerance: {closest.name}{at}"
+        by_kind: dict[Kind, dict[str, None]] = {}
+        for fault in self.faults:
+            by_kind.setdefault(fault.kind, {})[safe_text(fault.name, 60)] = None
+        for variable in self.differing:
+            by_kind.setdefault("values", {})[safe_text(variable.name, 60)] = None
+        parts = []
+        for kind in (kind for kind in KINDS if kind in by_kind):
+            names = [name for name in by_kind[kind] if name]
             more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
-            shown = f" ({', '.join(names[:NAMED])}{more})" if names else ""
-            told += [f"{kind}{shown}"] if any(own == kind for own, _ in named) else []
-        return f"not equal: {', '.join(told)}"
+            parts.append(f"{kind} ({', '.join(names[:NAMED])}{more})" if names else kind)
+        return f"not equal: {', '.join(parts)}"
 
     @property
     def lines(self) -> tuple[str, ...]:
         """What differs, a line each; after a value's the command that repeats its worst point."""
         faults = sorted(self.faults, key=lambda fault: KINDS.index(fault.kind))
-        found = [f"{fault.kind}: {fault.text}" for fault in faults]
-        for one in self.differing:
-            repeats = f"  {self.replay(one)}"
+        lines = [f"{fault.kind}: {fault.text}" for fault in faults]
+        for variable in self.differing:
+            command = f"  {self.replay(variable)}"
             # several variables are often worst at one point
-            found += [one.text, repeats] if repeats.strip() and repeats not in found else [one.text]
-        return tuple(found)
+            lines += [variable.text, command] if command.strip() and command not in lines else [variable.text]
+        return tuple(lines)
 
-    def replay(self, one: Judged) -> str:
+    def replay(self, variable: Judged) -> str:
         """The command that runs the worst point of a variable again; empty where there is none."""
-        if not self.repeats or not one.at:
+        if not self.repeats or not variable.at:
             return ""
-        return replay(self.repeats, one.at)
+        return replay(self.repeats, variable.at)
 
     def __str__(self) -> str:
         return "\n".join([self.headline, *self.lines, *(f"note: {note}" for note in self.notes)])

@@ -18,7 +18,7 @@ from ..text import safe_text
 from .replay import own
 from .schema import is_input
 from .select import places_of, select
-from .slabs import Where, factored, is_computed, slabs
+from .slabs import Where, distinct, factored, is_computed, slabs, varying_dims
 
 Mask = NDArray[np.bool_]
 # points up to which variables that are computed are ranked: some minutes
@@ -169,7 +169,7 @@ def _check(dataset: xr.Dataset, tol: float) -> None:
     missing = [name for name in JUDGED if name not in dataset]
     if missing:
         raise UsageError(f"this result has no {', '.join(missing)}; sweep without [output] variables, or add them")
-    if "e" not in dataset.coords or not _asks_for_e(dataset.variables["e"]):
+    if "e" not in dataset.coords or not _asks_for_e(dataset):
         raise UsageError("this sweep asks for no e, by which models are ranked; give it e or alpha")
     dims = set(dataset["e_error"].dims)
     if "model" not in dims or dims != set(dataset["status"].dims) or not dims.issuperset(dataset["e"].dims):
@@ -181,14 +181,18 @@ def _order(one: Ranked) -> tuple[float, ...]:
     return (-one.share, *(math.inf if math.isnan(error) else error for error in (one.max_error, one.mean_error)))
 
 
-def _asks_for_e(e: xr.Variable) -> bool:
+def _asks_for_e(dataset: xr.Dataset) -> bool:
     """Whether there is a point at which an e is asked for."""
+    e, _ = distinct(dataset, "e")
     return any(not np.isnan(e.isel(where).values).all() for where in slabs(e.sizes))
 
 
 def _evaluated(of_model: xr.Dataset) -> tuple[xr.Dataset, int]:
     """What is judged of a model, over the axes along which it or e varies, and how often each point counts."""
-    return factored(of_model, JUDGED, *of_model.variables["e"].dims)
+    along_one = of_model.variables["e"].ndim == 1
+    return factored(
+        of_model, JUDGED, *(of_model.variables["e"].dims if along_one else varying_dims(of_model, "e"))
+    )
 
 
 def _ranked(of_model: xr.Dataset, tol: float) -> Ranked:
@@ -196,7 +200,7 @@ def _ranked(of_model: xr.Dataset, tol: float) -> Ranked:
     axes = of_model.variables["e_error"].dims
     evaluated, weight = _evaluated(of_model)
     sizes = {dim: evaluated.sizes[dim] for dim in evaluated.variables["e_error"].dims}
-    e = evaluated.variables["e"]
+    e, along_one = evaluated.variables["e"], of_model.variables["e"].ndim == 1
     # along e, where it varies along one axis: whether there is a point to judge, and one that is not within tol
     asked_at, missed_at = np.zeros(e.shape, bool), np.zeros(e.shape, bool)
     points = known_points = within_points = failed_points = 0
@@ -222,7 +226,7 @@ def _ranked(of_model: xr.Dataset, tol: float) -> Ranked:
                 max_error = float(distance[index])
                 e_out = float(asked[index]) + float(error[index])
                 worst = {dim: where[dim].start + int(at) for dim, at in zip(sizes, index, strict=True)}
-        if e.ndim == 1:
+        if along_one:
             others = tuple(place for place, dim in enumerate(sizes) if dim not in e.dims)
             along = where[e.dims[0]]
             asked_at[along] |= np.logical_or.reduce(judged, axis=others)
@@ -234,7 +238,7 @@ def _ranked(of_model: xr.Dataset, tol: float) -> Ranked:
         mean_error = max_error if math.isinf(max_error) else float(total / known_points)
         asked_there = e.isel({dim: worst[dim] for dim in e.dims}).values.item()
         at = {**_inputs(of_model, {dim: worst.get(dim, 0) for dim in axes}), "e": float(asked_there)}
-    served = _served(e.values, asked_at, missed_at) if e.ndim == 1 else None
+    served = _served(e.values, asked_at, missed_at) if along_one else None
     return Ranked(
         str(of_model["model"].item()), points, within_points, failed_points, mean_error, max_error, at, e_out,
         served,

@@ -73,6 +73,11 @@ def is_computed(variable: xr.Variable) -> bool:
     return is_lazy(variable) and VARIES_ALONG in variable.encoding
 
 
+def is_large(variable: xr.Variable) -> bool:
+    """Whether a variable has more values than are read at once, and is not in memory."""
+    return is_lazy(variable) and variable.size > SLAB_POINTS
+
+
 def varying_dims(dataset: xr.Dataset, name: str) -> tuple[Hashable, ...]:
     """The dimensions along which a variable varies, as far as it is known; all of one that is in memory.
 

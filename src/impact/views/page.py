@@ -20,7 +20,7 @@ from ..results.plausibility import material_notes, result_notes
 from ..results.ranking import Ranked, ranking
 from ..results.replay import own
 from ..results.schema import exponents_of, is_input, plain_unit
-from ..results.slabs import MAX_SUMMARY_POINTS, is_lazy
+from ..results.slabs import MAX_SUMMARY_POINTS, is_large
 from ..results.summary import Tally, extremes_of, tally_of
 from ..sweeps.rules import MATERIAL
 from ..text import safe_text, with_year
@@ -117,14 +117,14 @@ def _about(coordinate: xr.DataArray) -> tuple[str, str]:
 
 def _range(coordinate: xr.DataArray) -> tuple[str, str, str, str]:
     """From, to, how many, and how the values are spaced."""
-    ends, lazy = ("–", "–"), is_lazy(coordinate.variable)
-    if lazy:
+    ends, large = ("–", "–"), is_large(coordinate.variable)
+    if large:
         extremes = extremes_of(coordinate.to_dataset(name="values"), "values")
         ends = (_shown(extremes.smallest), _shown(extremes.largest)) if extremes else ends
     elif coordinate.dtype.kind == "f":
         smallest, largest = (end.reduce(coordinate.values, axis=None) for end in (np.fmin, np.fmax))
         ends = _shown(float(smallest)), _shown(float(largest))
-    spacing = str(coordinate.attrs.get("equation", "")) or ("–" if lazy else _spacing(coordinate.values.ravel()))
+    spacing = str(coordinate.attrs.get("equation", "")) or ("–" if large else _spacing(coordinate.values.ravel()))
     if coordinate.name not in coordinate.dims:
         spacing = f"varies with {' and '.join(map(str, coordinate.dims))}: {spacing}"
     return *ends, f"{coordinate.size:,}", spacing
