@@ -8,6 +8,7 @@ import os
 import stat
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,9 +22,10 @@ from ..atomic import Sink, appearing
 from ..errors import ResultError, UnfinishedError, UsageError
 from ..sweeps.settings import Output
 from ..text import safe_text
-from .expand import TrajectoryTable, lazy_dataset
+from .expand import TrajectoryTable, in_memory, lazy_dataset
 from .factored import check_witnesses, stored_table, variables_of
 from .netcdf import StoredArray, read_variables, writing
+from .schema import SCHEMA
 from .sealed import MAGIC, check_seal, write_seal
 from .slabs import slabs
 from .validate import TABLE, is_quantity, schema_violation
@@ -128,8 +130,8 @@ def save(
 
     Parameters
     ----------
-    dataset : a result, or a part of one; of one that is computed or read when it is indexed no more than a little is
-        held at a time
+    dataset : a result, or a part of one; of one that is computed or read when it is indexed no more than
+        a slab is held at a time
     path : the file
     overwrite : replace a file that exists
     output : how it is stored
@@ -277,12 +279,16 @@ def load(path: str | Path) -> xr.Dataset:
     Traceback (most recent call last):
     impact.errors.ResultError: README.md: is not a readable result ...
     """
-    dataset = open_result(path)
+    dataset, table = open_with_table(path)
     if dataset.nbytes > SMALL_BYTES:
         return dataset
     with dataset:
         try:
-            return dataset.load()
+            if table is None:
+                return dataset.load()
+            # all variables of a slab together: they have much in common
+            held = [replace(one, dtype=dataset[one.name].dtype.str[1:]) for one in SCHEMA if one.name in dataset]
+            return in_memory(dataset, table, held)
         except MemoryError:
             raise
         except Exception as error:
@@ -319,7 +325,7 @@ def _dataset(file: h5py.File) -> tuple[xr.Dataset, TrajectoryTable | None, tuple
 
 
 class ImpactBackend(BackendEntrypoint):
-    """`xarray.open_dataset(path, engine="impact")`: a result of either layout, read or computed when it is indexed."""
+    """`xarray.open_dataset(path, engine="impact")`: a result of either layout, read when it is indexed."""
 
     description = "Open results of impact, of any size, in xarray"
     open_dataset_parameters = ("filename_or_obj", "drop_variables")

@@ -1,7 +1,7 @@
 """The factored layout: a result as its axes, its trajectory table and what its laws say, for any number of points.
 
-Some points, the witnesses, are stored in full. When a file is opened they are computed again: where they come to other
-numbers, the file belongs to another version, and is refused.
+Some points, the witnesses, are stored in full. When a file is opened they are computed again: where they come to
+other numbers, the file belongs to another version, and is refused.
 """
 
 from __future__ import annotations
@@ -80,8 +80,8 @@ def factored_outline(outline: xr.Dataset, table: TrajectoryTable, variables: Seq
             axes, K = whole_stiffness(table.inputs, law, rule)
             if K is None:
                 raise UsageError(
-                    f"output.layout: {law.key} has a rule of K that takes more than {MAX_STIFFNESS_VALUES:,} values "
-                    'here, expected at most so many to be factored; set output.layout = "full"'
+                    f"output.layout: {law.key} has a rule of K that takes more than {MAX_STIFFNESS_VALUES:,} "
+                    'values here, expected at most so many to be factored; set output.layout = "full"'
                 )
             about["stiffness_axes"] = [table.inputs.axes[axis].name for axis in axes]
             stiffness += K.size
@@ -326,10 +326,11 @@ def check_witnesses(table: TrajectoryTable, variables: Sequence[Variable], store
     for variable in variables:
         expected, got = stored[f"witness_{variable.name}"].values, here[variable.name]
         columns = {**known, variable.name: expected}
-        if "witness_peak_indentation" in stored:
+        has_peak = "witness_peak_indentation" in stored
+        if has_peak:
             columns["peak_indentation"] = stored["witness_peak_indentation"].values
         with np.errstate(all="ignore"):
-            scale = np.broadcast_to(scale_of(variable, columns), expected.shape)
+            scale = np.broadcast_to(scale_of(variable, columns.__getitem__, has_peak=has_peak), expected.shape)
             rounding = float(np.finfo(expected.dtype).eps) if expected.dtype.kind == "f" else 0.0
             allowed = np.maximum(WITNESS_TOLERANCE, 2.0 * rounding) * np.abs(scale)
             same = (got == expected) | (np.isnan(got) & np.isnan(expected)) | (np.abs(got - expected) <= allowed)
@@ -338,8 +339,8 @@ def check_witnesses(table: TrajectoryTable, variables: Sequence[Variable], store
             version = safe_text(str(stored.attrs.get("impact_version", "unknown")), 40)
             raise ResultError(
                 f"its witnesses expand to other numbers: {variable.name} is {got[at]:.12g}, the file has "
-                f"{expected[at]:.12g}; it was made by impact {version}, this is {__version__}: sweep its config again, or "
-                "expand it with that version (impact expand)"
+                f"{expected[at]:.12g}; it was made by impact {version}, this is {__version__}: sweep its config again, "
+                "or expand it with that version (impact expand)"
             )
 
 

@@ -195,7 +195,8 @@ def read_variables(file: h5py.File) -> tuple[dict[str, xr.Variable], dict[str, o
             variables[name] = xr.Variable(dims[name][:-1], np.char.decode(texts, "utf-8"), attributes)
         else:
             array = indexing.LazilyIndexedArray(StoredArray(name, dataset))
-            variables[name] = xr.Variable(dims[name], array, attributes)
+            chunks = {"chunksizes": dataset.chunks} if dataset.chunks else None
+            variables[name] = xr.Variable(dims[name], array, attributes, chunks)
     return variables, _attributes(file), tuple(sorted(unknown))
 
 
@@ -289,7 +290,7 @@ def _declared(name: str, dataset: h5d.DatasetID) -> int:
 
 
 def _dimensions(datasets: Mapping[str, h5py.Dataset]) -> dict[str, tuple[str, ...]]:
-    """The dimensions of each dataset, by the numbers that netCDF gives to them and to the datasets of their values."""
+    """The dimensions of each dataset, by the numbers that netCDF gives to them and to their values."""
     numbers = {
         name: np.ravel(dataset.attrs.get("_Netcdf4Coordinates", ())).tolist() for name, dataset in datasets.items()
     }
