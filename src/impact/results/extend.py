@@ -152,8 +152,8 @@ def _check_same(old: Plan, new: Plan, name: str) -> None:
     ]  # fmt: skip
     if changed or moved:
         raise UsageError(
-            f"{name}: --set changes {safe_text(', '.join([*changed, *moved]))}, expected more values of an axis, such "
-            "as --set 'sweep.m2=[1.0, 2.0]', or more models"
+            f"{name}: --set changes {safe_text(', '.join([*changed, *moved]))}, expected more values of an axis, "
+            "such as --set 'sweep.m2=[1.0, 2.0]', or more models"
         )
     if old.models == new.models and old.config.axes == new.config.axes:
         raise UsageError(f"{name}: has all of that already; expected more values of an axis, or more models")

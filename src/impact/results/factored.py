@@ -339,8 +339,8 @@ def check_witnesses(table: TrajectoryTable, variables: Sequence[Variable], store
             version = safe_text(str(stored.attrs.get("impact_version", "unknown")), 40)
             raise ResultError(
                 f"its witnesses expand to other numbers: {variable.name} is {got[at]:.12g}, the file has "
-                f"{expected[at]:.12g}; it was made by impact {version}, this is {__version__}: sweep its config again, "
-                "or expand it with that version (impact expand)"
+                f"{expected[at]:.12g}; it was made by impact {version}, this is {__version__}: sweep its config "
+                "again, or expand it with that version (impact expand)"
             )
 
 
