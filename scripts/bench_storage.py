@@ -1,9 +1,9 @@
 """How long does a sweep take to be stored in full, and how much memory, beside a plain write of the same bytes?
 
-One law over two axes that it does not depend on, so that nearly all of the time goes into the points. Printed are
-seconds and peak memory of `impact sweep` in layout full, of the same by another source tree if one is given, and of
-a plain h5py write of as many bytes, slab by slab, with SHA-256 and fsync; alternating, the best of a few. Then the
-same sweep in layout factored, its size, and the time to read one slice of either file.
+One law over two axes that it does not depend on, so that nearly all of the time goes into the points. Printed
+are seconds and peak memory of `impact sweep` in layout full, of the same by another source tree if one is given,
+and of a plain h5py write of as many bytes, slab by slab, with SHA-256 and fsync; alternating, the best of a few.
+Then the same sweep in layout factored, its size, and the time to read one slice of either file.
 
     python scripts/bench_storage.py [--points 1e7] [--repeat 3] [--against OTHER/src]
 """

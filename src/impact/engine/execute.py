@@ -200,8 +200,8 @@ def run(
             trials.update(part.number for part in running.values() or left)
             if max(trials.values()) > MAX_RETRIES:
                 raise StoreError(
-                    f"processes were killed {MAX_RETRIES + 1} times at the same trajectories: memory is short, or, "
-                    'of a program of your own, it lacks its if __name__ == "__main__":'
+                    f"processes were killed {MAX_RETRIES + 1} times at the same trajectories: memory is short; "
+                    'or, of a program of your own, it lacks its if __name__ == "__main__":'
                 ) from None
 
 
