@@ -18,7 +18,7 @@ from impact.errors import ResultError
 from impact.results.sweep import sweep_into
 
 from .forked import Done, Forked
-from .malicious import CHANGES, HARMLESS, NOT_HDF5, PATCHES, SECRET
+from .malicious import CHANGES, HARMLESS, NOT_SEALED, PATCHES, SECRET, seal
 
 # it starts many processes or reads many files: `make test-faults` runs it
 pytestmark = pytest.mark.slow
@@ -66,9 +66,9 @@ def check_refused(forked: Forked, path: Path, words: str) -> None:
         assert sorted(path.parent.iterdir()) == before, command
 
 
-@pytest.mark.parametrize("name", NOT_HDF5)
-def test_what_is_not_hdf5_is_refused(forked: Forked, tmp_path: Path, name: str) -> None:
-    make, words = NOT_HDF5[name]
+@pytest.mark.parametrize("name", NOT_SEALED)
+def test_what_is_not_sealed_is_refused(forked: Forked, tmp_path: Path, name: str) -> None:
+    make, words = NOT_SEALED[name]
     make(tmp_path / "bad.h5")
     check_refused(forked, tmp_path / "bad.h5", words)
 
@@ -80,6 +80,7 @@ def test_hdf5_with_one_thing_wrong_is_refused(forked: Forked, small: Path, tmp_p
     shutil.copy(small, path)
     with h5py.File(path, "r+") as file:
         change(file)
+    seal(path)
     check_refused(forked, path, words)
 
 
@@ -91,6 +92,7 @@ def test_hdf5_that_no_library_would_write_is_refused(
     path = tmp_path / "bad.h5"
     shutil.copy(small, path)
     make(path)
+    seal(path)
     check_refused(forked, path, words)
 
 
@@ -99,6 +101,7 @@ def test_what_is_not_read_does_no_harm(forked: Forked, small: Path, tmp_path: Pa
     path = tmp_path / "odd.h5"
     shutil.copy(small, path)
     HARMLESS[name](path)
+    seal(path)
     assert impact.load(path).identical(impact.load(small))
     for command in COMMANDS:
         done = tell(forked, path, command)

@@ -21,6 +21,7 @@ from ..contact.formula import Formula
 from ..contact.material import Material
 from ..contact.model import Parameter
 from ..contact.power import Array
+from ..contact.status import Status
 from ..contact.strike import Rebound
 from ..engine.build_impacts import Stiffness, has_stiffness_rule
 from ..engine.plan import Index, Inputs
@@ -179,12 +180,13 @@ def _cells(inputs: Inputs, cells: NDArray[np.int64]) -> Index:
     return tuple(reversed(index))
 
 
-def stored_table(dataset: xr.Dataset, read: Read) -> TrajectoryTable:
+def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: Read) -> TrajectoryTable:
     """The trajectory table of a factored file.
 
     Parameters
     ----------
     dataset : its coordinates and attributes
+    sizes : the lengths of the variables of the table
     read : values of a variable of the table, from one place to another
 
     Raises
@@ -220,7 +222,13 @@ def stored_table(dataset: xr.Dataset, read: Read) -> TrajectoryTable:
                 value += size
             rules.append(rule)
             stored.append(_law(key, about))
-    except (KeyError, TypeError, ValueError, IndexError):
+        held = {f"trajectory_{name}": starts[-1] for name in COLUMNS}
+        held |= {"trajectory_of_cell": cell} if cell else {}
+        held |= {"law_stiffness": value} if value else {}
+        if held != {name: size for name, size in sizes.items() if not name.startswith("witness_")}:
+            raise ValueError
+        _check_status(sizes["trajectory_status"], read)
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError):
         raise ResultError("is not a readable result (its laws do not fit its table)") from None
 
     def rows(model: int, start: int, stop: int) -> Rebound:
@@ -228,6 +236,14 @@ def stored_table(dataset: xr.Dataset, read: Read) -> TrajectoryTable:
         return Rebound(**{name: read(f"trajectory_{name}", part) for name in COLUMNS})
 
     return TrajectoryTable(inputs, tuple(stored), tuple(maps), Rows(maps, rows), tuple(rules))
+
+
+def _check_status(rows: int, read: Read) -> None:
+    """Refuse a status that has no meaning, which a computed one would have as well."""
+    for first in range(0, rows, SLAB_ROWS):
+        values = read("trajectory_status", slice(first, min(first + SLAB_ROWS, rows)))
+        if values.dtype != np.int8 or not np.isin(np.unique(values), [int(status) for status in Status]).all():
+            raise ValueError
 
 
 def _laws(dataset: xr.Dataset) -> dict[str, dict[str, Any]]:
