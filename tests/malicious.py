@@ -5,6 +5,7 @@ Each is sealed after it was changed, so that the seal refuses nothing: anyone ca
 
 from __future__ import annotations
 
+import json
 import mmap
 import os
 import re
@@ -13,6 +14,7 @@ import zlib
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -47,7 +49,8 @@ NOT_SEALED: dict[str, tuple[Make, str]] = {
     "png": (lambda path: path.write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(1000)), NO_SEAL),
     "netCDF-3": (_netcdf3, NO_SEAL),
     "magic": (lambda path: path.write_bytes(b"\x89HDF\r\n\x1a\n"), "is of schema version 1"),
-    "magic and zeros": (lambda path: path.write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(9999)), "is of schema version 1"),
+    "magic and zeros": (
+        lambda path: path.write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(9999)), "is of schema version 1"),
     "FIFO": (os.mkfifo, "is not a regular file"),
     "device": (lambda path: path.symlink_to("/dev/zero"), "is not a regular file"),
     "folder": (lambda path: path.mkdir(), "is not a regular file"),
@@ -236,7 +239,8 @@ CHANGES: dict[str, tuple[Change, str]] = {
     "another filter": (partial(anew, name="v1_post", compression="lzf"), HERE),
     "checksums": (partial(anew, name="v1_post", fletcher32=True), HERE),
     "a million chunks": (partial(_bare, name="other", shape=10**6, dtype="i1", chunks=(1,)), "200,000 chunks"),
-    "zip bomb": (partial(_bare, name="other", shape=10**8, dtype="f8", compression="gzip", chunks=(10**6,)), HOLDS),
+    "zip bomb": (
+        partial(_bare, name="other", shape=10**8, dtype="f8", compression="gzip", chunks=(10**6,)), HOLDS),
     "zip bomb in a chunk": (_bomb, CHUNK),
     "short chunk": (partial(_in_chunks, content=zlib.compress(b"short")), CHUNK),
     "damaged chunk": (partial(_in_chunks, content=b"not zlib"), "not a readable result"),
@@ -256,8 +260,10 @@ CHANGES: dict[str, tuple[Change, str]] = {
     "no numbers": (partial(_bare, name="other", shape=(0,), dtype="f8"), HERE),
     "null": (partial(_bare, name="other", data=h5py.Empty("f8")), HERE),
     **{f"{name} as {kind}": (
-        lambda f, name=name, kind=kind: anew(f, name, data=f[name][()].astype(kind)), f"{name}: got {np.dtype(kind)}")
-       for name, kind in (("e_out", "i4"), ("status", "f8"), ("status", "i4"), ("steps", "f8"), ("v1_post", "i8"))},
+        lambda f, name=name, kind=kind: anew(f, name, data=f[name][()].astype(kind)),
+        f"{name}: got {np.dtype(kind)}")
+       for name, kind in (("e_out", "i4"), ("status", "f8"), ("status", "i4"), ("steps", "f8"), ("v1_post", "i8"))
+    },
     "compound": (partial(_bare, name="other", data=np.zeros(3, "f8,i4")), KIND),
     "complex": (partial(_bare, name="other", data=np.zeros(3, complex)), KIND),
     "enum": (partial(_bare, name="other", data=np.zeros(3, bool)), KIND),
@@ -361,3 +367,88 @@ PATCHES: dict[str, tuple[Make, str]] = {
 HARMLESS: dict[str, Make] = {
     "references of 34 GB": _references,
 }
+
+
+def _json(file: h5py.File, attribute: str, change: Callable[[Any], object]) -> None:
+    """What an attribute holds as JSON, changed in place or returned anew."""
+    held = json.loads(file.attrs[attribute])
+    text = json.dumps(change(held) or held).encode()
+    file.attrs.create(attribute, np.bytes_(text))
+
+
+def change_law(file: h5py.File, **about: object) -> None:
+    """What a factored file says of its first law."""
+    _json(file, "laws", lambda laws: laws["bilinear"].update(about))
+
+
+def _put(file: h5py.File, name: str, place: int, value: float) -> None:
+    file[name][place] = value
+
+
+FIT = "its laws do not fit its table"
+LAWS = "laws: not those of its models"
+GRID = "axes: not those of its grid"
+WITNESSES = "its witnesses expand to other numbers"
+# what is wrong with a factored file
+FACTORED: dict[str, tuple[Change, str]] = {
+    "laws of text": (lambda f: _set(f, "", "laws", np.bytes_(b"x")), LAWS),
+    "laws in a list": (lambda f: _json(f, "laws", list), FIT),
+    "laws without an end": (lambda f: _set(f, "", "laws", np.bytes_(b"[" * 100_000)), LAWS),
+    "a law less": (lambda f: _json(f, "laws", lambda laws: {"bilinear": laws["bilinear"]}), LAWS),
+    "laws in another order": (lambda f: _json(f, "laws", lambda laws: dict(reversed(laws.items()))), LAWS),
+    "a law of nothing": (lambda f: _json(f, "laws", lambda laws: laws.update(bilinear=None)), FIT),
+    "a law without its axes": (
+        lambda f: _json(f, "laws", lambda laws: laws["bilinear"].pop("axes") and None), FIT),
+    "a law along no axis": (partial(change_law, axes=["twice"]), FIT),
+    "a law along an axis twice": (partial(change_law, axes=["alpha", "alpha"]), FIT),
+    "a law along a number": (partial(change_law, axes=[0]), FIT),
+    "a law along fewer axes": (partial(change_law, axes=["alpha"]), FIT),
+    "a law of a domain in a list": (partial(change_law, domain=[1, 2]), FIT),
+    "an exponent of text": (partial(change_law, exponent="x"), FIT),
+    "another exponent": (partial(change_law, exponent=1.5), WITNESSES),
+    "one trajectory more": (partial(change_law, trajectories=4), FIT),
+    "one trajectory less": (partial(change_law, trajectories=2), FIT),
+    "fewer trajectories than none": (partial(change_law, trajectories=-1), FIT),
+    "1e30 trajectories": (partial(change_law, trajectories=10**30), FIT),
+    "trajectories of text": (partial(change_law, trajectories="three"), FIT),
+    "trajectories that are not shared": (partial(change_law, is_shared=False), FIT),
+    "a rule of K without values": (partial(change_law, stiffness_axes=["alpha"]), FIT),
+    "axes of text": (lambda f: _set(f, "", "axes", np.bytes_(b"x")), GRID),
+    "axes in a table": (lambda f: _json(f, "axes", lambda axes: dict.fromkeys(axes, 1)), GRID),
+    "an unknown axis": (lambda f: _json(f, "axes", lambda axes: [*axes, "twice"]), GRID),
+    "an axis twice": (lambda f: _json(f, "axes", lambda axes: [*axes, axes[0]]), GRID),
+    "an axis less": (lambda f: _json(f, "axes", lambda axes: axes[:1]), "does not lie along one axis"),
+    "axes in another order": (lambda f: _json(f, "axes", lambda axes: axes[::-1]), WITNESSES),
+    "axes without an end": (lambda f: _set(f, "", "axes", np.bytes_(b"[" * 100_000)), GRID),
+    "materials in a list": (lambda f: _set(f, "", "materials", np.bytes_(b"[]")), "materials: no JSON"),
+    "no materials": (lambda f: _set(f, "", "materials", np.bytes_(b"{}")), "not a readable result"),
+    "a material of text": (lambda f: _set(f, "", "materials", np.bytes_(b'{"a": "x"}')), "materials: no JSON"),
+    "a trajectory that is not there": (partial(_put, name="trajectory_of_cell", place=5, value=3), FIT),
+    "a trajectory before the first": (partial(_put, name="trajectory_of_cell", place=5, value=-1), FIT),
+    "trajectories in fractions": (
+        lambda f: anew(f, "trajectory_of_cell", data=f["trajectory_of_cell"][()].astype(float)), FIT),
+    "a table less": (lambda f: f.__delitem__("trajectory_peak"), FIT),
+    "a table of cells less": (lambda f: f.__delitem__("trajectory_of_cell"), FIT),
+    "a table of text": (
+        lambda f: anew(f, "trajectory_peak", data=np.full(6, b"x", "S1")), "not a readable result"),
+    "an unknown status": (partial(_put, name="trajectory_status", place=5, value=99), FIT),
+    "a status of its own kind": (
+        lambda f: anew(f, "trajectory_status", data=f["trajectory_status"][()].astype("i2")), FIT),
+    "witnesses elsewhere": (partial(_put, name="witness_index", place=5, value=4), "its witnesses are not spread"),
+    "no index of witnesses": (lambda f: f.__delitem__("witness_index"), "not a readable result"),
+    "no witnesses": (
+        lambda f: [f.__delitem__(name) for name in list(f) if name.startswith("witness_")], "not a readable"),
+    "another witness": (lambda f: _put(f, "witness_v1_post", 5, f["witness_v1_post"][5] + 1e-6), WITNESSES),
+    "another last witness": (lambda f: _put(f, "witness_v1_post", 7, f["witness_v1_post"][7] - 1e-6), WITNESSES),
+    "a witness that is no number": (partial(_put, name="witness_e_out", place=3, value=np.nan), WITNESSES),
+    "a number for NaN": (partial(_put, name="witness_damping_ratio", place=0, value=0.5), WITNESSES),
+    "another status of a witness": (partial(_put, name="witness_status", place=2, value=2), WITNESSES),
+    "another trajectory": (partial(_put, name="trajectory_e_out", place=0, value=0.123), WITNESSES),
+    "witnesses as text": (
+        lambda f: anew(f, "witness_e_out", data=np.full(8, b"x", "S1")), "not a readable result"),
+    "steps as fractions": (
+        lambda f: anew(f, "witness_steps", data=f["witness_steps"][()].astype(float)), "steps: got float64"),
+}  # fmt: skip
+# values that a law cannot have
+JUNK = (None, True, -1, 10**30, float("inf"), 0.5, "", "alpha", [], ["v1"], ["alpha", "v1", "alpha"], {}, {"e": 1},
+        {"e": [0, "x"]}, [[]], {"e": [0.0, 1.0]})  # fmt: skip

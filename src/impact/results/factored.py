@@ -38,6 +38,11 @@ WITNESSES = 1_000
 WITNESS_TOLERANCE = 1e-12
 COLUMNS = tuple(column.name for column in fields(Rebound))
 SLAB_ROWS = 2**16
+# what a file says of a law, as JSON
+LAW_KINDS: Mapping[str, type] = {
+    "parameters": list, "domain": dict, "asks_for_e": bool, "is_permanent": bool, "has_chi": bool, "axes": list,
+    "trajectories": int, "is_shared": bool,
+}  # fmt: skip
 
 Read = Callable[[str, slice], NDArray[Any]]
 
@@ -201,7 +206,11 @@ def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: Read) -> T
     cell = value = 0
     try:
         for model, (key, about) in enumerate(laws.items()):
+            if any(type(about[name]) is not kind for name, kind in LAW_KINDS.items()):
+                raise TypeError
             axes = tuple(places[name] for name in about["axes"])
+            if len({*axes}) < len(axes):
+                raise ValueError
             shape = tuple(inputs.shape[axis] for axis in axes)
             own = TrajectoryMap(model, axes, shape)
             if about["is_shared"]:
@@ -210,7 +219,9 @@ def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: Read) -> T
                 # the cell from which a trajectory was taken is not needed to read it
                 own = TrajectoryMap(model, axes, shape, np.broadcast_to(np.intp(0), count), of_cell)
                 cell += own.cells
-                if of_cell.shape != (own.cells,) or of_cell.min() < 0 or of_cell.max() >= count:
+                if of_cell.dtype.kind != "i" or of_cell.shape != (own.cells,):
+                    raise ValueError
+                if of_cell.min() < 0 or of_cell.max() >= count:
                     raise ValueError
             maps.append(own)
             starts.append(starts[-1] + own.count)
@@ -311,7 +322,9 @@ def axis_names(dataset: xr.Dataset) -> list[str]:
     """The axes of the grid of a factored file, in their order."""
     try:
         names = json.loads(str(dataset.attrs["axes"]))
-        if not isinstance(names, list) or any(dataset.coords[name].dims != (name,) for name in names):
+        if not isinstance(names, list) or len({*names}) < len(names):
+            raise ValueError
+        if any(dataset.coords[name].dims != (name,) for name in names):
             raise ValueError
     except (KeyError, ValueError, TypeError, RecursionError):
         raise ResultError("is not a readable result (axes: not those of its grid)") from None
