@@ -241,7 +241,7 @@ def open_with_table(path: str | Path) -> tuple[xr.Dataset, TrajectoryTable | Non
             raise ResultError(f"is not a readable result ({odd})")
     except ResultError as error:
         file.close()
-        raise ResultError(f"{shown}: {error}") from None
+        raise _named(shown, error) from None
     except MemoryError:
         file.close()
         raise
@@ -255,6 +255,11 @@ def open_with_table(path: str | Path) -> tuple[xr.Dataset, TrajectoryTable | Non
     dataset.encoding = {"source": str(path), "seal": seal, "layout": dataset.encoding["layout"]}
     dataset.set_close(file.close)
     return dataset, table
+
+
+def _named(shown: str, error: ResultError) -> ResultError:
+    """An error that begins with the name of its file."""
+    return error if str(error).startswith(f"{shown}: ") else ResultError(f"{shown}: {error}")
 
 
 def load(path: str | Path) -> xr.Dataset:
@@ -283,6 +288,7 @@ def load(path: str | Path) -> xr.Dataset:
     if dataset.nbytes > SMALL_BYTES:
         return dataset
     with dataset:
+        shown = safe_text(str(path))
         try:
             if table is None:
                 return dataset.load()
@@ -291,10 +297,10 @@ def load(path: str | Path) -> xr.Dataset:
             return in_memory(dataset, table, held)
         except MemoryError:
             raise
+        except ResultError as error:
+            raise _named(shown, error) from None
         except Exception as error:
-            raise ResultError(
-                f"{safe_text(str(path))}: is not a readable result ({safe_text(str(error), 80)})"
-            ) from error
+            raise ResultError(f"{shown}: is not a readable result ({safe_text(str(error), 80)})") from error
 
 
 def _dataset(file: h5py.File) -> tuple[xr.Dataset, TrajectoryTable | None, tuple[str, ...]]:
@@ -311,10 +317,9 @@ def _dataset(file: h5py.File) -> tuple[xr.Dataset, TrajectoryTable | None, tuple
     witnesses = {name: variables[name].load() for name in table if name.startswith("witness_")}
     stored = xr.Dataset(witnesses, coordinates, attributes)
 
-    def read(name: str, part: slice) -> NDArray[Any]:
-        return np.asarray(StoredArray(name, file[name])._read((part,)))
-
-    found = stored_table(stored, read)
+    arrays = {name: StoredArray(name, file[name]) for name in table}
+    sizes = {name: array.shape[0] for name, array in arrays.items()}
+    found = stored_table(stored, sizes, lambda name, part: arrays[name].read((part,)))
     quantities = variables_of(stored)
     check_witnesses(found, quantities, stored)
     outline = stored.drop_vars(witnesses).drop_attrs(deep=False)

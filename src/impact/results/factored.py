@@ -21,6 +21,7 @@ from ..contact.formula import Formula
 from ..contact.material import Material
 from ..contact.model import Parameter
 from ..contact.power import Array
+from ..contact.status import Status
 from ..contact.strike import Rebound
 from ..engine.build_impacts import Stiffness, has_stiffness_rule
 from ..engine.plan import Index, Inputs
@@ -37,6 +38,11 @@ WITNESSES = 1_000
 WITNESS_TOLERANCE = 1e-12
 COLUMNS = tuple(column.name for column in fields(Rebound))
 SLAB_ROWS = 2**16
+# what a file says of a law, as JSON
+LAW_KINDS: Mapping[str, type] = {
+    "parameters": list, "domain": dict, "asks_for_e": bool, "is_permanent": bool, "has_chi": bool, "axes": list,
+    "trajectories": int, "is_shared": bool,
+}  # fmt: skip
 
 Read = Callable[[str, slice], NDArray[Any]]
 
@@ -179,12 +185,13 @@ def _cells(inputs: Inputs, cells: NDArray[np.int64]) -> Index:
     return tuple(reversed(index))
 
 
-def stored_table(dataset: xr.Dataset, read: Read) -> TrajectoryTable:
+def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: Read) -> TrajectoryTable:
     """The trajectory table of a factored file.
 
     Parameters
     ----------
     dataset : its coordinates and attributes
+    sizes : the lengths of the variables of the table
     read : values of a variable of the table, from one place to another
 
     Raises
@@ -199,7 +206,11 @@ def stored_table(dataset: xr.Dataset, read: Read) -> TrajectoryTable:
     cell = value = 0
     try:
         for model, (key, about) in enumerate(laws.items()):
+            if any(type(about[name]) is not kind for name, kind in LAW_KINDS.items()):
+                raise TypeError
             axes = tuple(places[name] for name in about["axes"])
+            if len({*axes}) < len(axes):
+                raise ValueError
             shape = tuple(inputs.shape[axis] for axis in axes)
             own = TrajectoryMap(model, axes, shape)
             if about["is_shared"]:
@@ -208,7 +219,9 @@ def stored_table(dataset: xr.Dataset, read: Read) -> TrajectoryTable:
                 # the cell from which a trajectory was taken is not needed to read it
                 own = TrajectoryMap(model, axes, shape, np.broadcast_to(np.intp(0), count), of_cell)
                 cell += own.cells
-                if of_cell.shape != (own.cells,) or of_cell.min() < 0 or of_cell.max() >= count:
+                if of_cell.dtype.kind != "i" or of_cell.shape != (own.cells,):
+                    raise ValueError
+                if of_cell.min() < 0 or of_cell.max() >= count:
                     raise ValueError
             maps.append(own)
             starts.append(starts[-1] + own.count)
@@ -220,7 +233,13 @@ def stored_table(dataset: xr.Dataset, read: Read) -> TrajectoryTable:
                 value += size
             rules.append(rule)
             stored.append(_law(key, about))
-    except (KeyError, TypeError, ValueError, IndexError):
+        held = {f"trajectory_{name}": starts[-1] for name in COLUMNS}
+        held |= {"trajectory_of_cell": cell} if cell else {}
+        held |= {"law_stiffness": value} if value else {}
+        if held != {name: size for name, size in sizes.items() if not name.startswith("witness_")}:
+            raise ValueError
+        _check_status(sizes["trajectory_status"], read)
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError):
         raise ResultError("is not a readable result (its laws do not fit its table)") from None
 
     def rows(model: int, start: int, stop: int) -> Rebound:
@@ -228,6 +247,14 @@ def stored_table(dataset: xr.Dataset, read: Read) -> TrajectoryTable:
         return Rebound(**{name: read(f"trajectory_{name}", part) for name in COLUMNS})
 
     return TrajectoryTable(inputs, tuple(stored), tuple(maps), Rows(maps, rows), tuple(rules))
+
+
+def _check_status(rows: int, read: Read) -> None:
+    """Refuse a status that has no meaning, which a computed one would have as well."""
+    for first in range(0, rows, SLAB_ROWS):
+        values = read("trajectory_status", slice(first, min(first + SLAB_ROWS, rows)))
+        if values.dtype != np.int8 or not np.isin(np.unique(values), [int(status) for status in Status]).all():
+            raise ValueError
 
 
 def _laws(dataset: xr.Dataset) -> dict[str, dict[str, Any]]:
@@ -295,7 +322,9 @@ def axis_names(dataset: xr.Dataset) -> list[str]:
     """The axes of the grid of a factored file, in their order."""
     try:
         names = json.loads(str(dataset.attrs["axes"]))
-        if not isinstance(names, list) or any(dataset.coords[name].dims != (name,) for name in names):
+        if not isinstance(names, list) or len({*names}) < len(names):
+            raise ValueError
+        if any(dataset.coords[name].dims != (name,) for name in names):
             raise ValueError
     except (KeyError, ValueError, TypeError, RecursionError):
         raise ResultError("is not a readable result (axes: not those of its grid)") from None
