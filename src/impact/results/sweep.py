@@ -33,7 +33,7 @@ from ..errors import ResultError, StoreError, UnfinishedError, UsageError
 from ..text import safe_text
 from .backend import SMALL_BYTES, check_output, check_readable, open_result, write
 from .expand import TrajectoryTable, expanded_slabs, in_memory, lazy_dataset, table_of
-from .factored import factored_outline, table_values
+from .factored import check_factored, factored_outline, table_values
 from .netcdf import MAX_LETTERS, is_text, letters
 from .schema import outline, stored
 from .summary import Survey, Tally, tally_of
@@ -97,7 +97,7 @@ def sweep_into(
     UnfinishedError : it was stopped; likewise
     """
     check_output(output, overwrite=overwrite)
-    check_labels(plan)
+    check_storable(plan)
     maps = trajectory_maps(plan)
     plan = with_core(plan, maps)
     ranges = list(trajectory_ranges(maps))
@@ -211,6 +211,18 @@ def loaded_again(work: Work, part: TrajectoryRange) -> Rebound:
     if rebound is None:
         raise StoreError(f"{safe_text(str(work.path(part.number)))}: cannot be read any more")
     return rebound
+
+
+def check_storable(plan: Plan) -> None:
+    """Refuse a plan whose result could not be stored, before anything is integrated.
+
+    Raises
+    ------
+    UsageError : its labels are too long, or a law cannot be factored
+    """
+    check_labels(plan)
+    if plan.layout == "factored":
+        check_factored(plan.inputs, plan.models)
 
 
 def check_labels(plan: Plan) -> None:
