@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from .. import __version__
 from ..contact.formula import Formula
 from ..contact.material import Material
-from ..contact.model import Parameter
+from ..contact.model import Law, Parameter
 from ..contact.power import Array
 from ..contact.status import Status
 from ..contact.strike import Rebound
@@ -78,17 +78,14 @@ def factored_outline(outline: xr.Dataset, table: TrajectoryTable, variables: Seq
         about: dict[str, Any] = {
             "exponent": law.exponent, "parameters": [parameter.name for parameter in law.parameters],
             "domain": {name: list(ends) for name, ends in law.domain.items()}, "asks_for_e": "e" in law.quantities,
-            "is_permanent": law.is_permanent, "has_chi": "chi" in law.domain,
+            "is_permanent": law.is_permanent,
             "axes": [table.inputs.axes[axis].name for axis in own.axes], "trajectories": own.count,
             "is_shared": own.is_shared, "stiffness_axes": None,
         }  # fmt: skip
         if rule is not None or has_stiffness_rule(table.inputs, law):
             axes, K = whole_stiffness(table.inputs, law, rule)
             if K is None:
-                raise UsageError(
-                    f"output.layout: {law.key} has a rule of K that takes more than {MAX_STIFFNESS_VALUES:,} "
-                    'values here, expected at most so many to be factored; set output.layout = "full"'
-                )
+                raise _too_many_stiffness_values(law)
             about["stiffness_axes"] = [table.inputs.axes[axis].name for axis in axes]
             stiffness += K.size
         laws[law.key] = about
@@ -116,6 +113,25 @@ def factored_outline(outline: xr.Dataset, table: TrajectoryTable, variables: Seq
     # without a variable that names them, the coordinates would be variables to a reader of netCDF
     names = [str(name) for name in outline.coords if name not in outline.dims]
     return made.assign_attrs(coordinates=" ".join(names))
+
+
+def check_factored(inputs: Inputs, laws: Sequence[Law]) -> None:
+    """Refuse laws that cannot be stored so, before anything is integrated.
+
+    Raises
+    ------
+    UsageError : a law's rule of K takes too many values to be stored
+    """
+    for law in laws:
+        if has_stiffness_rule(inputs, law) and whole_stiffness(inputs, law)[1] is None:
+            raise _too_many_stiffness_values(law)
+
+
+def _too_many_stiffness_values(law: Law) -> UsageError:
+    return UsageError(
+        f"output.layout: {law.key} has a rule of K that takes more than {MAX_STIFFNESS_VALUES:,} values here, "
+        'expected at most so many to be factored; set output.layout = "full"'
+    )
 
 
 def _blank(dim: str, size: int, dtype: np.dtype[Any], meaning: str) -> tuple[Any, ...]:

@@ -179,8 +179,9 @@ class StoredArray(BackendArray):
             raise ResultError(f"{path}: is not a readable result ({reason})") from error
 
     def _check_chunks(self, places: Sequence[NDArray[np.intp]]) -> None:
-        """Unpack the chunks that hold some values, no further than their size: HDF5 unpacks one to whatever it holds,
-        and reads on behind one that holds less.
+        """Unpack the chunks that hold some values, no further than their size.
+
+        HDF5 unpacks one to whatever it holds, and reads on behind one that holds less.
         """
         if not self.dataset.compression:
             return

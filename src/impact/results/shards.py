@@ -30,7 +30,7 @@ from .expand import table_of
 from .provenance import stored_config
 from .schema import outline
 from .summary import Survey
-from .sweep import fill, loaded_again, reader, store_result
+from .sweep import check_storable, fill, loaded_again, reader, store_result
 
 # what a folder says of its shard, beside the plan
 FILE = "shard.json"
@@ -110,6 +110,7 @@ def sweep_shard(
     ------
     UsageError, InUseError, StoreError, UnfinishedError : see there
     """
+    check_storable(plan)
     maps = trajectory_maps(plan)
     plan = with_core(plan, maps)
     blocks = list(trajectory_ranges(maps))

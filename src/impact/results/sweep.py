@@ -15,6 +15,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ..atomic import appearing
+from ..contact.collide import Contact
 from ..contact.strike import Rebound
 from ..engine.checkpoint import Work, folder_of, part_of, remove, working
 from ..engine.execute import Known, never, run, with_core
@@ -33,9 +34,9 @@ from ..errors import ResultError, StoreError, UnfinishedError, UsageError
 from ..text import safe_text
 from .backend import SMALL_BYTES, check_output, check_readable, open_result, write
 from .expand import TrajectoryTable, expanded_slabs, in_memory, lazy_dataset, table_of
-from .factored import factored_outline, table_values
+from .factored import check_factored, factored_outline, table_values
 from .netcdf import MAX_LETTERS, is_text, letters
-from .schema import outline, stored
+from .schema import Variable, outline, stored
 from .summary import Survey, Tally, tally_of
 
 # bytes that a result takes besides its values, about
@@ -97,7 +98,7 @@ def sweep_into(
     UnfinishedError : it was stopped; likewise
     """
     check_output(output, overwrite=overwrite)
-    check_labels(plan)
+    check_storable(plan)
     maps = trajectory_maps(plan)
     plan = with_core(plan, maps)
     ranges = list(trajectory_ranges(maps))
@@ -213,6 +214,18 @@ def loaded_again(work: Work, part: TrajectoryRange) -> Rebound:
     return rebound
 
 
+def check_storable(plan: Plan) -> None:
+    """Refuse a plan whose result could not be stored, before anything is integrated.
+
+    Raises
+    ------
+    UsageError : its labels are too long, or a law cannot be factored
+    """
+    check_labels(plan)
+    if plan.layout == "factored":
+        check_factored(plan.inputs, plan.models)
+
+
 def check_labels(plan: Plan) -> None:
     """Refuse a plan whose labels would not be read again, before anything is integrated.
 
@@ -286,8 +299,7 @@ def store_result(
                 extension.fill(model, where, values)
             for name, array in values.items():
                 yield name, (model, *where) if "model" in whole[name].dims else where, array
-            radius = np.fmin(contact.lanes.R1, contact.lanes.R2)
-            tally.add(values, model, [place.start for place in where], radius)
+            _add(tally, model, where, contact, values)
             points += values["status"].size
             check(points)
 
@@ -303,6 +315,19 @@ def store_result(
         check_readable(sink, output)
     if not is_full:
         whole = lazy_dataset(whole, table, variables)
-        tally = tally_of(whole)
+        tally = _tally_of_points(table, variables) if plan.points <= NO_CHECKPOINT_POINTS else tally_of(whole)
     whole.encoding = {"source": str(output), "seal": seal, "layout": plan.layout}
     return Survey(whole, tally, at.of_trajectories)
+
+
+def _tally_of_points(table: TrajectoryTable, variables: Sequence[Variable]) -> Tally:
+    """What came out, point by point: unlike `tally_of` it knows the radii."""
+    tally = Tally()
+    for model, where, contact, values in expanded_slabs(table, variables):
+        _add(tally, model, where, contact, values)
+    return tally
+
+
+def _add(tally: Tally, model: int, where: tuple[slice, ...], contact: Contact, values: Values) -> None:
+    radius = np.fmin(contact.lanes.R1, contact.lanes.R2)
+    tally.add(values, model, [place.start for place in where], radius)
