@@ -40,7 +40,7 @@ COLUMNS = tuple(column.name for column in fields(Rebound))
 SLAB_ROWS = 2**16
 # what a file says of a law, as JSON
 LAW_KINDS: Mapping[str, type] = {
-    "parameters": list, "domain": dict, "asks_for_e": bool, "is_permanent": bool, "has_chi": bool, "axes": list,
+    "parameters": list, "domain": dict, "asks_for_e": bool, "is_permanent": bool, "axes": list,
     "trajectories": int, "is_shared": bool,
 }  # fmt: skip
 
