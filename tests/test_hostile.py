@@ -160,7 +160,7 @@ def test_of_other_witnesses_both_versions_are_named(
         impact.load(path)
 
 
-@pytest.mark.parametrize("key", ["exponent", "parameters", "domain", "asks_for_e", "is_permanent", "has_chi",
+@pytest.mark.parametrize("key", ["exponent", "parameters", "domain", "asks_for_e", "is_permanent",
                                  "axes", "trajectories", "is_shared", "stiffness_axes"])  # fmt: skip
 def test_what_a_law_cannot_be_is_refused_or_changes_no_command(factored: Path, tmp_path: Path, key: str) -> None:
     path = tmp_path / "bad.h5"
