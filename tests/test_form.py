@@ -1,4 +1,4 @@
-"""What the commands could make no sense of is neither stored nor read, though its digest is right."""
+"""What the commands could make no sense of is neither stored nor read, though its seal holds."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from h5netcdf.utils import CompatibilityError
 
 import impact
 from impact.errors import ResultError, UsageError
-from impact.results import store
+from impact.results import backend
 
 Change = Callable[[xr.Dataset], xr.Dataset]
 DEEP = "[" * 100_000
@@ -41,7 +41,7 @@ RESULTS: dict[str, tuple[Change, str]] = {
     "title of all": (lambda r: r.assign_coords(title="x"), "title of the models is missing"),
     "reference by model": (lambda r: r.assign(v1_reference=r["v1_post"]), "v1_reference: lies along model"),
     "unknown status": (lambda r: r.assign(status=r["status"] + 70), "status: a number without a meaning"),
-    "no config": (lambda r: r.drop_attrs(deep=False).assign_attrs(schema_version=1, title="x"), "no config"),
+    "no config": (lambda r: r.drop_attrs(deep=False).assign_attrs(schema_version=2, title="x"), "no config"),
     "config of numbers": (lambda r: r.assign_attrs(config=5), "no config, or not as text"),
     "tolerance of text": (lambda r: r.assign_attrs(rtol="x"), "no rtol, or not as a number"),
     "config_set": (lambda r: r.assign_attrs(config_set="{}"), "config_set: no JSON of the right kind"),
@@ -67,7 +67,7 @@ def check(made: xr.Dataset, words: str, path: Path, monkeypatch: pytest.MonkeyPa
         impact.save(made, path)
     assert not path.exists()
     with monkeypatch.context() as patch:
-        patch.setattr(store, "misfit", lambda _: None)
+        patch.setattr(backend, "schema_violation", lambda _: None)
         try:
             impact.save(made, path)
         except (UsageError, TypeError, CompatibilityError):

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import errno
+import json
 import os
 import re
 import shutil
 import stat
 import subprocess
 import sys
+import time
+import tomllib
+import tracemalloc
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -17,10 +22,14 @@ import pytest
 import xarray as xr
 
 import impact
-from impact.errors import ResultError, StoreError, UsageError
-from impact.results.store import write_whole
+from impact.api import prepare
+from impact.engine.executors import team_of
+from impact.errors import ResultError, StoreError, UnfinishedError, UsageError
+from impact.results.backend import open_result, write_whole
+from impact.results.sealed import write_seal
+from impact.results.sweep import sweep_into
 
-from .conftest import ROOT
+from .conftest import ROOT, Run
 
 
 def test_what_was_saved_is_loaded(stored: Path, figure6: xr.Dataset) -> None:
@@ -34,24 +43,152 @@ def test_a_sweep_of_every_kind_of_axis_comes_back(wide: xr.Dataset, tmp_path: Pa
     xr.testing.assert_identical(impact.load(tmp_path / "wide.h5"), wide)
 
 
-def test_xarray_and_h5py_read_it(stored: Path, figure6: xr.Dataset) -> None:
-    with xr.open_dataset(stored, engine="h5netcdf") as opened:
-        assert opened["e_out"].values.tobytes() == figure6["e_out"].values.tobytes()
-        assert opened["status"].attrs["flag_meanings"].startswith("ok no_impact limit")
+FACTORED = ["output.layout=factored"]
+OPTIONS: dict[str, dict[str, object]] = {
+    "plain": {}, "float32": {"dtype": "float32"}, "gzip": {"compression": "gzip"}, "chunks": {"chunks": {"e": 20}},
+    "all": {"dtype": "float32", "compression": "gzip", "chunks": {"e": 33}},
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def factored(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The result of configs/figure6.toml of the other layout."""
+    path = tmp_path_factory.mktemp("factored") / "figure6.h5"
+    sweep_into(path, prepare(ROOT / "configs" / "figure6.toml", FACTORED))
+    return path
+
+
+@pytest.mark.parametrize("engine", [{}, {"engine": "impact"}])
+def test_xarray_opens_both_layouts(
+    stored: Path, factored: Path, figure6: xr.Dataset, engine: dict[str, Any]
+) -> None:
+    for path, layout in ((stored, "full"), (factored, "factored")):
+        with xr.open_dataset(path, **engine) as opened:
+            assert opened.encoding["layout"] == layout
+            # what the config was overridden with is an attribute
+            same = opened.assign_attrs({key: figure6.attrs[key] for key in ("config_set", "fingerprint")})
+            xr.testing.assert_identical(same.compute(), figure6)
+        with xr.open_dataset(path, drop_variables=["steps", "e_out"], **engine) as opened:
+            assert set(figure6.variables) - set(opened.variables) == {"steps", "e_out"}
+
+
+def _text(values: np.ndarray) -> list[object]:
+    return [value.decode() if isinstance(value, bytes) else value for value in np.ravel(values).tolist()]
+
+
+@pytest.mark.parametrize("option", OPTIONS)
+@pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4"])
+def test_xarray_reads_it_as_any_netcdf_file(
+    wide: xr.Dataset, figure6: xr.Dataset, tmp_path: Path, engine: str, option: str
+) -> None:
+    if engine == "netcdf4":
+        pytest.importorskip("netCDF4")
+    options = {**OPTIONS[option]}
+    for result in (figure6, wide):
+        if "chunks" in options:
+            options["chunks"] = {"e": 2}
+        path = tmp_path / f"{len(result.dims)}.h5"
+        config = tomllib.loads(result.attrs["config"])
+        sweep_into(path, prepare(config | {"output": options}))
+        expected = impact.load(path)
+        with xr.open_dataset(path, engine=engine) as opened:
+            assert dict(opened.sizes) == dict(expected.sizes)
+            assert set(opened.variables) == set(expected.variables)
+            assert set(opened.coords) == set(expected.coords)
+            for name, variable in expected.variables.items():
+                assert opened[name].dims == variable.dims, name
+                if variable.dtype.kind in "fi":
+                    assert opened[name].values.tobytes() == variable.values.tobytes(), name
+                else:
+                    assert _text(opened[name].values) == _text(variable.values), name
+                assert {key: opened[name].attrs.get(key) for key in ("units", "long_name")} == {
+                    key: variable.attrs.get(key) for key in ("units", "long_name")
+                }
+            assert opened.attrs["config"] == expected.attrs["config"]
+
+
+@pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4"])
+def test_of_a_factored_file_they_read_the_table(factored: Path, engine: str) -> None:
+    if engine == "netcdf4":
+        pytest.importorskip("netCDF4")
+    with xr.open_dataset(factored, engine=engine) as opened:
+        assert opened["trajectory_e_out"].dims == ("trajectory",)
+        assert opened["witness_index"].values.tolist() == list(range(303))
+        assert list(json.loads(opened.attrs["laws"])) == _text(opened["model"].values)
+        assert _text(opened["model"].values)[2] == "gharib-hurmuzlu-2012"
+        assert "v1" in opened.coords
+
+
+def test_h5py_reads_it(stored: Path, figure6: xr.Dataset) -> None:
     with h5py.File(stored) as file:
-        assert file["e_out"].shape == (3, 101)
+        assert file["e_out"][()].tobytes() == figure6["e_out"].values.tobytes()
         assert file["e_out"].attrs["units"] == b"1"
-        assert [key.decode() for key in file["model"][:]] == figure6["model"].values.tolist()
+        labels = [b"".join(letters).rstrip(b"\0").decode() for letters in file["model"][()]]
+        assert labels == figure6["model"].values.tolist()
         assert file["status"].dtype == np.int8
         assert file["e_out"].dims[1].keys() == ["e"]
 
 
 @pytest.mark.skipif(shutil.which("ncdump") is None, reason="ncdump (Debian: netcdf-bin) is not installed")
-def test_ncdump_reads_it(stored: Path) -> None:
+def test_ncdump_reads_it(stored: Path, factored: Path) -> None:
     header = subprocess.run(["ncdump", "-h", stored], capture_output=True, text=True, check=True).stdout
     assert re.search(r"model = 3 ;\s+e = 101 ;", header) or re.search(r"e = 101 ;\s+model = 3 ;", header)
     assert "double e_out(model, e) ;" in header
     assert "byte status(model, e) ;" in header
+    labels = subprocess.run(["ncdump", "-v", "model,e", stored], capture_output=True, text=True, check=True).stdout
+    assert '"gharib-hurmuzlu-2012"' in labels
+    assert "0.5, 0.51, 0.52" in labels
+    header = subprocess.run(["ncdump", "-h", factored], capture_output=True, text=True, check=True).stdout
+    assert "double trajectory_e_out(trajectory) ;" in header
+
+
+@pytest.mark.skipif(shutil.which("h5ls") is None, reason="h5ls (Debian: hdf5-tools) is not installed")
+def test_h5ls_reads_it(stored: Path, factored: Path) -> None:
+    listed = subprocess.run(["h5ls", stored], capture_output=True, text=True, check=True).stdout
+    assert re.search(r"e_out +Dataset \{3, 101\}", listed)
+    listed = subprocess.run(["h5ls", factored], capture_output=True, text=True, check=True).stdout
+    assert re.search(r"trajectory_e_out +Dataset \{303\}", listed)
+
+
+@pytest.mark.parametrize("layout", ["full", "factored"])
+@pytest.mark.parametrize("option", OPTIONS)
+def test_two_processes_write_equal_bytes(cli: Run, tmp_path: Path, layout: str, option: str) -> None:
+    if layout == "factored" and "chunks" in OPTIONS[option]:
+        pytest.skip("a factored file has chunks of its own")
+    config = (ROOT / "configs" / "figure6.toml").read_text(encoding="utf-8")
+    text = f'{config}\n[output]\nlayout = "{layout}"\n'
+    for name, value in OPTIONS[option].items():
+        text += f"{name} = {json.dumps(value).replace(':', ' =')}\n"
+    (tmp_path / "c.toml").write_text(text, encoding="utf-8")
+    contents = set()
+    # the hash of a text is another in each process begun anew
+    for name, environment in (("a", {"PYTHONHASHSEED": "1"}), ("b", {"PYTHONHASHSEED": "2"}), ("c", {})):
+        done = cli("sweep", "c.toml", "-o", f"{name}.h5", cwd=tmp_path, **environment)
+        assert done.returncode == 0, done.stderr
+        contents.add((tmp_path / f"{name}.h5").read_bytes())
+    assert len(contents) == 1
+
+
+MANY = {
+    "models": ["lankarani-nikravesh-1990", "gharib-hurmuzlu-2012"],
+    "sweep": {"e": {"linspace": [0.01, 1.0, 40_000]}, "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6e9},
+    "solver": {"rtol": 1e-4},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("layout", ["full", "factored"])
+def test_threads_processes_and_an_interruption_change_no_byte(tmp_path: Path, layout: str) -> None:
+    plan = prepare(MANY | {"output": {"layout": layout}})
+    sweep_into(tmp_path / "alone.h5", plan)
+    sweep_into(tmp_path / "threads.h5", plan, team=team_of(threads=2))
+    sweep_into(tmp_path / "jobs.h5", plan, team=team_of(jobs=2))
+    answers = iter([False] * 3 + [True] * 99)
+    with pytest.raises(UnfinishedError):
+        sweep_into(tmp_path / "again.h5", plan, should_stop=lambda: next(answers))
+    assert not (tmp_path / "again.h5").exists()
+    sweep_into(tmp_path / "again.h5", plan, resume=True)
+    assert len({path.read_bytes() for path in tmp_path.glob("*.h5")}) == 1
+    assert len(list(tmp_path.iterdir())) == 4
 
 
 def test_equal_inputs_give_equal_bytes(figure6: xr.Dataset, stored: Path, tmp_path: Path) -> None:
@@ -166,14 +303,18 @@ def test_what_is_no_result_is_refused(stored: Path, tmp_path: Path) -> None:
     (tmp_path / "empty.h5").write_bytes(b"")
     (tmp_path / "half.h5").write_bytes(stored.read_bytes()[:20_000])
     newer = tmp_path / "newer.h5"
-    shutil.copy(stored, newer)
-    with h5py.File(newer, "r+") as file:
-        file.attrs["schema_version"] = 99
+    newer.write_bytes(stored.read_bytes().replace(b"\nschema 2\n", b"\nschema 3\n", 1))
+    shutil.copy(stored, tmp_path / "inside.h5")
+    with (tmp_path / "inside.h5").open("r+b") as sealed:
+        with h5py.File(sealed, "r+") as file:
+            file.attrs["schema_version"] = 99
+        write_seal(sealed)
     for name, words in {
-        "absent.h5": "does not exist", ".": "not a regular file", "other.h5": "not a result of impact",
+        "absent.h5": "does not exist", ".": "not a regular file", "other.h5": "no result of impact",
         "text.h5": "not a readable result", "empty.h5": "not a readable result",
-        "half.h5": "not a readable result",
-        "newer.h5": "schema version 99",
+        "half.h5": "is damaged",
+        "newer.h5": "has schema version 3, this program reads 2; sweep its config again: impact sweep",
+        "inside.h5": "has schema version 99, this program reads 2",
     }.items():  # fmt: skip
         with pytest.raises(ResultError, match=words):
             impact.load(tmp_path / name)
@@ -224,3 +365,111 @@ def test_without_hard_links(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     with pytest.raises(UsageError, match="exists"):
         write_whole(tmp_path / "out.h5", b"other", overwrite=False)
     assert [p.name for p in tmp_path.iterdir()] == ["out.h5"]
+
+
+@pytest.mark.parametrize("schema_version", [1, None])
+def test_a_file_of_version_1_is_refused_with_how_to_make_it_again(
+    cli: Run, stored: Path, tmp_path: Path, schema_version: int | None
+) -> None:
+    # as they were: HDF5 from the first byte on
+    with xr.open_dataset(stored, engine="h5netcdf") as opened:
+        old = opened.drop_attrs(deep=False).load()
+    if schema_version:
+        old = old.assign_attrs(schema_version=schema_version, content_digest="0" * 64)
+    old.to_netcdf(tmp_path / "old.h5", engine="h5netcdf")
+    assert (tmp_path / "old.h5").read_bytes().startswith(b"\x89HDF\r\n\x1a\n")
+    told = (
+        "old.h5: is of schema version 1, or no result of impact; expected version 2: sweep its config again: "
+        "impact sweep CONFIG.toml -o RESULT --overwrite\n"
+    )
+    for command in (["info"], ["plot", "-o", "x.png"], ["recommend"], ["rerun"]):
+        done = cli(command[0], "old.h5", *command[1:], cwd=tmp_path)
+        assert (done.returncode, done.stdout, done.stderr) == (2, "", told), command
+    assert [path.name for path in tmp_path.iterdir()] == ["old.h5"]
+
+
+def test_a_time_history_is_written_by_run_and_read_again(cli: Run, tmp_path: Path) -> None:
+    words = ["run", ROOT / "configs" / "figure6.toml", "--model", "gharib-hurmuzlu-2012", "--at", "e=0.5"]
+    for name in ("a.h5", "b.h5"):
+        done = cli(*words, "--history", name, cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+    assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
+    history = impact.load(tmp_path / "a.h5")
+    assert history.encoding["layout"] == "full"
+    assert float(history["delta"][0]) == 0.0
+    assert history.attrs["e_kinetic"] == pytest.approx(0.5, abs=0.3)
+    impact.save(history, tmp_path / "again.h5")
+    xr.testing.assert_identical(impact.load(tmp_path / "again.h5"), history)
+    with xr.open_dataset(tmp_path / "a.h5", engine="h5netcdf") as opened:
+        assert opened["F"].values.tobytes() == history["F"].values.tobytes()
+    assert cli("plot", "a.h5", "-k", "loop", "-o", "loop.png", cwd=tmp_path).returncode == 0
+
+
+LARGE = {
+    "models": ["hertz"],
+    "sweep": {"e": {"linspace": [0.0, 1.0, 1_000]}, "v1": {"linspace": [1.0, 2.0, 10_000]}, "m2": 1.0, "K": 6e9,
+              "m1": {"linspace": [1.0, 2.0, 100_000]}},
+}  # fmt: skip
+
+
+def test_what_no_memory_holds_is_refused_before_it_is_computed(tmp_path: Path) -> None:
+    sweep_into(tmp_path / "large.h5", prepare(LARGE, max_points=10**13))
+    with open_result(tmp_path / "large.h5") as opened:
+        assert opened["e_out"].size == 10**12
+        tracemalloc.start()
+        begun = time.monotonic()
+        for compute in (lambda: opened["e_out"].mean(), lambda: opened.load(), lambda: opened["status"].values):
+            with pytest.raises(MemoryError, match=r"1,000,000,000,000 values take .* select a part first"):
+                compute()
+        assert time.monotonic() - begun < 1.0
+        assert tracemalloc.get_traced_memory()[1] < 20_000_000
+        tracemalloc.stop()
+        assert float(opened["e_out"].isel(v1=0, m1=slice(0, 50)).mean()) == pytest.approx(1.0, abs=1e-9)
+
+
+# what could be neither stored nor read is refused before anything is integrated: so many trajectories take minutes
+SLOW = """
+models = ["hertz"]
+[sweep]
+e = 1.0
+v1 = {linspace = [1.0, 2.0, 1000]}
+m1 = 1.0
+m2 = 1.0
+"""
+SLOW_LAW = """
+models = ["lankarani-nikravesh-1990"]
+[sweep]
+e = {linspace = [0.0, 1.0, 3000000]}
+v1 = 1.0
+m1 = 1.0
+m2 = 1.0
+K = 6e9
+"""
+
+
+def _refused(cli: Run, folder: Path, config: str, output: str, *words: str) -> str:
+    (folder / "c.toml").write_text(config, encoding="utf-8")
+    before = sorted(path.name for path in folder.iterdir())
+    begun = time.monotonic()
+    done = cli("sweep", "c.toml", "-o", output, *words, cwd=folder)
+    assert time.monotonic() - begun < 30.0
+    assert (done.returncode, done.stdout) == (2, ""), done
+    (line,) = done.stderr.splitlines()
+    assert sorted(path.name for path in folder.iterdir()) == before
+    return line
+
+
+def test_longer_labels_than_a_file_can_have_are_refused(cli: Run, tmp_path: Path) -> None:
+    # each takes as many letters as the longest
+    names = ["x" * 400_000, *(f"y{number}" for number in range(19))]
+    materials = "".join(f"[materials.{name}]\nE = 2e11\nnu = 0.3\nrho = 7800\n" for name in names)
+    line = _refused(cli, tmp_path, f"{SLOW}material = {json.dumps(names)}\n{materials}", "out.h5")
+    assert "labels take 8," in line
+    assert "expected at most 4,000,000: give materials shorter names" in line
+
+
+@pytest.mark.parametrize("length", [242, 255, 300])
+def test_longer_names_than_a_folder_can_have_are_refused(cli: Run, tmp_path: Path, length: int) -> None:
+    line = _refused(cli, tmp_path, SLOW_LAW, "r" * (length - 3) + ".h5")
+    assert f"got a name of {length} bytes, expected at most " in line
+    assert len(line) < 200

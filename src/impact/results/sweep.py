@@ -242,7 +242,8 @@ def check_labels(plan: Plan) -> None:
 
 def finished(path: Path, plan: Plan) -> Survey | None:
     """What a file holds, if it is the whole result of a plan."""
-    if path.is_symlink() or not path.is_file():
+    # of a name that is too long, pathlib would raise
+    if os.path.islink(path) or not os.path.isfile(path):
         return None
     try:
         dataset = open_result(path)
