@@ -195,9 +195,10 @@ def serve() -> None:
 def _warm_up() -> None:
     """Make ranges and slabs small before anything takes their sizes, and import what a sweep imports."""
     from impact.engine import trajectories
-    from impact.results import factored, slabs
 
     trajectories.RANGE_TRAJECTORIES, trajectories.trajectory_ranges.__defaults__ = RANGE, (RANGE,)
+    from impact.results import factored, slabs
+
     slabs.slabs.__defaults__, factored.SLAB_ROWS = (SLAB,), RANGE
     import impact.cli.sweeping
 

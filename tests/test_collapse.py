@@ -98,7 +98,7 @@ def test_within_blocks_too_where_there_are_too_many_cells(config: dict[str, obje
 def test_a_grid_by_its_axes_is_its_points_one_by_one(config: dict[str, object]) -> None:
     plan = prepare(config, plugins=[DASHPOT, SPEED])
     at = np.ix_(*map(np.arange, plan.shape)) if plan.shape else ()
-    flat = tuple(np.unravel_index(np.arange(plan.grid), plan.shape)) if plan.shape else ()
+    flat = tuple(np.unravel_index(np.arange(plan.inputs.cells), plan.shape)) if plan.shape else ()
     for model in plan.models:
         grid, points = (build_impacts(plan.inputs, model, index) for index in (at, flat))
         for name in ("e", "v0", "m", "K", "n", "length", "R1", "E2"):
@@ -143,7 +143,10 @@ def test_a_plan_of_any_size_is_counted_without_its_points() -> None:
     assert [one.count for one in trajectory_maps(plan)] == [100, 10_000]
     found = estimate(plan)
     assert (found.points, found.trajectories) == (plan.points, 10_100)
-    assert found.bytes > 100 * plan.points
+    # a row of the table for each trajectory, and the number of the trajectory for each of as many cells
+    assert 50 * 10_100 < found.bytes < 100 * 10_100
+    full = estimate(prepare({**config, "output": {"layout": "full"}}, plugins=[SPEED], max_points=10**15))
+    assert full.bytes > 100 * plan.points
     assert [one.axes for one in found.models] == [("e",), ("v1",)]
 
 
