@@ -32,7 +32,7 @@ def test_the_toml_and_the_commands_of_daily_use(cli: Run, tmp_path: Path) -> Non
     (toml,) = blocks("toml")
     (tmp_path / "config.toml").write_text(toml, encoding="utf-8")
     commands = [line for block in blocks("sh")[1:] for line in block.splitlines() if line]
-    assert len(commands) == 11
+    assert len(commands) == 13
     for line in commands:
         program, *words = shlex.split(line)
         assert program == "impact"
@@ -58,20 +58,21 @@ def test_generated_pages_are_fresh() -> None:
 
 
 def test_the_page_on_sweeps_says_what_is_so() -> None:
-    from impact.engine.trajectories import BLOCK, MOST_CELLS
-    from impact.results.sweep import FEW
-    from impact.results.writer import PIECE
+    from impact.engine.trajectories import MAX_CELLS, RANGE_TRAJECTORIES
+    from impact.results.netcdf import CHUNK_VALUES
+    from impact.results.sweep import NO_CHECKPOINT_POINTS
     from impact.sweeps.config import parse_config
     from impact.sweeps.grid import MAX_POINTS
     from impact.sweeps.ranges import MAX_AXIS
 
     page = (ROOT / "docs" / "sweeps.md").read_text(encoding="utf-8")
-    for number in (FEW, PIECE, MAX_AXIS, BLOCK, MOST_CELLS):
+    for number in (NO_CHECKPOINT_POINTS, CHUNK_VALUES, MAX_AXIS, RANGE_TRAJECTORIES, MAX_CELLS):
         assert f"{number:,}" in page
     assert MAX_POINTS == 10**9
     (toml,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
     output = parse_config((ROOT / "configs" / "figure6.toml").read_text(encoding="utf-8") + toml).output
-    assert (output.dtype, output.compression, output.chunks) == ("float32", "gzip", {"e": 50})
+    assert (output.dtype, output.compression, output.layout) == ("float32", "gzip", "full")
+    assert output.chunks == {"e": 50}
 
 
 def test_links_lead_somewhere() -> None:
