@@ -42,7 +42,7 @@ from impact.contact.lanes import Lanes
 from impact.contact.model import ForceModel
 from impact.contact.oracles import delivered_restitution
 from impact.engine.executors import team_of
-from impact.engine.trajectories import BLOCK, even
+from impact.engine.trajectories import RANGE_TRAJECTORIES, even
 
 # those of the paper whose restitution is e's alone: (10), (19)-(23), (28), (29), (33) and (43)
 PAPER = (
@@ -77,7 +77,7 @@ def core(
     blocks = []
     for place, model in enumerate(models):
         mine = e[place :: len(models)]
-        size = even(mine.size, BLOCK)
+        size = even(mine.size, RANGE_TRAJECTORIES)
         blocks += [(model, table1(mine[first : first + size], model)) for first in range(0, mine.size, size)]
 
     def outputs(block: tuple[ForceModel, Lanes]) -> tuple[float, int]:

@@ -3,11 +3,11 @@
 One sweep of two laws, all impacts distinct, nothing collapsed, goes into a file by one process, by two, by one
 and by two workers of dask; scheduler and workers are started by command line on this machine. Printed are
 trajectories a second from the plan to the whole file, and their ratio to one process. For dask also the
-processor time of the driver and of the scheduler for a block while workers integrate, beyond what they take when
+processor time of the driver and of the scheduler for a range while workers integrate, beyond what they take when
 idle, and the bytes over the wire for a trajectory, as the loopback interface counts them; and from these how
-many workers they keep busy: the time that a worker takes for a block over theirs. The file is assembled when all
+many workers they keep busy: the time that a worker takes for a range over theirs. The file is assembled when all
 is integrated, in its own time. The files go where TMPDIR says; in memory, the disk is left out of it, on which
-each block waits once.
+each range waits once.
 
     TMPDIR=/dev/shm python scripts/bench_scaling.py [--points 500000] [--core numpy]
 """
@@ -33,13 +33,12 @@ from rich.console import Console
 from rich.table import Table
 
 from impact.api import prepare
-from impact.engine.blocks import Block, integrated, work
 from impact.engine.dask import cluster
-from impact.engine.execute import kit_of, settled
+from impact.engine.execute import context_of, integrate, with_core, work
 from impact.engine.executors import AHEAD, Team, team_of
 from impact.engine.plan import Plan
 from impact.engine.progress import Progress
-from impact.engine.trajectories import block_of, stretches, trajectories
+from impact.engine.trajectories import Columns, columns_of, trajectory_maps, trajectory_ranges
 from impact.results.sweep import sweep_into
 
 IDLE = 5.0  # s
@@ -56,7 +55,7 @@ def plan_of(points: int, core: str) -> Plan:
             "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6.118486349e9,
         },
     })  # fmt: skip
-    return settled(found, trajectories(found))
+    return with_core(found, trajectory_maps(found))
 
 
 @contextmanager
@@ -121,7 +120,7 @@ def _measured(plan: Plan, team: Team, scheduler: psutil.Process | None) -> tuple
     return Cost.now(scheduler).since(begun).clock, ends[-1].since(ends[0])
 
 
-def by_dask(plan: Plan, block: Block, workers: int) -> tuple[float, Cost]:
+def by_dask(plan: Plan, key: str, columns: Columns, workers: int) -> tuple[float, Cost]:
     """The same, by workers that have loaded what they need."""
     with (
         tempfile.TemporaryDirectory() as folder,
@@ -131,7 +130,7 @@ def by_dask(plan: Plan, block: Block, workers: int) -> tuple[float, Cost]:
         while joined.team.room() < AHEAD * workers:
             time.sleep(0.1)
         with joined.team.executor() as executor:
-            wait([executor.submit(work, block, kit_of(plan)) for _ in range(4 * workers)])
+            wait([executor.submit(work, key, columns, context_of(plan)) for _ in range(4 * workers)])
         # both do something while nothing is asked of them
         begun = Cost.now(scheduler)
         time.sleep(IDLE)
@@ -149,30 +148,31 @@ def main() -> None:
     parse.add_argument("--core", default="numpy", choices=["numpy", "numba"])
     asked = parse.parse_args()
     plan = plan_of(asked.points, asked.core)
-    found = trajectories(plan)
-    blocks = list(stretches(found))
-    block = block_of(plan, found, blocks[len(blocks) // 2])
+    maps = trajectory_maps(plan)
+    ranges = list(trajectory_ranges(maps))
+    middle = ranges[len(ranges) // 2]
+    model, columns = plan.models[middle.model], columns_of(plan, maps, middle)
     for _ in range(2):
         begun = time.process_time()
-        integrated(plan.models[blocks[len(blocks) // 2].model], block, plan.config.solver)
+        integrate(model, columns, plan.config.solver)
         alone = time.process_time() - begun
-    print(f"{plan.points:,} points, {len(blocks)} blocks, {asked.core}, {os.cpu_count()} cores")
+    print(f"{plan.points:,} points, {len(ranges)} ranges, {asked.core}, {os.cpu_count()} cores")
     rows = Table("", "trajectories/s", "ratio", "driver", "scheduler", "bytes", box=None)
     one, cost = measured(plan, team_of(1))
     for way, (seconds, cost) in (
         ("1 process", (one, None)),
         ("2 processes", (measured(plan, team_of(2))[0], None)),
-        ("1 worker of dask", by_dask(plan, block, 1)),
-        ("2 workers of dask", by_dask(plan, block, 2)),
+        ("1 worker of dask", by_dask(plan, model.key, columns, 1)),
+        ("2 workers of dask", by_dask(plan, model.key, columns, 2)),
     ):
         told = [f"{plan.points / seconds:,.0f}", f"{one / seconds:.2f}"]
         if cost is not None:
-            each = (cost.driver / len(blocks), cost.scheduler / len(blocks))
+            each = (cost.driver / len(ranges), cost.scheduler / len(ranges))
             told += [*(f"{1e3 * own:.1f} ms" for own in each), f"{cost.wire / plan.points:.0f}"]
         rows.add_row(way, *told)
     Console(width=120).print(rows)
-    each = max(cost.driver, cost.scheduler) / len(blocks)
-    print(f"a worker takes {1e3 * alone:.0f} ms for a block: {alone / each:.0f} workers keep the busier one busy")
+    each = max(cost.driver, cost.scheduler) / len(ranges)
+    print(f"a worker takes {1e3 * alone:.0f} ms for a range: {alone / each:.0f} workers keep the busier one busy")
 
 
 if __name__ == "__main__":

@@ -1,13 +1,15 @@
 """Sweeps that meet a fault: the command line in real processes, in which a call of the system kills or fails.
 
-A server imports what a sweep needs once, makes the blocks small, and forks. Its standard input has a request a
-line, what to start or whom to wait for; its standard output a reply a line, a process id or how the process ended.
+A server imports what a sweep needs once, makes ranges and slabs small, and forks. Its standard input has a request
+a line, what to start or whom to wait for; its standard output a reply a line, a process id or how the process
+ended.
 """
 
 from __future__ import annotations
 
 import errno
 import gc
+import hashlib
 import io
 import itertools
 import json
@@ -21,14 +23,14 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NoReturn
 
 from .forked import PAUSE, ROOT, _command
 
-BLOCK, BOX = 64, 128  # trajectories of a block, and points of a box: many of each in little time
+RANGE, SLAB = 64, 128  # trajectories of a range, and points of a slab: many of each in little time
 CONFIG, RESULT, WORK = "c.toml", "results.h5", "results.h5.work"
 TEXT = """title = "Small"
 models = ["hertz", "lankarani-nikravesh-1990"]
@@ -43,6 +45,8 @@ m1 = 1.0
 m2 = [1.0, 2.0]
 K = 1e9
 """
+# the same, with the trajectory table in the file
+FACTORED = TEXT.replace("[output]", '[output]\nlayout = "factored"')
 BLOCKS = 3  # one of the first model, to which e is nothing, and two of the second
 PATIENCE = 60.0  # s after which what should have happened is not waited for any more
 Log = list[list[Any]]
@@ -167,9 +171,9 @@ def _watched(note: int) -> None:
         finally:
             _tell(note, "ended")
 
-    def kept(own: Any, stretch: Any, rebound: Any) -> None:
-        store(own, stretch, rebound)
-        _tell(note, "kept", stretch.number)
+    def kept(own: Any, part: Any, rebound: Any) -> None:
+        store(own, part, rebound)
+        _tell(note, "kept", part.number)
 
     sweeping.sweep_into, work.Work.store = told, kept  # type: ignore[method-assign]
 
@@ -189,18 +193,19 @@ def serve() -> None:
 
 
 def _warm_up() -> None:
-    """Make blocks and boxes small before anything takes their sizes, and import what a sweep imports."""
-    from impact.engine import points, trajectories
+    """Make ranges and slabs small before anything takes their sizes, and import what a sweep imports."""
+    from impact.engine import trajectories
+    from impact.results import factored, slabs
 
-    trajectories.BLOCK, trajectories.stretches.__defaults__ = BLOCK, (BLOCK,)
-    points.boxes.__defaults__ = (BOX,)
+    trajectories.RANGE_TRAJECTORIES, trajectories.trajectory_ranges.__defaults__ = RANGE, (RANGE,)
+    slabs.slabs.__defaults__, factored.SLAB_ROWS = (SLAB,), RANGE
     import impact.cli.sweeping
 
     with tempfile.TemporaryDirectory() as folder:
         config, result = Path(folder, CONFIG), Path(folder, RESULT)
-        config.write_text(TEXT)
-        for _ in range(2):
-            impact.cli.sweeping.sweep(config, result, quiet=True)
+        for text in (TEXT, FACTORED, TEXT):
+            config.write_text(text)
+            impact.cli.sweeping.sweep(config, result, quiet=True, overwrite=True)
 
 
 def _start(argv: list[str], cwd: str, told: str, fault: list[Any]) -> int:
@@ -330,6 +335,7 @@ class Sweeps:
 
     server: subprocess.Popen[str]
     told: Path
+    text: str = TEXT
     count: Iterator[int] = field(default_factory=itertools.count)
     digests: dict[str, str] = field(default_factory=dict)
 
@@ -354,20 +360,27 @@ class Sweeps:
     ) -> Done:
         return self.start(*words, cwd=cwd, fault=fault).wait(limit)
 
-    def folder(self, text: str = TEXT) -> Path:
+    def of(self, text: str) -> Sweeps:
+        """The same server, of another config."""
+        return replace(self, text=text)
+
+    def folder(self, text: str = "") -> Path:
         """A new folder with a config."""
         path = self.told / f"folder{next(self.count)}"
         path.mkdir()
-        (path / CONFIG).write_text(text)
+        (path / CONFIG).write_text(text or self.text)
         return path
 
     def right(self, folder: Path) -> str:
-        """The digest of the sweep of a folder, run in one piece and in memory."""
-        import impact
+        """The SHA-256 of the file of the sweep of a folder, run here in one piece."""
+        from impact.api import prepare
+        from impact.results.sweep import sweep_into
 
         text = (folder / CONFIG).read_text()
         if text not in self.digests:
-            self.digests[text] = str(impact.sweep(folder / CONFIG).attrs["content_digest"])
+            with tempfile.TemporaryDirectory() as whole:
+                sweep_into(Path(whole, RESULT), prepare(folder / CONFIG))
+                self.digests[text] = digest(Path(whole, RESULT))
         return self.digests[text]
 
     @cached_property
@@ -405,7 +418,7 @@ class Sweeps:
         """What is left by one that had finished all blocks."""
         return self.left(self.place("create", f"{RESULT}.part"))
 
-    def copied(self, text: str = TEXT) -> Path:
+    def copied(self, text: str = "") -> Path:
         """A copy of that, with this config."""
         folder = self.folder(text)
         shutil.copytree(self.finished / WORK, folder / WORK)
@@ -443,13 +456,8 @@ class Tally:
 
 
 def digest(path: Path) -> str:
-    """The digest of a result, or why it is none."""
-    import impact
-
-    try:
-        return str(impact.load(path).attrs["content_digest"])
-    except impact.ImpactError as error:
-        return str(error)
+    """The SHA-256 of all bytes of a file, or that it is none."""
+    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else "is no file"
 
 
 def kept_in(folder: Path) -> set[int]:

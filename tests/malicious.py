@@ -1,10 +1,11 @@
 """Files that do harm, each a genuine result in which one thing is wrong, and the words that refuse it.
 
-Where numbers could be read in spite of it they are the genuine ones: the digest is right, and refuses nothing.
+Each is sealed after it was changed, so that the seal refuses nothing: anyone can seal a file.
 """
 
 from __future__ import annotations
 
+import json
 import mmap
 import os
 import re
@@ -13,18 +14,23 @@ import zlib
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
-from h5py import h5a, h5d, h5p, h5s, h5t
+from h5py import h5a, h5d, h5p, h5s, h5t, h5z
 from scipy.io import netcdf_file
+
+from impact.results.sealed import write_seal
 
 SECRET = b"the secret 1234567"
 UTF8 = h5py.string_dtype()
-HERE = "not stored in this file, in one piece or in pieces of one size"
+HERE = "not stored in this file, in one piece or in chunks of one size"
 MUCH = "more data than such a file may hold"
 KIND = "neither numbers nor labels"
-HOLDS = "declares other data than the file holds"
+HOLDS = "declares what the file does not hold"
+NO_SEAL = "does not begin as a sealed file of impact does"
+CHUNK = "a chunk of another size than its own"
 AXES = "its axes are not those of the file"
 ODD = "an attribute of an unusual kind or size"
 Make = Callable[[Path], object]
@@ -37,13 +43,14 @@ def _netcdf3(path: Path) -> None:
         file.schema_version = 1
 
 
-NOT_HDF5: dict[str, tuple[Make, str]] = {
-    "empty": (lambda path: path.write_bytes(b""), "not an HDF5 file"),
-    "text": (lambda path: path.write_bytes(SECRET), "not an HDF5 file"),
-    "png": (lambda path: path.write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(1000)), "not an HDF5 file"),
-    "netCDF-3": (_netcdf3, "not an HDF5 file"),
-    "magic": (lambda path: path.write_bytes(b"\x89HDF\r\n\x1a\n"), "not a readable result"),
-    "magic and zeros": (lambda path: path.write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(9999)), "not a readable"),
+NOT_SEALED: dict[str, tuple[Make, str]] = {
+    "empty": (lambda path: path.write_bytes(b""), NO_SEAL),
+    "text": (lambda path: path.write_bytes(SECRET), NO_SEAL),
+    "png": (lambda path: path.write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(1000)), NO_SEAL),
+    "netCDF-3": (_netcdf3, NO_SEAL),
+    "magic": (lambda path: path.write_bytes(b"\x89HDF\r\n\x1a\n"), "is of schema version 1"),
+    "magic and zeros": (
+        lambda path: path.write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(9999)), "is of schema version 1"),
     "FIFO": (os.mkfifo, "is not a regular file"),
     "device": (lambda path: path.symlink_to("/dev/zero"), "is not a regular file"),
     "folder": (lambda path: path.mkdir(), "is not a regular file"),
@@ -51,6 +58,12 @@ NOT_HDF5: dict[str, tuple[Make, str]] = {
     "link to nothing": (lambda path: path.symlink_to("nothing"), "does not exist"),
     "link to itself": (lambda path: path.symlink_to(path.name), "bad.h5: "),
 }  # fmt: skip
+
+
+def seal(path: Path) -> None:
+    """Seal a file as it is now."""
+    with path.open("r+b") as file:
+        write_seal(file)
 
 
 def anew(file: h5py.File, name: str, **how: object) -> h5py.Dataset:
@@ -61,7 +74,7 @@ def anew(file: h5py.File, name: str, **how: object) -> h5py.Dataset:
     del file[name]
     new = file.create_dataset(name, **({"data": values} | how))
     for key, value in attributes.items():
-        new.attrs[key] = value
+        new.attrs.create(key, value, dtype=None if not isinstance(value, bytes) else f"S{len(value)}")
     for dimension, scale in zip(new.dims, scales, strict=True):
         dimension.attach_scale(file[scale])
     return new
@@ -110,27 +123,40 @@ def _compact(file: h5py.File) -> None:
     h5d.create(file.id, b"other", h5t.IEEE_F64LE, h5s.create_simple((3,)), plan)
 
 
-def _unwritten(file: h5py.File, length: int) -> None:
-    """A dataset that has its place in the file, though not on the disk."""
-    plan = h5p.create(h5p.DATASET_CREATE)
-    plan.set_alloc_time(h5d.ALLOC_TIME_EARLY)
-    plan.set_fill_time(h5d.FILL_TIME_NEVER)
-    h5d.create(file.id, b"other", h5t.IEEE_F64LE, h5s.create_simple((length,)), plan)
-
-
-def _pieces(file: h5py.File, content: bytes | None = None, mask: int = 0) -> None:
-    """A variable in packed pieces, of which the first holds this; the others are right, or none is there."""
+def _in_chunks(file: h5py.File, content: bytes | None = None, mask: int = 0) -> None:
+    """A variable in packed chunks, of which the first holds this; the others are right, or none is there."""
     values = file["v1_post"][()]
     new = anew(file, "v1_post", data=None, shape=values.shape, dtype="f8", compression="gzip", chunks=(1, 3, 2))
     if content is not None:
-        new[...] = values
+        new[1:] = values[1:]
+    if content:
         new.id.write_direct_chunk((0, 0, 0), content, mask)
 
 
 def _bomb(file: h5py.File) -> None:
-    """A piece of six numbers that unpacks to a gigabyte."""
+    """A chunk of six numbers that unpacks to a gigabyte."""
     pack = zlib.compressobj(9)
-    _pieces(file, b"".join([*(pack.compress(bytes(2**20)) for _ in range(2**10)), pack.flush()]))
+    _in_chunks(file, b"".join([*(pack.compress(bytes(2**20)) for _ in range(2**10)), pack.flush()]))
+
+
+def _packed(file: h5py.File, filters: list[int]) -> None:
+    """A dataset in a chunk on which filters work."""
+    plan = h5p.create(h5p.DATASET_CREATE)
+    plan.set_chunk((3,))
+    for code in filters:
+        plan.set_filter(code, 0, (4,) if code == h5z.FILTER_DEFLATE else ())
+    h5d.create(file.id, b"other", h5t.IEEE_F64LE, h5s.create_simple((3,)), plan)
+
+
+def _long_axis(file: h5py.File, **how: object) -> None:
+    """A variable along an axis of many values, of which the file holds no more than a few."""
+    attributes = dict(file["e"].attrs)
+    del file["e"], file["v1_post"]
+    axis = file.create_dataset("e", shape=(10**9,), dtype="f8", **how)
+    if axis.chunks:
+        axis[: axis.chunks[0]] = 0.5
+    for key in ("CLASS", "NAME", "_Netcdf4Dimid"):
+        axis.attrs.create(key, attributes[key])
 
 
 def _of_kind(file: h5py.File, kind: h5t.TypeID) -> None:
@@ -191,15 +217,11 @@ def _without(file: h5py.File, name: str) -> None:
 BROKEN = b"caf\xe9"
 CHANGES: dict[str, tuple[Change, str]] = {
     "no schema": (partial(_without, name="schema_version"), "is not a result of impact"),
-    "no digest": (partial(_without, name="content_digest"), "is not a result of impact"),
     "later schema": (lambda f: _set(f, "", "schema_version", 99), "schema version 99"),
     "huge schema": (lambda f: _set(f, "", "schema_version", 2**64 - 1, "u8"), "version 18446744073709551615"),
     "schema of text": (lambda f: _set(f, "", "schema_version", "1"), "not a number"),
     "schema of two": (lambda f: _set(f, "", "schema_version", [1, 1]), "not a number"),
     "schema of a million": (lambda f: _set(f, "", "schema_version", np.ones(8000, int)), "not a number"),
-    "digest of numbers": (lambda f: _set(f, "", "content_digest", 1), "is damaged"),
-    "digest of two numbers": (lambda f: _set(f, "", "content_digest", [1, 2]), "is damaged"),
-    "digest of texts": (lambda f: _set(f, "", "content_digest", ["a", "b"], UTF8), ODD),
     "external link": (_link_to_hdf5, "a link to somewhere else"),
     "external link to text": (_link_to_text, "a link to somewhere else"),
     "soft link": (_soft_link, "a link to somewhere else"),
@@ -216,22 +238,32 @@ CHANGES: dict[str, tuple[Change, str]] = {
     "growing": (partial(anew, name="v1_post", maxshape=(None, None, None), chunks=True), HERE),
     "another filter": (partial(anew, name="v1_post", compression="lzf"), HERE),
     "checksums": (partial(anew, name="v1_post", fletcher32=True), HERE),
-    "a million pieces": (partial(_bare, name="other", shape=10**6, dtype="i1", chunks=(1,)), "200,000 pieces"),
-    "zip bomb": (partial(_bare, name="other", shape=10**8, dtype="f8", compression="gzip", chunks=(10**6,)), MUCH),
-    "zip bomb in a piece": (_bomb, "is damaged"),
-    "short piece": (partial(_pieces, content=zlib.compress(b"short")), "a piece of 5 bytes"),
-    "damaged piece": (partial(_pieces, content=b"not zlib"), "not a readable result"),
-    "unpacked piece": (partial(_pieces, content=bytes(48), mask=1), "a piece at an odd place"),
-    "missing piece": (_pieces, "0 pieces, wants 2"),
+    "a million chunks": (partial(_bare, name="other", shape=10**6, dtype="i1", chunks=(1,)), "200,000 chunks"),
+    "zip bomb": (
+        partial(_bare, name="other", shape=10**8, dtype="f8", compression="gzip", chunks=(10**6,)), HOLDS),
+    "zip bomb in a chunk": (_bomb, CHUNK),
+    "short chunk": (partial(_in_chunks, content=zlib.compress(b"short")), CHUNK),
+    "damaged chunk": (partial(_in_chunks, content=b"not zlib"), "not a readable result"),
+    "unpacked chunk": (partial(_in_chunks, content=bytes(48), mask=1), CHUNK),
+    "packed twice": (lambda f: _packed(f, [h5z.FILTER_DEFLATE] * 2), HERE),
+    "shuffled alone": (lambda f: _packed(f, [h5z.FILTER_SHUFFLE]), HERE),
+    "no chunks": (_in_chunks, HOLDS),
+    "a chunk is missing": (partial(_in_chunks, content=b"", mask=-1), HOLDS),
     "compact": (_compact, HERE),
-    "1e15 numbers": (partial(_bare, name="other", shape=(10**15,), dtype="f8"), HOLDS),
-    "1e15 labels": (partial(_bare, name="other", shape=(10**15,), dtype=UTF8), HOLDS),
+    "1e15 numbers": (partial(_bare, name="other", shape=(10**15,), dtype="f8"), AXES),
+    "1e15 labels": (partial(_bare, name="other", shape=(10**15,), dtype="S1"), AXES),
+    "1e9 numbers of an axis": (_long_axis, "not a readable result"),
+    "1e9 numbers of an axis in chunks": (partial(_long_axis, chunks=(10**4,)), MUCH),
+    "1e9 numbers of an axis, packed": (partial(_long_axis, chunks=(10**4,), compression="gzip"), MUCH),
     "1e15 numbers of a known name": (
-        lambda f: anew(f, "v1_post", data=None, shape=(10**5,) * 3, dtype="f8"), HOLDS),
-    "no numbers": (partial(_bare, name="other", shape=(0,), dtype="f8"), HOLDS),
-    "null": (partial(_bare, name="other", data=h5py.Empty("f8")), HOLDS),
-    "17 GiB": (
-        partial(_unwritten, length=17 * 2**27), "more than are read at once"),
+        lambda f: anew(f, "v1_post", data=None, shape=(10**5,) * 3, dtype="f8"), AXES),
+    "no numbers": (partial(_bare, name="other", shape=(0,), dtype="f8"), HERE),
+    "null": (partial(_bare, name="other", data=h5py.Empty("f8")), HERE),
+    **{f"{name} as {kind}": (
+        lambda f, name=name, kind=kind: anew(f, name, data=f[name][()].astype(kind)),
+        f"{name}: got {np.dtype(kind)}")
+       for name, kind in (("e_out", "i4"), ("status", "f8"), ("status", "i4"), ("steps", "f8"), ("v1_post", "i8"))
+    },
     "compound": (partial(_bare, name="other", data=np.zeros(3, "f8,i4")), KIND),
     "complex": (partial(_bare, name="other", data=np.zeros(3, complex)), KIND),
     "enum": (partial(_bare, name="other", data=np.zeros(3, bool)), KIND),
@@ -245,15 +277,15 @@ CHANGES: dict[str, tuple[Change, str]] = {
     "long double": (partial(_bare, name="other", data=np.zeros(3, np.longdouble)), KIND),
     "seven bits": (lambda f: _of_kind(f, _seven_bits()), KIND),
     "10 MB of labels": (
-        lambda f: _bare(f, "other", data=np.full(1000, "x", object), dtype=UTF8) or f["other"].write_direct(
-            np.array(["y" * 10_000, *["x"] * 999], object)), "more than 4,000,000 bytes of labels"),
-    "250,001 empty labels": (
-        partial(_bare, name="other", data=np.full(250_001, "", object), dtype=UTF8), "bytes of labels"),
+        lambda f: anew(f, "doi", data=np.full((2, 5_000_000), b"x", "S1")), "more than 4,000,000 bytes of labels"),
+    "labels of any length": (
+        lambda f: anew(f, "title", data=np.array([["a"], ["b"]], object), dtype=UTF8), KIND),
+    "labels of letters in pairs": (lambda f: anew(f, "title", data=np.full((2, 9), b"ab", "S2")), KIND),
+    "labels in a single place": (partial(_bare, name="other", data=np.array(b"x", "S1")), KIND),
     "many attributes": (_many_attributes, "more than 10,000 attributes"),
     "text of any length": (lambda f: _set(f, "v1_post", "x", "x", UTF8), ODD),
     "not UTF-8": (lambda f: _set(f, "", "title", BROKEN, h5py.string_dtype(length=4)), "not a readable result"),
-    "labels not UTF-8": (
-        lambda f: anew(f, "title", data=np.array([BROKEN, b""], object), dtype=UTF8), "can't decode"),
+    "labels not UTF-8": (lambda f: f["title"].__setitem__((0, slice(0, 1)), b"\xe9"), "can't decode"),
     "100 MB of text": (
         lambda f: [_set(f, "", name, np.bytes_(b"x" * 50_000_000)) for name in "xy"], "bytes of text"),
     "texts": (lambda f: _set(f, "v1_post", "x", ["a"] * 1000, UTF8), ODD),
@@ -269,7 +301,7 @@ CHANGES: dict[str, tuple[Change, str]] = {
     "axes of one number": (partial(_numbered, name="v1_post", numbers=[0, 1, 0]), AXES),
     "axes of two lengths": (partial(_numbered, name="v1_post", numbers=[0, 2, 1]), AXES),
     "axes of texts": (partial(_numbered, name="v1_post", numbers=np.bytes_(b"012")), AXES),
-    "axis along another": (partial(_numbered, name="year", numbers=[2]), "is damaged"),
+    "axis along another": (partial(_numbered, name="year", numbers=[2]), "year of the models is missing"),
     "axis of another name": (lambda f: [_numbered(f, "e", [2]), _numbered(f, "m2", [1])], AXES),
     "unknown axis": (_unknown_axis, AXES),
 }  # fmt: skip
@@ -306,49 +338,6 @@ def _one_place(path: Path) -> None:
         swap(path, struct.pack("<QQ", 2**64 - 1, 8 * length), struct.pack("<QQ", place, 8 * length))
 
 
-def _labels(path: Path, length: int | None) -> None:
-    """A thousand labels, all of which are the first, of 20 kB; or say that they have another length."""
-    with h5py.File(path, "r+") as file:
-        file["other"] = np.array(["y" * 20_000, *["x"] * 999], object)
-        place = file["other"].id.get_offset()
-    whole = bytearray(path.read_bytes())
-    first = whole[place : place + 16]
-    if length is not None:
-        first[:4] = struct.pack("<I", length)
-    whole[place : place + 16_000] = first * 1000
-    path.write_bytes(whole)
-
-
-def _many_labels(path: Path) -> None:
-    """Fifty million labels, none of which takes room on the disk."""
-    count = 50_000_000
-    with h5py.File(path, "r+") as file:
-        _unwritten(file, 2 * count)
-        place = file["other"].id.get_offset()
-        file["behind"] = [1.0]
-        del file["other"]
-        file.create_dataset("labels", shape=count, dtype=UTF8)
-    swap(path, struct.pack("<QQ", 2**64 - 1, 16 * count), struct.pack("<QQ", place, 16 * count))
-
-
-def _heap(path: Path, begin: int, becomes: bytes) -> None:
-    """Other bytes in the heap of the titles."""
-    with h5py.File(path) as file:
-        place = file["title"].id.get_offset()
-    whole = path.read_bytes()
-    (heap,) = struct.unpack_from("<Q", whole, place + 4)
-    begin += heap
-    path.write_bytes(whole[:begin] + becomes + whole[begin + len(becomes) :])
-
-
-def _label(path: Path, length: int, heap: int, number: int) -> None:
-    """Another place of the first title."""
-    with h5py.File(path) as file:
-        place = file["title"].id.get_offset()
-    whole = path.read_bytes()
-    path.write_bytes(whole[:place] + struct.pack("<IQI", length, heap, number) + whole[place + 16 :])
-
-
 def _attribute(path: Path, name: str, value: object, dtype: object) -> None:
     """An attribute whose length, 777, is said to be 4 GB."""
     with h5py.File(path, "r+") as file:
@@ -369,15 +358,6 @@ def _references(path: Path) -> None:
 PATCHES: dict[str, tuple[Make, str]] = {
     "a length that wraps around": (_wraps, "not a readable result"),
     "data of one place": (_one_place, MUCH),
-    "labels of one place": (partial(_labels, length=None), "bytes of labels"),
-    "labels of 4 GB": (partial(_labels, length=2**32 - 1), "bytes of labels"),
-    "50,000,000 labels": (_many_labels, "bytes of labels"),
-    "label of another length": (partial(_label, length=23, heap=2048, number=1), "without a heap"),
-    "label without a heap": (partial(_label, length=23, heap=2**63, number=1), "not a readable result"),
-    "endless heap": (partial(_heap, begin=16, becomes=bytes(16)), "is stored as 0"),
-    "heap of 10 MB": (partial(_heap, begin=8, becomes=struct.pack("<Q", 10**7)), "bytes of heaps"),
-    "heap of nothing": (partial(_heap, begin=8, becomes=bytes(8)), "is stored as 0"),
-    "text of 4 EB in a heap": (partial(_heap, begin=24, becomes=struct.pack("<Q", 2**62)), "is stored as 0"),
     "attribute of 4 GB": (partial(_attribute, name="x", value="y" * 777, dtype=UTF8), ODD),
     "fixed attribute of 4 GB": (
         partial(_attribute, name="x", value=b"y" * 777, dtype="S777"), "not a readable result"),
@@ -387,3 +367,88 @@ PATCHES: dict[str, tuple[Make, str]] = {
 HARMLESS: dict[str, Make] = {
     "references of 34 GB": _references,
 }
+
+
+def _json(file: h5py.File, attribute: str, change: Callable[[Any], object]) -> None:
+    """What an attribute holds as JSON, changed in place or returned anew."""
+    held = json.loads(file.attrs[attribute])
+    text = json.dumps(change(held) or held).encode()
+    file.attrs.create(attribute, np.bytes_(text))
+
+
+def change_law(file: h5py.File, **about: object) -> None:
+    """What a factored file says of its first law."""
+    _json(file, "laws", lambda laws: laws["bilinear"].update(about))
+
+
+def _put(file: h5py.File, name: str, place: int, value: float) -> None:
+    file[name][place] = value
+
+
+FIT = "its laws do not fit its table"
+LAWS = "laws: not those of its models"
+GRID = "axes: not those of its grid"
+WITNESSES = "its witnesses expand to other numbers"
+# what is wrong with a factored file
+FACTORED: dict[str, tuple[Change, str]] = {
+    "laws of text": (lambda f: _set(f, "", "laws", np.bytes_(b"x")), LAWS),
+    "laws in a list": (lambda f: _json(f, "laws", list), FIT),
+    "laws without an end": (lambda f: _set(f, "", "laws", np.bytes_(b"[" * 100_000)), LAWS),
+    "a law less": (lambda f: _json(f, "laws", lambda laws: {"bilinear": laws["bilinear"]}), LAWS),
+    "laws in another order": (lambda f: _json(f, "laws", lambda laws: dict(reversed(laws.items()))), LAWS),
+    "a law of nothing": (lambda f: _json(f, "laws", lambda laws: laws.update(bilinear=None)), FIT),
+    "a law without its axes": (
+        lambda f: _json(f, "laws", lambda laws: laws["bilinear"].pop("axes") and None), FIT),
+    "a law along no axis": (partial(change_law, axes=["twice"]), FIT),
+    "a law along an axis twice": (partial(change_law, axes=["alpha", "alpha"]), FIT),
+    "a law along a number": (partial(change_law, axes=[0]), FIT),
+    "a law along fewer axes": (partial(change_law, axes=["alpha"]), FIT),
+    "a law of a domain in a list": (partial(change_law, domain=[1, 2]), FIT),
+    "an exponent of text": (partial(change_law, exponent="x"), FIT),
+    "another exponent": (partial(change_law, exponent=1.5), WITNESSES),
+    "one trajectory more": (partial(change_law, trajectories=4), FIT),
+    "one trajectory less": (partial(change_law, trajectories=2), FIT),
+    "fewer trajectories than none": (partial(change_law, trajectories=-1), FIT),
+    "1e30 trajectories": (partial(change_law, trajectories=10**30), FIT),
+    "trajectories of text": (partial(change_law, trajectories="three"), FIT),
+    "trajectories that are not shared": (partial(change_law, is_shared=False), FIT),
+    "a rule of K without values": (partial(change_law, stiffness_axes=["alpha"]), FIT),
+    "axes of text": (lambda f: _set(f, "", "axes", np.bytes_(b"x")), GRID),
+    "axes in a table": (lambda f: _json(f, "axes", lambda axes: dict.fromkeys(axes, 1)), GRID),
+    "an unknown axis": (lambda f: _json(f, "axes", lambda axes: [*axes, "twice"]), GRID),
+    "an axis twice": (lambda f: _json(f, "axes", lambda axes: [*axes, axes[0]]), GRID),
+    "an axis less": (lambda f: _json(f, "axes", lambda axes: axes[:1]), "does not lie along one axis"),
+    "axes in another order": (lambda f: _json(f, "axes", lambda axes: axes[::-1]), WITNESSES),
+    "axes without an end": (lambda f: _set(f, "", "axes", np.bytes_(b"[" * 100_000)), GRID),
+    "materials in a list": (lambda f: _set(f, "", "materials", np.bytes_(b"[]")), "materials: no JSON"),
+    "no materials": (lambda f: _set(f, "", "materials", np.bytes_(b"{}")), "not a readable result"),
+    "a material of text": (lambda f: _set(f, "", "materials", np.bytes_(b'{"a": "x"}')), "materials: no JSON"),
+    "a trajectory that is not there": (partial(_put, name="trajectory_of_cell", place=5, value=3), FIT),
+    "a trajectory before the first": (partial(_put, name="trajectory_of_cell", place=5, value=-1), FIT),
+    "trajectories in fractions": (
+        lambda f: anew(f, "trajectory_of_cell", data=f["trajectory_of_cell"][()].astype(float)), FIT),
+    "a table less": (lambda f: f.__delitem__("trajectory_peak"), FIT),
+    "a table of cells less": (lambda f: f.__delitem__("trajectory_of_cell"), FIT),
+    "a table of text": (
+        lambda f: anew(f, "trajectory_peak", data=np.full(6, b"x", "S1")), "not a readable result"),
+    "an unknown status": (partial(_put, name="trajectory_status", place=5, value=99), FIT),
+    "a status of its own kind": (
+        lambda f: anew(f, "trajectory_status", data=f["trajectory_status"][()].astype("i2")), FIT),
+    "witnesses elsewhere": (partial(_put, name="witness_index", place=5, value=4), "its witnesses are not spread"),
+    "no index of witnesses": (lambda f: f.__delitem__("witness_index"), "not a readable result"),
+    "no witnesses": (
+        lambda f: [f.__delitem__(name) for name in list(f) if name.startswith("witness_")], "not a readable"),
+    "another witness": (lambda f: _put(f, "witness_v1_post", 5, f["witness_v1_post"][5] + 1e-6), WITNESSES),
+    "another last witness": (lambda f: _put(f, "witness_v1_post", 7, f["witness_v1_post"][7] - 1e-6), WITNESSES),
+    "a witness that is no number": (partial(_put, name="witness_e_out", place=3, value=np.nan), WITNESSES),
+    "a number for NaN": (partial(_put, name="witness_damping_ratio", place=0, value=0.5), WITNESSES),
+    "another status of a witness": (partial(_put, name="witness_status", place=2, value=2), WITNESSES),
+    "another trajectory": (partial(_put, name="trajectory_e_out", place=0, value=0.123), WITNESSES),
+    "witnesses as text": (
+        lambda f: anew(f, "witness_e_out", data=np.full(8, b"x", "S1")), "not a readable result"),
+    "steps as fractions": (
+        lambda f: anew(f, "witness_steps", data=f["witness_steps"][()].astype(float)), "steps: got float64"),
+}  # fmt: skip
+# values that a law cannot have
+JUNK = (None, True, -1, 10**30, float("inf"), 0.5, "", "alpha", [], ["v1"], ["alpha", "v1", "alpha"], {}, {"e": 1},
+        {"e": [0, "x"]}, [[]], {"e": [0.0, 1.0]})  # fmt: skip

@@ -1,4 +1,4 @@
-"""Sweeps by the workers of a scheduler of dask: the same content, whatever becomes of the processes."""
+"""Sweeps by the workers of a scheduler of dask: the same file, whatever becomes of the processes."""
 
 from __future__ import annotations
 
@@ -14,11 +14,10 @@ import pytest
 
 import impact
 from impact.api import prepare
-from impact.engine.blocks import work
-from impact.engine.execute import kit_of, settled
-from impact.engine.trajectories import block_of, stretches, trajectories
+from impact.engine.execute import context_of, with_core, work
+from impact.engine.trajectories import columns_of, trajectory_maps, trajectory_ranges
 
-from .clusters import BLOCKS, CONFIG, Dask, dask, digest, in_group, sweep, until
+from .clusters import BLOCKS, CONFIG, Dask, content, dask, in_group, sweep, until
 from .conftest import ROOT
 
 pytestmark = pytest.mark.slow
@@ -35,18 +34,18 @@ OWN = CONFIG.replace('models = ["hertz", "lankarani-nikravesh-1990"]', 'models =
 
 
 @pytest.fixture(scope="module")
-def right(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """The digest of the sweep in one process."""
+def right(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """The file of the sweep in one process."""
     one = sweep(tmp_path_factory.mktemp("one") / "sweep")
     one.ends()
-    return one.digest
+    return one.content
 
 
-def resumed(folder: Path, *words: str) -> str:
-    """The digest of a sweep that was gone on with."""
+def resumed(folder: Path, *words: str) -> bytes:
+    """The file of a sweep that was gone on with."""
     again = sweep(folder, "--resume", *words)
     again.ends()
-    return again.digest
+    return again.content
 
 
 @pytest.fixture
@@ -55,12 +54,12 @@ def two(tmp_path: Path) -> Iterator[Dask]:
         yield found
 
 
-def test_the_same_content_by_address_file_and_local(two: Dask, tmp_path: Path, right: str) -> None:
+def test_the_same_content_by_address_file_and_local(two: Dask, tmp_path: Path, right: bytes) -> None:
     ways = {"address": ("--scheduler", two.address), "file": ("--scheduler-file", two.file)}
     for name, words in {**ways, "local": ("--scheduler", "local")}.items():
         one = sweep(tmp_path / name, *words)
         said = one.ends()
-        assert one.digest == right
+        assert one.content == right
         found = re.search(r"^\d+ workers?; dashboard: (http://127.0.0.1:\d+/status)$", said, re.MULTILINE)
         assert found, said
         if name != "local":
@@ -71,27 +70,27 @@ def test_the_same_content_by_address_file_and_local(two: Dask, tmp_path: Path, r
 
 
 @pytest.mark.parametrize("moment", [1, 4, 8])
-def test_a_worker_killed_in_the_middle(two: Dask, tmp_path: Path, right: str, moment: int) -> None:
+def test_a_worker_killed_in_the_middle(two: Dask, tmp_path: Path, right: bytes, moment: int) -> None:
     one = sweep(tmp_path / "sweep", "--scheduler", two.address)
     one.until_kept(moment)
     two.kill("a")
     one.ends()
-    assert one.digest == right
+    assert one.content == right
 
 
 @pytest.mark.parametrize("moment", [1, 7])
-def test_all_workers_killed_and_new_ones_join(two: Dask, tmp_path: Path, right: str, moment: int) -> None:
+def test_all_workers_killed_and_new_ones_join(two: Dask, tmp_path: Path, right: bytes, moment: int) -> None:
     one = sweep(tmp_path / "sweep", "--scheduler", two.address)
     one.until_kept(moment)
     two.kill("a", "b")
     assert one.process.poll() is None
     two.worker("c")
     one.ends()
-    assert one.digest == right
+    assert one.content == right
 
 
 @pytest.mark.parametrize("moment", [1, 7])
-def test_the_scheduler_gone(two: Dask, tmp_path: Path, right: str, moment: int) -> None:
+def test_the_scheduler_gone(two: Dask, tmp_path: Path, right: bytes, moment: int) -> None:
     one = sweep(tmp_path / "sweep", "--scheduler", two.address)
     one.until_kept(moment)
     two.kill("scheduler")
@@ -107,7 +106,7 @@ def test_the_scheduler_gone(two: Dask, tmp_path: Path, right: str, moment: int) 
     again.until_kept(len(kept) + 1)
     assert all(path.stat().st_mtime_ns == then for path, then in kept.items() if path.exists())
     again.ends()
-    assert again.digest == right
+    assert again.content == right
 
 
 def other_version(folder: Path) -> dict[str, str]:
@@ -121,7 +120,7 @@ def other_version(folder: Path) -> dict[str, str]:
     return {"PYTHONPATH": str(folder)}
 
 
-def test_a_worker_of_another_version_is_refused(two: Dask, tmp_path: Path, right: str) -> None:
+def test_a_worker_of_another_version_is_refused(two: Dask, tmp_path: Path, right: bytes) -> None:
     two.worker("old", **other_version(tmp_path / "other"))
     said = sweep(tmp_path / "sweep", "--scheduler", two.address).ends(2)
     assert f"has impact 0.0.1, this is {impact.__version__}; wants the same" in said
@@ -130,7 +129,7 @@ def test_a_worker_of_another_version_is_refused(two: Dask, tmp_path: Path, right
     assert resumed(tmp_path / "sweep", "--scheduler", two.address) == right
 
 
-def test_a_worker_of_another_version_that_joins_later_is_refused(two: Dask, tmp_path: Path, right: str) -> None:
+def test_a_worker_of_another_version_that_joins_later_is_refused(two: Dask, tmp_path: Path, right: bytes) -> None:
     one = sweep(tmp_path / "sweep", "--scheduler", two.address)
     one.until_kept(1)
     # nobody else is there to finish before it has begun
@@ -172,20 +171,21 @@ def test_a_plug_in_whose_file_the_workers_have_not(two: Dask, tmp_path: Path) ->
     one.until_kept(1)
     (tmp_path / "two" / "mine.py").unlink()
     one.ends()
-    assert one.digest == digest(tmp_path / "one")
+    assert one.content == content(tmp_path / "one")
 
 
-def test_a_block_executed_twice(two: Dask, tmp_path: Path, right: str) -> None:
+def test_a_block_executed_twice(two: Dask, tmp_path: Path, right: bytes) -> None:
     from distributed import Client
 
     (tmp_path / "c.toml").write_text(CONFIG)
     plan = prepare(tmp_path / "c.toml")
-    found = trajectories(plan)
-    plan = settled(plan, found)
-    block = block_of(plan, found, next(stretches(found)))
+    maps = trajectory_maps(plan)
+    plan = with_core(plan, maps)
+    part = next(trajectory_ranges(maps))
+    block = (plan.models[part.model].key, columns_of(plan, maps, part), context_of(plan))
     with Client(two.address, set_as_default=False) as client:
-        done = [client.submit(work, block, kit_of(plan), workers=[name], pure=False).result() for name in "ab"]
-    here, _ = work(block, kit_of(plan))
+        done = [client.submit(work, *block, workers=[name], pure=False).result() for name in "ab"]
+    here, _ = work(*block)
     for name, values in vars(here).items():
         assert all(getattr(one, name).tobytes() == values.tobytes() for one, _ in done), name
     # one that died of a block takes nothing with it: another executes what it had begun, and the driver killed
@@ -214,10 +214,10 @@ def test_a_block_that_kills_its_worker_once(two: Dask, tmp_path: Path, place: st
     one = sweep(tmp_path / "two", "--plugin", "mine.py", "--scheduler", address, config=OWN)
     one.ends()
     assert mark.exists()
-    assert one.digest == digest(tmp_path / "one")
+    assert one.content == content(tmp_path / "one")
 
 
-def test_interrupted_it_is_resumed(two: Dask, tmp_path: Path, right: str) -> None:
+def test_interrupted_it_is_resumed(two: Dask, tmp_path: Path, right: bytes) -> None:
     one = sweep(tmp_path / "sweep", "--scheduler", two.address)
     one.until_kept(2)
     one.process.send_signal(signal.SIGINT)
@@ -226,7 +226,7 @@ def test_interrupted_it_is_resumed(two: Dask, tmp_path: Path, right: str) -> Non
     assert resumed(tmp_path / "sweep", "--scheduler", two.address) == right
 
 
-def test_interrupted_when_nobody_is_left_it_ends(two: Dask, tmp_path: Path, right: str) -> None:
+def test_interrupted_when_nobody_is_left_it_ends(two: Dask, tmp_path: Path, right: bytes) -> None:
     one = sweep(tmp_path / "sweep", "--scheduler", two.address)
     one.until_kept(2)
     two.kill("a", "b")
@@ -249,7 +249,7 @@ def test_a_block_that_kills_every_worker_is_given_up(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
-def test_a_cluster_of_its_own_ends_with_the_sweep(tmp_path: Path, right: str, number: int) -> None:
+def test_a_cluster_of_its_own_ends_with_the_sweep(tmp_path: Path, right: bytes, number: int) -> None:
     one = sweep(tmp_path / "sweep", "--scheduler", "local")
     one.until_kept(2)
     group = one.process.pid

@@ -14,9 +14,9 @@ import impact
 from impact.api import prepare
 from impact.contact.lanes import Lanes
 from impact.engine import trajectories as module
-from impact.engine.build_impacts import lanes_of
+from impact.engine.build_impacts import build_impacts
 from impact.engine.plan import Plan
-from impact.engine.trajectories import trajectories
+from impact.engine.trajectories import trajectory_maps
 from impact.results.estimate import estimate
 from impact.results.schema import SCHEMA
 from impact.sweeps.config import read_config
@@ -89,7 +89,7 @@ def test_both_give_the_same_bits(config: dict[str, object]) -> None:
 def test_within_blocks_too_where_there_are_too_many_cells(config: dict[str, object]) -> None:
     once = swept(config)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "MOST_CELLS", 0)
+        patch.setattr(module, "MAX_CELLS", 0)
         same_bits(once, swept(config))
 
 
@@ -100,7 +100,7 @@ def test_a_grid_by_its_axes_is_its_points_one_by_one(config: dict[str, object]) 
     at = np.ix_(*map(np.arange, plan.shape)) if plan.shape else ()
     flat = tuple(np.unravel_index(np.arange(plan.grid), plan.shape)) if plan.shape else ()
     for model in plan.models:
-        grid, points = lanes_of(plan, model, at), lanes_of(plan, model, flat)
+        grid, points = (build_impacts(plan.inputs, model, index) for index in (at, flat))
         for name in ("e", "v0", "m", "K", "n", "length", "R1", "E2"):
             with np.errstate(all="ignore"):
                 one, other = getattr(grid, name), getattr(points, name)
@@ -111,7 +111,7 @@ def test_a_grid_by_its_axes_is_its_points_one_by_one(config: dict[str, object]) 
 def counts(sweep: dict[str, object], *models: str, **more: object) -> list[int]:
     """The trajectories of each model."""
     config = {"models": list(models), "sweep": sweep, "materials": MATERIALS, **more}
-    return [one.count for one in trajectories(prepare(config, plugins=[DASHPOT, SPEED]))]
+    return [one.count for one in trajectory_maps(prepare(config, plugins=[DASHPOT, SPEED]))]
 
 
 GRID = {"e": [0.1, 0.5, 0.9], "v1": [1.0, 2.0], "m1": [1.0, 4.0], "m2": [1.0, 4.0], "material": ["soft", "hard"]}
@@ -140,7 +140,7 @@ def test_a_plan_of_any_size_is_counted_without_its_points() -> None:
     config = {"models": ["gharib-hurmuzlu-2012", "speed"], "sweep": sweep, "materials": MATERIALS}
     plan = prepare(config, plugins=[SPEED], max_points=10**15)
     assert plan.points == 4 * 10**14
-    assert [one.count for one in trajectories(plan)] == [100, 10_000]
+    assert [one.count for one in trajectory_maps(plan)] == [100, 10_000]
     found = estimate(plan)
     assert (found.points, found.trajectories) == (plan.points, 10_100)
     assert found.bytes > 100 * plan.points

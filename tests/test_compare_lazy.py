@@ -18,10 +18,11 @@ from xarray.core import indexing
 import impact
 from impact.comparison.verdict import Verdict
 from impact.errors import UsageError
+from impact.results.schema import SCHEMA_VERSION
 from impact.results.slabs import SLAB_POINTS, VARIES_ALONG, is_lazy
 from impact.views.differences import differences
 
-ATTRIBUTES = {"schema_version": 1, "rtol": 1e-10}
+ATTRIBUTES = {"schema_version": SCHEMA_VERSION, "rtol": 1e-10}
 Compute = Callable[..., Any]
 
 

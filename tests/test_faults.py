@@ -233,7 +233,7 @@ def after_cuts(disk: Disk, log: Log, cuts: list[int]) -> Iterator[tuple[State, s
                 yield state, set(kept), f"after {at}, {kind} {what[:1]}"
 
 
-def laid_out(sweeps: Sweeps, state: State, text: str = TEXT) -> Path:
+def laid_out(sweeps: Sweeps, state: State, text: str = "") -> Path:
     """A folder in such a state."""
     folder = sweeps.folder(text)
     for path, content in sorted(state.items()):

@@ -45,8 +45,8 @@ def expand(
             points *= size
         if points > max_points:
             raise UsageError(
-                f"{safe_text(str(result))}: got {points:,} points, expected at most {max_points:,} (--max-points); "
-                "select a part, such as --sel e=0.5"
+                f"{safe_text(str(result))}: got {points:,} points, expected at most {max_points:,} "
+                "(--max-points); select a part, such as --sel e=0.5"
             )
         api.save(dataset, output, overwrite=overwrite, should_stop=stopping)
     door.say(f"{safe_text(str(output))}: {points:,} points, {output.stat().st_size:,} bytes")
@@ -59,8 +59,8 @@ def extend(
         typer.Option(
             "--set",
             metavar="PATH=VALUE",
-            help="More values of an axis, such as sweep.m2=[1.0, 2.0], or more models; may be repeated. Values that "
-            "the result has stay.",
+            help="More values of an axis, such as sweep.m2=[1.0, 2.0], or more models; may be repeated. "
+            "Values that the result has stay.",
         ),
     ],
     output: Annotated[

@@ -11,10 +11,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ..contact.material import effective_mass
 from ..contact.status import Status
 from ..errors import UsageError
 from ..results.replay import own
+from ..results.scales import scale_of
 from ..results.schema import Variable, is_input
 from ..results.slabs import (
     MAX_SUMMARY_POINTS,
@@ -220,7 +220,9 @@ def _ratio(
     """The difference of the values of a slab, in tolerances and in the variable's unit."""
     with np.errstate(all="ignore"):
         difference = np.where(a == b, 0.0, np.abs(a.astype(float) - b.astype(float)))
-        scale = np.broadcast_to(_scale(variable, aligned.baseline, where, b), b.shape)
+        has_peak = "peak_indentation" in aligned.baseline.dataset
+        scale = scale_of(variable, lambda name: aligned.baseline.read(name, where), has_peak=has_peak)
+        scale = np.broadcast_to(scale, b.shape)
         # what was stored in fewer digits has lost the others
         lost = sum(float(np.finfo(values.dtype).eps) for values in (a, b) if values.dtype == np.float32)
         allowed = tol * scale + (lost * np.maximum(np.abs(a), np.abs(b)) if lost else 0.0)
@@ -240,25 +242,6 @@ def _ratio(
     if (missing[0] & missing[1]).any():
         ratio = np.where(missing[0] & missing[1] & _may_be_missing(variable, aligned, where), 0.0, ratio)
     return ratio, difference
-
-
-def _scale(variable: Variable, baseline: Side, where: Mapping[str, slice], values: Array) -> Array:
-    """What a variable's tolerance is relative to, at every point of a slab, in its own unit."""
-
-    def read(name: str) -> Array:
-        return baseline.read(name, where).astype(float)
-
-    match variable.judged:
-        case "scaled by v0":
-            return np.asarray(np.abs(read("v1") - read("v2")))
-        case "scaled by m v0^2/2":
-            v0 = read("v1") - read("v2")
-            return np.asarray(0.5 * effective_mass(read("m1"), read("m2")) * v0 * v0)
-        case "scaled by the peak" if "peak_indentation" in baseline.dataset:
-            return np.asarray(np.abs(read("peak_indentation")))
-        case "scaled by itself" | "scaled by the peak":
-            return np.asarray(np.abs(values))
-    return np.ones(())
 
 
 def _may_be_missing(variable: Variable, aligned: Aligned, where: Mapping[str, slice]) -> Array | bool:

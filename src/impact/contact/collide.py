@@ -274,8 +274,8 @@ def first_look(model: Law, lanes: Lanes, checks: frozenset[str] = CHECKS) -> NDA
     ----------
     model : the law
     lanes : the impacts
-    checks : what is looked at: the restitution "e", the closing speed "v0", and the sizes of the contact, "length",
-        the unit of which comes from all of them
+    checks : what is looked at: the restitution "e", the closing speed "v0", and the sizes of the contact,
+        "length", the unit of which comes from all of them
     """
     status = np.asarray(Status.OK, np.int8)
     if "length" in checks:

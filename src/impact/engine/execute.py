@@ -95,7 +95,7 @@ def _models(context: WorkerContext) -> Mapping[str, ForceModel]:
         raise UsageError(other_version(here, __version__, context.version))
     if context.solver.core == "numba" and not is_installed():
         raise UsageError(
-            f'{here}: has no numba, by which the sweep is integrated; install it there, or set solver.core = "numpy"'
+            f'{here}: has no numba, which this sweep needs; install it there, or set solver.core = "numpy"'
         )
     if not context.hashes:
         return catalogue()
@@ -105,7 +105,7 @@ def _models(context: WorkerContext) -> Mapping[str, ForceModel]:
     lacking = [key for key, sha256 in context.hashes if plugins.hashes.get(key) != sha256]
     if lacking:
         raise UsageError(
-            f"{here}: {safe_text(', '.join(lacking))}: expected the package that has it, in the version that is here"
+            f"{here}: {safe_text(', '.join(lacking))}: expected the package that has it, in this version"
         )
     return catalogue(plugins.models)
 
@@ -200,8 +200,8 @@ def run(
             trials.update(part.number for part in running.values() or left)
             if max(trials.values()) > MAX_RETRIES:
                 raise StoreError(
-                    f"processes were killed {MAX_RETRIES + 1} times at the same trajectories: memory is short; or, of a "
-                    'program of your own, it lacks its if __name__ == "__main__":'
+                    f"processes were killed {MAX_RETRIES + 1} times at the same trajectories: memory is short; "
+                    'or, of a program of your own, it lacks its if __name__ == "__main__":'
                 ) from None
 
 

@@ -110,7 +110,8 @@ def check_count(plan: Plan, most: int, name: str) -> None:
         total += cells if cells > MAX_CELLS else 0
     if total > most:
         raise UsageError(
-            f"{safe_text(name)}: sweep: got {total:,} trajectories to integrate, expected at most {most:,} (--max-points)"
+            f"{safe_text(name)}: sweep: got {total:,} trajectories to integrate, expected at most {most:,} "
+            "(--max-points)"
         )
 
 

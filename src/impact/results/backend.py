@@ -8,6 +8,7 @@ import os
 import stat
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,9 +22,10 @@ from ..atomic import Sink, appearing
 from ..errors import ResultError, UnfinishedError, UsageError
 from ..sweeps.settings import Output
 from ..text import safe_text
-from .expand import TrajectoryTable, lazy_dataset
+from .expand import TrajectoryTable, in_memory, lazy_dataset
 from .factored import check_witnesses, stored_table, variables_of
 from .netcdf import StoredArray, read_variables, writing
+from .schema import SCHEMA
 from .sealed import MAGIC, check_seal, write_seal
 from .slabs import slabs
 from .validate import TABLE, is_quantity, schema_violation
@@ -128,8 +130,8 @@ def save(
 
     Parameters
     ----------
-    dataset : a result, or a part of one; of one that is computed or read when it is indexed no more than a little is
-        held at a time
+    dataset : a result, or a part of one; of one that is computed or read when it is indexed no more than
+        a slab is held at a time
     path : the file
     overwrite : replace a file that exists
     output : how it is stored
@@ -239,7 +241,7 @@ def open_with_table(path: str | Path) -> tuple[xr.Dataset, TrajectoryTable | Non
             raise ResultError(f"is not a readable result ({odd})")
     except ResultError as error:
         file.close()
-        raise ResultError(f"{shown}: {error}") from None
+        raise _named(shown, error) from None
     except MemoryError:
         file.close()
         raise
@@ -253,6 +255,11 @@ def open_with_table(path: str | Path) -> tuple[xr.Dataset, TrajectoryTable | Non
     dataset.encoding = {"source": str(path), "seal": seal, "layout": dataset.encoding["layout"]}
     dataset.set_close(file.close)
     return dataset, table
+
+
+def _named(shown: str, error: ResultError) -> ResultError:
+    """An error that begins with the name of its file."""
+    return error if str(error).startswith(f"{shown}: ") else ResultError(f"{shown}: {error}")
 
 
 def load(path: str | Path) -> xr.Dataset:
@@ -277,18 +284,23 @@ def load(path: str | Path) -> xr.Dataset:
     Traceback (most recent call last):
     impact.errors.ResultError: README.md: is not a readable result ...
     """
-    dataset = open_result(path)
+    dataset, table = open_with_table(path)
     if dataset.nbytes > SMALL_BYTES:
         return dataset
     with dataset:
+        shown = safe_text(str(path))
         try:
-            return dataset.load()
+            if table is None:
+                return dataset.load()
+            # all variables of a slab together: they have much in common
+            held = [replace(one, dtype=dataset[one.name].dtype.str[1:]) for one in SCHEMA if one.name in dataset]
+            return in_memory(dataset, table, held)
         except MemoryError:
             raise
+        except ResultError as error:
+            raise _named(shown, error) from None
         except Exception as error:
-            raise ResultError(
-                f"{safe_text(str(path))}: is not a readable result ({safe_text(str(error), 80)})"
-            ) from error
+            raise ResultError(f"{shown}: is not a readable result ({safe_text(str(error), 80)})") from error
 
 
 def _dataset(file: h5py.File) -> tuple[xr.Dataset, TrajectoryTable | None, tuple[str, ...]]:
@@ -305,10 +317,9 @@ def _dataset(file: h5py.File) -> tuple[xr.Dataset, TrajectoryTable | None, tuple
     witnesses = {name: variables[name].load() for name in table if name.startswith("witness_")}
     stored = xr.Dataset(witnesses, coordinates, attributes)
 
-    def read(name: str, part: slice) -> NDArray[Any]:
-        return np.asarray(StoredArray(name, file[name])._read((part,)))
-
-    found = stored_table(stored, read)
+    arrays = {name: StoredArray(name, file[name]) for name in table}
+    sizes = {name: array.shape[0] for name, array in arrays.items()}
+    found = stored_table(stored, sizes, lambda name, part: arrays[name].read((part,)))
     quantities = variables_of(stored)
     check_witnesses(found, quantities, stored)
     outline = stored.drop_vars(witnesses).drop_attrs(deep=False)
@@ -319,7 +330,7 @@ def _dataset(file: h5py.File) -> tuple[xr.Dataset, TrajectoryTable | None, tuple
 
 
 class ImpactBackend(BackendEntrypoint):
-    """`xarray.open_dataset(path, engine="impact")`: a result of either layout, read or computed when it is indexed."""
+    """`xarray.open_dataset(path, engine="impact")`: a result of either layout, read when it is indexed."""
 
     description = "Open results of impact, of any size, in xarray"
     open_dataset_parameters = ("filename_or_obj", "drop_variables")

@@ -1,7 +1,7 @@
 """Expand: from the trajectory table of a sweep to the outputs of any part of its grid.
 
-What is integrated is a table of distinct trajectories per model, in the contact's own units. All else in a result is
-a pure function of the inputs, this table and a place of the grid, and is computed here and nowhere else.
+What is integrated is a table of distinct trajectories per model, in the contact's own units. All else in a result
+is a pure function of the inputs, this table and a place of the grid, and is computed here and nowhere else.
 """
 
 from __future__ import annotations
@@ -127,8 +127,8 @@ def expand(table: TrajectoryTable, model: int, index: Index, names: Sequence[str
 
     Returns
     -------
-    dict : by name, arrays that broadcast to the shape of the index; what does not vary along an axis has length one
-        there. A plan without axes has one cell.
+    dict : by name, arrays that broadcast to the shape of the index; what does not vary along an axis has length
+        one there. A plan without axes has one cell.
     """
     contact = contact_at(table, model, index)
     return {name: getattr(contact, name) for name in names}
@@ -175,8 +175,8 @@ def _some(shape: tuple[int, ...], status: Status) -> NDArray[np.int8]:
 def checks_that_may_fail(inputs: Inputs, law: Law, stiffness: Stiffness | None = None) -> frozenset[str]:
     """The checks of `first_look` that may fail at some point of the grid; the others hold at all of them.
 
-    The sizes of a contact are monotonic in the closing speed, the masses, the radii, K and n each: they are safe at
-    all points if they are so at the ends of what each of these may be, in any combination.
+    The sizes of a contact are monotonic in the closing speed, the masses, the radii, K and n each: they are safe
+    at all points if they are so at the ends of what each of these may be, in any combination.
     """
     slowest, fastest, slowest_approach = _closing_speeds(inputs)
     if not fastest > 0.0:
@@ -216,7 +216,7 @@ def checks_that_may_fail(inputs: Inputs, law: Law, stiffness: Stiffness | None =
 
 
 def _closing_speeds(inputs: Inputs) -> tuple[float, float, float]:
-    """The least and greatest closing speed v1 - v2 [m/s] of a sweep, and a bound from below of the positive ones."""
+    """The least and greatest closing speed v1 - v2 [m/s], and a bound from below of the positive ones."""
     v1, v2 = (np.asarray(inputs.values(name), float) for name in ("v1", "v2"))
     slowest, fastest = float(v1.min() - v2.max()), float(v1.max() - v2.min())
     known = np.abs(np.concatenate([v1.reshape(-1), v2.reshape(-1)]))
@@ -294,8 +294,8 @@ def check_memory(name: str, shape: Sequence[int], dtype: np.dtype[Any]) -> None:
     size, most = math.prod(shape) * dtype.itemsize, max_bytes()
     if size > most:
         raise MemoryError(
-            f"{name}: {math.prod(shape):,} values take {size:,} bytes, expected at most {most:,}; select a part first, "
-            "such as result.isel(...) or result.sel(...)"
+            f"{name}: {math.prod(shape):,} values take {size:,} bytes, expected at most {most:,}; select a part "
+            "first, such as result.isel(...) or result.sel(...)"
         )
 
 

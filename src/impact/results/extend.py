@@ -51,7 +51,7 @@ def extend(
     ----------
     source : the result
     output : the file of the larger one, which may be the same
-    overrides : changes to its config, such as "sweep.m2=[1.0, 2.0]"; values that the result has are kept in any case
+    overrides : changes to its config, such as "sweep.m2=[1.0, 2.0]"; values that the result has are kept
     plugins : models that are not built in, those that it was made with among them
     resume, overwrite, team, tell, should_stop : see `impact.results.sweep.sweep_into`
     max_points : refuse a sweep of more points
@@ -125,7 +125,7 @@ def _extended_plan(
         is_there = len(matched([np.asarray(axis.columns[name])], [was])[0]) == was.size if was.size else True
         if len(axis.columns) == 1 and not is_there:
             values = [*was.tolist(), *(value for value in axis.columns[name] if value not in was.tolist())]
-            more.append(f"{'.'.join(path_of(name))}={_toml(values)}")
+            more.append(f"{'.'.join(map(str, path_of(name)))}={_toml(values)}")
     missing = [model.key for model in old.models if model not in asked.models]
     if missing:
         keys = [*(model.key for model in old.models), *(m.key for m in asked.models if m not in old.models)]
@@ -162,8 +162,8 @@ def _check_same(old: Plan, new: Plan, name: str) -> None:
     ]  # fmt: skip
     if changed or moved:
         raise UsageError(
-            f"{name}: --set changes {safe_text(', '.join([*changed, *moved]))}, expected more values of an axis, such as "
-            "--set 'sweep.m2=[1.0, 2.0]', or more models"
+            f"{name}: --set changes {safe_text(', '.join([*changed, *moved]))}, expected more values of an axis, "
+            "such as --set 'sweep.m2=[1.0, 2.0]', or more models"
         )
     if old.models == new.models and old.config.axes == new.config.axes:
         raise UsageError(f"{name}: has all of that already; expected more values of an axis, or more models")
@@ -171,7 +171,7 @@ def _check_same(old: Plan, new: Plan, name: str) -> None:
 
 @dataclass(frozen=True)
 class _AxisPlaces:
-    """Where the values of an axis stand in the old result: its axis there, if it has one, and places; -1 is new."""
+    """Where the values of an axis stand in the old result: its axis there, if any, and places; -1 is new."""
 
     axis: int | None
     places: Places

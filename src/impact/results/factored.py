@@ -1,7 +1,7 @@
 """The factored layout: a result as its axes, its trajectory table and what its laws say, for any number of points.
 
-Some points, the witnesses, are stored in full. When a file is opened they are computed again: where they come to other
-numbers, the file belongs to another version, and is refused.
+Some points, the witnesses, are stored in full. When a file is opened they are computed again: where they come to
+other numbers, the file belongs to another version, and is refused.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from ..contact.formula import Formula
 from ..contact.material import Material
 from ..contact.model import Law, Parameter
 from ..contact.power import Array
+from ..contact.status import Status
 from ..contact.strike import Rebound
 from ..engine.build_impacts import Stiffness, has_stiffness_rule
 from ..engine.plan import Index, Inputs
@@ -37,6 +38,11 @@ WITNESSES = 1_000
 WITNESS_TOLERANCE = 1e-12
 COLUMNS = tuple(column.name for column in fields(Rebound))
 SLAB_ROWS = 2**16
+# what a file says of a law, as JSON
+LAW_KINDS: Mapping[str, type] = {
+    "parameters": list, "domain": dict, "asks_for_e": bool, "is_permanent": bool, "axes": list,
+    "trajectories": int, "is_shared": bool,
+}  # fmt: skip
 
 Read = Callable[[str, slice], NDArray[Any]]
 
@@ -72,7 +78,7 @@ def factored_outline(outline: xr.Dataset, table: TrajectoryTable, variables: Seq
         about: dict[str, Any] = {
             "exponent": law.exponent, "parameters": [parameter.name for parameter in law.parameters],
             "domain": {name: list(ends) for name, ends in law.domain.items()}, "asks_for_e": "e" in law.quantities,
-            "is_permanent": law.is_permanent, "has_chi": "chi" in law.domain,
+            "is_permanent": law.is_permanent,
             "axes": [table.inputs.axes[axis].name for axis in own.axes], "trajectories": own.count,
             "is_shared": own.is_shared, "stiffness_axes": None,
         }  # fmt: skip
@@ -195,12 +201,13 @@ def _cells(inputs: Inputs, cells: NDArray[np.int64]) -> Index:
     return tuple(reversed(index))
 
 
-def stored_table(dataset: xr.Dataset, read: Read) -> TrajectoryTable:
+def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: Read) -> TrajectoryTable:
     """The trajectory table of a factored file.
 
     Parameters
     ----------
     dataset : its coordinates and attributes
+    sizes : the lengths of the variables of the table
     read : values of a variable of the table, from one place to another
 
     Raises
@@ -215,7 +222,11 @@ def stored_table(dataset: xr.Dataset, read: Read) -> TrajectoryTable:
     cell = value = 0
     try:
         for model, (key, about) in enumerate(laws.items()):
+            if any(type(about[name]) is not kind for name, kind in LAW_KINDS.items()):
+                raise TypeError
             axes = tuple(places[name] for name in about["axes"])
+            if len({*axes}) < len(axes):
+                raise ValueError
             shape = tuple(inputs.shape[axis] for axis in axes)
             own = TrajectoryMap(model, axes, shape)
             if about["is_shared"]:
@@ -224,7 +235,9 @@ def stored_table(dataset: xr.Dataset, read: Read) -> TrajectoryTable:
                 # the cell from which a trajectory was taken is not needed to read it
                 own = TrajectoryMap(model, axes, shape, np.broadcast_to(np.intp(0), count), of_cell)
                 cell += own.cells
-                if of_cell.shape != (own.cells,) or of_cell.min() < 0 or of_cell.max() >= count:
+                if of_cell.dtype.kind != "i" or of_cell.shape != (own.cells,):
+                    raise ValueError
+                if of_cell.min() < 0 or of_cell.max() >= count:
                     raise ValueError
             maps.append(own)
             starts.append(starts[-1] + own.count)
@@ -236,7 +249,13 @@ def stored_table(dataset: xr.Dataset, read: Read) -> TrajectoryTable:
                 value += size
             rules.append(rule)
             stored.append(_law(key, about))
-    except (KeyError, TypeError, ValueError, IndexError):
+        held = {f"trajectory_{name}": starts[-1] for name in COLUMNS}
+        held |= {"trajectory_of_cell": cell} if cell else {}
+        held |= {"law_stiffness": value} if value else {}
+        if held != {name: size for name, size in sizes.items() if not name.startswith("witness_")}:
+            raise ValueError
+        _check_status(sizes["trajectory_status"], read)
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError):
         raise ResultError("is not a readable result (its laws do not fit its table)") from None
 
     def rows(model: int, start: int, stop: int) -> Rebound:
@@ -244,6 +263,14 @@ def stored_table(dataset: xr.Dataset, read: Read) -> TrajectoryTable:
         return Rebound(**{name: read(f"trajectory_{name}", part) for name in COLUMNS})
 
     return TrajectoryTable(inputs, tuple(stored), tuple(maps), Rows(maps, rows), tuple(rules))
+
+
+def _check_status(rows: int, read: Read) -> None:
+    """Refuse a status that has no meaning, which a computed one would have as well."""
+    for first in range(0, rows, SLAB_ROWS):
+        values = read("trajectory_status", slice(first, min(first + SLAB_ROWS, rows)))
+        if values.dtype != np.int8 or not np.isin(np.unique(values), [int(status) for status in Status]).all():
+            raise ValueError
 
 
 def _laws(dataset: xr.Dataset) -> dict[str, dict[str, Any]]:
@@ -311,7 +338,9 @@ def axis_names(dataset: xr.Dataset) -> list[str]:
     """The axes of the grid of a factored file, in their order."""
     try:
         names = json.loads(str(dataset.attrs["axes"]))
-        if not isinstance(names, list) or any(dataset.coords[name].dims != (name,) for name in names):
+        if not isinstance(names, list) or len({*names}) < len(names):
+            raise ValueError
+        if any(dataset.coords[name].dims != (name,) for name in names):
             raise ValueError
     except (KeyError, ValueError, TypeError, RecursionError):
         raise ResultError("is not a readable result (axes: not those of its grid)") from None
@@ -342,10 +371,11 @@ def check_witnesses(table: TrajectoryTable, variables: Sequence[Variable], store
     for variable in variables:
         expected, got = stored[f"witness_{variable.name}"].values, here[variable.name]
         columns = {**known, variable.name: expected}
-        if "witness_peak_indentation" in stored:
+        has_peak = "witness_peak_indentation" in stored
+        if has_peak:
             columns["peak_indentation"] = stored["witness_peak_indentation"].values
         with np.errstate(all="ignore"):
-            scale = np.broadcast_to(scale_of(variable, columns), expected.shape)
+            scale = np.broadcast_to(scale_of(variable, columns.__getitem__, has_peak=has_peak), expected.shape)
             rounding = float(np.finfo(expected.dtype).eps) if expected.dtype.kind == "f" else 0.0
             allowed = np.maximum(WITNESS_TOLERANCE, 2.0 * rounding) * np.abs(scale)
             same = (got == expected) | (np.isnan(got) & np.isnan(expected)) | (np.abs(got - expected) <= allowed)
@@ -354,8 +384,8 @@ def check_witnesses(table: TrajectoryTable, variables: Sequence[Variable], store
             version = safe_text(str(stored.attrs.get("impact_version", "unknown")), 40)
             raise ResultError(
                 f"its witnesses expand to other numbers: {variable.name} is {got[at]:.12g}, the file has "
-                f"{expected[at]:.12g}; it was made by impact {version}, this is {__version__}: sweep its config again, or "
-                "expand it with that version (impact expand)"
+                f"{expected[at]:.12g}; it was made by impact {version}, this is {__version__}: sweep its config "
+                "again, or expand it with that version (impact expand)"
             )
 
 

@@ -7,8 +7,10 @@ many names. A result does none of that: datasets of numbers and letters in one g
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+import zlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from itertools import product
 from typing import Any
 
 import h5netcdf
@@ -152,15 +154,45 @@ class StoredArray(BackendArray):
     def __init__(self, name: str, dataset: h5py.Dataset) -> None:
         self.name, self.dataset = name, dataset
         self.shape, self.dtype = dataset.shape, dataset.dtype
+        self._checked: set[tuple[int, ...]] = set()
 
     def __getitem__(self, key: indexing.ExplicitIndexer) -> Any:
         support = indexing.IndexingSupport.OUTER_1VECTOR
-        return indexing.explicit_indexing_adapter(key, self.shape, support, self._read)
+        return indexing.explicit_indexing_adapter(key, self.shape, support, self.read)
 
-    def _read(self, key: tuple[Any, ...]) -> NDArray[Any]:
-        counts = (np.size(np.arange(size)[part]) for size, part in zip(self.shape, key, strict=True))
-        check_memory(self.name, tuple(counts), self.dtype)
-        return np.asarray(self.dataset[key])
+    def read(self, key: tuple[Any, ...]) -> NDArray[Any]:
+        """Some values; `key` has a number, a slice or an array of places for each axis.
+
+        Raises
+        ------
+        ResultError : they cannot be read
+        MemoryError : they are too many to be read at once
+        """
+        places = [np.atleast_1d(np.arange(size)[part]) for size, part in zip(self.shape, key, strict=True)]
+        check_memory(self.name, tuple(part.size for part in places), self.dtype)
+        try:
+            self._check_chunks(places)
+            return np.asarray(self.dataset[key])
+        except (OSError, RuntimeError, ValueError, zlib.error) as error:
+            path = safe_text(str(self.dataset.file.filename)) if self.dataset else "the result"
+            reason = f"{safe_text(self.name, 40)}: {safe_text(str(error), 80)}"
+            raise ResultError(f"{path}: is not a readable result ({reason})") from error
+
+    def _check_chunks(self, places: Sequence[NDArray[np.intp]]) -> None:
+        """Unpack the chunks that hold some values, no further than their size.
+
+        HDF5 unpacks one to whatever it holds, and reads on behind one that holds less.
+        """
+        if not self.dataset.compression:
+            return
+        chunks = self.dataset.chunks
+        size = math.prod(chunks) * self.dtype.itemsize
+        for corner in product(*(np.unique(p // c * c).tolist() for p, c in zip(places, chunks, strict=True))):
+            if corner not in self._checked:
+                unfiltered, packed = self.dataset.id.read_direct_chunk(corner)
+                if unfiltered or len(zlib.decompressobj().decompress(packed, size + 1)) != size:
+                    raise ValueError("a chunk of another size than its own")
+                self._checked.add(corner)
 
 
 def read_variables(file: h5py.File) -> tuple[dict[str, xr.Variable], dict[str, object], tuple[str, ...]]:
@@ -190,12 +222,13 @@ def read_variables(file: h5py.File) -> tuple[dict[str, xr.Variable], dict[str, o
             raise _odd("declares what the file does not hold", name)
         attributes = _attributes(dataset)
         if dataset.dtype.kind == "S":
-            values = np.asarray(dataset[()])
+            values = StoredArray(name, dataset).read((slice(None),) * dataset.ndim)
             texts = values.view(f"S{values.shape[-1]}")[..., 0]
             variables[name] = xr.Variable(dims[name][:-1], np.char.decode(texts, "utf-8"), attributes)
         else:
             array = indexing.LazilyIndexedArray(StoredArray(name, dataset))
-            variables[name] = xr.Variable(dims[name], array, attributes)
+            chunks = {"chunksizes": dataset.chunks} if dataset.chunks else None
+            variables[name] = xr.Variable(dims[name], array, attributes, chunks)
     return variables, _attributes(file), tuple(sorted(unknown))
 
 
@@ -242,7 +275,8 @@ def _check_data(file: h5py.File, datasets: Mapping[str, h5py.Dataset]) -> dict[s
     for name, dataset in datasets.items():
         declared = _declared(name, dataset.id)
         if dataset.chunks:
-            chunks += math.prod(-(-n // c) for n, c in zip(dataset.shape, dataset.chunks, strict=True))
+            chunks += _chunks(dataset)
+        if dataset.compression:
             compressed += declared
         else:
             plain += declared
@@ -251,9 +285,17 @@ def _check_data(file: h5py.File, datasets: Mapping[str, h5py.Dataset]) -> dict[s
         raise _odd("more data than such a file may hold")
     if chunks > MAX_CHUNKS:
         raise _odd(f"more than {MAX_CHUNKS:,} chunks")
+    # of one that is missing, any number of values would be read as zeros
+    missing = [name for name, one in datasets.items() if one.chunks and one.id.get_num_chunks() != _chunks(one)]
+    if missing:
+        raise _odd("declares what the file does not hold", missing[0])
     if text > MAX_LETTERS:
         raise _odd(f"more than {MAX_LETTERS:,} bytes of labels")
     return _dimensions(datasets)
+
+
+def _chunks(dataset: h5py.Dataset) -> int:
+    return math.prod(-(-n // c) for n, c in zip(dataset.shape, dataset.chunks, strict=True))
 
 
 def _is_number(kind: h5t.TypeID) -> bool:
@@ -274,11 +316,11 @@ def _declared(name: str, dataset: h5d.DatasetID) -> int:
     plist = dataset.get_create_plist()
     declared = math.prod(shape) * kind.get_size() if shape is not None else 0
     if plist.get_layout() == h5d.CHUNKED:
-        filters = {plist.get_filter(place)[0] for place in range(plist.get_nfilters())}
+        filters = [plist.get_filter(place)[0] for place in range(plist.get_nfilters())]
         whole = shape == dataset.get_space().get_simple_extent_dims(maxdims=True)
         # a chunk that is larger than the whole would be unpacked to its own size
         fits = whole and all(c <= n for c, n in zip(plist.get_chunk(), shape, strict=True))
-        stored = fits and filters <= {h5z.FILTER_DEFLATE, h5z.FILTER_SHUFFLE}
+        stored = fits and filters in ([], [h5z.FILTER_DEFLATE], [h5z.FILTER_SHUFFLE, h5z.FILTER_DEFLATE])
     else:
         # the dataset of a dimension without values is never written
         held = dataset.get_storage_size() in (0, declared)
@@ -289,7 +331,7 @@ def _declared(name: str, dataset: h5d.DatasetID) -> int:
 
 
 def _dimensions(datasets: Mapping[str, h5py.Dataset]) -> dict[str, tuple[str, ...]]:
-    """The dimensions of each dataset, by the numbers that netCDF gives to them and to the datasets of their values."""
+    """The dimensions of each dataset, by the numbers that netCDF gives to them and to their values."""
     numbers = {
         name: np.ravel(dataset.attrs.get("_Netcdf4Coordinates", ())).tolist() for name, dataset in datasets.items()
     }

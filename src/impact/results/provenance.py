@@ -36,7 +36,8 @@ def config_of(
         return read_config(source, overrides, plugins.models)
     path = Path(source)
     if is_result(path):
-        attributes = open_result(path).attrs
+        with open_result(path) as stored:
+            attributes = stored.attrs
         config = stored_config(attributes, overrides, plugins, str(path), allow_changed_plugins=True)
         for note in changed_plugins(attributes, plugins, str(path)):
             warnings.warn(note, stacklevel=2)
@@ -48,7 +49,8 @@ def picked_out(source: str | Path | Mapping[str, object] | None) -> dict[str, fl
     """The single values of a result; where its sweep varied one of them, the result is the part at that value."""
     if not isinstance(source, str | Path) or not is_result(Path(source)):
         return {}
-    single = {str(name): one for name, one in open_result(Path(source)).coords.items() if one.ndim == 0}
+    with open_result(source) as stored:
+        single = {str(name): one for name, one in stored.coords.items() if one.ndim == 0}
     return {name: one.values.item() for name, one in single.items() if name != "model"}
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -12,24 +12,28 @@ from ..contact.material import effective_mass
 from .schema import Variable
 
 
-def scale_of(variable: Variable, columns: Mapping[str, NDArray[Any]]) -> NDArray[np.float64]:
+def scale_of(variable: Variable, read: Callable[[str], NDArray[Any]], *, has_peak: bool) -> NDArray[np.float64]:
     """The scale of a variable, of a shape that broadcasts to that of the points.
 
     Parameters
     ----------
     variable : which
-    columns : by name, v1, v2 [m/s], m1, m2 [kg], the variable itself, and `peak_indentation` if the result has it;
-        arrays that broadcast against each other
+    read : gives values by name: v1, v2 [m/s], m1, m2 [kg], the variable itself, `peak_indentation` [m]; arrays
+        that broadcast against each other
+    has_peak : whether the result has `peak_indentation`
     """
-    v0 = np.asarray(columns["v1"], float) - np.asarray(columns["v2"], float)
+
+    def number(name: str) -> NDArray[np.float64]:
+        return np.asarray(read(name), float)
+
     match variable.judged:
         case "scaled by v0":
-            return np.asarray(np.abs(v0))
+            return np.asarray(np.abs(number("v1") - number("v2")))
         case "scaled by m v0^2/2":
-            mass = effective_mass(np.asarray(columns["m1"], float), np.asarray(columns["m2"], float))
-            return np.asarray(0.5 * mass * v0 * v0)
-        case "scaled by the peak" if "peak_indentation" in columns:
-            return np.asarray(np.abs(columns["peak_indentation"]), float)
+            v0 = number("v1") - number("v2")
+            return np.asarray(0.5 * effective_mass(number("m1"), number("m2")) * v0 * v0)
+        case "scaled by the peak" if has_peak:
+            return np.asarray(np.abs(number("peak_indentation")))
         case "scaled by itself" | "scaled by the peak":
-            return np.asarray(np.abs(columns[variable.name]), float)
+            return np.asarray(np.abs(number(variable.name)))
     return np.ones(())

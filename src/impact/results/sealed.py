@@ -1,7 +1,7 @@
 """Sealed files: 512 bytes that name the format and hold the SHA-256 of everything after them.
 
-The seal is checked before the HDF5 library parses a byte, so that every changed bit and every truncation is found. It
-is also the identity of a result: equal inputs give equal files within one installation.
+The seal is checked before the HDF5 library parses a byte, so that every changed bit and every truncation is found.
+It is also the identity of a result: equal inputs give equal files within one installation.
 """
 
 from __future__ import annotations

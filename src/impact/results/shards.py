@@ -1,7 +1,7 @@
 """Shards: a sweep in parts that know nothing of each other, for job arrays without a scheduler of our own.
 
 Shard K of N has the ranges K, K + N, K + 2N, ... of trajectories in a work folder that stays; those of all shards
-make the result. A range is a pure function of its plan, so that it may be in several folders: it has the same bits.
+make the result. A range is a pure function of its plan: it may be in several folders, with the same bits.
 """
 
 from __future__ import annotations
@@ -257,8 +257,8 @@ def _places(
                 if any(values.tobytes() != vars(other)[name].tobytes() for name, values in vars(found).items()):
                     raise ResultError(
                         f"{safe_text(str(work.path(part.number)))}: differs from "
-                        f"{safe_text(str(where[part.number].path(part.number)))}; expected both to be of processors of "
-                        "one kind"
+                        f"{safe_text(str(where[part.number].path(part.number)))}; expected both to be of "
+                        "processors of one kind"
                     )
     return where, len(repeated)
 

@@ -15,6 +15,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ..atomic import appearing
+from ..contact.collide import Contact
 from ..contact.strike import Rebound
 from ..engine.checkpoint import Work, folder_of, part_of, remove, working
 from ..engine.execute import Known, never, run, with_core
@@ -35,7 +36,7 @@ from .backend import SMALL_BYTES, check_output, check_readable, open_result, wri
 from .expand import TrajectoryTable, expanded_slabs, in_memory, lazy_dataset, table_of
 from .factored import check_factored, factored_outline, table_values
 from .netcdf import MAX_LETTERS, is_text, letters
-from .schema import outline, stored
+from .schema import Variable, outline, stored
 from .summary import Survey, Tally, tally_of
 
 # bytes that a result takes besides its values, about
@@ -298,8 +299,7 @@ def store_result(
                 extension.fill(model, where, values)
             for name, array in values.items():
                 yield name, (model, *where) if "model" in whole[name].dims else where, array
-            radius = np.fmin(contact.lanes.R1, contact.lanes.R2)
-            tally.add(values, model, [place.start for place in where], radius)
+            _add(tally, model, where, contact, values)
             points += values["status"].size
             check(points)
 
@@ -315,6 +315,19 @@ def store_result(
         check_readable(sink, output)
     if not is_full:
         whole = lazy_dataset(whole, table, variables)
-        tally = tally_of(whole)
+        tally = _tally_of_points(table, variables) if plan.points <= NO_CHECKPOINT_POINTS else tally_of(whole)
     whole.encoding = {"source": str(output), "seal": seal, "layout": plan.layout}
     return Survey(whole, tally, at.of_trajectories)
+
+
+def _tally_of_points(table: TrajectoryTable, variables: Sequence[Variable]) -> Tally:
+    """What came out, point by point: unlike `tally_of` it knows the radii."""
+    tally = Tally()
+    for model, where, contact, values in expanded_slabs(table, variables):
+        _add(tally, model, where, contact, values)
+    return tally
+
+
+def _add(tally: Tally, model: int, where: tuple[slice, ...], contact: Contact, values: Values) -> None:
+    radius = np.fmin(contact.lanes.R1, contact.lanes.R2)
+    tally.add(values, model, [place.start for place in where], radius)

@@ -1,4 +1,4 @@
-"""The names that a result, or a time history, may have, and what it has to be like for the commands to make sense of it.
+"""The names that a result, or a time history, may have, and what commands rely on in it.
 
 `load` passes over other names, `save` refuses them.
 """

@@ -73,7 +73,7 @@ def lay_out(
     given : the names under [sweep], whether their entries could be read or not
     models : how many there are
     max_points : how many points are allowed
-    in_full : whether all of them are to be stored; else only what is integrated is bounded, see `impact.api.prepare`
+    in_full : whether all of them are to be stored; else what is integrated is bounded, see `impact.api.prepare`
     """
     member_of, faults = _zipped(groups, entries, given)
     scalars = {name: entry.given[0] for name, entry in entries.items() if entry.kind == "scalar"}
