@@ -426,7 +426,7 @@ def test_every_option_of_the_starter_works() -> None:
     config = read_config_text(rest)
     assert config.solver == Solver(1e-10, 10_000)
     assert set(config.materials) == {"table1", "steel"}
-    assert config.output == Output(("v1_post", "v2_post", "e_out", "status"), "float32", "gzip", {"e": 50})
+    assert config.output == Output(("v1_post", "v2_post", "e_out", "status"), "float32", "gzip", {"e": 50}, "full")
     # without e as an axis there is nothing to cut along it
     rest = re.sub(r"^chunks = .*\n", "", rest, flags=re.MULTILINE)
     one_by_one = [line for line in shown if line.split(" = ")[0] in ("alpha", "m2", "K", "R2")]

@@ -81,14 +81,19 @@ def extend(
         places = _Places(old, new, trajectory_maps(new), axes)
         counted: dict[int, int] = {}
 
+        # a full result has no trajectories to hand on to a table, only the values of its points
+        fill = places.filler(before) if table is None and new.layout == "full" else None
+
         def known(part: TrajectoryRange) -> tuple[NDArray[np.bool_], Rebound] | None:
-            found = places.from_table(part, table) if table is not None else places.not_needed(part)
+            found = None
+            if table is not None:
+                found = places.from_table(part, table)
+            elif fill is not None:
+                found = places.not_needed(part)
             counted[part.number] = part.size - (0 if found is None else int(np.count_nonzero(found[0])))
             return found
 
-        extension = Extension(
-            seal, json.dumps(history), known, None if table is not None else places.filler(before)
-        )
+        extension = Extension(seal, json.dumps(history), known, fill)
         survey = sweep_into(
             output, new, resume=resume, overwrite=overwrite or output == source, team=team, tell=tell,
             should_stop=should_stop, extension=extension,
@@ -144,6 +149,11 @@ def _check_same(old: Plan, new: Plan, name: str) -> None:
     ]
     used = new.materials_used
     changed += [f"materials.{key}" for key, one in old.materials_used.items() if used.get(key, one) != one]
+    outputs = old.config.output, new.config.output
+    # values that are copied have the variables and the digits of the result
+    changed += [
+        f"output.{key}" for key in ("variables", "dtype") if getattr(outputs[0], key) != getattr(outputs[1], key)
+    ]
     changed += [key for key in old.inputs.names() if key not in new.inputs.names()]
     changed += [key for key in new.inputs.names() if key not in old.inputs.names() and "." not in key]
     moved = [
