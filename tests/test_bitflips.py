@@ -79,9 +79,7 @@ def test_the_commands_refuse_a_flipped_bit(good: Path, cli: Run, tmp_path: Path)
     (tmp_path / "good.h5").write_bytes(content)
     # in the digest, in the padding, and anywhere
     for place, bit in [(40, 1), (USER_BLOCK - 1, 128), *flips(len(content), OF_COMMANDS, 3)]:
-        (tmp_path / "flip.h5").write_bytes(
-            content[:place] + bytes([content[place] ^ bit]) + content[place + 1 :]
-        )
+        (tmp_path / "flip.h5").write_bytes(content[:place] + bytes([content[place] ^ bit]) + content[place + 1 :])
         for command in COMMANDS:
             done = cli(*command, cwd=tmp_path)
             assert (done.returncode, done.stdout) == (2, ""), (place, bit, done)
