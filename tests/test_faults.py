@@ -21,6 +21,7 @@ import pytest
 from .faults import (
     BLOCKS,
     CONFIG,
+    FACTORED,
     RESULT,
     TEXT,
     WORK,
@@ -71,13 +72,15 @@ def check_kills(sweeps: Sweeps, count: int | None) -> None:
     tally.end()
 
 
-def test_killed_at_an_operation(sweeps: Sweeps) -> None:
-    check_kills(sweeps, 20)
+@pytest.mark.parametrize(("text", "count"), [(TEXT, 20), (FACTORED, 8)])
+def test_killed_at_an_operation(sweeps: Sweeps, text: str, count: int) -> None:
+    check_kills(sweeps.of(text), count)
 
 
 @pytest.mark.faults
-def test_killed_at_every_operation(sweeps: Sweeps) -> None:
-    check_kills(sweeps, None)
+@pytest.mark.parametrize("text", [TEXT, FACTORED])
+def test_killed_at_every_operation(sweeps: Sweeps, text: str) -> None:
+    check_kills(sweeps.of(text), None)
 
 
 def check_random_kills(sweeps: Sweeps, count: int) -> None:
@@ -256,9 +259,10 @@ def check_power_cuts(sweeps: Sweeps, kinds: set[str], writes: int) -> None:
     tally.end()
 
 
-def test_power_cuts(sweeps: Sweeps) -> None:
+@pytest.mark.parametrize(("text", "kinds"), [(TEXT, {"link", "rename", "rmdir"}), (FACTORED, {"link"})])
+def test_power_cuts(sweeps: Sweeps, text: str, kinds: set[str]) -> None:
     # where a name appears, and when all is done
-    check_power_cuts(sweeps, {"link", "rename", "rmdir"}, 0)
+    check_power_cuts(sweeps.of(text), kinds, 0)
 
 
 @pytest.mark.faults
@@ -325,13 +329,15 @@ def check_failures(sweeps: Sweeps, count: int | None) -> None:
         tally.end()
 
 
-def test_a_disk_that_fails(sweeps: Sweeps) -> None:
-    check_failures(sweeps, 5)
+@pytest.mark.parametrize(("text", "count"), [(TEXT, 5), (FACTORED, 3)])
+def test_a_disk_that_fails(sweeps: Sweeps, text: str, count: int) -> None:
+    check_failures(sweeps.of(text), count)
 
 
 @pytest.mark.faults
-def test_a_disk_that_fails_at_any_operation(sweeps: Sweeps) -> None:
-    check_failures(sweeps, 120)
+@pytest.mark.parametrize(("text", "count"), [(TEXT, 120), (FACTORED, 40)])
+def test_a_disk_that_fails_at_any_operation(sweeps: Sweeps, text: str, count: int) -> None:
+    check_failures(sweeps.of(text), count)
 
 
 def test_a_disk_that_fails_before_the_first_block_says_how_to_go_on(sweeps: Sweeps) -> None:

@@ -19,6 +19,7 @@ import pytest
 from .faults import (
     BLOCKS,
     CONFIG,
+    FACTORED,
     RESULT,
     TEXT,
     WORK,
@@ -285,10 +286,12 @@ def stopped(sweeps: Sweeps, folder: Path, place: int | list[str], *words: str | 
     return running
 
 
-@pytest.mark.parametrize("words", [
-    ("write", f"{WORK}/block.part"), ("rename", f"{WORK}/block.part"), ("write", f"{RESULT}.part"),
+@pytest.mark.parametrize(("text", "words"), [
+    (TEXT, ("write", f"{WORK}/block.part")), (TEXT, ("rename", f"{WORK}/block.part")),
+    (TEXT, ("write", f"{RESULT}.part")), (FACTORED, ("write", f"{RESULT}.part")),
 ])  # fmt: skip
-def test_the_second_sweep_on_an_output_ends_at_once(sweeps: Sweeps, words: tuple[str, ...]) -> None:
+def test_the_second_sweep_on_an_output_ends_at_once(sweeps: Sweeps, text: str, words: tuple[str, ...]) -> None:
+    sweeps = sweeps.of(text)
     folder = sweeps.folder()
     first = stopped(sweeps, folder, sweeps.place(*words))
     before = snapshot(folder)
@@ -343,13 +346,15 @@ def check_signals(sweeps: Sweeps, count: int | None, moments: int) -> None:
     tally.end()
 
 
-def test_signals(sweeps: Sweeps) -> None:
-    check_signals(sweeps, 5, 1)
+@pytest.mark.parametrize(("text", "count"), [(TEXT, 5), (FACTORED, 3)])
+def test_signals(sweeps: Sweeps, text: str, count: int) -> None:
+    check_signals(sweeps.of(text), count, 1)
 
 
 @pytest.mark.faults
-def test_many_signals(sweeps: Sweeps) -> None:
-    check_signals(sweeps, 60, 40)
+@pytest.mark.parametrize(("text", "count"), [(TEXT, 60), (FACTORED, 20)])
+def test_many_signals(sweeps: Sweeps, text: str, count: int) -> None:
+    check_signals(sweeps.of(text), count, 40)
 
 
 def test_a_small_sweep_that_is_interrupted_says_what_became_of_it(sweeps: Sweeps) -> None:

@@ -619,10 +619,6 @@ def test_a_rerun_allocates_no_more_than_the_file_holds(tmp_path: Path) -> None:
         done = run(["bash", "-c", command])
         assert done.returncode == (0 if name == "config" else 1), done
         assert "note: repeated " in done.stdout
-    # of which no more is bounded than what is integrated
-    done = run(["bash", "-c", f"{command} --max-points 1"])
-    assert (done.returncode, done.stdout) == (2, "")
-    assert "got 4 trajectories to integrate, expected at most 1 (--max-points)" in done.stderr
 
 
 PLUGIN = """\

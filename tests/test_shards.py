@@ -118,6 +118,29 @@ def test_an_unfinished_shard_is_told_from_a_missing_one(cli: Run, folder: Path) 
     merged(cli, folder, *found)
 
 
+LIMITED = """import resource
+resource.setrlimit(resource.RLIMIT_NOFILE, (64, 64))
+from impact.cli.main import main
+main()
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs a limit of open files")
+def test_more_shards_than_open_files_are_merged(cli: Run, folder: Path) -> None:
+    # of the 100 only five have a range, and each is a folder with a lock
+    found = shards(cli, folder, "1/100", "2/100", "3/100", "4/100", "5/100")
+    for number in range(6, 101):
+        found.append(folder / f"results.h5.{number}-of-100.work")
+        shutil.copytree(found[0], found[-1])
+        told = json.loads((found[-1] / "shard.json").read_text()) | {"shard": [number, 100]}
+        (found[-1] / "shard.json").write_text(json.dumps(told))
+        (found[-1] / "00000000.npz").unlink()
+    words = [sys.executable, "-c", LIMITED, "merge", *map(str, reversed(found))]
+    done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert content(folder) == right(folder)
+
+
 @pytest.mark.slow
 def test_many_missing_ones_are_counted(cli: Run, folder: Path) -> None:
     more = '"gharib-hurmuzlu-2012", "herbert-mcwhannell-1977", "lankarani-nikravesh-1994"]'

@@ -459,6 +459,28 @@ def _refused(cli: Run, folder: Path, config: str, output: str, *words: str) -> s
     return line
 
 
+# a law of forty parameters
+FORTY = """
+import impact
+MINE = impact.ForceModel(
+    "mine-2026", "Mine", 2026, equation="", reference="", exponent=1.0, force=lambda elastic: elastic,
+    parameters=tuple(impact.Parameter(f"p{number}", "1", "a number", default=1.0) for number in range(40)),
+)
+"""
+
+
+@pytest.mark.parametrize("layout", ["full", "factored"])
+def test_more_axes_than_a_file_can_have_are_refused(cli: Run, tmp_path: Path, layout: str) -> None:
+    (tmp_path / "mine.py").write_text(FORTY, encoding="utf-8")
+    axes = "".join(f"p{number} = {[1.0, 2.0] if number < 2 else [1.0]}\n" for number in range(40))
+    config = (
+        f'models = ["mine-2026"]\n[sweep]\nv1 = 1.0\nm1 = 1.0\nm2 = 1.0\nK = 6e9\nn = 1.0\n'
+        f'[output]\nlayout = "{layout}"\n[model.mine-2026]\n{axes}'
+    )
+    line = _refused(cli, tmp_path, config, "out.h5", "--plugin", "mine.py")
+    assert "got 40 axes, expected at most 31" in line
+
+
 def test_longer_labels_than_a_file_can_have_are_refused(cli: Run, tmp_path: Path) -> None:
     # each takes as many letters as the longest
     names = ["x" * 400_000, *(f"y{number}" for number in range(19))]

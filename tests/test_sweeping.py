@@ -125,17 +125,23 @@ def test_a_dry_run_says_where_equal_values_are_not_looked_for(cli: Run, blocks: 
 def test_too_many_points_are_refused_before_there_is_anything(forked: Forked, blocks: Path) -> None:
     grid = [f"sweep.{name}.geomspace=[1,2,10000]" for name in ("v1", "m1", "m2")]
     sets = [word for one in grid for word in ("--set", one)]
-    done = forked("sweep", blocks, *sets, cwd=blocks.parent, limit=10.0)
-    wants = "got 80,000,000,000,000,000 points (axes times models), up to 12,800,000,000 GB, wants at most "
-    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
-    assert f"sweep: {wants}1,000,000,000 points (--max-points)" in done.stderr
-    assert done.memory < 300e6
-    fewer = forked("sweep", blocks, "--max-points", "159999", cwd=blocks.parent)
+    count = "80,000,000,000,000,000"
+    for change, message in (
+        ('output.layout="full"', f"got {count} points (axes times models), up to 12,800,000,000 GB, expected at most "
+         '1,000,000,000 points in layout "full" (--max-points); layout = "factored" stores any number'),
+        ("solver.collapse=false", f"got {count} trajectories to integrate, expected at most 1,000,000,000 "),
+    ):  # fmt: skip
+        done = forked("sweep", blocks, *sets, "--set", change, cwd=blocks.parent, limit=10.0)
+        assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
+        assert f"sweep: {message}" in done.stderr
+        assert done.memory < 300e6
+    full = 'output.layout="full"'
+    fewer = forked("sweep", blocks, "--max-points", "159999", "--set", full, cwd=blocks.parent)
     assert fewer.returncode == 2
     assert "got 160,000 points" in fewer.stderr
     assert [one.name for one in blocks.parent.iterdir()] == ["blocks.toml"]
     with pytest.raises(ConfigError, match="160,000 points"):
-        impact.sweep(blocks, max_points=79_999)
+        impact.sweep(blocks, overrides=[full], max_points=79_999)
 
 
 # ---- how far it is

@@ -252,6 +252,7 @@ def rerun(
     config = stored_config(stored.attrs, changes, own, str(result), max_points, allow_changed_plugins=True)
     whole = Plan(config, own.of(config.models))
     plan = replace(whole, config=part_of(config, stored))
+    check_count(plan, max_points, str(result))
     verdict = compare(execute(plan), stored, tol=tol, subset=subset)
     if plan.points < whole.points:
         part = f"repeated {plan.points:,} of {whole.points:,} points of the config: the file holds no others"
