@@ -245,5 +245,5 @@ def test_chunks_are_counted_by_the_variables_that_are_stored() -> None:
         read_config({"models": "hertz", "sweep": sweep, "output": {"variables": variables, "chunks": {"v1": 1}}})
 
     read("e_out")
-    with pytest.raises(impact.ImpactError, match="got 150,000 pieces of 1 points"):
+    with pytest.raises(impact.ImpactError, match="got 150,000 chunks of 1 points"):
         read("e_out", "separation_time")

@@ -347,8 +347,8 @@ STORED = {
     "as it is": ([], None, "f8"),
     "in fewer digits": (["output.dtype='float32'"], None, "f4"),
     "packed": (["output.compression='gzip'"], (1, 3, 2, 2, 2, 2), "f8"),
-    "in pieces": (["output.chunks={e=2, m1=1}"], (1, 2, 2, 1, 2, 2), "f8"),
-    "packed in pieces": (["output.compression='gzip'", "output.chunks.v1=1"], (1, 3, 1, 2, 2, 2), "f8"),
+    "in chunks": (["output.chunks={e=2, m1=1}"], (1, 2, 2, 1, 2, 2), "f8"),
+    "packed in chunks": (["output.compression='gzip'", "output.chunks.v1=1"], (1, 3, 1, 2, 2, 2), "f8"),
 }
 
 
@@ -417,10 +417,10 @@ def test_how_it_cannot_be_stored(blocks: Path, key: str) -> None:
     assert line.endswith(message)
 
 
-def test_pieces_that_are_too_many_or_too_large(blocks: Path) -> None:
-    with pytest.raises(ConfigError, match=r"got 1,600,000 pieces of 2 points, wants at most 100,000 of"):
+def test_chunks_that_are_too_many_or_too_large(blocks: Path) -> None:
+    with pytest.raises(ConfigError, match=r"got 1,600,000 chunks of 2 points, wants at most 100,000 of"):
         prepare(blocks, ["output.chunks.e=1"])
-    with pytest.raises(ConfigError, match=r"got 80 pieces of 10,000,000 points"):
+    with pytest.raises(ConfigError, match=r"got 80 chunks of 10,000,000 points"):
         prepare(blocks, ["output.chunks.m1=1", "sweep.e.linspace=[0,1,10000000]"])
 
 

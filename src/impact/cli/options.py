@@ -29,7 +29,13 @@ Threads = Annotated[
     ),
 ]
 MaxPoints = Annotated[
-    int, typer.Option("--max-points", metavar="N", parser=whole_number, help="Refuse a sweep of more points.")
+    int,
+    typer.Option(
+        "--max-points",
+        metavar="N",
+        parser=whole_number,
+        help="Refuse more: points in layout full, else trajectories.",
+    ),
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
 Output = Annotated[Path, typer.Option("-o", "--output", help="The result file.")]

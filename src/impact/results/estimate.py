@@ -18,6 +18,7 @@ from ..engine.execute import context_of, integrate, with_core
 from ..engine.plan import Plan
 from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryMap, columns_of, trajectory_maps, trajectory_ranges
 from .expand import expanded_slabs, table_of
+from .factored import factored_outline
 from .schema import outline, stored
 
 # numbers of workers of which the time is told
@@ -68,7 +69,7 @@ class Estimate:
 
 
 def estimate(plan: Plan, jobs: int = 1) -> Estimate:
-    """Count a sweep, and time one block of its trajectories and one box of its points.
+    """Count a sweep, and time one range of its trajectories and one slab of its points.
 
     Parameters
     ----------
@@ -104,13 +105,13 @@ def estimate(plan: Plan, jobs: int = 1) -> Estimate:
     after = assembling() / slab * plan.points if is_full else 0.0
     busy = min(max(round(each / own), 1), len(ranges))
     kept = total * sum(getattr(rebound, column.name).itemsize for column in fields(rebound))
-    cells = sum(4 * own_map.cells for own_map in maps if own_map.is_shared)
+    whole = outline(plan)
     counts = [*(count for count in WORKERS if count < busy), busy]
     return Estimate(
         plan.points,
         total,
         tuple(_collapse(plan, own_map) for own_map in maps),
-        outline(plan).nbytes if is_full else kept + cells,
+        (whole if is_full else factored_outline(whole, table, stored(plan))).nbytes,
         kept,
         each * total / jobs + after,
         plan.config.solver.core,

@@ -17,8 +17,8 @@ MOST_POINTS = 2**62
 # HDF5 has arrays of 32 dimensions, one of which is that of the models
 MAX_AXES = 31
 FULL = ' in layout "full" (--max-points); layout = "factored" stores any number'
-# pieces of a result, and points of a piece: a reader opens each, and holds it as a whole
-MOST_PIECES, MOST_OF_A_PIECE = 100_000, 2**22
+# chunks of a result, and points of a chunk: a reader opens each, and holds it as a whole
+MAX_CHUNKS, MAX_CHUNK_POINTS = 100_000, 2**22
 # bytes that the outputs of a point take at most, by default
 WIDTH = 8 * len(BY_DEFAULT)
 
@@ -108,7 +108,7 @@ def lay_out(
 
 
 def chunk_faults(chunks: Mapping[str, int], axes: Sequence[Axis], models: int, variables: int) -> list[Fault]:
-    """What is wrong with the pieces that a result is to be stored in: no such axis, too small or too large.
+    """What is wrong with the chunks that a result is to be stored in: no such axis, too small or too large.
 
     Parameters
     ----------
@@ -123,9 +123,9 @@ def chunk_faults(chunks: Mapping[str, int], axes: Sequence[Axis], models: int, v
     size = math.prod(min(chunks.get(name, whole), whole) for name, whole in sizes.items())
     count = math.prod(-(-whole // chunks.get(name, whole)) for name, whole in sizes.items())
     count *= models * variables
-    if size > MOST_OF_A_PIECE or count > MOST_PIECES:
-        wants = f"wants at most {MOST_PIECES:,} of at most {MOST_OF_A_PIECE:,}"
-        return [(path, f"got {count:,} pieces of {size:,} points, {wants}")]
+    if size > MAX_CHUNK_POINTS or count > MAX_CHUNKS:
+        wants = f"wants at most {MAX_CHUNKS:,} of at most {MAX_CHUNK_POINTS:,}"
+        return [(path, f"got {count:,} chunks of {size:,} points, {wants}")]
     return []
 
 

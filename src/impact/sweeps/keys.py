@@ -185,7 +185,7 @@ OUTPUT_KEYS = {
     "layout": _word_key(
         LAYOUTS, "all values, or the trajectories from which they are computed when they are read"
     ),
-    "chunks": Key(_chunks, CHUNKS, "lengths along axes, by name, of the pieces in which variables are stored"),
+    "chunks": Key(_chunks, CHUNKS, "lengths along axes, by name, of the chunks in which variables are stored"),
 }
 
 
