@@ -22,7 +22,7 @@ from impact.results.factored import WITNESS_TOLERANCE, WITNESSES
 from impact.results.netcdf import MAX_LETTERS
 from impact.results.ranking import MAX_RANKED_POINTS
 from impact.results.slabs import MAX_SUMMARY_POINTS
-from impact.sweeps.grid import MAX_AXES, MAX_POINTS, MOST_OF_A_PIECE, MOST_PIECES, MOST_POINTS
+from impact.sweeps.grid import MAX_AXES, MAX_CHUNK_POINTS, MAX_CHUNKS, MAX_POINTS, MOST_POINTS
 from impact.sweeps.ranges import MAX_AXIS
 from impact.views.slices import MAX_DRAWN
 
@@ -119,7 +119,7 @@ def test_the_numbers_of_the_page() -> None:
     shown = "10^7 10^9 10^10 10^6 2^26 2^30 2^24 2^62 1e-12"
     for text in ("512 MB", "4 MB", "| 31;", *shown.split()):
         assert text in PAGE
-    for number in (MAX_AXIS, WITNESSES, MOST_PIECES, MOST_OF_A_PIECE):
+    for number in (MAX_AXIS, WITNESSES, MAX_CHUNKS, MAX_CHUNK_POINTS):
         assert f"{number:,}" in PAGE
 
 
