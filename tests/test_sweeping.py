@@ -127,8 +127,8 @@ def test_too_many_points_are_refused_before_there_is_anything(forked: Forked, bl
     sets = [word for one in grid for word in ("--set", one)]
     count = "80,000,000,000,000,000"
     for change, message in (
-        ('output.layout="full"', f"got {count} points (axes times models), up to 12,800,000,000 GB, expected at most "
-         '1,000,000,000 points in layout "full" (--max-points); layout = "factored" stores any number'),
+        ('output.layout="full"', f"got {count} points (axes times models), up to 12,800,000,000 GB, expected at "
+         'most 1,000,000,000 points in layout "full" (--max-points); layout = "factored" stores any number'),
         ("solver.collapse=false", f"got {count} trajectories to integrate, expected at most 1,000,000,000 "),
     ):  # fmt: skip
         done = forked("sweep", blocks, *sets, "--set", change, cwd=blocks.parent, limit=10.0)

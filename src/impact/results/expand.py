@@ -268,7 +268,8 @@ class ExpandedArray(BackendArray):
         of_models = self.variable.per == "model"
         models, axes = (places[0], places[1:]) if of_models else (np.zeros(1, np.intp), places)
         for row, model in enumerate(models.tolist()):
-            out = values[row] if of_models else values
+            # an array even where there is no axis
+            out = values[row, ...] if of_models else values
             for where in slabs(dict(enumerate(out.shape))):
                 part = tuple(where.values())
                 index = np.ix_(*(axis[chosen] for axis, chosen in zip(axes, part, strict=True)))
