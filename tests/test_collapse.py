@@ -134,6 +134,37 @@ def test_how_many_trajectories_there_are() -> None:
     assert counts(GRID, "gharib-hurmuzlu-2012", "hertz", solver={"collapse": False}) == [48, 48]
 
 
+@pytest.mark.parametrize(
+    ("unit", "n", "p", "axes"),
+    [
+        ("m^(n-1)", [1.0, 1.0, 2.0], 1.0, (0, 1)),
+        ("m^(n-p)/s^(n-p)", [1.5, 1.5, 1.0], 1.5, (0, 1)),
+        ("N s^p/m^(n+p)", [1.0, 1.0, 2.0], [0.0, 2.0, 1.0], (0, 1, 2)),
+        ("s^(p-1)", [1.0, 1.0, 1.0], 1.0, (0,)),
+    ],
+)
+def test_an_exponent_that_is_zero_at_the_first_values_hides_no_axis(
+    unit: str, n: list[float], p: object, axes: tuple[int, ...]
+) -> None:
+    powers = impact.ForceModel(
+        "powers", "Powers", 2026, equation="", reference="",
+        force=lambda elastic, v, c: elastic * (1.0 + v * c / (1.0 + c)),
+        parameters=(impact.Parameter("c", unit, "", least=0.0), impact.Parameter("p", "1", "an exponent")),
+    )  # fmt: skip
+    config = {
+        "models": ["powers"], "materials": MATERIALS, "solver": {"rtol": 1e-4},
+        "sweep": {"e": [0.1, 0.5, 0.9], "n": n, "v1": [1.0, 2.0, 3.0], "m1": 1.0, "m2": 1.0, "material": "hard",
+                  "zip": [["e", "n"]]},
+        "model": {"powers": {"c": 0.3, "p": p}},
+    }  # fmt: skip
+    (found,) = trajectory_maps(prepare(config, plugins=[powers]))
+    assert found.axes == axes
+    once, each = (
+        impact.sweep(config, overrides=[f"solver.collapse={word}"], plugins=[powers]) for word in ("true", "false")
+    )
+    same_bits(once, each)
+
+
 def test_a_plan_of_any_size_is_counted_without_its_points() -> None:
     long = {"geomspace": [0.1, 10.0, 10_000]}
     sweep = {"e": {"linspace": [0.01, 1.0, 100]}, "v1": long, "m1": long, "m2": long, "material": ["soft", "hard"]}

@@ -157,18 +157,19 @@ def varies_along(table: TrajectoryTable, model: int, names: Sequence[str]) -> di
             "length": [lanes.v0, lanes.length, lanes.energy, lanes.time],
         }
     shapes = [array.shape for check in table.checks[model] for array in looked_at[check]]
-    status = _some(np.broadcast_shapes((1,) * dimensions(index), *shapes), Status.NO_IMPACT)
+    status = _some(np.broadcast_shapes((1,) * dimensions(index), *shapes), Status.NO_IMPACT, Status.OUT_OF_RANGE)
     shape = table.maps[model].rows(index).shape
     rebound = Rebound.blank(1).take(np.zeros(shape, np.intp))
     contact = Contact(law, lanes, replace(rebound, status=_some(shape, Status.MAX_STEPS)), status)
     return {name: tuple(sorted(axes_of_arrays([getattr(contact, name)]))) for name in names}
 
 
-def _some(shape: tuple[int, ...], status: Status) -> NDArray[np.int8]:
-    """A status at every second place, where there are several."""
+def _some(shape: tuple[int, ...], *statuses: Status) -> NDArray[np.int8]:
+    """Each of some statuses at some places, where there are several."""
     found = np.full(shape, Status.OK, np.int8)
     if found.size > 1:
-        found.reshape(-1)[::2] = status
+        for place, status in enumerate(statuses):
+            found.reshape(-1)[place :: len(statuses) + 1] = status
     return found
 
 
@@ -268,7 +269,8 @@ class ExpandedArray(BackendArray):
         of_models = self.variable.per == "model"
         models, axes = (places[0], places[1:]) if of_models else (np.zeros(1, np.intp), places)
         for row, model in enumerate(models.tolist()):
-            out = values[row] if of_models else values
+            # an array even where there is no axis
+            out = values[row, ...] if of_models else values
             for where in slabs(dict(enumerate(out.shape))):
                 part = tuple(where.values())
                 index = np.ix_(*(axis[chosen] for axis, chosen in zip(axes, part, strict=True)))
