@@ -119,7 +119,7 @@ def test_an_unfinished_shard_is_told_from_a_missing_one(cli: Run, folder: Path) 
 
 
 LIMITED = """import resource
-resource.setrlimit(resource.RLIMIT_NOFILE, (64, 64))
+resource.setrlimit(resource.RLIMIT_NOFILE, (40, 40))
 from impact.cli.main import main
 main()
 """
@@ -127,12 +127,12 @@ main()
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a limit of open files")
 def test_more_shards_than_open_files_are_merged(cli: Run, folder: Path) -> None:
-    # of the 100 only five have a range, and each is a folder with a lock
-    found = shards(cli, folder, "1/100", "2/100", "3/100", "4/100", "5/100")
-    for number in range(6, 101):
-        found.append(folder / f"results.h5.{number}-of-100.work")
+    # of the 60 only five have a range, and each is a folder with a lock
+    found = shards(cli, folder, "1/60", "2/60", "3/60", "4/60", "5/60")
+    for number in range(6, 61):
+        found.append(folder / f"results.h5.{number}-of-60.work")
         shutil.copytree(found[0], found[-1])
-        told = json.loads((found[-1] / "shard.json").read_text()) | {"shard": [number, 100]}
+        told = json.loads((found[-1] / "shard.json").read_text()) | {"shard": [number, 60]}
         (found[-1] / "shard.json").write_text(json.dumps(told))
         (found[-1] / "00000000.npz").unlink()
     words = [sys.executable, "-c", LIMITED, "merge", *map(str, reversed(found))]
