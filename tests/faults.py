@@ -1,7 +1,8 @@
 """Sweeps that meet a fault: the command line in real processes, in which a call of the system kills or fails.
 
 A server imports what a sweep needs once, makes ranges and slabs small, and forks. Its standard input has a request
-a line, what to start or whom to wait for; its standard output a reply a line, a process id or how the process ended.
+a line, what to start or whom to wait for; its standard output a reply a line, a process id or how the process
+ended.
 """
 
 from __future__ import annotations

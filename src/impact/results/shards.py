@@ -187,8 +187,8 @@ def merge(
             # what differs in the trajectories is told by its name first
             with held(folder, plan):
                 raise UsageError(
-                    f"{safe_text(str(folder))}: its title or output is not that of {safe_text(str(first))}; expected "
-                    "the folders of one sweep"
+                    f"{safe_text(str(folder))}: its title or output is not that of {safe_text(str(first))}; "
+                    "expected the folders of one sweep"
                 )
     # a folder is locked while it is looked at, one after the other: there may be more of them than open files
     where, twice = _places([*told], plan, blocks, gauge, should_stop)
