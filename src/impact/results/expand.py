@@ -157,7 +157,8 @@ def varies_along(table: TrajectoryTable, model: int, names: Sequence[str]) -> di
             "length": [lanes.v0, lanes.length, lanes.energy, lanes.time],
         }
     shapes = [array.shape for check in table.checks[model] for array in looked_at[check]]
-    status = _some(np.broadcast_shapes((1,) * dimensions(index), *shapes), Status.NO_IMPACT, Status.OUT_OF_RANGE)
+    checked = np.broadcast_shapes((1,) * dimensions(index), *shapes)
+    status = _some(checked, Status.NO_IMPACT, Status.OUT_OF_RANGE)
     shape = table.maps[model].rows(index).shape
     rebound = Rebound.blank(1).take(np.zeros(shape, np.intp))
     contact = Contact(law, lanes, replace(rebound, status=_some(shape, Status.MAX_STEPS)), status)
