@@ -123,7 +123,7 @@ def other_version(folder: Path) -> dict[str, str]:
 def test_a_worker_of_another_version_is_refused(two: Dask, tmp_path: Path, right: bytes) -> None:
     two.worker("old", **other_version(tmp_path / "other"))
     said = sweep(tmp_path / "sweep", "--scheduler", two.address).ends(2)
-    assert f"has impact 0.0.1, this is {impact.__version__}; wants the same" in said
+    assert f"has impact 0.0.1, this is {impact.__version__}; expected the same" in said
     assert "tcp://127.0.0.1" in said
     two.kill("old")
     assert resumed(tmp_path / "sweep", "--scheduler", two.address) == right
@@ -136,9 +136,9 @@ def test_a_worker_of_another_version_that_joins_later_is_refused(two: Dask, tmp_
     two.kill("a", "b")
     two.worker("old", ready=False, **other_version(tmp_path / "other"))
     said = one.ends(2)
-    assert re.search(rf"has impact 0\.0\.1, this is {re.escape(impact.__version__)}; wants the same; \d", said), (
-        said
-    )
+    assert re.search(
+        rf"has impact 0\.0\.1, this is {re.escape(impact.__version__)}; expected the same; \d", said
+    ), said
     assert "--resume goes on" in said
     two.kill("old")
     two.worker("c")

@@ -175,7 +175,7 @@ def test_a_plan_of_any_size_is_counted_without_its_points() -> None:
     found = estimate(plan)
     assert (found.points, found.trajectories) == (plan.points, 10_100)
     # a row of the table for each trajectory, and the number of the trajectory for each of as many cells
-    assert 50 * 10_100 < found.bytes < 100 * 10_100
+    assert 50 * 10_100 < found.bytes < 100 * 10_100 + 500_000
     full = estimate(prepare({**config, "output": {"layout": "full"}}, plugins=[SPEED], max_points=10**15))
     assert full.bytes > 100 * plan.points
     assert [one.axes for one in found.models] == [("e",), ("v1",)]

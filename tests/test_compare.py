@@ -569,8 +569,8 @@ def test_a_dataset_that_is_no_result(figure6: xr.Dataset) -> None:
         (figure6.assign(e_out=figure6["e_out"].astype(str)), "e_out holds"),
         (figure6.assign_coords(v1=((), "fast")), "v1 holds"),
         (figure6.assign(e_out=("model", [0.1, 0.2, 0.3])), "e_out does not vary along all axes"),
-        (figure6.assign_attrs(schema_version=2), "is not a result"),
-        (figure6.assign_attrs(schema_version=np.array([1, 1])), "is not a result"),
+        (figure6.assign_attrs(schema_version=1), "is not a result"),
+        (figure6.assign_attrs(schema_version=np.array([2, 2])), "is not a result"),
     ):  # fmt: skip
         with pytest.raises(UsageError, match=f"^NEW: {words}"):
             impact.compare(dataset, figure6)

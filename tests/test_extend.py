@@ -187,3 +187,63 @@ def test_expand_refuses_what_is_too_much_or_in_the_way(cli, tmp_path):
         assert (done.returncode, len(done.stderr.splitlines())) == (2, 1), done.stderr
         assert expected in done.stderr
     assert sorted(os.listdir(tmp_path)) == ["base.toml", "r.h5"]
+
+
+@pytest.mark.parametrize("layout", ["full", "factored"])
+@pytest.mark.parametrize(
+    ("first", "more"),
+    [
+        (("sweep.v1=-1.0",), ("sweep.v1=[-1.0, 1.0]",)),
+        (("sweep.K=1e-300", "sweep.v1=1.0"), ("sweep.K=[1e-300, 1e9]",)),
+        (("sweep.v1=1.0", "sweep.m2=inf", "sweep.m1=inf"), ("sweep.m2=[inf, 1.0]",)),
+    ],
+)
+def test_points_that_failed_beforehand_do_not_spoil_new_ones(cli, tmp_path, layout, first, more):
+    """A closing speed, a stiffness or a mass that is out of range is so at its own points only."""
+    config = tmp_path / "base.toml"
+    config.write_text(BASE)
+    first = (f'output.layout="{layout}"', *first)
+    sweep(cli, config, tmp_path / "r.h5", *first)
+    larger = impact.extend(tmp_path / "r.h5", more)
+    same(larger, sweep(cli, config, tmp_path / "at_once.h5", *first, *more))
+    assert (larger["status"] == 1).any()
+
+
+@pytest.mark.parametrize("layout", ["full", "factored"])
+def test_what_the_result_has_is_never_dropped(cli, tmp_path, layout):
+    config, path = tmp_path / "base.toml", tmp_path / "r.h5"
+    config.write_text(BASE + 'zip = [["e", "v1"]]\n')
+    sweep(cli, config, path, f'output.layout="{layout}"')
+    before = path.read_bytes()
+    for changes, expected in (
+        (["sweep.e=0.3", "sweep.v1=1.0", "sweep.zip=[]", "sweep.m2=[1.0, 2.0]"], "--set leaves out e=0.3, v1=1.0"),
+        (["sweep.e=[0.1, 0.2]", "sweep.v1=[3.0, 4.0]"], "--set leaves out e=0.3, v1=1.0"),
+    ):
+        done = cli("extend", path, *(word for change in changes for word in ("--set", change)))
+        assert (done.returncode, len(done.stderr.splitlines())) == (2, 1), done.stderr
+        assert expected in done.stderr
+        assert path.read_bytes() == before
+
+
+def test_the_work_folder_of_another_sweep_is_not_cleared(cli, tmp_path):
+    config, path = tmp_path / "base.toml", tmp_path / "r.h5"
+    config.write_text(BASE)
+    sweep(cli, config, path)
+    folder = tmp_path / "r.h5.work"
+    folder.mkdir()
+    (folder / "plan.json").write_text("{}")
+    done = cli("extend", path, "--set", "sweep.m2=[3.0]")
+    assert done.returncode == 2
+    assert "r.h5.work" in done.stderr
+    assert (folder / "plan.json").read_text() == "{}"
+
+
+def test_an_extended_result_keeps_its_core_and_its_seal_is_that_of_equal_input(cli, tmp_path):
+    config = tmp_path / "base.toml"
+    config.write_text(BASE)
+    sweep(cli, config, tmp_path / "a.h5")
+    (tmp_path / "b.h5").write_bytes((tmp_path / "a.h5").read_bytes())
+    for name in ("a.h5", "b.h5"):
+        impact.extend(tmp_path / name, ["sweep.m2=[3.0]"])
+    assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
+    assert impact.load(tmp_path / "a.h5").attrs["core"] == "numpy"

@@ -255,7 +255,7 @@ def test_more_models_than_panels_are_left_out_and_said(many: xr.Dataset) -> None
     ("choice", "words"),
     [
         ({"variable": "e_eror"}, 'no variable "e_eror" in this result; did you mean "e_error"?'),
-        ({"variable": "\x1b[31m"}, r'no variable "\x1b[31m" in this result; known: damping'),
+        ({"variable": "\x1b[31m"}, r'no variable "\x1b[31m" in this result; known: closed_form_error'),
         ({"x": "v3"}, 'cannot draw over "v3"'),
         ({"x": "e"}, "cannot draw over e, which varies over alpha, v1; select one with --sel"),
         ({"x": "v1", "y": "v1"}, "map wants two axes; v1 and v1 vary together"),

@@ -197,7 +197,10 @@ def test_shards_that_overlap_are_one_where_their_bits_are(cli: Run, folder: Path
     np.savez(path, **arrays)
     done = cli("merge", *found, "--overwrite", cwd=folder)
     assert done.returncode == 2
-    assert f"{path}: differs from {found[0] / path.name}; wants both of processors of one kind" in done.stderr
+    assert (
+        f"{path}: differs from {found[0] / path.name}; expected both to be of processors of one kind"
+        in done.stderr
+    )
 
 
 def test_a_shard_that_is_being_made_is_told(cli: Run, folder: Path) -> None:

@@ -142,7 +142,7 @@ def appearing(path: Path, *, overwrite: bool, part: Path | None = None) -> Itera
                 part.unlink()
         sync_folder(path.parent)
     except FileExistsError:
-        raise UsageError(f"{shown}: appeared while this ran, and is left alone") from None
+        raise UsageError(f"{shown}: appeared while this ran, and is not modified") from None
     except OSError as error:
         raise StoreError(f"{shown}: not written: {error.strerror}") from error
 

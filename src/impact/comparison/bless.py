@@ -98,4 +98,4 @@ def _standing(baseline: Path) -> xr.Dataset | None:
     try:
         return load(baseline)
     except ResultError as error:
-        raise ResultError(f"{error}; it is left alone, remove it to make a new baseline") from None
+        raise ResultError(f"{error}; it is not modified, remove it to make a new baseline") from None

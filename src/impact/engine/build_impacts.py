@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -13,6 +14,7 @@ from ..contact.lanes import stiffness as hertz_or_secant
 from ..contact.material import effective_mass, hertz_stiffness, sphere_radius
 from ..contact.model import Law
 from ..contact.power import Array
+from ..errors import ModelError
 from .plan import Index, Inputs, dimensions
 
 # K of a law at some cells of the grid [N/m^n]
@@ -70,7 +72,13 @@ def build_impacts(inputs: Inputs, model: Law, index: Index, stiffness: Stiffness
     assert model.stiffness is not None
     with np.errstate(all="ignore"):
         known = {name: lanes.quantity(name) for name in wishes(model.stiffness)}
-        return replace(lanes, K=ask(model.stiffness, known))
+        shape = np.broadcast_shapes(missing.shape, *(values.shape for values in known.values()))
+        # a formula is promised arrays of one shape (n,)
+        flat = {name: np.broadcast_to(values, shape).reshape(-1) for name, values in known.items()}
+        K = ask(model.stiffness, flat)
+    if K.shape not in ((), (math.prod(shape),)):
+        raise ModelError(f"{model.key}: stiffness returned the shape {K.shape}, expected ({math.prod(shape)},)")
+    return replace(lanes, K=np.broadcast_to(K, math.prod(shape)).reshape(shape))
 
 
 def has_stiffness_rule(inputs: Inputs, model: Law) -> bool:

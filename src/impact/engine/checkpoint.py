@@ -28,7 +28,7 @@ from .trajectories import RANGE_TRAJECTORIES, TrajectoryRange, trajectory_maps
 
 FIELDS = tuple(one.name for one in fields(Rebound))
 PLAN, LOCK = "plan.json", "lock"
-ELSE = "give the sweep that it is of, another output, or --overwrite to begin anew"
+ELSE = "give the sweep that it is of, another output, or --overwrite to start again"
 TOLD = 3  # differences
 
 
@@ -141,11 +141,11 @@ def _check(folder: Path) -> None:
     """Refuse what has the name of a work folder, and is none."""
     shown = safe_text(str(folder))
     if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
-        raise UsageError(f"{shown}: is not a folder, and is left alone")
+        raise UsageError(f"{shown}: is not a folder, and is not modified")
     if folder.is_dir() and not os.path.lexists(folder / PLAN):
         strange = [one.name for one in folder.iterdir() if one.name != LOCK and not one.name.endswith(".part")]
         if strange:
-            raise UsageError(f"{shown}: holds {safe_text(strange[0])}, and no {PLAN}; it is left alone")
+            raise UsageError(f"{shown}: holds {safe_text(strange[0])}, and no {PLAN}; it is not modified")
 
 
 def remove(folder: Path) -> None:
@@ -176,7 +176,7 @@ def _prepare(folder: Path, record: Mapping[str, Any], *, resume: bool, overwrite
         left = any(one.name != LOCK for one in folder.iterdir())
         if left and not resume and not overwrite:
             raise UsageError(
-                f"{shown}: is left of an interrupted sweep; --resume goes on with it, --overwrite begins anew"
+                f"{shown}: is left of an interrupted sweep; use --resume to continue or --overwrite to start again"
             )
         if left and _is_of(folder, record, resume=resume):
             return

@@ -58,9 +58,9 @@ def check_output(path: Path, *, overwrite: bool, source: Path | None = None) -> 
     except OSError as error:
         raise UsageError(f"{shown}: {error.strerror}") from None
     if not stat.S_ISREG(mode):
-        raise UsageError(f"{shown}: is not a regular file, and is left alone")
+        raise UsageError(f"{shown}: is not a regular file, and is not modified")
     if source is not None and source.exists() and path.samefile(source):
-        raise UsageError(f"{shown}: is what is read from, and is left alone")
+        raise UsageError(f"{shown}: is what is read from, and is not modified")
     if not overwrite:
         raise UsageError(f"{shown}: exists; give another name, or overwrite it (--overwrite)")
 
@@ -340,11 +340,16 @@ class ImpactBackend(BackendEntrypoint):
     ) -> xr.Dataset:
         dataset = open_result(filename_or_obj)
         dropped = [drop_variables] if isinstance(drop_variables, str) else list(drop_variables or ())
-        return dataset.drop_vars(dropped, errors="ignore")
+        rest = dataset.drop_vars(dropped, errors="ignore")
+        rest.set_close(dataset.close)
+        return rest
 
     def guess_can_open(self, filename_or_obj: Any) -> bool:
         try:
-            with Path(filename_or_obj).open("rb") as file:
+            path = Path(filename_or_obj)
+            if not path.is_file():
+                return False
+            with path.open("rb") as file:
                 return file.read(len(MAGIC)) == MAGIC
         except (OSError, TypeError, ValueError):
             return False

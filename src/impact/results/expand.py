@@ -29,7 +29,7 @@ from ..engine.plan import Index, Inputs, Plan, dimensions
 from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryMap, axes_of_arrays, even, probe_index
 from ..sweeps.grid import Axis
 from .schema import Variable, attributes_of
-from .slabs import VARIES_ALONG, aligned_slabs, slabs
+from .slabs import AXES, VARIES_ALONG, aligned_slabs, slabs
 
 # values up to which a law's rule of K is looked at as a whole, and stored in a file
 MAX_STIFFNESS_VALUES = 10**6
@@ -62,12 +62,13 @@ class Rows:
         if not own.is_shared:
             flat = self._segments(model, rows.reshape(-1))
             return flat.take(np.arange(rows.size).reshape(rows.shape))
-        if model not in self._whole:
+        whole = self._whole.get(model)
+        if whole is None:
             # any of them may be needed at any time
             whole = self._segments(model, np.arange(own.count))
             self._whole.clear()
             self._whole[model] = whole
-        return self._whole[model].take(rows)
+        return whole.take(rows)
 
     def _segments(self, model: int, rows: NDArray[np.intp]) -> Rebound:
         count = self.maps[model].count
@@ -177,8 +178,9 @@ def _some(shape: tuple[int, ...], *statuses: Status) -> NDArray[np.int8]:
 def checks_that_may_fail(inputs: Inputs, law: Law, stiffness: Stiffness | None = None) -> frozenset[str]:
     """The checks of `first_look` that may fail at some point of the grid; the others hold at all of them.
 
-    The sizes of a contact are monotonic in the closing speed, the masses, the radii, K and n each: they are safe
-    at all points if they are so at the ends of what each of these may be, in any combination.
+    The sizes of a contact are monotonic in the closing speed, the masses, the radii, K and n each, or nearly
+    so: they are safe at all points if at the ends of what each of these may be, in any combination, they are far
+    from what a number can hold.
     """
     slowest, fastest, slowest_approach = _closing_speeds(inputs)
     if not fastest > 0.0:
@@ -331,7 +333,9 @@ def lazy_dataset(outline: xr.Dataset, table: TrajectoryTable, variables: Sequenc
             for law, own in zip(table.laws, along, strict=True)
         }
         array = indexing.LazilyIndexedArray(ExpandedArray(table, variable))
-        computed[variable.name] = xr.Variable(dims, array, attributes_of(variable), {VARIES_ALONG: by_model})
+        computed[variable.name] = xr.Variable(
+            dims, array, attributes_of(variable), {VARIES_ALONG: by_model, AXES: tuple(dims)}
+        )
     dataset = outline.drop_vars(list(outline.data_vars)).assign(computed)
     for dim in map(str, dataset.dims):
         dataset = dataset if dim in dataset.xindexes else dataset.set_xindex(dim)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,15 +12,17 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from ..contact.status import OK, Status
 from ..contact.strike import Rebound
 from ..engine.execute import never
 from ..engine.executors import ALONE, Team
 from ..engine.plan import Inputs, Plan
 from ..engine.plugins import Plugins
 from ..engine.progress import Tell
-from ..engine.trajectories import TrajectoryMap, TrajectoryRange, check_count, trajectory_maps
+from ..engine.trajectories import TrajectoryMap, TrajectoryRange, check_count, columns_of, trajectory_maps
 from ..errors import ResultError, UsageError
 from ..sweeps.grid import MAX_POINTS, Axis, path_of
+from ..sweeps.settings import CORES
 from ..text import safe_text
 from .backend import open_with_table
 from .expand import TrajectoryTable
@@ -30,6 +32,8 @@ from .summary import Survey
 from .sweep import Extension, Values, sweep_into
 
 Places = NDArray[np.intp]
+# statuses that are given before anything is integrated
+CHECKED = (Status.NO_IMPACT, Status.INVALID_PARAMETER, Status.OUT_OF_RANGE)
 
 
 def extend(
@@ -73,9 +77,14 @@ def extend(
         old = Plan(config, plugins.of(config.models))
         _check_whole(before, old, name)
         new = _extended_plan(before, old, overrides, plugins, source, max_points)
+        if before.attrs.get("core") in CORES:
+            # the trajectories that are known are of this core
+            solver = replace(new.config.solver, core=str(before.attrs["core"]))
+            new = replace(new, config=replace(new.config, solver=solver))
         _check_same(old, new, name)
         check_count(new, max_points, str(source))
         axes = tuple(_axis_places(axis, old.inputs, name) for axis in new.config.axes)
+        _check_kept(old, axes, name)
         seal = str(before.encoding["seal"])
         history = [*json.loads(str(before.attrs.get("extended", "[]"))), {"seal": seal, "set": list(overrides)}]
         places = _Places(old, new, trajectory_maps(new), axes)
@@ -95,7 +104,7 @@ def extend(
 
         extension = Extension(seal, json.dumps(history), known, fill)
         survey = sweep_into(
-            output, new, resume=resume, overwrite=overwrite or output == source, team=team, tell=tell,
+            output, new, resume=resume, overwrite=overwrite, in_place=output == source, team=team, tell=tell,
             should_stop=should_stop, extension=extension,
         )  # fmt: skip
     return survey, sum(counted.values())
@@ -136,7 +145,9 @@ def _extended_plan(
 
 
 def _toml(values: Sequence[object]) -> str:
-    return "[" + ", ".join(json.dumps(v) if isinstance(v, str) else repr(v) for v in values) + "]"
+    return (
+        "[" + ", ".join(json.dumps(v, ensure_ascii=False) if isinstance(v, str) else repr(v) for v in values) + "]"
+    )
 
 
 def _check_same(old: Plan, new: Plan, name: str) -> None:
@@ -175,6 +186,20 @@ class _AxisPlaces:
 
     axis: int | None
     places: Places
+
+
+def _check_kept(old: Plan, axes: Sequence[_AxisPlaces], name: str) -> None:
+    """Refuse a plan that lacks a value of the smaller one."""
+    for number, axis in enumerate(old.config.axes):
+        held = {place for own in axes if own.axis == number for place in own.places.tolist()}
+        lost = [place for place in range(axis.size) if place not in held]
+        if lost:
+            row = {column: safe_text(str(values[lost[0]]), 40) for column, values in axis.columns.items()}
+            values = ", ".join(f"{column}={value}" for column, value in row.items())
+            raise UsageError(
+                f"{name}: --set leaves out {values}, expected all values that the result has, and more; columns "
+                "that vary together are given together"
+            )
 
 
 def _axis_places(axis: Axis, old: Inputs, name: str) -> _AxisPlaces:
@@ -222,8 +247,12 @@ class _Places:
             return None
         before = self._old_rows(part, table.maps[model])
         is_known = before >= 0
+        held = table.rows.take(model, np.maximum(before, 0))
+        # what was checked beforehand at the values of the smaller sweep need not hold at those of the larger one
+        status = columns_of(self.new, self.maps, part)["status"]
+        is_known &= np.where(status == OK, ~np.isin(held.status, CHECKED), held.status == status)
         rebound = Rebound.blank(part.size)
-        rebound.put(np.flatnonzero(is_known), table.rows.take(model, before[is_known]))
+        rebound.put(np.flatnonzero(is_known), held.take(np.flatnonzero(is_known)))
         return is_known, rebound
 
     def not_needed(self, part: TrajectoryRange) -> tuple[NDArray[np.bool_], Rebound] | None:

@@ -174,7 +174,10 @@ def witness_places(points: int) -> NDArray[np.int64]:
     """
     if points <= WITNESSES:
         return np.arange(points)
-    step = int(points * 0.6180339887498949) | 1
+    step = int(points * 0.6180339887498949)
+    # without a common factor all places differ
+    while math.gcd(step, points) > 1:
+        step += 1
     return np.array(sorted({points - 1, *(place * step % points for place in range(WITNESSES - 1))}), np.int64)
 
 

@@ -19,9 +19,9 @@ from ..engine.plan import Plan
 from ..sweeps.rules import MATERIALS, SWEEP, own_quantities
 
 SCHEMA_VERSION = 2
-# coordinates along `model` that are texts about it
 # models with another exponent are named in at most so many characters
 MAX_NAMED = 48
+# coordinates along `model` that are texts about it
 ABOUT_A_MODEL = ("title", "year", "equation", "reference", "doi")
 
 

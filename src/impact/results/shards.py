@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from ..atomic import appearing
-from ..engine.checkpoint import Work, held, part_of, working
+from ..engine.checkpoint import Work, held, working
 from ..engine.execute import never, with_core
 from ..engine.executors import ALONE, Team
 from ..engine.plan import Plan
@@ -198,7 +198,7 @@ def merge(
         raise UsageError("\n".join(_missing(output, lacking, told)))
     table = table_of(plan, maps, reader(maps, lambda number: loaded_again(where[number], blocks[number])))
     try:
-        return store_result(output, plan, table, part_of(output), overwrite, gauge, should_stop), twice
+        return store_result(output, plan, table, None, overwrite, gauge, should_stop), twice
     except (StoreError, UnfinishedError) as error:
         raise type(error)(
             "; ".join(filter(None, [str(error), "the folders have all that is finished"]))

@@ -18,13 +18,13 @@ import xarray as xr
 SLAB_POINTS = 2**17
 # points up to which something is computed in full that nothing but a summary asks for: a few seconds
 MAX_SUMMARY_POINTS = 2**26
-VARIES_ALONG = "varies_along"
+VARIES_ALONG, AXES = "varies_along", "axes"
 
 Where = dict[Hashable, slice]
 
 
 def slabs(sizes: Mapping[Hashable, int], points: int = SLAB_POINTS) -> Iterator[Where]:
-    """All points in C order, in slabs of at most so many, or of one place along all axes but the last.
+    """All points in C order, in slabs of at most so many.
 
     >>> list(slabs({"e": 2, "v1": 3}, 2))[:2]
     [{'e': slice(0, 1, None), 'v1': slice(0, 2, None)}, {'e': slice(0, 1, None), 'v1': slice(2, 3, None)}]
@@ -90,6 +90,8 @@ def varying_dims(dataset: xr.Dataset, name: str) -> tuple[Hashable, ...]:
     keys = [str(key) for key in np.ravel(dataset["model"].values)]
     # of a model that was given another key nothing is known
     along = {"model", *(dim for key in keys for dim in by_model.get(key, variable.dims))}
+    # an axis that was renamed since is not known
+    along |= {*variable.dims} - {*variable.encoding.get(AXES, variable.dims)}
     return tuple(dim for dim in variable.dims if dim in along)
 
 

@@ -72,6 +72,7 @@ def sweep_into(
     *,
     resume: bool = False,
     overwrite: bool = False,
+    in_place: bool = False,
     team: Team = ALONE,
     tell: Tell = lambda progress: None,
     should_stop: Callable[[], bool] = never,
@@ -85,6 +86,7 @@ def sweep_into(
     plan : what to run
     resume : continue with the work folder that an interrupted sweep left
     overwrite : replace the file if it exists, and a work folder if it is not to be resumed
+    in_place : replace the file, and no work folder
     team : who integrates
     tell : receives the progress, now and then
     should_stop : whether to stop; what was begun is finished and kept
@@ -97,7 +99,7 @@ def sweep_into(
     StoreError : the disk is full or failed, or processes were killed; what is finished is kept
     UnfinishedError : it was stopped; likewise
     """
-    check_output(output, overwrite=overwrite)
+    check_output(output, overwrite=overwrite or in_place)
     check_storable(plan)
     maps = trajectory_maps(plan)
     plan = with_core(plan, maps)
@@ -113,7 +115,7 @@ def sweep_into(
             gauge.count(part, rebound)
         table = table_of(plan, maps, reader(maps, finished.__getitem__))
         try:
-            return store_result(output, plan, table, None, overwrite, gauge, should_stop, extension)
+            return store_result(output, plan, table, None, overwrite or in_place, gauge, should_stop, extension)
         except UnfinishedError:
             raise UnfinishedError("nothing was written") from None
 
@@ -122,13 +124,15 @@ def sweep_into(
         folder, plan, resume=resume, overwrite=overwrite, extends=extension.seal if extension else ""
     ) as work:
         # another may have stored it since
-        check_output(output, overwrite=overwrite)
+        check_output(output, overwrite=overwrite or in_place)
         # without the other word a result that is to be replaced would be in the way
         again = "--resume --overwrite" if os.path.lexists(output) and not extension else "--resume"
         with kept(folder, gauge, again, lambda error: _room(error, output, plan, gauge)):
             fill(work, plan, maps, ranges, gauge, team, should_stop, known)
             table = table_of(plan, maps, reader(maps, lambda number: loaded_again(work, ranges[number])))
-            survey = store_result(output, plan, table, part_of(output), overwrite, gauge, should_stop, extension)
+            survey = store_result(
+                output, plan, table, part_of(output), overwrite or in_place, gauge, should_stop, extension
+            )
         remove(folder)
     return survey
 
@@ -254,6 +258,7 @@ def finished(path: Path, plan: Plan) -> Survey | None:
         return None
     axes = dict(zip((axis.name for axis in plan.config.axes), plan.shape, strict=True))
     if dict(dataset.sizes) != {"model": len(plan.models), **axes}:
+        dataset.close()
         return None
     return Survey(dataset, tally_of(dataset), sum(own.count for own in trajectory_maps(plan)))
 

@@ -51,8 +51,11 @@ def is_quantity(name: str, axes: tuple[str, ...]) -> bool:
 # attributes of a result that the program reads: text, numbers, and text that is JSON of a kind
 TEXT = ("title", "config", "config_set", "fingerprint", "impact_version", "packages", "plugins")
 NUMBERS = ("rtol", "max_steps")
+# attributes that say that a file is factored, which a dataset has not
+FACTORED = ("laws", "axes")
 JSON: Mapping[str, type] = {
     "config_set": list, "packages": dict, "plugins": dict, "materials": dict, "tolerances": dict, "inputs": dict,
+    "extended": list,
 }  # fmt: skip
 # statuses that are looked at at a time
 MAX_STATUS = 2**22
@@ -94,6 +97,9 @@ def _kinds(dataset: xr.Dataset) -> Iterator[str]:
 
 
 def _json(dataset: xr.Dataset) -> Iterator[str]:
+    for key in FACTORED:
+        if key in dataset.attrs:
+            yield f"{key}: an attribute of files in layout factored"
     for key, kind in JSON.items():
         if key in dataset.attrs and not isinstance(_parsed(dataset.attrs[key]), kind):
             yield f"{key}: no JSON of the right kind"
