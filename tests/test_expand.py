@@ -91,7 +91,7 @@ def same_bits(one: xr.DataArray, other: xr.DataArray) -> None:
     assert one.values.tobytes() == other.values.tobytes(), one.name
 
 
-@settings(max_examples=25)
+@settings(max_examples=8)
 @given(configs(), st.data())
 def test_any_part_is_that_of_the_whole_bit_for_bit(config: dict[str, object], data: st.DataObject) -> None:
     lazy, full = lazy_and_full(config, [DASHPOT, SPEED])
@@ -105,7 +105,7 @@ def test_any_part_is_that_of_the_whole_bit_for_bit(config: dict[str, object], da
         same_bits(lazy[name].isel(part, missing_dims="ignore"), full[name].isel(part, missing_dims="ignore"))
 
 
-@settings(max_examples=50)
+@settings(max_examples=12)
 @given(configs())
 def test_nothing_varies_along_an_axis_that_is_not_named(config: dict[str, object]) -> None:
     lazy, full = lazy_and_full(config, [DASHPOT, SPEED])
@@ -150,7 +150,7 @@ def test_a_plain_sweep_needs_no_checks_and_one_that_may_fail_has_them() -> None:
     assert checks_that_may_fail(plan.inputs, plan.models[0]) == {"e"}
 
 
-@settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=5, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(configs())
 def test_a_factored_file_holds_what_a_full_one_does(tmp_path: Path, config: dict[str, object]) -> None:
     plans = {layout: prepare(config, [f'output.layout="{layout}"'], [DASHPOT, SPEED]) for layout in LAYOUTS}
