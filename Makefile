@@ -14,7 +14,7 @@ help:  ## list the targets
 figure: $(BIN)/impact  ## sweep configs/figure6.toml and draw Figure 6 of the paper
 	@mkdir -p $(RESULTS)
 	$(BIN)/impact sweep configs/figure6.toml -o $(RESULTS)/figure6.h5 --overwrite
-	$(BIN)/impact plot $(RESULTS)/figure6.h5 -o $(RESULTS)/figure6.png
+	$(BIN)/impact plot $(RESULTS)/figure6.h5 --equations -o $(RESULTS)/figure6.png --overwrite
 	@echo "the picture is $(RESULTS)/figure6.png"
 
 # these follow one impact; figure 6 is a sweep over e
@@ -25,7 +25,7 @@ figures: figure $(addprefix figure-,$(FIGURES))  ## draw Figures 2, 3, 5a, 5b, 5
 figure-%: $(BIN)/impact
 	@mkdir -p $(RESULTS)
 	$(BIN)/impact sweep configs/figure$*.toml -o $(RESULTS)/figure$*.h5 --overwrite --quiet
-	$(BIN)/impact plot $(RESULTS)/figure$*.h5 --kind $(if $(filter 2,$*),impulse,loop) -o $(RESULTS)/figure$*.png
+	$(BIN)/impact plot $(RESULTS)/figure$*.h5 --kind $(if $(filter 2,$*),impulse,loop) --equations -o $(RESULTS)/figure$*.png --overwrite
 
 test: $(VENV)/dev  ## run the tests
 	$(BIN)/python -m pytest -n auto --dist worksteal

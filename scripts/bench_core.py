@@ -36,11 +36,11 @@ from scipy.integrate import solve_ivp
 
 import impact
 from impact.api import execute, prepare
-from impact.contact.collide import OUTPUTS, collide
-from impact.contact.compiled import is_installed
-from impact.contact.lanes import Lanes
+from impact.contact.closed_forms import delivered_restitution
+from impact.contact.impacts import Impacts
 from impact.contact.model import ForceModel
-from impact.contact.oracles import delivered_restitution
+from impact.contact.numba.dispatch import is_installed
+from impact.contact.outputs import OUTPUTS, collide
 from impact.engine.executors import team_of
 from impact.engine.trajectories import RANGE_TRAJECTORIES, even
 
@@ -55,7 +55,7 @@ ACCURACY = 1e-8
 TOLERANCES = tuple(float(f"{one:.2g}") for one in np.geomspace(1e-6, 1e-12, 61))
 
 
-def table1(e: np.ndarray, model: ForceModel) -> Lanes:
+def table1(e: np.ndarray, model: ForceModel) -> Impacts:
     """Impacts of the two balls of Table 1."""
 
     def all_of(value: float) -> np.ndarray:
@@ -63,7 +63,7 @@ def table1(e: np.ndarray, model: ForceModel) -> Lanes:
 
     unknown = all_of(np.nan)
     n = model.exponent or 1.5
-    return Lanes(
+    return Impacts(
         e=e, v1=all_of(1.0), v2=all_of(0.0), m1=all_of(1.0), m2=all_of(1.0), K=all_of(6.118486349e9), n=all_of(n),
         R1=unknown, R2=unknown, E1=unknown, nu1=unknown, yield_strength1=unknown, E2=unknown, nu2=unknown,
         yield_strength2=unknown,
@@ -80,9 +80,9 @@ def core(
         size = even(mine.size, RANGE_TRAJECTORIES)
         blocks += [(model, table1(mine[first : first + size], model)) for first in range(0, mine.size, size)]
 
-    def outputs(block: tuple[ForceModel, Lanes]) -> tuple[float, int]:
+    def outputs(block: tuple[ForceModel, Impacts]) -> tuple[float, int]:
         contact = collide(*block, rtol=rtol, max_steps=10_000, collapse=False, core=by)
-        found = {name: getattr(contact, name) for name in OUTPUTS}
+        found = {name: contact[name] for name in OUTPUTS}
         return float(np.max(np.abs(found["closed_form_error"]))), int(found["steps"].sum())
 
     with team_of(1, threads).executor() as pool:
@@ -94,8 +94,8 @@ def core(
 
 # the operations of one step, counted where the kernel is plain Python
 COUNT = """
-from impact.contact.compiled import DAMPED, STOP, Form
-from impact.contact.equations import attempt
+from impact.contact.numba.dispatch import DAMPED, STOP, Form
+from impact.contact.numba.expressions import rk_step
 class Counted(float):
     total = 0
 def counted(name):
@@ -105,7 +105,7 @@ def counted(name):
     return operation
 for name in ("add", "radd", "sub", "rsub", "mul", "rmul", "truediv", "rtruediv"):
     setattr(Counted, f"__{name}__", counted(f"__{name}__"))
-attempt(Form(DAMPED, STOP, 2, 3), *map(Counted, (0.5, 0.5, 0.5, 0.1, 0.1, 0.01, 1.0)))
+rk_step(Form(DAMPED, STOP, 2, 3), *map(Counted, (0.5, 0.5, 0.5, 0.1, 0.1, 0.01, 1.0)))
 print(Counted.total)
 """
 

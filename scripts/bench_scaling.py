@@ -38,7 +38,13 @@ from impact.engine.execute import context_of, integrate, with_core, work
 from impact.engine.executors import AHEAD, Team, team_of
 from impact.engine.plan import Plan
 from impact.engine.progress import Progress
-from impact.engine.trajectories import Columns, columns_of, trajectory_maps, trajectory_ranges
+from impact.engine.trajectories import (
+    RANGE_TRAJECTORIES,
+    Columns,
+    columns_of,
+    trajectory_maps,
+    trajectory_ranges,
+)
 from impact.results.sweep import sweep_into
 
 IDLE = 5.0  # s
@@ -147,6 +153,8 @@ def main() -> None:
     parse.add_argument("--points", type=int, default=500_000)
     parse.add_argument("--core", default="numpy", choices=["numpy", "numba"])
     asked = parse.parse_args()
+    if asked.points <= RANGE_TRAJECTORIES:
+        parse.error(f"--points: got {asked.points:,}, expected more than {RANGE_TRAJECTORIES:,}")
     plan = plan_of(asked.points, asked.core)
     maps = trajectory_maps(plan)
     ranges = list(trajectory_ranges(maps))

@@ -19,9 +19,9 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from tests.problems import impacts, quadratures
 
-from impact.contact.collide import collide
+from impact.config.load import DEFAULT_RTOL
 from impact.contact.models import find
-from impact.sweeps.config import DEFAULT_RTOL
+from impact.contact.outputs import collide
 
 MODELS = ("gharib-hurmuzlu-2012", "exact-hysteresis")
 
@@ -35,13 +35,14 @@ def main() -> None:
         contact = collide(find(key), lanes, rtol=DEFAULT_RTOL, max_steps=10_000)
         unit = lanes.length / lanes.v0
         for place, asked in enumerate(e):
-            chi = contact.damping_ratio[place]
+            chi = contact["damping_ratio"][place]
             exact, time, force = quadratures(chi, 1.5)
-            own = contact.contact_time[place] / unit[place]
-            pushed = contact.peak_force[place] * lanes.length[place] / (lanes.m[place] * lanes.v0[place] ** 2)
+            own = contact["contact_time"][place] / unit[place]
+            pushed = contact["peak_force"][place] * lanes.length[place] / (lanes.m[place] * lanes.v0[place] ** 2)
             table.add_row(
-                key, f"{asked:.0e}", f"{chi:.3g}", str(contact.steps[place]),
-                f"{contact.steps[place] / contact.steps[0]:.2f}", f"{abs(contact.e_out[place] / exact - 1):.1e}",
+                key, f"{asked:.0e}", f"{chi:.3g}", str(contact["steps"][place]),
+                f"{contact['steps'][place] / contact['steps'][0]:.2f}",
+                f"{abs(contact['e_out'][place] / exact - 1):.1e}",
                 f"{abs(own / time - 1):.1e}", f"{abs(pushed / force - 1):.1e}",
             )  # fmt: skip
     Console(width=130).print(f"rtol {DEFAULT_RTOL:g}", table, sep="\n")

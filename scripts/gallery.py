@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from impact.views.names import KINDS
+from impact.plots.kinds import KINDS
 
 ROOT = Path(__file__).parent.parent
 PAGE = """\
@@ -109,7 +109,7 @@ def write_gallery(folder: Path) -> None:
             words[1] = str(results / words[1])
             words[-1] = str(folder / words[-1])
             table = results / f"{entry.kind}.csv"
-            _run(*words, "--data", str(table))
+            _run(*words, "--data", str(table), "--data-form", "long", "--overwrite")
             found[entry.kind] = summary(table)
     (folder / "numbers.json").write_text(json.dumps(found, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 

@@ -10,12 +10,12 @@ from typing import Literal
 import numpy as np
 
 import impact
-from impact.contact.lanes import in_own_units, stiffness
-from impact.contact.material import effective_mass, hertz_stiffness, sphere_radius
+from impact.contact.impacts import dimensionless_exponents, stiffness
+from impact.contact.materials import effective_mass, hertz_stiffness, sphere_radius
 from impact.contact.model import ForceModel
 from impact.contact.models import catalogue
-from impact.contact.power import Array
-from impact.contact.values import delivered
+from impact.contact.powers import Array
+from impact.contact.scaling import delivered
 
 GRID = np.arange(1, 201) / 200
 SPEEDS = np.logspace(-2, 1, 25)
@@ -46,7 +46,7 @@ def laws() -> list[ForceModel]:
 
 def driven(model: ForceModel) -> bool:
     """Whether a law is driven by e; so is one that nothing else drives."""
-    others = {"yield_strength1", "yield_strength2", *(one.name for one in model.parameters)}
+    others = {"yield_strength1", "yield_strength2", "Y_min", *(one.name for one in model.parameters)}
     return "e" in model.quantities or model.quantities.isdisjoint(others)
 
 
@@ -95,7 +95,9 @@ def own_settings(model: ForceModel) -> dict[str, float]:
     found = {} if model.exponent is None else {"K": float(K[0])}
     exponents = {"n": n, **{one.name: one.default for one in model.parameters if one.default is not None}}
     for one in model.parameters:
-        size = np.prod([units[u] ** exponent for u, exponent in in_own_units(model, one.name, exponents).items()])
+        size = np.prod(
+            [units[u] ** exponent for u, exponent in dimensionless_exponents(model, one.name, exponents).items()]
+        )
         # a depth is that of the elastic peak
         own = (0.5 * (n + 1)) ** (1 / (n + 1)) if one.unit == "m" else DAMPING
         free = float(np.clip(max(one.least, 0.0) + own * size, one.least, one.most))

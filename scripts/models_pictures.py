@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from impact.contact.model import ForceModel
-from impact.views.look import COLOURS
+from impact.plots.style import COLOURS
 from models_measured import GRID, SPEEDS, laws, measured
 
 # the picture of a curve, in px: its size, and the margin around the frame

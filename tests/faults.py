@@ -200,13 +200,13 @@ def _warm_up() -> None:
     from impact.results import factored, slabs
 
     slabs.slabs.__defaults__, factored.SLAB_ROWS = (SLAB,), RANGE
-    import impact.cli.sweeping
+    import impact.cli.sweep
 
     with tempfile.TemporaryDirectory() as folder:
         config, result = Path(folder, CONFIG), Path(folder, RESULT)
         for text in (TEXT, FACTORED, TEXT):
             config.write_text(text)
-            impact.cli.sweeping.sweep(config, result, quiet=True, overwrite=True)
+            impact.cli.sweep.sweep(config, result, quiet=True, overwrite=True)
 
 
 def _start(argv: list[str], cwd: str, told: str, fault: list[Any]) -> int:

@@ -87,8 +87,9 @@ def serve() -> None:
 def _warm_up() -> None:
     """Import what the commands import, and what their libraries import on first use."""
     import impact
+    import impact.cli.info
+    import impact.cli.run
     import impact.cli.summary
-    import impact.cli.tables
 
     point = {"e": [0.5, 1.0], "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6e9}
     with tempfile.TemporaryDirectory() as folder:

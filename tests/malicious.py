@@ -386,17 +386,18 @@ def _put(file: h5py.File, name: str, place: int, value: float) -> None:
 
 
 FIT = "its laws do not fit its table"
+JSON = "no JSON of the right kind"
 LAWS = "laws: not those of its models"
 GRID = "axes: not those of its grid"
 WITNESSES = "its witnesses expand to other numbers"
 # what is wrong with a factored file
 FACTORED: dict[str, tuple[Change, str]] = {
-    "laws of text": (lambda f: _set(f, "", "laws", np.bytes_(b"x")), LAWS),
-    "laws in a list": (lambda f: _json(f, "laws", list), FIT),
-    "laws without an end": (lambda f: _set(f, "", "laws", np.bytes_(b"[" * 100_000)), LAWS),
+    "laws of text": (lambda f: _set(f, "", "laws", np.bytes_(b"x")), JSON),
+    "laws in a list": (lambda f: _json(f, "laws", list), JSON),
+    "laws without an end": (lambda f: _set(f, "", "laws", np.bytes_(b"[" * 100_000)), JSON),
     "a law less": (lambda f: _json(f, "laws", lambda laws: {"bilinear": laws["bilinear"]}), LAWS),
     "laws in another order": (lambda f: _json(f, "laws", lambda laws: dict(reversed(laws.items()))), LAWS),
-    "a law of nothing": (lambda f: _json(f, "laws", lambda laws: laws.update(bilinear=None)), FIT),
+    "a law of nothing": (lambda f: _json(f, "laws", lambda laws: laws.update(bilinear=None)), JSON),
     "a law without its axes": (
         lambda f: _json(f, "laws", lambda laws: laws["bilinear"].pop("axes") and None), FIT),
     "a law along no axis": (partial(change_law, axes=["twice"]), FIT),
@@ -413,13 +414,13 @@ FACTORED: dict[str, tuple[Change, str]] = {
     "trajectories of text": (partial(change_law, trajectories="three"), FIT),
     "trajectories that are not shared": (partial(change_law, is_shared=False), FIT),
     "a rule of K without values": (partial(change_law, stiffness_axes=["alpha"]), FIT),
-    "axes of text": (lambda f: _set(f, "", "axes", np.bytes_(b"x")), GRID),
-    "axes in a table": (lambda f: _json(f, "axes", lambda axes: dict.fromkeys(axes, 1)), GRID),
+    "axes of text": (lambda f: _set(f, "", "axes", np.bytes_(b"x")), JSON),
+    "axes in a table": (lambda f: _json(f, "axes", lambda axes: dict.fromkeys(axes, 1)), JSON),
     "an unknown axis": (lambda f: _json(f, "axes", lambda axes: [*axes, "twice"]), GRID),
     "an axis twice": (lambda f: _json(f, "axes", lambda axes: [*axes, axes[0]]), GRID),
     "an axis less": (lambda f: _json(f, "axes", lambda axes: axes[:1]), "does not lie along one axis"),
     "axes in another order": (lambda f: _json(f, "axes", lambda axes: axes[::-1]), WITNESSES),
-    "axes without an end": (lambda f: _set(f, "", "axes", np.bytes_(b"[" * 100_000)), GRID),
+    "axes without an end": (lambda f: _set(f, "", "axes", np.bytes_(b"[" * 100_000)), JSON),
     "materials in a list": (lambda f: _set(f, "", "materials", np.bytes_(b"[]")), "materials: no JSON"),
     "no materials": (lambda f: _set(f, "", "materials", np.bytes_(b"{}")), "not a readable result"),
     "a material of text": (lambda f: _set(f, "", "materials", np.bytes_(b'{"a": "x"}')), "materials: no JSON"),

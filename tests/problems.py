@@ -14,8 +14,8 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from impact.contact.lanes import Lanes, stiffness
-from impact.contact.material import effective_mass, hertz_stiffness, sphere_radius
+from impact.contact.impacts import Impacts, stiffness
+from impact.contact.materials import effective_mass, hertz_stiffness, sphere_radius
 from impact.contact.model import ForceModel
 from impact.contact.models import catalogue
 from impact.ode.problem import Problem
@@ -52,10 +52,10 @@ def _rates(second, quadrature):
 
 
 def _until(level: float):
-    """The end: y1 falls through a level; a lane whose y0 is huge is lost."""
+    """The end: y1 falls through a level; a trajectory whose y0 is huge cannot reach it."""
     return {
         "event": lambda y, k, columns: (y[1] - level, k[1]),
-        "lost": lambda y, k, columns: y[0] > 1e6,
+        "unreachable": lambda y, k, columns: y[0] > 1e6,
         "floor": (1.0, 1.0),
         "watch": True,
     }
@@ -109,7 +109,7 @@ EACH_LAW = [
 ]
 
 
-def impacts(n: float = 1.5, **changes: object) -> Lanes:
+def impacts(n: float = 1.5, **changes: object) -> Impacts:
     """Impacts of the balls of Table 1 at e = 0.5, with changes by name; what varies is an array.
 
     The balls are of 1 kg, E = 56 GPa, nu = 0.3 and 2712 kg/m3, the first at 1 m/s and the second at rest.
@@ -129,13 +129,13 @@ def impacts(n: float = 1.5, **changes: object) -> Lanes:
         hertz = hertz_stiffness(at["E1"], poisson, at["E2"], poisson, at["R1"], at["R2"])
         at.setdefault("K", stiffness(exponent, hertz, effective_mass(at["m1"], at["m2"]), at["v1"] - at["v2"]))
     own = {name: at.pop(name) for name in parameters}
-    return Lanes(
+    return Impacts(
         **at, n=exponent, nu1=poisson, nu2=poisson, yield_strength1=strength, yield_strength2=strength,
         parameters=own,
     )  # fmt: skip
 
 
-def with_parameters(model: ForceModel, lanes: Lanes, value: object) -> Lanes:
+def with_parameters(model: ForceModel, lanes: Impacts, value: object) -> Impacts:
     """The impacts with the law's own parameters, each above its least by a value in the contact's own units.
 
     Of a parameter with a typical value it is that value times it.
@@ -146,7 +146,7 @@ def with_parameters(model: ForceModel, lanes: Lanes, value: object) -> Lanes:
     unit = replace(lanes, parameters={**{one.name: ones for one in model.parameters}, **pure})
     typical = {one.name: one.typical * value * ones for one in model.parameters if one.typical is not None}
     others = [one.name for one in model.parameters if one.unit != "1" and one.typical is None]
-    own = typical | {name: value / unit.own_units(model, name) for name in others}
+    own = typical | {name: value / unit.dimensionless(model, name) for name in others}
     return replace(lanes, parameters={**pure, **own})
 
 

@@ -8,17 +8,20 @@ import json
 import re
 import subprocess
 import sys
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import impact
+from impact.config.load import read_config
 from impact.contact.status import Status
+from impact.engine.checkpoint import working
 from impact.engine.plan import Plan
 from impact.engine.plugins import read_plugins
-from impact.errors import ModelError
-from impact.sweeps.config import read_config
+from impact.errors import ModelError, UsageError
+from impact.results.sweep import finished
 
 SWEEP = {"e": [0.2, 0.8], "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6e9}
 
@@ -52,7 +55,7 @@ def test_a_model_of_ones_own() -> None:
     assert recorded["file"] is None
     assert re.fullmatch("[0-9a-f]{64}", recorded["sha256"])
     assert impact.run({"models": ["mine-2026"], "sweep": SWEEP}, plugins=[_mine()]).model.title == "Mine"
-    with pytest.raises(impact.ImpactError, match='got "mine-2026", wants a model'):
+    with pytest.raises(impact.ImpactError, match='got "mine-2026", expected a model'):
         impact.sweep({"models": ["mine-2026"], "sweep": SWEEP})
 
 
@@ -73,15 +76,21 @@ def test_a_changed_model_has_another_fingerprint() -> None:
         ({"coefficients": {"a": lambda b: b, "b": lambda e: e}}, 'its coefficient a asks for "b"'),
         ({"key": "Mine"}, 'model key "Mine": wants kebab-case'),
         ({"release": "tension"}, 'release: got \'tension\', wants "gap" or "force"'),
-        ({"smooth": 3}, "smooth: got 3, wants 2, 4, 6 or 8"),
+        ({"coordinate_power": 3}, "coordinate_power: got 3, wants 2, 4, 6 or 8"),
         ({"exponent": -1.0}, "exponent: got -1.0"),
         ({"domain": {"foo": (0, 1)}}, 'domain of "foo"'),
         ({"domain": {"e": (1, 0)}}, "domain of e: got (1, 0), wants (least, most)"),
         ({"parameters": ("c",)}, "wants a tuple of Parameter"),
         ({"coefficients": {"K": lambda e: e}}, '"K" is the name of a quantity'),
-        ({"momentum": "log"}, 'momentum "log" wants a coefficient chi, a force of elastic and chi'),
-        ({"momentum": "force"}, 'momentum "force" wants a coefficient c and one q, a force of elastic and c'),
-        ({"momentum": "w"}, 'momentum: got \'w\', wants "v", "log" or "force"'),
+        (
+            {"velocity_coordinate": "log"},
+            'velocity_coordinate "log" wants a coefficient chi, a force of elastic and chi',
+        ),
+        (
+            {"velocity_coordinate": "force"},
+            'velocity_coordinate "force" wants a coefficient c and one q, a force of elastic and c',
+        ),
+        ({"velocity_coordinate": "w"}, 'velocity_coordinate: got \'w\', wants "v", "log" or "force"'),
     ],
 )
 def test_a_wrong_model_is_refused_when_it_is_made(change: dict[str, object], words: str) -> None:
@@ -120,20 +129,24 @@ def test_a_stiffness_of_a_laws_own() -> None:
     assert result.sel(model="hertz")["stiffness"].values.tolist() == [6e9, 6e9]
 
 
-def test_the_fingerprint_sees_what_a_formula_closes_over() -> None:
-    def scaled(factor: float) -> impact.ForceModel:
-        return _mine(chi=lambda e: factor * (1 - e))
-
-    def fingerprint(model: impact.ForceModel) -> str:
-        return Plan(
-            read_config({"models": model.key, "sweep": SWEEP}, (), [model]), read_plugins([model])
-        ).fingerprint
-
-    assert fingerprint(scaled(1.0)) == fingerprint(scaled(1.0))
-    assert fingerprint(scaled(1.0)) != fingerprint(scaled(2.0))
-    partly = [_mine(chi=functools.partial(lambda e, c: c * (1 - e), c=c)) for c in (1.0, 1.0, 2.0)]
-    assert fingerprint(partly[0]) == fingerprint(partly[1])
-    assert fingerprint(partly[0]) != fingerprint(partly[2])
+def test_a_model_that_closes_over_values_is_never_taken_for_another(tmp_path: Path) -> None:
+    closed = [_mine(chi=lambda e, c=c: c * (1 - e)) for c in (1.0, 2.0)]
+    partly = _mine(chi=functools.partial(lambda e, c: c * (1 - e), c=1.0))
+    config = {"models": closed[0].key, "sweep": SWEEP}
+    impact.save(impact.sweep(config, plugins=closed[:1]), tmp_path / "result.h5")
+    for model in (*closed, partly):
+        plan = Plan(read_config(config, (), [model]), read_plugins([model]))
+        assert finished(tmp_path / "result.h5", plan) is None
+        with working(tmp_path / "work", plan, resume=False, overwrite=True):
+            pass
+        with (
+            pytest.raises(UsageError, match="mine-2026 is in no file, so that it cannot be known to be the same"),
+            working(tmp_path / "work", plan, resume=True, overwrite=False),
+        ):
+            pass
+    in_a_file = Plan(read_config({**config, "models": "hertz"}))
+    impact.save(impact.sweep({**config, "models": "hertz"}), tmp_path / "hertz.h5")
+    assert finished(tmp_path / "hertz.h5", in_a_file) is not None
 
 
 def test_a_force_of_the_wrong_shape_is_an_error_of_the_model() -> None:
@@ -157,11 +170,11 @@ ROLES: dict[str, dict[str, Any]] = {
     "unloading of the peak": {"unloading": lambda elastic, peak: elastic * _in_place(peak)},
     "residual": {"residual": lambda peak: 0.1 * _in_place(peak)},
     "recovered": {"recovered": lambda peak: _in_place(peak)},
-    "bend": {"bends": (lambda e: 0.1 * _in_place(e),)},
-    "bend of the motion": {"bends": (lambda x, e: x - 0.1 * _in_place(e),)},
+    "bend": {"breakpoints": (lambda e: 0.1 * _in_place(e),)},
+    "bend of the motion": {"breakpoints": (lambda x, e: x - 0.1 * _in_place(e),)},
     "unloading bend": {
         "unloading": lambda elastic: elastic,
-        "unloading_bends": (lambda peak: 0.1 * _in_place(peak),),
+        "unloading_breakpoints": (lambda peak: 0.1 * _in_place(peak),),
     },
     "oracle": {"oracle": _in_place},
 }
@@ -253,6 +266,6 @@ def test_a_mistake_of_the_program_is_not_taken_for_one_of_the_model(monkeypatch:
     def broken(*_: object, **__: object) -> None:
         raise KeyError("of our own")
 
-    monkeypatch.setattr("impact.contact.trajectories.strike", broken)
+    monkeypatch.setattr("impact.contact.simulate.integrate_phases", broken)
     with pytest.raises(KeyError, match="of our own"):
         impact.sweep({"models": "hertz", "sweep": SWEEP})

@@ -8,10 +8,10 @@ import pytest
 
 import impact
 from impact.api import Impact
+from impact.config.load import Config, read_config
+from impact.config.tables import expand_models
 from impact.contact.models import built_in, catalogue, find
 from impact.errors import ConfigError, ModelError
-from impact.sweeps.config import Config, read_config
-from impact.sweeps.rules import expand_models
 
 BALLS = {"v1": 1.0, "v2": -0.5, "m1": 1.0, "m2": 2.0}
 NAMES = {key: model.same_as for key, model in catalogue().items() if model.same_as}
@@ -154,7 +154,7 @@ def problems(asked: object) -> list[str]:
     return list(caught.value.problems)
 
 
-NOTHING_BEFORE = "wants models to leave out of those before it"
+NOTHING_BEFORE = "expected models to leave out of those before it"
 
 
 @pytest.mark.parametrize(
@@ -166,15 +166,15 @@ NOTHING_BEFORE = "wants models to leave out of those before it"
         (["hertz", "!family:permanent"], f'models[1]: got "!family:permanent", {NOTHING_BEFORE}'),
         # "all" has each law once, under its first name
         (["hertz", "bilinear", "!marhefka-*"], f'models[2]: got "!marhefka-*", {NOTHING_BEFORE}'),
-        (["hertz", "!hertzz"], 'models[1]: after !: got "hertzz", wants a model; did you mean "hertz"?'),
-        (["hertz", "!!hertz"], 'models[1]: after !: got "!hertz", wants a model; did you mean "hertz"?'),
+        (["hertz", "!hertzz"], 'models[1]: after !: got "hertzz", expected a model; did you mean "hertz"?'),
+        (["hertz", "!!hertz"], 'models[1]: after !: got "!hertz", expected a model; did you mean "hertz"?'),
         (
             ["hertz", "!family:dashpott"],
-            'models[1]: after !: got "family:dashpott", wants a family of models; did you mean "dashpot"?',
+            'models[1]: after !: got "family:dashpott", expected a family of models; did you mean "dashpot"?',
         ),
-        (["hertz", "!zz*"], 'models[1]: after !: got "zz*", wants a pattern that some model matches'),
-        (["hertz", "!hertz"], "models: got a list, wants models that are not all left out again"),
-        (["all", "!all"], "models: got a list, wants models that are not all left out again"),
+        (["hertz", "!zz*"], 'models[1]: after !: got "zz*", expected a pattern that some model matches'),
+        (["hertz", "!hertz"], "models: got a list, expected models that are not all left out again"),
+        (["all", "!all"], "models: got a list, expected models that are not all left out again"),
     ],
 )
 def test_a_wrong_exclusion_is_told(asked, line):
@@ -183,7 +183,7 @@ def test_a_wrong_exclusion_is_told(asked, line):
 
 def test_an_exclusion_of_nothing_is_told_with_what_there_is():
     (line,) = problems(["hertz", "!"])
-    assert line.startswith('config: models[1]: after !: got "", wants a model; known: ')
+    assert line.startswith('config: models[1]: after !: got "", expected a model; known: ')
 
 
 def test_a_law_of_all_whose_parameter_is_missing_is_told_with_the_way_to_leave_it_out():
@@ -191,7 +191,7 @@ def test_a_law_of_all_whose_parameter_is_missing_is_told_with_the_way_to_leave_i
     lines = problems("all")
     assert list(dict.fromkeys(line.split(".")[1] for line in lines)) == wanting
     assert (
-        "config: model.kuwabara-kono-1987.A: missing, wants a number of at least 0 s: dissipative constant of the "
+        "config: model.kuwabara-kono-1987.A: missing, expected a number >= 0 s: dissipative constant of the "
         'material; or models = [..., "!kuwabara-kono-1987"]'
     ) in lines
     # the advice of all lines together is right, and so is giving what is missing
@@ -207,7 +207,7 @@ def test_a_law_of_all_whose_parameter_is_missing_is_told_with_the_way_to_leave_i
 
 @pytest.mark.parametrize("asked", ["kelvin-voigt", ["hertz", "kelvin-voigt"]])
 def test_a_law_that_was_named_is_not_advised_to_be_left_out(asked):
-    missing = "missing, wants a number of at least 0 N s/m: damping constant of the dashpot"
+    missing = "missing, expected a number >= 0 N s/m: damping constant of the dashpot"
     assert problems(asked) == [f"config: model.kelvin-voigt.C: {missing}"]
 
 

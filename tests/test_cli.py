@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import fcntl
 import itertools
 import json
 import os
+import pty
 import re
 import signal
+import struct
 import subprocess
 import sys
+import termios
 import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
+from rich.cells import cell_len
 
 import impact
 
@@ -75,8 +80,8 @@ def test_a_bad_config_writes_nothing(cli: Run, small: Path, tmp_path: Path) -> N
     refused = cli("sweep", "small.toml", cwd=tmp_path)
     assert (refused.returncode, refused.stdout) == (2, "")
     assert refused.stderr.splitlines() == [
-        'small.toml:1: models[0]: got "herz", wants a model; did you mean "hertz"?',
-        "small.toml:3: sweep.e[1]: got 1.5, wants a number from 0 to 1",
+        'small.toml:1: models[0]: got "herz", expected a model; did you mean "hertz"?',
+        "small.toml:3: sweep.e[1]: got 1.5, expected a number from 0 to 1",
     ]
     assert [p.name for p in tmp_path.iterdir()] == ["small.toml"]
 
@@ -127,7 +132,7 @@ def test_failed_points_are_told_and_change_the_exit_code(cli: Run, small: Path, 
 def test_plot_prints_the_plotted_numbers(cli: Run, stored: Path, tmp_path: Path) -> None:
     drawn = cli("plot", stored, "-o", tmp_path / "a.svg", "--json", "--model", "gharib-hurmuzlu-2012")
     (panel,) = json.loads(drawn.stdout)["final-velocities"]["panels"]
-    assert panel["x_label"] == "coefficient of restitution, e"
+    assert (panel["x_label"], panel["x_name"]) == ("coefficient of restitution", "e")
     assert [(c["model"], c["end"]) for c in panel["curves"]] == [
         (None, "v₁⁺"), (None, "v₂⁺"), ("gharib-hurmuzlu-2012", "v₁⁺"), ("gharib-hurmuzlu-2012", "v₂⁺"),
     ]  # fmt: skip
@@ -136,15 +141,14 @@ def test_plot_prints_the_plotted_numbers(cli: Run, stored: Path, tmp_path: Path)
 
 
 def test_several_kinds_in_one_call_and_the_numbers_behind_them(cli: Run, stored: Path, tmp_path: Path) -> None:
-    drawn = cli("plot", stored, "-k", "restitution", "-k", "loop", "--sel", "e=0.5", "--width", "single",
+    drawn = cli("plot", stored, "-k", "restitution", "-k", "error", "--width", "single",
                 "--model", "gharib-hurmuzlu-2012", "-o", "a.svg", "--data", "a.csv", cwd=tmp_path)  # fmt: skip
     assert drawn.returncode == 0, drawn.stderr
-    names = {"a-restitution.svg", "a-loop.svg", "a-restitution.csv", "a-loop.csv"}
+    names = {"a-restitution.svg", "a-error.svg", "a-restitution.csv", "a-error.csv"}
     assert names <= {path.name for path in tmp_path.iterdir()}
-    # the loop is at one e, the restitution over all of them
-    assert len((tmp_path / "a-restitution.csv").read_text("utf-8").splitlines()) == 1 + 2 * 101
-    assert "indentation, delta [m]" in (tmp_path / "a-loop.csv").read_text("utf-8")
-    assert [line.split(":")[0] for line in drawn.stderr.splitlines()] == ["a-restitution.svg", "a-loop.svg"]
+    assert len((tmp_path / "a-restitution.csv").read_text("utf-8").splitlines()) == 1 + 101
+    assert "abs_e_error gharib-hurmuzlu-2012" in (tmp_path / "a-error.csv").read_text("utf-8")
+    assert [line.split(":")[0] for line in drawn.stderr.splitlines()] == ["a-restitution.svg", "a-error.svg"]
 
 
 def test_a_report_is_one_page(cli: Run, stored: Path, tmp_path: Path) -> None:
@@ -161,9 +165,13 @@ def test_a_report_is_one_page(cli: Run, stored: Path, tmp_path: Path) -> None:
     ("words", "said"),
     [
         (["-k", "lop"], '--kind: no kind "lop"; did you mean "loop"?'),
-        (["--width", "wide"], "--width wide: wants single or double"),
-        (["--log", "z"], "--log z: wants x, y, xy"),
-        (["--data", "a.txt"], "--data a.txt: wants a name that ends in .csv"),
+        (
+            ["--width", "wide"],
+            "--width: got wide, expected a length from 26mm to 60in, such as 84mm, 8.4cm or 3.3in, or single or "
+            "double",
+        ),
+        (["--log", "z"], "--log: got z, expected x, y, xy"),
+        (["--data", "a.txt"], "--data a.txt: expected a name that ends in .csv, .tex or .parquet"),
     ],
 )
 def test_what_plot_does_not_know_is_told_and_nothing_written(
@@ -237,32 +245,38 @@ def test_run_reads_a_result(cli: Run, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "line"),
     [
-        (["run", "--at", "e=1.4"], "--at e=1.4: sweep.e: got 1.4, wants a number from 0 to 1"),
+        (["run", "--at", "e=1.4"], "--at e=1.4: sweep.e: got 1.4, expected a number from 0 to 1"),
         (["run", "--at", "speed=1"], 'no input "speed" here; known: e, m1, m2, material, n, v1, v2'),
-        (["run", "--at", "e"], "--at e: wants NAME=VALUE, such as --at m2=1.0"),
-        (["run", "--at", "e=1", "--at", "e=0"], "--at e: given twice"),
+        (
+            ["run", "--at", "e"],
+            "impact run: Invalid value for '--at': got \"e\", expected NAME=VALUE, such as m2=1.0; see ",
+        ),
+        (
+            ["run", "--at", "e=1", "--at", "e=0"],
+            "impact run: Invalid value for '--at': got e twice, expected each name once; see impact run -h",
+        ),
         (["run", "absent.toml"], "absent.toml: cannot be read: No such file or directory"),
         (["models", "herz"], 'no model "herz"; did you mean "hertz"?'),
         (["info", "absent.h5"], "absent.h5: does not exist"),
         (["info", "pyproject.toml"], "pyproject.toml: is not a readable result"),
         (["plot", "absent.h5"], "absent.h5: does not exist"),
         (["init", "README.md"], "README.md: exists; give another name, or overwrite it (--overwrite)"),
-        (["swep"], "impact: No such command 'swep'. Did you mean 'sweep'?; impact -h tells what there is"),
-        (["sweep"], "impact sweep: Missing argument 'config'; impact sweep -h tells what there is"),
+        (["swep"], "impact: No such command 'swep'. Did you mean 'sweep'?; see impact -h"),
+        (["sweep"], "impact sweep: Missing argument 'config'; see impact sweep -h"),
         (["sweep", "--job", "2"], "impact sweep: No such option: --job"),
         (["sweep", "a.toml", "b.toml"], "impact sweep: Got unexpected extra argument(s) (b.toml); "),
         (
             ["sweep", "a.toml", "--max-points", "1e6.5"],
             "impact sweep: Invalid value for '--max-points': "
-            'got "1e6.5", wants a whole number of at least 1, such as 8 or 1e9; ',
+            'got "1e6.5", expected a whole number of at least 1, such as 8 or 1e9; ',
         ),
         (
             ["sweep", "a.toml", "-j", "0"],
-            "impact sweep: Invalid value for '--jobs' / '-j': got \"0\", wants a whole number of at least 1",
+            "impact sweep: Invalid value for '--jobs' / '-j': got \"0\", expected a whole number of at least 1",
         ),
         (
             ["recommend", "a.h5", "--tol", "x"],
-            "impact recommend: Invalid value for '--tol': got \"x\", wants a number, such as 8 or 0.02; ",
+            "impact recommend: Invalid value for '--tol': got \"x\", expected a number, such as 0.02 or 2%; ",
         ),
     ],
 )
@@ -430,7 +444,7 @@ def test_help_loads_no_numpy(words: list[str]) -> None:
     code = (
         "import sys\nfrom impact.cli import main\nsys.argv = ['impact', *sys.argv[1:]]\n"
         "try:\n    main.main()\nexcept SystemExit as leaving:\n    assert not leaving.code, leaving.code\n"
-        "heavy = {'numpy', 'scipy', 'xarray', 'matplotlib', 'h5py', 'tomllib'} & sys.modules.keys()\n"
+        "heavy = {'numpy', 'scipy', 'xarray', 'matplotlib', 'jinja2', 'h5py', 'tomllib'} & sys.modules.keys()\n"
         "sys.exit(f'loaded {heavy}' if heavy else 0)"
     )
     done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, check=False)
@@ -606,4 +620,72 @@ def test_one_of_those_who_integrate_is_asked_for(cli: Run, small: Path, tmp_path
     ways = ("--jobs 2", "--threads 2", "--scheduler local", "--scheduler-file s.json")
     for one, other in itertools.combinations(ways, 2):
         done = cli("sweep", small, *one.split(), *other.split(), cwd=tmp_path)
-        assert (done.returncode, done.stderr) == (2, f"{one}: given beside {other}, wants one of the two\n")
+        assert (done.returncode, done.stderr) == (2, f"{one}: given beside {other}, expected one of the two\n")
+
+
+def test_help_of_a_command_and_the_version(cli: Run) -> None:
+    assert cli("help", "sweep").stdout == cli("sweep", "--help").stdout
+    assert cli("help").stdout.rstrip() == cli("--help").stdout.rstrip()
+    assert cli("-V").stdout == cli("--version").stdout == f"impact {impact.__version__}\n"
+    wrong = cli("help", "swep")
+    assert (wrong.returncode, wrong.stderr) == (2, cli("swep").stderr)
+
+
+def test_flags_are_shown_without_a_type(cli: Run) -> None:
+    for words in (["--help"], ["sweep", "--help"], ["models", "--help"], ["help", "bless"]):
+        assert "bool" not in cli(*words).stdout
+
+
+def test_models_by_a_pattern(cli: Run) -> None:
+    keys = [one["key"] for one in json.loads(cli("models", "lammps-t*", "--json").stdout)]
+    assert keys == [key for key in impact.models() if key.startswith("lammps-t")]
+    # the second column is that of e = 0.1
+    assert re.search(r"^lammps-tsuji +0\.0995 ", cli("models", "lammps-t*").stdout, re.MULTILINE)
+    wrong = cli("models", "lamps*")
+    assert (wrong.returncode, wrong.stderr[:28]) == (2, 'no model matches "lamps*"; k'[:28])
+    assert cli("models", "lammps-*", "--family", "elastic").returncode == 2
+
+
+@pytest.mark.parametrize(("width", "columns"), [(40, 1), (80, 5), (120, 5)])
+def test_the_catalogue_keeps_the_restitution_on_a_narrow_terminal(width: int, columns: int) -> None:
+    driver, terminal = pty.openpty()
+    fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 50, width, 0, 0))
+    words = [sys.executable, "-m", "impact", "models"]
+    with subprocess.Popen(words, stdout=terminal, env=os.environ | {"NO_COLOR": "1"}) as child:
+        os.close(terminal)
+        printed = b""
+        while True:
+            try:
+                printed += os.read(driver, 10_000)
+            except OSError:
+                break
+    os.close(driver)
+    assert child.returncode == 0
+    lines = re.sub(r"\x1b\[[\d;]*m", "", printed.decode()).splitlines()
+    assert len(re.findall(r"e=0\.\d", lines[0])) == columns
+    assert ("equation" in lines[0]) == (width == 120)
+    assert max(map(cell_len, lines)) <= width
+    # a long key may be folded, nothing else is in the way of a number
+    assert re.search(r"^tsuji-1992 +0\.\d{4}", "\n".join(lines), re.MULTILINE)
+
+
+def test_a_shell_completes_models_and_families() -> None:
+    def completed(*words: str) -> list[str]:
+        place = str(len(words) - 1)
+        asked = {"COMP_WORDS": " ".join(words), "COMP_CWORD": place, "_IMPACT_COMPLETE": "complete_bash"}
+        command = [sys.executable, "-m", "impact"]
+        return subprocess.run(
+            command, env=os.environ | asked, capture_output=True, text=True, check=False
+        ).stdout.split()
+
+    keys = [key for key in impact.models() if key.startswith("thornton")]
+    assert completed("impact", "models", "thornton") == keys
+    assert completed("impact", "run", "--model", "thornton") == keys
+    assert completed("impact", "models", "--family", "elastic-") == ["elastic-plastic"]
+    assert completed("impact", "swe") == ["sweep"]
+
+
+def test_a_tolerance_in_percent(cli: Run, stored: Path) -> None:
+    percent, fraction = (cli("recommend", stored, "--tol", word, "--json").stdout for word in ("5%", "0.05"))
+    assert percent == fraction
+    assert json.loads(percent)["tol"] == 0.05

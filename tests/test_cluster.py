@@ -277,4 +277,4 @@ def test_nobody_answers(tmp_path: Path) -> None:
     said = sweep(tmp_path / "sweep", "--scheduler", "localhorst").ends(2)
     assert said == "localhorst: wants the address of a scheduler of dask, such as tcp://host:8786; or local\n"
     said = sweep(tmp_path / "sweep", "--scheduler", "local", "--jobs", "2").ends(2)
-    assert "--jobs 2: given beside --scheduler local, wants one of the two" in said
+    assert "--jobs 2: given beside --scheduler local, expected one of the two" in said

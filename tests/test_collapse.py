@@ -12,14 +12,14 @@ from hypothesis import strategies as st
 
 import impact
 from impact.api import prepare
-from impact.contact.lanes import Lanes
+from impact.config.load import read_config
+from impact.contact.impacts import Impacts
 from impact.engine import trajectories as module
 from impact.engine.build_impacts import build_impacts
 from impact.engine.plan import Plan
 from impact.engine.trajectories import trajectory_maps
 from impact.results.estimate import estimate
 from impact.results.schema import SCHEMA
-from impact.sweeps.config import read_config
 
 from .conftest import ROOT
 
@@ -185,11 +185,11 @@ def test_one_exponent_has_the_same_bits_in_any_company() -> None:
     # numpy takes a short way for the powers 1/2, 2 and -1 of a whole array, with other last bits
     rng = np.random.default_rng(7)
 
-    def lanes(n: list[float]) -> Lanes:
+    def lanes(n: list[float]) -> Impacts:
         count = len(n)
         sizes = {name: rng_values[:count] for name, rng_values in columns.items()}
         unknown = np.full(count, np.nan)
-        return Lanes(
+        return Impacts(
             e=unknown, **sizes, n=np.array(n), R1=unknown, R2=unknown, E1=unknown, nu1=unknown, E2=unknown,
             nu2=unknown, yield_strength1=unknown, yield_strength2=unknown,
         )  # fmt: skip

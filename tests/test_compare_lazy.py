@@ -18,9 +18,9 @@ from xarray.core import indexing
 import impact
 from impact.comparison.verdict import Verdict
 from impact.errors import UsageError
+from impact.plots.differences import differences
 from impact.results.schema import SCHEMA_VERSION
 from impact.results.slabs import SLAB_POINTS, VARIES_ALONG, is_lazy
-from impact.views.differences import differences
 
 ATTRIBUTES = {"schema_version": SCHEMA_VERSION, "rtol": 1e-10}
 Compute = Callable[..., Any]
@@ -271,7 +271,7 @@ def test_points_of_the_same_trajectory_are_judged_once_and_all_counted() -> None
     assert reads.total < 10**5
     # the picture: a peak along e, and a line along what was not walked along
     panels = differences(verdict).panels
-    assert [panel.label.split(",")[0] for panel in panels] == ["model", *EVERY]
+    assert [panel.label.split()[0].lower() for panel in panels] == ["model", *EVERY]
     assert np.flatnonzero(panels[1].ratios["e_out"]).tolist() == [500]
     assert set(panels[4].ratios["v1_post"]) == {judged["v1_post"].times}
 

@@ -5,11 +5,11 @@ import itertools
 import numpy as np
 import pytest
 
-from impact.contact.contract import contract
+from impact.contact.checks import contract
+from impact.contact.closed_forms import delivered_restitution
 from impact.contact.model import ForceModel
 from impact.contact.models import catalogue
 from impact.contact.models.hysteresis import hysteresis
-from impact.contact.oracles import delivered_restitution
 
 from .problems import EACH_LAW
 
@@ -72,7 +72,7 @@ WRONG = {
         wrong(
             lambda elastic, v, chi: elastic * (1.0 + chi * v * v),
             coefficients={"chi": lambda e: 8.0 - e},
-            momentum="log",
+            velocity_coordinate="log",
         ),
         "work balances energy",
     ),
@@ -80,7 +80,7 @@ WRONG = {
         wrong(
             lambda elastic, x, v, c: elastic + c * x * v,
             coefficients={"c": lambda e: 4.0 - e, "q": lambda: 0.5},
-            momentum="force",
+            velocity_coordinate="force",
             release="force",
         ),
         "work balances energy",

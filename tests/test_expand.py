@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import impact
 from impact.api import prepare
-from impact.contact.collide import first_look
+from impact.contact.outputs import check_inputs
 from impact.engine.build_impacts import build_impacts
 from impact.results import sweep as sweeps_of
 from impact.results.expand import CHECKS, checks_that_may_fail
@@ -127,8 +127,8 @@ def test_what_is_not_checked_never_fails(config: dict[str, object]) -> None:
     for law in plan.models:
         lanes = build_impacts(plan.inputs, law, plan.inputs.index())
         with np.errstate(all="ignore"):
-            expected = first_look(law, lanes)
-            found = first_look(law, lanes, checks_that_may_fail(plan.inputs, law))
+            expected = check_inputs(law, lanes)
+            found = check_inputs(law, lanes, checks_that_may_fail(plan.inputs, law))
         shape = plan.shape or (1,)
         assert np.array_equal(np.broadcast_to(found, shape), np.broadcast_to(expected, shape)), law.key
 
@@ -161,7 +161,7 @@ def test_a_factored_file_holds_what_a_full_one_does(tmp_path: Path, config: dict
     # what the summary prints, for which a factored sweep counts each distinct point once
     whole, distinct = surveys["full"].tally, surveys["factored"].tally
     np.testing.assert_equal((distinct.counts, distinct.worst), (whole.counts, whole.worst))
-    assert distinct.points == whole.points == full["status"].size
+    assert distinct.points == whole.points == plans["full"].points
     # of failed points that differ in nothing but an axis along which no status varies, the first is named
     assert distinct.failed_at[:1] == whole.failed_at[:1]
     for status, *at in distinct.failed_at:

@@ -11,8 +11,7 @@ from pathlib import Path
 import pytest
 
 import impact
-from impact.engine.installed import installed
-from impact.engine.plugins import read_plugins
+from impact.engine.plugins import installed, read_plugins
 from impact.errors import ModelError
 
 from .conftest import ROOT, Run
@@ -171,8 +170,12 @@ def test_no_data_file_brings_a_package_in(cli: Run, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "value", "said"),
     [
-        ("1 / 0", "our_package.laws", "ZeroDivisionError: division by zero; wants a package that works, or none"),
-        ("", "our_package.laws", "no model in it, wants a ForceModel, or a module that holds some"),
+        (
+            "1 / 0",
+            "our_package.laws",
+            "ZeroDivisionError: division by zero; expected a package that works",
+        ),
+        ("", "our_package.laws", "no model in it, expected a ForceModel, or a module that holds some"),
         ("", "our_package.laws:GONE", "AttributeError"),
         ("raise SystemExit", "our_package.laws", "SystemExit"),
     ],

@@ -1,24 +1,41 @@
-"""A figure shows the numbers of the slice it names, and has the same bytes each time."""
+"""A picture shows the numbers of the slice it names, fits any size, and has the same bytes in any process."""
 
 from __future__ import annotations
 
 import csv
+import hashlib
+import subprocess
+import sys
+from itertools import combinations
 from pathlib import Path
 
+import matplotlib
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.path import Path as Path2D
+from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 import impact
 from impact import api
 from impact.errors import UsageError
-from impact.views.kinds import Choice, as_csv, draw
-from impact.views.lines import Lines, Panel
-from impact.views.look import save_figure
-from impact.views.names import FOLLOWED, KINDS, WIDTHS
-from impact.views.over import error, final_velocities, restitution
+from impact.plots.curves import Lines, Panel
+from impact.plots.kinds import FOLLOWED, KINDS, WIDTHS, Choice
+from impact.plots.style import save_figure
+
+from .conftest import ROOT, Run
+
+CURVES = [kind for kind in KINDS if kind not in ("map", "validity")]
+
+
+def pictured(dataset: xr.Dataset, kind: str = "final-velocities", **choice: object) -> Lines:
+    """The numbers of a picture of curves."""
+    numbers = api.pictured(dataset, kind, Choice(**choice))  # type: ignore[arg-type]
+    assert isinstance(numbers, Lines)
+    return numbers
 
 
 def only(numbers: Lines) -> Panel:
@@ -32,9 +49,58 @@ def shown(numbers: Lines) -> str:
     return numbers.conditions.replace("\N{NO-BREAK SPACE}", " ")
 
 
+def names_of(figure: Figure) -> list[str]:
+    """The names of a legend, whose lines do not count."""
+    (legend,) = figure.legends
+    return [text.get_text().replace("\n", " ") for text in legend.get_texts()]
+
+
+def texts_of(figure: Figure) -> list[Text]:
+    """All text that is seen; a tick beyond the ends of its axis is not."""
+    texts = [*figure.texts, *(text for legend in figure.legends for text in legend.get_texts())]
+    for axes in figure.axes:
+        texts += [text for text in axes.get_children() if isinstance(text, Text)]
+        for axis in (axes.xaxis, axes.yaxis):
+            low, high = sorted(axis.get_view_interval())
+            for tick in (*axis.get_major_ticks(), *axis.get_minor_ticks()):
+                texts += [tick.label1, tick.label2] if low <= tick.get_loc() <= high else []
+            texts += [axis.label, axis.get_offset_text()]
+    return [text for text in texts if text.get_visible() and text.get_text().strip()]
+
+
+def check_layout(figure: Figure) -> None:
+    """No text over another, over a panel's edge or over the edge of the figure; the legend below all panels."""
+    FigureCanvasAgg(figure).draw()
+    boxes = [(text, text.get_window_extent()) for text in texts_of(figure)]
+    inside = figure.bbox.padded(1)
+    within = {text for axes in figure.axes for text in axes.texts}
+    for text, box in boxes:
+        assert inside.x0 <= box.x0 < box.x1 <= inside.x1, text
+        assert inside.y0 <= box.y0 < box.y1 <= inside.y1, text
+        for axes in figure.axes:
+            assert text in within or not box.padded(-1.5).overlaps(axes.get_window_extent()), (text, axes)
+    for (text, box), (other, beside) in combinations(boxes, 2):
+        assert not box.padded(-1.0).overlaps(beside.padded(-1.0)), (text, other)
+    for legend in figure.legends:
+        box = legend.get_window_extent()
+        assert not any(box.overlaps(axes.get_window_extent()) for axes in figure.axes)
+        assert box.height < 0.55 * figure.bbox.height
+
+
+@pytest.fixture(scope="module")
+def many() -> xr.Dataset:
+    """All models that need nothing but a stiffness and a restitution, over e and v1."""
+    sweep = {"e": {"linspace": [0.1, 1.0, 7]}, "v1": [0.5, 1.0], "m1": 1.0, "m2": 1.0, "K": 6e9}
+    keys = [key for key, model in impact.models().items() if not model.same_as and model.exponent in (None, 1.5)
+            and not any(one.default is None for one in model.parameters)
+            and model.quantities <= {"e", "v0", "m", "K", "n", "m1", "m2", "lambda_"}]  # fmt: skip
+    assert len(keys) > 25
+    return impact.sweep({"models": keys, "sweep": sweep})
+
+
 def test_figure_6_is_the_stored_numbers(figure6: xr.Dataset) -> None:
-    panel = only(final_velocities(figure6))
-    assert panel.x_label == "coefficient of restitution, e"
+    panel = only(pictured(figure6, equations=True))
+    assert (panel.x_label, panel.x_name) == ("coefficient of restitution", "e")
     labels = [curve.label for curve in panel.curves if curve.end == "v₁⁺"]
     assert labels == [
         "Impulse-momentum (6), (7)",
@@ -51,23 +117,28 @@ def test_figure_6_is_the_stored_numbers(figure6: xr.Dataset) -> None:
         assert curve.y == pytest.approx(expected.values, abs=1e-15)
 
 
+def test_numbers_of_equations_are_of_the_paper_only(figure6: xr.Dataset) -> None:
+    for kind in CURVES:
+        numbers = pictured(figure6, kind, sel={"e": 0.5} if kind in FOLLOWED else {})
+        labels = [curve.label for panel in numbers.panels for curve in panel.curves]
+        assert labels
+        assert not [label for label in labels if "(2" in label.replace("(20", "") or "(6)" in label]
+
+
 def test_what_is_drawn_is_what_is_numbered(figure6: xr.Dataset) -> None:
-    panel = only(final_velocities(figure6))
+    panel = only(pictured(figure6))
     axes = impact.plot(figure6).axes[0]
     assert len(axes.lines) == len(panel.curves) == 8
     for line, curve in zip(axes.lines, panel.curves, strict=True):
         np.testing.assert_array_equal(line.get_xdata(), curve.x)
         np.testing.assert_array_equal(line.get_ydata(), curve.y)
-    assert axes.get_ylabel() == "velocity after the impact [m/s]"
-    models = {curve.model for curve in panel.curves if curve.model}
-    looks = {(line.get_color(), line.get_marker()) for line in axes.lines}
-    assert len(looks) == len(models) + 1
+    assert axes.get_ylabel() == "Velocity after the impact $v_i^+$\xa0(m/s)"
 
 
 def test_restitution_and_its_error_are_the_stored_numbers(figure6: xr.Dataset) -> None:
-    asked, *delivered = only(restitution(figure6)).curves
+    asked, *delivered = only(pictured(figure6, "restitution")).curves
     assert (asked.model, asked.x, asked.y) == (None, asked.y, asked.x)
-    signed, absolute = error(figure6).panels
+    signed, absolute = pictured(figure6, "error").panels
     for key, out, off, size in zip(
         figure6["model"].values, delivered, signed.curves, absolute.curves, strict=True
     ):
@@ -80,18 +151,18 @@ def test_restitution_and_its_error_are_the_stored_numbers(figure6: xr.Dataset) -
     assert (signed.bands, absolute.bands) == ((0.05, 0.01), (0.05, 0.01))
 
 
-def test_an_error_wants_a_restitution_asked_for() -> None:
+def test_an_error_needs_a_restitution_asked_for() -> None:
     result = impact.sweep({"models": "hertz", "sweep": {"v1": [1.0, 2.0], "m1": 1.0, "m2": 1.0, "K": 6e9}})
-    with pytest.raises(UsageError, match="no restitution asked for"):
-        error(result)
-    assert [curve.model for curve in only(restitution(result)).curves] == ["hertz"]
+    with pytest.raises(UsageError, match="needs an e that is asked for"):
+        pictured(result, "error")
+    assert [curve.model for curve in only(pictured(result, "restitution")).curves] == ["hertz"]
 
 
 @pytest.mark.parametrize("kind", FOLLOWED)
 def test_a_point_is_followed_through_time_again(figure6: xr.Dataset, kind: str) -> None:
-    choice = Choice(sel={"e": 0.5}, models=["gharib-hurmuzlu-2012", "lankarani-nikravesh-1990"])
-    numbers = api.pictured(figure6, kind, choice)
-    once = {key: impact.run(model=key, at={"e": 0.5}) for key in choice.models or ()}
+    keys = ["gharib-hurmuzlu-2012", "lankarani-nikravesh-1990"]
+    numbers = pictured(figure6, kind, sel={"e": 0.5}, models=keys)
+    once = {key: impact.run(model=key, at={"e": 0.5}) for key in keys}
     assert "e = 0.5" in shown(numbers)
     for panel in numbers.panels:
         for curve in panel.curves:
@@ -116,151 +187,174 @@ def test_a_history_file_is_drawn_as_it_is(tmp_path: Path) -> None:
     assert history is not None
     impact.save(history, tmp_path / "history.h5")
     stored = impact.load(tmp_path / "history.h5")
-    (curve,) = only(api.pictured(stored, "loop", Choice())).curves
+    (curve,) = only(pictured(stored, "loop")).curves
     np.testing.assert_array_equal(curve.y, history["F"])
     with pytest.raises(UsageError, match="time history"):
-        api.pictured(stored, "restitution", Choice())
+        pictured(stored, "restitution")
 
 
 def test_the_impulse_diagram_ends_where_impulse_and_momentum_say(figure6: xr.Dataset) -> None:
-    numbers = api.pictured(figure6, "impulse", Choice(sel={"e": 0.25}, models=["lankarani-nikravesh-1994"]))
-    ends = {(curve.model, curve.end): (curve.x[-1], curve.y[-1]) for curve in only(numbers).curves}
+    numbers = pictured(figure6, "impulse", sel={"e": 0.25}, models=["lankarani-nikravesh-1994"])
+    ends = {(curve.model, curve.variable): (curve.x[-1], curve.y[-1]) for curve in only(numbers).curves}
     # two equal balls of 1 kg, one at rest: tau = m v0 (1 + e) = 0.625 N s
-    assert ends[None, "v₁"] == pytest.approx((0.625, 0.375))
-    assert ends[None, "v₂"] == pytest.approx((0.625, 0.625))
-    for ball in ("v₁", "v₂"):
+    assert ends[None, "v1"] == pytest.approx((0.625, 0.375))
+    assert ends[None, "v2"] == pytest.approx((0.625, 0.625))
+    for ball in ("v1", "v2"):
         assert ends["lankarani-nikravesh-1994", ball] == pytest.approx(ends[None, ball], abs=1e-9)
 
 
 @pytest.mark.parametrize(
     ("kind", "choice", "words"),
     [
-        ("lop", Choice(), 'no kind "lop"; did you mean "loop"?'),
-        ("loop", Choice(), "no motion to draw at e = 0.0: closed-form limit"),
-        ("loop", Choice(sel={"e": 0.5}, models=["herz"]), 'no model "herz" in this result'),
-        ("loop", Choice(sel={"m3": 0.5}), 'no input "m3" here'),
+        ("lop", {}, 'no kind "lop"; did you mean "loop"?'),
+        ("loop", {"models": ["gharib-hurmuzlu-2012"]}, "no motion to draw at e = 0.0: closed-form limit"),
+        ("loop", {"sel": {"e": 0.5}, "models": ["herz"]}, 'no model "herz" in this result'),
+        ("loop", {"sel": {"m3": 0.5}}, 'no input "m3" here'),
     ],
 )
-def test_what_cannot_be_followed_is_told_in_one_line(
-    figure6: xr.Dataset, kind: str, choice: Choice, words: str
+def test_what_cannot_be_followed_is_one_line(
+    figure6: xr.Dataset, kind: str, choice: dict[str, object], words: str
 ) -> None:
-    if kind == "loop" and not choice.sel:
-        choice = Choice(models=["gharib-hurmuzlu-2012"])
     with pytest.raises(UsageError) as caught:
-        api.pictured(figure6, kind, choice)
+        pictured(figure6, kind, **choice)
     assert words in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
-def test_the_table_behind_a_picture_has_its_numbers(figure6: xr.Dataset) -> None:
-    numbers = restitution(figure6, models=["gharib-hurmuzlu-2012"])
-    head, *rows = csv.reader(as_csv(numbers).splitlines())
-    assert head == ["x_axis", "y_axis", "curve", "model", "x", "y"]
-    own = [(float(x), float(y)) for *_, model, x, y in rows if model]
-    exact = figure6.sel(model="gharib-hurmuzlu-2012")
-    assert own == list(zip(exact["e"].values.tolist(), exact["e_out"].values.tolist(), strict=True))
+def test_one_prefix_of_the_unit_stands_in_the_label(figure6: xr.Dataset) -> None:
+    axes = impact.plot(figure6, kind="loop", sel={"e": 0.5}).axes[0]
+    assert axes.get_xlabel() == r"Indentation $\delta$" + "\xa0(µm)"
+    assert axes.get_ylabel() == "Contact force $F$\xa0(kN)"
+    # the data stay in SI, so that a user can draw more
+    assert 5e-5 < max(max(line.get_xdata()) for line in axes.lines) < 2e-4
+    FigureCanvasAgg(axes.figure).draw()
+    ticks = [text.get_text() for text in axes.get_xticklabels()]
+    assert {"0", "20", "100"} <= set(ticks)
 
 
-def test_names_stand_beside_few_curves_and_below_many(figure6: xr.Dataset) -> None:
-    few = draw(restitution(figure6))
-    assert few.legends == []
-    names = {text.get_text().replace("\n", " ") for text in few.axes[0].texts}
-    assert {curve.label for curve in only(restitution(figure6)).curves} <= names
-    many = impact.sweep({"models": ["family:hysteresis", "!ye-2009-kelvin"],
-                         "sweep": {"e": [0.1, 0.5, 0.9], "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6e9}})  # fmt: skip
-    (legend,) = draw(restitution(many)).legends
-    assert len(legend.get_texts()) == many.sizes["model"] + 1
+@pytest.mark.parametrize("width", ["84mm", "single", 7.1], ids=str)
+@pytest.mark.parametrize("kind", CURVES)
+def test_nothing_covers_a_text(figure6: xr.Dataset, kind: str, width: float | str) -> None:
+    figure = impact.plot(figure6, kind=kind, sel={"e": 0.5} if kind in FOLLOWED else None, width=width)
+    expected = {"84mm": 84 / 25.4, "single": 3.5, 7.1: 7.1}[width]
+    assert figure.get_figwidth() == pytest.approx(expected)
+    check_layout(figure)
 
 
-def test_a_name_crosses_no_curve_and_no_other_name(figure6: xr.Dataset) -> None:
-    figure = draw(restitution(figure6))
-    FigureCanvasAgg(figure).draw()
-    axes = figure.axes[0]
-    boxes = [text.get_window_extent() for text in axes.texts if text.get_fontsize() == 8.0]
-    assert len(boxes) == 4
-    for place, box in enumerate(boxes):
-        assert not any(box.overlaps(other) for other in boxes[:place])
-        for line in axes.lines:
-            path = axes.transData.transform(np.column_stack([line.get_xdata(), line.get_ydata()]))
-            assert not Path2D(path).intersects_bbox(box, filled=False)
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("count", [1, 12, 27])
+def test_a_legend_is_never_taller_than_the_picture(many: xr.Dataset, count: int, width: str) -> None:
+    figure = impact.plot(many, kind="restitution", models=many["model"].values[:count].tolist(), width=width)
+    check_layout(figure)
+    assert figure.axes[0].get_window_extent().height > 0.3 * figure.bbox.height
+    assert len(names_of(figure)) == count + 1
 
 
-@pytest.mark.parametrize("width", WIDTHS.values(), ids=WIDTHS)
-@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in ("map", "validity")])
-def test_nothing_is_clipped_at_either_width(figure6: xr.Dataset, kind: str, width: float) -> None:
-    numbers = api.pictured(figure6, kind, Choice(sel={"e": 0.5} if kind in FOLLOWED else None))
-    figure = draw(numbers, width)
-    FigureCanvasAgg(figure).draw()
-    assert figure.get_figwidth() == width
-    inside = figure.bbox.padded(1)
-    texts = [
-        text for axes in figure.axes for text in (axes.title, axes.xaxis.label, axes.yaxis.label, *axes.texts)
-    ]
-    for text in (*texts, *(text for legend in figure.legends for text in legend.get_texts())):
-        box = text.get_window_extent()
-        assert inside.x0 <= box.x0, text
-        assert box.x1 <= inside.x1, text
-        assert inside.y0 <= box.y0, text
-        assert box.y1 <= inside.y1, text
+def test_a_legend_without_room_says_how_many_are_left_out(many: xr.Dataset) -> None:
+    figure = impact.plot(many, kind="restitution", width="single", height=4.0)
+    check_layout(figure)
+    *names, more = names_of(figure)
+    assert more == f"and {many.sizes['model'] + 1 - len(names)} more"
 
 
-def test_a_model_looks_the_same_in_every_figure(figure6: xr.Dataset) -> None:
+@pytest.mark.parametrize("size", [(3.0, 3.5), (10.0, 8.0), (4.0, 6.0)])
+def test_a_figure_can_be_resized(figure6: xr.Dataset, size: tuple[float, float]) -> None:
+    for kind in ("restitution", "history" if size[1] > 4.0 else "loop"):
+        figure = impact.plot(figure6, kind=kind, sel=None if kind == "restitution" else {"e": 0.5})
+        figure.set_size_inches(*size)
+        check_layout(figure)
+
+
+def test_models_of_a_picture_never_look_alike(many: xr.Dataset) -> None:
+    def looks(models: list[str]) -> list[tuple[object, ...]]:
+        lines = impact.plot(many, kind="restitution", models=models).axes[0].lines
+        return [(line.get_color(), line.get_marker(), line.get_linestyle()) for line in lines]
+
+    keys = many["model"].values.tolist()
+    everything = looks(keys)
+    assert len({(color, marker) for color, marker, _ in everything}) == len(keys) + 1
+    for few in (keys[0::9][:3], keys[:5], keys[-7:], keys[::4][:7]):
+        assert len({color for color, _, _ in looks(few)}) == len(few) + 1, few
+        assert len({marker for _, marker, _ in looks(few)}) == len(few) + 1, few
+
+
+def test_a_model_keeps_its_look_where_it_is_free(figure6: xr.Dataset) -> None:
     def look(**choice: object) -> tuple[object, object]:
-        line = next(x for x in impact.plot(figure6, **choice).axes[0].lines if "2012" in str(x.get_label()))
+        lines = impact.plot(figure6, **choice).axes[0].lines  # type: ignore[arg-type]
+        line = next(line for line in lines if "2012" in str(line.get_label()))
         return line.get_color(), line.get_marker()
 
     assert look() == look(models=["gharib-hurmuzlu-2012"])
 
 
-def test_the_legend_covers_nothing(figure6: xr.Dataset) -> None:
-    figure = impact.plot(figure6, width=3.5)
-    FigureCanvasAgg(figure).draw()
-    (legend,) = figure.legends
-    assert not legend.get_window_extent().overlaps(figure.axes[0].get_window_extent())
-    inside = figure.bbox.padded(1)
-    for artist in (legend, figure.axes[0].xaxis.label, figure.axes[0].title, *figure.axes[0].texts):
-        box = artist.get_window_extent()
-        assert inside.x0 <= box.x0, artist
-        assert box.x1 <= inside.x1, artist
-
-
 def test_the_slice_is_chosen_and_named(wide: xr.Dataset) -> None:
-    assert "v1 = 1 m/s, m1 = 1 kg" in shown(final_velocities(wide))
-    other = final_velocities(wide, sel={"v1": 2.0, "material2": "hard", "m2": np.inf}, models=["hertz"])
-    assert "v1 = 2 m/s" in shown(other)
-    assert "m1 = 3 kg" in shown(other)
-    assert "material2 = hard" in shown(other)
+    assert "v1 = 1 m/s, m1 = 1 kg" in shown(pictured(wide))
+    other = pictured(wide, sel={"v1": 2.0, "material2": "hard", "m2": np.inf}, models=["hertz"])
+    for part in ("v1 = 2 m/s", "m1 = 3 kg", "material2 = hard"):
+        assert part in shown(other)
     expected = wide["v1_post"].sel(model="hertz", v1=2.0, material2="hard", m1=3.0)
     values = next(c for c in only(other).curves if c.model == "hertz" and c.end == "v₁⁺").y
     assert values == tuple(expected.isel({"ismail-stronge-2008.gamma": 0}).values)
 
 
+def test_parameters_of_a_law_stand_beside_its_name_only(wide: xr.Dataset) -> None:
+    for kind in ("restitution", "loop"):
+        numbers = pictured(wide, kind, sel={"ismail-stronge-2008.gamma": 4.0})
+        assert "gamma" not in numbers.conditions
+        labels = {curve.model: curve.label.replace("\xa0", " ") for curve in only(numbers).curves}
+        assert labels.pop("ismail-stronge-2008").endswith("(2008), gamma = 4")
+        assert not any("gamma" in label for label in labels.values())
+        assert any(r"$\gamma$" in name for name in names_of(impact.plot(wide, kind=kind)))
+
+
 def test_values_that_vary_together_have_to_agree(wide: xr.Dataset) -> None:
-    both = final_velocities(wide, sel={"m1": 3.0, "m2": np.inf})
-    assert "m1 = 3 kg" in shown(both)
+    assert "m1 = 3 kg" in shown(pictured(wide, sel={"m1": 3.0, "m2": np.inf}))
     with pytest.raises(UsageError, match=r"no m2 = 1\.0 in this result"):
-        final_velocities(wide, sel={"m1": 3.0, "m2": 1.0})
+        pictured(wide, sel={"m1": 3.0, "m2": 1.0})
 
 
 def test_points_are_drawn_in_order_and_geometric_axes_in_logarithms() -> None:
     def drawn(values: list[float], log: str = "") -> Panel:
         sweep = {"e": 0.5, "v1": values, "m1": 1.0, "m2": 1.0, "K": 1e9}
-        return only(final_velocities(impact.sweep({"models": "hertz", "sweep": sweep}), log=log))
+        return only(pictured(impact.sweep({"models": "hertz", "sweep": sweep}), log=log))
 
     unsorted = drawn([5.0, 2.0, 3.3])
     assert unsorted.curves[0].x == (2.0, 3.3, 5.0)
     assert unsorted.curves[0].y == pytest.approx((0.5, 0.825, 1.25))
+    assert unsorted.joined
     assert not unsorted.x_log
     assert drawn([5.0, 2.0, 3.3], "xy").x_log
     assert drawn([5.0, 2.0, 3.3], "xy").y_log
     assert drawn([1000.0, 10.0, 0.1]).x_log
 
 
+@pytest.mark.parametrize(
+    ("v1", "joined"), [([1.0, 2.0, 3.0], True), ([3.0, 2.0, 1.0], True), ([1.0, 3.0, 2.0], False)]
+)
+def test_points_without_an_order_are_not_joined(v1: list[float], joined: bool) -> None:
+    sweep = {"e": [0.2, 0.5, 0.8], "v1": v1, "zip": [["e", "v1"]], "m1": 1.0, "m2": 1.0, "K": 6e9}
+    result = impact.sweep({"models": "lankarani-nikravesh-1990", "sweep": sweep})
+    lines = impact.plot(result, kind="restitution", x="v1").axes[0].lines
+    assert all((line.get_linestyle() != "None") == joined for line in lines)
+    assert all(line.get_marker() not in ("None", None) for line in lines if not joined)
+
+
+def test_cases_are_numbered_and_not_joined() -> None:
+    sweep = {"e": [0.2, 0.5, 0.8], "v1": [1.0, 2.0, 3.0], "zip": [["e", "v1"]], "m1": 1.0, "m2": 1.0, "K": 6e9}
+    result = impact.sweep({"models": "lankarani-nikravesh-1990", "sweep": sweep}).reset_index("e")
+    cases = result.swap_dims(e="case").assign_coords(case=[0, 1, 2], e=("case", [0.5, 0.2, 0.5]))
+    assert only(pictured(cases, "restitution")).x_name == "e"
+    for x in ("e", "case"):
+        figure = impact.plot(cases, kind="restitution", x=x)
+        assert {line.get_linestyle() for line in figure.axes[0].lines} == {"None"}
+        check_layout(figure)
+
+
 def test_over_another_axis(wide: xr.Dataset) -> None:
-    panel = only(final_velocities(wide, x="v1", sel={"e": 0.6}))
+    panel = only(pictured(wide, x="v1", sel={"e": 0.6}))
     assert panel.curves[0].x == (1.0, 2.0)
-    assert panel.x_label == "velocity of ball 1 before the impact, v1 [m/s]"
-    walls = final_velocities(wide, x="m2")
+    assert (panel.x_label, panel.x_unit) == ("velocity of ball 1 before the impact", "m/s")
+    walls = pictured(wide, x="m2")
     assert only(walls).curves[0].x == (1.0,)
     assert walls.not_drawn == ("m2 = inf",)
 
@@ -277,38 +371,281 @@ def test_over_another_axis(wide: xr.Dataset) -> None:
 )
 def test_what_is_not_there_is_named(wide: xr.Dataset, choice: dict[str, object], words: str) -> None:
     with pytest.raises(UsageError) as caught:
-        final_velocities(wide, **choice)
+        pictured(wide, **choice)
     assert words in str(caught.value)
 
 
-@pytest.mark.parametrize("kind", ["png", "svg", "pdf"])
-def test_the_same_bytes_each_time(figure6: xr.Dataset, tmp_path: Path, kind: str) -> None:
-    for name in ("one", "two"):
-        save_figure(impact.plot(figure6), tmp_path / f"{name}.{kind}")
-    content = (tmp_path / f"one.{kind}").read_bytes()
-    assert content == (tmp_path / f"two.{kind}").read_bytes()
-    assert content.startswith({"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}[kind])
+@pytest.mark.parametrize("kind", ["png", "svg", "pdf", "eps"])
+def test_pictures_are_files_of_their_format(figure6: xr.Dataset, tmp_path: Path, kind: str) -> None:
+    save_figure(impact.plot(figure6), tmp_path / f"one.{kind}")
+    magic = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF", "eps": b"%!PS"}[kind]
+    assert (tmp_path / f"one.{kind}").read_bytes().startswith(magic)
     # saving by matplotlib's own method gives the same picture size and no error
-    impact.plot(figure6).savefig(tmp_path / f"three.{kind}")
+    impact.plot(figure6).savefig(tmp_path / f"two.{kind}")
 
 
-def test_no_other_ending(figure6: xr.Dataset, tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match=r"\.png, \.svg or \.pdf"):
+def test_the_same_bytes_in_every_process(stored: Path, tmp_path: Path) -> None:
+    sweep = {"e": [0.1, 0.5, 1.0], "v1": {"geomspace": [0.1, 10.0, 5]}, "m1": 1.0, "m2": 1.0, "K": 6e9}
+    plane = impact.sweep({"models": ["hertz", "flores-2011", "lankarani-nikravesh-1990"], "sweep": sweep})
+    impact.save(plane, tmp_path / "plane.h5")
+    code = (
+        "import sys, hashlib, impact\nfrom impact.plots.style import encoded\n"
+        "for path, kinds in ((sys.argv[1], ('error', 'history')), (sys.argv[2], ('map', 'validity'))):\n"
+        "    result = impact.load(path)\n"
+        "    for kind in kinds:\n"
+        "        for form in ('svg', 'eps') if kind == 'error' else ('png',):\n"
+        "            at = {'e': 0.5} if kind == 'history' else None\n"
+        "            figure = impact.plot(result, kind=kind, sel=at, width='84mm')\n"
+        "            print(kind, form, hashlib.sha256(encoded(figure, form)).hexdigest())\n"
+    )
+    words = [sys.executable, "-c", code, str(stored), str(tmp_path / "plane.h5")]
+    printed = {subprocess.run(words, capture_output=True, text=True, check=True).stdout for _ in range(3)}
+    assert len(printed) == 1
+    assert len(printed.pop().splitlines()) == 5
+
+
+def test_no_other_ending(figure6: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(UsageError, match=r"\.png, \.svg, \.pdf, \.eps or \.pgf"):
         save_figure(impact.plot(figure6), tmp_path / "results.h5")
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(UsageError, match=r"pgf needs xelatex of LaTeX, which is not installed"):
+        save_figure(impact.plot(figure6), tmp_path / "results.pgf")
     assert list(tmp_path.iterdir()) == []
 
 
 def test_text_from_a_file_is_text(figure6: xr.Dataset, tmp_path: Path) -> None:
-    odd = figure6.assign_attrs(title="$\\frac{1$ \x1b[31m \u202e")
-    odd["title"] = ("model", ["$x^{$", "a_b$", "[red]"])
-    numbers = final_velocities(odd)
+    odd = figure6.assign_attrs(title="$\\frac{1$ \x1b[31m \u202e $x$ " + "W" * 90)
+    odd["title"] = ("model", ["$x^{$", "a_b$ $\\oops$", "[red]" + "W" * 60])
+    numbers = pictured(odd)
     assert "\x1b" not in numbers.title
-    save_figure(draw(numbers), tmp_path / "odd.png")
-    assert (tmp_path / "odd.png").stat().st_size > 10_000
+    for width in WIDTHS.values():
+        figure = impact.plot(odd, width=width)
+        check_layout(figure)
+        assert any("a_b\\$ \\$\\oops\\$" in name for name in names_of(figure))
+        save_figure(figure, tmp_path / "odd.png")
 
 
 def test_one_point_and_no_reference(tmp_path: Path) -> None:
     result = impact.sweep({"models": "hertz", "sweep": {"v1": [1.0], "m1": 1.0, "m2": 1.0, "K": 6e9}})
-    numbers = final_velocities(result)
-    assert [curve.model for curve in only(numbers).curves] == ["hertz", "hertz"]
-    save_figure(draw(numbers), tmp_path / "one.png")
+    assert [curve.model for curve in only(pictured(result)).curves] == ["hertz", "hertz"]
+    save_figure(impact.plot(result), tmp_path / "one.png")
+
+
+# what the user chooses
+
+
+def test_the_users_own_style_is_respected(figure6: xr.Dataset, tmp_path: Path) -> None:
+    assert impact.plot(figure6).axes[0].xaxis.label.get_fontsize() == 9.0
+    with matplotlib.rc_context({"font.size": 13.0, "axes.grid": True, "figure.figsize": (5.0, 4.0)}):
+        figure = impact.plot(figure6)
+        assert figure.axes[0].xaxis.label.get_fontsize() == 13.0
+        assert tuple(figure.get_size_inches()) == (5.0, 4.0)
+        assert impact.plot(figure6, width="single").get_figwidth() == 3.5
+    sheet = tmp_path / "mine.mplstyle"
+    sheet.write_text("font.size: 7\naxes.facecolor: cccccc\n", encoding="utf-8")
+    figure = impact.plot(figure6, style=sheet)
+    assert figure.axes[0].xaxis.label.get_fontsize() == 7.0
+    assert matplotlib.colors.to_hex(figure.axes[0].get_facecolor()) == "#cccccc"
+    assert impact.plot(figure6, style="grayscale").axes
+    with pytest.raises(UsageError, match=r"--style none\.mplstyle: no such file"):
+        impact.plot(figure6, style="none.mplstyle")
+    sheet.write_bytes(b"font.size: \xff\n")
+    with pytest.raises(UsageError, match="cannot be read"):
+        impact.plot(figure6, style=sheet)
+
+
+def test_labels_titles_and_sizes_are_chosen(figure6: xr.Dataset) -> None:
+    labels = {"e": "Restitution $e$", "gharib-hurmuzlu-2012": "G & H", "reference": "Exact", "title": "Mine"}
+    figure = impact.plot(figure6, labels=labels, width="84mm", height="60mm")
+    assert figure.get_size_inches() * 25.4 == pytest.approx((84.0, 60.0))
+    assert figure.axes[0].get_xlabel() == "Restitution $e$"
+    assert {"G & H", "Exact"} <= set(names_of(figure))
+    assert figure.texts[0].get_text() == "Mine"
+    bare = impact.plot(figure6, title=False)
+    assert bare.texts == []
+    assert bare.get_figheight() < impact.plot(figure6).get_figheight()
+    loop = impact.plot(figure6, kind="loop", sel={"e": 0.5}, labels={"delta": "Overlap", "v1": "not here"})
+    assert loop.axes[0].get_xlabel() == "Overlap (µm)"
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (
+            {"width": "wide"},
+            "--width: got wide, expected a length from 26mm to 60in, such as 84mm, 8.4cm or 3.3in, or",
+        ),
+        ({"width": "84"}, "--width: got 84, expected a length"),
+        ({"width": 0.01}, "--width: got 0.01, expected a length"),
+        ({"height": "single in"}, "--height: got single in, expected a length"),
+        ({"labels": {"E": "Young"}}, 'nothing in the picture is called "E"; known: e, gharib'),
+        ({"labels": {"e": "$x^{$"}}, "--label e=$x^{$: is not valid mathtext"),
+    ],
+)
+def test_a_wrong_option_is_one_line(figure6: xr.Dataset, options: dict[str, object], words: str) -> None:
+    with pytest.raises(UsageError) as caught:
+        impact.plot(figure6, **options)  # type: ignore[arg-type]
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_picture_is_drawn_into_axes_of_the_user(figure6: xr.Dataset) -> None:
+    figure = Figure((8.0, 4.0))
+    axes = figure.subplots(1, 2)
+    assert impact.plot(figure6, kind="restitution", ax=axes[0]) is figure
+    assert (len(axes[0].lines), len(axes[1].lines)) == (4, 0)
+    assert axes[0].get_legend().get_texts()[0].get_text() == "As asked for"
+    impact.plot(figure6, kind="error", ax=axes)
+    assert isinstance(axes[1], Axes)
+    with pytest.raises(UsageError, match="ax: got 1 axes, expected 3"):
+        impact.plot(figure6, kind="history", sel={"e": 0.5}, ax=axes[0])
+
+
+def test_a_notebook_shows_the_picture(figure6: xr.Dataset) -> None:
+    figure = impact.plot(figure6, width="single")
+    assert figure._repr_png_().startswith(b"\x89PNG")  # type: ignore[attr-defined]
+
+
+# measured points
+
+
+POINTS = "v1 [mm/s], e_out, sigma\n500, 0.9, 0.05\n\n1000, 0.8, 0.1\n"
+
+
+@pytest.fixture(scope="module")
+def speeds() -> xr.Dataset:
+    sweep = {"v1": [0.5, 1.0, 2.0], "e": 0.6, "m1": 1.0, "m2": 1.0, "K": 6e9}
+    return impact.sweep({"models": "flores-2011", "sweep": sweep})
+
+
+def test_measured_points_are_drawn_over_the_curves(speeds: xr.Dataset, tmp_path: Path) -> None:
+    path = tmp_path / "data.csv"
+    path.write_text(POINTS, encoding="utf-8")
+    frame = pd.DataFrame({"v1 [mm/s]": [500.0, 1000.0], "e_out": [0.9, 0.8], "sigma": [0.05, 0.1]})
+    dataset = xr.Dataset({"e_out": ("v1", [0.9, 0.8]), "sigma": ("v1", [0.05, 0.1])},
+                         {"v1": ("v1", [500.0, 1000.0], {"units": "mm/s"})})  # fmt: skip
+    for points in (path, str(path), frame, dataset):
+        figure = impact.plot(speeds, kind="restitution", points=points)
+        (bars,) = figure.axes[0].containers
+        assert bars[0].get_xydata().tolist() == [[0.5, 0.9], [1.0, 0.8]]
+        low, high = bars[2][0].get_segments()[0][:, 1]
+        assert (low, high) == pytest.approx((0.85, 0.95))
+        assert names_of(figure)[-1] == "Measured"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("speed, e_out\n1, 2\n", 'data.csv:1: got "speed"; '),
+        ("v1, v1\n1, 2\n", 'data.csv:1: got "v1" twice'),
+        ("v1 [kg], e_out\n1, 2\n", "data.csv:1: v1: got [kg], expected a unit of m/s"),
+        ("v1, e_out\n1, 2\n2, high\n", 'data.csv:3: e_out: got "high", expected a'),
+        ("m1, e_out\n1, 2\n", "data.csv: the picture shows v1 and e_out, and the points have m1, e_out"),
+        ("v1, e_out\n", "data.csv: got 1 lines, expected a line of names"),
+    ],
+)
+def test_wrong_points_are_one_line(
+    speeds: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str, words: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("data.csv").write_text(text, encoding="utf-8")
+    with pytest.raises(impact.ImpactError) as caught:
+        impact.plot(speeds, kind="restitution", points="data.csv")
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+# the command
+
+
+def test_the_table_behind_a_picture_has_a_column_for_each_curve(cli: Run, stored: Path, tmp_path: Path) -> None:
+    words = ("plot", stored, "--model", "gharib-hurmuzlu-2012", "--model", "lankarani-nikravesh-1990")
+    cli(*words, "-o", "a.svg", "--data", "a.csv", cwd=tmp_path)
+    frame = pd.read_csv(tmp_path / "a.csv")
+    assert list(frame) == [
+        "e", "v1_post reference [m/s]", "v2_post reference [m/s]", "v1_post gharib-hurmuzlu-2012 [m/s]",
+        "v2_post gharib-hurmuzlu-2012 [m/s]", "v1_post lankarani-nikravesh-1990 [m/s]",
+        "v2_post lankarani-nikravesh-1990 [m/s]",
+    ]  # fmt: skip
+    exact = impact.load(stored).sel(model="gharib-hurmuzlu-2012")
+    np.testing.assert_array_equal(frame["v1_post gharib-hurmuzlu-2012 [m/s]"], exact["v1_post"])
+    cli(*words, "-o", "b.svg", "--data", "b.csv", "--data-form", "long", "-k", "restitution", cwd=tmp_path)
+    head, *rows = csv.reader((tmp_path / "b.csv").read_text("utf-8").splitlines())
+    assert head == ["x_axis", "y_axis", "curve", "model", "x", "y"]
+    own = [(float(x), float(y)) for *_, model, x, y in rows if model == "gharib-hurmuzlu-2012"]
+    assert own == list(zip(exact["e"].values.tolist(), exact["e_out"].values.tolist(), strict=True))
+    cli(*words, "-o", "c.svg", "--data", "c.csv", "-k", "loop", "--sel", "e=0.5", cwd=tmp_path)
+    loops = pd.read_csv(tmp_path / "c.csv")
+    assert list(loops) == [
+        f"{name} {key} [{unit}]" for key in words[3::2] for name, unit in (("delta", "m"), ("F", "N"))
+    ]
+    assert loops.notna().all(axis=None) == (len({loops[name].count() for name in loops}) == 1)
+
+
+def test_tables_in_other_formats(cli: Run, stored: Path, tmp_path: Path) -> None:
+    done = cli("plot", stored, "-o", "a.svg", "--data", "a.tex", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    text = (tmp_path / "a.tex").read_text("utf-8")
+    assert r"\begin{tabular}" in text
+    assert r"v1\_post reference [m/s]" in text
+    done = cli("plot", stored, "-o", "b.svg", "--data", "b.parquet", cwd=tmp_path)
+    try:
+        import pyarrow  # noqa: F401
+    except ImportError:
+        assert done.returncode == 2
+        assert done.stderr == (
+            '--data: .parquet needs pyarrow, which is not installed: pip install "impact-sweep[parquet]"\n'
+        )
+        assert not (tmp_path / "b.svg").exists()
+    else:
+        assert "v1_post reference [m/s]" in pd.read_parquet(tmp_path / "b.parquet")
+
+
+def test_a_picture_that_exists_is_replaced_on_request_only(cli: Run, stored: Path, tmp_path: Path) -> None:
+    (tmp_path / "a.svg").write_text("mine")
+    (tmp_path / "a.csv").write_text("mine")
+    for words in (["-o", "a.svg"], ["-o", "b.svg", "--data", "a.csv"], ["-o", "a.svg", "-k", "loop"]):
+        refused = cli("plot", stored, *words, cwd=tmp_path)
+        assert refused.returncode == 2
+        assert refused.stderr.endswith("exists; give another name, or overwrite it (--overwrite)\n")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.csv", "a.svg"]
+    assert cli("plot", stored, "-o", "a.svg", "--data", "a.csv", "--overwrite", cwd=tmp_path).returncode == 0
+    assert (tmp_path / "a.svg").read_text("utf-8").startswith("<?xml")
+    assert (tmp_path / "a.csv").read_text("utf-8").startswith("e,")
+
+
+def test_kinds_that_do_not_apply_are_named_and_the_others_drawn(cli: Run, stored: Path, tmp_path: Path) -> None:
+    drawn = cli("plot", stored, "-k", "map", "-k", "restitution", "-o", "a.svg", cwd=tmp_path)
+    assert drawn.returncode == 0
+    first, second = drawn.stderr.splitlines()
+    assert first.startswith("a-restitution.svg: ")
+    assert second.startswith("map is not drawn: map needs two axes")
+    # what is selected is so in every kind: no axis is left for a line over e
+    drawn = cli("plot", stored, "-k", "loop", "-k", "error", "--sel", "e=0.5", "-o", "b.svg", cwd=tmp_path)
+    assert drawn.returncode == 0
+    assert "error is not drawn: this result has no numeric axis left to draw over" in drawn.stderr
+    none = cli("plot", stored, "-k", "map", "-k", "validity", "-o", "c.svg", cwd=tmp_path)
+    assert (none.returncode, len(none.stderr.splitlines())) == (2, 2)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a-restitution.svg", "b-loop.svg"]
+
+
+def test_the_command_draws_what_python_draws(cli: Run, stored: Path, tmp_path: Path) -> None:
+    (tmp_path / "mine.mplstyle").write_text("font.size: 8\n", encoding="utf-8")
+    (tmp_path / "data.csv").write_text("e, e_out\n0.5, 0.5\n", encoding="utf-8")
+    words = ["-k", "restitution", "--width", "84mm", "--height", "7cm", "--no-title", "--style", "mine.mplstyle",
+             "--label", "e=Asked", "--points", "data.csv", "--equations", "-o", "a.svg"]  # fmt: skip
+    done = cli("plot", stored, *words, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    style = tmp_path / "mine.mplstyle"
+    figure = impact.plot(
+        impact.load(stored), kind="restitution", width="84mm", height="7cm", title=False, style=style,
+        labels={"e": "Asked"}, points=tmp_path / "data.csv", equations=True,
+    )  # fmt: skip
+    save_figure(figure, tmp_path / "b.svg", style=style)
+    digests = {hashlib.sha256((tmp_path / f"{name}.svg").read_bytes()).hexdigest() for name in "ab"}
+    assert len(digests) == 1
+
+
+def test_the_gallery_and_the_docs_are_drawn_by_the_package() -> None:
+    for name in ("gallery.py", "make_docs.py", "models_pictures.py"):
+        compile((ROOT / "scripts" / name).read_text(encoding="utf-8"), name, "exec")

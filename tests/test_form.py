@@ -46,6 +46,7 @@ RESULTS: dict[str, tuple[Change, str]] = {
     "tolerance of text": (lambda r: r.assign_attrs(rtol="x"), "no rtol, or not as a number"),
     "config_set": (lambda r: r.assign_attrs(config_set="{}"), "config_set: no JSON of the right kind"),
     "plugins": (lambda r: r.assign_attrs(plugins="{}x"), "plugins: no JSON of the right kind"),
+    "no hash": (lambda r: r.assign_attrs(plugins='{"mine": {"file": "my.py"}}'), "plugins: no JSON of the right"),
     "deep plugins": (lambda r: r.assign_attrs(plugins=DEEP), "plugins: no JSON of the right kind"),
     "materials": (lambda r: r.assign_attrs(materials=1.0), "materials: no JSON of the right kind"),
 }  # fmt: skip

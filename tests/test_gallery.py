@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from impact.views.names import KINDS
+from impact.plots.kinds import KINDS
 
 from .conftest import ROOT, Run
 
@@ -42,7 +42,7 @@ def test_the_page_is_fresh_and_has_every_kind() -> None:
 def test_the_numbers_of_a_picture_are_fresh(entry: gallery.Entry, results: Path, cli: Run, tmp_path: Path) -> None:
     _, *words = entry.command
     words[1] = str(results / words[1])
-    done = cli(*words, "--data", "fresh.csv", cwd=tmp_path)
+    done = cli(*words, "--data", "fresh.csv", "--data-form", "long", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     now, kept = (
         gallery.summary(tmp_path / "fresh.csv"),

@@ -27,7 +27,7 @@ COMMANDS = (
     ("info", FILE),
     ("info", FILE, "--json"),
     ("plot", FILE, "-o", "picture.png"),
-    ("plot", FILE, "-k", "loop", "-o", "picture.png"),
+    ("plot", FILE, "-k", "loop", "-o", "loop.png"),
     ("recommend", FILE),
     ("compare", FILE, FILE, "--plot", "differences.png"),
     ("rerun", FILE, "--plot", "differences.png"),
@@ -210,7 +210,12 @@ def test_a_genuine_file_is_not(forked: Forked, small: Path, factored: Path, tmp_
     shutil.copy({"small": small, "factored": factored}[layout], tmp_path / "good.h5")
     for command in COMMANDS:
         assert tell(forked, tmp_path / "good.h5", command).returncode == 0
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["differences.png", "good.h5", "picture.png"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "differences.png",
+        "good.h5",
+        "loop.png",
+        "picture.png",
+    ]
 
 
 def test_what_is_unknown_is_passed_over_with_a_note(forked: Forked, small: Path, tmp_path: Path) -> None:

@@ -12,8 +12,8 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from impact.config.tables import expand_models
 from impact.contact.models import catalogue
-from impact.sweeps.rules import expand_models
 
 from .conftest import ROOT
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import impact
-from impact.contact.collide import collide
 from impact.contact.models import find
+from impact.contact.outputs import collide
 from impact.contact.status import Status
 
 from .conftest import Run
@@ -28,8 +28,8 @@ def test_the_three_restitutions_of_every_law_are_one_number(e: float) -> None:
     for key in LAWS:
         lanes = with_parameters(find(key), impacts(find(key).exponent or 1.5, e=e), 0.5)
         contact = collide(find(key), lanes, rtol=RTOL, max_steps=100_000)
-        three = [getattr(contact, name)[0] for name in ("e_out", "e_kinetic", "e_energetic")]
-        if contact.status[0] in (Status.OK, Status.LIMIT):
+        three = [contact[name][0] for name in ("e_out", "e_kinetic", "e_energetic")]
+        if contact["status"][0] in (Status.OK, Status.LIMIT):
             apart[key] = np.ptp(three)
     assert len(apart) > 0.9 * len(LAWS)
     assert max(apart.values()) <= 10 * RTOL, max(apart, key=lambda key: apart[key])
@@ -149,7 +149,7 @@ def test_parameters_have_units(cli: Run) -> None:
 def test_balls_that_miss_each_other_have_no_phases(cli: Run, key: str) -> None:
     derived = impact.run(model=key, at={"v1": -1.0}).derived
     assert derived["m"] == 0.5
-    assert all(math.isnan(value) for name, value in derived.items() if name not in ("R1", "R2", "m"))
+    assert all(math.isnan(value) for name, value in derived.items() if name not in ("m1", "m2", "R1", "R2", "m"))
     done = cli("run", "--model", key, "--at", "v1=-1")
     assert done.returncode == 0, done.stderr
     assert not {"tau_c", "W_c", "K_r"} & {line.split()[0] for line in done.stdout.splitlines()}
@@ -166,6 +166,24 @@ def test_a_linear_law_shows_its_own_exponent(cli: Run, key: str) -> None:
     lines = [line.split() for line in cli("run", "--model", key).stdout.splitlines()]
     assert ["n", "1"] in lines
     assert ["stiffness", "61445658.07", "N/m"] in lines
+
+
+def test_a_parameter_of_one_of_several_models_chooses_its_loop() -> None:
+    sweep = {"e": 0.5, "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 1e6, "n": 1.0}
+    config = {
+        "models": ["kelvin-voigt", "bilinear"], "sweep": sweep, "model": {"kelvin-voigt": {"C": [10.0, 200.0]}},
+    }  # fmt: skip
+    result = impact.sweep(config)
+
+    def peaks(sel: dict[str, float]) -> list[float]:
+        figure = impact.plot(result, kind="loop", sel=sel)
+        return [max(line.get_ydata()) for line in figure.axes[0].lines if len(line.get_xdata()) > 2]
+
+    first, second = peaks({}), peaks({"kelvin-voigt.C": 200.0})
+    assert first[0] != second[0]
+    assert first[1] == second[1]
+    with pytest.raises(impact.ImpactError, match=r'no input "kelvin-voight\.C"'):
+        impact.plot(result, kind="loop", sel={"kelvin-voight.C": 200.0})
 
 
 # ---- e and alpha
@@ -196,3 +214,46 @@ def test_alpha_takes_the_place_of_the_e_of_a_stored_sweep(tmp_path: Path) -> Non
 def test_alpha_beside_e_is_refused(cli: Run) -> None:
     done = cli("run", "--at", "alpha=0.3", "--at", "e=0.5")
     assert (done.returncode, done.stderr) == (2, "--at alpha: got alpha beside e, expected one of the two\n")
+
+
+CASES = """models = ["gharib-hurmuzlu-2012"]
+[sweep]
+cases = "cases.csv"
+m1 = 1.0
+m2 = 1.0
+material = "steel"
+[materials.steel]
+E = [200e9, 210e9]
+nu = 0.3
+rho = 7850
+"""
+
+
+def test_a_case_is_run_by_its_number_and_a_material_by_its_property(cli: Run, tmp_path: Path) -> None:
+    (tmp_path / "c.toml").write_text(CASES, encoding="utf-8")
+    (tmp_path / "cases.csv").write_text("e,v1\n0.5,1.0\n0.5,2.0\n0.9,2.0\n", encoding="utf-8")
+    assert cli("sweep", "c.toml", "-o", "r.h5", cwd=tmp_path).returncode == 0
+    stored = impact.load(tmp_path / "r.h5").squeeze("model")
+    for source in ("c.toml", "r.h5"):
+        words = ["run", source, "--at", "case=2", "--at", "materials.steel.E=210e9", "--json"]
+        shot = json.loads(cli(*words, cwd=tmp_path).stdout)
+        assert (shot["inputs"]["e"], shot["inputs"]["v1"], shot["first_value_of"]) == (0.9, 2.0, [])
+        assert shot["materials"]["steel"]["E"] == 210e9
+        expected = float(stored["e_out"].sel({"case": 2, "materials.steel.E": 210e9}))
+        assert shot["outputs"]["e_out"] == expected
+    # values that vary together choose a case as well, where one has them all
+    shot = json.loads(cli("run", "r.h5", "--at", "e=0.5", "--at", "v1=2.0", "--json", cwd=tmp_path).stdout)
+    assert shot["first_value_of"] == ["materials.steel.E"]
+    for words, said in (
+        (["--at", "case=3"], "case = 3.0: not on the zipped axis case; these values vary together"),
+        (["--at", "case=1", "--at", "e=0.9"], "case = 1.0, e = 0.9: not on the zipped axis case"),
+        (["--at", "materials.steel.E=-1"], "--at materials.steel.E=-1.0: materials.steel.E: got -1.0, expected"),
+        (["--at", "materials.steel.G=1"], 'no input "materials.steel.G" here; did you mean'),
+    ):
+        done = cli("run", "r.h5", *words, cwd=tmp_path)
+        assert done.returncode == 2
+        assert done.stderr.startswith(said), done.stderr
+    # a part of the cases is run at the one that it holds
+    part = impact.load(tmp_path / "r.h5").isel(case=1)
+    assert impact.run(part).point["v1"] == 2.0
+    assert impact.run(part).first == ("materials.steel.E",)

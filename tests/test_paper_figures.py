@@ -11,8 +11,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import impact
 from impact import api
-from impact.views.kinds import Choice, draw
-from impact.views.lines import Lines, Panel
+from impact.plots.curves import Lines, Panel
+from impact.plots.kinds import Choice, draw
+from impact.plots.labels import symbol
 
 from .conftest import ROOT, Run
 
@@ -60,7 +61,7 @@ def test_names_of_marks_are_legible(figure: str, width: float) -> None:
     drawn = draw(numbers(figure), width)
     FigureCanvasAgg(drawn).draw()
     (axes,) = drawn.axes
-    names = [text for text in axes.texts if text.get_text().startswith("$")]
+    names = [text for text in axes.texts if text.get_text() in {symbol(mark) for mark in MARKS[figure]}]
     assert len(names) == len(MARKS[figure])
     boxes = [text.get_window_extent() for text in axes.texts]
     for place, box in enumerate(boxes):
@@ -102,7 +103,7 @@ def test_info_and_the_report_show_the_laws_own_exponent(cli: Run, tmp_path: obje
     lines = [line.split() for line in cli("info", "bilinear.h5", cwd=tmp_path).stdout.splitlines()]
     assert ["n", "1"] in lines
     page = impact.report(impact.load(tmp_path / "bilinear.h5"))  # type: ignore[operator]
-    assert '<th scope="row">n</th><td data-head="value">1</td>' in page
+    assert '<th scope="row">n</th>\n<td data-head="value">1</td>' in page
 
 
 @pytest.mark.skipif(shutil.which("make") is None, reason="make is not installed")
@@ -113,4 +114,7 @@ def test_make_figures_draws_all_of_them() -> None:
     for figure in (*MARKS, "6"):
         assert f"impact sweep configs/figure{figure}.toml -o results/figure{figure}.h5" in done.stdout
         kind = {"2": "--kind impulse ", "6": ""}.get(figure, "--kind loop ")
-        assert f"impact plot results/figure{figure}.h5 {kind}-o results/figure{figure}.png" in done.stdout
+        assert (
+            f"impact plot results/figure{figure}.h5 {kind}--equations -o results/figure{figure}.png --overwrite"
+            in done.stdout
+        )

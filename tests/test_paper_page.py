@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import impact
+from impact.config.tables import SWEEP
 from impact.results.history import HISTORY
 from impact.results.impact import DERIVED
 from impact.results.schema import SCHEMA
-from impact.sweeps.rules import SWEEP
 
 from .conftest import ROOT, Run
 

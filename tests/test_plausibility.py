@@ -57,6 +57,12 @@ def test_a_note_for_what_is_implausible(forked: Forked, tmp_path: Path, change: 
     assert (again.returncode, again.stderr) == (0, "")
 
 
+def test_a_modulus_that_is_an_axis_is_no_implausible_number(forked: Forked, tmp_path: Path) -> None:
+    (tmp_path / "config.toml").write_text(SWEEP.replace('E = "210 GPa"', 'E = ["70 GPa", "210 GPa"]'))
+    done = forked("sweep", "config.toml", cwd=tmp_path)
+    assert (done.returncode, done.stderr.count("note: ")) == (0, 0)
+
+
 def test_the_configs_of_the_project_give_no_note(forked: Forked, tmp_path: Path) -> None:
     for config in sorted((ROOT / "configs").glob("*.toml")):
         done = forked("sweep", config, "-o", f"{config.stem}.h5", "--allow-failed", cwd=tmp_path)

@@ -32,7 +32,8 @@ def test_the_toml_and_the_commands_of_daily_use(cli: Run, tmp_path: Path) -> Non
     (toml,) = blocks("toml")
     (tmp_path / "config.toml").write_text(toml, encoding="utf-8")
     commands = [line for block in blocks("sh")[1:] for line in block.splitlines() if line]
-    assert len(commands) == 13
+    assert len(commands) == 14
+    (tmp_path / "measured.csv").write_text("e, e_out, sigma\n0.5, 0.45, 0.02\n", encoding="utf-8")
     for line in commands:
         program, *words = shlex.split(line)
         assert program == "impact"
@@ -58,12 +59,12 @@ def test_generated_pages_are_fresh() -> None:
 
 
 def test_the_page_on_sweeps_says_what_is_so() -> None:
+    from impact.config.grid import MAX_POINTS
+    from impact.config.load import parse_config
+    from impact.config.quantities import MAX_AXIS
     from impact.engine.trajectories import MAX_CELLS, RANGE_TRAJECTORIES
     from impact.results.netcdf import CHUNK_VALUES
     from impact.results.sweep import NO_CHECKPOINT_POINTS
-    from impact.sweeps.config import parse_config
-    from impact.sweeps.grid import MAX_POINTS
-    from impact.sweeps.ranges import MAX_AXIS
 
     page = (ROOT / "docs" / "sweeps.md").read_text(encoding="utf-8")
     for number in (NO_CHECKPOINT_POINTS, CHUNK_VALUES, MAX_AXIS, RANGE_TRAJECTORIES, MAX_CELLS):

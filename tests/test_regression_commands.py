@@ -233,12 +233,13 @@ def test_unreadable_in_five_formats(forked: Forked, folder: Path, name: str) -> 
 
 
 def test_usage_is_exit_2_and_a_line(forked: Forked, folder: Path) -> None:
+    wrong = "impact compare: Invalid value for '--tol': "
     for words, told in (
         (["--tol", "e_oot=1"], '--tol e_oot: no variable of a result; did you mean "e_out"?'),
-        (["--tol", "much"], "--tol much: wants VALUE or NAME=VALUE"), (["--tol", "-1"], "--tol -1.0: wants"),
-        (["--tol", "nan"], "--tol nan: wants a number"), (["--tol", "status=1"], "--tol status: has none"),
-        (["--tol", "1", "--tol", "2"], "--tol 2: the second one for all, wants one"),
-        (["--tol", "e_out=x"], "--tol e_out=x: wants"),
+        (["--tol", "much"], wrong + 'got "much", expected VALUE or NAME=VALUE, such as 1e-8, 5% or v1_post'),
+        (["--tol", "nan"], wrong + 'got "nan", expected'), (["--tol", "e_out=x"], wrong + 'got "e_out=x"'),
+        (["--tol", "-1"], "--tol -1.0: wants"), (["--tol", "status=1"], "--tol status: has none"),
+        (["--tol", "1", "--tol", "2"], wrong + "got all twice, expected each name once"),
     ):  # fmt: skip
         done = forked("compare", "different.h5", "base.h5", *words, cwd=folder)
         assert (done.returncode, done.stdout) == (2, "")
@@ -251,7 +252,8 @@ def test_usage_is_exit_2_and_a_line(forked: Forked, folder: Path) -> None:
 def test_tolerances_from_the_command_line(forked: Forked, folder: Path) -> None:
     for words, code in (
         (["--tol", "1.7e-7"], 0), (["--tol", "1.5e-7"], 1), (["--tol", "v1_post=1.7e-7"], 0),
-        (["--tol", "v2_post=1.7e-7"], 1), (["--tol", "1", "--tol", "v1_post=1.5e-7"], 1), (["--tol", "0"], 1),
+        (["--tol", "v2_post=1.7e-7"], 1), (["--tol", "1.7e-5%"], 0), (["--tol", "v1_post=1.5e-5%"], 1),
+        (["--tol", "1", "--tol", "v1_post=1.5e-7"], 1), (["--tol", "0"], 1),
     ):  # fmt: skip
         assert forked("compare", "different.h5", "base.h5", *words, cwd=folder).returncode == code, words
     assert forked("compare", "equal.h5", "base.h5", "--tol", "0", cwd=folder).returncode == 0
@@ -385,7 +387,7 @@ def test_a_picture_that_cannot_be_stored_is_refused_before_any_work(
     (tmp_path / "folder.png").mkdir()
     for picture, told in (
         ("new.png", "is what is read from"), ("base.svg", "is what is read from"), ("hard.png", "is what is read"),
-        ("x.jpg", "wants a name that ends in .png"), ("x", "wants a name that ends in .png"),
+        ("x.jpg", "expected a name that ends in .png"), ("x", "expected a name that ends in .png"),
         ("folder.png", "is not a regular file"), ("absent/x.png", "does not exist"),
     ):  # fmt: skip
         done = forked("compare", "new.png", "base.svg", "--plot", picture, cwd=tmp_path)

@@ -10,14 +10,14 @@ import pytest
 import xarray as xr
 
 import impact
-from impact.contact.collide import OUTPUTS
+from impact.config.load import parse_config
+from impact.contact.outputs import OUTPUTS
 from impact.contact.status import Status
 from impact.engine.execute import run, with_core
 from impact.engine.plan import Plan
 from impact.engine.trajectories import trajectory_maps, trajectory_ranges
 from impact.results.expand import Rows, TrajectoryTable, in_memory, lazy_dataset
 from impact.results.schema import SCHEMA, outline, stored
-from impact.sweeps.config import parse_config
 
 from .conftest import WIDE
 
@@ -65,9 +65,9 @@ def test_variables_stored_on_request_only() -> None:
 
 
 def test_variables_stored_on_request_are_in_the_json_schema_and_in_messages() -> None:
-    from impact.sweeps.config import json_schema
+    from impact.config.load import json_schema
 
-    known = json_schema()["$defs"]["output"]["properties"]["variables"]["items"]["enum"]  # type: ignore[index]
+    known = json_schema()["$defs"]["Output"]["properties"]["variables"]["items"]["enum"]  # type: ignore[index]
     assert ON_REQUEST.keys() <= set(known)
     with pytest.raises(impact.ImpactError, match='did you mean "separation_time"'):
         impact.sweep({"models": "hertz", "sweep": TABLE1, "output": {"variables": ["separation_tim"]}})
@@ -238,7 +238,7 @@ def test_the_fingerprint_is_over_what_takes_effect() -> None:
 
 
 def test_chunks_are_counted_by_the_variables_that_are_stored() -> None:
-    from impact.sweeps.config import read_config
+    from impact.config.load import read_config
 
     def read(*variables: str) -> None:
         sweep = {**TABLE1, "v1": {"linspace": [1.0, 2.0, 50_000]}}

@@ -1,6 +1,8 @@
 """The integrator has the order of its tableau, finds where lanes end, and computes a lane as if it were alone."""
 
+from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -9,30 +11,29 @@ from hypothesis import strategies as st
 
 from impact.contact import motion
 from impact.contact.models import find
-from impact.ode import tableau
-from impact.ode.problem import End, Outcome, Problem
-from impact.ode.rk45 import integrate
-from impact.ode.step import Space, attempt
+from impact.ode import events, maximum, rk45, tableau
+from impact.ode.problem import Problem, Solution, Termination
+from impact.ode.rk45 import Workspace, integrate, rk_step
 
 from .problems import OSCILLATOR, PROBLEMS, SPRINGS, TANH, Known
 
 RTOLS = 10.0 ** -np.arange(4, 13)
 
 
-def solve(known: Known, rtol: float, record: bool = False) -> Outcome:
+def solve(known: Known, rtol: float, record: bool = False) -> Solution:
     start = np.array(known.start).reshape(2, 1)
     return integrate(known.problem, start, (), rtol=rtol, max_steps=1000, record=record)
 
 
-def springs(rows: np.ndarray, max_steps: int = 1000) -> Outcome:
+def springs(rows: np.ndarray, max_steps: int = 1000) -> Solution:
     """Lanes of `SPRINGS` from (0, 1), one a row (k, c, q)."""
     columns = tuple(np.ascontiguousarray(np.array(rows, float).reshape(-1, 3).T))
     start = np.array([np.zeros(columns[0].size), np.ones(columns[0].size)])
     return integrate(SPRINGS, start, columns, rtol=1e-9, max_steps=max_steps)
 
 
-def bits(outcome: Outcome, place: int) -> bytes:
-    arrays = (outcome.state, outcome.maximum, outcome.steps, outcome.end)
+def bits(solution: Solution, place: int) -> bytes:
+    arrays = (solution.state, solution.maximum, solution.steps, solution.termination)
     return b"".join(array[..., place].tobytes() for array in arrays)
 
 
@@ -43,7 +44,7 @@ def fixed_step_error(known: Known, count: int, embedded: bool) -> float:
     y[:2, 0] = known.start
     k = rates(y[:2], ())
     for _ in range(count):
-        y, stages = attempt(known.problem, y, k, h, (), Space.of(h.size))
+        y, stages = rk_step(known.problem, y, k, h, (), Workspace.of(h.size))
         k = stages[-1]
         if embedded:
             y = y - h * sum(float(e) * stage[:4] for e, stage in zip(tableau.E, stages, strict=True))
@@ -69,12 +70,12 @@ def test_tighter_tolerance_lowers_the_error_in_proportion(known):
 
 @pytest.mark.parametrize("known", PROBLEMS, ids=str)
 def test_ends_with_its_quadratures_and_maximum_at_the_event(known):
-    outcome = solve(known, 1e-11)
-    assert outcome.end[0] == End.LANDED
-    assert outcome.state[:, 0] == pytest.approx(
+    solution = solve(known, 1e-11)
+    assert solution.termination[0] == Termination.EVENT_REACHED
+    assert solution.state[:, 0] == pytest.approx(
         [*known.exact(known.ends), known.ends, known.quadrature], rel=0, abs=1e-10
     )
-    assert outcome.maximum[0] == pytest.approx(known.highest, rel=1e-10)
+    assert solution.maximum[0] == pytest.approx(known.highest, rel=1e-10)
 
 
 @pytest.mark.parametrize("known", PROBLEMS, ids=str)
@@ -84,13 +85,13 @@ def test_event_is_met_to_rounding(known):
 
 @pytest.mark.parametrize("known", PROBLEMS, ids=str)
 def test_recorded_interpolant_matches_the_solution_between_steps(known):
-    outcome = solve(known, 1e-10, record=True)
-    assert len(outcome.recorded) == outcome.steps[0]
-    for step in outcome.recorded:
+    solution = solve(known, 1e-10, record=True)
+    assert len(solution.recorded) == solution.steps[0]
+    for step in solution.recorded:
         for part in (0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0):
             y0, y1, t, _ = step.at(step.end * part)[:, 0]
             assert (y0, y1) == pytest.approx(known.exact(t), rel=0, abs=1e-9)
-    assert step.at(step.end)[:, 0] == pytest.approx(outcome.state[:, 0], rel=0, abs=1e-12)
+    assert step.at(step.end)[:, 0] == pytest.approx(solution.state[:, 0], rel=0, abs=1e-12)
 
 
 @pytest.mark.parametrize("known", PROBLEMS, ids=str)
@@ -115,17 +116,17 @@ def test_lane_has_the_same_bits_alone_and_in_any_crowd(rows, seed):
 
 
 def test_lane_has_the_same_bits_among_lanes_that_end_much_later():
-    outcome = springs([(1.0, 0.1, 0.0), *[(1e-11, 0.0, -1e-3)] * 40])
-    assert outcome.steps[0] * 3 < outcome.steps[1]
-    assert bits(outcome, 0) == bits(springs([(1.0, 0.1, 0.0)]), 0)
+    solution = springs([(1.0, 0.1, 0.0), *[(1e-11, 0.0, -1e-3)] * 40])
+    assert solution.steps[0] * 3 < solution.steps[1]
+    assert bits(solution, 0) == bits(springs([(1.0, 0.1, 0.0)]), 0)
 
 
 FAILURES = {
-    "a rate is not a number": ((np.nan, 0.0, 0.0), End.NOT_FINITE),
-    "a rate is infinite": ((1.0, np.inf, 0.0), End.NOT_FINITE),
-    "it never ends": ((1.0, 1e6, 0.0), End.MAX_STEPS),
-    "it runs away": ((-1.0, 0.0, 0.0), End.LOST),
-    "it blows up": ((0.0, 0.0, 1.0), End.STEP_UNDERFLOW),
+    "a rate is not a number": ((np.nan, 0.0, 0.0), Termination.NOT_FINITE),
+    "a rate is infinite": ((1.0, np.inf, 0.0), Termination.NOT_FINITE),
+    "it never ends": ((1.0, 1e6, 0.0), Termination.MAX_STEPS),
+    "it runs away": ((-1.0, 0.0, 0.0), Termination.EVENT_UNREACHABLE),
+    "it blows up": ((0.0, 0.0, 1.0), Termination.STEP_UNDERFLOW),
 }
 
 
@@ -133,11 +134,11 @@ FAILURES = {
 def test_failure_is_told_and_leaves_the_other_lanes_alone(row, end):
     others = [(0.5 + 0.1 * place, 0.1, 0.0) for place in range(9)]
     whole, crowd = springs(others), springs([*others[:4], row, *others[4:]])
-    assert crowd.end[4] == end
+    assert crowd.termination[4] == end
     assert np.isnan(crowd.state[:, 4]).all()
     assert np.isnan(crowd.maximum[4])
     for place in range(9):
-        assert crowd.end[place + (place >= 4)] == End.LANDED
+        assert crowd.termination[place + (place >= 4)] == Termination.EVENT_REACHED
         assert bits(crowd, place + (place >= 4)) == bits(whole, place)
 
 
@@ -147,28 +148,123 @@ def test_rate_that_becomes_nan_on_the_way_is_not_finite(wall):
         return OSCILLATOR.problem.rates(y, columns) * np.where(y[0] > wall, np.nan, 1.0)
 
     other = OSCILLATOR.problem
-    problem = Problem(rates, other.event, other.lost, other.floor)
-    outcome = integrate(problem, np.array([[0.0], [1.0]]), (), rtol=1e-9, max_steps=1000)
-    assert outcome.end[0] == End.NOT_FINITE
+    problem = Problem(rates, other.event, other.unreachable, other.floor)
+    solution = integrate(problem, np.array([[0.0], [1.0]]), (), rtol=1e-9, max_steps=1000)
+    assert solution.termination[0] == Termination.NOT_FINITE
 
 
 def test_given_up_after_max_steps_attempts():
     # attempts are accepted steps and those tried again, so that the number of them that suffices is found
-    enough = next(count for count in range(1, 200) if springs([(1.0, 0.0, 0.0)], count).end[0] == End.LANDED)
+    enough = next(
+        count
+        for count in range(1, 200)
+        if springs([(1.0, 0.0, 0.0)], count).termination[0] == Termination.EVENT_REACHED
+    )
     reference = springs([(1.0, 0.0, 0.0)])
     assert enough >= reference.steps[0]
     assert bits(springs([(1.0, 0.0, 0.0)], enough), 0) == bits(reference, 0)
-    assert springs([(1.0, 0.0, 0.0)], enough - 1).end[0] == End.MAX_STEPS
+    assert springs([(1.0, 0.0, 0.0)], enough - 1).termination[0] == Termination.MAX_STEPS
 
 
 @pytest.mark.parametrize("rtol", [1e-7, 1e-8])
 def test_hardly_a_step_of_an_impact_is_tried_again(rtol):
-    law = motion.Law.of(find("hunt-crossley-1975"), 1.5, strong=False)
+    law = motion.MotionLaw.of(find("hunt-crossley-1975"), 1.5, strong=False)
     for chi in np.linspace(0.0, 2.0, 9):
         start = motion.start_of_approach(law, (), 1)
         into = partial(integrate, motion.approach(law), start, (np.array([chi]),), rtol=rtol)
-        assert into(max_steps=int(into(max_steps=1000).steps[0]) + 1).end[0] == End.LANDED
+        assert into(max_steps=int(into(max_steps=1000).steps[0]) + 1).termination[0] == Termination.EVENT_REACHED
 
 
 def test_no_lanes_give_no_outcome():
     assert springs(np.empty((0, 3))).state.shape == (4, 0)
+
+
+# ---- the formulas that the NumPy and the compiled back end share, by themselves
+
+
+@pytest.mark.parametrize("root", [-0.8, -0.2, -1e-4, 1e-4, 0.3, 0.6])
+def test_the_event_of_a_parabola_is_met_exactly(root):
+    # g = (root − t)(2 + t)/3 over a step of length 1 that ends at t = 0
+    def g(t):
+        return (root - t) * (2.0 + t) / 3.0, (root - 2.0 - 2.0 * t) / 3.0
+
+    offset, sure = events.event_offset(*map(np.asarray, (*g(0.0), *g(-1.0), 1.0)))
+    assert offset == pytest.approx(root, rel=1e-12)
+    assert sure
+
+
+def test_the_event_of_a_cubic_is_met_better_than_by_its_parabola():
+    # g = −t − t³/2 + c over a step of length 1 that ends at t = 0, with its roots to 17 digits
+    for c, root, rest in ((0.3, 0.28804985959466517, 1e-4), (0.1, 0.09950735335435984, 1e-7)):
+        g = (np.asarray(c), np.asarray(-1.0), np.asarray(c + 1.5), np.asarray(-2.5), np.asarray(1.0))
+        assert events.event_offset(*g)[0] == pytest.approx(root, abs=rest)
+
+
+def test_an_event_that_rises_is_nowhere_and_one_that_fades_away_is_not_sure():
+    with np.errstate(all="ignore"):
+        rising = events.event_offset(*map(np.asarray, (1.0, 0.5, 0.5, 0.5, 1.0)))
+        # exp(−t) has no zero
+        fading = events.event_offset(*map(np.asarray, (1.0, -1.0, np.e, -np.e, 1.0)))
+    assert rising[0] == np.inf
+    assert not fading[1]
+
+
+def test_a_step_is_shortened_to_an_event_that_is_sure_and_near_it_is_not():
+    h = 2.0
+    at_bound = events.NEAR_EVENT * h + events.EVENT_ATOL
+    offset = np.array([at_bound, np.nextafter(at_bound, 1.0), -at_bound, 5.0])
+    near, h_next = events.before_event(offset, np.array([True, True, False, True]), h, 3.0)
+    assert near.tolist() == [True, False, True, False]
+    assert h_next.tolist() == [offset[0], offset[1], 3.0, 3.0]
+
+
+def test_a_step_across_the_event_is_tried_again_up_to_it():
+    near, remaining = np.array([True, False, False, False]), np.zeros(4)
+    g, offset = np.array([-1.0, -1.0, -1.0, 1.0]), np.array([-1e-4, -0.5, -3.0, 0.5])
+    located, crossed, h_next = events.at_event(near, remaining, g, offset, 2.0, 7.0)
+    assert located.tolist() == [True, False, False, False]
+    assert crossed.tolist() == [False, True, True, False]
+    # by half where the event is not within the step
+    assert h_next.tolist() == [7.0, 1.5, 1.0, 7.0]
+
+
+def test_the_step_follows_the_error_within_bounds():
+    rtol = 1e-9
+    grow, stay, shrink = rk45.next_step(np.array([2.0, 2.0, 2.0]), rtol * np.array([1e-30, 1.0, 1e30]), rtol)
+    assert (grow, shrink) == (2.0 * rk45.MAX_FACTOR, 2.0 * rk45.MIN_FACTOR)
+    assert stay == 2.0 * rk45.SAFETY
+    errors = rtol * np.geomspace(1e-2, 1e2, 50)
+    exact = rk45.SAFETY * (rtol / errors) ** (rk45.GAIN / 256)
+    assert rk45.next_step(np.ones(50), errors, rtol) == pytest.approx(exact, rel=0.05)
+
+
+def test_the_norm_is_the_larger_error_and_keeps_what_is_not_a_number():
+    def norm(first, second):
+        y = np.array([0.5, -2.0, 1.0, -3.0])
+        return rk45.error_norm(*map(np.asarray, (first, second, *y)), (1e-200, 1e-200))
+
+    # relative to the larger of the values at both ends: 1 and 3
+    assert norm(-2.0, 3.0) == 2.0
+    assert norm(0.5, -6.0) == 2.0
+    assert np.isnan(norm(np.nan, 1.0))
+    assert np.isnan(norm(1.0, np.nan))
+
+
+def test_a_secant_leads_to_the_root_of_a_line_but_not_out_of_the_step():
+    left, right = np.zeros(3), np.ones(3)
+    slopes = np.array([1.0, 1.0, 3.0]), np.array([-1.0, -3.0, 1.0])
+    assert maximum.secant_update(left, slopes[0], right, slopes[1]).tolist() == [0.5, 0.25, 1.0]
+
+
+@pytest.mark.parametrize("known", PROBLEMS, ids=str)
+def test_every_recorded_step_begins_where_the_one_before_ended(known):
+    # at this tolerance each problem has a step across its event, which is tried again and not recorded
+    steps = solve(known, 1e-3, record=True).recorded
+    for before, step in pairwise(steps):
+        assert step.start == pytest.approx(before.at(1.0), abs=1e-14)
+
+
+def test_the_maximum_is_located_where_it_is_asked_for_only():
+    unwatched = replace(OSCILLATOR.problem, watch=False)
+    start = np.array(OSCILLATOR.start).reshape(2, 1)
+    assert integrate(unwatched, start, (), rtol=1e-9, max_steps=1000).maximum.tolist() == [-np.inf]

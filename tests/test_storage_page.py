@@ -15,16 +15,16 @@ import pytest
 
 import impact
 from impact.comparison.judge import MAX_POINTS as MAX_COMPARED
+from impact.config.grid import MAX_AXES, MAX_CHUNK_POINTS, MAX_CHUNKS, MAX_POINTS, MOST_POINTS
+from impact.config.quantities import MAX_AXIS
 from impact.engine.plan import MAX_FULL_POINTS
+from impact.plots.slices import MAX_DRAWN
 from impact.results.backend import SMALL_BYTES
 from impact.results.expand import MAX_STIFFNESS_VALUES
 from impact.results.factored import WITNESS_TOLERANCE, WITNESSES
 from impact.results.netcdf import MAX_LETTERS
 from impact.results.ranking import MAX_RANKED_POINTS
 from impact.results.slabs import MAX_SUMMARY_POINTS
-from impact.sweeps.grid import MAX_AXES, MAX_CHUNK_POINTS, MAX_CHUNKS, MAX_POINTS, MOST_POINTS
-from impact.sweeps.ranges import MAX_AXIS
-from impact.views.slices import MAX_DRAWN
 
 from .conftest import ROOT, Run
 

@@ -25,7 +25,7 @@ import xarray as xr
 
 import impact
 from impact.api import execute, prepare
-from impact.cli.progress import Pace
+from impact.cli.progress import line, new_bar, update
 from impact.engine.execute import context_of, run, work
 from impact.engine.executors import ALONE, Team, team_of
 from impact.engine.progress import Progress
@@ -91,7 +91,7 @@ def test_a_dry_run_tells_what_goes_over_the_wire_and_how_many_workers_are_of_use
     words = ("sweep", blocks, "--dry-run", "--set", "solver.collapse=false", "--set", 'solver.core="numpy"')
     told = cli(*words, cwd=blocks.parent).stdout.splitlines()[-1]
     found = json.loads(cli(*words, "--json", cwd=blocks.parent).stdout)
-    counts = r"(\d+:\d\d by \d+, )+\d+:\d\d by \d+ workers"
+    counts = r"(\d+:\d\d:\d\d by \d+, )+\d+:\d\d:\d\d by \d+ workers"
     wire = f"{found['wire']:,} bytes over the wire"
     assert re.fullmatch(f"on a cluster: {wire}; about {counts}; more are of no use", told), told
     plan = prepare(blocks, ["solver.collapse=false", 'solver.core="numpy"'])
@@ -180,16 +180,24 @@ def test_a_bar_on_a_terminal(blocks: Path) -> None:
     assert told.rstrip().endswith(b"limit)")
 
 
-def test_the_pace_of_what_was_resumed_is_that_of_this_run() -> None:
-    pace = Pace()
-    assert (
-        pace.told(Progress(8_000, 10_000, 0, 50_000, 0), 100.0)[2]
-        == "trajectories 8,000 of 10,000 for 50,000 points"
-    )
-    told = pace.told(Progress(9_000, 10_000, 0, 50_000, 2), 110.0)
-    assert told == (9_000, 10_000, "trajectories 9,000 of 10,000 for 50,000 points, 100/s, 0:10 left, 2 failed")
-    pace.told(Progress(10_000, 10_000, 0, 50_000, 2), 120.0)
-    assert pace.told(Progress(10_000, 10_000, 10_000, 50_000, 9), 121.0)[2] == "points 10,000 of 50,000, 9 failed"
+def test_the_rate_of_what_was_resumed_is_that_of_this_run_and_is_not_guessed() -> None:
+    now = 100.0
+    bar = new_bar(lambda: now)
+
+    def at(seconds: float, progress: Progress) -> str:
+        nonlocal now
+        now = seconds
+        return line(update(bar, progress), progress.of_points)
+
+    started = at(100.0, Progress(8_000, 10_000, 0, 50_000, 0))
+    assert started == "trajectories 8,000 of 10,000 for 50,000 points"
+    # what a tenth of a second says of the rest is worth nothing
+    early = at(100.1, Progress(8_001, 10_000, 0, 50_000, 0))
+    assert early == "trajectories 8,001 of 10,000 for 50,000 points"
+    later = at(110.0, Progress(9_000, 10_000, 0, 50_000, 2))
+    assert later == "trajectories 9,000 of 10,000 for 50,000 points, 100/s, 0:00:10 left, 2 failed"
+    at(120.0, Progress(10_000, 10_000, 0, 50_000, 2))
+    assert at(121.0, Progress(10_000, 10_000, 10_000, 50_000, 9)) == "points 10,000 of 50,000, 9 failed"
 
 
 # ---- what came out
@@ -316,7 +324,7 @@ ODD_BLOCKS = {
     "approach_work: got float32 of shape (301,)": _changed(approach_work=lambda values: values.astype(np.float32)),
     "steps: got list": _changed(steps=lambda values: values.tolist()),
     "status: got 77, expected one of": _changed(status=lambda values: np.full_like(values, 77)),
-    "got NoneType, expected Rebound": lambda done: None,
+    "got NoneType, expected CollisionResult": lambda done: None,
     "got list, expected a dict of errors": lambda done: (done[0], []),
 }
 
@@ -395,10 +403,10 @@ def test_what_half_the_digits_lose_is_no_difference_and_more_is(wide: xr.Dataset
 
 
 REFUSED = {
-    "dtype": ("float16", 'output.dtype: got "float16", wants one of float64, float32'),
-    "compression": ("zip", 'output.compression: got "zip", wants one of none, gzip'),
-    "chunks": (3, "output.chunks: got 3, wants a table of lengths by axis, such as { e = 50 }"),
-    "chunks.e": (0, "output.chunks.e: got 0, wants a whole number from 1 to 10,000,000"),
+    "dtype": ("float16", 'output.dtype: got "float16", expected one of float64, float32'),
+    "compression": ("zip", 'output.compression: got "zip", expected one of none, gzip'),
+    "chunks": (3, "output.chunks: got 3, expected a table of lengths by axis, such as { e = 50 }"),
+    "chunks.e": (0, "output.chunks.e: got 0, expected a whole number from 1 to 10,000,000"),
     "chunks.m2": (2, "output.chunks.m2: no axis of this sweep; known: e, m1"),
     "chunks.m1": (1, None),
 }
@@ -418,7 +426,7 @@ def test_how_it_cannot_be_stored(blocks: Path, key: str) -> None:
 
 
 def test_chunks_that_are_too_many_or_too_large(blocks: Path) -> None:
-    with pytest.raises(ConfigError, match=r"got 1,600,000 chunks of 2 points, wants at most 100,000 of"):
+    with pytest.raises(ConfigError, match=r"got 1,600,000 chunks of 2 points, expected at most 100,000 of"):
         prepare(blocks, ["output.chunks.e=1"])
     with pytest.raises(ConfigError, match=r"got 80 chunks of 10,000,000 points"):
         prepare(blocks, ["output.chunks.m1=1", "sweep.e.linspace=[0,1,10000000]"])

@@ -6,8 +6,8 @@ from math import prod
 
 import pytest
 
-from impact.ode.step import ERROR
-from impact.ode.step import STAGES as STAGES_NESTED
+from impact.ode.rk45 import ERROR
+from impact.ode.rk45 import STAGES as STAGES_NESTED
 from impact.ode.tableau import DENSE_WEIGHTS, A, B, C, E, P
 
 STAGES = range(7)

@@ -7,12 +7,26 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from .api import bless, compare, extend, load, models, plot, recommend, report, rerun, run, save, sweep
+    from .api import (
+        bless,
+        compare,
+        extend,
+        load,
+        materials,
+        models,
+        plot,
+        recommend,
+        report,
+        rerun,
+        run,
+        save,
+        sweep,
+    )
     from .comparison.verdict import Verdict
     from .contact.evidence import Evidence
     from .contact.model import ForceModel, Parameter
     from .contact.models.hysteresis import hysteresis
-    from .contact.power import power
+    from .contact.powers import power
     from .errors import ImpactError
 
 __all__ = [
@@ -26,6 +40,7 @@ __all__ = [
     "extend",
     "hysteresis",
     "load",
+    "materials",
     "models",
     "plot",
     "power",

@@ -13,6 +13,9 @@ from .comparison.bless import bless as bless
 from .comparison.compare import compare as compare
 from .comparison.tolerances import Tolerances
 from .comparison.verdict import Verdict as Verdict
+from .config.grid import MAX_POINTS
+from .config.library import records
+from .config.load import read_config
 
 # a name imported "as itself" is public: `impact.__all__` hands it on
 from .contact.evidence import Evidence as Evidence
@@ -20,7 +23,7 @@ from .contact.model import ForceModel as ForceModel
 from .contact.model import Parameter as Parameter
 from .contact.models import catalogue
 from .contact.models.hysteresis import hysteresis as hysteresis
-from .contact.power import power as power
+from .contact.powers import power as power
 from .engine.execute import never
 from .engine.executors import ALONE, Team, team_of
 from .engine.plan import Plan
@@ -29,25 +32,23 @@ from .engine.progress import Tell
 from .engine.trajectories import check_count
 from .errors import ImpactError as ImpactError
 from .errors import UsageError
-from .results.again import histories
 from .results.backend import load as load
 from .results.backend import save as save
 from .results.extend import extend as extend_result
 from .results.impact import Impact as Impact
 from .results.impact import impact_of
-from .results.provenance import config_of, part_of, picked_out, stored_config
+from .results.provenance import histories, part_of, single_point, stored_config
 from .results.ranking import Ranking, ranking
 from .results.replay import repeats
 from .results.sweep import sweep_in_memory
-from .sweeps.config import read_config
-from .sweeps.grid import MAX_POINTS
-from .sweeps.point import one_point
 
 if TYPE_CHECKING:
+    import pandas as pd
     import xarray as xr
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from .views.kinds import Choice, Numbers
+    from .plots.kinds import Choice, Numbers
 
 
 def prepare(
@@ -161,9 +162,7 @@ def run(
     if times is not None and times < 2:
         raise UsageError(f"times: got {times}, expected a whole number >= 2")
     own = read_plugins(plugins)
-    config, first = one_point(
-        lambda more: config_of(source, [*overrides, *more], own), model, at, picked_out(source)
-    )
+    config, first = single_point(source, overrides, own, model, at)
     return impact_of(Plan(config, own.of(config.models)), first, times)
 
 
@@ -282,7 +281,14 @@ def plot(
     sel: Mapping[str, float | str] | None = None,
     models: Sequence[str] | None = None,
     log: str = "",
-    width: float = 7.1,
+    points: str | Path | pd.DataFrame | xr.Dataset | None = None,
+    width: float | str | None = None,
+    height: float | str | None = None,
+    style: str | Path | None = None,
+    title: bool = True,
+    labels: Mapping[str, str] | None = None,
+    equations: bool = False,
+    ax: Axes | Sequence[Axes] | None = None,
     plugins: Sequence[ForceModel | str | Path] = (),
 ) -> Figure:
     """Draw a result; by default the final-velocity comparison, Figure 6 of the paper.
@@ -290,7 +296,7 @@ def plot(
     Parameters
     ----------
     dataset : a result, or a time history
-    kind : one of `impact.views.kinds.KINDS`
+    kind : one of `impact.plots.kinds.KINDS`
     x : what to draw over; by default e, else the first numeric axis
     y : second axis of a map, or of the kind validity; by default the next one
     variable : that a map shows
@@ -298,12 +304,21 @@ def plot(
         a history or an impulse may be at a point that is not on the grid
     models : keys of the models to show; by default all
     log : which axes are logarithmic, such as "x" or "xy"; axes that are spaced so are in any case
-    width : of the figure [in]
-    plugins : models of one's own, which the kinds that follow a motion want again
+    points : measured points over the curves: a CSV file, or a table of pandas or xarray, whose columns have names
+        such as "v1 [m/s]", "e_out" and "sigma"
+    width : of the figure [in], or a length such as "84mm", "single" or "double"; by default that of rcParams where
+        it was changed, else "double"
+    height : of the figure [in], or a length; by default what suits the kind
+    style : a style sheet of matplotlib, or the name of one; the user's own rcParams are respected in any case
+    title : write the title and the conditions
+    labels : texts by the name of an axis, the key of a law, "reference" or "title"
+    equations : name the laws with the numbers of their equations in the paper
+    ax : draw into these axes of a figure of one's own, one for each panel, in that figure's style
+    plugins : models of one's own, which the kinds that follow a motion need again
 
     Returns
     -------
-    matplotlib.figure.Figure : `figure.savefig("results.png")` writes it
+    matplotlib.figure.Figure : `figure.savefig("results.png")` writes it; a notebook shows it
 
     Raises
     ------
@@ -312,21 +327,36 @@ def plot(
     >>> import impact
     >>> figure = impact.plot(impact.sweep("configs/figure6.toml"))
     >>> figure.axes[0].get_xlabel()
-    'coefficient of restitution, e'
+    'Coefficient of restitution $e$'
     """
-    from .views.kinds import Choice, draw
+    from .plots.kinds import Choice, draw
 
-    return draw(pictured(dataset, kind, Choice(x, y, variable, sel, models, log), plugins), width)
+    choice = Choice(x, y, variable, sel, models, log, equations)
+    numbers = pictured(dataset, kind, choice, plugins)
+    return draw(numbers, width, height, style=style, title=title, labels=labels, points=points, ax=ax)
 
 
 def pictured(
     dataset: xr.Dataset, kind: str, choice: Choice, plugins: Sequence[ForceModel | str | Path] = ()
 ) -> Numbers:
     """The numbers of a picture; see `plot`."""
-    from .views.kinds import numbers_of
+    from .plots.kinds import numbers_of
 
     own = read_plugins(plugins)
     return numbers_of(kind, dataset, choice, lambda: histories(dataset, choice.models, choice.sel or {}, own))
+
+
+def materials() -> dict[str, dict[str, float | str]]:
+    """Common materials in SI units, which a config may name without a table [materials.NAME].
+
+    Returns
+    -------
+    By name: E [Pa], nu, rho [kg/m3], yield_strength [Pa] where it is known, about, source
+
+    >>> materials()["glass"]["E"]
+    72000000000.0
+    """
+    return {name: dict(record) for name, record in records().items()}
 
 
 def recommend(
@@ -377,6 +407,6 @@ def report(dataset: xr.Dataset, *, plugins: Sequence[ForceModel | str | Path] = 
     >>> "<h1>Final velocities comparison</h1>" in impact.report(impact.sweep("configs/figure6.toml"))
     True
     """
-    from .views.page import page
+    from .reporting.page import page
 
     return page(dataset, lambda kind, choice: pictured(dataset, kind, choice, plugins))

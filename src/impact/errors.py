@@ -10,7 +10,7 @@
     └── UnfinishedError  a signal ended a sweep; what was finished is kept
 
 They say what is wrong, where, what was got and what is wanted. They become exit codes in one place,
-`impact.cli.door`.
+`impact.cli.exits`.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class ImpactError(Exception):
     ...     impact.run(at={"e": 1.4})
     ... except impact.ImpactError as error:
     ...     print(error)
-    --at e=1.4: sweep.e: got 1.4, wants a number from 0 to 1
+    --at e=1.4: sweep.e: got 1.4, expected a number from 0 to 1
     """
 
 

@@ -1,4 +1,4 @@
-"""Options that several commands have, each with its one help text."""
+"""Options and arguments that several commands have, each declared once."""
 
 from __future__ import annotations
 
@@ -7,10 +7,15 @@ from typing import Annotated
 
 import typer
 
-from .words import whole_number
+from .params import Setting, Tolerance, complete_model, once, setting, tolerance, whole_number
 
-Json = Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")]
+Result = Annotated[Path, typer.Argument(help="A result of `impact sweep`.")]
+Output = Annotated[Path, typer.Option("-o", "--output", help="The result file.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace the output if it exists.")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
+AllowFailed = Annotated[bool, typer.Option("--allow-failed", help="Exit 0 even if points failed.")]
+Resume = Annotated[bool, typer.Option("--resume", help="Resume work that was interrupted.")]
 Sets = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="PATH=VALUE", help="Change the config, such as sweep.m2=2.0; may be repeated."),
@@ -18,6 +23,19 @@ Sets = Annotated[
 Plugins = Annotated[
     list[Path] | None,
     typer.Option("--plugin", metavar="FILE", help="Python file with models of your own; may be repeated."),
+]
+Sel = Annotated[
+    list[Setting] | None,
+    typer.Option(
+        "--sel", metavar="NAME=VALUE", parser=setting, callback=once,
+        help="Value of an axis, such as m2=1.0; may be repeated.",
+    ),
+]  # fmt: skip
+Models = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--model", metavar="KEY", autocompletion=complete_model, help="Only this model; may be repeated."
+    ),
 ]
 Jobs = Annotated[
     int, typer.Option("--jobs", "-j", metavar="N", parser=whole_number, help="Processes that integrate.")
@@ -31,12 +49,15 @@ Threads = Annotated[
 MaxPoints = Annotated[
     int,
     typer.Option(
-        "--max-points",
-        metavar="N",
-        parser=whole_number,
+        "--max-points", metavar="N", parser=whole_number,
         help="Refuse more: points in layout full, else trajectories.",
     ),
-]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
-Output = Annotated[Path, typer.Option("-o", "--output", help="The result file.")]
-AllowFailed = Annotated[bool, typer.Option("--allow-failed", help="Exit 0 even if points failed.")]
+]  # fmt: skip
+Tolerances = Annotated[
+    list[Tolerance] | None,
+    typer.Option(
+        "--tol", metavar="[NAME=]VALUE", parser=tolerance, callback=once,
+        help="Tolerance relative to the scale of a point, such as 1e-8 or 5%, for all variables or for one; may "
+        "be repeated. \\[default: the baseline's, else 10 times its solver's rtol]",
+    ),
+]  # fmt: skip

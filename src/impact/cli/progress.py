@@ -1,92 +1,106 @@
-"""What a sweep tells on stderr while it runs: a bar on a terminal, else a line now and then."""
+"""The progress of a sweep on stderr: a bar on a terminal, else a line now and then."""
 
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from datetime import timedelta
 from typing import TYPE_CHECKING
 
-from rich.progress import BarColumn, TextColumn
+from rich.progress import BarColumn, Task, TextColumn, TimeRemainingColumn
 from rich.progress import Progress as Bar
+from rich.text import Text
 
 from .console import console
-from .door import say
+from .exits import say
 
 if TYPE_CHECKING:
     from ..engine.progress import Progress
 
-# seconds after which something is told, and between two lines where there is no terminal
-PATIENCE, PAUSE = 1.0, 10.0
+# seconds after which something is printed, between two lines where there is no terminal, and from the beginning of
+# a phase until a rate says how long the rest takes
+FIRST_S, INTERVAL_S, SETTLING_S = 1.0, 10.0, 5.0
+# seconds over which the rate is taken: a block may take minutes
+RATE_PERIOD_S = 3600.0
 
 
-@dataclass
-class Pace:
-    """How fast a phase goes; a phase that is resumed has done some of its work before."""
+class RemainingColumn(TimeRemainingColumn):
+    """The time left, once it is known."""
 
-    phase: str = ""
-    begun: float = 0.0
-    before: int = 0
-
-    def told(self, at: Progress, now: float) -> tuple[int, int, str]:
-        """Done, of all, and a line that says so with the rate, the time left and what failed."""
-        integrating = at.trajectories < at.of_trajectories or not at.points
-        phase = "trajectories" if integrating else "points"
-        done, total = (at.trajectories, at.of_trajectories) if integrating else (at.points, at.of_points)
-        if phase != self.phase:
-            self.phase, self.begun, self.before = phase, now, done if integrating else 0
-        line = f"{phase} {done:,} of {total:,}" + (f" for {at.of_points:,} points" if integrating else "")
-        passed = now - self.begun
-        if passed > 0.0 and done > self.before:
-            rate = (done - self.before) / passed
-            line += f", {rate:,.0f}/s, {clock((total - done) / rate)} left"
-        return done, total, line + (f", {at.failed:,} failed" if at.failed else "")
+    def render(self, task: Task) -> Text:
+        return super().render(task) if remaining(task) is not None else Text()
 
 
-def clock(seconds: float) -> str:
-    """A time as one reads it.
+def remaining(task: Task) -> float | None:
+    """Seconds that the rest of a phase takes; None as long as its rate is not known well enough."""
+    settled = task.elapsed is not None and task.elapsed >= SETTLING_S
+    return task.time_remaining if settled else None
 
-    >>> clock(7), clock(754), clock(7500)
-    ('0:07', '12:34', '2:05:00')
+
+def update(bar: Bar, at: Progress) -> Task:
+    """Bring a bar to where a sweep is; its task is one for the trajectories, then another for the points."""
+    integrating = at.trajectories < at.of_trajectories or not at.points
+    phase = "trajectories" if integrating else "points"
+    done, total = (at.trajectories, at.of_trajectories) if integrating else (at.points, at.of_points)
+    if not bar.tasks or bar.tasks[-1].description != phase:
+        for task in bar.tasks:
+            bar.update(task.id, visible=False)
+        bar.add_task(phase, total=total, failed="")
+    task = bar.tasks[-1]
+    bar.update(task.id, completed=done, failed=f"{at.failed:,} failed" if at.failed else "")
+    return task
+
+
+def line(task: Task, points: int) -> str:
+    """A phase in words: how much is done, the rate, the time left, and what failed.
+
+    Parameters
+    ----------
+    task : of a bar, see `update`
+    points : of the whole sweep
     """
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
+    words = f"{task.description} {task.completed:,.0f} of {task.total:,.0f}"
+    if task.description == "trajectories":
+        words += f" for {points:,} points"
+    seconds = remaining(task)
+    if seconds is not None:
+        words += f", {task.speed:,.0f}/s, {timedelta(seconds=round(seconds))} left"
+    return words + (f", {task.fields['failed']}" if task.fields["failed"] else "")
+
+
+def new_bar(get_time: Callable[[], float] | None = None) -> Bar:
+    """A bar on stderr, not yet shown; `get_time` is the clock, in seconds."""
+    return Bar(
+        TextColumn("{task.description} {task.completed:,.0f} of {task.total:,.0f}"), BarColumn(),
+        RemainingColumn(), TextColumn("{task.fields[failed]}"), console=console(sys.stderr), transient=True,
+        get_time=get_time,
+        speed_estimate_period=RATE_PERIOD_S, disable=not sys.stderr.isatty(),
+    )  # fmt: skip
 
 
 @contextmanager
 def progress(*, quiet: bool) -> Iterator[Callable[[Progress], None]]:
-    """A function to tell how far a sweep is."""
+    """A function to report how far a sweep is."""
     if quiet:
         yield lambda at: None
         return
-    pace, begun = Pace(), time.monotonic()
-    last = begun + PATIENCE - PAUSE
+    bar = new_bar()
+    begun = bar.get_time()
+    last = begun + FIRST_S - INTERVAL_S
 
-    def line(at: Progress) -> None:
+    def report(at: Progress) -> None:
         nonlocal last
-        now = time.monotonic()
-        _, _, text = pace.told(at, now)
-        if now - last >= PAUSE:
+        now = bar.get_time()
+        task = update(bar, at)
+        if not bar.disable:
+            if not bar.live.is_started and now - begun > FIRST_S:
+                bar.start()
+        elif now - last >= INTERVAL_S and not task.finished:
             last = now
-            say(text)
-
-    if not sys.stderr.isatty():
-        yield line
-        return
-    bar = Bar(BarColumn(), TextColumn("{task.description}"), console=console(sys.stderr), transient=True)
-    task = bar.add_task("", total=None)
-
-    def draw(at: Progress) -> None:
-        now = time.monotonic()
-        done, total, text = pace.told(at, now)
-        if not bar.live.is_started and now - begun > PATIENCE:
-            bar.start()
-        bar.update(task, completed=done, total=total, description=text)
+            say(line(task, at.of_points))
 
     try:
-        yield draw
+        yield report
     finally:
         bar.stop()

@@ -1,4 +1,4 @@
-"""What a sweep tells on stderr when it is done: what came out, what failed, and how to see that again."""
+"""What a sweep prints on stderr when it is done: what came out, what failed, and what repeats it."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import typer
 from rich.table import Table
 
 from ..contact.status import FIRST_FAILURE, Status
+from ..formatting import label, number
 from ..text import safe_text
-from . import door
-from .console import cell, console, shown, table
+from . import exits
+from .console import cell, console, dump, table
 from .progress import progress
-from .words import dump
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,17 +24,17 @@ if TYPE_CHECKING:
     from ..results.summary import Survey, Tally
 
 
-def execute(plan: Plan, stopping: Callable[[], bool], *, quiet: bool) -> xr.Dataset:
+def execute(plan: Plan, should_stop: Callable[[], bool], *, quiet: bool) -> xr.Dataset:
     """The result of a plan in memory, with progress; a signal ends it."""
     from .. import api
 
-    with progress(quiet=quiet) as tell:
-        return api.execute(plan, tell=tell, should_stop=stopping)
+    with progress(quiet=quiet) as report:
+        return api.execute(plan, tell=report, should_stop=should_stop)
 
 
 def summary(survey: Survey, output: Path) -> dict[str, Any]:
     """Points, counts per status, and the first failed points with their coordinates and the command for each."""
-    from ..results.replay import own, repeats, replay
+    from ..results.replay import inputs_of_model, repeats, replay
     from ..results.summary import counted
 
     outline, tally = survey.outline, survey.tally
@@ -42,7 +42,7 @@ def summary(survey: Survey, output: Path) -> dict[str, Any]:
     failures = []
     for status, model, places in tally.failed_at:
         point = outline["status"].isel(dict(zip(outline["status"].dims, (model, *places), strict=True)))
-        at = own({str(dim): point[dim].values.item() for dim in outline["status"].dims})
+        at = inputs_of_model({str(dim): point[dim].values.item() for dim in outline["status"].dims})
         again = replay(begin, at) if begin else None
         failures.append({"status": status.name.lower(), "at": at, "replay": again})
     return {
@@ -53,7 +53,7 @@ def summary(survey: Survey, output: Path) -> dict[str, Any]:
 
 
 def conclude(survey: Survey, output: Path, *, fresh: bool, quiet: bool, as_json: bool, allow_failed: bool) -> None:
-    """Tell what came out of a sweep, and end with the exit code that it has.
+    """Print what came out of a sweep, and end with the exit code that it has.
 
     Parameters
     ----------
@@ -64,21 +64,21 @@ def conclude(survey: Survey, output: Path, *, fresh: bool, quiet: bool, as_json:
     """
     from ..results.plausibility import result_notes
 
-    told = summary(survey, output)
+    outcome = summary(survey, output)
     if not quiet:
         if fresh:
-            with door.readers_may_leave(sys.stderr):
-                print_summary(survey, told)
+            with exits.readers_may_leave(sys.stderr):
+                print_summary(survey, outcome)
             for note in result_notes(survey.tally):
-                door.say(f"note: {note}")
+                exits.say(f"note: {note}")
         else:
-            door.say(f"{safe_text(str(output))}: already holds this sweep; nothing to do")
+            exits.say(f"{safe_text(str(output))}: already holds this sweep; nothing to do")
     if as_json:
-        print(dump(told))
-    if told["failed"] and not allow_failed:
+        print(dump(outcome))
+    if outcome["failed"] and not allow_failed:
         if quiet or not fresh:
-            door.say(failed_line(told), error=True)
-        raise typer.Exit(door.LANES_FAILED)
+            exits.say(failed_line(outcome), error=True)
+        raise typer.Exit(exits.LANES_FAILED)
 
 
 def failed_line(found: Mapping[str, Any]) -> str:
@@ -97,7 +97,7 @@ def print_summary(survey: Survey, found: Mapping[str, Any]) -> None:
     distinct = f" from {found['trajectories']:,} trajectories" if found["trajectories"] is not None else ""
     out.print(cell(f"{found['output']}: {found['points']:,} points{distinct} ({counts})"))
     for one in found["first_failed"]:
-        where = ", ".join(f"{name}={shown(value)}" for name, value in one["at"].items())
+        where = ", ".join(f"{name}={label(value)}" for name, value in one["at"].items())
         out.print(cell(f"failed: {where}: {Status[one['status'].upper()].meaning}"))
         if one["replay"]:
             # as one line, however long: a command is to be copied
@@ -117,5 +117,5 @@ def worst_errors(outline: xr.Dataset, tally: Tally) -> Table:
     rows = table("model", *(columns[name] for name in held))
     for place, key in enumerate(outline["model"].values):
         largest = (tally.worst[name].get(place, float("nan")) for name in held)
-        rows.add_row(cell(key), *(f"{value:.3g}" if value == value else "–" for value in largest))
+        rows.add_row(cell(key), *(number(value, 3) for value in largest))
     return rows

@@ -9,7 +9,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..results.schema import ABOUT_A_MODEL, SCHEMA, Variable, is_input
+from ..engine.plan import material_property, owner_of
+from ..formatting import number
+from ..results.attributes import read_attribute
+from ..results.schema import ABOUT_A_MODEL, SCHEMA, Variable, columns_along, is_case, is_input
 from ..results.select import NUMBERS, ROUNDING, Places, Values, matched
 from ..text import safe_text
 from .verdict import Fault, Kind
@@ -131,13 +134,14 @@ def align(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Aligned:
 def _without_foreign_axes(result: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
     """A result without the parameters of models that the other has not got; the others do not vary with them."""
     models = {str(key) for key in np.ravel(other["model"].values)}
-    foreign = [str(n) for n in result.coords if "." in str(n) and str(n).rpartition(".")[0] not in models]
+    foreign = [str(name) for name in result.coords if owner_of(str(name)) not in models | {""}]
     return result.isel({name: 0 for name in foreign if name in result.dims}).drop_vars(foreign)
 
 
 def _coordinates(result: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
     """The coordinates of a result, in memory; a single value that the other varies is an axis of length one."""
-    coords = result.coords.to_dataset().compute()
+    materials = read_attribute(result.attrs, "materials")
+    coords = _with_materials(result.coords.to_dataset().compute(), materials, other)
     if "model" not in result.dims:
         # one model was picked out; it is still a label
         coords = _with_axis(coords, "model", OF_A_MODEL)
@@ -155,6 +159,17 @@ def _coordinates(result: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
         if coords[name].ndim == 0 and other[name].ndim == 1 and other[name].dims[0] in coords.dims
     }
     return coords.assign_coords(repeated)
+
+
+def _with_materials(coords: xr.Dataset, materials: Mapping[str, Any], other: xr.Dataset) -> xr.Dataset:
+    """Coordinates with the properties of materials that are axes, or a value of one, in the other result only."""
+    for name in map(str, other.coords):
+        material, key = material_property(name) or ("", "")
+        properties = materials.get(material)
+        value = properties.get(key) if isinstance(properties, dict) and name not in coords else None
+        if isinstance(value, float):
+            coords = coords.assign_coords({name: xr.Variable((), value, other.variables[name].attrs)})
+    return coords
 
 
 def _with_axis(coords: xr.Dataset, axis: str, names: Iterable[Hashable]) -> xr.Dataset:
@@ -182,12 +197,10 @@ def _inputs_of_one_side(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
 
 
 def _columns(dataset: xr.Dataset, axis: str) -> list[str]:
-    """The coordinates that tell the places on an axis: its own, and the others of its zip group."""
-    if axis == "model":
-        return ["model"]
-    derived = {"e"} if "alpha" in dataset.coords else set()
-    along = [str(name) for name in dataset.coords if dataset.variables[name].dims == (axis,)]
-    return sorted(name for name in along if is_input(name) and name not in derived)
+    """The coordinates that tell the places on an axis: its numbers, or its own and the others of its zip group."""
+    if axis == "model" or (is_case(axis) and axis in dataset.coords):
+        return [axis]
+    return sorted(columns_along(dataset, axis))
 
 
 def _labels(
@@ -222,8 +235,24 @@ def _derived(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
             # e = 1 - alpha v0 is rounded as 1 is
             rounding = ROUNDING if name == "e" else 0.0
             if set(a.dims) != set(b.dims) or not _same(a.transpose(*b.dims).values, b.values, rounding):
-                faults.append(Fault("labels", name, f"the coordinate {safe_text(name)} has other values"))
+                faults.append(_fault_of_values(name, a, b))
     return faults
+
+
+def _fault_of_values(name: str, new: xr.DataArray, baseline: xr.DataArray) -> Fault:
+    """That a coordinate has other values; of an input of numbered points, which they are."""
+    axis = str(baseline.dims[0])
+    if not is_case(axis) or new.dims != (axis,) or baseline.dims != (axis,):
+        return Fault("labels", name, f"the coordinate {safe_text(name)} has other values")
+    differ = [n for n in range(baseline.size) if not _same(new.values[n : n + 1], baseline.values[n : n + 1])]
+    numbers, a, b = (
+        [_shown(array.values[n]) for n in differ[:NAMED]] for array in (baseline[axis], new, baseline)
+    )
+    shown = "; ".join(
+        f"{x} at {axis} {number}, in BASELINE {y}" for number, x, y in zip(numbers, a, b, strict=True)
+    )
+    more = f"; and {len(differ) - NAMED} more" if len(differ) > NAMED else ""
+    return Fault("physics config", name, f"{safe_text(name)} is {shown}{more}")
 
 
 def _same(a: Values, b: Values, rounding: float = 0.0) -> bool:
@@ -243,8 +272,7 @@ def _some(columns: Sequence[Values], names: Sequence[str]) -> str:
 
 
 def _shown(value: Any) -> str:
-    plain = np.asarray(value).item()
-    return f"{plain:.12g}" if isinstance(plain, float) else safe_text(str(plain), 60)
+    return safe_text(number(np.asarray(value).item(), 12), 60)
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -12,7 +12,7 @@ import xarray as xr
 
 from ..errors import ResultError, UsageError
 from ..results.backend import check_output, load, save_with
-from ..results.replay import described, own, repeats
+from ..results.replay import described, inputs_of_model, repeats
 from ..results.summary import tally_of
 from ..text import safe_text
 from .compare import check_result, compare
@@ -86,7 +86,7 @@ def _check_failed(result: xr.Dataset, path: Path) -> None:
     if tally.failed:
         status, model, places = tally.failed_at[0]
         point = result["status"].isel(dict(zip(result["status"].dims, (model, *places), strict=True)))
-        at = described(own({str(dim): point[dim].item() for dim in result["status"].dims}))
+        at = described(inputs_of_model({str(dim): point[dim].item() for dim in result["status"].dims}))
         count = f"{tally.failed:,} of {tally.points:,} points failed, the first at {at} ({status.name.lower()})"
         raise UsageError(f"{safe_text(str(path))}: {count}; expected none, or --allow-failed")
 

@@ -10,10 +10,10 @@ import numpy as np
 import xarray as xr
 
 from ..errors import UsageError
-from ..results.attributes import json_object, json_table
+from ..results.attributes import read_attribute
 from ..results.backend import load
 from ..results.replay import repeats
-from ..results.schema import ABOUT_A_MODEL, SCHEMA, SCHEMA_VERSION, is_input
+from ..results.schema import ABOUT_A_MODEL, SCHEMA, SCHEMA_VERSION, is_case, is_input
 from ..text import safe_text
 from .align import OF_A_MODEL, align
 from .judge import boxes_of, group_size, judge
@@ -140,18 +140,20 @@ def check_result(dataset: xr.Dataset, name: str) -> None:
 def _strange(dataset: xr.Dataset) -> list[str]:
     """The variables that no result has."""
     known = {*OF_A_MODEL, *(variable.name for variable in SCHEMA)}
-    return [str(name) for name in dataset.variables if name not in known and not is_input(str(name))]
+    names = [str(name) for name in dataset.variables if name not in known]
+    return [name for name in names if not (is_input(name) or is_case(name))]
 
 
 def _materials(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
     """Properties that differ between materials of the same name."""
-    materials = [json_table(dataset, "materials") for dataset in (new, baseline)]
+    materials = [read_attribute(dataset.attrs, "materials") for dataset in (new, baseline)]
     faults = []
     for name in materials[0].keys() & materials[1].keys():
         a, b = (table[name] for table in materials)
         for field in a.keys() | b.keys():
-            if a.get(field) != b.get(field):
-                path = f"materials.{name}.{field}"
+            path = f"materials.{name}.{field}"
+            # what one of them varies is a coordinate
+            if a.get(field) != b.get(field) and not (path in new.coords or path in baseline.coords):
                 shown = [f"{v:.12g}" if isinstance(v, float) else v for v in (a.get(field), b.get(field))]
                 text = f"{path} is {shown[0]}, in BASELINE {shown[1]}"
                 faults.append(Fault("physics config", path, safe_text(text)))
@@ -176,7 +178,7 @@ def _notes(new: xr.Dataset, baseline: xr.Dataset) -> list[str]:
         if not _alike(a, b):
             notes.append(safe_text(f"{name} is {a}, in BASELINE {b}", 400))
     for name in ("packages", "plugins"):
-        a, b = (json_object(dataset, name) for dataset in (new, baseline))
+        a, b = (read_attribute(dataset.attrs, name) for dataset in (new, baseline))
         notes += [
             safe_text(f"{key} is {a.get(key)}, in BASELINE {b.get(key)}", 400)
             for key in sorted(a.keys() | b.keys())

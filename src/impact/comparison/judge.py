@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from ..contact.status import Status
 from ..errors import UsageError
-from ..results.replay import own
+from ..results.replay import inputs_of_model
 from ..results.scales import scale_of
-from ..results.schema import Variable, is_input
+from ..results.schema import Variable, columns_along, is_case
 from ..results.slabs import (
     MAX_SUMMARY_POINTS,
     SLAB_POINTS,
@@ -280,9 +280,9 @@ def _labels(coords: xr.Dataset, index: Mapping[str, int]) -> dict[str, float | s
     at = {
         name: coords.variables[name].values[place].item()
         for dim, place in index.items()
-        for name in [dim, *(str(n) for n in coords.coords if n != dim and is_input(str(n)))]
-        if coords.variables[name].dims == (dim,) and not (name == "e" and "alpha" in coords)
+        for name in dict.fromkeys([dim, *columns_along(coords, dim)])
     }
     return {
-        name: float(value) if isinstance(value, int | float) else str(value) for name, value in own(at).items()
+        name: value if is_case(name) else float(value) if isinstance(value, int | float) else str(value)
+        for name, value in inputs_of_model(at).items()
     }

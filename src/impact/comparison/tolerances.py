@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Mapping
 from typing import Any, TypeGuard
@@ -10,6 +9,7 @@ from typing import Any, TypeGuard
 import numpy as np
 
 from ..errors import ResultError, UsageError, did_you_mean
+from ..results.attributes import read_attribute
 from ..results.schema import SCHEMA
 from ..text import safe_text
 
@@ -51,9 +51,9 @@ def in_effect(tol: float | Tolerances | None, attributes: Mapping[str, Any]) -> 
     if not _is_number(rtol) or not 0.0 < rtol <= 1.0:
         raise ResultError("the attribute rtol of the baseline is not that of a result")
     try:
-        kept = dict(json.loads(str(attributes.get("tolerances", "{}"))))
+        kept = read_attribute(attributes, "tolerances")
         _check(kept)
-    except (ValueError, TypeError, RecursionError, UsageError):
+    except (ResultError, UsageError):
         raise ResultError("the attribute tolerances of the baseline is not that of a result") from None
     return {ALL: SOLVER_TOLERANCES * float(rtol), **kept, **asked}
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import NOT_OF_A_PLUGIN, ModelError
 from ..text import safe_text
-from .power import Array
+from .powers import Array
 
 # whose own lines say nothing about where a formula is wrong
 LIBRARIES = (Path(__file__).parents[1], Path(np.__file__).parent)
@@ -21,10 +21,10 @@ Formula = Callable[..., object]
 
 
 @cache
-def wishes(formula: Formula | None) -> tuple[str, ...]:
+def argument_names(formula: Formula | None) -> tuple[str, ...]:
     """The names that a formula asks for; an argument with a default is its own.
 
-    >>> wishes(lambda elastic, v, chi: elastic * (1 + chi * v))
+    >>> argument_names(lambda elastic, v, chi: elastic * (1 + chi * v))
     ('elastic', 'v', 'chi')
     """
     if formula is None:
@@ -33,14 +33,14 @@ def wishes(formula: Formula | None) -> tuple[str, ...]:
     return tuple(one.name for one in arguments if one.default is inspect.Parameter.empty)
 
 
-def ask(formula: Formula, known: Mapping[str, Array | float]) -> Array:
+def call_by_name(formula: Formula, known: Mapping[str, Array | float]) -> Array:
     """The value of a formula, given what it asks for by name, in arrays that it cannot write to.
 
     Raises
     ------
     ModelError : the formula raised an error, whatever it was, or returned something other than real numbers
     """
-    given = [_read_only(known[wish]) for wish in wishes(formula)]
+    given = [_read_only(known[wish]) for wish in argument_names(formula)]
     try:
         return _real(formula(*given))
     except NOT_OF_A_PLUGIN:
@@ -56,7 +56,7 @@ def explained(key: str, error: ModelError) -> tuple[str, str]:
     Parameters
     ----------
     key : of the model
-    error : that `ask` raised, or whoever found its answer to be of a wrong shape
+    error : that `call_by_name` raised, or whoever found its answer to be of a wrong shape
     """
     cause = error.__cause__
     if cause is None:

@@ -7,15 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..ode.problem import Columns, Problem, Step
+from ..ode.problem import Params, Problem, Step
 from . import motion
-from .lanes import Lanes
+from .impacts import Impacts
 from .model import ForceModel
-from .momentum import is_strong
-from .power import Array
+from .powers import Array
+from .scaling import dimensionless_values, with_coefficients, with_units
+from .simulate import integrate_phases
 from .status import Status
-from .strike import strike
-from .values import own_values, with_coefficients, with_units
+from .velocity_coordinates import is_strong
 
 # points at which a step is shown, and at which it is integrated again
 SAMPLES, GAUSS = 4, 5
@@ -50,65 +50,65 @@ class History:
 
 
 def follow(
-    model: ForceModel, lanes: Lanes, *, rtol: float, max_steps: int, times: int | None = None
+    model: ForceModel, impacts: Impacts, *, rtol: float, max_steps: int, times: int | None = None
 ) -> History | None:
     """Follow a single impact through time.
 
     Parameters
     ----------
     model : the law
-    lanes : one impact
-    rtol, max_steps : see `impact.contact.collide.collide`
+    impacts : one impact
+    rtol, max_steps : see `impact.contact.outputs.collide`
     times : how many points in time, uniform from first contact to release; by default some in each step
 
     Returns
     -------
     History or None : None where there is no motion to follow, because the balls miss or a limit was taken
     """
-    n = float(lanes.n[0])
+    n = float(impacts.n[0])
     with np.errstate(all="ignore"):
-        values = with_coefficients(model, with_units(own_values(model, lanes), n), 1)
-        law = motion.Law.of(model, n, bool(is_strong(model, values, 1)[0]))
-        columns = tuple(np.asarray(values[name]) for name in law.names)
-        struck = strike(law, columns, 1, rtol, max_steps, record=True)
-    if struck.outward is None or struck.rebound.status[0] != Status.OK:
+        values = with_coefficients(model, with_units(dimensionless_values(model, impacts), n), 1)
+        law = motion.MotionLaw.of(model, n, bool(is_strong(model, values, 1)[0]))
+        params = tuple(np.asarray(values[name]) for name in law.names)
+        collision = integrate_phases(law, params, 1, rtol, max_steps, record=True)
+    if collision.restitution is None or collision.result.status[0] != Status.OK:
         return None
-    turn, end = float(struck.inward.state[2, 0]), float(struck.outward.state[2, 0])
+    turn, end = float(collision.approach.state[2, 0]), float(collision.restitution.state[2, 0])
     grid = None if times is None else np.linspace(0.0, turn + end, times)
     before = None if grid is None else grid[grid <= turn]
     after = None if grid is None else np.minimum(grid[grid > turn] - turn, end)
-    inward = _phase(law, motion.approach(law), struck.inward.recorded, columns, before)
+    approach = _phase(law, motion.approach(law), collision.approach.recorded, params, before)
     back = motion.of_restitution(law)
-    outward = _phase(back, motion.restitution(back), struck.outward.recorded, struck.columns, after)
+    restitution = _phase(back, motion.restitution(back), collision.restitution.recorded, collision.params, after)
 
     residual = (
-        struck.columns[motion.BRANCH.index("residual") - len(motion.BRANCH)] if model.unloading else np.zeros(1)
+        collision.params[motion.BRANCH.index("residual") - len(motion.BRANCH)] if model.unloading else np.zeros(1)
     )
-    unit_t = lanes.length / lanes.v0
-    t = np.concatenate([inward.t, struck.inward.state[2] + outward.t]) * unit_t
-    delta = np.concatenate([inward.x, residual + outward.x]) * lanes.length
-    v = np.concatenate([inward.v, outward.v]) * lanes.v0
-    force = np.concatenate([inward.F, outward.F]) * (lanes.m * lanes.v0 / unit_t)
+    unit_t = impacts.length / impacts.v0
+    t = np.concatenate([approach.t, collision.approach.state[2] + restitution.t]) * unit_t
+    delta = np.concatenate([approach.x, residual + restitution.x]) * impacts.length
+    v = np.concatenate([approach.v, restitution.v]) * impacts.v0
+    force = np.concatenate([approach.F, restitution.F]) * (impacts.m * impacts.v0 / unit_t)
     # the phases meet at the peak, and a landing can be shorter than rounding: each moment is told once
     later = np.append(np.minimum.accumulate(t[::-1])[::-1][1:], np.inf)
     t, delta, v, force = (row[t < later] for row in (t, delta, v, force))
-    momentum, energy = (lanes.m * lanes.v0).item(), lanes.energy.item()
-    share1, share2 = lanes.m / lanes.m1, lanes.m / lanes.m2
+    momentum, energy = (impacts.m * impacts.v0).item(), impacts.energy.item()
+    share1, share2 = impacts.m / impacts.m1, impacts.m / impacts.m2
     return History(
         t=t,
         delta=delta,
         v=v,
         F=force,
-        x1=lanes.v1 * t - share1 * (lanes.v0 * t - delta),
-        x2=lanes.v2 * t + share2 * (lanes.v0 * t - delta),
-        v1=lanes.v1 - share1 * (lanes.v0 - v),
-        v2=lanes.v2 + share2 * (lanes.v0 - v),
-        tau_c=inward.impulse * momentum,
-        tau_r=outward.impulse * momentum,
-        W_c=inward.work * energy,
-        W_r=outward.work * energy,
-        e_kinetic=outward.impulse / inward.impulse,
-        e_energetic=math.sqrt(-outward.work / inward.work) if outward.work <= 0.0 else math.nan,
+        x1=impacts.v1 * t - share1 * (impacts.v0 * t - delta),
+        x2=impacts.v2 * t + share2 * (impacts.v0 * t - delta),
+        v1=impacts.v1 - share1 * (impacts.v0 - v),
+        v2=impacts.v2 + share2 * (impacts.v0 - v),
+        tau_c=approach.impulse * momentum,
+        tau_r=restitution.impulse * momentum,
+        W_c=approach.work * energy,
+        W_r=restitution.work * energy,
+        e_kinetic=restitution.impulse / approach.impulse,
+        e_energetic=math.sqrt(-restitution.work / approach.work) if restitution.work <= 0.0 else math.nan,
     )
 
 
@@ -125,7 +125,7 @@ class _Phase:
 
 
 def _phase(
-    law: motion.Law, problem: Problem, steps: tuple[Step, ...], columns: Columns, times: Array | None
+    law: motion.MotionLaw, problem: Problem, steps: tuple[Step, ...], params: Params, times: Array | None
 ) -> _Phase:
     """Sample the interpolant of a phase, and integrate force and power over it by Gauss points."""
     nodes, weights = np.polynomial.legendre.leggauss(GAUSS)
@@ -135,10 +135,10 @@ def _phase(
     for step, within in zip(steps, fractions, strict=True):
         for theta in within:
             y = step.at(theta)
-            rates = problem.rates(y[:2], columns)
-            rows.append(np.array([y[2], motion.indentation(law, y[0]), law.velocity(y, columns), rates[4]]))
+            rates = problem.rates(y[:2], params)
+            rows.append(np.array([y[2], motion.indentation(law, y[0]), law.velocity(y, params), rates[4]]))
         for node, weight in zip(nodes, weights, strict=True):
-            rates = problem.rates(step.at(step.end * 0.5 * (1.0 + node))[:2], columns)
+            rates = problem.rates(step.at(step.end * 0.5 * (1.0 + node))[:2], params)
             share = 0.5 * weight * (step.end * step.length)[0]
             impulse.append(share * (rates[4] * rates[2])[0])
             work.append(share * rates[3][0])

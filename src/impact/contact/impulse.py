@@ -4,29 +4,29 @@ from __future__ import annotations
 
 import numpy as np
 
-from .lanes import Lanes
-from .power import Array, all_within
+from .impacts import Impacts
+from .powers import Array, all_within
 
 LARGEST = float(np.finfo(float).max)
 
 
-def velocities_at(lanes: Lanes, impulse: Array) -> tuple[Array, Array]:
+def velocities_at(impacts: Impacts, impulse: Array) -> tuple[Array, Array]:
     """Velocities v1, v2 [m/s] once an impulse tau [N s] has passed: equations (8) and (9), shape (n,).
 
     (9) as printed has a minus, an erratum. An infinite mass (a wall) keeps its velocity.
     """
-    return lanes.v1 - impulse / lanes.m1, lanes.v2 + impulse / lanes.m2
+    return impacts.v1 - impulse / impacts.m1, impacts.v2 + impulse / impacts.m2
 
 
-def velocities_after(lanes: Lanes, e: Array) -> tuple[Array, Array]:
+def velocities_after(impacts: Impacts, e: Array) -> tuple[Array, Array]:
     """Velocities v1+, v2+ [m/s] after an impact of restitution e: equations (6) and (7), shape (n,).
 
     They are those at the impulse tau_c (1 + e), where tau_c = m v0 is that of the approach. Balls that do not
     approach keep their velocities; an impulse that is too large for a number gives NaN.
     """
-    impulse = (1.0 + e) * lanes.m * lanes.v0
-    if not lanes.all_approach:
-        impulse = np.where(lanes.v0 > 0.0, impulse, 0.0)
+    impulse = (1.0 + e) * impacts.m * impacts.v0
+    if not impacts.all_approach:
+        impulse = np.where(impacts.v0 > 0.0, impulse, 0.0)
     if not all_within(impulse, -LARGEST, LARGEST):
         impulse = np.where(np.isfinite(impulse), impulse, np.nan)
-    return velocities_at(lanes, impulse)
+    return velocities_at(impacts, impulse)

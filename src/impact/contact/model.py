@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal, NotRequired, Protocol, TypedDict
 
 from ..errors import ModelError, did_you_mean
 from .evidence import Evidence
-from .formula import Formula, wishes
+from .formula import Formula, argument_names
 from .units import dimension
 
 # what a law may ask for by name, besides its own parameters and coefficients, and the unit of each
 QUANTITIES = {
     "e": "1", "n": "1", "K": "N/m^n", "m": "kg", "v0": "m/s", "R1": "m", "R2": "m", "E1": "Pa", "E2": "Pa",
     "nu1": "1", "nu2": "1", "yield_strength1": "Pa", "yield_strength2": "Pa",
+    "R_eff": "m", "E_eff": "Pa", "Y_min": "Pa",
 }  # fmt: skip
+# the quantities that others are computed from
+BASE_QUANTITIES = {
+    "R_eff": ("R1", "R2"),
+    "E_eff": ("E1", "nu1", "E2", "nu2"),
+    "Y_min": ("yield_strength1", "yield_strength2"),
+}
 NOT_VERIFIED = Evidence("not verified")
 # what else a domain may bound
 IN_DOMAIN = ("v1", "v2", "m1", "m2", "length")
@@ -30,6 +37,16 @@ IN_UNLOADING = {
 IN_MOTION_BACK = {"stretch": "indentation above the permanent one"}
 # coefficients that a coordinate of the velocity asks for; the first is the strength of the damping
 COORDINATES = {"v": (), "log": ("chi",), "force": ("c", "q")}
+
+
+def with_base_quantities(names: Iterable[str]) -> frozenset[str]:
+    """Some names, and those of the quantities that they are computed from.
+
+    >>> sorted(with_base_quantities(["R_eff", "e"]))
+    ['R1', 'R2', 'R_eff', 'e']
+    """
+    names = frozenset(names)
+    return names.union(*(BASE_QUANTITIES.get(name, ()) for name in names))
 
 
 @dataclass(frozen=True)
@@ -96,7 +113,9 @@ class ForceModel:
 
     Every formula asks by the names of its arguments for what it needs: `x` (indentation), `v` (its rate),
     `elastic` (K δⁿ), the quantities of the contact (`K, n, m, v0, e, R1, R2, E1, E2, nu1, nu2,
-    yield_strength1, yield_strength2`), the model's own parameters and coefficients; `unloading` also for
+    yield_strength1, yield_strength2`, and of both balls together `R_eff` = 1/(1/R1 + 1/R2), `E_eff` =
+    1/((1 − nu1²)/E1 + (1 − nu2²)/E2), `Y_min` = min(yield_strength1, yield_strength2)), the
+    model's own parameters and coefficients; `unloading` also for
     `peak`, `force_at_peak`, `residual`, `recovered` and `stretch`, x above the residual. All arrive in the
     contact's own units, in which K = m = v0 = 1, as arrays of one shape, (n,), or as numbers where they are the
     same for all; parameters are converted by their unit, so that the formula does not change. A formula works on
@@ -114,19 +133,19 @@ class ForceModel:
     unloading : contact force of the restitution phase
     residual : permanent indentation, from `peak`, `force_at_peak` and the quantities of the contact
     recovered : what of the peak indentation is recovered, in place of `residual` where it may be a small part
-    bends, unloading_bends : indentations at which `force`, or `unloading`, goes over to another formula, NaN for
-        none; no step goes across. They ask for what is known beforehand, the latter for `peak`, `force_at_peak`
-        and `residual` too. One that asks for `x`, `v` or `elastic` is a function that changes its sign there
+    breakpoints, unloading_breakpoints : indentations at which `force`, or `unloading`, has another formula, NaN
+        for none; no step goes across. They ask for what is known beforehand, the latter for `peak`,
+        `force_at_peak` and `residual` too. One that asks for `x`, `v` or `elastic` changes its sign there
     coefficients : formulas evaluated once per impact, by name; a later one may ask for an earlier one.
         `chi` is the dimensionless damping χ = λ v₀/K
     parameters : what the user gives in `[model.KEY]`
     oracle : exact delivered restitution, where a closed form exists
     stiffness : K in SI from the quantities of the contact and the parameters, where it is not given and not (12)
     release : the contact ends at zero indentation ("gap"), or already at zero force ("force")
-    smooth : p of the smooth coordinate δ = δᵣ + sᵖ: 2 for half-integer powers, 4 for quarters
-    momentum : "log" where `force` is K δⁿ (1 + χ δ̇/v₀) exactly, which lets large χ be integrated without
-        stiffness; "force" where it is K δⁿ + c δ^q δ̇ exactly, with coefficients c, and q of n alone, which keeps
-        the digits of the force at its zero
+    coordinate_power : p of the smooth coordinate δ = δᵣ + sᵖ: 2 for half-integer powers, 4 for quarters
+    velocity_coordinate : "log" where `force` is K δⁿ (1 + χ δ̇/v₀) exactly, so that large χ can be integrated
+        without stiffness; "force" where it is K δⁿ + c δ^q δ̇ exactly, with coefficients c, and q of n alone,
+        which keeps the digits of the force at its zero
     exponent : n, where the law fixes it; None takes the sweep's
     family : the group it is listed under
     same_as : the key of the law that this is another name of, if it is
@@ -165,15 +184,15 @@ class ForceModel:
     unloading: Formula | None = None
     residual: Formula | None = None
     recovered: Formula | None = None
-    bends: tuple[Formula, ...] = ()
-    unloading_bends: tuple[Formula, ...] = ()
+    breakpoints: tuple[Formula, ...] = ()
+    unloading_breakpoints: tuple[Formula, ...] = ()
     coefficients: Mapping[str, Formula] = field(default_factory=dict)
     parameters: tuple[Parameter, ...] = ()
     oracle: Formula | None = None
     stiffness: Formula | None = None
     release: Literal["gap", "force"] = "gap"
-    smooth: int = 2
-    momentum: Literal["v", "log", "force"] = "v"
+    coordinate_power: int = 2
+    velocity_coordinate: Literal["v", "log", "force"] = "v"
     exponent: float | None = None
     family: str = "other"
     same_as: str = ""
@@ -183,10 +202,10 @@ class ForceModel:
             raise ModelError(f'model key "{self.key}": wants kebab-case, such as "hunt-crossley-1975"')
         if self.residual is not None and self.recovered is not None:
             raise ModelError(f"model {self.key}: recovered: given beside residual, wants one of the two")
-        if self.unloading_bends and self.unloading is None:
-            raise ModelError(f"model {self.key}: unloading_bends: wants an unloading")
+        if self.unloading_breakpoints and self.unloading is None:
+            raise ModelError(f"model {self.key}: unloading_breakpoints: wants an unloading")
         self._check_fields()
-        self._check_momentum()
+        self._check_velocity_coordinate()
         once = {*QUANTITIES, *(parameter.name for parameter in self.parameters)}
         for name, formula in self.coefficients.items():
             self._check(f"coefficient {name}", formula, once)
@@ -195,22 +214,22 @@ class ForceModel:
         self._check("unloading", self.unloading, {*once, *IN_FORCE, *IN_UNLOADING, *IN_MOTION_BACK})
         for role in ("residual", "recovered"):
             self._check(role, getattr(self, role), {*once, "peak", "force_at_peak"})
-        for formula in self.bends:
-            self._check("bend", formula, {*once, *IN_FORCE})
-        for formula in self.unloading_bends:
-            self._check("unloading bend", formula, {*once, *IN_FORCE, *IN_UNLOADING})
+        for formula in self.breakpoints:
+            self._check("breakpoint", formula, {*once, *IN_FORCE})
+        for formula in self.unloading_breakpoints:
+            self._check("unloading breakpoint", formula, {*once, *IN_FORCE, *IN_UNLOADING})
         self._check("oracle", self.oracle, once)
         self._check(
             "stiffness", self.stiffness, {*QUANTITIES, *(one.name for one in self.parameters)} - {"K", "e"}
         )
 
-    def _check_momentum(self) -> None:
-        wanted = COORDINATES[self.momentum]
-        smooth = {"elastic", *wanted[:1]} <= set(wishes(self.force)) and not self.bends
-        if wanted and not (smooth and self.coefficients.keys() >= set(wanted)):
+    def _check_velocity_coordinate(self) -> None:
+        wanted = COORDINATES[self.velocity_coordinate]
+        is_of_form = {"elastic", *wanted[:1]} <= set(argument_names(self.force)) and not self.breakpoints
+        if wanted and not (is_of_form and self.coefficients.keys() >= set(wanted)):
             raise ModelError(
-                f'model {self.key}: momentum "{self.momentum}" wants a coefficient {" and one ".join(wanted)}, a '
-                f"force of elastic and {wanted[0]}, and no bends"
+                f'model {self.key}: velocity_coordinate "{self.velocity_coordinate}" wants a coefficient '
+                f"{' and one '.join(wanted)}, a force of elastic and {wanted[0]}, and no breakpoints"
             )
 
     def _check_fields(self) -> None:
@@ -219,8 +238,8 @@ class ForceModel:
         allowed = {
             "evidence": (known, 'an impact.Evidence, such as Evidence("derived", "our report, equation (3)")'),
             "release": (self.release in ("gap", "force"), '"gap" or "force"'),
-            "momentum": (self.momentum in COORDINATES, '"v", "log" or "force"'),
-            "smooth": (self.smooth in (2, 4, 6, 8), "2, 4, 6 or 8"),
+            "velocity_coordinate": (self.velocity_coordinate in COORDINATES, '"v", "log" or "force"'),
+            "coordinate_power": (self.coordinate_power in (2, 4, 6, 8), "2, 4, 6 or 8"),
             "exponent": (self.exponent is None or 1.0 <= self.exponent <= 10.0, "None, or a number from 1 to 10"),
             "parameters": (own, "a tuple of Parameter"),
         }
@@ -250,19 +269,24 @@ class ForceModel:
         return f"<ForceModel {self.key}>"
 
     def _check(self, role: str, formula: Formula | None, known: set[str]) -> None:
-        for wish in wishes(formula):
+        for wish in argument_names(formula):
             if wish not in known:
                 raise ModelError(
                     f'model {self.key}: its {role} asks for "{wish}"; {did_you_mean(wish, sorted(known))}'
                 )
 
     @property
+    def motion_formulas(self) -> tuple[Formula | None, ...]:
+        """The formulas that the equations of motion call."""
+        branches = (self.force, self.unloading, self.residual, self.recovered)
+        return (*branches, *self.breakpoints, *self.unloading_breakpoints)
+
+    @property
     def quantities(self) -> frozenset[str]:
         """The names of the quantities and parameters that the law's motion depends on."""
         own = {parameter.name for parameter in self.parameters}
-        formulas = (self.force, self.unloading, self.residual, self.recovered, *self.bends, *self.unloading_bends,
-                    *self.coefficients.values())  # fmt: skip
-        return frozenset(w for formula in formulas for w in wishes(formula) if w in QUANTITIES or w in own)
+        formulas = (*self.motion_formulas, *self.coefficients.values())
+        return frozenset(w for formula in formulas for w in argument_names(formula) if w in QUANTITIES or w in own)
 
     def unit_of(self, name: str) -> str:
         """The unit of a quantity or parameter."""

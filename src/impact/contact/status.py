@@ -36,5 +36,6 @@ MEANINGS = {
     Status.OUT_OF_RANGE: "a derived quantity is not finite, such as K of two planes or m of two walls",
     Status.MODEL_ERROR: "the force raised an error or returned the wrong shape",
 }
+STATUSES = tuple(map(int, Status))
 # an array is compared with a plain number eight times as fast as with a member of an enum
 OK, NO_IMPACT, LIMIT, FIRST_FAILURE = map(int, (Status.OK, Status.NO_IMPACT, Status.LIMIT, Status.NOT_SEPARATED))

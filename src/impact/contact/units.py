@@ -9,7 +9,7 @@ from functools import cache
 from typing import NamedTuple
 
 from ..errors import ModelError
-from .power import Array
+from .powers import Array
 
 
 class Dimension(NamedTuple):

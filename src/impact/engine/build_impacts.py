@@ -8,12 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..contact.formula import ask, wishes
-from ..contact.lanes import Lanes
-from ..contact.lanes import stiffness as hertz_or_secant
-from ..contact.material import effective_mass, hertz_stiffness, sphere_radius
+from ..contact.formula import argument_names, call_by_name
+from ..contact.impacts import Impacts
+from ..contact.impacts import stiffness as hertz_or_secant
+from ..contact.materials import effective_mass, hertz_stiffness, sphere_mass, sphere_radius
 from ..contact.model import Law
-from ..contact.power import Array
+from ..contact.powers import Array
 from ..errors import ModelError
 from .plan import Index, Inputs, dimensions
 
@@ -21,7 +21,7 @@ from .plan import Index, Inputs, dimensions
 Stiffness = Callable[[Index], Array]
 
 
-def build_impacts(inputs: Inputs, model: Law, index: Index, stiffness: Stiffness | None = None) -> Lanes:
+def build_impacts(inputs: Inputs, model: Law, index: Index, stiffness: Stiffness | None = None) -> Impacts:
     """The impacts of a model at some cells of the grid; what does not vary along an axis has length one there.
 
     Parameters
@@ -35,18 +35,14 @@ def build_impacts(inputs: Inputs, model: Law, index: Index, stiffness: Stiffness
     missing = np.full((1,) * dimensions(index), np.nan)
 
     def value(name: str) -> Array:
-        return np.asarray(inputs.column(name, index), float) if name in given else missing
+        return values_at(inputs, name, index)
 
-    def of_material(ball: str, field: str) -> Array:
-        name = "material" if "material" in given else f"material{ball}"
-        if name not in given:
-            return missing
-        table = {key: getattr(material, field) for key, material in inputs.materials.items()}
-        chosen, where = np.unique(inputs.column(name, index), return_inverse=True)
-        return np.array([table[str(key)] for key in chosen], dtype=float)[where]
+    def of_material(ball: str, key: str) -> Array:
+        return property_at(inputs, ball, key, index)
 
-    v1, v2, m1, m2 = (value(name) for name in ("v1", "v2", "m1", "m2"))
-    E1, E2, nu1, nu2 = (of_material(ball, field) for field in ("E", "nu") for ball in "12")
+    v1, v2 = value("v1"), value("v2")
+    m1, m2 = (mass_at(inputs, ball, index) for ball in "12")
+    E1, E2, nu1, nu2 = (of_material(ball, key) for key in ("E", "nu") for ball in "12")
     R1, R2 = (
         value(f"R{ball}") if f"R{ball}" in given else sphere_radius(mass, of_material(ball, "rho"))
         for ball, mass in (("1", m1), ("2", m2))
@@ -60,25 +56,73 @@ def build_impacts(inputs: Inputs, model: Law, index: Index, stiffness: Stiffness
             K = stiffness(index)
         else:
             K = hertz_or_secant(n, hertz_stiffness(E1, nu1, E2, nu2, R1, R2), effective_mass(m1, m2), v1 - v2)
-        e = value("e") if "e" in given else 1.0 - value("alpha") * (v1 - v2)
+        e = restitution_at(inputs, index)
     own = {parameter.name: value(f"{model.key}.{parameter.name}") for parameter in model.parameters}
-    lanes = Lanes(
+    impacts = Impacts(
         e=e, v1=v1, v2=v2, m1=m1, m2=m2, K=K, n=n, R1=R1, R2=R2, E1=E1, nu1=nu1, E2=E2, nu2=nu2,
         yield_strength1=of_material("1", "yield_strength"), yield_strength2=of_material("2", "yield_strength"),
         parameters=own,
     )  # fmt: skip
     if not has_stiffness_rule(inputs, model) or stiffness is not None:
-        return lanes
+        return impacts
     assert model.stiffness is not None
     with np.errstate(all="ignore"):
-        known = {name: lanes.quantity(name) for name in wishes(model.stiffness)}
+        known = {name: impacts.quantity(name) for name in argument_names(model.stiffness)}
         shape = np.broadcast_shapes(missing.shape, *(values.shape for values in known.values()))
         # a formula is promised arrays of one shape (n,)
         flat = {name: np.broadcast_to(values, shape).reshape(-1) for name, values in known.items()}
-        K = ask(model.stiffness, flat)
+        K = call_by_name(model.stiffness, flat)
     if K.shape not in ((), (math.prod(shape),)):
         raise ModelError(f"{model.key}: stiffness returned the shape {K.shape}, expected ({math.prod(shape)},)")
-    return replace(lanes, K=np.broadcast_to(K, math.prod(shape)).reshape(shape))
+    return replace(impacts, K=np.broadcast_to(K, math.prod(shape)).reshape(shape))
+
+
+def values_at(inputs: Inputs, name: str, index: Index) -> Array:
+    """The numbers of a config name at some cells; NaN of one that has no value."""
+    if name not in inputs.names():
+        return np.full((1,) * dimensions(index), np.nan)
+    return np.asarray(inputs.column(name, index), float)
+
+
+def property_at(inputs: Inputs, ball: str, key: str, index: Index) -> Array:
+    """A property of the material of a ball, "1" or "2", at some cells, such as E [Pa]; NaN where it is unknown."""
+    names = inputs.names()
+    name = "material" if "material" in names else f"material{ball}"
+    if name not in names:
+        return np.full((1,) * dimensions(index), np.nan)
+    of_cell = inputs.column(name, index)
+    chosen, where = np.unique(of_cell, return_inverse=True)
+    table = np.array([getattr(inputs.materials[str(material)], key) for material in chosen], dtype=float)
+    values = table[where].reshape(of_cell.shape)
+    for material in sorted(inputs.materials_of(ball)):
+        column = f"materials.{material}.{key}"
+        # whether or not these cells have the material: the shape tells along which axes the ball's property varies
+        if column in names:
+            values = np.where(of_cell == material, values_at(inputs, column, index), values)
+    return values
+
+
+def mass_at(inputs: Inputs, ball: str, index: Index) -> Array:
+    """The mass of a ball, "1" or "2", at some cells [kg]; where none is given, that of a sphere of its radius.
+
+    Raises
+    ------
+    ModelError : there is no mass, and no radius and density to derive it from
+    """
+    if f"m{ball}" in inputs.names():
+        return values_at(inputs, f"m{ball}", index)
+    mass = sphere_mass(values_at(inputs, f"R{ball}", index), property_at(inputs, ball, "rho", index))
+    if np.isnan(mass).any():
+        raise ModelError(f"m{ball}: missing, expected m{ball}, or R{ball} and the density rho of its material")
+    return mass
+
+
+def restitution_at(inputs: Inputs, index: Index) -> Array:
+    """The restitution asked for at some cells: e, or e = 1 - alpha (v1 - v2), equation (24)."""
+    if "e" in inputs.names():
+        return values_at(inputs, "e", index)
+    speed = values_at(inputs, "v1", index) - values_at(inputs, "v2", index)
+    return 1.0 - values_at(inputs, "alpha", index) * speed
 
 
 def has_stiffness_rule(inputs: Inputs, model: Law) -> bool:

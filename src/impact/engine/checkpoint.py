@@ -11,7 +11,7 @@ import hashlib
 import json
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,14 +19,13 @@ import numpy as np
 from filelock import FileLock, Timeout
 
 from ..atomic import appearing, sync_folder
-from ..contact.strike import Rebound
+from ..contact.simulate import TABLE_COLUMNS, CollisionResult
 from ..errors import ImpactError, InUseError, StoreError, UsageError
 from ..text import safe_text
 from .execute import with_core
 from .plan import Plan
 from .trajectories import RANGE_TRAJECTORIES, TrajectoryRange, trajectory_maps
 
-FIELDS = tuple(one.name for one in fields(Rebound))
 PLAN, LOCK = "plan.json", "lock"
 ELSE = "give the sweep that it is of, another output, or --overwrite to start again"
 TOLD = 3  # differences
@@ -56,7 +55,7 @@ class Work:
         """What a block says of itself."""
         return f"{part.number} {part.model} {part.start} {part.stop} {self.key}"
 
-    def store(self, part: TrajectoryRange, rebound: Rebound) -> None:
+    def store(self, part: TrajectoryRange, rebound: CollisionResult) -> None:
         """Keep a finished block.
 
         Raises
@@ -66,7 +65,7 @@ class Work:
         with appearing(self.path(part.number), overwrite=True, part=self.folder / "block.part") as sink:
             pack(sink, self._of(part), rebound)
 
-    def load(self, part: TrajectoryRange) -> Rebound | None:
+    def load(self, part: TrajectoryRange) -> CollisionResult | None:
         """A finished block; None if it is not there, or not whole."""
         # what is no regular file might never end
         if not self.path(part.number).is_file():
@@ -192,7 +191,7 @@ def _prepare(folder: Path, record: Mapping[str, Any], *, resume: bool, overwrite
 def _record(plan: Plan, extends: str = "") -> dict[str, Any]:
     """What a folder is of: all that the finished blocks depend on."""
     solver = plan.config.solver
-    return {"schema": FIELDS, "block": RANGE_TRAJECTORIES, "collapse": solver.collapse, "core": solver.core,
+    return {"schema": TABLE_COLUMNS, "block": RANGE_TRAJECTORIES, "collapse": solver.collapse, "core": solver.core,
             "physics": plan.physics, **({"extends": extends} if extends else {})}  # fmt: skip
 
 
@@ -224,6 +223,9 @@ def _is_of(folder: Path, record: Mapping[str, Any], *, resume: bool) -> bool:
 
 def _told_apart(folder: Path, record: Mapping[str, Any]) -> str | None:
     """In what a folder is of another sweep; None if it is of this one."""
+    unknown = [key for key, digest in record["physics"]["plugins"].items() if digest is None]
+    if unknown:
+        return f"the model {safe_text(unknown[0])} is in no file, so that it cannot be known to be the same"
     try:
         if not (folder / PLAN).is_file():
             raise ValueError
@@ -235,7 +237,7 @@ def _told_apart(folder: Path, record: Mapping[str, Any]) -> str | None:
     return f"is of another sweep: {'; '.join(told[:TOLD])}{more}" if told else None
 
 
-def pack(file: Any, of: str, rebound: Rebound) -> None:
+def pack(file: Any, of: str, rebound: CollisionResult) -> None:
     """Write a block.
 
     Parameters
@@ -244,27 +246,27 @@ def pack(file: Any, of: str, rebound: Rebound) -> None:
     of : what it says of itself
     rebound : what is in it
     """
-    np.savez(file, of=of, **{name: getattr(rebound, name) for name in FIELDS})
+    np.savez(file, of=of, **{name: getattr(rebound, name) for name in TABLE_COLUMNS})
 
 
-def unpack(path: Path, of: str, size: int) -> Rebound | None:
+def unpack(path: Path, of: str, size: int) -> CollisionResult | None:
     """A block of so many trajectories; None if it is of something else, or not whole."""
     try:
         with np.load(path, allow_pickle=False) as stored:
             if stored["of"].item() != of:
                 return None
-            arrays = {name: stored[name] for name in FIELDS}
+            arrays = {name: stored[name] for name in TABLE_COLUMNS}
     except MemoryError:
         raise
     # numpy and zipfile raise almost anything on a damaged file
     except Exception:
         return None
-    blank = Rebound.blank(size)
+    blank = CollisionResult.blank(size)
     right = all(
         (one.shape, one.dtype) == (getattr(blank, name).shape, getattr(blank, name).dtype)
         for name, one in arrays.items()
     )
-    return Rebound(**arrays) if right else None
+    return CollisionResult(**arrays) if right else None
 
 
 def differences(there: object, here: object, path: str = "") -> Iterator[str]:

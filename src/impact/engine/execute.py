@@ -12,20 +12,19 @@ import warnings
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..contact.compiled import is_installed, serves
+from ..config.tables import Solver
 from ..contact.model import ForceModel
 from ..contact.models import catalogue
-from ..contact.status import Status
-from ..contact.strike import Rebound
-from ..contact.trajectories import integrate_all
+from ..contact.numba.dispatch import is_installed, serves
+from ..contact.simulate import TABLE_COLUMNS, CollisionResult, simulate
+from ..contact.status import STATUSES
 from ..errors import StoreError, UsageError
-from ..sweeps.settings import Solver
 from ..text import safe_text
 from .build_impacts import exponents
 from .executors import ALONE, Team
@@ -40,10 +39,12 @@ MAX_RETRIES = 3
 POLL_INTERVAL_S = 0.2
 
 # what a range comes to, and a line for each distinct error that the law raised
-Integrated = tuple[Rebound, dict[str, str]]
+Integrated = tuple[CollisionResult, dict[str, str]]
 # which trajectories of a range are known already, and what they come to; None where none is
-Known = Callable[[TrajectoryRange], tuple[NDArray[np.bool_], Rebound] | None]
-STATUSES = [int(status) for status in Status]
+KnownPart = tuple[NDArray[np.bool_], CollisionResult] | None
+Known = Callable[[TrajectoryRange], KnownPart]
+# what is being integrated
+Running = dict[Future[Integrated], tuple[TrajectoryRange, KnownPart]]
 
 
 @dataclass(frozen=True)
@@ -61,14 +62,14 @@ class WorkerContext:
     version: str
     solver: Solver
     sources: tuple[tuple[str, bytes], ...] = ()
-    hashes: tuple[tuple[str, str], ...] = ()
+    hashes: tuple[tuple[str, str | None], ...] = ()
 
 
 def integrate(model: ForceModel, columns: Columns, solver: Solver) -> Integrated:
     """Integrate some trajectories of a model; see `impact.engine.trajectories.columns_of`."""
     errors: dict[str, str] = {}
     values = {name: column for name, column in columns.items() if name not in ("n", "status")}
-    rebound = integrate_all(
+    rebound = simulate(
         model, columns["n"], values, columns["status"],
         rtol=solver.rtol, max_steps=solver.max_steps, collapse=solver.collapse, core=solver.core, errors=errors,
     )  # fmt: skip
@@ -151,7 +152,7 @@ def run(
     team: Team = ALONE,
     should_stop: Callable[[], bool] = never,
     known: Known = lambda part: None,
-) -> Iterator[tuple[TrajectoryRange, Rebound]]:
+) -> Iterator[tuple[TrajectoryRange, CollisionResult]]:
     """Integrate range after range; alone in order, with others as they finish.
 
     Parameters
@@ -176,14 +177,13 @@ def run(
     left, trials = deque(todo), Counter[int]()
     reported: set[str] = set()
     while True:
-        running: dict[Future[Integrated], TrajectoryRange] = {}
+        running: Running = {}
         try:
             with team.executor() as executor:
 
-                def start(part: TrajectoryRange) -> Future[Integrated]:
+                def start(part: TrajectoryRange, before: KnownPart) -> Future[Integrated]:
                     # no more is held of a range than what it is made of
                     columns = columns_of(plan, maps, part)
-                    before = known(part)
                     if before is not None:
                         columns = {name: values[~before[0]] for name, values in columns.items()}
                     return submit(executor, plan.models[part.model].key, columns)
@@ -196,8 +196,9 @@ def run(
                 return
         except BrokenExecutor:
             # which of the ranges it did not live through cannot be known
-            left.extendleft(running.values())
-            trials.update(part.number for part in running.values() or left)
+            begun = [part for part, _ in running.values()]
+            left.extendleft(begun)
+            trials.update(part.number for part in begun or left)
             if max(trials.values()) > MAX_RETRIES:
                 raise StoreError(
                     f"processes were killed {MAX_RETRIES + 1} times at the same trajectories: memory is short; "
@@ -206,9 +207,9 @@ def run(
 
 
 def _finished(
-    start: Callable[[TrajectoryRange], Future[Integrated]],
+    start: Callable[[TrajectoryRange, KnownPart], Future[Integrated]],
     left: deque[TrajectoryRange],
-    running: dict[Future[Integrated], TrajectoryRange],
+    running: Running,
     known: Known,
     room: Callable[[], int],
     should_stop: Callable[[], bool],
@@ -219,11 +220,12 @@ def _finished(
             # asked in every round, also where nothing is left to submit: it raises if nobody answers any more
             most = room()
             while left and len(running) < most and not should_stop():
-                before = known(left[0])
+                part, before = left[0], known(left[0])
                 if before is not None and before[0].all():
-                    yield left.popleft(), (before[1], {})
+                    left.popleft()
+                    yield part, (before[1], {})
                     continue
-                running[start(left[0])] = left[0]
+                running[start(part, before)] = part, before
                 left.popleft()
             # what was begun is finished, unless there is nobody left to do it
             if should_stop() and not (running and most):
@@ -232,8 +234,7 @@ def _finished(
                 # nobody is there yet
                 time.sleep(POLL_INTERVAL_S if left else 0.0)
             for future in wait(running, POLL_INTERVAL_S, FIRST_COMPLETED).done:
-                part, done = running[future], future.result()
-                before = known(part)
+                (part, before), done = running[future], future.result()
                 _check(part, done, part.size if before is None else int(np.count_nonzero(~before[0])))
                 del running[future]
                 yield part, done if before is None else (_merged(before, done[0]), done[1])
@@ -242,11 +243,11 @@ def _finished(
             future.cancel()
 
 
-def _merged(known: tuple[NDArray[np.bool_], Rebound], integrated: Rebound) -> Rebound:
+def _merged(known: tuple[NDArray[np.bool_], CollisionResult], integrated: CollisionResult) -> CollisionResult:
     """A range of which some trajectories were known."""
     is_known, before = known
     whole = before.take(slice(None))
-    whole = Rebound(**{name: values.copy() for name, values in vars(whole).items()})
+    whole = CollisionResult(**{name: values.copy() for name, values in vars(whole).items()})
     whole.put(~is_known, integrated)
     return whole
 
@@ -260,18 +261,18 @@ def _check(part: TrajectoryRange, done: object, size: int) -> None:
     """
     where = f"executor: range {part.number}"
     rebound, errors = done if isinstance(done, tuple) and len(done) == 2 else (done, {})
-    if not isinstance(rebound, Rebound):
-        raise StoreError(f"{where}: got {safe_text(type(rebound).__name__)}, expected Rebound")
+    if not isinstance(rebound, CollisionResult):
+        raise StoreError(f"{where}: got {safe_text(type(rebound).__name__)}, expected CollisionResult")
     if not isinstance(errors, dict):
         raise StoreError(f"{where}: got {safe_text(type(errors).__name__)}, expected a dict of errors")
-    blank = Rebound.blank(size)
-    for field in fields(Rebound):
-        got, expected = (_form(getattr(result, field.name)) for result in (rebound, blank))
+    blank = CollisionResult.blank(size)
+    for name in TABLE_COLUMNS:
+        got, expected = (_form(getattr(result, name)) for result in (rebound, blank))
         if got != expected:
-            raise StoreError(f"{where}: {field.name}: got {got}, expected {expected}")
+            raise StoreError(f"{where}: {name}: got {got}, expected {expected}")
     unknown = np.setdiff1d(rebound.status, STATUSES)
     if unknown.size:
-        raise StoreError(f"{where}: status: got {unknown[0]}, expected one of {STATUSES}")
+        raise StoreError(f"{where}: status: got {unknown[0]}, expected one of {list(STATUSES)}")
 
 
 def _form(array: object) -> str:

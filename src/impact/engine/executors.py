@@ -14,7 +14,6 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import Any
 
-from ..contact.turns import taken
 from ..errors import UsageError
 
 # blocks that a worker has before it: the one it works at, and those it goes on with while the driver is busy
@@ -68,23 +67,8 @@ def team_of(jobs: int = 1, threads: int = 1, executor: Executor | None = None) -
     if executor is not None:
         return Team(lambda: nullcontext(executor), lambda: SOME, isinstance(executor, ThreadPoolExecutor))
     if threads > 1:
-        return Team(lambda: _Threads(threads), lambda: AHEAD * threads, is_here=True)
+        return Team(lambda: ThreadPoolExecutor(threads), lambda: AHEAD * threads, is_here=True)
     return Team(lambda: _processes(jobs), lambda: AHEAD * jobs) if jobs > 1 else ALONE
-
-
-class _Threads(ThreadPoolExecutor):
-    """Threads of which half are at what is not compiled at a time."""
-
-    def __init__(self, threads: int) -> None:
-        super().__init__(threads)
-        self._turns = threading.Semaphore(max(1, threads // 2))
-
-    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        return super().submit(self._in_turn, fn, *args, **kwargs)
-
-    def _in_turn(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Any:
-        with taken(self._turns):
-            return fn(*args, **kwargs)
 
 
 class _Processes(ProcessPoolExecutor):

@@ -5,22 +5,22 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..contact.material import Material
+from ..config.load import Axis, Config
+from ..contact.materials import Material
 from ..contact.model import ForceModel
-from ..sweeps.config import Axis, Config
-from ..sweeps.rules import MATERIALS
 from .plugins import Plugins
 
-# points up to which a result is stored in full where nothing else is said
-MAX_FULL_POINTS = 10**7
+# values of a variable up to which a result is stored in full where nothing else is said; and where some of them
+# only repeat others, along the axes of other laws
+MAX_FULL_POINTS, MAX_FULL_REPEATED = 10**7, 10**6
 
 # the places along each axis of some cells of the grid, in arrays that broadcast against each other
 Index = tuple[NDArray[np.intp], ...]
@@ -29,6 +29,47 @@ Index = tuple[NDArray[np.intp], ...]
 def dimensions(index: Index) -> int:
     """How many axes the arrays of an index have; those of a plan without axes have one."""
     return index[0].ndim if index else 1
+
+
+def owner_of(name: str) -> str:
+    """The key of the model that a config name is a parameter of; empty for one that all models share.
+
+    >>> owner_of("bilinear.K"), owner_of("v1"), owner_of("materials.steel.E")
+    ('bilinear', '', '')
+    """
+    return "" if material_property(name) else name.rpartition(".")[0]
+
+
+def material_property(name: str) -> tuple[str, str] | None:
+    """The material and the property that a config name is of, if it is.
+
+    >>> material_property("materials.steel.E"), material_property("bilinear.K")
+    (('steel', 'E'), None)
+    """
+    # the key of a model has no dot
+    table, _, rest = name.partition(".")
+    material, _, key = rest.rpartition(".")
+    return (material, key) if table == "materials" and material else None
+
+
+def is_foreign(names: Iterable[str], model: str) -> bool:
+    """Whether columns that vary together are parameters of other models only, so that nothing of this one varies.
+
+    >>> is_foreign(["bilinear.K"], "hertz"), is_foreign(["bilinear.K", "m1"], "hertz")
+    (True, False)
+    """
+    owners = {owner_of(name) for name in names}
+    return bool(owners) and owners.isdisjoint({"", model})
+
+
+def is_own(names: Iterable[str], model: str) -> bool:
+    """Whether columns that vary together are parameters of this model, and none that all share.
+
+    >>> is_own(["bilinear.K"], "bilinear"), is_own(["bilinear.K", "m1"], "bilinear")
+    (True, False)
+    """
+    owners = {owner_of(name) for name in names}
+    return model in owners and "" not in owners
 
 
 @dataclass(frozen=True)
@@ -53,8 +94,16 @@ class Inputs:
 
     @property
     def cells(self) -> int:
-        """Cells of the grid; a point is a cell of one model."""
+        """Cells of the grid; those of a model that differ by parameters of other models only are one point."""
         return math.prod(self.shape)
+
+    def axes_of_model(self, key: str) -> tuple[int, ...]:
+        """The axes along which the points of a model lie: all but those of other models' parameters."""
+        return tuple(place for place, axis in enumerate(self.axes) if not is_foreign(axis.columns, key))
+
+    def points_of(self, key: str) -> int:
+        """How many points a model has."""
+        return math.prod(self.shape[axis] for axis in self.axes_of_model(key))
 
     def names(self) -> tuple[str, ...]:
         """All names that have a value, those of axes first."""
@@ -72,8 +121,16 @@ class Inputs:
         return self._columns[name][index[place]]
 
     def values(self, name: str) -> NDArray[np.generic]:
-        """All values of a name: along its axis, or one."""
-        return self._columns.get(name, np.asarray(self.scalars.get(name)))
+        """All values of a name: along its axis, or one; None of a name without a value."""
+        if name in self._columns:
+            return self._columns[name]
+        material, key = material_property(name) or ("", "")
+        fixed = getattr(self.materials[material], key) if material in self.materials else None
+        return np.asarray(self.scalars.get(name, fixed))
+
+    def materials_of(self, ball: str) -> frozenset[str]:
+        """The materials that a ball, "1" or "2", has somewhere."""
+        return self._materials[ball]
 
     def index(self, where: Sequence[slice] | None = None) -> Index:
         """The places of a part of the grid, one array along each axis; by default of the whole grid."""
@@ -83,6 +140,14 @@ class Inputs:
     @cached_property
     def _columns(self) -> dict[str, NDArray[np.generic]]:
         return {name: np.asarray(values) for axis in self.axes for name, values in axis.columns.items()}
+
+    @cached_property
+    def _materials(self) -> dict[str, frozenset[str]]:
+        names = {ball: ({"material", f"material{ball}"} & {*self.names()}) for ball in "12"}
+        return {
+            ball: frozenset(str(value) for name in of_ball for value in np.unique(self.values(name)))
+            for ball, of_ball in names.items()
+        }
 
 
 @dataclass(frozen=True)
@@ -113,15 +178,21 @@ class Plan:
 
     @property
     def points(self) -> int:
-        """Cells of the grid times models."""
+        """Of all models; one that does not have the parameters of an axis has no more points along it."""
+        return sum(self.inputs.points_of(model.key) for model in self.models)
+
+    @property
+    def stored_points(self) -> int:
+        """Values of a variable in the dataset, cells times models: along the axes of other laws they repeat."""
         return self.inputs.cells * len(self.models)
 
     @property
     def layout(self) -> Literal["full", "factored"]:
-        """How the result is stored: by default in full up to 10^7 points, or where chunks are asked for."""
+        """How the result is stored: by default in full if that is not too much, or where chunks are asked for."""
         output = self.config.output
         if output.layout == "auto":
-            return "full" if output.chunks or self.points <= MAX_FULL_POINTS else "factored"
+            most = MAX_FULL_POINTS if self.stored_points == self.points else MAX_FULL_REPEATED
+            return "full" if output.chunks or self.stored_points <= most else "factored"
         return output.layout
 
     @cached_property
@@ -140,8 +211,12 @@ class Plan:
             "version": __version__,
             "models": [model.key for model in config.models],
             "scalars": dict(sorted(config.scalars.items())),
-            "axes": [{name: list(values) for name, values in axis.columns.items()} for axis in config.axes],
-            "materials": {name: asdict(material) for name, material in self.materials_used.items()},
+            "axes": [
+                ({axis.name: list(axis.labels)} if axis.numbered else {})
+                | {name: list(values) for name, values in axis.columns.items()}
+                for axis in config.axes
+            ],
+            "materials": self.material_record,
             # not whether impacts are collapsed, which changes nothing
             "solver": {"rtol": config.solver.rtol, "max_steps": config.solver.max_steps},
             "plugins": self.plugins.hashes,
@@ -149,11 +224,18 @@ class Plan:
 
     @property
     def materials_used(self) -> dict[str, Material]:
-        """The materials that some ball has, by name."""
-        used: set[str] = set()
-        for name in MATERIALS:
-            if name in self.config.scalars:
-                used.add(str(self.config.scalars[name]))
-            for place in self.inputs.axes_of(name):
-                used.update(str(one) for one in self.config.axes[place].columns[name])
-        return {name: self.config.materials[name] for name in sorted(used)}
+        """The materials that some ball has, by name; E and nu are NaN where they are axes, the others None."""
+        fixed: dict[str, dict[str, float]] = {}
+        for name, value in self.config.scalars.items():
+            material, key = material_property(name) or ("", "")
+            fixed.setdefault(material, {})[key] = float(value) if material else math.nan
+        used = sorted(self.inputs.materials_of("1") | self.inputs.materials_of("2"))
+        return {name: replace(self.config.materials[name], **fixed.get(name, {})) for name in used}
+
+    @property
+    def material_record(self) -> dict[str, dict[str, float | None]]:
+        """The properties of the materials that some ball has, as plain data: None of one that is an axis."""
+        return {
+            name: {key: None if value != value else value for key, value in asdict(material).items()}
+            for name, material in self.materials_used.items()
+        }

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ..contact.simulate import CollisionResult
 from ..contact.status import FIRST_FAILURE
-from ..contact.strike import Rebound
 from ..errors import StoreError, UnfinishedError, UsageError
 from ..text import safe_text
 from .trajectories import TrajectoryRange
@@ -46,7 +46,7 @@ class Gauge:
         """Whether all trajectories are integrated."""
         return self.at.trajectories == self.at.of_trajectories
 
-    def count(self, part: TrajectoryRange, rebound: Rebound) -> None:
+    def count(self, part: TrajectoryRange, rebound: CollisionResult) -> None:
         """One more block is finished."""
         failed = int(np.count_nonzero(rebound.status >= FIRST_FAILURE))
         self.at = replace(self.at, trajectories=self.at.trajectories + part.size, failed=self.at.failed + failed)

@@ -14,11 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..contact.collide import CHECKS, first_look
 from ..contact.deduplicate import deduplicate
-from ..contact.lanes import Lanes
+from ..contact.impacts import CHECKS, Impacts, check_inputs
 from ..contact.model import ForceModel
-from ..contact.values import exponent_names, own_values
+from ..contact.scaling import dimensionless_values, exponent_names
 from ..errors import UsageError
 from ..text import safe_text
 from .build_impacts import build_impacts
@@ -104,7 +103,8 @@ def check_count(plan: Plan, most: int, name: str) -> None:
         return
     total = 0
     for model in plan.models:
-        axes = axes_of_law(plan.inputs, model) if plan.config.solver.collapse else range(len(plan.shape))
+        collapse = plan.config.solver.collapse
+        axes = axes_of_law(plan.inputs, model) if collapse else plan.inputs.axes_of_model(model.key)
         # what is the same is found where the cells are not too many
         cells = math.prod(plan.shape[axis] for axis in axes)
         total += cells if cells > MAX_CELLS else 0
@@ -116,11 +116,10 @@ def check_count(plan: Plan, most: int, name: str) -> None:
 
 
 def _map_of(plan: Plan, place: int, model: ForceModel) -> TrajectoryMap:
-    if not plan.config.solver.collapse:
-        return TrajectoryMap(place, tuple(range(len(plan.shape))), plan.shape)
-    axes = axes_of_law(plan.inputs, model)
+    collapse = plan.config.solver.collapse
+    axes = axes_of_law(plan.inputs, model) if collapse else plan.inputs.axes_of_model(model.key)
     found = TrajectoryMap(place, axes, tuple(plan.shape[axis] for axis in axes))
-    if found.cells > MAX_CELLS:
+    if not collapse or found.cells > MAX_CELLS:
         return found
     # the other axes are at their first value
     shape = tuple(size if axis in axes else 1 for axis, size in enumerate(plan.shape))
@@ -170,12 +169,16 @@ def columns_at(plan: Plan, model: ForceModel, axes: Sequence[int], index: Index)
     axes : the axes that the law's values come from; what varies along others is not checked here
     index : the places
     """
-    lanes = build_impacts(plan.inputs, model, index)
+    impacts = build_impacts(plan.inputs, model, index)
     with np.errstate(all="ignore"):
         checks = frozenset(
             check for check, varying in axes_of_checks(plan.inputs, model).items() if varying <= {*axes}
         )
-        return {"n": lanes.n, "status": first_look(model, lanes, checks), **own_values(model, lanes)}
+        return {
+            "n": impacts.n,
+            "status": check_inputs(model, impacts, checks),
+            **dimensionless_values(model, impacts),
+        }
 
 
 def probe_index(inputs: Inputs, whole: Iterable[str] = ()) -> Index:
@@ -194,20 +197,24 @@ def axes_of_arrays(arrays: Iterable[NDArray[Any]]) -> frozenset[int]:
 
 def axes_of_law(inputs: Inputs, model: ForceModel) -> tuple[int, ...]:
     """The axes that the values of a law come from."""
-    lanes = _probed(inputs, model)
+    impacts = _probed(inputs, model)
     with np.errstate(all="ignore"):
-        return tuple(sorted(axes_of_arrays([lanes.n, *own_values(model, lanes).values()])))
+        return tuple(sorted(axes_of_arrays([impacts.n, *dimensionless_values(model, impacts).values()])))
 
 
 def axes_of_checks(inputs: Inputs, model: ForceModel) -> Mapping[str, frozenset[int]]:
-    """The axes that each check of `first_look` comes from."""
-    lanes = _probed(inputs, model)
+    """The axes that each check of `check_inputs` comes from."""
+    impacts = _probed(inputs, model)
     with np.errstate(all="ignore"):
-        looked_at = {"e": [lanes.e], "v0": [lanes.v0], "length": [lanes.length, lanes.energy, lanes.time]}
+        looked_at = {
+            "e": [impacts.e],
+            "v0": [impacts.v0],
+            "length": [impacts.length, impacts.energy, impacts.time],
+        }
     return {check: axes_of_arrays(looked_at[check]) for check in CHECKS}
 
 
-def _probed(inputs: Inputs, model: ForceModel) -> Lanes:
+def _probed(inputs: Inputs, model: ForceModel) -> Impacts:
     # an exponent may be zero by its value, and then leaves a unit out: all values of those are looked at
     names = exponent_names(model)
     return build_impacts(inputs, model, probe_index(inputs, {"n", *names, *(f"{model.key}.{n}" for n in names)}))

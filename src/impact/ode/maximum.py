@@ -2,28 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .problem import COMPONENTS, INTEGRATED, WATCHED, Array, Columns, Mask, Problem
-from .step import Space, attempt
+from .events import choose
+from .problem import COMPONENTS, INTEGRATED, WATCHED, Array, Mask, Params, Problem
 
 if TYPE_CHECKING:
-    from .lanes import Lanes, Trial
+    from .rk45 import State, TrialStep
 
-# step of the difference that gives the slope of the watched quantity, relative to the step beside it
+# step of the difference quotient for the slope of the watched quantity, relative to the step beside it
 DIFFERENCE = 1e-5
-# a slope that over that step is less than this of the value is none
+# a slope that over that step is less than this of the value counts as zero
 FLAT = 1e-10
 # a maximum is flat, so that a crude location of it is enough
-GUESSES = 2
+SECANT_STEPS = 2
+
+# (positions, rows, rates, lengths of the step) -> rows and rates at its end
+TakeStep = Callable[[NDArray[np.intp], Array, Array, Array], tuple[Array, Array]]
 
 
 @dataclass(frozen=True)
-class Top:
+class PeakCandidate:
     """Where the watched quantity was largest at a step's end, shape (2, n), and the steps behind and ahead."""
 
     y: Array
@@ -31,61 +35,73 @@ class Top:
     ahead: Array
 
     @classmethod
-    def of(cls, start: Array) -> Top:
+    def of(cls, start: Array) -> PeakCandidate:
         """The starts, beside which there is no step yet."""
         return cls(start.copy(), np.zeros(start.shape[1]), np.zeros(start.shape[1]))
 
     def put(self, where: NDArray[np.intp], y: Array, behind: Array, ahead: Array | float) -> None:
-        """Write down new ones at their places."""
-        for row, mine in zip(self.y, y, strict=True):
-            row[where] = mine
+        """Replace the candidates at some positions."""
+        for row, new in zip(self.y, y, strict=True):
+            row[where] = new
         self.behind[where], self.ahead[where] = behind, ahead
 
 
-def watch(lanes: Lanes, trial: Trial, accepted: Mask, home: NDArray[np.intp]) -> None:
-    """Note where the watched quantity begins to fall, or a lane lands, above all that was noted before."""
-    seen, watched = lanes.k[WATCHED], trial.k[WATCHED]
-    at = ((watched < seen) & accepted & (seen > lanes.best)).nonzero()[0]
+def begins_to_fall(before: Array, after: Array, best: Array) -> Mask:
+    """Whether the watched quantity falls over a step, from a value above the best one so far."""
+    return (after < before) & (before > best)
+
+
+def secant_update(left: Array, d_left: Array, right: Array, d_right: Array) -> Array:
+    """The root of the secant through two slopes, as a fraction of the step; the right end where it is outside."""
+    root = right - d_right * (right - left) / (d_right - d_left)
+    return choose((root >= 0.0) & (root <= 1.0), root, right)
+
+
+def note_peaks(state: State, trial: TrialStep, accepted: Mask, ended: NDArray[np.intp]) -> None:
+    """Note where the watched quantity begins to fall, or a trajectory ends, above all that was noted before."""
+    before, after = state.k[WATCHED], trial.k[WATCHED]
+    at = (begins_to_fall(before, after, state.best) & accepted).nonzero()[0]
     if at.size:
-        lanes.best[at] = seen[at]
-        lanes.top.put(lanes.index[at], lanes.y[:COMPONENTS, at], lanes.last[at], lanes.h[at])
-    home = home[watched[home] > lanes.best[home]]
-    if home.size:
-        lanes.best[home] = watched[home]
-        lanes.top.put(lanes.index[home], trial.new[:COMPONENTS, home], lanes.h[home], 0.0)
+        state.best[at] = before[at]
+        state.peak.put(state.index[at], state.y[:COMPONENTS, at], state.h_last[at], state.h[at])
+    ended = ended[after[ended] > state.best[ended]]
+    if ended.size:
+        state.best[ended] = after[ended]
+        state.peak.put(state.index[ended], trial.y[:COMPONENTS, ended], state.h[ended], 0.0)
 
 
-def search(problem: Problem, columns: Columns, top: Top, best: Array, space: Space) -> None:
-    """Raise the values at the tops, shape (n,), to the maxima beside them.
+def refine_maximum(
+    problem: Problem, params: Params, peak: PeakCandidate, best: Array, take_step: TakeStep
+) -> None:
+    """Raise the values at the candidates, shape (n,), to the maxima beside them.
 
-    The secant rule finds where the slope along the trajectory vanishes, by true steps from the top into the step
-    that is ahead of it or, where it falls there already, back into the one behind.
+    The secant rule finds where the slope along the trajectory vanishes, by true steps from the candidate into the
+    step ahead of it or, where the slope is negative there already, back into the one behind.
     """
-    small = DIFFERENCE * np.maximum(top.behind, top.ahead)
+    small = DIFFERENCE * np.maximum(peak.behind, peak.ahead)
 
     def slope(y: Array, k: Array) -> Array:
-        ahead = problem.rates(y[:COMPONENTS] + small * k[:COMPONENTS], columns)
+        ahead = problem.rates(y[:COMPONENTS] + small * k[:COMPONENTS], params)
         return np.asarray((ahead[WATCHED] - k[WATCHED]) / small)
 
-    k = problem.rates(top.y, columns, space.k)
-    d_top = slope(top.y, k)
-    h = np.where(d_top > 0.0, top.ahead, -top.behind)
-    at = np.flatnonzero(np.abs(d_top * h) > FLAT * np.abs(best))
+    k = problem.rates(peak.y, params)
+    d_peak = slope(peak.y, k)
+    h = np.where(d_peak > 0.0, peak.ahead, -peak.behind)
+    at = np.flatnonzero(np.abs(d_peak * h) > FLAT * np.abs(best))
     if not at.size:
         return
-    small, columns, space = small[at], tuple(column[at] for column in columns), space.narrow(at.size)
-    h, k, d_top = h[at], k.take(at, 1), d_top[at]
+    small, params = small[at], tuple(column[at] for column in params)
+    h, k, d_peak = h[at], k.take(at, 1), d_peak[at]
     y = np.zeros((INTEGRATED, at.size))
-    y[:COMPONENTS] = top.y[:, at]
+    y[:COMPONENTS] = peak.y[:, at]
 
-    def slope_after(part: Array) -> Array:
-        new, stages = attempt(problem, y, k, part * h, columns, space)
-        best[at] = np.fmax(best[at], stages[-1][WATCHED])
-        return slope(new, stages[-1])
+    def slope_after(fraction: Array) -> Array:
+        y_end, k_end = take_step(at, y, k, fraction * h)
+        best[at] = np.fmax(best[at], k_end[WATCHED])
+        return slope(y_end, k_end)
 
     left, right = np.zeros(at.size), np.ones(at.size)
-    d_left, d_right = d_top, slope_after(right)
-    for _ in range(GUESSES):
-        guess = right - d_right * (right - left) / (d_right - d_left)
-        guess = np.where((guess >= 0.0) & (guess <= 1.0), guess, right)
-        left, d_left, right, d_right = right, d_right, guess, slope_after(guess)
+    d_left, d_right = d_peak, slope_after(right)
+    for _ in range(SECANT_STEPS):
+        root = secant_update(left, d_left, right, d_right)
+        left, d_left, right, d_right = right, d_right, root, slope_after(root)

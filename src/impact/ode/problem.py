@@ -1,4 +1,4 @@
-"""What the integrator is given, and what it gives back: a problem of many lanes, its steps and its outcome."""
+"""What the integrator takes and returns: a problem of many trajectories, its steps and its solution."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from .tableau import DENSE_WEIGHTS
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-Columns = tuple[Array, ...]
-Event = Callable[[Array, Array, Columns], tuple[Array, Array]]
+Params = tuple[Array, ...]
+Event = Callable[[Array, Array, Params], tuple[Array, Array]]
 
 # rows of a state: two components and two quadratures; rates have one row more, the watched quantity
 COMPONENTS, INTEGRATED, WATCHED = 2, 4, 4
 
 
-class End(IntEnum):
-    """How a lane ended."""
+class Termination(IntEnum):
+    """How a trajectory ended."""
 
     RUNNING = 0
-    LANDED = 1
-    LOST = 2
+    EVENT_REACHED = 1
+    EVENT_UNREACHABLE = 2
     MAX_STEPS = 3
     STEP_UNDERFLOW = 4
     NOT_FINITE = 5
@@ -35,7 +35,7 @@ class End(IntEnum):
 class Rates(Protocol):
     """See `Problem`."""
 
-    def __call__(self, y: Array, columns: Columns, out: Array | None = None, /) -> Array: ...
+    def __call__(self, y: Array, params: Params, out: Array | None = None, /) -> Array: ...
 
 
 @dataclass(frozen=True)
@@ -44,12 +44,12 @@ class Problem:
 
     Parameters
     ----------
-    rates : (y, columns, out=None) -> rates of the two components and the two quadratures, and the watched
+    rates : (y, params, out=None) -> rates of the two components and the two quadratures, and the watched
         quantity, of shape (5, n), at components y of shape (2, n); they may be written into `out`, and the last
         rows left out that it has no room for
-    event : (y, k, columns) -> (g, dg): a function that is positive until the lane ends, and its rate along the
-        trajectory, at components y where the rates are k
-    lost : (y, k, columns) -> mask of the lanes that can no longer reach the event
+    event : (y, k, params) -> (g, dg): a function that is positive until the trajectory ends, and its rate along
+        the trajectory, at components y where the rates are k
+    unreachable : (y, k, params) -> mask of the trajectories that can no longer reach the event
     floor : the local error of each component is judged against rtol max(|y|, floor)
     watch : locate the maximum of the watched quantity
     first : the length of a step whose error is of the order of 1, by which the first one is chosen
@@ -57,7 +57,7 @@ class Problem:
 
     rates: Rates
     event: Event
-    lost: Callable[[Array, Array, Columns], Mask]
+    unreachable: Callable[[Array, Array, Params], Mask]
     floor: tuple[float, float]
     watch: bool = False
     first: float = 1.0
@@ -90,22 +90,22 @@ class Step:
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """Where each lane ended: state (4, n), maximum of the watched quantity, accepted steps, how it ended (n,)."""
+class Solution:
+    """The end of each trajectory: state (4, n), maximum of the watched quantity, accepted steps, termination."""
 
     state: Array
     maximum: Array
     steps: NDArray[np.int32]
-    end: NDArray[np.int8]
+    termination: NDArray[np.int8]
     recorded: tuple[Step, ...] = ()
 
     @classmethod
-    def unwritten(cls, n: int) -> Outcome:
-        """Room for n lanes."""
+    def empty(cls, n: int) -> Solution:
+        """Arrays for n trajectories, to be filled."""
         return cls(np.empty((INTEGRATED, n)), np.empty(n), np.empty(n, np.int32), np.empty(n, np.int8))
 
     @classmethod
-    def blank(cls, n: int) -> Outcome:
-        """n lanes of which nothing is known."""
+    def blank(cls, n: int) -> Solution:
+        """n trajectories of which nothing is known."""
         unknown = np.full((INTEGRATED, n), np.nan)
         return cls(unknown, np.full(n, np.nan), np.zeros(n, np.int32), np.zeros(n, np.int8))

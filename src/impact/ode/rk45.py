@@ -1,162 +1,375 @@
-"""Adaptive Dormand-Prince 5(4) over many lanes: every lane has its own step, all are advanced as arrays.
+"""Adaptive Dormand-Prince 5(4) for many trajectories: each has its own step, all are advanced as arrays.
 
-A lane is one initial value problem of two components that ends where an event function falls through zero.
+A trajectory is one initial value problem of two components that ends where an event function falls through zero.
 Beside the two, rates that depend on them alone are integrated as quadratures with the same weights, and one
-quantity is watched for its maximum. All arithmetic is elementwise and in a fixed order, so that a lane has the
-same bits alone, in any crowd and in any order.
+quantity is watched for its maximum. All arithmetic is elementwise and in a fixed order, so that a trajectory has
+the same bits alone, in any batch and in any order.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
-from functools import cache
+from dataclasses import dataclass, replace
+from fractions import Fraction
 
 import numpy as np
+from numpy.typing import NDArray
 
-from .event import land
-from .lanes import RUNNING, Lanes, Trial
-from .maximum import search, watch
-from .problem import Array, Columns, End, Outcome, Problem, Step
-from .step import Space, attempt, local_error
+from .events import choose, locate_event
+from .maximum import PeakCandidate, note_peaks, refine_maximum
+from .problem import COMPONENTS, INTEGRATED, WATCHED, Array, Mask, Params, Problem, Solution, Step, Termination
+from .tableau import A, E
 
 # the controller: a step is multiplied by SAFETY/error^GAIN, within bounds; exponents are in parts of 256. The
-# order would have it a FIFTH, but steps that follow the error by less are smoother, and hardly any is rejected
-SAFETY, SMALLEST, LARGEST, GAIN, FIFTH = 0.87, 0.2, 3.0, 36, 51
-LAST_STEP = 1e-16
-# after so many halvings a rate is taken to be not finite for good; they are counted over the whole lane, since
+# order of the method suggests a FIFTH, but with a smaller exponent steps vary less, and hardly any is rejected
+SAFETY, MIN_FACTOR, MAX_FACTOR, GAIN, FIFTH = 0.87, 0.2, 3.0, 36, 51
+MIN_STEP = 1e-16
+# after so many halvings a rate is taken to stay not finite; they are counted over the whole trajectory, since
 # towards a point beyond which there is no rate every halved step is accepted
-HALVINGS = 20
-# lanes that are done are taken out when they are more than this fraction
+MAX_HALVINGS = 20
+# trajectories that have ended are removed when they are more than this fraction
 COMPACT_ABOVE = 0.125
+RUNNING, EVENT_REACHED = int(Termination.RUNNING), int(Termination.EVENT_REACHED)
+
+Nested = tuple[tuple[int, Array], ...]
+
+
+def _nested(row: tuple[Fraction, ...]) -> Nested:
+    """A row of weights for `_weighted`: each relative to the next, zeros left out."""
+    stages = [stage for stage, weight in enumerate(row) if weight]
+    next_weights = [*(row[stage] for stage in stages[1:]), Fraction(1)][: len(stages)]
+    ratios = (float(row[stage] / other) for stage, other in zip(stages, next_weights, strict=True))
+    # as arrays: NumPy converts a float on every call
+    return tuple((stage, np.array(ratio)) for stage, ratio in zip(stages, ratios, strict=True))
+
+
+STAGES, ERROR = tuple(map(_nested, A[1:])), _nested(E)
+# rows of the rates that each stage needs: the second has no part in the solution
+STAGE_ROWS = (WATCHED + 1, COMPONENTS, INTEGRATED, INTEGRATED, INTEGRATED, INTEGRATED, WATCHED + 1)
+
+
+def _keep_freed_memory() -> None:
+    """Allocate and free 16 MiB once, after which glibc keeps freed arrays of that size for the next ones.
+
+    It would else return them to the system every few steps; the first use of new pages is slow.
+    """
+    np.empty(1 << 21)
+
+
+_keep_freed_memory()
+
+
+@dataclass
+class Workspace:
+    """Memory for the rows and rates of a batch, and for a step: later stages, rows at its end, a sum of stages."""
+
+    y: Array
+    k: Array
+    stages: list[Array]
+    y_end: Array
+    part: Array
+
+    @classmethod
+    def of(cls, n: int) -> Workspace:
+        """For n trajectories, in one block of memory."""
+        rows = (INTEGRATED, WATCHED + 1, *STAGE_ROWS[1:], INTEGRATED, COMPONENTS)
+        block = np.empty((sum(rows), n))
+        y, k, *stages, y_end, part = np.split(block, np.cumsum(rows)[:-1])
+        return cls(y, k, stages, y_end, part)
+
+    def narrow(self, n: int) -> Workspace:
+        """The same memory for fewer trajectories."""
+        stages = [_narrow(stage, n) for stage in self.stages]
+        ends = (_narrow(rows, n) for rows in (self.y_end, self.part))
+        return Workspace(_narrow(self.y, n), _narrow(self.k, n), stages, *ends)
+
+
+def _narrow(rows: Array, n: int) -> Array:
+    """The memory of an array of rows, for rows of length n."""
+    return rows.reshape(-1)[: len(rows) * n].reshape(len(rows), n)
+
+
+@dataclass
+class State:
+    """The trajectories that still run, in arrays that are compacted together; the last axis is the trajectory.
+
+    `h` is the length of the next step, `h_last` that of the one before. `best` is the largest watched value at the
+    end of a step from which it fell or at which the trajectory ended; `peak`, of all trajectories, is where.
+    """
+
+    index: NDArray[np.intp]
+    params: Params
+    y: Array
+    k: Array
+    h: Array
+    h_last: Array
+    halvings: NDArray[np.int8]
+    steps: NDArray[np.int32]
+    termination: NDArray[np.int8]
+    best: Array
+    peak: PeakCandidate
+    workspace: Workspace
+
+    @classmethod
+    def begin(cls, problem: Problem, start: Array, params: Params, workspace: Workspace, h: float) -> State:
+        """All trajectories at their start; rows that the start does not have are zero."""
+        n = start.shape[1]
+        y, k = workspace.y, workspace.k
+        y[: len(start)], y[len(start) :] = start, 0.0
+        start = start[:COMPONENTS]
+        np.copyto(k, problem.rates(start, params, k))
+        return cls(
+            index=np.arange(n),
+            params=params,
+            y=y,
+            k=k,
+            h=np.full(n, h),
+            h_last=np.zeros(n),
+            halvings=np.zeros(n, np.int8),
+            steps=np.zeros(n, np.int32),
+            termination=np.full(n, RUNNING, np.int8),
+            best=np.full(n, -np.inf),
+            peak=PeakCandidate.of(start),
+            workspace=workspace,
+        )
+
+    def put(self, solution: Solution) -> None:
+        """Write the trajectories that have ended to the solution."""
+        at = np.flatnonzero(self.termination != RUNNING)
+        where, termination = self.index[at], self.termination[at]
+        reached = termination == EVENT_REACHED
+        for row, values in zip(solution.state, self.y, strict=True):
+            row[where] = np.where(reached, values[at], np.nan)
+        solution.maximum[where] = np.where(reached, self.best[at], np.nan)
+        solution.steps[where], solution.termination[where] = self.steps[at], termination
+
+    def compacted(self) -> State:
+        """Those that still run, in the same memory: what is kept moves into the spare array of each pair."""
+        kept = np.flatnonzero(self.termination == RUNNING)
+        workspace = self.workspace.narrow(kept.size)
+        y = self.y.take(kept, 1, workspace.y_end, "clip")
+        k = self.k.take(kept, 1, workspace.stages[-1], "clip")
+        workspace.y_end, workspace.stages[-1] = _narrow(self.y, kept.size), _narrow(self.k, kept.size)
+        return State(
+            index=self.index[kept],
+            params=tuple(column[kept] for column in self.params),
+            y=y,
+            k=k,
+            h=self.h[kept],
+            h_last=self.h_last[kept],
+            halvings=self.halvings[kept],
+            steps=self.steps[kept],
+            termination=self.termination[kept],
+            best=self.best[kept],
+            peak=self.peak,
+            workspace=workspace,
+        )
+
+
+@dataclass(frozen=True)
+class TrialStep:
+    """A step tried in all trajectories: rows and rates at its end, whether it is accurate, the next step."""
+
+    y: Array
+    k: Array
+    is_accurate: Mask
+    h_next: Array
 
 
 def integrate(
     problem: Problem,
     start: Array,
-    columns: Columns,
+    params: Params,
     *,
     rtol: float,
     max_steps: int,
     record: bool = False,
-    space: Space | None = None,
-) -> Outcome:
-    """Integrate every lane from its start to its event.
+    workspace: Workspace | None = None,
+) -> Solution:
+    """Integrate every trajectory from its start to its event.
 
     Parameters
     ----------
     problem : rates, event and error scale
-    start : components at the start, shape (2, n); or all rows, of shape (4, n), where it goes on
-    columns : what the rates need per lane, each of shape (n,)
+    start : components at the start, shape (2, n); or all rows, shape (4, n), where it continues
+    params : what the rates need per trajectory, each of shape (n,)
     rtol : local error per step, relative to max(|y|, floor)
-    max_steps : attempted steps after which a lane is given up
-    record : keep every accepted step for the interpolant; for a single lane
-    space : room of an earlier call for as many lanes or more
+    max_steps : attempted steps after which a trajectory fails
+    record : keep every accepted step for the interpolant; for a single trajectory
+    workspace : memory of an earlier call for as many trajectories or more
 
     Returns
     -------
-    Outcome : a failed lane has NaN for its state, and its reason in `end`
+    Solution : a failed trajectory has NaN for its state, and its reason in `termination`
     """
     n = start.shape[1]
-    outcome = Outcome.blank(n)
+    solution = Solution.blank(n)
     recorded: list[Step] = []
-    space = Space.of(n) if space is None else space.narrow(n)
+    workspace = Workspace.of(n) if workspace is None else workspace.narrow(n)
     with np.errstate(all="ignore"):
-        lanes = Lanes.begin(problem, start, columns, space.narrow(n), first_step(problem, rtol))
+        state = State.begin(problem, start, params, workspace.narrow(n), first_step(problem, rtol))
         for count in range(1, max_steps + 1):
-            step = _advance(problem, lanes, rtol, record)
+            step = _advance(problem, state, rtol, record)
             if step is not None:
                 recorded.append(step)
             if count == max_steps:
-                lanes.end[lanes.end == RUNNING] = End.MAX_STEPS
-            if np.count_nonzero(lanes.end) <= COMPACT_ABOVE * lanes.end.size and count < max_steps:
+                state.termination[state.termination == RUNNING] = Termination.MAX_STEPS
+            if np.count_nonzero(state.termination) <= COMPACT_ABOVE * state.termination.size and count < max_steps:
                 continue
-            lanes.put(outcome)
-            lanes = lanes.compacted()
-            if not lanes.index.size:
+            state.put(solution)
+            state = state.compacted()
+            if not state.index.size:
                 break
         if problem.watch:
-            search(problem, columns, lanes.top, outcome.maximum, space)
-    return replace(outcome, recorded=tuple(recorded))
+
+            def take_step(at: NDArray[np.intp], y: Array, k: Array, h: Array) -> tuple[Array, Array]:
+                some = tuple(column[at] for column in params)
+                y_end, stages = rk_step(problem, y, k, h, some, workspace.narrow(at.size))
+                return y_end, stages[-1]
+
+            refine_maximum(problem, params, state.peak, solution.maximum, take_step)
+    return replace(solution, recorded=tuple(recorded))
 
 
-def _advance(problem: Problem, lanes: Lanes, rtol: float, record: bool) -> Step | None:
-    """Try one step in every running lane; accept, land or shorten it. Returns a step to be recorded."""
-    y, h, space, running = lanes.y, lanes.h, lanes.space, lanes.end == RUNNING
-    new, stages = attempt(problem, y, lanes.k, h, lanes.columns, space)
-    worst = local_error(problem, stages, y, new, h, space)
-    trial = Trial(new, stages[-1], worst <= rtol, _following(h, worst, rtol))
-    if np.count_nonzero(trial.within) < worst.size:
-        _halve(lanes, trial, worst)
-    accepted = trial.within & running
-    home, rest = land(problem, lanes, trial, accepted)
-    accepted &= trial.within
+def _advance(problem: Problem, state: State, rtol: float, record: bool) -> Step | None:
+    """Try one step in every running trajectory; accept, end or shorten it. Returns a step to be recorded."""
+    y, h, workspace, running = state.y, state.h, state.workspace, state.termination == RUNNING
+    y_end, stages = rk_step(problem, y, state.k, h, state.params, workspace)
+    error = local_error(problem, stages, y, y_end, h, workspace)
+    trial = TrialStep(y_end, stages[-1], error <= rtol, next_step(h, error, rtol))
+    if np.count_nonzero(trial.is_accurate) < error.size:
+        _halve(state, trial, error)
+    accepted = trial.is_accurate & running
+    ended, offset = locate_event(problem, state, trial, accepted)
+    accepted &= trial.is_accurate
 
     if problem.watch:
-        watch(lanes, trial, accepted, home)
-    lost = problem.lost(new, trial.k, lanes.columns)
-    if np.count_nonzero(lost):
-        lanes.end[lost & accepted & (lanes.end == RUNNING)] = End.LOST
-    small = trial.following < LAST_STEP
+        note_peaks(state, trial, accepted, ended)
+    unreachable = problem.unreachable(y_end, trial.k, state.params)
+    if np.count_nonzero(unreachable):
+        unreachable &= accepted & (state.termination == RUNNING)
+        state.termination[unreachable] = Termination.EVENT_UNREACHABLE
+    small = trial.h_next < MIN_STEP
     if np.count_nonzero(small):
-        lanes.end[small & (lanes.end == RUNNING)] = End.STEP_UNDERFLOW
-    lanes.steps += accepted
-    end = 1.0 + rest if home.size else np.ones(1)
+        state.termination[small & (state.termination == RUNNING)] = Termination.STEP_UNDERFLOW
+    state.steps += accepted
+    end = 1.0 + offset if ended.size else np.ones(1)
     step = Step.of(y, h, stages, end) if record and accepted[0] else None
-    _move(lanes, trial)
+    _move(state, trial)
     return step
 
 
-def first_step(problem: Problem, rtol: float) -> float:
-    """The length of the first step, by which none of an ordinary impact is rejected."""
-    return problem.first * _of_tolerance(rtol)
+def rk_step(
+    problem: Problem, y: Array, k: Array, h: Array, params: Params, workspace: Workspace
+) -> tuple[Array, list[Array]]:
+    """One step of length h from rows y whose rates are k: rows at its end, the seven stages; in the workspace."""
+    stages, slopes = [k], [k[:COMPONENTS]]
+    part, y_end, start = workspace.part, workspace.y_end, y[:COMPONENTS]
+    for weights, rows in zip(STAGES[:-1], workspace.stages[:-1], strict=True):
+        _weighted(weights, slopes, part)
+        np.multiply(part, h, part)
+        np.add(part, start, part)
+        stages.append(problem.rates(part, params, rows))
+        slopes.append(stages[-1][:COMPONENTS])
+    _weighted(STAGES[-1], [stage[:INTEGRATED] for stage in stages], y_end)
+    np.multiply(y_end, h, y_end)
+    np.add(y_end, y, y_end)
+    stages.append(problem.rates(y_end[:COMPONENTS], params, workspace.stages[-1]))
+    return y_end, stages
 
 
-@cache
-def _of_tolerance(rtol: float) -> float:
-    """What the step of an error of 1 is to be multiplied by, in full."""
-    return float(_factor(np.ones(1), rtol, FIFTH)[0])
+def _weighted(weights: Nested, stages: list[Array], total: Array) -> None:
+    """The weighted sum of the stages, in order, by Horner's scheme: it needs no memory for terms."""
+    (first, weight), *rest = weights
+    np.multiply(stages[first], weight, total)
+    for stage, weight in rest:
+        np.add(total, stages[stage], total)
+        np.multiply(total, weight, total)
 
 
-def _following(h: Array, worst: Array, rtol: float) -> Array:
+def local_error(
+    problem: Problem, stages: list[Array], y: Array, y_end: Array, h: Array, workspace: Workspace
+) -> Array:
+    """The norm of the local error of a step, shape (n,)."""
+    error = workspace.part
+    _weighted(ERROR, [stage[:COMPONENTS] for stage in stages], error)
+    np.multiply(error, h, error)
+    return error_norm(error[0], error[1], y[0], y[1], y_end[0], y_end[1], problem.floor)
+
+
+# The formulas from here to `next_step` hold for arrays and, compiled, for numbers; the compiled back end has own
+# versions of `larger`, `larger_quotient`, `bits` and `from_bits`.
+
+
+def larger(one: Array, other: Array | float) -> Array:
+    """The larger of two values."""
+    return np.maximum(one, other)
+
+
+def larger_quotient(one: Array, divisor: Array, other: Array, other_divisor: Array) -> Array:
+    """The larger of two quotients; NaN where one is NaN."""
+    return np.maximum(one / divisor, other / other_divisor)
+
+
+def error_norm(
+    error_0: Array, error_1: Array, y_0: Array, y_1: Array, end_0: Array, end_1: Array, floor: tuple[float, float]
+) -> Array:
+    """The larger error of the two components, each relative to the largest of |y|, |y_end| and its floor."""
+    scale_0 = larger(larger(np.abs(y_0), np.abs(end_0)), floor[0])
+    scale_1 = larger(larger(np.abs(y_1), np.abs(end_1)), floor[1])
+    return larger_quotient(np.abs(error_0), scale_0, np.abs(error_1), scale_1)
+
+
+def bits(number: Array | float) -> NDArray[np.int64]:
+    """The bits of a number as an integer."""
+    return np.asarray(number, float).view(np.int64)
+
+
+def from_bits(whole: NDArray[np.int64]) -> Array:
+    """The number that has these bits."""
+    return np.asarray(whole, np.int64).view(np.float64)
+
+
+SAFETY_BITS = int(bits(SAFETY))
+
+
+def step_factor(error: Array, rtol: float, exponent: int) -> Array:
+    """SAFETY (rtol/error)^(exponent/256), within a few per cent.
+
+    The bits of a number, taken as an integer, are its logarithm within a few per cent. Unlike those of a power
+    they are the same on every processor.
+    """
+    return from_bits(SAFETY_BITS + (bits(rtol) >> 8) * exponent - (bits(error) >> 8) * exponent)
+
+
+def next_step(h: Array, error: Array, rtol: float) -> Array:
     """The length of the next step by the controller."""
-    following = _factor(worst, rtol, GAIN)
-    np.minimum(following, LARGEST, out=following)
-    np.maximum(following, SMALLEST, out=following)
-    following *= h
-    return following
+    factor = step_factor(error, rtol, GAIN)
+    factor = choose(factor < MAX_FACTOR, factor, MAX_FACTOR)
+    return h * choose(factor > MIN_FACTOR, factor, MIN_FACTOR)
 
 
-def _factor(worst: Array, rtol: float, exponent: int) -> Array:
-    """What the step of an error is to be multiplied by."""
-    # the bits of a number taken for an integer are its logarithm, but for a few per cent; unlike those of a power
-    # they are the same on every processor
-    bits = worst.view(np.int64) >> 8
-    bits *= exponent
-    np.subtract(_bits(SAFETY) + (_bits(rtol) >> 8) * exponent, bits, bits)
-    return bits.view(np.float64)
+def first_step(problem: Problem, rtol: float) -> float:
+    """The length of the first step, which is accepted in ordinary impacts."""
+    return problem.first * float(step_factor(np.ones(1), rtol, FIFTH)[0])
 
 
-def _bits(number: float) -> int:
-    return int(np.float64(number).view(np.int64))
-
-
-def _halve(lanes: Lanes, trial: Trial, worst: Array) -> None:
+def _halve(state: State, trial: TrialStep, error: Array) -> None:
     """Halve a step with a rate that is not finite."""
-    at = np.flatnonzero(~trial.within)
-    at = at[~np.isfinite(worst[at]) & (lanes.end[at] == RUNNING)]
-    trial.following[at] = 0.5 * lanes.h[at]
-    lanes.halvings[at] += 1
-    lanes.end[at[lanes.halvings[at] > HALVINGS]] = End.NOT_FINITE
+    at = np.flatnonzero(~trial.is_accurate)
+    at = at[~np.isfinite(error[at]) & (state.termination[at] == RUNNING)]
+    trial.h_next[at] = 0.5 * state.h[at]
+    state.halvings[at] += 1
+    state.termination[at[state.halvings[at] > MAX_HALVINGS]] = Termination.NOT_FINITE
 
 
-def _move(lanes: Lanes, trial: Trial) -> None:
-    """Go to the ends of the steps accepted; a lane that has ended stands still until it is taken out."""
-    stay = (~trial.within).nonzero()[0]
+def _move(state: State, trial: TrialStep) -> None:
+    """Go to the ends of the accepted steps; a trajectory that has ended stands still until it is removed."""
+    stay = (~trial.is_accurate).nonzero()[0]
     if stay.size:
-        for row, before in (*zip(trial.new, lanes.y, strict=True), *zip(trial.k, lanes.k, strict=True)):
+        for row, before in (*zip(trial.y, state.y, strict=True), *zip(trial.k, state.k, strict=True)):
             row[stay] = before[stay]
-        lanes.h[stay] = lanes.last[stay]
-    lanes.space.new, lanes.y = lanes.y, trial.new
-    lanes.space.stages[-1], lanes.k = lanes.k, trial.k
-    trial.following[lanes.end != RUNNING] = 0.0
-    lanes.last, lanes.h = lanes.h, trial.following
+        state.h[stay] = state.h_last[stay]
+    state.workspace.y_end, state.y = state.y, trial.y
+    state.workspace.stages[-1], state.k = state.k, trial.k
+    trial.h_next[state.termination != RUNNING] = 0.0
+    state.h_last, state.h = state.h, trial.h_next

@@ -1,26 +1,73 @@
-"""Attributes of a result that hold JSON; the file may come from anywhere."""
+"""Attributes of a result that hold JSON: read and validated here only, since the file may come from anywhere."""
 
 from __future__ import annotations
 
-import json
+from collections.abc import Mapping
+from functools import cache
 from typing import Any
 
-import xarray as xr
+from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from ..errors import ResultError
+from ..text import safe_text
 
 
-def json_object(dataset: xr.Dataset, attribute: str) -> dict[str, Any]:
-    """What an attribute holds as JSON."""
+class PluginRecord(BaseModel):
+    """What a result records of a model that is not built in; see `impact.engine.plugins.Plugin.record`."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+    file: str | None
+    sha256: str | None
+    package: str | None = None
+
+
+KINDS: Mapping[str, Any] = {
+    "axes": list[str],
+    "config_set": list[str],
+    "extended": list[Any],
+    "inputs": dict[str, float | str],
+    "laws": dict[str, dict[str, Any]],
+    "materials": dict[str, dict[str, Any]],
+    "packages": dict[str, Any],
+    "plugins": dict[str, PluginRecord],
+    "tolerances": dict[str, Any],
+}
+
+
+def read_attribute(attributes: Mapping[Any, Any], name: str, source: str = "", *, required: bool = False) -> Any:
+    """The value of a JSON attribute.
+
+    Parameters
+    ----------
+    attributes : of a result
+    name : one of `KINDS`
+    source : name of the result, for messages
+    required : refuse a result without the attribute; else its value is empty there
+
+    Raises
+    ------
+    ResultError : it is missing, is not JSON, or is JSON of another kind
+
+    >>> read_attribute({"config_set": '["sweep.m2=2.0"]'}, "config_set")
+    ['sweep.m2=2.0']
+    >>> read_attribute({"plugins": '{"mine": 3}'}, "plugins", "r.h5")
+    Traceback (most recent call last):
+    impact.errors.ResultError: r.h5: attribute plugins: no JSON of the right kind
+    """
+    kind = KINDS[name]
+    if name not in attributes and not required:
+        return [] if kind in (list[str], list[Any]) else {}
+    text = attributes.get(name)
     try:
-        return dict(json.loads(dataset.attrs.get(attribute, "{}")))
-    except (ValueError, TypeError, RecursionError):
-        raise ResultError(f"the attribute {attribute} is not that of a result") from None
+        if isinstance(text, str):
+            return _adapter(name).validate_json(text, strict=True)
+    except ValidationError:
+        pass
+    what = "missing" if text is None else "no JSON of the right kind"
+    raise ResultError(f"{safe_text(source)}{': ' if source else ''}attribute {name}: {what}")
 
 
-def json_table(dataset: xr.Dataset, attribute: str) -> dict[str, dict[str, Any]]:
-    """The same, where each entry is a table again."""
-    found = json_object(dataset, attribute)
-    if not all(isinstance(one, dict) for one in found.values()):
-        raise ResultError(f"the attribute {attribute} is not that of a result")
-    return found
+@cache
+def _adapter(name: str) -> TypeAdapter[Any]:
+    return TypeAdapter(KINDS[name])

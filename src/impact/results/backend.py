@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from xarray.backends import BackendEntrypoint
 
 from ..atomic import Sink, appearing
+from ..config.tables import Output
 from ..errors import ResultError, UnfinishedError, UsageError
-from ..sweeps.settings import Output
 from ..text import safe_text
 from .expand import TrajectoryTable, in_memory, lazy_dataset
 from .factored import check_witnesses, stored_table, variables_of
@@ -265,19 +265,8 @@ def _named(shown: str, error: ResultError) -> ResultError:
 def load(path: str | Path) -> xr.Dataset:
     """Open a result, and read or compute all of its values if they are few: at most 512 MB.
 
-    Of a larger one they are read or computed when they are indexed; see `open_result`.
-
-    Parameters
-    ----------
-    path : a file that `impact sweep` or `impact run --history` wrote
-
-    Raises
-    ------
-    ResultError : it does not exist, is no result, is damaged, or is of another schema version
-
-    Warns
-    -----
-    UserWarning : it holds more than a result does, which is passed over
+    Of a larger one they are read or computed when they are indexed; see `open_result`, also for what it raises and
+    warns of.
 
     >>> import impact
     >>> impact.load("README.md")  # doctest: +ELLIPSIS

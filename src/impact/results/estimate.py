@@ -8,11 +8,12 @@ import pickle
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
+from ..contact.simulate import TABLE_COLUMNS
 from ..engine.checkpoint import pack
 from ..engine.execute import context_of, integrate, with_core
 from ..engine.plan import Plan
@@ -35,7 +36,7 @@ class Collapse:
     Parameters
     ----------
     model : its key
-    points, cells, trajectories : of the grid; of the product of the axes that its values come from; integrated
+    points, cells, trajectories : of its own; of the product of the axes that its values come from; integrated
     axes : those axes
     within : where equal values are found: over the whole "plan", within a "block" only, or "not" at all
     """
@@ -102,9 +103,9 @@ def estimate(plan: Plan, jobs: int = 1) -> Estimate:
     slab = values["status"].size
     is_full = plan.layout == "full"
     each, own = integrating() / chosen.size, DASK * driving() / chosen.size
-    after = assembling() / slab * plan.points if is_full else 0.0
+    after = assembling() / slab * plan.stored_points if is_full else 0.0
     busy = min(max(round(each / own), 1), len(ranges))
-    kept = total * sum(getattr(rebound, column.name).itemsize for column in fields(rebound))
+    kept = total * sum(getattr(rebound, name).itemsize for name in TABLE_COLUMNS)
     whole = outline(plan)
     counts = [*(count for count in WORKERS if count < busy), busy]
     return Estimate(
@@ -131,7 +132,8 @@ def _timed() -> Iterator[Callable[[], float]]:
 
 def _collapse(plan: Plan, own: TrajectoryMap) -> Collapse:
     axes = tuple(plan.config.axes[axis].name for axis in own.axes)
+    key = plan.models[own.model].key
     within: Literal["plan", "block", "not"] = "block" if not own.is_shared else "plan"
     if not plan.config.solver.collapse:
         within = "not"
-    return Collapse(plan.models[own.model].key, plan.inputs.cells, own.cells, own.count, axes, within)
+    return Collapse(key, plan.inputs.points_of(key), own.cells, own.count, axes, within)

@@ -19,15 +19,16 @@ from numpy.typing import NDArray
 from xarray.backends import BackendArray
 from xarray.core import indexing
 
-from ..contact.collide import CHECKS, Contact, first_look
+from ..config.grid import Axis
+from ..contact.impacts import CHECKS, Impacts, check_inputs
 from ..contact.model import Law
-from ..contact.power import Array
+from ..contact.outputs import Outputs, outputs
+from ..contact.powers import Array
+from ..contact.simulate import CollisionResult
 from ..contact.status import Status
-from ..contact.strike import Rebound
 from ..engine.build_impacts import Stiffness, build_impacts, has_stiffness_rule
-from ..engine.plan import Index, Inputs, Plan, dimensions
+from ..engine.plan import Index, Inputs, Plan, dimensions, owner_of
 from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryMap, axes_of_arrays, even, probe_index
-from ..sweeps.grid import Axis
 from .schema import Variable, attributes_of
 from .slabs import AXES, VARIES_ALONG, aligned_slabs, slabs
 
@@ -51,12 +52,12 @@ class Rows:
     """
 
     maps: Sequence[TrajectoryMap]
-    read: Callable[[int, int, int], Rebound]
+    read: Callable[[int, int, int], CollisionResult]
     segment: int = RANGE_TRAJECTORIES
     # those of the model that was asked for last, where its cells share them
-    _whole: dict[int, Rebound] = field(default_factory=dict)
+    _whole: dict[int, CollisionResult] = field(default_factory=dict)
 
-    def take(self, model: int, rows: NDArray[np.intp]) -> Rebound:
+    def take(self, model: int, rows: NDArray[np.intp]) -> CollisionResult:
         """Some trajectories of a model, arrays of the shape of `rows`."""
         own = self.maps[model]
         if not own.is_shared:
@@ -70,10 +71,10 @@ class Rows:
             self._whole[model] = whole
         return whole.take(rows)
 
-    def _segments(self, model: int, rows: NDArray[np.intp]) -> Rebound:
+    def _segments(self, model: int, rows: NDArray[np.intp]) -> CollisionResult:
         count = self.maps[model].count
         size = even(count, self.segment)
-        found, segment = Rebound.blank(rows.size), rows // size
+        found, segment = CollisionResult.blank(rows.size), rows // size
         for number in np.unique(segment).tolist():
             where = np.flatnonzero(segment == number)
             start = number * size
@@ -102,7 +103,7 @@ class TrajectoryTable:
 
     @cached_property
     def checks(self) -> tuple[frozenset[str], ...]:
-        """What has to be checked at each point of a model; see `impact.contact.collide.first_look`."""
+        """What has to be checked at each point of a model; see `impact.contact.outputs.check_inputs`."""
         return tuple(
             checks_that_may_fail(self.inputs, law, stiffness)
             for law, stiffness in zip(self.laws, self.stiffness, strict=True)
@@ -110,7 +111,7 @@ class TrajectoryTable:
 
 
 def table_of(
-    plan: Plan, maps: Sequence[TrajectoryMap], read: Callable[[int, int, int], Rebound]
+    plan: Plan, maps: Sequence[TrajectoryMap], read: Callable[[int, int, int], CollisionResult]
 ) -> TrajectoryTable:
     """The trajectory table of a plan; for `read` see `Rows`."""
     return TrajectoryTable(plan.inputs, plan.models, tuple(maps), Rows(maps, read), (None,) * len(plan.models))
@@ -131,17 +132,17 @@ def expand(table: TrajectoryTable, model: int, index: Index, names: Sequence[str
     dict : by name, arrays that broadcast to the shape of the index; what does not vary along an axis has length
         one there. A plan without axes has one cell.
     """
-    contact = contact_at(table, model, index)
-    return {name: getattr(contact, name) for name in names}
+    return _expand(table, model, index, names)[1]
 
 
-def contact_at(table: TrajectoryTable, model: int, index: Index) -> Contact:
-    """The collisions of a model at some cells of the grid; see `expand`."""
+def _expand(table: TrajectoryTable, model: int, index: Index, names: Sequence[str]) -> tuple[Impacts, Outputs]:
+    """The inputs and outputs of a model at some cells of the grid; see `expand`."""
     law = table.laws[model]
-    lanes = build_impacts(table.inputs, law, index, table.stiffness[model])
+    impacts = build_impacts(table.inputs, law, index, table.stiffness[model])
     with np.errstate(all="ignore"):
-        status = first_look(law, lanes, table.checks[model])
-    return Contact(law, lanes, table.rows.take(model, table.maps[model].rows(index)), status)
+        checked = check_inputs(law, impacts, table.checks[model])
+    result = table.rows.take(model, table.maps[model].rows(index))
+    return impacts, outputs(law, impacts, result, names, checked)
 
 
 def varies_along(table: TrajectoryTable, model: int, names: Sequence[str]) -> dict[str, tuple[int, ...]]:
@@ -149,21 +150,21 @@ def varies_along(table: TrajectoryTable, model: int, names: Sequence[str]) -> di
     law, inputs = table.laws[model], table.inputs
     # K may depend on n by its value: Hertz's for n = 3/2
     index = probe_index(inputs, {"n"})
-    lanes = build_impacts(inputs, law, index, table.stiffness[model])
+    impacts = build_impacts(inputs, law, index, table.stiffness[model])
     # where something may fail, something does: masks then have all the axes that they may have
     with np.errstate(all="ignore"):
         looked_at = {
-            "e": [lanes.e],
-            "v0": [lanes.v0],
-            "length": [lanes.v0, lanes.length, lanes.energy, lanes.time],
+            "e": [impacts.e],
+            "v0": [impacts.v0],
+            "length": [impacts.v0, impacts.length, impacts.energy, impacts.time],
         }
     shapes = [array.shape for check in table.checks[model] for array in looked_at[check]]
     checked = np.broadcast_shapes((1,) * dimensions(index), *shapes)
     status = _some(checked, Status.NO_IMPACT, Status.OUT_OF_RANGE)
     shape = table.maps[model].rows(index).shape
-    rebound = Rebound.blank(1).take(np.zeros(shape, np.intp))
-    contact = Contact(law, lanes, replace(rebound, status=_some(shape, Status.MAX_STEPS)), status)
-    return {name: tuple(sorted(axes_of_arrays([getattr(contact, name)]))) for name in names}
+    rebound = CollisionResult.blank(1).take(np.zeros(shape, np.intp))
+    values = outputs(law, impacts, replace(rebound, status=_some(shape, Status.MAX_STEPS)), names, status)
+    return {name: tuple(sorted(axes_of_arrays([values[name]]))) for name in names}
 
 
 def _some(shape: tuple[int, ...], *statuses: Status) -> NDArray[np.int8]:
@@ -176,7 +177,7 @@ def _some(shape: tuple[int, ...], *statuses: Status) -> NDArray[np.int8]:
 
 
 def checks_that_may_fail(inputs: Inputs, law: Law, stiffness: Stiffness | None = None) -> frozenset[str]:
-    """The checks of `first_look` that may fail at some point of the grid; the others hold at all of them.
+    """The checks of `check_inputs` that may fail at some point of the grid; the others hold at all of them.
 
     The sizes of a contact are monotonic in the closing speed, the masses, the radii, K and n each, or nearly
     so: they are safe at all points if at the ends of what each of these may be, in any combination, they are far
@@ -190,7 +191,7 @@ def checks_that_may_fail(inputs: Inputs, law: Law, stiffness: Stiffness | None =
     ends: dict[str, tuple[Any, ...]] = {"v1": tuple(speeds.tolist())}
     for axis in inputs.axes:
         for name, values in axis.columns.items():
-            if name not in ("v1", "v2", "e", "alpha"):
+            if name not in ("v1", "v2", "e", "alpha") and owner_of(name) in ("", law.key):
                 is_text = isinstance(values[0], str)
                 ends[name] = tuple(sorted({*values})) if is_text else tuple({min(values), max(values)})
     if stiffness is not None or has_stiffness_rule(inputs, law):
@@ -204,8 +205,8 @@ def checks_that_may_fail(inputs: Inputs, law: Law, stiffness: Stiffness | None =
     axes = tuple(Axis({name: values}) for name, values in ends.items())
     corners = Inputs({name: scalars[name] for name in scalars.keys() - ends.keys()}, axes, inputs.materials)
     with np.errstate(all="ignore"):
-        lanes = build_impacts(corners, law, corners.index())
-        sizes = [lanes.m, lanes.K, lanes.length, lanes.energy, lanes.time]
+        impacts = build_impacts(corners, law, corners.index())
+        sizes = [impacts.m, impacts.K, impacts.length, impacts.energy, impacts.time]
         if not all(np.all((size > SAFE_SIZES[0]) & (size < SAFE_SIZES[1])) for size in sizes):
             failing.add("length")
         if "alpha" in inputs.names():
@@ -344,8 +345,8 @@ def lazy_dataset(outline: xr.Dataset, table: TrajectoryTable, variables: Sequenc
 
 def expanded_slabs(
     table: TrajectoryTable, variables: Sequence[Variable], lengths: Sequence[int] = ()
-) -> Iterator[tuple[int, tuple[slice, ...], Contact, dict[str, NDArray[Any]]]]:
-    """All values of a result, slab by slab: the model, the place, the collisions, and values by name.
+) -> Iterator[tuple[int, tuple[slice, ...], Impacts, dict[str, NDArray[Any]]]]:
+    """All values of a result, slab by slab: the model, the place, the impacts, and values by name.
 
     What depends on the axes alone is there once, with the first model.
 
@@ -358,13 +359,14 @@ def expanded_slabs(
     for model in range(len(table.laws)):
         for places in aligned_slabs(sizes, lengths) if lengths else slabs(sizes):
             where = tuple(places.values())
-            contact = contact_at(table, model, table.inputs.index(where))
+            wanted = [variable for variable in variables if variable.per == "model" or model == 0]
+            index = table.inputs.index(where)
+            impacts, arrays = _expand(table, model, index, [variable.name for variable in wanted])
             values = {}
-            for variable in variables:
-                if variable.per == "model" or model == 0:
-                    values[variable.name] = np.empty(tuple(p.stop - p.start for p in where), variable.dtype)
-                    values[variable.name][...] = _one(getattr(contact, variable.name), where)
-            yield model, where, contact, values
+            for variable in wanted:
+                values[variable.name] = np.empty(tuple(p.stop - p.start for p in where), variable.dtype)
+                values[variable.name][...] = _one(arrays[variable.name], where)
+            yield model, where, impacts, values
 
 
 def in_memory(dataset: xr.Dataset, table: TrajectoryTable, variables: Sequence[Variable]) -> xr.Dataset:

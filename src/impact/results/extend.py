@@ -12,8 +12,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from ..config.grid import MAX_POINTS, Axis, path_of
+from ..config.tables import CORES
+from ..contact.simulate import CollisionResult
 from ..contact.status import OK, Status
-from ..contact.strike import Rebound
 from ..engine.execute import never
 from ..engine.executors import ALONE, Team
 from ..engine.plan import Inputs, Plan
@@ -21,9 +23,8 @@ from ..engine.plugins import Plugins
 from ..engine.progress import Tell
 from ..engine.trajectories import TrajectoryMap, TrajectoryRange, check_count, columns_of, trajectory_maps
 from ..errors import ResultError, UsageError
-from ..sweeps.grid import MAX_POINTS, Axis, path_of
-from ..sweeps.settings import CORES
 from ..text import safe_text
+from .attributes import read_attribute
 from .backend import open_with_table
 from .expand import TrajectoryTable
 from .provenance import stored_config
@@ -86,14 +87,14 @@ def extend(
         axes = tuple(_axis_places(axis, old.inputs, name) for axis in new.config.axes)
         _check_kept(old, axes, name)
         seal = str(before.encoding["seal"])
-        history = [*json.loads(str(before.attrs.get("extended", "[]"))), {"seal": seal, "set": list(overrides)}]
+        history = [*read_attribute(before.attrs, "extended", str(source)), {"seal": seal, "set": list(overrides)}]
         places = _Places(old, new, trajectory_maps(new), axes)
         counted: dict[int, int] = {}
 
         # a full result has no trajectories to hand on to a table, only the values of its points
         fill = places.filler(before) if table is None and new.layout == "full" else None
 
-        def known(part: TrajectoryRange) -> tuple[NDArray[np.bool_], Rebound] | None:
+        def known(part: TrajectoryRange) -> tuple[NDArray[np.bool_], CollisionResult] | None:
             found = None
             if table is not None:
                 found = places.from_table(part, table)
@@ -130,9 +131,9 @@ def _extended_plan(
     more = []
     for axis in asked.axes:
         name = axis.name
-        was = np.atleast_1d(old.inputs.values(name)) if name in old.inputs.names() else np.array([])
+        was = np.atleast_1d(old.inputs.values(name)) if _has_value(old.inputs, name) else np.array([])
         is_there = len(matched([np.asarray(axis.columns[name])], [was])[0]) == was.size if was.size else True
-        if len(axis.columns) == 1 and not is_there:
+        if len(axis.columns) == 1 and not axis.numbered and not is_there:
             values = [*was.tolist(), *(value for value in axis.columns[name] if value not in was.tolist())]
             more.append(f"{'.'.join(map(str, path_of(name)))}={_toml(values)}")
     missing = [model.key for model in old.models if model not in asked.models]
@@ -142,6 +143,11 @@ def _extended_plan(
     if more:
         asked = stored_config(before.attrs, [*overrides, *more], plugins, str(source), max_points)
     return Plan(asked, plugins.of(asked.models))
+
+
+def _has_value(inputs: Inputs, name: str) -> bool:
+    """Whether an axis or a scalar had a value, be it a property of a material."""
+    return inputs.values(name).item(0) is not None
 
 
 def _toml(values: Sequence[object]) -> str:
@@ -158,15 +164,20 @@ def _check_same(old: Plan, new: Plan, name: str) -> None:
     changed += [
         f"model {key}" for key in old.plugins.hashes if old.plugins.hashes[key] != new.plugins.hashes.get(key)
     ]
-    used = new.materials_used
-    changed += [f"materials.{key}" for key, one in old.materials_used.items() if used.get(key, one) != one]
+    used, swept = new.material_record, new.inputs.names()
+    changed += [
+        f"materials.{key}.{field}"
+        for key, properties in old.material_record.items()
+        for field, value in properties.items()
+        if key in used and used[key][field] != value and f"materials.{key}.{field}" not in swept
+    ]
     outputs = old.config.output, new.config.output
     # values that are copied have the variables and the digits of the result
     changed += [
         f"output.{key}" for key in ("variables", "dtype") if getattr(outputs[0], key) != getattr(outputs[1], key)
     ]
     changed += [key for key in old.inputs.names() if key not in new.inputs.names()]
-    changed += [key for key in new.inputs.names() if key not in old.inputs.names() and "." not in key]
+    changed += [key for key in swept if key not in old.inputs.names() and "." not in key]
     moved = [
         key for key in old.inputs.scalars
         if key in new.inputs.scalars and old.inputs.scalars[key] != new.inputs.scalars[key]
@@ -213,11 +224,27 @@ def _axis_places(axis: Axis, old: Inputs, name: str) -> _AxisPlaces:
     if len(axes) > 1:
         shown = safe_text(", ".join(map(str, axis.columns)))
         raise UsageError(f"{name}: {shown} vary together now and did not before; sweep the new config")
+    numbered = {old.axes[place].numbered for place in axes}
+    if numbered - {axis.numbered}:
+        raise UsageError(f"{name}: the points of {safe_text(axis.name)} had other labels; sweep the new config")
     columns = [np.atleast_1d(old.values(column)).tolist() for column in axis.columns]
     size = max(map(len, columns))
-    rows = zip(*(values * size if len(values) == 1 else values for values in columns), strict=True)
-    place = {row: number for number, row in enumerate(rows)}
-    found = [place.get(row, -1) for row in zip(*axis.columns.values(), strict=True)]
+    before = [*zip(*(values * size if len(values) == 1 else values for values in columns), strict=True)]
+    rows = [*zip(*axis.columns.values(), strict=True)]
+    if {old.axes[place].numbered for place in axes} - {axis.numbered}:
+        raise UsageError(f"{name}: the points of {safe_text(axis.name)} had other labels; sweep the new config")
+    if axes and axis.numbered:
+        # a case keeps its number: those that the result has come first, as they were
+        changed = [number for number, row in enumerate(before) if rows[number : number + 1] != [row]]
+        if changed:
+            raise UsageError(
+                f"{name}: --set changes {safe_text(axis.name)} {changed[0]}, expected the cases that the result "
+                "has, in their order, and more after them"
+            )
+        found = [number if number < size else -1 for number in range(axis.size)]
+    else:
+        place = {row: number for number, row in enumerate(before)}
+        found = [place.get(row, -1) for row in rows]
     return _AxisPlaces(next(iter(axes), None), np.array(found, np.intp))
 
 
@@ -240,7 +267,7 @@ class _Places:
 
     def from_table(
         self, part: TrajectoryRange, table: TrajectoryTable
-    ) -> tuple[NDArray[np.bool_], Rebound] | None:
+    ) -> tuple[NDArray[np.bool_], CollisionResult] | None:
         """The trajectories of a range that the smaller result has in its table."""
         model = self.model(part.model)
         if model is None:
@@ -251,11 +278,11 @@ class _Places:
         # what was checked beforehand at the values of the smaller sweep need not hold at those of the larger one
         status = columns_of(self.new, self.maps, part)["status"]
         is_known &= np.where(status == OK, ~np.isin(held.status, CHECKED), held.status == status)
-        rebound = Rebound.blank(part.size)
+        rebound = CollisionResult.blank(part.size)
         rebound.put(np.flatnonzero(is_known), held.take(np.flatnonzero(is_known)))
         return is_known, rebound
 
-    def not_needed(self, part: TrajectoryRange) -> tuple[NDArray[np.bool_], Rebound] | None:
+    def not_needed(self, part: TrajectoryRange) -> tuple[NDArray[np.bool_], CollisionResult] | None:
         """The trajectories of a range that only points have which the smaller result holds in full."""
         own = self.maps[part.model]
         others = [axis for axis in range(len(self.axes)) if axis not in own.axes]
@@ -267,7 +294,7 @@ class _Places:
             needed = np.zeros(own.count, bool)
             needed[own.of_cell[~self._is_old(own, np.arange(own.cells))]] = True
             is_old = ~needed[part.start : part.stop]
-        return is_old, Rebound.blank(part.size)
+        return is_old, CollisionResult.blank(part.size)
 
     def _is_old(self, own: TrajectoryMap, cells: Places) -> NDArray[np.bool_]:
         along = np.unravel_index(cells, own.shape) if own.shape else ()

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,26 +17,26 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from .. import __version__
+from ..config.grid import Axis
 from ..contact.formula import Formula
-from ..contact.material import Material
+from ..contact.materials import Material
 from ..contact.model import Law, Parameter
-from ..contact.power import Array
-from ..contact.status import Status
-from ..contact.strike import Rebound
-from ..engine.build_impacts import Stiffness, has_stiffness_rule
+from ..contact.powers import Array
+from ..contact.simulate import TABLE_COLUMNS, CollisionResult
+from ..contact.status import STATUSES
+from ..engine.build_impacts import Stiffness, has_stiffness_rule, mass_at, values_at
 from ..engine.plan import Index, Inputs
 from ..engine.trajectories import TrajectoryMap
 from ..errors import ResultError, UsageError
-from ..sweeps.grid import Axis
 from ..text import safe_text
+from .attributes import read_attribute
 from .expand import MAX_STIFFNESS_VALUES, Rows, TrajectoryTable, expand, whole_stiffness
 from .scales import scale_of
-from .schema import SCHEMA, Variable, attributes_of, is_input
+from .schema import SCHEMA, Variable, attributes_of, derived_names, is_input
 
 WITNESSES = 1_000
 # how far a witness may be from what is stored, of the scale that `compare` uses for its variable
 WITNESS_TOLERANCE = 1e-12
-COLUMNS = tuple(column.name for column in fields(Rebound))
 SLAB_ROWS = 2**16
 # what a file says of a law, as JSON
 LAW_KINDS: Mapping[str, type] = {
@@ -93,10 +93,10 @@ def factored_outline(outline: xr.Dataset, table: TrajectoryTable, variables: Seq
         sum(sizes) for sizes in zip(*((own.count, own.cells * own.is_shared) for own in table.maps), strict=True)
     )
     witnesses = len(witness_places(len(table.laws) * table.inputs.cells))
-    blank = Rebound.blank(1)
+    blank = CollisionResult.blank(1)
     held: dict[str, Any] = {
         f"trajectory_{name}": _blank("trajectory", rows, getattr(blank, name).dtype, f"{name} of a trajectory")
-        for name in COLUMNS
+        for name in TABLE_COLUMNS
     }
     if cells:
         held["trajectory_of_cell"] = _blank("cell", cells, np.dtype("i4"), "number of the trajectory of a cell")
@@ -147,7 +147,7 @@ def table_values(
         for first in range(0, own.count, SLAB_ROWS):
             rows = np.arange(first, min(first + SLAB_ROWS, own.count))
             part = table.rows.take(model, rows)
-            for name in COLUMNS:
+            for name in TABLE_COLUMNS:
                 yield f"trajectory_{name}", slice(start + first, start + first + rows.size), getattr(part, name)
         start += own.count
         if own.of_cell is not None:
@@ -252,7 +252,7 @@ def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: Read) -> T
                 value += size
             rules.append(rule)
             stored.append(_law(key, about))
-        held = {f"trajectory_{name}": starts[-1] for name in COLUMNS}
+        held = {f"trajectory_{name}": starts[-1] for name in TABLE_COLUMNS}
         held |= {"trajectory_of_cell": cell} if cell else {}
         held |= {"law_stiffness": value} if value else {}
         if held != {name: size for name, size in sizes.items() if not name.startswith("witness_")}:
@@ -261,9 +261,9 @@ def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: Read) -> T
     except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError):
         raise ResultError("is not a readable result (its laws do not fit its table)") from None
 
-    def rows(model: int, start: int, stop: int) -> Rebound:
+    def rows(model: int, start: int, stop: int) -> CollisionResult:
         part = slice(starts[model] + start, starts[model] + stop)
-        return Rebound(**{name: read(f"trajectory_{name}", part) for name in COLUMNS})
+        return CollisionResult(**{name: read(f"trajectory_{name}", part) for name in TABLE_COLUMNS})
 
     return TrajectoryTable(inputs, tuple(stored), tuple(maps), Rows(maps, rows), tuple(rules))
 
@@ -272,17 +272,14 @@ def _check_status(rows: int, read: Read) -> None:
     """Refuse a status that has no meaning, which a computed one would have as well."""
     for first in range(0, rows, SLAB_ROWS):
         values = read("trajectory_status", slice(first, min(first + SLAB_ROWS, rows)))
-        if values.dtype != np.int8 or not np.isin(np.unique(values), [int(status) for status in Status]).all():
+        if values.dtype != np.int8 or not np.isin(np.unique(values), STATUSES).all():
             raise ValueError
 
 
 def _laws(dataset: xr.Dataset) -> dict[str, dict[str, Any]]:
-    try:
-        laws: dict[str, dict[str, Any]] = json.loads(str(dataset.attrs["laws"]))
-        if list(laws) != [str(key) for key in dataset["model"].values]:
-            raise ValueError
-    except (KeyError, ValueError, TypeError, RecursionError):
-        raise ResultError("is not a readable result (laws: not those of its models)") from None
+    laws: dict[str, dict[str, Any]] = read_attribute(dataset.attrs, "laws", required=True)
+    if list(laws) != [str(key) for key in dataset["model"].values]:
+        raise ResultError("is not a readable result (laws: not those of its models)")
     return laws
 
 
@@ -312,7 +309,7 @@ def _rule(inputs: Inputs, axes: tuple[int, ...], values: Array) -> Stiffness:
 
 def inputs_of(dataset: xr.Dataset) -> Inputs:
     """What a sweep gave a value to, from the coordinates of its result."""
-    derived = {"e"} if "alpha" in dataset.coords else set()
+    derived = derived_names(dataset.coords)
     scalars: dict[str, Any] = {}
     axes: dict[str, dict[str, Any]] = {name: {} for name in axis_names(dataset)}
     for name, variable in dataset.coords.items():
@@ -327,26 +324,32 @@ def inputs_of(dataset: xr.Dataset) -> Inputs:
                 f"is not a readable result ({safe_text(str(name), 40)}: does not lie along one axis)"
             )
     try:
+        stored = read_attribute(dataset.attrs, "materials", required=True)
         materials = {
-            name: Material(**about) for name, about in json.loads(str(dataset.attrs["materials"])).items()
+            name: Material(**{"E": np.nan, "nu": np.nan, **_numbers(about)}) for name, about in stored.items()
         }
-    except (KeyError, ValueError, TypeError, AttributeError, RecursionError):
+    except (TypeError, ValueError):
         raise ResultError("is not a readable result (materials: no JSON of the right kind)") from None
-    # an axis is named by its first column
-    ordered = (Axis({name: columns[name], **columns}) for name, columns in axes.items() if name in columns)
+    # an axis is named by its first column, if it is not numbered
+    ordered = (
+        Axis({name: columns[name], **columns}) if name in columns else Axis(columns, numbered=name)
+        for name, columns in axes.items()
+        if columns
+    )
     return Inputs(scalars, tuple(ordered), materials)
+
+
+def _numbers(properties: Mapping[str, float | None]) -> dict[str, float]:
+    """The properties of a material that are no axes."""
+    return {key: value for key, value in properties.items() if value is not None}
 
 
 def axis_names(dataset: xr.Dataset) -> list[str]:
     """The axes of the grid of a factored file, in their order."""
-    try:
-        names = json.loads(str(dataset.attrs["axes"]))
-        if not isinstance(names, list) or len({*names}) < len(names):
-            raise ValueError
-        if any(dataset.coords[name].dims != (name,) for name in names):
-            raise ValueError
-    except (KeyError, ValueError, TypeError, RecursionError):
-        raise ResultError("is not a readable result (axes: not those of its grid)") from None
+    names: list[str] = read_attribute(dataset.attrs, "axes", required=True)
+    along = [name for name in names if name in dataset.coords and dataset.coords[name].dims == (name,)]
+    if along != names or len({*names}) < len(names):
+        raise ResultError("is not a readable result (axes: not those of its grid)")
     return names
 
 
@@ -370,7 +373,8 @@ def check_witnesses(table: TrajectoryTable, variables: Sequence[Variable], store
     here = witnesses_of(table, variables, places)
     cells = places % table.inputs.cells
     index = _cells(table.inputs, cells)
-    known = {name: np.asarray(table.inputs.column(name, index)) for name in ("v1", "v2", "m1", "m2")}
+    known = {name: values_at(table.inputs, name, index) for name in ("v1", "v2")}
+    known |= {f"m{ball}": mass_at(table.inputs, ball, index) for ball in "12"}
     for variable in variables:
         expected, got = stored[f"witness_{variable.name}"].values, here[variable.name]
         columns = {**known, variable.name: expected}

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 
 import xarray as xr
 
-from ..contact.collide import OUTPUTS, collide
-from ..contact.forms import returning, stiffer
+from ..contact.force_expressions import returning, stiffer
 from ..contact.history import History, follow
-from ..contact.lanes import Lanes
-from ..contact.material import Material
+from ..contact.impacts import Impacts
+from ..contact.materials import Material
 from ..contact.model import ForceModel
+from ..contact.outputs import collide
 from ..contact.status import Status
 from ..engine.build_impacts import build_impacts
 from ..engine.plan import Plan
@@ -22,6 +22,8 @@ from .history import history_dataset
 
 # name, unit, meaning of what follows from the inputs and the motion of one impact
 DERIVED = (
+    ("m1", "kg", "mass of ball 1"),
+    ("m2", "kg", "mass of ball 2"),
     ("R1", "m", "radius of ball 1"),
     ("R2", "m", "radius of ball 2"),
     ("m", "kg", "effective mass (17)"),
@@ -78,20 +80,20 @@ def impact_of(plan: Plan, first: tuple[str, ...], times: int | None = None) -> I
     """
     config = plan.config
     law = config.models[0]
-    lanes = build_impacts(plan.inputs, law, ())
+    impacts = build_impacts(plan.inputs, law, ())
     solver = config.solver
     errors: dict[str, str] = {}
-    contact = collide(law, lanes, rtol=solver.rtol, max_steps=solver.max_steps, errors=errors)
-    values = {name: getattr(contact, name)[0].item() for name in OUTPUTS}
+    collision = collide(law, impacts, rtol=solver.rtol, max_steps=solver.max_steps, errors=errors)
+    values = {name: array[0].item() for name, array in collision.items()}
     for error in errors.values():
         warnings.warn(error, stacklevel=2)
     going = values["status"] == Status.OK
-    history = follow(law, lanes, rtol=solver.rtol, max_steps=solver.max_steps, times=times) if going else None
-    v0 = lanes.v0[0].item()
+    history = follow(law, impacts, rtol=solver.rtol, max_steps=solver.max_steps, times=times) if going else None
+    v0 = impacts.v0[0].item()
     # a law may have an n of its own, in place of the one given
-    point = {**config.scalars, "n": lanes.n[0].item()}
+    point = {**config.scalars, "n": impacts.n[0].item()}
     if "alpha" in config.scalars:
-        point["e"] = lanes.e[0].item()
+        point["e"] = impacts.e[0].item()
     without_history = 0.0 if values["status"] == Status.LIMIT else math.nan
     return Impact(
         model=law,
@@ -99,8 +101,8 @@ def impact_of(plan: Plan, first: tuple[str, ...], times: int | None = None) -> I
         first=first,
         values=values,
         materials=plan.materials_used,
-        derived=_derived(law, lanes, values, history),
-        exponent=lanes.n[0].item(),
+        derived=_derived(law, impacts, values, history),
+        exponent=impacts.n[0].item(),
         closing_speed=v0,
         damping=values["lambda"],
         e_kinematic=(values["v2_post"] - values["v1_post"]) / v0 if v0 > 0.0 else float("nan"),
@@ -111,21 +113,21 @@ def impact_of(plan: Plan, first: tuple[str, ...], times: int | None = None) -> I
 
 
 def _derived(
-    law: ForceModel, lanes: Lanes, values: Mapping[str, float], history: History | None
+    law: ForceModel, impacts: Impacts, values: Mapping[str, float], history: History | None
 ) -> dict[str, float]:
     """The quantities of DERIVED."""
-    found = {name: getattr(lanes, name)[0].item() for name in ("R1", "R2", "m")}
+    found = {name: getattr(impacts, name)[0].item() for name in ("m1", "m2", "R1", "R2", "m")}
     if law.unloading in (returning, stiffer) and values["status"] in (Status.OK, Status.LIMIT):
         recovered = values["peak_indentation"] - values["permanent_indentation"]
-        found["K_r"] = values["peak_force"] / recovered ** lanes.n[0].item() if recovered else math.inf
+        found["K_r"] = values["peak_force"] / recovered ** impacts.n[0].item() if recovered else math.inf
     if history is not None:
         found |= {name: getattr(history, name) for name in ("tau_c", "tau_r", "W_c", "W_r")}
     elif values["status"] == Status.LIMIT:
         # all that the balls bring is taken from them, and nothing given back
-        found["tau_c"], found["W_c"] = (lanes.m * lanes.v0)[0].item(), 0.5 * lanes.energy[0].item()
+        found["tau_c"], found["W_c"] = (impacts.m * impacts.v0)[0].item(), 0.5 * impacts.energy[0].item()
         found["tau_r"] = found["W_r"] = 0.0
     if "chi" in law.coefficients and law.unloading is None:
-        chi, v0 = values["damping_ratio"], lanes.v0[0].item()
+        chi, v0 = values["damping_ratio"], impacts.v0[0].item()
         # the damping of a limit is infinite
         chi = math.inf if values["status"] == Status.LIMIT else chi
         found["rebound_speed_bound"] = v0 / chi if chi else math.inf

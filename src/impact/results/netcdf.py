@@ -23,8 +23,8 @@ from xarray.backends import BackendArray
 from xarray.core import indexing
 
 from ..atomic import Sink
+from ..config.tables import Output
 from ..errors import ResultError
-from ..sweeps.settings import Output
 from ..text import safe_text
 from .expand import check_memory
 from .schema import SCHEMA_VERSION

@@ -1,57 +1,36 @@
-"""Where a config comes from: a TOML file, a mapping, the starter, or the sweep that a result came from."""
+"""Where a result comes from: the config of its sweep, one point of that, and the models that it was made by."""
 
 from __future__ import annotations
 
 import json
+import re
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from ..config.grid import MAX_POINTS, Axis, path_of
+from ..config.load import Config, parse_config, read_config
+from ..config.tables import SWEEP
+from ..engine.plan import Plan, owner_of
 from ..engine.plugins import Plugins
-from ..errors import ResultError, UsageError
-from ..sweeps.config import Axis, Config, parse_config, read_config
-from ..sweeps.grid import MAX_POINTS
+from ..errors import ConfigError, ResultError, UsageError, did_you_mean
 from ..text import safe_text
+from .attributes import PluginRecord, read_attribute
 from .backend import open_result
+from .impact import impact_of
 from .sealed import is_result
 from .select import matched
 
-STARTER = files("impact") / "sweeps" / "starter.toml"
+STARTER = files("impact") / "config" / "starter.toml"
 
-
-def config_of(
-    source: str | Path | Mapping[str, object] | None, overrides: Sequence[str], plugins: Plugins
-) -> Config:
-    """The config of a TOML file, a mapping, the starter, or of the sweep that a result came from."""
-    if source is None:
-        overrides = ["sweep.e=0.5", *overrides]
-        return parse_config(STARTER.read_text(encoding="utf-8"), overrides, plugins.models, name="starter")
-    if isinstance(source, Mapping):
-        return read_config(source, overrides, plugins.models)
-    path = Path(source)
-    if is_result(path):
-        with open_result(path) as stored:
-            attributes = stored.attrs
-        config = stored_config(attributes, overrides, plugins, str(path), allow_changed_plugins=True)
-        for note in changed_plugins(attributes, plugins, str(path)):
-            warnings.warn(note, stacklevel=2)
-        return config
-    return read_config(path, overrides, plugins.models)
-
-
-def picked_out(source: str | Path | Mapping[str, object] | None) -> dict[str, float | str]:
-    """The single values of a result; where its sweep varied one of them, the result is the part at that value."""
-    if not isinstance(source, str | Path) or not is_result(Path(source)):
-        return {}
-    with open_result(source) as stored:
-        single = {str(name): one for name, one in stored.coords.items() if one.ndim == 0}
-    return {name: one.values.item() for name, one in single.items() if name != "model"}
+Source = str | Path | Mapping[str, object] | xr.Dataset | None
+# from overrides to the config with them
+Read = Callable[[Sequence[str]], Config]
 
 
 def stored_config(
@@ -82,14 +61,194 @@ def stored_config(
     text = attributes.get("config")
     if text is None:
         raise UsageError(f"{safe_text(name)}: holds no config; it is a time history")
+    if not isinstance(text, str):
+        raise ResultError(f"{safe_text(name)}: its attribute config is no text")
     check_plugins(attributes, plugins, name)
-    changed = () if allow_changed_plugins else changed_plugins(attributes, plugins, name)
-    if changed:
-        raise UsageError(changed[0])
-    stored = _json(attributes, "config_set", name)
-    if not (isinstance(text, str) and isinstance(stored, list) and all(isinstance(one, str) for one in stored)):
-        raise ResultError(f"{safe_text(name)}: its attributes config and config_set are not those of a result")
+    if not allow_changed_plugins:
+        for reason in (*changed_plugins(attributes, plugins, name), *unknown_plugins(attributes, plugins, name)):
+            raise UsageError(reason)
+    stored = read_attribute(attributes, "config_set", name, required=True)
     return parse_config(text, [*stored, *overrides], plugins.models, name, max_points)
+
+
+def single_point(
+    source: Source,
+    overrides: Sequence[str],
+    plugins: Plugins,
+    model: str | None = None,
+    at: Mapping[str, float | str] | None = None,
+) -> tuple[Config, tuple[str, ...]]:
+    """The config of a single impact.
+
+    Parameters
+    ----------
+    source : path of a TOML file or of a result, a mapping of the shape of the former, a result, or None for the
+        starter at e = 0.5; a part of a result stands for the values that it was taken at
+    overrides : changes to its config
+    plugins : models that are not built in; one that has changed since the result was made gives a warning
+    model : key of the model; by default the config's first
+    at : values by config name, which need not be on the grid. Those that vary together, in a zip group or in
+        numbered cases, have to be; the number of a case is chosen by the name of its dimension
+
+    Returns
+    -------
+    (Config, names) : a config without axes, and the names of the axes that were not named: they took their first
+        value
+
+    Raises
+    ------
+    ConfigError, UsageError : a name is not known here, or a value is not allowed
+    ResultError : what a result carries cannot be read
+    """
+    read, parted = _reader(source, overrides, plugins)
+    # each override, and how it is called in a message: as it was asked for
+    asked = {} if model is None else {f"models={json.dumps([model])}": f"--model {model}"}
+    config = _read(read, asked)
+    columns = [_columns(axis) for axis in config.axes]
+    varied = {name for names in columns for name in names}
+    if at and {"e", "alpha"} <= at.keys():
+        raise UsageError("--at alpha: got alpha beside e, expected one of the two")
+    at = {**{name: value for name, value in parted.items() if name in varied}, **(at or {})}
+    together = {name for names in columns if len(names) > 1 for name in names}
+    known = [*(name for names in columns for name in names), *config.scalars]
+    for name, value in at.items():
+        if name not in known and name not in SWEEP:
+            raise UsageError(f'no input "{safe_text(name)}" here; {did_you_mean(name, known)}')
+        if name not in together:
+            asked[f"{_override_path(name)}={_toml(value)}"] = f"--at {name}={value}"
+    config = _read(read, asked)
+
+    scalars = dict(config.scalars)
+    first: list[str] = []
+    for axis in config.axes:
+        scalars |= {name: values[_place(axis, at)] for name, values in axis.columns.items()}
+        if axis.size > 1 and not any(name in at for name in _columns(axis)):
+            first += axis.columns
+    return replace(config, axes=(), scalars=scalars, models=config.models[:1]), tuple(first)
+
+
+def _reader(source: Source, overrides: Sequence[str], plugins: Plugins) -> tuple[Read, dict[str, float | str]]:
+    """How the config of a source is read, and the single values of a part of a result."""
+    if source is None:
+        text = STARTER.read_text(encoding="utf-8")
+        first = ["sweep.e=0.5", *overrides]
+        return lambda more: parse_config(text, [*first, *more], plugins.models, name="starter"), {}
+    if isinstance(source, str | Path) and is_result(Path(source)):
+        with open_result(source) as stored:
+            return _stored_reader(stored, overrides, plugins, str(source))
+    if isinstance(source, xr.Dataset):
+        return _stored_reader(source, overrides, plugins, "the result")
+    path_or_table = Path(source) if isinstance(source, str) else source
+    return lambda more: read_config(path_or_table, [*overrides, *more], plugins.models), {}
+
+
+def _stored_reader(
+    dataset: xr.Dataset, overrides: Sequence[str], plugins: Plugins, name: str
+) -> tuple[Read, dict[str, float | str]]:
+    attributes = dict(dataset.attrs)
+    single = {str(key): label.values.item() for key, label in dataset.coords.items() if label.ndim == 0}
+    if "config" in attributes:
+        check_plugins(attributes, plugins, name)
+        for note in (*changed_plugins(attributes, plugins, name), *unknown_plugins(attributes, plugins, name)):
+            warnings.warn(note, stacklevel=4)
+
+    def read(more: Sequence[str]) -> Config:
+        return stored_config(attributes, [*overrides, *more], plugins, name, allow_changed_plugins=True)
+
+    return read, {key: value for key, value in single.items() if key != "model"}
+
+
+def _columns(axis: Axis) -> dict[str, Sequence[float | str]]:
+    """The values along an axis by the names that choose a point of it: its columns, and the number of a case."""
+    return {**({axis.numbered: axis.labels} if axis.numbered else {}), **axis.columns}
+
+
+def _place(axis: Axis, at: Mapping[str, float | str]) -> int:
+    """The place on an axis where its columns have the values asked for."""
+    columns = _columns(axis)
+    for place in range(axis.size):
+        if all(columns[name][place] == value for name, value in at.items() if name in columns):
+            return place
+    asked = ", ".join(f"{name} = {value}" for name, value in at.items() if name in columns)
+    raise UsageError(f"{safe_text(asked)}: not on the zipped axis {axis.name}; these values vary together")
+
+
+def _override_path(name: str) -> str:
+    """The path of an input in an override, as TOML writes it.
+
+    >>> _override_path("v1"), _override_path("bilinear.K"), _override_path("materials.soft steel.E")
+    ('sweep.v1', 'model.bilinear.K', 'materials."soft steel".E')
+    """
+    parts = map(str, path_of(name))
+    return ".".join(part if re.fullmatch("[A-Za-z0-9_-]+", part) else _toml(part) for part in parts)
+
+
+def _toml(value: float | str) -> str:
+    return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
+
+
+def _read(read: Read, asked: Mapping[str, str]) -> Config:
+    """A config whose problems are called by what was asked for, not by the overrides that stand for it."""
+    try:
+        return read(list(asked))
+    except ConfigError as error:
+        names = {f"--set {override}:": f"{name}:" for override, name in asked.items()}
+        raise ConfigError([_renamed(line, names) for line in error.problems]) from None
+
+
+def _renamed(line: str, names: Mapping[str, str]) -> str:
+    """A line that begins with one of the names, beginning with what it stands for."""
+    return next((safe_text(new) + line[len(old) :] for old, new in names.items() if line.startswith(old)), line)
+
+
+def histories(
+    dataset: xr.Dataset,
+    models: Sequence[str] | None,
+    at: Mapping[str, float | str],
+    plugins: Plugins,
+) -> list[xr.Dataset]:
+    """Time histories of one point by several models; of a time history, itself.
+
+    Parameters
+    ----------
+    dataset : a result, or a time history
+    models : keys; by default all
+    at : values of the axes, which need not be on the grid; one that is not named takes its first value. A
+        parameter of one model is no input of the others
+    plugins : models that are not built in
+
+    Raises
+    ------
+    UsageError : a model or an axis is not in the result, or no model has a motion to follow there
+    """
+    if "t" in dataset.dims:
+        return [dataset]
+    known = [str(key) for key in dataset["model"].values.ravel()]
+    for key in models or ():
+        if key not in known:
+            raise UsageError(f'no model "{safe_text(key)}" in this result; {did_you_mean(key, known)}')
+    check_plugins(dataset.attrs, plugins, "the result")
+    for changed in changed_plugins(dataset.attrs, plugins, "the result"):
+        # the motion of another law is not that of the result
+        raise UsageError(changed)
+    followed: list[xr.Dataset] = []
+    ends: dict[str, str] = {}
+    first: dict[str, float | str] = {}
+    for key in dict.fromkeys(models or known):
+        others = {str(name) for name in dataset.coords if owner_of(str(name)) not in ("", key)}
+        of_model = {name: value for name, value in at.items() if name not in others}
+        config, names = single_point(dataset, (), plugins, key, of_model)
+        impact = impact_of(Plan(config, plugins.of(config.models)), names)
+        first |= {name: impact.point[name] for name in names}
+        if impact.history is None:
+            ends[key] = impact.status.meaning
+        else:
+            followed.append(impact.history)
+    if not followed:
+        where = ", ".join(f"{name} = {value}" for name, value in {**first, **at}.items())
+        reason = next(iter(ends.values()))
+        raise UsageError(f"no motion to draw at {safe_text(where)}: {reason}; choose a point, such as --sel e=0.5")
+    return followed
 
 
 def part_of(config: Config, dataset: xr.Dataset) -> Config:
@@ -99,21 +258,24 @@ def part_of(config: Config, dataset: xr.Dataset) -> Config:
     """
     axes = []
     for axis in config.axes:
-        held = {name: dataset.coords[name] for name in axis.columns if name in dataset.coords}
+        labels_of = {axis.name: axis.labels} if axis.numbered else axis.columns
+        held = {name: dataset.coords[name] for name in labels_of if name in dataset.coords}
         first = next(iter(held.values()), None)
         names = [name for name, labels in held.items() if first is not None and labels.dims == first.dims]
-        values = [np.asarray(axis.columns[name]) for name in names]
+        values = [np.asarray(labels_of[name]) for name in names]
         labels = [np.ravel(held[name].values) for name in names]
         places = sorted(matched(values, labels)[0].tolist()) if names else []
         chosen = np.array(places or [0])
-        axes.append(Axis({name: tuple(np.asarray(v)[chosen].tolist()) for name, v in axis.columns.items()}))
+        columns = {name: tuple(np.asarray(v)[chosen].tolist()) for name, v in axis.columns.items()}
+        numbers = tuple(axis.labels[place] for place in chosen) if axis.numbered else ()
+        axes.append(replace(axis, columns=columns, numbers=numbers))
     return replace(config, axes=tuple(axes))
 
 
 def check_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str) -> None:
     """Refuse if a model of one's own that a result was made with is not given again.
 
-    Nothing is imported because a result names it: what it names is compared with what is given, and told.
+    Nothing is imported because a result names it: what it names is compared with what is given, and reported.
 
     Parameters
     ----------
@@ -131,17 +293,14 @@ def check_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str)
     impact.errors.UsageError: results.h5: made with mine of my.py; give it again with --plugin FILE
     """
     made = _made_with(attributes, name)
-    shown = safe_text(name)
-    given = plugins.record
+    given = _given(plugins)
     # the hash of a file is not that of a value: given in another way, a model cannot be known to be the same
-    missing = [key for key, one in made.items() if key not in given or _way(given[key]) != _way(one)]
+    missing = {key: record for key, record in made.items() if key not in given or _way(given[key]) != _way(record)}
     if missing:
-        told = ", ".join(f"{key} of {_origin(made[key]) or 'a Python value'}" for key in missing)
-        ways = {_way(made[key]) for key in missing}
+        named = ", ".join(f"{key} of {_origin(record) or 'a Python value'}" for key, record in missing.items())
+        ways = " and ".join(sorted({_way(record) for record in missing.values()}))
         again = "it" if len(missing) == 1 else "them"
-        raise UsageError(
-            f"{shown}: made with {safe_text(told)}; give {again} again with {' and '.join(sorted(ways))}"
-        )
+        raise UsageError(f"{safe_text(name)}: made with {safe_text(named)}; give {again} again with {ways}")
 
 
 def changed_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str) -> tuple[str, ...]:
@@ -153,49 +312,45 @@ def changed_plugins(attributes: Mapping[str, object], plugins: Plugins, name: st
     plugins : what is given now, all that the result was made with among them
     name : of the result, for messages
     """
-    given = plugins.record
+    given = _given(plugins)
     return tuple(
-        f"{safe_text(name)}: was made with another version of {safe_text(_origin(one) or f'the model {key}')}: "
-        f"its SHA-256 is {safe_text(str(one['sha256']), 64)}, this one's is {given[key]['sha256']}"
-        for key, one in _made_with(attributes, name).items()
-        if one["sha256"] != given[key]["sha256"]
+        f"{safe_text(name)}: was made with another version of {safe_text(_origin(record) or f'the model {key}')}: "
+        f"its SHA-256 is {safe_text(record.sha256, 64)}, this one's is {given[key].sha256}"
+        for key, record in _made_with(attributes, name).items()
+        if record.sha256 and given[key].sha256 and record.sha256 != given[key].sha256
     )
 
 
-def _origin(one: Mapping[str, str | None]) -> str | None:
+def unknown_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str) -> tuple[str, ...]:
+    """A sentence for each model of which no hash says whether it is the one that a result was made with.
+
+    Parameters are those of `changed_plugins`.
+    """
+    given = _given(plugins)
+    return tuple(
+        f"{safe_text(name)}: the model {safe_text(key)} is a Python value that no file defines, so that it cannot "
+        "be known to be the one that the result was made with; expected a model in a Python file"
+        for key, record in _made_with(attributes, name).items()
+        if not (record.sha256 and given[key].sha256)
+    )
+
+
+def _made_with(attributes: Mapping[str, object], name: str) -> dict[str, PluginRecord]:
+    records: dict[str, PluginRecord] = read_attribute(attributes, "plugins", name, required=True)
+    return records
+
+
+def _given(plugins: Plugins) -> dict[str, PluginRecord]:
+    return {key: PluginRecord(**record) for key, record in plugins.record.items()}
+
+
+def _origin(record: PluginRecord) -> str | None:
     """The file or the package of a model."""
-    return one.get("package") or one["file"]
+    return record.package or record.file
 
 
-def _way(one: Mapping[str, str | None]) -> str:
+def _way(record: PluginRecord) -> str:
     """How a model is given again."""
-    if one.get("package"):
+    if record.package:
         return "the package installed"
-    return "plugins=[...]" if one["file"] is None else "--plugin FILE"
-
-
-def _made_with(attributes: Mapping[str, object], name: str) -> dict[str, dict[str, str | None]]:
-    """What a result says of the models that are not built in, in the shape of `Plugins.record`."""
-    made = _json(attributes, "plugins", name)
-    right = isinstance(made, dict) and all(
-        isinstance(one, dict)
-        and {"file", "sha256"} <= one.keys() <= {"file", "sha256", "package"}
-        and isinstance(one["sha256"], str)
-        and isinstance(one["file"], str | None)
-        and isinstance(one.get("package"), str | None)
-        for one in made.values()
-    )
-    if not right:
-        raise ResultError(
-            f"{safe_text(name)}: its attribute plugins is not that of a result, wants a file and a sha256 by key"
-        )
-    found: dict[str, dict[str, str | None]] = made
-    return found
-
-
-def _json(attributes: Mapping[str, object], attribute: str, name: str) -> Any:
-    """What an attribute of a result holds as JSON; it may come from anywhere."""
-    try:
-        return json.loads(str(attributes[attribute]))
-    except (KeyError, ValueError, RecursionError):
-        raise ResultError(f"{safe_text(name)}: its attribute {attribute} is missing, or is not JSON") from None
+    return "plugins=[...]" if record.file is None else "--plugin FILE"

@@ -12,29 +12,36 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from ..config.grid import path_of
 from ..contact.status import FIRST_FAILURE, Status
+from ..engine.plan import owner_of
 from ..errors import UsageError
 from ..text import safe_text
-from .replay import own
-from .schema import is_input
+from .replay import described
+from .schema import columns_along, foreign_dims, own_dims
 from .select import places_of, select
-from .slabs import Where, distinct, factored, is_computed, slabs, varying_dims
+from .slabs import Where, distinct, is_computed, over_varying_dims, slabs, varying_dims
 
 Mask = NDArray[np.bool_]
 # points up to which variables that are computed are ranked: some minutes
 MAX_RANKED_POINTS = 2**30
+# values of a law's own parameters, in all combinations
+MAX_CHOICES = 2**24
 JUDGED = ("e_error", "status")
+# ranges of e that a table names
+MAX_RANGES = 8
 # bits of a double, and of the upper part in which it is summed
 MANTISSA_BITS, UPPER_BITS = 53, 27
 
 
 @dataclass(frozen=True)
 class Ranked:
-    """How well one model gives the restitution asked for.
+    """How well one model gives the restitution asked for, with the values of its own parameters that do it best.
 
     Parameters
     ----------
     model : its key
+    parameters : those values by the path in the config, such as "model.bilinear.K"; where they are axes
     points : those judged, where an e was asked for and the balls meet
     within : those of them where |e_out - e| is within the tolerance
     failed : those of them that failed, which are not within it
@@ -49,6 +56,7 @@ class Ranked:
     """
 
     model: str
+    parameters: Mapping[str, float | str]
     points: int
     within: int
     failed: int
@@ -57,6 +65,12 @@ class Ranked:
     at: Mapping[str, float | str]
     e_out: float
     served: tuple[tuple[float, float], ...] | None
+
+    @property
+    def name(self) -> str:
+        """The model, and the parameters that were chosen."""
+        chosen = (f"{path.rpartition('.')[2]} = {value:.6g}" for path, value in self.parameters.items())
+        return " with ".join(filter(None, [self.model, ", ".join(chosen)]))
 
     @property
     def share(self) -> float:
@@ -72,7 +86,7 @@ class Ranked:
         """The share as text, which is 0 or 100 only where none or all are within the tolerance.
 
         >>> nan = math.nan
-        >>> [Ranked("hertz", 3000, n, 0, nan, nan, {}, nan, None).percent for n in (0, 1, 2000, 2999, 3000)]
+        >>> [Ranked("hertz", {}, 3000, n, 0, nan, nan, {}, nan, None).percent for n in (0, 1, 2000, 2999, 3000)]
         ['0%', '<0.1%', '66.7%', '>99.9%', '100%']
         """
         if self.within == 0 or self.serves_everywhere:
@@ -80,6 +94,26 @@ class Ranked:
         if self.share < 0.001:
             return "<0.1%"
         return ">99.9%" if self.share > 0.999 else f"{100.0 * self.share:.1f}%"
+
+    @property
+    def row(self) -> tuple[str, ...]:
+        """The model in a table under `Ranking.headings`.
+
+        >>> Ranked("hertz", {}, 10, 1, 0, 0.45, 0.9, {"e": 0.1}, 1.0, ((1.0, 1.0),)).row
+        ('hertz', '10.0%', '0.9', '0.45', '0', 'e=0.1: e_out 1', '1')
+        """
+        errors = ("–" if math.isnan(error) else f"{error:.3g}" for error in (self.max_error, self.mean_error))
+        worst = f"{described(self.at)}: e_out {self.e_out:.4g}" if self.at else "–"
+        return (self.name, self.percent, *errors, f"{self.failed:,}", worst, self._served_text)
+
+    @property
+    def _served_text(self) -> str:
+        """The first ranges of e that it serves."""
+        if self.served is None:
+            return "–"
+        ranges = [f"{least:.12g}" + (f" to {most:.12g}" if most > least else "") for least, most in self.served]
+        more = f" and {len(ranges) - MAX_RANGES:,} more" if len(ranges) > MAX_RANGES else ""
+        return ", ".join(ranges[:MAX_RANGES]) + more or "nowhere"
 
 
 @dataclass(frozen=True)
@@ -96,6 +130,11 @@ class Ranking:
     models: tuple[Ranked, ...]
 
     @property
+    def headings(self) -> tuple[str, ...]:
+        """Of a table of `Ranked.row`; the first and the last two columns are text, the others numbers."""
+        return ("model", f"within {self.tol:g}", "max error", "mean error", "failed", "worst point", "e served")
+
+    @property
     def best(self) -> tuple[Ranked, ...]:
         """The models that are within the tolerance at all points."""
         return tuple(one for one in self.models if one.serves_everywhere)
@@ -104,7 +143,7 @@ class Ranking:
     def headline(self) -> str:
         """The answer in a sentence."""
         first = self.models[0]
-        key, tol, points = safe_text(first.model, 60), f"{self.tol:g}", f"{first.points:,} points"
+        key, tol, points = safe_text(first.name, 120), f"{self.tol:g}", f"{first.points:,} points"
         alone = "the only point" if first.points == 1 else ""
         if self.best:
             others = len(self.best) - 1
@@ -126,6 +165,8 @@ def ranking(
 
     Judged is |e_out - e| at all points where an e was asked for and the balls meet. A point that failed, or that
     no restitution can have (1 - alpha v0 below 0), is judged too: it is not within the tolerance.
+    Axes of a model's own parameters are choices: the model is judged over all other axes, with the values that
+    give the largest share of points within the tolerance, among equals the smallest error.
     The result may be of any size: points that differ along axes on which nothing varies are evaluated once, and
     count as often as they occur.
 
@@ -145,7 +186,7 @@ def ranking(
     _check(dataset, tol)
     chosen = places_of(models, dataset) if models else range(dataset.sizes["model"])
     selected = select(dataset[list(JUDGED)], sel or {})
-    by_model = [selected.isel(model=place) for place in chosen]
+    by_model = [_part_of_model(selected, place) for place in chosen]
     evaluated = [_evaluated(of_model)[0] for of_model in by_model if is_computed(of_model.variables["e_error"])]
     points = sum(math.prod(of_model.sizes.values()) for of_model in evaluated)
     if points > max_points:
@@ -187,16 +228,74 @@ def _asks_for_e(dataset: xr.Dataset) -> bool:
     return any(not np.isnan(e.isel(where).values).all() for where in slabs(e.sizes))
 
 
+def _part_of_model(dataset: xr.Dataset, place: int) -> xr.Dataset:
+    """A model of a result, without the axes of other models' parameters."""
+    first = dict.fromkeys(foreign_dims(dataset, str(dataset["model"].values[place])), 0)
+    return dataset.isel({"model": place, **first})
+
+
 def _evaluated(of_model: xr.Dataset) -> tuple[xr.Dataset, int]:
     """What is judged of a model, over the axes along which it or e varies, and how often each point counts."""
     along_one = of_model.variables["e"].ndim == 1
-    return factored(
+    return over_varying_dims(
         of_model, JUDGED, *(of_model.variables["e"].dims if along_one else varying_dims(of_model, "e"))
     )
 
 
+@dataclass(frozen=True)
+class _Judged:
+    """Points of a slab: e and its error, and which are judged, failed, known, and within the tolerance."""
+
+    asked: NDArray[Any]
+    error: NDArray[Any]
+    distance: NDArray[np.float64]
+    judged: Mask
+    failed: Mask
+    known: Mask
+    within: Mask
+
+
+def _judge(evaluated: xr.Dataset, where: Where, sizes: Mapping[Hashable, int], tol: float) -> _Judged:
+    error, status, asked = (_laid_out(evaluated.variables[name], where, sizes) for name in (*JUDGED, "e"))
+    distance = np.abs(np.asarray(error, float))
+    judged = ~np.isnan(asked) & (status != Status.NO_IMPACT)
+    failed = judged & (status >= FIRST_FAILURE)
+    known = judged & ~failed & ~np.isnan(distance)
+    return _Judged(asked, error, distance, judged, failed, known, known & (distance <= tol))
+
+
+def _choose(of_model: xr.Dataset, own: Sequence[Hashable], tol: float) -> dict[Hashable, int]:
+    """The place on each axis of a model's own parameters at which it does best over all other axes."""
+    evaluated, _ = over_varying_dims(of_model, JUDGED, *own, *varying_dims(of_model, "e"))
+    shape = tuple(evaluated.sizes[dim] for dim in own)
+    if math.prod(shape) > MAX_CHOICES:
+        raise UsageError(
+            f"got {math.prod(shape):,} combinations of parameters of {of_model['model'].item()}, expected at most "
+            f"{MAX_CHOICES:,}; select values of them"
+        )
+    dims = evaluated.variables["e_error"].dims
+    sizes = {dim: evaluated.sizes[dim] for dim in (*own, *(dim for dim in dims if dim not in own))}
+    points, within, errors = np.zeros(shape, int), np.zeros(shape, int), np.full(shape, np.nan)
+    others = tuple(range(len(own), len(sizes)))
+    for where in slabs(sizes):
+        part = _judge(evaluated, where, sizes, tol)
+        place = tuple(where[dim] for dim in own)
+        points[place] += part.judged.sum(axis=others)
+        within[place] += part.within.sum(axis=others)
+        largest = np.fmax.reduce(np.where(part.known, part.distance, np.nan), axis=others, initial=np.nan)
+        errors[place] = np.fmax(errors[place], largest)
+    share = within / np.maximum(points, 1)
+    best = np.lexsort((np.where(np.isnan(errors), np.inf, errors).reshape(-1), -share.reshape(-1)))[0]
+    return dict(zip(own, (int(at) for at in np.unravel_index(best, shape)), strict=True))
+
+
 def _ranked(of_model: xr.Dataset, tol: float) -> Ranked:
     """How well a model does, from its e_error and status, of the shape of the axes, and the e asked for."""
+    key = str(of_model["model"].item())
+    own = [dim for dim in own_dims(of_model, key) if dim in of_model.variables["e_error"].dims]
+    best = _choose(of_model, own, tol) if own else {}
+    chosen = _inputs(of_model, best)
+    of_model = of_model.isel(best)
     axes = of_model.variables["e_error"].dims
     evaluated, weight = _evaluated(of_model)
     sizes = {dim: evaluated.sizes[dim] for dim in evaluated.variables["e_error"].dims}
@@ -207,41 +306,35 @@ def _ranked(of_model: xr.Dataset, tol: float) -> Ranked:
     total, max_error, e_out = Fraction(), math.nan, math.nan
     worst: dict[Hashable, int] | None = None
     for where in slabs(sizes):
-        error, status, asked = (
-            _laid_out(evaluated.variables[name], where, sizes) for name in ("e_error", "status", "e")
-        )
-        distance = np.abs(np.asarray(error, float))
-        judged = ~np.isnan(asked) & (status != Status.NO_IMPACT)
-        failed = judged & (status >= FIRST_FAILURE)
-        known = judged & ~failed & ~np.isnan(distance)
-        within = known & (distance <= tol)
-        points += weight * int(judged.sum())
+        part = _judge(evaluated, where, sizes, tol)
+        distance, known = part.distance, part.known
+        points += weight * int(part.judged.sum())
         known_points += weight * int(known.sum())
-        within_points += weight * int(within.sum())
-        failed_points += weight * int(failed.sum())
+        within_points += weight * int(part.within.sum())
+        failed_points += weight * int(part.failed.sum())
         if known.any():
             total += weight * _exact_sum(distance[known & np.isfinite(distance)])
             index = np.unravel_index(int(np.argmax(np.where(known, distance, -1.0))), distance.shape)
             if worst is None or distance[index] > max_error:
                 max_error = float(distance[index])
-                e_out = float(asked[index]) + float(error[index])
+                e_out = float(part.asked[index]) + float(part.error[index])
                 worst = {dim: where[dim].start + int(at) for dim, at in zip(sizes, index, strict=True)}
         if along_one:
             others = tuple(place for place, dim in enumerate(sizes) if dim not in e.dims)
             along = where[e.dims[0]]
-            asked_at[along] |= np.logical_or.reduce(judged, axis=others)
-            missed_at[along] |= np.logical_or.reduce(judged & ~within, axis=others)
+            asked_at[along] |= np.logical_or.reduce(part.judged, axis=others)
+            missed_at[along] |= np.logical_or.reduce(part.judged & ~part.within, axis=others)
     at: dict[str, float | str] = {}
     mean_error = math.nan
     if worst is not None:
         # an error without bound comes from a file that was not written by a sweep
         mean_error = max_error if math.isinf(max_error) else float(total / known_points)
         asked_there = e.isel({dim: worst[dim] for dim in e.dims}).values.item()
-        at = {**_inputs(of_model, {dim: worst.get(dim, 0) for dim in axes}), "e": float(asked_there)}
+        at = {**_inputs(of_model, {dim: worst.get(dim, 0) for dim in axes}), **chosen, "e": float(asked_there)}
+    parameters = {".".join(map(str, path_of(name))): chosen[name] for name in chosen if owner_of(name) == key}
     served = _served(e.values, asked_at, missed_at) if along_one else None
     return Ranked(
-        str(of_model["model"].item()), points, within_points, failed_points, mean_error, max_error, at, e_out,
-        served,
+        key, parameters, points, within_points, failed_points, mean_error, max_error, at, e_out, served,
     )  # fmt: skip
 
 
@@ -276,16 +369,13 @@ def _exact_sum(values: NDArray[np.float64]) -> Fraction:
 
 def _inputs(of_model: xr.Dataset, places: Mapping[Hashable, int]) -> dict[str, float | str]:
     """What is swept, at a place along each axis, without the parameters of other models."""
-    variables = of_model.variables
-    inputs = {
-        str(name): variables[name].values[place].item()
+    variables, key = of_model.variables, str(of_model["model"].item())
+    return {
+        name: variables[name].values[place].item()
         for dim, place in places.items()
-        for name in (dim, *(name for name in of_model.coords if name != dim and is_input(str(name))))
-        if variables[name].dims == (dim,)
+        for name in dict.fromkeys([str(dim), *columns_along(of_model, dim)])
+        if owner_of(name) in ("", key)
     }
-    inputs = own({"model": str(of_model["model"].item()), **inputs})
-    del inputs["model"]
-    return inputs
 
 
 def _served(e: NDArray[Any], asked: Mask, missed: Mask) -> tuple[tuple[float, float], ...]:

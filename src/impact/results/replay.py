@@ -8,8 +8,10 @@ from typing import TypeVar
 
 import xarray as xr
 
+from ..engine.plan import owner_of
+from ..formatting import number
 from ..text import safe_text
-from .attributes import json_table
+from .attributes import read_attribute
 
 T = TypeVar("T")
 
@@ -22,19 +24,19 @@ def repeats(path: str, dataset: xr.Dataset) -> tuple[str, ...]:
     >>> repeats("new.h5", xr.Dataset(attrs={"plugins": '{"mine": {"file": "my.py", "sha256": ""}}'}))
     ('impact', 'run', 'new.h5', '--plugin', 'my.py')
     """
-    files = [one.get("file") for one in json_table(dataset, "plugins").values() if not one.get("package")]
+    files = [record.file for record in read_attribute(dataset.attrs, "plugins").values() if not record.package]
     if not path or None in files:
         return ()
     return ("impact", "run", path, *(word for file in dict.fromkeys(files) for word in ("--plugin", str(file))))
 
 
-def own(at: Mapping[str, T]) -> dict[str, T]:
-    """The inputs of a point without the parameters of other models than its own.
+def inputs_of_model(at: Mapping[str, T]) -> dict[str, T]:
+    """The inputs of a point without the parameters of other models.
 
-    >>> own({"model": "mine", "e": 0.5, "mine.c": 2.0, "other.c": 3.0})
-    {'model': 'mine', 'e': 0.5, 'mine.c': 2.0}
+    >>> inputs_of_model({"model": "mine", "e": 0.5, "mine.c": 2.0, "other.c": 3.0, "materials.steel.E": 2e11})
+    {'model': 'mine', 'e': 0.5, 'mine.c': 2.0, 'materials.steel.E': 200000000000.0}
     """
-    return {name: one for name, one in at.items() if name.rpartition(".")[0] in ("", at.get("model"))}
+    return {name: value for name, value in at.items() if owner_of(name) in ("", at.get("model"))}
 
 
 def described(at: Mapping[str, float | str]) -> str:
@@ -43,15 +45,14 @@ def described(at: Mapping[str, float | str]) -> str:
     >>> described({"model": "hertz", "e": 0.1 + 0.2})
     'model=hertz, e=0.3'
     """
-    return ", ".join(
-        f"{safe_text(name)}={value:.12g}" if isinstance(value, float) else f"{name}={safe_text(str(value), 60)}"
-        for name, value in at.items()
-    )
+    return ", ".join(f"{safe_text(name)}={safe_text(number(value, 12), 60)}" for name, value in at.items())
 
 
 def replay(begin: Sequence[str], at: Mapping[str, object]) -> str:
     """The whole command: how it begins, and the model and the inputs of the point.
 
+    >>> replay(("impact", "run", "new.h5"), {"model": "hertz", "case": 3})
+    'impact run new.h5 --model hertz --at case=3'
     >>> replay(("impact", "run", "new.h5"), {"model": "hertz", "e": 0.5, "material": "soft steel"})
     "impact run new.h5 --model hertz --at e=0.5 --at 'material=soft steel'"
     """

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..contact.material import effective_mass
+from ..contact.materials import effective_mass
 from .schema import Variable
 
 

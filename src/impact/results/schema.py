@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections import Counter
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from importlib.metadata import version
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
 
 from .. import __version__
+from ..config.tables import MATERIAL, MATERIALS, SWEEP, own_quantities
+from ..contact.outputs import BY_DEFAULT
+from ..contact.powers import Array
 from ..contact.status import Status
-from ..engine.plan import Plan
-from ..sweeps.rules import MATERIALS, SWEEP, own_quantities
+from ..engine.build_impacts import mass_at, restitution_at
+from ..engine.plan import Index, Inputs, Plan, is_foreign, is_own, material_property
 
 SCHEMA_VERSION = 2
 # models with another exponent are named in at most so many characters
@@ -30,8 +34,7 @@ class Variable:
     """One variable of a result.
 
     `per` says whether it depends on the model or on the axes alone; `judged` how a comparison judges it: by its
-    difference over a scale, by a bound on itself, exactly, or not at all. `by_default` is False for a variable
-    that is stored only where `[output] variables` names it.
+    difference over a scale, by a bound on itself, exactly, or not at all.
     """
 
     name: str
@@ -42,7 +45,11 @@ class Variable:
     meaning: str
     equation: str
     dtype: str = "f8"
-    by_default: bool = True
+
+    @property
+    def by_default(self) -> bool:
+        """Whether it is stored where `[output] variables` does not say which."""
+        return self.name in BY_DEFAULT
 
 
 SCHEMA = (
@@ -84,15 +91,13 @@ SCHEMA = (
              "approach + restitution", "i4"),
     Variable("e_kinetic", "1", "model", "scaled by 1",
              "kinetic restitution; the impulses are the changes of the momentum, so that it is e_out",
-             "τ_r/τ_c  (2)", by_default=False),
+             "τ_r/τ_c  (2)"),
     Variable("e_energetic", "1", "model", "scaled by 1",
-             "energetic restitution, from the integrated works of the two phases", "√(-W_r/W_c)  (3)",
-             by_default=False),
+             "energetic restitution, from the integrated works of the two phases", "√(-W_r/W_c)  (3)"),
     Variable("lambda", "N s m-(n+1)", "model", "scaled by itself",
-             "damping factor, where the law has one; n is the coordinate exponent", "λ = χ K/v0  (18)",
-             by_default=False),
+             "damping factor, where the law has one; n is the coordinate exponent", "λ = χ K/v0  (18)"),
     Variable("separation_time", "s", "model", "scaled by itself", "time until the surfaces part",
-             "contact_time + remaining indentation/(e_out v0)", by_default=False),
+             "contact_time + remaining indentation/(e_out v0)"),
 )  # fmt: skip
 
 PACKAGES = ("numpy", "h5py", "h5netcdf", "xarray")
@@ -100,7 +105,7 @@ PACKAGES = ("numpy", "h5py", "h5netcdf", "xarray")
 
 def stored(plan: Plan) -> tuple[Variable, ...]:
     """The variables of the result of a plan; the status is always there: without it a NaN would have no reason."""
-    chosen = {"status", *(plan.config.output.variables or (one.name for one in SCHEMA if one.by_default))}
+    chosen = {"status", *(plan.config.output.variables or BY_DEFAULT)}
     return tuple(replace(one, dtype=plan.config.output.dtype if one.dtype == "f8" else one.dtype)
                  for one in SCHEMA if one.name in chosen)  # fmt: skip
 
@@ -145,6 +150,8 @@ def _coordinates(plan: Plan) -> dict[str, object]:
         "year": ("model", [model.year for model in models], {"long_name": "year of the model"}),
     }
     for axis in plan.config.axes:
+        if axis.numbered:
+            found[axis.name] = (axis.name, list(axis.labels), {"long_name": "number of the case"})
         for name, values in axis.columns.items():
             found[name] = (axis.name, list(values), _about(plan, name))
     for name, value in plan.config.scalars.items():
@@ -152,11 +159,17 @@ def _coordinates(plan: Plan) -> dict[str, object]:
     found["exponent"] = _exponent(plan)
     if "alpha" in plan.inputs.names():
         found["e"] = _restitution(plan)
+    for ball in "12":
+        if f"m{ball}" not in plan.inputs.names():
+            found[f"m{ball}"] = _mass(plan, ball)
     return found
 
 
 def _about(plan: Plan, name: str) -> dict[str, str]:
     """Units and meaning of a coordinate."""
+    material, field = material_property(name) or ("", "")
+    if material:
+        return {"units": udunits(MATERIAL[field].unit), "long_name": f"{MATERIAL[field].meaning} of {material}"}
     key, _, own = name.rpartition(".")
     for model in plan.models:
         if model.key == key:
@@ -209,8 +222,54 @@ def exponents_of(dataset: xr.Dataset) -> str | None:
 
 
 def is_input(name: str) -> bool:
-    """Whether a coordinate is an input of the sweep: not a text about a model, nor computed from inputs."""
+    """Whether a coordinate has the name of an input: it is not a text about a model, nor the number of a case."""
     return name in SWEEP or name in MATERIALS or "." in name
+
+
+def is_case(name: str) -> bool:
+    """Whether a dimension has numbers for its points: that of a table of cases, or of a group like it.
+
+    >>> is_case("case"), is_case("case_2"), is_case("m1")
+    (True, True, False)
+    """
+    return re.fullmatch(r"case(_[0-9]{1,3})?", name) is not None
+
+
+def derived_names(coords: Mapping[Any, xr.DataArray]) -> frozenset[str]:
+    """The coordinates that have the name of an input and were computed from others: e by alpha, m by R and rho."""
+    masses = {name for name in ("m1", "m2") if name in coords and "equation" in coords[name].attrs}
+    return frozenset(masses | ({"e"} if "alpha" in coords else set()))
+
+
+def columns_along(dataset: xr.Dataset, dim: Hashable) -> list[str]:
+    """The inputs that vary along a dimension and no other: the columns of its axis."""
+    derived = derived_names(dataset.coords)
+    along = [str(name) for name, coordinate in dataset.coords.variables.items() if coordinate.dims == (dim,)]
+    return [name for name in along if is_input(name) and name not in derived]
+
+
+def foreign_dims(dataset: xr.Dataset, key: str) -> list[Hashable]:
+    """The dimensions along which only parameters of other models than one vary, so that nothing of it does."""
+    return [dim for dim in dataset.dims if is_foreign(columns_along(dataset, dim), key)]
+
+
+def own_dims(dataset: xr.Dataset, key: str) -> list[Hashable]:
+    """The dimensions along which only parameters of a model, and perhaps of others, vary."""
+    return [dim for dim in dataset.dims if is_own(columns_along(dataset, dim), key)]
+
+
+def parts_of_models(dataset: xr.Dataset) -> Iterator[xr.Dataset]:
+    """The part of each model of a result, at the first place along the parameters of other models."""
+    for model, key in enumerate(dataset["model"].values):
+        first = dict.fromkeys(foreign_dims(dataset, str(key)), slice(0, 1))
+        yield dataset.isel({"model": model, **first})
+
+
+def count_points(dataset: xr.Dataset) -> int:
+    """How many points a result has; along the parameters of other models, the points of a model are one."""
+    if "model" not in dataset.dims:
+        return math.prod(dataset.sizes.values())
+    return sum(math.prod(part.sizes.values()) for part in parts_of_models(dataset))
 
 
 def _exponent(plan: Plan) -> tuple[tuple[str, ...], object, dict[str, str]]:
@@ -226,20 +285,26 @@ def _exponent(plan: Plan) -> tuple[tuple[str, ...], object, dict[str, str]]:
 
 
 def _restitution(plan: Plan) -> tuple[tuple[str, ...], object, dict[str, str]]:
-    """e = 1 - alpha (v1 - v2), equation (24), over the axes that it depends on."""
-    config = plan.config
-    places = sorted({place for name in ("alpha", "v1", "v2") for place in plan.inputs.axes_of(name)})
-
-    def column(name: str) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-        if name in config.scalars:
-            return np.asarray(config.scalars[name], float)
-        (own,) = plan.inputs.axes_of(name)
-        values = np.asarray(config.axes[own].columns[name], float)
-        return values.reshape([-1 if place == own else 1 for place in places])
-
-    e = 1.0 - column("alpha") * (column("v1") - column("v2"))
     about = {"units": "1", "long_name": "restitution asked for", "equation": "e = 1 - alpha (v1 - v2)  (24)"}
-    return tuple(config.axes[place].name for place in places), e, about
+    return *_derived(plan, ("alpha", "v1", "v2"), restitution_at), about
+
+
+def _mass(plan: Plan, ball: str) -> tuple[tuple[str, ...], object, dict[str, str]]:
+    of_materials = [f"materials.{name}.rho" for name in plan.inputs.materials_of(ball)]
+    names = (f"R{ball}", "material", f"material{ball}", *of_materials)
+    about = {**_about(plan, f"m{ball}"), "equation": "m = (4/3) pi R^3 rho"}
+    return *_derived(plan, names, lambda inputs, index: mass_at(inputs, ball, index)), about
+
+
+def _derived(
+    plan: Plan, names: Sequence[str], formula: Callable[[Inputs, Index], Array]
+) -> tuple[tuple[str, ...], Array]:
+    """What is computed from inputs, with its dimensions: the axes of those."""
+    axes = sorted({axis for name in names for axis in plan.inputs.axes_of(name)})
+    where = [slice(None) if axis in axes else slice(1) for axis in range(len(plan.shape))]
+    shape = [plan.shape[axis] for axis in axes]
+    values = formula(plan.inputs, plan.inputs.index(where))
+    return tuple(plan.config.axes[axis].name for axis in axes), values.reshape(shape)
 
 
 def _provenance(plan: Plan) -> dict[str, object]:
@@ -256,5 +321,5 @@ def _provenance(plan: Plan) -> dict[str, object]:
         "impact_version": __version__,
         "packages": json.dumps({name: version(name) for name in PACKAGES}),
         "plugins": json.dumps(plan.plugins.record),
-        "materials": json.dumps({name: asdict(material) for name, material in plan.materials_used.items()}),
+        "materials": json.dumps(plan.material_record),
     }

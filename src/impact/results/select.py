@@ -47,7 +47,8 @@ def select(dataset: xr.Dataset, sel: Mapping[str, float | str]) -> xr.Dataset:
     Parameters
     ----------
     dataset : a result
-    sel : the values, by name; an axis that has its value is none any more
+    sel : the values, by name; an axis that has its value is none any more, but where several numbered points have
+        it, they are kept
 
     Raises
     ------
@@ -68,12 +69,18 @@ def select(dataset: xr.Dataset, sel: Mapping[str, float | str]) -> xr.Dataset:
             has = safe_text(shown + (", ..." if values.size > 8 else ""))
             raise UsageError(f"no {safe_text(f'{name} = {value}')} in this result; {safe_text(name)} is {has}")
         masks[dim] = same
-    return dataset.isel({dim: int(np.argmax(same)) for dim, same in masks.items()})
+    return dataset.isel({dim: _places(dataset[dim], same) for dim, same in masks.items()})
+
+
+def _places(labels: xr.DataArray, same: Mask) -> int | Places:
+    """The place that is asked for; several of an axis whose points are numbered, which may be alike otherwise."""
+    is_numbered = labels.dtype.kind in "iu" and np.count_nonzero(same) > 1
+    return np.flatnonzero(same) if is_numbered else int(np.argmax(same))
 
 
 def _same(values: np.ndarray, value: float | str) -> Mask:
     """Which values are the one asked for."""
-    if values.dtype.kind != "f":
+    if values.dtype.kind not in NUMBERS:
         return np.asarray(values.astype(str) == str(value))
     number = _number(value)
     return np.asarray(np.isclose(values, np.nan if number is None else number, rtol=SAME, atol=0.0))

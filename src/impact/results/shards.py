@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from ..atomic import appearing
+from ..config.tables import CORES
 from ..engine.checkpoint import Work, held, working
 from ..engine.execute import never, with_core
 from ..engine.executors import ALONE, Team
@@ -23,7 +24,6 @@ from ..engine.plugins import Plugins
 from ..engine.progress import Gauge, Tell, kept
 from ..engine.trajectories import TrajectoryRange, trajectory_maps, trajectory_ranges
 from ..errors import ResultError, StoreError, UnfinishedError, UsageError
-from ..sweeps.settings import CORES
 from ..text import safe_text
 from .backend import check_output
 from .expand import table_of

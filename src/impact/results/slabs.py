@@ -108,7 +108,7 @@ def distinct(dataset: xr.Dataset, name: str) -> tuple[xr.Variable, int]:
     return variable.isel(dict.fromkeys(fixed, slice(0, 1))), weight
 
 
-def factored(dataset: xr.Dataset, names: Sequence[str], *more: Hashable) -> tuple[xr.Dataset, int]:
+def over_varying_dims(dataset: xr.Dataset, names: Sequence[str], *more: Hashable) -> tuple[xr.Dataset, int]:
     """Some variables over the dimensions along which any of them varies, and how often each point of that counts.
 
     The other dimensions are at their first place.

@@ -12,6 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ..contact.status import FIRST_FAILURE, Status
+from .schema import parts_of_models
 from .slabs import MAX_SUMMARY_POINTS, distinct, is_computed, slabs
 
 # the errors of which the largest is told
@@ -121,8 +122,7 @@ def tally_of(
     """
     tally = Tally(max_failed_at=max_failed_at)
     names = [name for name in ("status", *ERRORS) if name in dataset]
-    for model in range(dataset.sizes["model"]):
-        of_model = dataset.isel(model=model)
+    for model, of_model in enumerate(parts_of_models(dataset)):
         for name in names:
             variable, weight = distinct(of_model, name)
             if variable.size <= max_points or not is_computed(variable):
@@ -148,8 +148,8 @@ def extremes_of(dataset: xr.Dataset, name: str) -> Extremes | None:
 
     None of one that is computed, and varies over more than `MAX_SUMMARY_POINTS` points of all models together.
     """
-    models = range(dataset.sizes["model"]) if "model" in dataset.variables[name].dims else ()
-    parts = [distinct(dataset.isel(model=model), name) for model in models] or [distinct(dataset, name)]
+    of_models = parts_of_models(dataset) if "model" in dataset.variables[name].dims else (dataset,)
+    parts = [distinct(part, name) for part in of_models]
     evaluations = sum(variable.size for variable, _ in parts)
     if evaluations > MAX_SUMMARY_POINTS and is_computed(dataset.variables[name]):
         return None

@@ -5,8 +5,8 @@ from __future__ import annotations
 import errno
 import os
 import shutil
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +15,12 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ..atomic import appearing
-from ..contact.collide import Contact
-from ..contact.strike import Rebound
+from ..contact.impacts import Impacts
+from ..contact.simulate import TABLE_COLUMNS, CollisionResult
 from ..engine.checkpoint import Work, folder_of, part_of, remove, working
 from ..engine.execute import Known, never, run, with_core
 from ..engine.executors import ALONE, Team
-from ..engine.plan import Plan
+from ..engine.plan import Plan, material_property
 from ..engine.progress import Gauge, Tell, kept
 from ..engine.trajectories import (
     RANGE_TRAJECTORIES,
@@ -38,6 +38,7 @@ from .factored import check_factored, factored_outline, table_values
 from .netcdf import MAX_LETTERS, is_text, letters
 from .schema import Variable, outline, stored
 from .summary import Survey, Tally, tally_of
+from .validate import is_name
 
 # bytes that a result takes besides its values, about
 OVERHEAD = 2**16
@@ -107,7 +108,7 @@ def sweep_into(
     total = sum(own.count for own in maps)
     gauge = Gauge.begin(total, plan.points, tell)
     known = extension.known if extension else lambda part: None
-    few = plan.points <= NO_CHECKPOINT_POINTS or plan.layout == "factored"
+    few = plan.stored_points <= NO_CHECKPOINT_POINTS or plan.layout == "factored"
     if total <= RANGE_TRAJECTORIES and few and not os.path.lexists(folder_of(output)):
         finished = {}
         for part, rebound in run(plan, maps, ranges, known=known):
@@ -183,7 +184,7 @@ def sweep_in_memory(plan: Plan, *, team: Team = ALONE, tell: Tell, should_stop: 
     maps = trajectory_maps(plan)
     plan = with_core(plan, maps)
     gauge = Gauge.begin(sum(own.count for own in maps), plan.points, tell)
-    finished: dict[int, Rebound] = {}
+    finished: dict[int, CollisionResult] = {}
     for part, rebound in run(plan, maps, trajectory_ranges(maps), team=team, should_stop=should_stop):
         finished[part.number] = rebound
         gauge.count(part, rebound)
@@ -195,17 +196,19 @@ def sweep_in_memory(plan: Plan, *, team: Team = ALONE, tell: Tell, should_stop: 
     return in_memory(dataset, table, variables) if dataset.nbytes <= SMALL_BYTES else dataset
 
 
-def reader(maps: Sequence[TrajectoryMap], load: Callable[[int], Rebound]) -> Callable[[int, int, int], Rebound]:
+def reader(
+    maps: Sequence[TrajectoryMap], load: Callable[[int], CollisionResult]
+) -> Callable[[int, int, int], CollisionResult]:
     """The finished ranges of a plan as what a `TrajectoryTable` reads; `load` gives the one of a number."""
     before = np.cumsum([0, *(-(-own.count // RANGE_TRAJECTORIES) for own in maps)])
 
-    def read(model: int, start: int, stop: int) -> Rebound:
+    def read(model: int, start: int, stop: int) -> CollisionResult:
         return load(int(before[model]) + start // even(maps[model].count, RANGE_TRAJECTORIES))
 
     return read
 
 
-def loaded_again(work: Work, part: TrajectoryRange) -> Rebound:
+def loaded_again(work: Work, part: TrajectoryRange) -> CollisionResult:
     """A range that was finished.
 
     Raises
@@ -235,8 +238,14 @@ def check_labels(plan: Plan) -> None:
 
     Raises
     ------
-    UsageError : they are too long
+    UsageError : they are too long, or a material that has an axis could not be part of a name in the file
     """
+    columns = [name for axis in plan.config.axes for name in axis.columns]
+    odd = [name for name in columns if material_property(name) and not is_name(name)]
+    if odd:
+        raise UsageError(
+            f"{safe_text(odd[0])}: expected a material name without spaces and slashes, to be an axis"
+        )
     size = sum(letters(one).size for one in outline(plan).coords.values() if is_text(one))
     if size > MAX_LETTERS:
         raise UsageError(
@@ -246,8 +255,8 @@ def check_labels(plan: Plan) -> None:
 
 def finished(path: Path, plan: Plan) -> Survey | None:
     """What a file holds, if it is the whole result of a plan."""
-    # of a name that is too long, pathlib would raise
-    if os.path.islink(path) or not os.path.isfile(path):
+    # a model without a hash cannot be known to be the same; of a name that is too long, pathlib would raise
+    if None in plan.plugins.hashes.values() or os.path.islink(path) or not os.path.isfile(path):
         return None
     try:
         dataset = open_result(path)
@@ -268,7 +277,7 @@ def _room(error: Exception, output: Path, plan: Plan, gauge: Gauge) -> list[str]
     cause = error.__cause__
     if not isinstance(cause, OSError) or cause.errno not in (errno.ENOSPC, errno.EDQUOT):
         return []
-    row = sum(getattr(Rebound.blank(1), column.name).nbytes for column in fields(Rebound))
+    row = sum(getattr(CollisionResult.blank(1), name).nbytes for name in TABLE_COLUMNS)
     result = gauge.at.of_trajectories * row if plan.layout == "factored" else outline(plan).nbytes
     wanted = result + OVERHEAD + (gauge.at.of_trajectories - gauge.at.trajectories) * row
     free = shutil.disk_usage(output.parent).free
@@ -297,17 +306,16 @@ def store_result(
             raise UnfinishedError
 
     def full() -> Iterator[tuple[str, tuple[int | slice, ...], NDArray[Any]]]:
-        points = 0
         chunks = plan.config.output.chunks
         lengths = [chunks.get(axis.name, axis.size) for axis in plan.config.axes] if chunks else []
-        for model, where, contact, values in expanded_slabs(table, variables, lengths):
+        for model, where, impacts, values in expanded_slabs(table, variables, lengths):
             if extension and extension.fill:
                 extension.fill(model, where, values)
             for name, array in values.items():
                 yield name, (model, *where) if "model" in whole[name].dims else where, array
-            _add(tally, model, where, contact, values)
-            points += values["status"].size
-            check(points)
+            axes = plan.inputs.axes_of_model(table.laws[model].key)
+            _add(tally, axes, model, where, impacts, values)
+            check(tally.points)
 
     def factored() -> Iterator[tuple[str, tuple[slice], NDArray[Any]]]:
         for name, where, array in table_values(table, variables):
@@ -321,7 +329,8 @@ def store_result(
         check_readable(sink, output)
     if not is_full:
         whole = lazy_dataset(whole, table, variables)
-        tally = _tally_of_points(table, variables) if plan.points <= NO_CHECKPOINT_POINTS else tally_of(whole)
+        is_small = plan.stored_points <= NO_CHECKPOINT_POINTS
+        tally = _tally_of_points(table, variables) if is_small else tally_of(whole)
     whole.encoding = {"source": str(output), "seal": seal, "layout": plan.layout}
     return Survey(whole, tally, at.of_trajectories)
 
@@ -329,11 +338,19 @@ def store_result(
 def _tally_of_points(table: TrajectoryTable, variables: Sequence[Variable]) -> Tally:
     """What came out, point by point: unlike `tally_of` it knows the radii."""
     tally = Tally()
-    for model, where, contact, values in expanded_slabs(table, variables):
-        _add(tally, model, where, contact, values)
+    for model, where, impacts, values in expanded_slabs(table, variables):
+        axes = table.inputs.axes_of_model(table.laws[model].key)
+        _add(tally, axes, model, where, impacts, values)
     return tally
 
 
-def _add(tally: Tally, model: int, where: tuple[slice, ...], contact: Contact, values: Values) -> None:
-    radius = np.fmin(contact.lanes.R1, contact.lanes.R2)
-    tally.add(values, model, [place.start for place in where], radius)
+def _add(
+    tally: Tally, axes: Collection[int], model: int, where: tuple[slice, ...], impacts: Impacts, values: Values
+) -> None:
+    """Count the points of a slab, those that differ by parameters of other models once."""
+    if any(part.start > 0 for axis, part in enumerate(where) if axis not in axes):
+        return
+    first = tuple(slice(None) if axis in axes else slice(1) for axis in range(len(where)))
+    counted = {name: array[first or ...] for name, array in values.items()}
+    radius = np.fmin(impacts.R1, impacts.R2)
+    tally.add(counted, model, [place.start for place in where], radius)

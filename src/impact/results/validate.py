@@ -5,20 +5,21 @@
 
 from __future__ import annotations
 
-import json
 import re
-from collections.abc import Iterator, Mapping
-from dataclasses import fields
+from collections.abc import Iterator
 
 import numpy as np
 import xarray as xr
 
-from ..contact.status import Status
-from ..contact.strike import Rebound
-from ..sweeps.rules import MATERIALS, SWEEP
+from ..config.tables import MATERIAL, MATERIALS, SWEEP
+from ..contact.simulate import TABLE_COLUMNS
+from ..contact.status import STATUSES
+from ..engine.plan import material_property
+from ..errors import ResultError
 from ..text import safe_text
+from .attributes import KINDS, read_attribute
 from .history import HISTORY
-from .schema import ABOUT_A_MODEL, SCHEMA
+from .schema import ABOUT_A_MODEL, SCHEMA, is_case
 from .slabs import VARIES_ALONG, is_lazy, slabs
 
 COMPUTED = frozenset(one.name for one in SCHEMA)
@@ -26,7 +27,7 @@ FOLLOWED = frozenset(name for name, _, _ in HISTORY)  # over the time t
 TEXTS = frozenset({"model", *ABOUT_A_MODEL, *MATERIALS} - {"year"})
 # the table of a factored file, see `impact.results.factored`
 TABLE = frozenset({
-    *(f"trajectory_{column.name}" for column in fields(Rebound)), "trajectory_of_cell", "law_stiffness",
+    *(f"trajectory_{name}" for name in TABLE_COLUMNS), "trajectory_of_cell", "law_stiffness",
     "witness_index", *(f"witness_{name}" for name in COMPUTED),
 })  # fmt: skip
 NAMES = COMPUTED | FOLLOWED | TEXTS | TABLE | {"t", "year", "exponent", *SWEEP}
@@ -37,10 +38,14 @@ OWN = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*\.[^\W\d]\w*")
 def is_name(name: str) -> bool:
     """Whether a variable of a result may be called this.
 
-    >>> is_name("e_out"), is_name("ismail-stronge-2008.gamma"), is_name("twice")
-    (True, True, False)
+    >>> is_name("e_out"), is_name("ismail-stronge-2008.gamma"), is_name("materials.steel.E"), is_name("twice")
+    (True, True, True, False)
     """
-    return name in NAMES or OWN.fullmatch(name) is not None
+    if name in NAMES or OWN.fullmatch(name) or is_case(name):
+        return True
+    material, key = material_property(name) or ("", "")
+    # netCDF separates names by spaces, and HDF5 groups by slashes
+    return key in MATERIAL and material.isprintable() and re.fullmatch(r"[^\s/]+", material) is not None
 
 
 def is_quantity(name: str, axes: tuple[str, ...]) -> bool:
@@ -48,18 +53,13 @@ def is_quantity(name: str, axes: tuple[str, ...]) -> bool:
     return name in COMPUTED or (name in FOLLOWED and axes == ("t",))
 
 
-# attributes of a result that the program reads: text, numbers, and text that is JSON of a kind
+# attributes of a result that the program reads: text, some of which is JSON, and numbers
 TEXT = ("title", "config", "config_set", "fingerprint", "impact_version", "packages", "plugins")
 NUMBERS = ("rtol", "max_steps")
 # attributes that say that a file is factored, which a dataset has not
 FACTORED = ("laws", "axes")
-JSON: Mapping[str, type] = {
-    "config_set": list, "packages": dict, "plugins": dict, "materials": dict, "tolerances": dict, "inputs": dict,
-    "extended": list,
-}  # fmt: skip
 # statuses that are looked at at a time
 MAX_STATUS = 2**22
-KNOWN = [int(status) for status in Status]
 # of a variable of a result
 DTYPES = {
     variable.name: [np.dtype(variable.dtype)] if variable.dtype != "f8" else [np.dtype("f8"), np.dtype("f4")]
@@ -100,16 +100,11 @@ def _json(dataset: xr.Dataset) -> Iterator[str]:
     for key in FACTORED:
         if key in dataset.attrs:
             yield f"{key}: an attribute of files in layout factored"
-    for key, kind in JSON.items():
-        if key in dataset.attrs and not isinstance(_parsed(dataset.attrs[key]), kind):
-            yield f"{key}: no JSON of the right kind"
-
-
-def _parsed(text: object) -> object:
-    try:
-        return json.loads(text) if isinstance(text, str) else None
-    except (ValueError, RecursionError):
-        return None
+    for key in KINDS:
+        try:
+            read_attribute(dataset.attrs, key)
+        except ResultError as error:
+            yield str(error)
 
 
 def _history(dataset: xr.Dataset) -> Iterator[str]:
@@ -144,4 +139,4 @@ def _has_unknown_status(status: xr.DataArray) -> bool:
     if is_lazy(status.variable) and VARIES_ALONG in status.encoding:
         return False
     parts = (status.isel(where).values for where in slabs(status.sizes, MAX_STATUS))
-    return any(not np.isin(np.unique(part), KNOWN).all() for part in parts)
+    return any(not np.isin(np.unique(part), STATUSES).all() for part in parts)

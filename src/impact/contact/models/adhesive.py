@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..closed_forms import edinburgh_adhesion, edinburgh_restitution, jkr_restitution, jkr_root
 from ..evidence import Evidence
-from ..forms import spring
+from ..force_expressions import spring
 from ..model import ForceModel, Parameter
-from ..oracles import edinburgh_adhesion, edinburgh_restitution, jkr_restitution, jkr_root
-from ..power import Array, integer_power, power
-from .elastoplastic import CONTACT
+from ..powers import Array, integer_power, power
+from .elastoplastic import E_OF_K
 
 JKR_1971 = ForceModel(
     key="jkr-1971",
@@ -30,26 +30,25 @@ JKR_1971 = ForceModel(
     ),
     parameters=(Parameter("gamma", "N/m", "work of adhesion Γ", least=0.0, typical=0.01),),
     coefficients={
-        "R": CONTACT["R"],
-        "E": CONTACT["E"],
+        "E": E_OF_K,
         "b": lambda gamma, E: np.sqrt(2 * np.pi * gamma / E),
     },
     # with y = √a: δ = y⁴/R* − b y and F = E* (4y⁶/(3R*) − 2b y³)
-    force=lambda x, E, R, b: jkr_force(x, E, R, b),
-    unloading=lambda x, E, R, b: jkr_force(x, E, R, b),
+    force=lambda x, E, R_eff, b: jkr_force(x, E, R_eff, b),
+    unloading=lambda x, E, R_eff, b: jkr_force(x, E, R_eff, b),
     # the neck lengthens to here, where δ as a function of y is least
-    residual=lambda R, b: -0.75 * b * np.cbrt(0.25 * b * R),
-    oracle=lambda m, v0, E, R, b: jkr_restitution(m * v0 * v0, E, R, b),
+    residual=lambda R_eff, b: -0.75 * b * np.cbrt(0.25 * b * R_eff),
+    oracle=lambda m, v0, E, R_eff, b: jkr_restitution(m * v0 * v0, E, R_eff, b),
     exponent=1.5,
     family="adhesive",
 )
 
 
-def jkr_force(x: Array, E: Array, R: Array, b: Array) -> Array:
+def jkr_force(x: Array, E: Array, R_eff: Array, b: Array) -> Array:
     """The force at an indentation, negative where the neck pulls."""
-    y = jkr_root(x, R, b)
+    y = jkr_root(x, R_eff, b)
     cube = integer_power(y, 3)
-    return np.asarray(E * cube * (4 / 3 * cube / R - 2 * b))
+    return np.asarray(E * cube * (4 / 3 * cube / R_eff - 2 * b))
 
 
 LIGGGHTS_EDINBURGH = ForceModel(
@@ -80,7 +79,7 @@ LIGGGHTS_EDINBURGH = ForceModel(
     ),
     # where nothing pulls, the balls part at δₚ
     residual=lambda peak, n, k2, gamma: np.where(gamma > 0, 0.0, peak * np.power(1 - 1 / k2, 1 / n)),
-    unloading_bends=(
+    unloading_breakpoints=(
         lambda x, peak, K, n, k2, gamma, adhesion_exponent, R1, R2: np.where(
             gamma > 0,
             np.subtract(*edinburgh_branches(x, peak, K, n, k2, gamma, adhesion_exponent, R1, R2)),
@@ -90,9 +89,7 @@ LIGGGHTS_EDINBURGH = ForceModel(
     oracle=lambda K, m, v0, n, k2, gamma, adhesion_exponent, R1, R2: edinburgh_restitution(
         m * v0 * v0, K, n, k2, gamma, adhesion_exponent, R1, R2
     ),
-    stiffness=lambda n, E1, E2, nu1, nu2, R1, R2: np.where(
-        n == 1.0, 2 * np.sqrt(1 / (1 / R1 + 1 / R2)), 4 / 3
-    ) * np.sqrt(1 / (1 / R1 + 1 / R2)) / ((1 - nu1 * nu1) / E1 + (1 - nu2 * nu2) / E2),
+    stiffness=lambda n, E_eff, R_eff: np.where(n == 1.0, 2 * np.sqrt(R_eff), 4 / 3) * np.sqrt(R_eff) * E_eff,
     family="adhesive",
 )  # fmt: skip
 

@@ -7,11 +7,11 @@ from typing import Unpack
 
 import numpy as np
 
+from ..closed_forms import approach_damped_restitution, approach_damping, approach_restitution
 from ..evidence import Evidence
-from ..forms import damped, spring, stiffer
+from ..force_expressions import damped, spring, stiffer
 from ..formula import Formula
 from ..model import About, ForceModel
-from ..oracles import approach_damped_restitution, approach_damping, approach_restitution
 from .dashpot import dashpot
 from .sources import DYS, OPENSEES_JANKOWSKI, RAILWAY
 
@@ -85,7 +85,7 @@ PANT_WIJEYEWICKREMA_2012 = ForceModel(
     force=damped,
     unloading=spring,
     oracle=lambda chi: approach_damped_restitution(chi),
-    momentum="log",
+    velocity_coordinate="log",
     exponent=1.0,
     family="asymmetric",
 )

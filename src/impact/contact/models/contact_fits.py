@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..closed_forms import muthukumar_restitution
 from ..evidence import Evidence
-from ..forms import returning
+from ..force_expressions import returning
 from ..model import ForceModel, Parameter
-from ..oracles import muthukumar_restitution
-from ..power import Array, power
-from .elastoplastic import CONTACT
+from ..powers import Array, power
+from .elastoplastic import E_OF_K
 from .sources import IMPACT_MATERIAL
 
 
@@ -37,18 +37,18 @@ JACKSON_GREEN_2010 = ForceModel(
         "above that fit there, and within 0.009 of it beyond",
     ),
     coefficients={
-        **CONTACT,
+        "E": E_OF_K,
         "nu": lambda nu1, nu2, yield_strength1, yield_strength2: softer(
             nu1, nu2, yield_strength1, yield_strength2
         ),
         "C": lambda nu: 1.295 * np.exp(0.736 * nu),
-        "dc": lambda E, R, Y, C: np.pi * C * Y / (2 * E) * (np.pi * C * Y / (2 * E)) * R,
+        "dc": lambda E, R_eff, Y_min, C: np.pi * C * Y_min / (2 * E) * (np.pi * C * Y_min / (2 * E)) * R_eff,
         "Fc": lambda K, dc: K * power(dc, 1.5),
-        "B": lambda E, Y: 0.14 * np.exp(np.minimum(23 * Y / E, 700)),
+        "B": lambda E, Y_min: 0.14 * np.exp(np.minimum(23 * Y_min / E, 700)),
     },
-    bends=(lambda dc: 1.9 * dc,),
-    force=lambda elastic, x, R, C, dc, Fc, B: np.where(
-        x < 1.9 * dc, elastic, Fc * jackson_green(np.maximum(x / dc, 1.9), x / R, C, B)
+    breakpoints=(lambda dc: 1.9 * dc,),
+    force=lambda elastic, x, R_eff, C, dc, Fc, B: np.where(
+        x < 1.9 * dc, elastic, Fc * jackson_green(np.maximum(x / dc, 1.9), x / R_eff, C, B)
     ),
     unloading=returning,
     residual=lambda peak, dc: np.where(
@@ -88,15 +88,15 @@ KOGUT_ETSION_2005 = ForceModel(
         "come back than went in: here it begins where the two meet; the fits are continued beyond w = 110",
     ),
     coefficients={
-        **CONTACT,
+        "E": E_OF_K,
         "nu": lambda nu1, nu2, yield_strength1, yield_strength2: softer(
             nu1, nu2, yield_strength1, yield_strength2
         ),
         # the hardness is 2.8 Y
-        "dc": lambda E, R, Y, nu: np.square(np.pi * (0.454 + 0.41 * nu) * 2.8 * Y / (2 * E)) * R,
+        "dc": lambda E, R_eff, Y_min, nu: np.square(np.pi * (0.454 + 0.41 * nu) * 2.8 * Y_min / (2 * E)) * R_eff,
         "Fc": lambda K, dc: K * power(dc, 1.5),
     },
-    bends=(lambda dc: MEETS * dc, lambda dc: 6 * dc),
+    breakpoints=(lambda dc: MEETS * dc, lambda dc: 6 * dc),
     force=lambda elastic, x, dc, Fc: np.where(
         x < MEETS * dc, elastic, Fc * kogut_etsion(np.maximum(x / dc, MEETS))
     ),
@@ -107,7 +107,7 @@ KOGUT_ETSION_2005 = ForceModel(
         )
     ),
     residual=lambda peak, dc: peak * kogut_etsion_residual(np.maximum(peak / dc, 1)),
-    smooth=2,
+    coordinate_power=2,
     exponent=1.5,
     family="elastic-plastic",
 )
@@ -142,10 +142,10 @@ MUTHUKUMAR_2003 = ForceModel(
         "K1": lambda base, loss: base * (1 + 10 * loss),
         "K2": lambda base, loss: base * (1 - 10 * loss / 9),
     },
-    bends=(lambda d: 0.1 * d,),
+    breakpoints=(lambda d: 0.1 * d,),
     force=lambda x, K1, K2, d: K2 * x + (K1 - K2) * np.minimum(x, 0.1 * d),
     unloading=lambda x, peak, force_at_peak, K1, K2: np.maximum(force_at_peak - K1 * (peak - x), K2 * x),
-    unloading_bends=(lambda peak, force_at_peak, K1, K2: (K1 * peak - force_at_peak) / (K1 - K2),),
+    unloading_breakpoints=(lambda peak, force_at_peak, K1, K2: (K1 * peak - force_at_peak) / (K1 - K2),),
     oracle=lambda m, v0, K1, K2, d: muthukumar_restitution(v0 * np.sqrt(m), K1, K2, 0.1 * d),
     family="elastic-plastic",
 )

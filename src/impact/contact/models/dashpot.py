@@ -10,12 +10,12 @@ from typing import Literal, Unpack
 
 import numpy as np
 
+from ..closed_forms import force_damping, force_restitution, gap_damping, gap_restitution
 from ..evidence import Evidence
-from ..forms import dragged
+from ..force_expressions import dragged
 from ..formula import Formula
 from ..model import About, ForceModel, Parameter
-from ..oracles import force_damping, force_restitution, gap_damping, gap_restitution
-from ..power import Array, power
+from ..powers import Array, power
 from .sources import CHRONO, DEMLAB_VISCOELASTIC, LIGGGHTS, MAPLESIM_HELP, YADE_2025, YADE_BIBLIOGRAPHY
 
 
@@ -44,10 +44,10 @@ def dashpot(key: str, *, zeta: Formula, release: Literal["gap", "force"], **abou
         },
         force=lambda elastic, x, v, n, c: dragged(elastic, power(x, (n - 1) / 2), v, c),
         release=release,
-        momentum="force",
+        velocity_coordinate="force",
         oracle=by_gap if release == "gap" else by_force,
         # with n = 3/2 the dashpot goes as the fourth root of the indentation
-        smooth=2 if about.get("exponent") == 1.0 else 4,
+        coordinate_power=2 if about.get("exponent") == 1.0 else 4,
         family="dashpot",
     )
 

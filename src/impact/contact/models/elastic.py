@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..evidence import Evidence
-from ..forms import spring
+from ..force_expressions import spring
 from ..model import ForceModel
 from .sources import DEMLAB_VISCOELASTIC, GHARIB_HURMUZLU
 

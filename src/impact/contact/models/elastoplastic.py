@@ -1,33 +1,29 @@
 """Elastic-plastic laws: a yield on approach, an elastic recovery on restitution; the restitution falls with speed.
 
-A yield strength is that of the softer ball. E* and R* are those of equation (12): where the stiffness K is given,
-E* is 3 K/(4 √R*).
+A yield strength is that of the softer ball. E* is that of equation (12) for the stiffness K, 3 K/(4 √R*), so that
+it follows a K that is given.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from ..closed_forms import luding_restitution, thornton_restitution
 from ..evidence import Evidence
-from ..forms import returning, spring
+from ..force_expressions import returning, spring
 from ..formula import Formula
 from ..model import ForceModel, Parameter
-from ..oracles import luding_restitution, thornton_restitution
-from ..power import Array, power
+from ..powers import Array, power
 from .sources import DEMLAB_PLASTIC, YADE_BIBLIOGRAPHY
 
-# E*, R* and the yield strength, for the laws that are written in them
-CONTACT: dict[str, Formula] = {
-    "R": lambda R1, R2: 1 / (1 / R1 + 1 / R2),
-    "E": lambda K, R: 0.75 * K / np.sqrt(R),
-    "Y": lambda yield_strength1, yield_strength2: np.minimum(yield_strength1, yield_strength2),
-}
+# E* of the laws that are written in it
+E_OF_K: Formula = lambda K, R_eff: 0.75 * K / np.sqrt(R_eff)  # noqa: E731
 
 
-def yield_indentation(E: Array, R: Array, pressure: Array) -> Array:
+def yield_indentation(E: Array, R_eff: Array, pressure: Array) -> Array:
     """Where the largest pressure of a Hertz contact, (2E*/π) √(δ/R*), comes to one that the material yields at."""
     root = np.pi * pressure / (2 * E)
-    return root * root * R
+    return root * root * R_eff
 
 
 WALTON_BRAUN_VARIABLE = ForceModel(
@@ -74,8 +70,8 @@ LUDING_2008 = ForceModel(
         Parameter("phi", "1", "plasticity depth φ", default=0.05, least=1e-6, most=10.0),
     ),
     # 1/δ*, which is zero where nothing yields
-    coefficients={"R": CONTACT["R"], "shallow": lambda k2, R, phi: (k2 - 1) / (k2 * phi * 2 * R)},
-    bends=(lambda shallow: np.divide(1, shallow),),
+    coefficients={"shallow": lambda k2, R_eff, phi: (k2 - 1) / (k2 * phi * 2 * R_eff)},
+    breakpoints=(lambda shallow: np.divide(1, shallow),),
     force=lambda x, K, k2, shallow: K * (x + (k2 - 1) * np.maximum(x - np.divide(1, shallow), 0)),
     unloading=lambda x, peak, force_at_peak, K, k2, kc, shallow: np.maximum(
         force_at_peak - K * unloading_ratio(peak, k2, shallow) * (peak - x), -kc * K * x
@@ -84,7 +80,7 @@ LUDING_2008 = ForceModel(
     residual=lambda peak, force_at_peak, K, k2, kc, shallow: np.where(
         kc > 0, 0, peak - force_at_peak / (K * unloading_ratio(peak, k2, shallow))
     ),
-    unloading_bends=(
+    unloading_breakpoints=(
         lambda peak, force_at_peak, K, k2, kc, shallow: (
             (unloading_ratio(peak, k2, shallow) * peak - force_at_peak / K)
             / (unloading_ratio(peak, k2, shallow) + kc)
@@ -116,15 +112,15 @@ THORNTON_1997 = ForceModel(
     ),
     parameters=(Parameter("c", "1", "contact yield pressure over the yield strength", 1.6, 0.1, 10.0),),
     coefficients={
-        **CONTACT,
-        "py": lambda Y, c: c * Y,
-        "dy": lambda E, R, py: yield_indentation(E, R, py),
+        "E": E_OF_K,
+        "py": lambda Y_min, c: c * Y_min,
+        "dy": lambda E, R_eff, py: yield_indentation(E, R_eff, py),
         "Fy": lambda K, dy: K * power(dy, 1.5),
     },
-    bends=(lambda dy: dy,),
-    force=lambda elastic, x, R, py, dy, Fy: np.where(x < dy, elastic, Fy + np.pi * py * R * (x - dy)),
+    breakpoints=(lambda dy: dy,),
+    force=lambda elastic, x, R_eff, py, dy, Fy: np.where(x < dy, elastic, Fy + np.pi * py * R_eff * (x - dy)),
     unloading=returning,
-    residual=lambda peak, force_at_peak, R, E, py, dy, Fy: np.where(
+    residual=lambda peak, force_at_peak, R_eff, E, py, dy, Fy: np.where(
         peak <= dy,
         0.0,
         peak - power(0.75 * force_at_peak / (E * np.sqrt(thornton_radius(force_at_peak, E, py, Fy))), 2 / 3),
@@ -154,27 +150,30 @@ JOHNSON_1985 = ForceModel(
     ),
     parameters=(Parameter("c", "1", "dynamic yield pressure over the yield strength", 3.0, 0.1, 30.0),),
     coefficients={
-        **CONTACT,
-        "pd": lambda Y, c: c * Y,
-        "yields": lambda K, m, v0, E, R, Y: np.where(
-            m * v0 * v0 > 0.8 * K * power(yield_indentation(E, R, 1.6 * Y), 2.5), 1.0, 0.0
+        "E": E_OF_K,
+        "pd": lambda Y_min, c: c * Y_min,
+        "yields": lambda K, m, v0, E, R_eff, Y_min: np.where(
+            m * v0 * v0 > 0.8 * K * power(yield_indentation(E, R_eff, 1.6 * Y_min), 2.5), 1.0, 0.0
         ),
     },
-    force=lambda elastic, x, R, pd, yields: np.where(yields > 0, 2 * np.pi * R * pd * x, elastic),
+    force=lambda elastic, x, R_eff, pd, yields: np.where(yields > 0, 2 * np.pi * R_eff * pd * x, elastic),
     unloading=returning,
     # too slow an impact is not fully plastic: it would recover more than it went in
-    residual=lambda peak, force_at_peak, R, E, yields: (
-        yields * (peak - np.minimum(0.75 * force_at_peak / (np.sqrt(2 * R * peak) * E), peak))
+    residual=lambda peak, force_at_peak, R_eff, E, yields: (
+        yields * (peak - np.minimum(0.75 * force_at_peak / (np.sqrt(2 * R_eff * peak) * E), peak))
     ),
     # e² = (4/5)(δₘ − δₚ)/δₘ, with m v₀² = 2π R* p_d δₘ²
-    oracle=lambda m, v0, R, E, pd, yields: np.where(
+    oracle=lambda m, v0, R_eff, E, pd, yields: np.where(
         yields > 0,
         np.sqrt(
-            0.8 * np.minimum(1.5 * np.pi * pd / E * np.sqrt(R / (2 * v0 * np.sqrt(m / (2 * np.pi * R * pd)))), 1)
+            0.8
+            * np.minimum(
+                1.5 * np.pi * pd / E * np.sqrt(R_eff / (2 * v0 * np.sqrt(m / (2 * np.pi * R_eff * pd)))), 1
+            )
         ),
         1.0,
     ),
-    smooth=2,
+    coordinate_power=2,
     exponent=1.5,
     family="elastic-plastic",
 )

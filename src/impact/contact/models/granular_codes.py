@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..closed_forms import force_damping, gap_damping
 from ..evidence import Evidence
 from ..model import ForceModel, Parameter
-from ..oracles import force_damping, gap_damping
-from ..power import Array, power
+from ..powers import Array, power
 from .aliases import same_law
 from .dashpot import (
     ANAGNOSTOPOULOS_1988,
@@ -43,14 +43,9 @@ def in_code(
     )
 
 
-def effective_modulus(E1: Array, E2: Array, nu1: Array, nu2: Array) -> Array:
-    """E* of equation (13)."""
-    return 1 / ((1 - nu1 * nu1) / E1 + (1 - nu2 * nu2) / E2)
-
-
-def by_speed(E1: Array, E2: Array, nu1: Array, nu2: Array, R1: Array, R2: Array, m: Array, vc: Array) -> Array:
-    """K of a linear spring from moduli, radii and a characteristic speed."""
-    root = np.sqrt(1 / (1 / R1 + 1 / R2)) * effective_modulus(E1, E2, nu1, nu2)
+def by_speed(E_eff: Array, R_eff: Array, m: Array, vc: Array) -> Array:
+    """K of a linear spring from modulus, radius and a characteristic speed."""
+    root = np.sqrt(R_eff) * E_eff
     return 16 / 15 * root * power(15 * m * vc * vc / (16 * root), 0.2)
 
 
@@ -127,7 +122,7 @@ CHRONO_SMC_PLAINCOULOMB = of_code(
         release="force",
         exponent=1.5,
     ),
-    stiffness=lambda E1, E2, nu1, nu2: 4 / 3 * effective_modulus(E1, E2, nu1, nu2),
+    stiffness=lambda E_eff: 4 / 3 * E_eff,
 )
 
 # ---- YADE
@@ -284,9 +279,8 @@ KRATOS_LINEAR = of_code(
         release="force",
         exponent=1.0,
     ),
-    stiffness=lambda E1, E2, nu1, nu2, R1, R2: (
-        np.where(np.isinf(R1) | np.isinf(R2), 1.0, 1.432)
-        * np.pi * 0.31225 * effective_modulus(E1, E2, nu1, nu2) / (1 / R1 + 1 / R2)
+    stiffness=lambda E_eff, R_eff, R1, R2: (
+        np.where(np.isinf(R1) | np.isinf(R2), 1.0, 1.432) * np.pi * 0.31225 * E_eff * R_eff
     ),
 )  # fmt: skip
 

@@ -6,12 +6,12 @@ from typing import Unpack
 
 import numpy as np
 
+from ..closed_forms import delivered_restitution, exact_damping_ratio
 from ..evidence import Evidence
-from ..forms import damped
+from ..force_expressions import damped
 from ..formula import Formula
 from ..model import About, ForceModel
-from ..oracles import delivered_restitution, exact_damping_ratio
-from ..power import power
+from ..powers import power
 from .sources import DYS, GHARIB_HURMUZLU, MBDYN, MBDYN_BIBLIOGRAPHY, OPENSEES_HERTZDAMP, RAILWAY
 
 
@@ -33,7 +33,7 @@ def hysteresis(key: str, *, chi: Formula, **about: Unpack[About]) -> ForceModel:
         force=damped,
         coefficients={"chi": chi},
         oracle=lambda chi: delivered_restitution(chi),
-        momentum="log",
+        velocity_coordinate="log",
         family="hysteresis",
     )
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..evidence import Evidence
 from ..model import ForceModel, Parameter
-from ..power import Array
+from ..powers import Array
 from .dashpot import (
     ANAGNOSTOPOULOS_1988,
     ANAGNOSTOPOULOS_1988_NO_TENSION,
@@ -118,7 +118,7 @@ def viscoelastic(exponent: float) -> Maker:
     """η m a δ̇ with the contact radius a = √(R* δ), which LAMMPS has for a linear spring too."""
     return partial(
         drag,
-        c=lambda eta, m, R1, R2: eta * m * np.sqrt(1 / (1 / R1 + 1 / R2)),
+        c=lambda eta, m, R_eff: eta * m * np.sqrt(R_eff),
         q=0.5,
         # a linear spring is slow to overcome so strong a damping, which takes steps in proportion to it
         parameters=(replace(VISCOELASTIC[0], typical=1e3),) if exponent == 1.0 else VISCOELASTIC,

@@ -9,11 +9,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..closed_forms import force_restitution, limited_restitution
 from ..evidence import Evidence
 from ..formula import Formula
 from ..model import ForceModel, Parameter
-from ..oracles import force_restitution, limited_restitution
-from ..power import Array, power, powers
+from ..powers import Array, power, powers
 from .aliases import same_law
 from .dashpot import KELVIN_VOIGT_NO_TENSION
 from .hysteresis import FLORES_2011, HUNT_CROSSLEY_1975, LANKARANI_NIKRAVESH_1990, hysteresis
@@ -62,7 +62,7 @@ ADAMS_IMPACT = ForceModel(
     # below n = 2 the spring outlasts the damping as the gap closes, and pushes once more after the force was zero
     force=lambda elastic, x, v, c, d: np.maximum(elastic + c * step(x / d) * v, 0),
     # where the force begins or ceases to be zero; over the spring, so that it does not fade with the indentation
-    bends=(lambda d: d, lambda elastic, x, v, c, d: 1 + c * step(x / d) * v / elastic),
+    breakpoints=(lambda d: d, lambda elastic, x, v, c, d: 1 + c * step(x / d) * v / elastic),
     family="codes",
 )
 
@@ -102,15 +102,15 @@ RECURDYN_EXPONENTS = ForceModel(
     force=lambda elastic, x, v, c, damping_exponent, indentation_exponent: (
         elastic + c * np.sign(v) * powers(np.abs(v), damping_exponent) * powers(x, indentation_exponent)
     ),
-    smooth=4,
+    coordinate_power=4,
     family="codes",
 )
 
 
-def simbody_stiffness(E1: Array, E2: Array, nu1: Array, nu2: Array, R1: Array, R2: Array) -> Array:
+def simbody_stiffness(E1: Array, E2: Array, nu1: Array, nu2: Array, R_eff: Array) -> Array:
     """K of Simbody, which mixes the plane strain moduli by their powers 2/3."""
     k1, k2 = power(E1 / (1 - nu1 * nu1), 2 / 3), power(E2 / (1 - nu2 * nu2), 2 / 3)
-    return 4 / 3 * np.sqrt(1 / (1 / R1 + 1 / R2)) * series(k1, k2) ** 1.5
+    return 4 / 3 * np.sqrt(R_eff) * series(k1, k2) ** 1.5
 
 
 def simbody_dissipation(c1: Array, c2: Array, E1: Array, E2: Array, nu1: Array, nu2: Array) -> Array:
@@ -227,7 +227,7 @@ MODELICA_ELASTOGAP = ForceModel(
     ),
     parameters=(Parameter("d", "N s/m", "damping constant", least=0.0),),
     force=lambda elastic, v, d: elastic + np.minimum(d * v, elastic),
-    bends=(lambda elastic, v, d: np.where(v > 0, elastic - d * v, np.nan),),
+    breakpoints=(lambda elastic, v, d: np.where(v > 0, elastic - d * v, np.nan),),
     release="force",
     family="codes",
 )
@@ -252,7 +252,7 @@ MAPLESIM_LIMITED = ForceModel(
     evidence=Evidence("seen", MAPLESIM_HELP, note="its first year was not seen"),
     parameters=(Parameter("d", "N s/m", "damping constant", least=0.0),),
     force=lambda elastic, v, d: elastic + np.minimum(d * v, elastic),
-    bends=(lambda elastic, v, d: np.where(v > 0, elastic - d * v, np.nan),),
+    breakpoints=(lambda elastic, v, d: np.where(v > 0, elastic - d * v, np.nan),),
     oracle=lambda d, m, K: limited_restitution(d / (2 * np.sqrt(m * K))),
     release="force",
     exponent=1.0,
@@ -401,7 +401,7 @@ SIMSCAPE_CONTACT = ForceModel(
         Parameter("w", "m", "transition region width", least=1e-9),
     ),
     force=lambda elastic, x, v, b, w: step(x / w) * (elastic + b * v),
-    bends=(lambda w: w,),
+    breakpoints=(lambda w: w,),
     release="force",
     exponent=1.0,
     family="codes",

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..evidence import Evidence
-from ..forms import returning, spring, stiffer
+from ..force_expressions import returning, spring, stiffer
 from ..model import ForceModel, Parameter
-from ..power import power
+from ..powers import power
 from .sources import DEMLAB_PLASTIC, GHARIB_HURMUZLU
 
 LANKARANI_NIKRAVESH_1994 = ForceModel(

@@ -4,23 +4,29 @@ from __future__ import annotations
 
 from typing import Literal, Unpack
 
+from ..closed_forms import pade_damping
 from ..evidence import Evidence
-from ..forms import dragged
+from ..force_expressions import dragged
 from ..formula import Formula
 from ..model import About, ForceModel, Parameter
-from ..oracles import pade_damping
-from ..power import power, powers
+from ..powers import power, powers
 from .sources import DEMLAB_VISCOELASTIC
 
 
 def drag(
-    key: str, *, c: Formula, q: float, release: Literal["gap", "force"], smooth: int = 2, **about: Unpack[About]
+    key: str,
+    *,
+    c: Formula,
+    q: float,
+    release: Literal["gap", "force"],
+    coordinate_power: int = 2,
+    **about: Unpack[About],
 ) -> ForceModel:
     """A spring and a damping of its own power, F = K δⁿ + c δ^q δ̇.
 
     Parameters
     ----------
-    key, smooth, about : see `ForceModel`
+    key, coordinate_power, about : see `ForceModel`
     c : the damping coefficient as a function of what it asks for by name
     q : exponent of the indentation in the damping
     release : where the contact ends
@@ -31,8 +37,8 @@ def drag(
         coefficients={"c": c, "q": lambda: q},
         force=lambda elastic, x, v, c: dragged(elastic, power(x, q), v, c),
         release=release,
-        momentum="force",
-        smooth=smooth,
+        velocity_coordinate="force",
+        coordinate_power=coordinate_power,
         family="rate-dependent",
     )
 
@@ -117,7 +123,7 @@ HERTZ_POWER_DAMPING = ForceModel(
     ),
     force=lambda elastic, x, v, C, q: elastic + C * powers(x, q) * v,
     release="force",
-    smooth=4,
+    coordinate_power=4,
     exponent=1.5,
     family="rate-dependent",
 )
@@ -139,5 +145,5 @@ BORDBAR_HYPPANEN_2007 = drag(
     c=lambda C: C,
     q=0.65,
     release="force",
-    smooth=4,
+    coordinate_power=4,
 )

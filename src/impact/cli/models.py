@@ -1,0 +1,259 @@
+"""The command `models`: the catalogue, one law, or whether a law of one's own keeps the contract."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Sequence
+from fnmatch import fnmatchcase
+from itertools import groupby
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..errors import UsageError, did_you_mean
+from ..text import safe_text, with_year
+from . import exits
+from .console import cell, console, dump, print_rows, table
+from .options import Json, Plugins
+from .params import complete_family, complete_model
+
+if TYPE_CHECKING:
+    from rich.text import Text
+
+    from ..contact.checks import Finding
+    from ..contact.model import ForceModel, Parameter
+
+# where a table of the catalogue shows the delivered restitution
+ASKED = (0.1, 0.3, 0.5, 0.7, 0.9)
+# characters that a column of the catalogue takes, with the space before it
+E_WIDTH, EQUATION_WIDTH, DOMAIN_WIDTH, CORE_WIDTH = 8, 32, 26, 7
+# exponents for which the compiled core is reported
+COMPILED_AT = (1.0, 1.5, 2.0, 2.5, 3.0)
+
+
+def models(
+    key: Annotated[
+        str | None,
+        typer.Argument(
+            autocompletion=complete_model,
+            help='A model to describe in full, or a pattern of models to list: "lammps-*". \\[default: list all]',
+        ),
+    ] = None,
+    family: Annotated[
+        str | None,
+        typer.Option(
+            "--family", metavar="NAME", autocompletion=complete_family, help="List the laws of a family only."
+        ),
+    ] = None,
+    check: Annotated[
+        Path | None,
+        typer.Option("--check", metavar="FILE", help="Python file of whose models to check the contract."),
+    ] = None,
+    plugins: Plugins = None,
+    as_json: Json = False,
+) -> None:
+    """The catalogue of contact force models: equations, references, domains, delivered restitution."""
+    from ..contact.models import catalogue, find
+    from ..engine.plugins import read_plugins
+
+    if check is not None:
+        own = [plugin.model for plugin in read_plugins([check]).items if plugin.source is not None]
+        _check([model for model in own if key in (None, model.key)] or [find(str(key), own)], as_json=as_json)
+        return
+    others = read_plugins(plugins or ()).models
+    is_pattern = key is None or bool({*"*?["} & {*key})
+    if is_pattern:
+        chosen = _matching(key or "*", _of_family(family, list(catalogue(others).values())))
+    else:
+        chosen = [find(str(key), others)]
+    if as_json:
+        print(dump([model_json(model) for model in chosen]))
+    elif is_pattern:
+        _print_models(chosen)
+    else:
+        _print_model(chosen[0])
+
+
+def _matching(pattern: str, models: Sequence[ForceModel]) -> Sequence[ForceModel]:
+    """The models whose keys match a pattern."""
+    matching = [model for model in models if fnmatchcase(model.key, pattern)]
+    if not matching:
+        keys = [model.key for model in models]
+        raise UsageError(f'no model matches "{safe_text(pattern)}"; {did_you_mean(pattern.strip("*?"), keys)}')
+    return matching
+
+
+def _of_family(family: str | None, models: Sequence[ForceModel]) -> Sequence[ForceModel]:
+    """The models of a family, or all."""
+    families = sorted({model.family for model in models})
+    if family is not None and family not in families:
+        raise UsageError(f'--family: no family "{safe_text(family)}"; {did_you_mean(family, families)}')
+    return [model for model in models if family in (None, model.family)]
+
+
+def model_json(model: ForceModel) -> dict[str, Any]:
+    """A model's declaration as plain data."""
+    own = [vars(parameter) for parameter in model.parameters]
+    names = ("key", "title", "year", "family", "equation", "reference", "doi", "same_as")
+    return {
+        **{name: getattr(model, name) for name in names}, "evidence": vars(model.evidence),
+        "domain": {name: list(ends) for name, ends in model.domain.items()},
+        "domain_source": model.domain_source, "parameters": own,
+        "exponent": model.exponent, "release": model.release, "delivered_restitution": _delivered(model),
+        "integrated_by": _cores(model),
+    }  # fmt: skip
+
+
+def _delivered(model: ForceModel) -> dict[str, float]:
+    """The exact delivered restitution by the e asked for; empty where there is none."""
+    import numpy as np
+
+    from ..contact.scaling import delivered
+
+    found = delivered(model, np.array(ASKED))
+    return {} if found is None else {f"{e:g}": out for e, out in zip(ASKED, found.tolist(), strict=True)}
+
+
+def _print_models(models: Sequence[ForceModel]) -> None:
+    """The catalogue, a line a model, family by family, with as many columns as there is room for."""
+    from rich.text import Text
+
+    from ..contact.evidence import summary
+
+    out = console(sys.stdout)
+    room = out.width - max(len(model.key) for model in models)
+    asked, others = _columns(max(room, E_WIDTH))
+    rows = table("model", *(f"e={e:g}" for e in asked), *others)
+    # on the narrowest terminal the keys are folded, so that one value stays
+    rows.columns[0].no_wrap = room >= E_WIDTH
+    for column in rows.columns[1 + len(asked) :]:
+        column.justify = "left"
+    for column in rows.columns[1 : 1 + len(asked)]:
+        column.no_wrap = True
+    for family, members in groupby(models, lambda model: model.family):
+        rows.add_row(Text(f"family:{family}", style="dim"))
+        for model in members:
+            rows.add_row(model.key, *_cells(model, asked, others))
+    out.print(rows)
+    if asked:
+        out.print("\nThe columns e=... show the restitution that a model delivers when it is asked for e.")
+    if "core" in others:
+        out.print('The core is what integrates a law, or a phase of it, where numba is installed (extra "fast").')
+    out.print("A law with [parameters] of its own is driven by them; `impact models KEY` describes one in full.")
+    counts = summary(model.evidence for model in models)
+    out.print(f"Evidence for the formulas of these {len(models)} entries: {counts}.")
+
+
+def _columns(room: int) -> tuple[tuple[float, ...], tuple[str, ...]]:
+    """The values of e, and the other columns, that a table of the catalogue shows beside the keys.
+
+    >>> _columns(3), _columns(20), _columns(43)
+    (((), ()), ((0.1, 0.9), ()), ((0.1, 0.3, 0.5, 0.7, 0.9), ()))
+    """
+    count = min(len(ASKED), room // E_WIDTH)
+    asked = {0: (), 1: (0.5,), 2: (0.1, 0.9), 3: (0.1, 0.5, 0.9)}.get(count, ASKED[: count - 1] + ASKED[-1:])
+    room -= E_WIDTH * len(asked)
+    others = []
+    for name, width in (("equation", EQUATION_WIDTH), ("core", CORE_WIDTH), ("said to hold for", DOMAIN_WIDTH)):
+        if room >= width:
+            others.append(name)
+            room -= width
+    return asked, tuple(others)
+
+
+def _cells(model: ForceModel, asked: Sequence[float], others: Sequence[str]) -> Iterator[Text | str]:
+    """The cells of a model in a table of the catalogue."""
+    from rich.text import Text
+
+    delivered = _delivered(model)
+    for e in asked:
+        yield f"{delivered[f'{e:g}']:.4f}" if delivered else "–"
+    parameters = ", ".join(parameter.name for parameter in model.parameters)
+    texts = {
+        "equation": model.equation + (f"  [{parameters}]" if parameters else ""),
+        "core": _cores(model).split()[0].rstrip(","),
+        "said to hold for": model.domain_text or "–",
+    }
+    if model.same_as:
+        texts = {"equation": f"same law as {model.same_as}", "core": "", "said to hold for": ""}
+    for name in others:
+        yield Text(texts[name])
+
+
+def _print_model(model: ForceModel) -> None:
+    """All about one model."""
+    rows = {
+        "model": model.key, "same law as": model.same_as, "title": with_year(model.title, model.year),
+        "family": model.family, "equation": model.equation, "reference": model.reference, "doi": model.doi,
+        "evidence": str(model.evidence), "said to hold for": model.domain_text or "not stated",
+        "exponent": "the sweep's n" if model.exponent is None else f"n = {model.exponent:g}, its own",
+        "ends at": _release(model), "integrated by": _cores(model),
+    }  # fmt: skip
+    for place, parameter in enumerate(model.parameters):
+        # the table is named once
+        rows[" " * place if place else f"[model.{model.key}]"] = _parameter(parameter)
+    found = _delivered(model)
+    if found:
+        rows["delivers"] = ", ".join(f"{out:.4f} for e = {e}" for e, out in found.items())
+    print_rows({name: text for name, text in rows.items() if text})
+
+
+def _parameter(one: Parameter) -> str:
+    default = "required" if one.default is None else f"default {one.default:g}"
+    unit = "" if one.unit == "1" else f" [{one.unit}]"
+    return f"{one.name}{unit}: {one.meaning}; from {one.least:g} to {one.most:g}, {default}"
+
+
+def _release(model: ForceModel) -> str:
+    gap = "the permanent indentation" if model.is_permanent else "zero indentation"
+    return gap if model.release == "gap" else f"zero force, at {gap} at the latest"
+
+
+def _cores(model: ForceModel) -> str:
+    """By what a law is integrated where numba is installed."""
+    from ..contact.numba.dispatch import serves
+
+    tried = [model.exponent] if model.exponent is not None else COMPILED_AT
+    approach, restitution = ([n for n in tried if serves(model, n)[phase]] for phase in (0, 1))
+    phases = [name for name, served in (("approach", approach), ("restitution", restitution)) if served]
+    if not phases:
+        return "numpy"
+    where = "" if model.exponent is not None else f", where n is {', '.join(f'{n:g}' for n in approach)}"
+    only = f" on {phases[0]}, numpy else" if len(phases) == 1 else ""
+    return f"numba{only}{where}"
+
+
+def _check(models: Sequence[ForceModel], *, as_json: bool) -> None:
+    """Print what came of every clause of the contract; exit 1 if one does not hold."""
+    from rich.text import Text
+
+    from ..contact.checks import contract
+
+    found = [(model, list(contract(model))) for model in models]
+    broken = [finding for _, findings in found for finding in findings if not finding.holds]
+    if as_json:
+        print(dump([{"model": model.key, "holds": all(one.holds for one in findings),
+                     "clauses": list(_clauses(findings))} for model, findings in found]))  # fmt: skip
+    else:
+        rows = table("model", "clause", "", "worst", "bound")
+        rows.columns[1].justify = "left"
+        for model, findings in found:
+            for place, one in enumerate(findings):
+                mark = Text("holds", style="green") if one.holds else Text("broken", style="red")
+                key = cell("" if place else model.key)
+                rows.add_row(key, one.clause, mark, f"{one.worst:.2g}", f"{one.bound:.2g}")
+        console(sys.stdout).print(rows)
+        for model, findings in found:
+            if not any(one.clause == CLOSED_FORM for one in findings):
+                exits.say(f"{model.key}: has no oracle, so that its restitution was compared with no closed form")
+    if broken:
+        raise typer.Exit(exits.NOT_EQUAL)
+
+
+CLOSED_FORM = "agrees with its closed form"
+
+
+def _clauses(findings: Sequence[Finding]) -> Iterator[dict[str, Any]]:
+    for one in findings:
+        yield {"clause": one.clause, "holds": one.holds, "worst": one.worst, "bound": one.bound}

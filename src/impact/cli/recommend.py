@@ -1,0 +1,64 @@
+"""The command `recommend`: which model gives the restitution asked for, and how wrong the others are."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from .console import dump
+from .options import Json, Models, Result, Sel
+from .params import number
+
+if TYPE_CHECKING:
+    from ..results.ranking import Ranking
+
+# of a longer ranking the table shows the beginning
+ROWS = 30
+
+
+def recommend(
+    result: Result,
+    tol: Annotated[
+        float,
+        typer.Option("--tol", metavar="VALUE", parser=number, help="What |e_out − e| may be, such as 0.02 or 2%."),
+    ] = 0.01,
+    sel: Sel = None,
+    model: Models = None,
+    as_json: Json = False,
+) -> None:
+    """Which model gives the restitution asked for over the swept range, and how wrong is it where it does not?"""
+    from .. import api
+
+    ranking = api.recommend(api.load(result), tol=tol, sel=dict(sel or ()), models=model)
+    if as_json:
+        print(dump(ranking_json(ranking)))
+    else:
+        _print_ranking(ranking)
+
+
+def ranking_json(ranking: Ranking) -> dict[str, Any]:
+    """A ranking as plain data."""
+    return {
+        "headline": ranking.headline, "tol": ranking.tol, "best": [one.model for one in ranking.best],
+        "models": [{**vars(one), "share": one.share} for one in ranking.models],
+    }  # fmt: skip
+
+
+def _print_ranking(ranking: Ranking) -> None:
+    """The answer in a sentence, and the models, a line each, the best first."""
+    from .console import cell, console, table
+
+    out = console(sys.stdout)
+    out.print(ranking.headline, soft_wrap=True)
+    rows = table(*ranking.headings)
+    for column in rows.columns[5:]:
+        column.justify = "left"
+    for one in ranking.models[:ROWS]:
+        rows.add_row(*map(cell, one.row))
+    out.print()
+    out.print(rows)
+    more = len(ranking.models) - ROWS
+    if more > 0:
+        out.print(f"and {more:,} more (--json has all)")

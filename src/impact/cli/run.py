@@ -1,0 +1,145 @@
+"""The command `run`: one impact."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..errors import UsageError
+from ..formatting import quantity
+from ..text import safe_text
+from . import exits
+from .console import dump, print_rows
+from .options import Json, Overwrite, Plugins, Sets
+from .params import Setting, complete_model, once, setting, whole_number
+
+if TYPE_CHECKING:
+    from ..api import Impact
+
+
+def run(
+    source: Annotated[
+        Path | None, typer.Argument(help="A TOML file or a result. \\[default: Table 1 of the paper]")
+    ] = None,
+    model: Annotated[
+        str | None,
+        typer.Option(
+            "--model",
+            metavar="KEY",
+            autocompletion=complete_model,
+            help="The model. \\[default: the first of the source]",
+        ),
+    ] = None,
+    at: Annotated[
+        list[Setting] | None,
+        typer.Option(
+            "--at",
+            metavar="NAME=VALUE",
+            parser=setting,
+            callback=once,
+            help="Value of an input, such as e=0.05; may be repeated.",
+        ),
+    ] = None,
+    sets: Sets = None,
+    plugins: Plugins = None,
+    history: Annotated[
+        Path | None, typer.Option("--history", metavar="FILE", help="Keep the time history in this file.")
+    ] = None,
+    times: Annotated[
+        int | None,
+        typer.Option(
+            "--times",
+            metavar="N",
+            parser=whole_number,
+            help="Points in time of the history, uniform from contact to release. \\[default: the integrator's]",
+        ),
+    ] = None,
+    overwrite: Overwrite = False,
+    as_json: Json = False,
+) -> None:
+    """Run one impact: what goes in, what comes out, and how far it can be trusted."""
+    from .. import api
+    from ..contact.status import FIRST_FAILURE
+    from ..results import backend
+
+    if times is not None and history is None:
+        raise UsageError(f"--times {times}: expected --history FILE beside it")
+    if history is not None:
+        for path in (source, *(plugins or ())):
+            backend.check_output(history, overwrite=overwrite, source=path)
+    impact = api.run(
+        source, model=model, at=dict(at or ()), overrides=sets or (), plugins=plugins or (), times=times
+    )
+    if as_json:
+        print(dump(run_json(impact)))
+    else:
+        print_run(impact)
+    if impact.status >= FIRST_FAILURE:
+        raise typer.Exit(exits.LANES_FAILED)
+    if history is not None:
+        if impact.history is None:
+            raise UsageError(f"no history to keep: {impact.status.meaning}")
+        api.save(impact.history, history, overwrite=overwrite)
+        exits.say(f"{safe_text(str(history))}: {impact.history.sizes['t']} points in time")
+
+
+def run_json(impact: Impact) -> dict[str, Any]:
+    """One impact as plain data."""
+    return {
+        "model": impact.model.key, "inputs": dict(impact.point), "first_value_of": list(impact.first),
+        "exponent": impact.exponent, "closing_speed": impact.closing_speed,
+        "outputs": {**impact.values, "status": impact.status.name.lower()},
+        "materials": {name: asdict(material) for name, material in impact.materials.items()},
+        "derived": dict(impact.derived), "damping": impact.damping, "e_kinematic": impact.e_kinematic,
+        "e_kinetic": impact.e_kinetic, "e_energetic": impact.e_energetic,
+    }  # fmt: skip
+
+
+def print_run(impact: Impact) -> None:
+    """One impact: inputs, outputs, the three restitutions, and how far they can be trusted."""
+    from ..config.tables import MATERIAL
+    from ..results.impact import DERIVED
+    from ..results.schema import SCHEMA, plain_unit
+
+    rows: dict[str, Any] = {"model": impact.model.key, "equation": impact.model.equation}
+    for name, value in impact.point.items():
+        note = "  (first value of its axis)" if name in impact.first else ""
+        rows[name] = quantity(value, _unit_at(impact, _unit_of(impact, name)), 10) + note
+    for name, material in impact.materials.items():
+        known = {field: value for field, value in asdict(material).items() if value is not None}
+        about = (f"{field} = {quantity(value, MATERIAL[field].unit, 10)}" for field, value in known.items())
+        rows[f"[materials.{name}]"] = ", ".join(about)
+    for name, unit, meaning in DERIVED:
+        if impact.derived[name] == impact.derived[name] and name not in impact.point:
+            rows[name] = f"{quantity(impact.derived[name], _unit_at(impact, plain_unit(unit)), 10)}  {meaning}"
+    rows["status"] = f"{impact.status.name.lower()}: {impact.status.meaning}"
+    for variable in SCHEMA:
+        if variable.dtype == "f8" and variable.name not in ("e_kinetic", "e_energetic"):
+            unit = _unit_at(impact, plain_unit(variable.unit))
+            rows[variable.name] = quantity(impact.values[variable.name], unit, 10)
+    rows["e_kinematic"] = quantity(impact.e_kinematic, "1", 12) + "  (1), from the velocities"
+    rows["e_kinetic"] = quantity(impact.e_kinetic, "1", 12) + "  (2), tau_r/tau_c"
+    rows["e_energetic"] = quantity(impact.e_energetic, "1", 12) + "  (3), the root of -W_r/W_c"
+    rows["in the stated domain"] = "yes" if impact.values["in_domain"] else f"no: {impact.model.domain_text}"
+    rows["steps"] = impact.values["steps"]
+    print_rows(rows)
+
+
+def _unit_of(impact: Impact, name: str) -> str:
+    """The unit of an input, which may be a parameter of the model, or a property of a material."""
+    from ..config.tables import MATERIAL, SWEEP, own_quantities
+
+    key, _, parameter = name.rpartition(".")
+    known = own_quantities(impact.model) if key == impact.model.key else MATERIAL if key else SWEEP
+    return known[parameter].unit if parameter in known else "1"
+
+
+def _unit_at(impact: Impact, unit: str) -> str:
+    """A unit with the values of n and of the parameters that its exponents have."""
+    from ..contact.units import with_numbers
+
+    own = {name.rpartition(".")[2]: value for name, value in impact.point.items() if isinstance(value, float)}
+    return with_numbers(unit, {**own, "n": impact.exponent})

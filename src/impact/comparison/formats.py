@@ -1,0 +1,161 @@
+"""A verdict for whoever reads it: a person in a pull request, a CI server, a program."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+from xml.etree import ElementTree
+
+from ..text import safe_text
+from .verdict import KINDS, Judged, Verdict
+
+PROGRAM = "impact compare"
+# differences that an annotation names
+ANNOTATED = 3
+
+
+@dataclass(frozen=True)
+class Case:
+    """One thing that was looked at: a variable, or one kind of fault; `texts` say what is wrong with it."""
+
+    name: str
+    texts: tuple[str, ...] = ()
+    replay: str = ""
+
+
+@dataclass(frozen=True)
+class Report:
+    """What the formats are made from: a verdict, or the reason why there is none (`equal` is None then)."""
+
+    new: str
+    baseline: str
+    equal: bool | None
+    headline: str
+    cases: tuple[Case, ...] = ()
+    notes: tuple[str, ...] = ()
+    variables: tuple[Judged, ...] = ()
+
+
+def report_of(verdict: Verdict) -> Report:
+    """The report of a verdict: a case for each kind of fault, and for each variable, the worst first."""
+    faults = (
+        Case(kind, tuple(fault.text for fault in verdict.faults if fault.kind == kind))
+        for kind in KINDS
+        if kind != "values"
+    )
+    values = (
+        Case(one.name) if one.is_equal else Case(one.name, (one.text,), verdict.replay(one))
+        for one in verdict.ranked
+    )
+    return Report(
+        safe_text(verdict.new), safe_text(verdict.baseline), verdict.equal, verdict.headline, (*faults, *values),
+        verdict.notes, verdict.ranked,
+    )  # fmt: skip
+
+
+def report_of_error(new: str, baseline: str, error: str) -> Report:
+    """The report where one of the two could not be read."""
+    return Report(safe_text(new), safe_text(baseline), None, "; ".join(error.splitlines()))
+
+
+def as_data(report: Report) -> dict[str, Any]:
+    """Plain data, for JSON; `equal` is null where there is no verdict."""
+    return {
+        "equal": report.equal, "headline": report.headline, "new": report.new, "baseline": report.baseline,
+        "faults": [
+            {"kind": case.name, "text": text} for case in report.cases if case.name in KINDS for text in case.texts
+        ],
+        "variables": [
+            {**vars(one), "at": _safe(one.at), "equal": one.is_equal, "text": one.text,
+             "replay": next((case.replay for case in report.cases if case.name == one.name), "")}
+            for one in report.variables
+        ],
+        "notes": list(report.notes),
+    }  # fmt: skip
+
+
+def _safe(at: Mapping[str, float | str]) -> dict[str, float | str]:
+    return {safe_text(name): safe_text(v, 2000) if isinstance(v, str) else v for name, v in at.items()}
+
+
+def as_junit(report: Report) -> str:
+    """JUnit XML: a suite with a test for each kind of fault and each variable."""
+    failed = [case for case in report.cases if case.texts]
+    cases = report.cases or (Case("readable"),)
+    numbers = {"tests": len(cases), "failures": len(failed), "errors": int(report.equal is None), "skipped": 0}
+    counts = {name: str(number) for name, number in numbers.items()}
+    root = ElementTree.Element("testsuites", counts)
+    suite = ElementTree.SubElement(
+        root, "testsuite", {"name": f"{PROGRAM} {report.new} {report.baseline}", **counts}
+    )
+    for case in cases:
+        test = ElementTree.SubElement(suite, "testcase", {"classname": "impact.compare", "name": case.name})
+        if report.equal is None:
+            ElementTree.SubElement(test, "error", {"message": report.headline})
+        elif case.texts:
+            body = "\n".join([*case.texts, *([case.replay] if case.replay else [])])
+            ElementTree.SubElement(test, "failure", {"message": case.texts[0]}).text = body
+    said = ElementTree.SubElement(suite, "system-out")
+    said.text = "\n".join([report.headline, *(f"note: {note}" for note in report.notes)])
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="unicode", xml_declaration=True)
+
+
+def as_markdown(report: Report) -> str:
+    """Markdown for a pull request or a job summary."""
+    sign = {True: "✅", False: "❌", None: "⚠️"}[report.equal]
+    lines = [f"### {sign} {PROGRAM}: {_plain(report.headline)}", ""]
+    lines += [f"`{_code(report.new)}` against the baseline `{_code(report.baseline)}`", ""]
+    told = [f"- {_plain(text)}" for case in report.cases if case.name in KINDS for text in case.texts]
+    lines += [*told, ""] if told else []
+    differing = [one for one in report.variables if not one.is_equal]
+    if differing:
+        lines += [
+            "| variable | differ | worst | × tolerance | at | new | baseline |",
+            "|---|--:|--:|--:|---|--:|--:|",
+        ]
+        for one in differing:
+            numbers = f"{one.worst:.3g} | {one.times:.3g}"
+            values = f"{one.new:.12g} | {one.baseline:.12g}"
+            lines.append(
+                f"| `{one.name}` | {one.different} of {one.points} | {numbers} | {_plain(one.place)} | {values} |"
+            )
+        repeats = dict.fromkeys(case.replay for case in report.cases if case.replay)
+        # a fence of four, because a name may hold three
+        lines += ["", "````sh", *repeats, "````", ""] if repeats else [""]
+    lines += [f"- note: {_plain(note)}" for note in report.notes]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def as_github(report: Report) -> str:
+    """A workflow command of GitHub Actions: one annotation on the baseline, with the worst of what differs."""
+    differing = [case for case in report.cases if case.texts]
+    worst = [(text, case.replay) for case in differing for text in case.texts]
+    lines = [report.headline]
+    for text, replay in worst[:ANNOTATED]:
+        lines += [text, replay] if replay and replay not in lines else [text]
+    lines += [f"and {len(worst) - ANNOTATED} more"] if len(worst) > ANNOTATED else []
+    lines += [f"note: {note}" for note in report.notes]
+    return _annotation("notice" if report.equal else "error", report.baseline, "\n".join(lines))
+
+
+def _annotation(level: str, file: str, text: str) -> str:
+    where = "".join(ESCAPED.get(letter, letter) for letter in file)
+    message = "".join(letter if letter in ":," else ESCAPED.get(letter, letter) for letter in text)
+    return f"::{level} file={where},title={PROGRAM}::{message}"
+
+
+# what a workflow command cannot hold as it is; the last two in its properties only
+ESCAPED: Mapping[str, str] = {"%": "%25", "\r": "%0D", "\n": "%0A", ":": "%3A", ",": "%2C"}
+
+
+def _plain(text: str) -> str:
+    """Text that Markdown shows as it is."""
+    return re.sub(r"([\\`*_{}\[\]<>|~#!&$@])", r"\\\1", text)
+
+
+def _code(text: str) -> str:
+    """Text within backticks, which know no escapes."""
+    return text.replace("`", "'").replace("|", "¦")

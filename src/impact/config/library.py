@@ -1,0 +1,25 @@
+"""Common materials, which need no table in a config, with the source of each number."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from functools import cache
+from importlib.resources import files
+
+from .tables import MATERIAL
+
+
+@cache
+def records() -> Mapping[str, Mapping[str, float | str]]:
+    """The materials of `materials.toml`, with their sources, by name."""
+    return tomllib.loads((files("impact") / "config" / "materials.toml").read_text(encoding="utf-8"))
+
+
+@cache
+def library() -> Mapping[str, Mapping[str, float | str]]:
+    """The same as tables of a config."""
+    return {
+        name: {key: value for key, value in record.items() if key in MATERIAL}
+        for name, record in records().items()
+    }

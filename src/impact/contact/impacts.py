@@ -1,0 +1,196 @@
+"""The impacts of a block: what goes into a law, in SI, and the contact's own units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .closed_forms import peak_indentation
+from .materials import effective_compliance, effective_mass, effective_radius
+from .model import ForceModel, Law
+from .powers import Array, all_within, powers
+from .status import Status
+from .units import dimension
+
+# what of an impact is checked before it is integrated, see `check_inputs`
+CHECKS = frozenset({"e", "v0", "length"})
+
+
+@dataclass(frozen=True)
+class Impacts:
+    """Impacts side by side; every field is an array of shape (n,).
+
+    Impacts on a grid may be arrays of several axes that broadcast against each other: what does not vary along
+    an axis has length one there, and nothing is computed twice.
+
+    Parameters
+    ----------
+    e : restitution asked for [-]; NaN where none is
+    v1, v2 : velocities before the impact [m/s]
+    m1, m2 : masses [kg]; infinity is a wall
+    R1, R2 : radii [m]; infinity is a plane; NaN where unknown
+    K : contact stiffness [N/m^n]
+    n : compliance exponent [-]
+    E1, nu1, yield_strength1, E2, nu2, yield_strength2 : materials [Pa, -, Pa]; NaN where unknown
+    parameters : the law's own parameters by name, in the units it declares
+    """
+
+    e: Array
+    v1: Array
+    v2: Array
+    m1: Array
+    m2: Array
+    K: Array
+    n: Array
+    R1: Array
+    R2: Array
+    E1: Array
+    nu1: Array
+    yield_strength1: Array
+    E2: Array
+    nu2: Array
+    yield_strength2: Array
+    parameters: Mapping[str, Array] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.e)
+
+    def __getitem__(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> Impacts:
+        arrays = {f.name: getattr(self, f.name)[chosen] for f in fields(self) if f.name != "parameters"}
+        return Impacts(**arrays, parameters={name: a[chosen] for name, a in self.parameters.items()})
+
+    @cached_property
+    def shape(self) -> tuple[int, ...]:
+        """Of all impacts together."""
+        own = {getattr(self, f.name).shape for f in fields(self) if f.name != "parameters"}
+        return np.broadcast_shapes(*own.union(array.shape for array in self.parameters.values()))
+
+    @cached_property
+    def v0(self) -> Array:
+        """Closing speed v1 - v2 [m/s]."""
+        return self.v1 - self.v2
+
+    @cached_property
+    def all_approach(self) -> bool:
+        """Whether all pairs of balls approach each other."""
+        return all_within(self.v0, float(np.nextafter(0.0, 1.0)), np.inf)
+
+    @cached_property
+    def m(self) -> Array:
+        """Effective mass [kg], equation (17)."""
+        return effective_mass(self.m1, self.m2)
+
+    @cached_property
+    def R_eff(self) -> Array:
+        """Effective radius [m], 1/(1/R1 + 1/R2); NaN where a radius is unknown."""
+        return effective_radius(self.R1, self.R2)
+
+    @cached_property
+    def E_eff(self) -> Array:
+        """Effective modulus [Pa], 1/((1 - nu1^2)/E1 + (1 - nu2^2)/E2); NaN where a material is unknown."""
+        return 1.0 / effective_compliance(self.E1, self.nu1, self.E2, self.nu2)
+
+    @cached_property
+    def Y_min(self) -> Array:
+        """Yield strength [Pa] of the softer ball; NaN where one is unknown."""
+        return np.minimum(self.yield_strength1, self.yield_strength2)
+
+    @cached_property
+    def length(self) -> Array:
+        """The contact's unit of length [m], (m v0^2/K)^(1/(n+1)); its unit of mass is m."""
+        return powers(self.m * self.v0 / self.K * self.v0, 1.0 / (self.n + 1.0))
+
+    @cached_property
+    def time(self) -> Array:
+        """The contact's unit of time [s], length/v0."""
+        return self.length / self.v0
+
+    @cached_property
+    def energy(self) -> Array:
+        """The contact's unit of energy [J], m v0^2, twice what the balls bring with them."""
+        return self.m * self.v0 * self.v0
+
+    def quantity(self, name: str) -> Array:
+        """A quantity of the contact or a parameter of the law, in SI."""
+        return np.asarray(self.parameters[name] if name in self.parameters else getattr(self, name))
+
+    def dimensionless(self, model: ForceModel, name: str) -> Array:
+        """A quantity or parameter in the contact's own units, in which K = m = v0 = 1."""
+        value = self.quantity(name)
+        exponents = dimensionless_exponents(model, name, {"n": self.n, **self.parameters})
+        for unit, exponent in exponents.items():
+            if np.any(exponent):
+                value = value / powers(getattr(self, unit), np.asarray(exponent))
+        # adding zero turns -0.0 into 0.0, which is the same physics
+        return value + 0.0
+
+
+def dimensionless_exponents(
+    model: ForceModel, name: str, given: Mapping[str, Array | float]
+) -> dict[str, Array | float]:
+    """The exponents of m, length and v0 by which a quantity or parameter is made dimensionless.
+
+    Parameters
+    ----------
+    model, name : the law, and which quantity or parameter
+    given : what the exponents of its unit are made of: n, and parameters of the law
+
+    >>> from impact.contact.models import find
+    >>> dimensionless_exponents(find("hertz"), "E1", {"n": 1.5})
+    {'m': 1.0, 'length': -3.0, 'v0': 2.0}
+    """
+    mass, length, time = dimension(model.unit_of(name), given)
+    return {"m": mass + 0.0, "length": length + time + 0.0, "v0": 0.0 - time}
+
+
+def stiffness(n: Array, hertz: Array, m: Array, v0: Array) -> Array:
+    """Stiffness K [N/m^n] where none is given: Hertz's for n = 3/2, else K = F_m/delta_m^n of the Hertz peak.
+
+    For n = 1 that is the secant stiffness. It depends on the speed, so that it is NaN where there is none.
+
+    Parameters
+    ----------
+    n : compliance exponent [-], shape (n,)
+    hertz : stiffness of equation (12) [N/m^1.5], shape (n,)
+    m, v0 : effective mass [kg] and closing speed [m/s], shape (n,)
+    """
+    if (n == 1.5).all():
+        return hertz
+    peak = peak_indentation(m, np.where(v0 > 0.0, v0, np.nan), hertz, 1.5)
+    return np.where(n == 1.5, hertz, hertz * powers(peak, np.asarray(1.5)) / powers(peak, n))
+
+
+def check_inputs(model: Law, impacts: Impacts, checks: frozenset[str] = CHECKS) -> NDArray[np.int8]:
+    """What can be said of impacts before they are integrated; of a shape that broadcasts to theirs.
+
+    Parameters
+    ----------
+    model : the law
+    impacts : the impacts
+    checks : what is looked at: the restitution "e", the closing speed "v0", and the sizes of the contact,
+        "length", the unit of which comes from all of them
+    """
+    status = np.asarray(Status.OK, np.int8)
+    if "length" in checks:
+        sizes = [impacts.m, impacts.K, impacts.length, impacts.energy, impacts.time]
+        least, most = np.nextafter(0.0, 1.0), np.finfo(float).max
+        for size in sizes:
+            status = _unless(size, least, most, status, Status.OUT_OF_RANGE)
+    if "e" in checks and "e" in model.quantities:
+        status = _unless(impacts.e, 0.0, 1.0, status, Status.INVALID_PARAMETER)
+    if "v0" in checks or "length" in checks:
+        status = _unless(impacts.v0, np.nextafter(0.0, 1.0), np.inf, status, Status.NO_IMPACT)
+    return status.astype(np.int8)
+
+
+def _unless(
+    values: Array, least: float, most: float, status: NDArray[np.int8], otherwise: Status
+) -> NDArray[np.int8]:
+    """The status, but another one where a value is not within bounds."""
+    if all_within(values, least, most):
+        return status
+    return np.where((values >= least) & (values <= most), status, otherwise)

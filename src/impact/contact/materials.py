@@ -1,0 +1,86 @@
+"""The material of a ball, and the elastic contact of two of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .powers import Array
+
+
+@dataclass(frozen=True)
+class Material:
+    """An isotropic material.
+
+    Parameters
+    ----------
+    E : Young's modulus [Pa]
+    nu : Poisson's ratio [-]
+    rho : density [kg/m3], or None where no radius is derived from it
+    yield_strength : yield strength [Pa], or None where it is not known
+    """
+
+    E: float
+    nu: float
+    rho: float | None = None
+    yield_strength: float | None = None
+
+
+def sphere_radius(mass: Array, density: Array) -> Array:
+    """Radius [m] of a solid sphere from its mass [kg] and density [kg/m3]; an infinite mass is a plane.
+
+    >>> print(sphere_radius(np.array([1.0]), np.array([2712.0]))[0].round(10))
+    0.0444843486
+    """
+    return np.cbrt(mass * (3.0 / (4.0 * np.pi)) / density)
+
+
+def sphere_mass(radius: Array, density: Array) -> Array:
+    """Mass [kg] of a solid sphere from its radius [m] and density [kg/m3]; that of a plane is infinite.
+
+    >>> sphere_mass(np.array([0.1, np.inf]), np.array([7850.0, np.nan])).round(3).tolist()
+    [32.882, inf]
+    """
+    return np.where(np.isinf(radius), np.inf, (4.0 / 3.0) * np.pi * radius**3 * density)
+
+
+def effective_radius(R1: Array, R2: Array) -> Array:
+    """Effective radius R [m] of two spheres, equation (12), as 1/(1/R1 + 1/R2); an infinite radius is a plane.
+
+    >>> print(effective_radius(np.array([0.1, 0.1]), np.array([0.1, np.inf])))
+    [0.05 0.1 ]
+    """
+    with np.errstate(divide="ignore"):
+        return np.asarray(1.0 / (1.0 / R1 + 1.0 / R2))
+
+
+def effective_compliance(E1: Array, nu1: Array, E2: Array, nu2: Array) -> Array:
+    """k1 + k2 [1/Pa] of equation (13), without its π: (1 - nu1^2)/E1 + (1 - nu2^2)/E2."""
+    return (1.0 - nu1 * nu1) / E1 + (1.0 - nu2 * nu2) / E2
+
+
+def hertz_stiffness(E1: Array, nu1: Array, E2: Array, nu2: Array, R1: Array, R2: Array) -> Array:
+    """Stiffness K [N/m^1.5] of the contact of two spheres: Gharib and Hurmuzlu (2012), equations (12) and (13).
+
+    K = (4/3)/(k1 + k2) sqrt(R), k_j = (1 - nu_j^2)/E_j, with R = 1/(1/R1 + 1/R2), so that an infinite
+    radius is a plane. Two planes have an infinite K.
+
+    Parameters
+    ----------
+    E1, E2 : Young's moduli [Pa], shape (n,)
+    nu1, nu2 : Poisson's ratios [-], shape (n,)
+    R1, R2 : radii [m], shape (n,)
+    """
+    compliance = effective_compliance(E1, nu1, E2, nu2)
+    return np.asarray((4.0 / 3.0) / compliance * np.sqrt(effective_radius(R1, R2)))
+
+
+def effective_mass(m1: Array, m2: Array) -> Array:
+    """Effective mass m [kg] of two bodies, equation (17), as 1/(1/m1 + 1/m2); an infinite mass is a wall.
+
+    >>> effective_mass(np.array([1.0, 1.0]), np.array([1.0, np.inf]))
+    array([0.5, 1. ])
+    """
+    with np.errstate(divide="ignore", over="ignore"):
+        return 1.0 / (1.0 / m1 + 1.0 / m2)

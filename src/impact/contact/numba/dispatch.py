@@ -1,0 +1,131 @@
+"""Which phases of which laws a compiled core integrates, and how they are handed to it."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.util import find_spec
+from typing import NamedTuple
+
+import numpy as np
+
+from ...ode import rk45
+from ...ode.problem import Array, Params, Problem, Solution
+from .. import force_expressions, motion
+from ..model import ForceModel
+from ..powers import integer_power, power
+from ..velocity_coordinates import ForceCoordinate, LogCoordinate, force_form
+
+# the equations of motion: of A xⁿ, of xⁿ (1 + χ v) in v and in "log", of xⁿ + c x^q v in v and in "force"
+SPRING, DAMPED, LOG, DRAGGED, FORCE = range(5)
+# what ends a phase: the largest indentation, the gap, no force
+STOP, GAP, NO_FORCE = range(3)
+# largest power of s
+MOST = 15
+
+
+@cache
+def is_installed() -> bool:
+    """Whether numba is there, of which no more is loaded for that."""
+    return find_spec("numba") is not None
+
+
+class Form(NamedTuple):
+    """A phase of a law in whole powers of s: x = sᵖ, xⁿ = s^spring, x^q = s^drag.
+
+    `extra` is the power of s that the coordinate "force" has beside v, `bound_power` the one that bounds the speed
+    of balls that are overdamped.
+    """
+
+    equation: int
+    ending: int
+    coordinate_power: int
+    spring: int
+    drag: int = 0
+    extra: int = 0
+    bound_power: int = 0
+
+
+def of_approach(law: motion.MotionLaw) -> Form | None:
+    """The form of the approach, None where it has none."""
+    return None if law.model.breakpoints else _of_force(law, STOP)
+
+
+def of_restitution(law: motion.MotionLaw) -> Form | None:
+    """The form of the restitution phase, None where it has none."""
+    model = law.model
+    ending = NO_FORCE if model.release == "force" else GAP
+    if model.unloading is None:
+        return None if model.breakpoints else _of_force(law, ending)
+    if model.unloading in force_expressions.POWER_LAWS and not model.unloading_breakpoints:
+        return _whole(SPRING, ending, model.coordinate_power, model.coordinate_power * law.n)
+    return None
+
+
+def serves(model: ForceModel, n: float) -> tuple[bool, bool]:
+    """Whether the compiled core integrates the approach, and the restitution phase, of a law."""
+    laws = [motion.MotionLaw.of(model, n, strong) for strong in (False, True)]
+    back = [motion.of_restitution(law) for law in laws]
+    return all(map(of_approach, laws)), all(map(of_restitution, back))
+
+
+def _of_force(law: motion.MotionLaw, ending: int) -> Form | None:
+    model, p = law.model, law.model.coordinate_power
+    if model.velocity_coordinate == "force":
+        form = force_form(model, law.n)
+        q = form.drag / p
+        if ending == GAP and law.n != 2.0 * q + 1.0:
+            return None
+        equation = FORCE if isinstance(law.coordinate, ForceCoordinate) else DRAGGED
+        return _whole(equation, ending, p, p * law.n, form.drag, form.spring, p * (q + 1.0))
+    if model.velocity_coordinate == "log":
+        return _whole(LOG if isinstance(law.coordinate, LogCoordinate) else DAMPED, ending, p, p * law.n)
+    return _whole(SPRING, ending, p, p * law.n) if model.force is force_expressions.spring else None
+
+
+def _whole(equation: int, ending: int, *exponents: float) -> Form | None:
+    if not all(float(one).is_integer() and 0.0 <= one <= MOST for one in exponents):
+        return None
+    return Form(equation, ending, *map(int, exponents))
+
+
+def integrate(
+    form: Form,
+    law: motion.MotionLaw,
+    problem: Problem,
+    start: Array,
+    params: Params,
+    *,
+    rtol: float,
+    max_steps: int,
+) -> Solution:
+    """Integrate a phase as `impact.ode.rk45.integrate` does, without its record.
+
+    Parameters
+    ----------
+    form : of the phase
+    law, problem, params : of the phase; params each of shape (n,)
+    start : components at the start, shape (2, n)
+    rtol, max_steps : see there
+    """
+    from .kernel import kernel
+
+    n = start.shape[1]
+    known = dict(zip(law.names, params, strict=False))
+    bound = np.zeros(n)
+    if form.equation != SPRING:
+        strength = known["chi" if form.equation in (DAMPED, LOG) else "c"]
+    elif law.model.unloading is not None and form.ending != STOP:
+        # what a power law is times is the same at every stretch
+        stretch = power(integer_power(start[0], form.coordinate_power), law.n)
+        strength = problem.rates(start, params)[4] / stretch
+    else:
+        strength = np.ones(n)
+    if form.ending == GAP and motion.may_be_overdamped(law.model):
+        bound = motion.overdamped_speed(strength, law.n, form.drag / form.coordinate_power)
+    solution = Solution.empty(n)
+    rows = (np.ascontiguousarray(start), np.ascontiguousarray(strength), np.ascontiguousarray(bound))
+    kernel(form)(
+        *rows, rk45.first_step(problem, rtol), rtol, max_steps,
+        solution.state, solution.maximum, solution.steps, solution.termination,
+    )  # fmt: skip
+    return solution

@@ -1,0 +1,141 @@
+"""The equations of the forms and one step of them, for one trajectory: what the compiled kernel calls.
+
+Every function is compiled into its caller, for the numbers of a form, and has no branch that depends on a value.
+Formulas that the NumPy back end has too are `shared` with it.
+"""
+
+from __future__ import annotations
+
+from ...ode import events, maximum, rk45
+from ...ode.tableau import A as FRACTIONS
+from ...ode.tableau import E as DIFFERENCES
+from .. import force_expressions, motion, velocity_coordinates
+from .dispatch import DAMPED, DRAGGED, FORCE, GAP, LOG, NO_FORCE, SPRING, STOP
+from .simd_math import exponential, inlined, shared, whole_power
+
+A = tuple(tuple(map(float, row)) for row in FRACTIONS)
+E = tuple(map(float, DIFFERENCES))
+FAR, FLOOR, DIFFERENCE, NEAREST = motion.FAR, motion.FLOOR, motion.DIFFERENCE, motion.NEAREST
+
+damped, dragged = shared(force_expressions.damped), shared(force_expressions.dragged)
+rate_of_log, rate_of_force = shared(velocity_coordinates.rate_of_log), shared(velocity_coordinates.rate_of_force)
+velocity_of_force, release = shared(velocity_coordinates.velocity_of_force), shared(motion.release)
+step_factor, next_step, error_norm = shared(rk45.step_factor), shared(rk45.next_step), shared(rk45.error_norm)
+is_event_ahead, event_offset = shared(events.is_event_ahead), shared(events.event_offset)
+before_event, at_event = shared(events.before_event), shared(events.at_event)
+linear_offset, trapezoid = shared(events.linear_offset), shared(events.trapezoid)
+begins_to_fall, secant_update = shared(maximum.begins_to_fall), shared(maximum.secant_update)
+
+
+@inlined
+def solution(k1, k3, k4, k5, k6):
+    """The weighted sum of the rates, of order five."""
+    return A[6][0] * k1 + A[6][2] * k3 + A[6][3] * k4 + A[6][4] * k5 + A[6][5] * k6
+
+
+@inlined
+def difference(k1, k3, k4, k5, k6, k7):
+    """What it differs by from that of order four."""
+    return E[0] * k1 + E[2] * k3 + E[3] * k4 + E[4] * k5 + E[5] * k6 + E[6] * k7
+
+
+@inlined
+def rates(form, s, y, strength):
+    """Rates of the two components and the two quadratures."""
+    weight = form.coordinate_power * whole_power(s, form.coordinate_power - 1)
+    # of the force, K δⁿ and the drag with the weight in them: fewer products that a step has to wait for
+    weighted = form.coordinate_power * whole_power(s, form.spring + form.coordinate_power - 1)
+    if form.equation == FORCE:
+        v = velocity_of_force(y, whole_power(s, form.extra), strength)
+        force = strength * whole_power(s, form.drag) * y
+        rate_y = rate_of_force(v, whole_power(s, form.extra - 1), form.extra / strength, weight, force)
+        return v, rate_y, weight, weight * force * v
+    if form.equation == LOG:
+        # one division for all stages
+        v = (exponential(y) - 1.0) * (1.0 / strength)
+        return v, rate_of_log(weighted, 1.0, strength), weight, damped(weighted, v, 1.0, strength) * v
+    v = y
+    if form.equation == SPRING:
+        pushed = strength * weighted
+    elif form.equation == DAMPED:
+        pushed = damped(weighted, v, 1.0, strength)
+    else:
+        pushed = dragged(
+            weighted, form.coordinate_power * whole_power(s, form.drag + form.coordinate_power - 1), v, strength
+        )
+    return v, -pushed, weight, pushed * v
+
+
+@inlined
+def force(form, s, y, v, strength):
+    """The force."""
+    elastic = whole_power(s, form.spring)
+    if form.equation == FORCE:
+        return strength * whole_power(s, form.drag) * y
+    if form.equation == SPRING:
+        return strength * elastic
+    if form.equation == DRAGGED:
+        return dragged(elastic, whole_power(s, form.drag), v, strength)
+    return damped(elastic, v, 1.0, strength)
+
+
+@inlined
+def rk_step(form, s, y, s1, y1, watched, h, strength):
+    """One step: components at its end and what is added to the others, rates there, the local error."""
+    t1 = form.coordinate_power * whole_power(s, form.coordinate_power - 1)
+    work1 = t1 * watched * s1
+    s2, y2, _, _ = rates(form, s + (h * A[1][0]) * s1, y + (h * A[1][0]) * y1, strength)
+    # a stage comes last, and by itself, into the next one, which waits for it
+    s3, y3, t3, work3 = rates(
+        form, s + h * (A[2][0] * s1) + (h * A[2][1]) * s2, y + h * (A[2][0] * y1) + (h * A[2][1]) * y2, strength
+    )
+    s4, y4, t4, work4 = rates(
+        form, s + h * (A[3][0] * s1 + A[3][1] * s2) + (h * A[3][2]) * s3,
+        y + h * (A[3][0] * y1 + A[3][1] * y2) + (h * A[3][2]) * y3, strength,
+    )  # fmt: skip
+    s5, y5, t5, work5 = rates(
+        form, s + h * (A[4][0] * s1 + A[4][1] * s2 + A[4][2] * s3) + (h * A[4][3]) * s4,
+        y + h * (A[4][0] * y1 + A[4][1] * y2 + A[4][2] * y3) + (h * A[4][3]) * y4, strength,
+    )  # fmt: skip
+    s6, y6, t6, work6 = rates(
+        form, s + h * (A[5][0] * s1 + A[5][1] * s2 + A[5][2] * s3 + A[5][3] * s4) + (h * A[5][4]) * s5,
+        y + h * (A[5][0] * y1 + A[5][1] * y2 + A[5][2] * y3 + A[5][3] * y4) + (h * A[5][4]) * y5, strength,
+    )  # fmt: skip
+    new_s = s + h * solution(s1, s3, s4, s5, s6)
+    new_y = y + h * solution(y1, y3, y4, y5, y6)
+    more_t, more_work = h * solution(t1, t3, t4, t5, t6), h * solution(work1, work3, work4, work5, work6)
+    s7, y7, _, _ = rates(form, new_s, new_y, strength)
+    watched = force(form, new_s, new_y, s7, strength)
+    error_s, error_y = h * difference(s1, s3, s4, s5, s6, s7), h * difference(y1, y3, y4, y5, y6, y7)
+    worst = error_norm(error_s, error_y, s, y, new_s, new_y, FLOOR)
+    return new_s, new_y, more_t, more_work, s7, y7, watched, worst
+
+
+@inlined
+def slope_of_force(form, s, y, rate_s, rate_y, now, small, strength):
+    """The slope of the force along the trajectory, by a small step."""
+    ahead_s, ahead_y = s + small * rate_s, y + small * rate_y
+    v, _, _, _ = rates(form, ahead_s, ahead_y, strength)
+    return (force(form, ahead_s, ahead_y, v, strength) - now) / small
+
+
+@inlined
+def event(form, s, y, rate_s, rate_y, now, strength):
+    """What falls to zero at the end of the phase, and its rate."""
+    if form.ending == GAP:
+        return s, rate_s
+    if form.ending == NO_FORCE:
+        small = DIFFERENCE * min(max(abs(s), NEAREST), 1.0)
+        slope = slope_of_force(form, s, y, rate_s, rate_y, now, small, strength)
+        return release(s, rate_s, now, slope)
+    if form.equation == FORCE:
+        return rate_s, -form.coordinate_power * whole_power(s, form.coordinate_power - 1) * now
+    return y, rate_y
+
+
+@inlined
+def is_unreachable(form, s, rate_s, bound):
+    """Whether the event cannot be reached any more."""
+    if form.ending == STOP:
+        return s > FAR
+    return -rate_s <= (bound * whole_power(s, form.bound_power) if form.equation >= DRAGGED else 0.0)

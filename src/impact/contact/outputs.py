@@ -1,0 +1,218 @@
+"""The outputs of collisions, in SI: what a result file has of each impact."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .formula import argument_names
+from .impacts import Impacts, check_inputs
+from .impulse import velocities_after
+from .model import ForceModel, Law
+from .powers import Array, all_within
+from .scaling import dimensionless_values
+from .simulate import CollisionResult, simulate
+from .status import FIRST_FAILURE, LIMIT, NO_IMPACT, OK
+
+Mask = NDArray[np.bool_]
+Outputs = dict[str, NDArray[Any]]
+InSI = Callable[[Array, Array], Array]
+
+# the outputs of an impact that a result has by default, in its order, and those that it has on request
+BY_DEFAULT = (
+    "v1_post", "v2_post", "v1_reference", "v2_reference", "v1_error", "v2_error", "e_out", "e_error",
+    "peak_indentation", "permanent_indentation", "peak_force", "contact_time", "energy_loss", "stiffness",
+    "damping_ratio", "energy_residual", "closed_form_error", "status", "in_domain", "steps",
+)  # fmt: skip
+OUTPUTS = (*BY_DEFAULT, "e_kinetic", "e_energetic", "lambda", "separation_time")
+
+
+def outputs(
+    law: Law,
+    impacts: Impacts,
+    result: CollisionResult,
+    names: Iterable[str],
+    checked: NDArray[np.int8] | None = None,
+) -> Outputs:
+    """Some outputs of collisions; no more is computed than they need.
+
+    Parameters
+    ----------
+    law : of the model
+    impacts : the inputs
+    result : what the law does with them, in the contact's own units, of shapes that broadcast to theirs
+    names : of `OUTPUTS`, see docs/schema.md
+    checked : what `check_inputs` says of the impacts, where it is known
+
+    Returns
+    -------
+    dict : by name, arrays of the shape of the impacts, or that broadcast to it; an impact that failed has NaN
+    """
+    known: dict[str, Any] = {"law": law, "impacts": impacts, "result": result}
+    if checked is not None:
+        known["checked"] = checked
+
+    def value(name: str) -> Any:
+        if name not in known:
+            formula = FORMULAS[name]
+            known[name] = formula(*map(value, argument_names(formula)))
+        return known[name]
+
+    with np.errstate(all="ignore"):
+        return {name: value(name) for name in names}
+
+
+def collide(
+    model: ForceModel,
+    impacts: Impacts,
+    *,
+    rtol: float,
+    max_steps: int,
+    collapse: bool = True,
+    core: str = "numpy",
+    errors: dict[str, str] | None = None,
+    names: Iterable[str] = OUTPUTS,
+) -> Outputs:
+    """Let every pair of balls collide by the law of a model.
+
+    Parameters
+    ----------
+    model : the law
+    impacts : the inputs, n of them
+    rtol : local error of a step of the integrator, relative
+    max_steps : attempted steps per phase after which an impact fails
+    collapse : integrate impacts that are the same in the contact's own units once; changes no bit
+    core : "numpy", or "numba" for what that compiles; they agree within the tolerance
+    errors : receives a line for each distinct error that the law raised, see `impact.contact.formula.explained`
+    names : of the outputs
+
+    Returns
+    -------
+    dict : see `outputs`; an impact that fails has NaN and a status, and does not affect any other
+    """
+    with np.errstate(all="ignore"):
+        values, checked = dimensionless_values(model, impacts), check_inputs(model, impacts)
+    result = simulate(
+        model, impacts.n, values, checked,
+        rtol=rtol, max_steps=max_steps, collapse=collapse, core=core, errors=errors,
+    )  # fmt: skip
+    return outputs(model, impacts, result, names, checked)
+
+
+def _if_any(mask: Mask) -> Mask | None:
+    """A mask, if anything is in it: None is cheaper than an empty one."""
+    return mask if mask.any() else None
+
+
+def _except(value: NDArray[Any], where: Mask | None, otherwise: float | np.int32 | NDArray[Any]) -> NDArray[Any]:
+    """The value, but another one where a mask is true."""
+    return value if where is None else np.where(where, otherwise, value)
+
+
+# ---- what outputs have in common; each function is one value, its arguments are others, by name
+
+
+def _status(result: CollisionResult, not_integrated: Mask | None, checked: NDArray[np.int8]) -> NDArray[np.int8]:
+    return _except(result.status, not_integrated, checked)
+
+
+def _unknown(failed: Mask | None, missed: Mask | None, status: NDArray[np.int8]) -> Mask | None:
+    """Where there is no collision of which anything is known."""
+    return failed if missed is None else _if_any(missed | (status >= FIRST_FAILURE))
+
+
+def _asked_e(impacts: Impacts) -> Array:
+    """The restitution asked for, NaN where it is none."""
+    e = impacts.e
+    return e if all_within(e, 0.0, 1.0) else np.where((e >= 0.0) & (e <= 1.0), e, np.nan)
+
+
+def _in_si(failed: Mask | None, missed: Mask | None) -> InSI:
+    """Values in a unit of the contact's own, in SI; nothing moves where the balls miss each other."""
+    return lambda value, unit: _except(_except(value * unit, failed, np.nan), missed, 0.0)
+
+
+# ---- outputs
+
+
+def _damping_ratio(result: CollisionResult, not_integrated: Mask | None) -> Array:
+    chi = result.chi
+    return _except(_except(chi, not_integrated, np.nan), _if_any(np.isinf(chi)), np.nan)
+
+
+def _energy_residual(result: CollisionResult, unknown: Mask | None) -> Array:
+    work = result.approach_work + result.restitution_work
+    return _except(work - (1.0 - result.e_out * result.e_out), unknown, np.nan)
+
+
+def _energetic(result: CollisionResult, unknown: Mask | None) -> Array:
+    """sqrt(-W_r/W_c), equation (3), from the works that were integrated; 0 where the balls stay together."""
+    e = np.sqrt(np.maximum(-result.restitution_work, 0.0) / result.approach_work)
+    return _except(_except(e, _if_any(result.status == LIMIT), 0.0), unknown, np.nan)
+
+
+def _in_domain(law: Law, impacts: Impacts, damping_ratio: Array) -> NDArray[np.int8]:
+    inside = np.ones((1,) * max(1, len(impacts.shape)), bool)
+    for name, (low, high) in law.domain.items():
+        value = damping_ratio if name == "chi" else impacts.quantity(name)
+        # what is not known, such as an e that was not asked for, is not claimed
+        inside = inside & (value >= low) & (value <= high)
+    return inside.astype(np.int8)
+
+
+def _separation_time(
+    law: Law,
+    impacts: Impacts,
+    result: CollisionResult,
+    contact_time: Array,
+    in_si: Callable[[Array, Array], Array],
+) -> Array:
+    """Time until the surfaces part: after the force has ended they move at e_out v0. NaN if they never do."""
+    if law.is_permanent:
+        # a permanent indentation stays in the surfaces, which part at the release
+        return contact_time
+    rest = np.where(result.permanent > 0.0, result.permanent / result.e_out, 0.0)
+    return in_si(result.contact_time + np.where(np.isinf(rest), np.nan, rest), impacts.time)
+
+
+# by name: a formula of values by name
+FORMULAS: dict[str, Callable[..., Any]] = {
+    "checked": lambda law, impacts: check_inputs(law, impacts),
+    "not_integrated": lambda checked: _if_any(checked != OK),
+    "missed": lambda checked: _if_any(checked == NO_IMPACT),
+    "failed": lambda status: _if_any(status >= FIRST_FAILURE),
+    "unknown": _unknown,
+    "asked_e": _asked_e,
+    "in_si": _in_si,
+    "velocities": lambda impacts, e_out: velocities_after(impacts, e_out),
+    "references": lambda impacts, asked_e: velocities_after(impacts, asked_e),
+    "v1_post": lambda velocities: velocities[0],
+    "v2_post": lambda velocities: velocities[1],
+    "v1_reference": lambda references: references[0],
+    "v2_reference": lambda references: references[1],
+    "v1_error": lambda v1_post, v1_reference: v1_post - v1_reference,
+    "v2_error": lambda v2_post, v2_reference: v2_post - v2_reference,
+    "e_out": lambda result, unknown: _except(result.e_out, unknown, np.nan),
+    "e_error": lambda e_out, asked_e: e_out - asked_e,
+    "peak_indentation": lambda result, impacts, in_si: in_si(result.peak, impacts.length),
+    "permanent_indentation": lambda result, impacts, in_si: in_si(result.permanent, impacts.length),
+    "peak_force": lambda result, impacts, in_si: in_si(result.force, impacts.energy / impacts.length),
+    "contact_time": lambda result, impacts, in_si: in_si(result.contact_time, impacts.time),
+    "energy_loss": lambda result, impacts, in_si: in_si(1.0 - result.e_out * result.e_out, 0.5 * impacts.energy),
+    "stiffness": lambda impacts, failed: _except(impacts.K, failed, np.nan),
+    "damping_ratio": _damping_ratio,
+    "energy_residual": _energy_residual,
+    "closed_form_error": lambda e_out, result: e_out - result.exact,
+    "status": _status,
+    "in_domain": _in_domain,
+    "steps": lambda result, not_integrated: _except(result.steps, not_integrated, np.int32(0)),
+    # tau_r/tau_c, equation (2): the phases change the momentum by m v0 and e_out m v0
+    "e_kinetic": lambda e_out: e_out,
+    "e_energetic": _energetic,
+    # lambda = chi K/v0 [N s/m^(n+1)]
+    "lambda": lambda damping_ratio, stiffness, impacts: damping_ratio * stiffness / impacts.v0,
+    "separation_time": _separation_time,
+}

@@ -1,0 +1,343 @@
+"""Simulate collisions: dimensionless impacts through both phases, each distinct one integrated once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ModelError
+from ..ode.problem import Params, Problem, Solution, Termination
+from ..ode.rk45 import Workspace, integrate
+from . import motion
+from .deduplicate import deduplicate
+from .formula import argument_names, explained
+from .model import ForceModel
+from .numba import dispatch
+from .piecewise import in_parts
+from .powers import Array, distinct
+from .scaling import Values, chi_of, exact_restitution, with_coefficients, with_units
+from .status import LIMIT, OK, Status
+from .velocity_coordinates import VelocityCoordinate, is_strong
+
+# the status that belongs to each termination, by its number; no trajectory ends running
+STATUS_OF_TERMINATION = np.zeros(len(Termination), np.int8)
+STATUS_OF_TERMINATION[Termination.EVENT_REACHED] = Status.OK
+STATUS_OF_TERMINATION[Termination.EVENT_UNREACHABLE] = Status.NOT_SEPARATED
+STATUS_OF_TERMINATION[Termination.MAX_STEPS] = Status.MAX_STEPS
+STATUS_OF_TERMINATION[Termination.STEP_UNDERFLOW] = Status.STEP_UNDERFLOW
+STATUS_OF_TERMINATION[Termination.NOT_FINITE] = Status.NOT_FINITE
+
+# positions of impacts; a slice where it is all of them, so that nothing is copied
+Positions = NDArray[np.intp] | slice
+# what a law asks for, by name, in the contact's own units
+Named = Mapping[str, Array]
+
+
+def positions(chosen: NDArray[np.bool_]) -> Positions:
+    """The positions of those that are chosen."""
+    return slice(None) if chosen.all() else np.flatnonzero(chosen)
+
+
+@dataclass(frozen=True)
+class CollisionResult:
+    """What a law does with impacts, in the contact's own units; arrays of shape (n,).
+
+    `approach_work` and `restitution_work` are twice the works done against the force in the two phases, 1 and
+    -e_out^2 up to the solver's error; `chi` is the law's damping ratio and `exact` its restitution in closed form,
+    where it has them.
+    """
+
+    e_out: Array
+    peak: Array
+    permanent: Array
+    force: Array
+    contact_time: Array
+    approach_work: Array
+    restitution_work: Array
+    steps: NDArray[np.int32]
+    status: NDArray[np.int8]
+    chi: Array
+    exact: Array
+
+    @classmethod
+    def blank(cls, n: int) -> CollisionResult:
+        """n impacts of which nothing is known."""
+        return cls(
+            e_out=np.full(n, np.nan),
+            peak=np.full(n, np.nan),
+            permanent=np.full(n, np.nan),
+            force=np.full(n, np.nan),
+            contact_time=np.full(n, np.nan),
+            approach_work=np.full(n, np.nan),
+            restitution_work=np.full(n, np.nan),
+            steps=np.zeros(n, np.int32),
+            status=np.full(n, Status.OK, np.int8),
+            chi=np.full(n, np.nan),
+            exact=np.full(n, np.nan),
+        )
+
+    def put(self, where: Positions | NDArray[np.bool_], part: CollisionResult) -> None:
+        """Write a part's arrays at their positions."""
+        for field in fields(self):
+            getattr(self, field.name)[where] = getattr(part, field.name)
+
+    @classmethod
+    def joined(
+        cls, n: int, status: NDArray[np.int8], parts: Sequence[tuple[Positions, CollisionResult]]
+    ) -> CollisionResult:
+        """n impacts, parts of them at their positions; of those in none only the status is known."""
+        if parts and isinstance(parts[0][0], slice):
+            return parts[0][1]
+        result = cls.blank(n)
+        result.status[:] = status
+        for where, part in parts:
+            result.put(where, part)
+        return result
+
+    def take(self, where: Positions) -> CollisionResult:
+        """The impacts at some positions."""
+        return CollisionResult(**{field.name: getattr(self, field.name)[where] for field in fields(self)})
+
+
+# the columns of a table of trajectories
+TABLE_COLUMNS = tuple(field.name for field in fields(CollisionResult))
+
+
+@dataclass(frozen=True)
+class RecordedCollision:
+    """Impacts integrated through both phases: the result, and the solution of each phase.
+
+    `params` are those of the restitution phase, of the impacts that entered it.
+    """
+
+    result: CollisionResult
+    approach: Solution
+    restitution: Solution | None
+    params: Params
+
+
+def simulate(
+    model: ForceModel,
+    n: Array,
+    values: Named,
+    status: NDArray[np.int8],
+    *,
+    rtol: float,
+    max_steps: int,
+    collapse: bool = True,
+    core: str = "numpy",
+    errors: dict[str, str] | None = None,
+) -> CollisionResult:
+    """Integrate impacts by the law of a model.
+
+    Parameters
+    ----------
+    model : the law
+    n : compliance exponents, shape (k,)
+    values : what the law asks for, by name, in the contact's own units, each of shape (k,)
+    status : what is known of the impacts before; those that are not OK are not integrated
+    rtol, max_steps, collapse, core, errors : see `impact.contact.outputs.collide`
+
+    Returns
+    -------
+    CollisionResult : arrays of shape (k,); an impact that fails has a status, and does not affect any other
+    """
+    parts: list[tuple[Positions, CollisionResult]] = []
+    integrate_both = partial(integrate_phases, rtol=rtol, max_steps=max_steps, core=core)
+    errors = {} if errors is None else errors
+    with np.errstate(all="ignore"):
+        for exponent in distinct(n):
+            chosen = (status == OK) & (n == exponent)
+            count, where = int(np.count_nonzero(chosen)), positions(chosen)
+            if count:
+                some = _at(values, where)
+                part = _isolate_failures(model, float(exponent), some, count, integrate_both, collapse, errors)
+                parts.append((where, part))
+    return CollisionResult.joined(n.size, status, parts)
+
+
+def _at(values: Named, where: Positions) -> Named:
+    return {name: array[where] for name, array in values.items()}
+
+
+def _isolate_failures(
+    model: ForceModel,
+    n: float,
+    values: Named,
+    count: int,
+    integrate_both: Callable[..., RecordedCollision],
+    collapse: bool,
+    errors: dict[str, str],
+) -> CollisionResult:
+    """Simulate impacts that share n; those at which the law raises have a status.
+
+    A law that raises is tried again on both halves, so that only the impacts that make it raise fail. A single
+    impact is tried together with a copy: a result of the wrong shape, or an `if`, does not show at one.
+    """
+    try:
+        if count == 1:
+            twice = _at(values, np.array([0, 0]))
+            return _simulate_distinct(model, n, twice, 2, integrate_both, collapse=False).take(np.array([0]))
+        return _simulate_distinct(model, n, values, count, integrate_both, collapse)
+    except ModelError as error:
+        result = CollisionResult.blank(count)
+        if count == 1:
+            result.status[:] = Status.MODEL_ERROR
+            errors.setdefault(*explained(model.key, error))
+            return result
+        for half in np.array_split(np.arange(count), 2):
+            part = _isolate_failures(model, n, _at(values, half), half.size, integrate_both, collapse, errors)
+            result.put(half, part)
+        return result
+
+
+def _simulate_distinct(
+    model: ForceModel,
+    n: float,
+    values: Named,
+    count: int,
+    integrate_both: Callable[..., RecordedCollision],
+    collapse: bool,
+) -> CollisionResult:
+    """Integrate the distinct ones of some impacts, with weak and with strong damping."""
+    known = with_coefficients(model, with_units(values, n), count)
+    status = _check_coefficients(model, known, values, count)
+    exact, chi = exact_restitution(model, known, count), chi_of(known, count)
+    strong = is_strong(model, known, count)
+    parts: list[tuple[Positions, CollisionResult]] = []
+    for is_strongly_damped in (False, True):
+        chosen = (status == OK) & (strong == is_strongly_damped)
+        size = int(np.count_nonzero(chosen))
+        if not size:
+            continue
+        where = positions(chosen)
+        law = motion.MotionLaw.of(model, n, is_strongly_damped)
+        params = tuple(np.asarray(known[name])[where] for name in law.names)
+        first, back = deduplicate(params, (size,)) if collapse else (slice(None), slice(None))
+        never_separates = exact[where][first] == 0.0
+        distinct_params = tuple(column[first] for column in params)
+        collision = integrate_both(law, distinct_params, never_separates.size, never_separates=never_separates)
+        parts.append((where, collision.result.take(back)))
+    result = replace(CollisionResult.joined(count, status, parts), chi=chi, exact=exact)
+    held = status == LIMIT
+    if held.any():
+        for array in (result.e_out, result.peak, result.permanent):
+            array[held] = 0.0
+    return result
+
+
+def _check_coefficients(model: ForceModel, known: Values, values: Named, count: int) -> NDArray[np.int8]:
+    """The status of impacts once their coefficients are known, before they are integrated."""
+    status = np.full(count, Status.OK, np.int8)
+    coefficients = {name: np.asarray(known[name]) for name in model.coefficients}
+    if all(np.isfinite(coefficient).all() for coefficient in coefficients.values()):
+        return status
+    plastic = values.get("e", np.full(count, np.nan)) == 0.0
+    for coefficient in coefficients.values():
+        status[np.isinf(coefficient) & ~plastic] = Status.OUT_OF_RANGE
+    for coefficient in coefficients.values():
+        status[np.isnan(coefficient)] = Status.INVALID_PARAMETER
+    # with an infinite damping the balls neither approach nor part: force and time have no finite limit
+    for name in coefficients.keys() & argument_names(model.force):
+        status[np.isinf(coefficients[name]) & plastic] = Status.LIMIT
+    return status
+
+
+def integrate_phases(
+    law: motion.MotionLaw,
+    params: Params,
+    n: int,
+    rtol: float,
+    max_steps: int,
+    record: bool = False,
+    never_separates: NDArray[np.bool_] | bool = False,
+    core: str = "numpy",
+) -> RecordedCollision:
+    """Integrate n impacts through approach and restitution.
+
+    Parameters
+    ----------
+    law : the law at one exponent and in one coordinate of the velocity
+    params : its values per impact, each of shape (n,)
+    rtol, max_steps, record : see `impact.ode.rk45.integrate`
+    never_separates : which are known to stay together, where they do not part
+    core : "numba" integrates the phases that have a form for it compiled, unless they are recorded
+    """
+    back = motion.of_restitution(law)
+    forms: tuple[dispatch.Form | None, dispatch.Form | None] = (None, None)
+    if core == "numba" and not record:
+        forms = dispatch.of_approach(law), dispatch.of_restitution(back)
+    workspace = None if all(forms) else Workspace.of(n)
+    run = partial(integrate, rtol=rtol, max_steps=max_steps, record=record, workspace=workspace)
+
+    def solve(
+        form: dispatch.Form | None,
+        law: motion.MotionLaw,
+        problem: Problem,
+        start: Array,
+        params: Params,
+        residual: Array | None = None,
+    ) -> Solution:
+        if form is not None:
+            return dispatch.integrate(form, law, problem, start, params, rtol=rtol, max_steps=max_steps)
+        params, breakpoints = motion.breakpoints(law, params, start, residual)
+        return in_parts(run, problem, breakpoints, start, params)
+
+    approach = solve(forms[0], law, motion.approach(law), motion.start_of_approach(law, params, n), params)
+    peak = motion.indentation(law, approach.state[0])
+    at_peak = motion.force_at_peak(law, approach.state[0], params)
+    residual, recovered, params = motion.unloading_state(law, params, peak, at_peak)
+    unknown = np.full(n, np.nan)
+    result = CollisionResult(
+        e_out=unknown.copy(), peak=peak, permanent=residual.copy(), force=np.maximum(approach.maximum, at_peak),
+        contact_time=approach.state[2].copy(), approach_work=2.0 * approach.state[3], restitution_work=np.zeros(n),
+        steps=approach.steps.copy(), status=_status(approach), chi=unknown, exact=unknown,
+    )  # fmt: skip
+
+    # nothing is recovered where the balls stay at their peak
+    stays = (result.status == OK) & (recovered <= 0.0)
+    if stays.any():
+        result.status[stays], result.e_out[stays] = LIMIT, 0.0
+
+    where = positions(result.status == OK)
+    params, recovered = tuple(column[where] for column in params), recovered[where]
+    if not recovered.size:
+        return RecordedCollision(result, approach, None, params)
+    start = motion.start_of_restitution(back, params, recovered)
+    restitution = solve(forms[1], back, motion.restitution(back), start, params, residual[where])
+    _mark_never_separating(back, restitution, params, recovered)
+    e_out, work = -back.velocity(restitution.state, params), 2.0 * restitution.state[3]
+    status = _status(restitution)
+    # held, or parting with no speed after an infinite time: all the energy of such balls is lost
+    held = restitution.termination == Termination.EVENT_UNREACHABLE
+    if held.any():
+        held &= motion.may_be_overdamped(back.model) | np.broadcast_to(never_separates, n)[where]
+        e_out[held], work[held], status[held] = 0.0, 0.0, LIMIT
+    result.e_out[where] = e_out
+    result.contact_time[where] += restitution.state[2]
+    result.restitution_work[where] = work
+    result.steps[where] += restitution.steps
+    result.status[where] = status
+    if law.model.release == "force":
+        result.permanent[where] += motion.indentation(law, restitution.state[0])
+    return RecordedCollision(result, approach, restitution, params)
+
+
+def _mark_never_separating(law: motion.MotionLaw, solution: Solution, params: Params, recovered: Array) -> None:
+    """Mark trajectories that never separate, unlike those that only take too many steps."""
+    unfinished = np.isin(solution.termination, (Termination.MAX_STEPS, Termination.STEP_UNDERFLOW))
+    left = np.flatnonzero(unfinished)
+    if not left.size or law.model.release != "gap":
+        return
+    rates = motion.restitution(replace(law, coordinate=VelocityCoordinate())).rates
+    some = tuple(column[left] for column in params)
+    never = motion.never_separates(rates, some, recovered[left], law.model.coordinate_power)
+    solution.termination[left[never]] = Termination.EVENT_UNREACHABLE
+
+
+def _status(solution: Solution) -> NDArray[np.int8]:
+    return STATUS_OF_TERMINATION.take(solution.termination)

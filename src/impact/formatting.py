@@ -1,0 +1,95 @@
+"""Numbers, units and quantities as text: every table, message, page and picture writes them by these functions."""
+
+from __future__ import annotations
+
+import re
+
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+# prefixes of units, by the power of ten
+PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
+# units whose first factor takes a prefix
+PREFIXED = re.compile(r"(m|s|N|J|Pa|W|Hz)(?![\^A-Za-z])")
+
+
+def number(value: object, digits: int = 6) -> str:
+    """A value with so many digits; a missing number is a dash, and what is no float is as it is.
+
+    >>> number(1 / 3), number(0.5), number(6e9), number(float("nan")), number(12)
+    ('0.333333', '0.5', '6e+09', '–', '12')
+    """
+    if not isinstance(value, float):
+        return str(value)
+    return "–" if value != value else f"{value:.{digits}g}"
+
+
+def label(value: object) -> str:
+    """A value of an axis: all its digits but those that rounding left, without many zeros.
+
+    >>> label(0.1 + 0.2), label(6e9), label(1234567.0), label("steel")
+    ('0.3', '6e+09', '1234567', 'steel')
+    """
+    short, long = number(value), number(value, 12)
+    return long if isinstance(value, float) and value == value and float(short) != float(long) else short
+
+
+def quantity(value: object, unit: str = "1", digits: int = 6) -> str:
+    """A value with its unit, where it has one.
+
+    >>> quantity(0.5, "m/s"), quantity(1.5), quantity(float("nan"), "N")
+    ('0.5 m/s', '1.5', '–')
+    """
+    text = number(value, digits)
+    return text if unit in ("", "1") or text == "–" else f"{text} {unit}"
+
+
+def heading(name: str, of: str = "", unit: str = "1") -> str:
+    """The head of a column: a name, what it is of, and its unit in brackets.
+
+    >>> heading("v1_post", "hertz", "m/s"), heading("e")
+    ('v1_post hertz [m/s]', 'e')
+    """
+    return " ".join(part for part in (name, of, "" if unit in ("", "1") else f"[{unit}]") if part)
+
+
+def typographic(value: float, *, powers: bool = False) -> str:
+    """A number as it is printed: with a true minus, and powers of ten, also for 1e-4 where `powers` asks for them.
+
+    >>> [typographic(value) for value in (0.25, -3.0, -1e-9, 2.5e10, 1e-4)], typographic(1e-4, powers=True)
+    (['0.25', '−3', '−10⁻⁹', '2.5·10¹⁰', '0.0001'], '10⁻⁴')
+    """
+    text = number(float(value))
+    if powers and value and not 0.01 <= abs(value) < 1e5:
+        digits, _, exponent = f"{value:.5e}".partition("e")
+        text = f"{float(digits):g}e{exponent}"
+    mantissa, _, power = text.partition("e")
+    text = f"{mantissa}·10{str(int(power)).translate(SUPERSCRIPTS)}" if power else mantissa
+    return re.sub(r"^(-?)1·", r"\1", text).replace("-", "−")
+
+
+def scaled_unit(unit: str, largest: float) -> tuple[float, str]:
+    """The size of the unit with the prefix that suits a number, and that unit.
+
+    Parameters
+    ----------
+    unit : in SI, such as "m/s"
+    largest : magnitude of the largest number that is shown, in it
+
+    >>> scaled_unit("m", 1.2e-4), scaled_unit("m/s", 0.5), scaled_unit("N", 6200.0), scaled_unit("kg", 2e-3)
+    ((1e-06, 'µm'), (1.0, 'm/s'), (1000.0, 'kN'), (0.001, 'g'))
+    """
+    if unit.startswith("kg") and largest < 0.1 and not unit.startswith("kg^"):
+        power, text = _prefixed(largest * 1e3)
+        return 10.0 ** (power - 3), f"{text}g{unit[2:]}"
+    if PREFIXED.match(unit) is None:
+        return 1.0, unit
+    power, text = _prefixed(largest)
+    return 10.0**power, text + unit
+
+
+def _prefixed(largest: float) -> tuple[int, str]:
+    """The power of ten of a prefix, and the prefix; none for numbers that are short without one."""
+    if not 0.0 < largest < float("inf") or 0.1 <= largest < 1000.0:
+        return 0, ""
+    exponent = int(f"{largest:.6e}".partition("e")[2])
+    power = min(max(3 * (exponent // 3), min(PREFIXES)), max(PREFIXES))
+    return power, PREFIXES[power]

@@ -1,0 +1,172 @@
+"""The numbers behind a picture as a file, and measured points as one."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..config.cases import HEADER, CsvTable, column_values, read_csv
+from ..config.quantities import Quantity, show
+from ..config.tables import SWEEP
+from ..errors import ConfigError, UsageError, did_you_mean
+from ..formatting import number
+from ..results.history import HISTORY
+from ..results.schema import SCHEMA, plain_unit
+from ..text import safe_text
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+
+    from .curves import Panel
+    from .kinds import Numbers
+
+# the endings of a table, and its forms
+TABLES = (".csv", ".tex", ".parquet")
+FORMS = ("wide", "long")
+SIGMA = "sigma"
+MEASURED = "Measured"
+
+
+def check_table(path: Path, form: str) -> None:
+    """Refuse a table whose ending or form is not known.
+
+    Raises
+    ------
+    UsageError : see above
+    """
+    if path.suffix.lower() not in TABLES:
+        *most, last = TABLES
+        raise UsageError(
+            f"--data {safe_text(str(path))}: expected a name that ends in {', '.join(most)} or {last}"
+        )
+    if form not in FORMS:
+        raise UsageError(f"--data-form: got {safe_text(form)}, expected {' or '.join(FORMS)}")
+
+
+def as_table(numbers: Numbers, suffix: str, form: str = "wide") -> bytes:
+    """The numbers behind a picture as the bytes of a file; every digit is kept, but for print.
+
+    Parameters
+    ----------
+    numbers : of the picture
+    suffix : one of TABLES
+    form : "wide" has a column for each curve, whose names are ASCII and have the unit; "long" a row for each point
+
+    Raises
+    ------
+    UsageError : the table needs a package that is not installed
+    """
+    import pandas as pd
+
+    if form == "long":
+        frame = pd.DataFrame(numbers.rows(), columns=list(numbers.columns))
+    else:
+        frame = pd.DataFrame({name: pd.Series(values) for name, values in numbers.table().items()})
+    if suffix == ".tex":
+        text: str = frame.to_latex(index=False, escape=True, na_rep="", float_format=number)
+        return text.encode()
+    if suffix == ".parquet":
+        buffer = io.BytesIO()
+        try:
+            frame.to_parquet(buffer, index=False, engine="pyarrow")
+        except ImportError:
+            needs = 'needs pyarrow, which is not installed: pip install "impact-sweep[parquet]"'
+            raise UsageError(f"--data: .parquet {needs}") from None
+        return buffer.getvalue()
+    return str(frame.to_csv(index=False, lineterminator="\n")).encode()
+
+
+@dataclass(frozen=True)
+class Points:
+    """What was measured: columns in SI by the names of inputs and variables, sigma among them, and where from."""
+
+    source: str
+    columns: Mapping[str, np.ndarray]
+
+    def draw(self, axes: Axes, panel: Panel) -> dict[str, Artist]:
+        """Draw the points over the curves of a panel, with error bars where there is a sigma.
+
+        Raises
+        ------
+        UsageError : the points have not got what the panel shows
+        """
+        variables = list(dict.fromkeys(curve.variable for curve in panel.curves if curve.model))
+        shown = [name for name in variables if name in self.columns]
+        if panel.x_name not in self.columns or not shown:
+            needs = f"{panel.x_name} and {' or '.join(variables)}"
+            has = ", ".join(self.columns)
+            raise UsageError(f"{self.source}: the picture shows {safe_text(needs)}, and the points have {has}")
+        if SIGMA in self.columns and len(shown) > 1:
+            raise UsageError(f"{self.source}: {SIGMA} of which, {' or '.join(shown)}? expected one of them")
+        artists: dict[str, Artist] = {}
+        for place, name in enumerate(shown):
+            bars = axes.errorbar(
+                self.columns[panel.x_name], self.columns[name], self.columns.get(SIGMA), color="black", zorder=3,
+                marker="o", markersize=4.0, linestyle="none", elinewidth=0.9, capsize=2.0,
+                markerfacecolor="black" if place == 0 else "white",
+            )  # fmt: skip
+            artists[MEASURED if len(shown) == 1 else f"{MEASURED} {name}"] = bars[0]
+        return artists
+
+
+def read_points(points: str | Path | pd.DataFrame | xr.Dataset) -> Points:
+    """Measured points, of a CSV file or of a table of pandas or xarray.
+
+    The names of the columns are those of inputs and variables, with their units in brackets: "v1 [mm/s]". Without
+    a unit a column is in SI. `sigma` is the standard deviation of the variable before it, by default in its unit.
+
+    Raises
+    ------
+    ConfigError : the file cannot be read, or a name, a unit or a number is not right
+    """
+    table = read_csv(Path(points)) if isinstance(points, str | Path) else _table_of(points)
+    known = _known()
+    for column in table.units:
+        if column not in known:
+            place = f"{table.name}:1: " if isinstance(points, str | Path) else f"{table.name}: "
+            raise ConfigError([f"{place}got {show(column)}; {did_you_mean(column, sorted(known))}"])
+    units, before = dict(table.units), ""
+    for column in table.units:
+        if column == SIGMA and before:
+            known[SIGMA] = Quantity(known[before].unit, "standard deviation", least=0.0)
+            units[SIGMA] = units[SIGMA] or units[before]
+        before = column
+    table = replace(table, units=units)
+    return Points(
+        table.name, {name: np.array(column_values(table, name, known[name], None), float) for name in table.units}
+    )
+
+
+def _table_of(points: pd.DataFrame | xr.Dataset) -> CsvTable:
+    """A table of pandas or xarray as that of a file, whose lines are its rows."""
+    units: dict[str, str] = {}
+    frame: Any = points
+    if hasattr(points, "data_vars"):
+        dataset: Any = points
+        units = {str(name): plain_unit(str(one.attrs.get("units", ""))) for name, one in dataset.variables.items()}
+        frame = dataset.to_dataframe().reset_index()
+    cells: dict[str, list[tuple[int, str]]] = {}
+    for name, values in frame.items():
+        parts = HEADER.fullmatch(str(name))
+        assert parts is not None
+        units[parts[1]] = parts[2] or units.get(parts[1], "")
+        cells[parts[1]] = [(row, repr(value)) for row, value in enumerate(values.tolist(), 1)]
+    return CsvTable("points", {name: units[name] for name in cells}, cells)
+
+
+def _known() -> dict[str, Quantity]:
+    """What a column may be called, with its unit."""
+    outputs = {one.name: Quantity(plain_unit(one.unit), one.meaning) for one in SCHEMA if one.dtype == "f8"}
+    history = {name: Quantity(plain_unit(unit), meaning) for name, unit, meaning in HISTORY}
+    inputs = {name: Quantity(one.unit, one.meaning) for name, one in SWEEP.items()}
+    time, impulse = Quantity("s", "time"), Quantity("N s", "impulse")
+    sigma = Quantity("1", "standard deviation", least=0.0)
+    return {**outputs, **history, **inputs, "t": time, "tau": impulse, SIGMA: sigma}

@@ -1,0 +1,145 @@
+"""Words of a picture: symbols of variables in italics, labels of axes, names of laws, conditions."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from functools import cache
+
+from matplotlib.axis import Axis
+from matplotlib.mathtext import MathTextParser
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+
+from ..contact.models import catalogue
+from ..errors import UsageError, did_you_mean
+from ..formatting import scaled_unit, typographic
+from ..results.history import HISTORY
+from ..results.schema import SCHEMA, is_input
+from ..text import safe_text, with_year
+from .slices import NO_BREAK
+
+GREEK = (
+    "alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "kappa", "lambda", "mu", "nu", "xi",
+    "rho", "sigma", "tau", "phi", "chi", "psi", "omega",
+)  # fmt: skip
+# letters of the paper for names that are words; those of v_post and abs_e_error stand for several variables
+SYMBOLS = {
+    "e_out": r"e_\mathrm{out}", "e_error": r"e_\mathrm{out}-e", "abs_e_error": r"|e_\mathrm{out}-e|",
+    "v1_post": "v_1^+", "v2_post": "v_2^+", "v1_reference": "v_1^+", "v2_reference": "v_2^+", "v_post": "v_i^+",
+    "v_i": "v_i", "v": r"\dot{\delta}", "peak_indentation": r"\delta_m", "permanent_indentation": r"\delta_p",
+    "peak_force": "f_m", "stiffness": "K", "damping_ratio": r"\chi", "E1": "E_1", "E2": "E_2",
+    "e_kinetic": r"e_\mathrm{kinetic}", "e_energetic": r"e_\mathrm{energetic}",
+}  # fmt: skip
+# what the paper calls the solution by impulse and momentum
+REFERENCE = "Impulse-momentum"
+
+
+@cache
+def symbol(name: str) -> str:
+    r"""A variable as mathtext; empty where its name is no letter.
+
+    >>> symbol("v1"), symbol("e_out"), symbol("tau_c"), symbol("contact_time"), symbol("maw.gamma")
+    ('$v_1$', '$e_\\mathrm{out}$', '$\\tau_c$', '', '$\\gamma$')
+    """
+    name = name.rpartition(".")[2]
+    if name in SYMBOLS:
+        return f"${SYMBOLS[name]}$"
+    parts = re.fullmatch(r"([A-Za-z]|[a-z]+)_?([A-Za-z]?|[0-9]*)", name)
+    if parts is None or not (len(parts[1]) == 1 or parts[1] in GREEK):
+        return ""
+    letter = parts[1] if len(parts[1]) == 1 else rf"\{parts[1]}"
+    return f"${letter}_{parts[2]}$" if parts[2] else f"${letter}$"
+
+
+def plain(text: str) -> str:
+    """Text of a file or a user as mathtext that shows it as it is."""
+    return text.replace("$", r"\$")
+
+
+def checked_labels(labels: Mapping[str, str], shown: set[str]) -> dict[str, str]:
+    """The labels that a user chose for names of a picture.
+
+    Parameters
+    ----------
+    labels : texts, which may have mathtext, by the name of an axis or a variable, the key of a law, "reference" or
+        "title"
+    shown : the names of the picture; others of the program are passed over
+
+    Raises
+    ------
+    UsageError : there is no such name, or a text is not valid mathtext
+    """
+    known = {*shown, "reference", "title"}
+    elsewhere = {*(one.name for one in SCHEMA), *(name for name, _, _ in HISTORY), *catalogue()}
+    for key, text in labels.items():
+        if key not in known and key not in elsewhere and not is_input(key):
+            names = did_you_mean(key, sorted(known))
+            raise UsageError(f'--label: nothing in the picture is called "{safe_text(key)}"; {names}')
+        try:
+            MathTextParser("path").parse(text)
+        except ValueError as error:
+            reason = safe_text(str(error).strip().splitlines()[-1])
+            raise UsageError(f"--label {safe_text(f'{key}={text}')}: is not valid mathtext: {reason}") from None
+    return dict(labels)
+
+
+def axis_text(words: str, name: str, unit: str, labels: Mapping[str, str]) -> str:
+    """The label of an axis: words, symbol and unit, of which the last two stay together."""
+    if name in labels:
+        words, letter = labels[name], ""
+    else:
+        words, letter = plain(words[:1].upper() + words[1:]), symbol(name)
+    shown = f"({pretty(unit)})" if unit not in ("", "1") else ""
+    return " ".join(filter(None, (words, NO_BREAK.join(filter(None, (letter, shown))))))
+
+
+def words_of(attributes: Mapping[object, object], name: str) -> str:
+    """The meaning of a variable in words; what stands after a semicolon is no label."""
+    return safe_text(str(attributes.get("long_name") or name).partition(";")[0])
+
+
+def pretty(text: str) -> str:
+    r"""Units and numbers as they are printed.
+
+    >>> pretty("6e+09 N/m^1.5")
+    '6·10⁹ N/m$^{1.5}$'
+    """
+    text = re.sub(r"(?<![\w.])-?\d+(?:\.\d+)?e[+-]\d+", lambda found: typographic(float(found[0])), plain(text))
+    return re.sub(r"\^(-?[\d.]+|\([^)]*\))", r"$^{\1}$", text)
+
+
+def pretty_conditions(text: str) -> str:
+    """Conditions with their symbols in italics; a property is that of its material."""
+
+    def shown(name: re.Match[str]) -> str:
+        material = re.fullmatch(r"materials\.(.+)\.\w+", name[1])
+        return (symbol(name[1]) or name[1]) + (f" of {material[1]}" if material else "")
+
+    return re.sub(rf"([A-Za-z][\w.-]*)(?={NO_BREAK}={NO_BREAK})", shown, pretty(text))
+
+
+def law_text(title: str, year: int, equation: str, own: str, *, numbered: bool) -> str:
+    """The name of a law: title, year, its own parameters, and where `numbered` its equation in the paper."""
+    number = re.search(r"\(\d+\)(?:-\(\d+\))?$", equation) if numbered else None
+    name = safe_text(with_year(title, year), 80)
+    return ", ".join(filter(None, (name, number[0] if number else "", own)))
+
+
+def label_axis(
+    axis: Axis, words: str, name: str, unit: str, largest: float, labels: Mapping[str, str], *, log: bool
+) -> None:
+    """Write the label of an axis, and its numbers with one prefix of the unit for all of them."""
+    size, shown = (1.0, unit) if log else scaled_unit(unit, largest)
+    axis.set_label_text(axis_text(words, name, shown, labels))
+    number_axis(axis, size, log=log)
+
+
+def number_axis(axis: Axis, size: float = 1.0, *, log: bool = False) -> None:
+    """Write the numbers of an axis, in multiples of `size`; logarithmic ones are few, and never between powers."""
+    axis.set_major_formatter(FuncFormatter(lambda value, _: typographic(value / size, powers=log)))
+    if log:
+        low, high = sorted(axis.get_view_interval())
+        axis.set_major_locator(LogLocator(subs=(1.0, 3.0) if high < 1e3 * low else (1.0,)))
+        axis.set_minor_formatter(NullFormatter())
+    else:
+        axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 2.5, 5, 10], min_n_ticks=3))

@@ -1,0 +1,241 @@
+"""The figure of a picture: a title, panels and a legend, laid out by matplotlib at any size."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.backend_bases import RendererBase
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.legend import Legend
+from matplotlib.lines import Line2D
+from matplotlib.text import Text
+
+from .style import encoded
+
+# between the parts of a picture, and its edges [in]
+GAP = 0.05
+# the most that a picture grows for its legend [in]
+PAGE = 9.5
+# of the height of a single row of panels, what the label of a low one may take; a word is broken above this [in]
+OF_ROW, LONGEST_WORD = 0.7, 2.4
+# of a layout at most
+PASSES = 4
+# of the length of an axis, what its label may take: the axis may become a little shorter
+SPARE = 0.93
+# of a picture whose height is given, the largest part that its legend takes
+LEGEND_SHARE = 0.5
+# a legend of more entries has smaller letters
+MANY = 16
+
+
+class Picture(Figure):
+    """A figure with a title, conditions below it and a legend at its foot, which fit it at any size.
+
+    Unlike a plain figure it shows itself in a notebook, also where no backend of matplotlib was chosen.
+    """
+
+    def __init__(self, width: float, title: str = "", conditions: str = "") -> None:
+        super().__init__((width, width), layout=Layout())
+        FigureCanvasAgg(self)
+        looks: tuple[dict[str, Any], ...] = (
+            {"fontweight": "bold", "fontsize": "large"},
+            {"fontsize": "small", "color": "#555555"},
+        )
+        texts = zip((title, conditions), looks, strict=True)
+        self.header = [self.text(0.0, 1.0, text, va="top", **look) for text, look in texts if text]
+        self.entries: list[tuple[Artist, str]] = []
+        self.shared: tuple[Text, ...] = ()
+        # a later change of the size makes the legend again, in the style of now
+        self.style = {
+            key: value for key, value in matplotlib.rcParams.items() if key.startswith(("legend", "font"))
+        }
+        # texts that were broken into lines, as they were and as they are
+        self.fitted: dict[Text, tuple[str, str]] = {}
+
+    def _repr_png_(self) -> bytes:
+        return encoded(self, "png")
+
+    def set_size_inches(self, w: Any, h: Any = None, forward: bool = True) -> None:
+        before = self.get_figwidth()
+        super().set_size_inches(w, h, forward)
+        # a change of the resolution comes here too
+        if self.get_figwidth() != before and self.entries:
+            self.place_legend(self.entries)
+
+    def settle(self, body: float, height: float | None, entries: Sequence[tuple[Artist, str]]) -> None:
+        """Add the legend and choose the height.
+
+        Parameters
+        ----------
+        body : height of the panels [in], where none is given; of a tall legend they are as high
+        height : of the figure [in], where the user chose one
+        entries : handles and names of the legend
+        """
+        width, shown = self.get_figwidth(), list(entries)
+        legend = self.place_legend(shown)
+        if height is None:
+            most = min(legend, PAGE / 2.0)
+            height = GAP + self.place_header() + max(body, most) + most
+        while legend > LEGEND_SHARE * height and len(shown) > 1:
+            # as many entries as there is room for, and the number of the others
+            shown = shown[: max(1, int(0.9 * len(shown)))]
+            more = (Line2D([], [], linestyle=""), f"and {len(entries) - len(shown)} more")
+            legend = self.place_legend([*shown, more])
+        self.set_size_inches(width, height)
+
+    def place_legend(self, entries: Sequence[tuple[Artist, str]]) -> float:
+        """Put the legend at the foot in as many columns as fit; returns its height [in]."""
+        for legend in list(self.legends):
+            legend.remove()
+        self.entries = list(entries)
+        if entries:
+            with matplotlib.rc_context(self.style):
+                self._place_legend()
+        return self.legend_height()
+
+    def _place_legend(self) -> None:
+        room = self.bbox.width - GAP * self.dpi
+        columns = max(1, int(room / self._legend(1).get_window_extent(self.renderer).width))
+        # columns of short names are narrower than that of all: perhaps there is room for another
+        for number in range(min(columns + 1, len(self.entries)), 0, -1):
+            self.legends[0].remove()
+            if self._legend(number).get_window_extent(self.renderer).width <= room:
+                break
+
+    @property
+    def renderer(self) -> RendererBase:
+        """What measures text at the present resolution; a text keeps the one that it was measured by before."""
+        return self._get_renderer()  # type: ignore[attr-defined, no-any-return]
+
+    def legend_height(self) -> float:
+        """The height of the legend [in]."""
+        return sum(
+            float(legend.get_window_extent(self.renderer).height / self.dpi) + GAP for legend in self.legends
+        )
+
+    def _legend(self, columns: int) -> Legend:
+        """The legend in so many columns; names that are wider than the figure have several lines."""
+        look: dict[str, Any] = {"fontsize": "x-small"} if len(self.entries) > MANY else {}
+        handles, names = zip(*self.entries, strict=True)
+        legend = self.legend(
+            handles, names, loc="lower center", ncols=columns, borderaxespad=0.3, columnspacing=1.2, **look
+        )
+        room = self.bbox.width - 4.5 * float(legend.get_texts()[0].get_fontsize()) * self.dpi / 72.0
+        for text in legend.get_texts():
+            self.fit(text, room)
+        return legend
+
+    def share_labels(self, x_label: str, y_label: str) -> None:
+        """Write labels of the axes once for all panels."""
+        size = matplotlib.rcParams["axes.labelsize"]
+        below = self.text(0.5, 0.0, x_label, ha="center", va="bottom", fontsize=size)
+        self.shared = (
+            below,
+            self.text(0.0, 0.5, y_label, ha="left", va="center", rotation="vertical", fontsize=size),
+        )
+
+    def place_header(self) -> float:
+        """Put the title and the conditions at the top, in lines that fit; returns their height [in]."""
+        gap = GAP * self.dpi
+        down = self.bbox.height - gap
+        for text in self.header:
+            self.fit(text, self.bbox.width - 2.0 * gap)
+            text.set_position((gap / self.bbox.width, down / self.bbox.height))
+            down -= text.get_window_extent(self.renderer).height + gap
+        return float((self.bbox.height - down) / self.dpi)
+
+    def place_around(self) -> tuple[float, float, float]:
+        """Place what stands around the panels; returns the parts of the figure at the left, below and above."""
+        width, height = self.bbox.width, self.bbox.height
+        gap, above = GAP * self.dpi, self.place_header() * self.dpi
+        left, below = 0.0, self.legend_height() * self.dpi
+        if self.shared:
+            x_label, y_label = self.shared
+            self.fit(x_label, width)
+            x_label.set_y((below + gap) / height)
+            below += gap + x_label.get_window_extent(self.renderer).height
+            self.fit(y_label, height - above - below)
+            y_label.set_position((gap / width, 0.5 * (height - above + below) / height))
+            left = gap + y_label.get_window_extent(self.renderer).width
+        return left / width, below / height, above / height
+
+    def fit_labels(self, height: float) -> list[str]:
+        """Break the labels and titles of all axes to the lengths of these; returns their texts.
+
+        Where the axes stand in a single row of some height [px], a label may be longer than a low one.
+        """
+        labels = []
+        rows = len({round(axes.get_position().y0, 1) for axes in self.axes})
+        least = OF_ROW * height if rows == 1 else 0.0
+        for axes in self.axes:
+            box = axes.get_window_extent()
+            titles = [text for text in axes.get_children() if isinstance(text, Text) and text not in axes.texts]
+            for text in (*titles, axes.xaxis.label, axes.yaxis.label):
+                self.fit(text, max(SPARE * box.height, least) if text is axes.yaxis.label else SPARE * box.width)
+                labels.append(text.get_text())
+        return labels
+
+    def fit(self, text: Text, room: float) -> None:
+        """Break a text at its spaces into lines no longer than a number of pixels.
+
+        Of what is one word only one that no language has is broken.
+        """
+        whole, shown = self.fitted.get(text, ("", ""))
+        if not shown or text.get_text() != shown:
+            whole = text.get_text()
+
+        def length(line: str) -> float:
+            text.set_text(line)
+            box = text.get_window_extent(renderer)
+            return float(box.height if text.get_rotation() == 90.0 else box.width)
+
+        lines, renderer = [""], self.renderer
+        if length(whole) <= room:
+            return
+        for word in whole.split(" "):
+            longer = f"{lines[-1]} {word}" if lines[-1] else word
+            if length(longer) <= room:
+                lines[-1] = longer
+                continue
+            letters = len(word)
+            if "$" not in word and length(word) > max(room, LONGEST_WORD * self.dpi):
+                letters = max(1, int(len(word) * room / length(word)))
+            lines += [word[start : start + letters] for start in range(0, len(word), letters)]
+        text.set_text("\n".join(filter(None, lines)))
+        self.fitted[text] = whole, text.get_text()
+
+
+class Layout(ConstrainedLayoutEngine):
+    """Constrained layout below the title of a picture, with every label broken to the length of its axis.
+
+    The solver of the layout is not the same to the last digit each time: positions are rounded, so that a picture
+    has the same bytes in any process.
+    """
+
+    def execute(self, fig: Figure) -> None:
+        assert isinstance(fig, Picture)
+        fig.fitted = {text: texts for text, texts in fig.fitted.items() if text.figure is not None}
+        left, below, above = fig.place_around()
+        self.set(rect=(left, below, 1.0 - left, 1.0 - above - below))
+        # the axes have their sizes of before, and become shorter where a label gets another line
+        before: list[str] = []
+        for _ in range(PASSES):
+            labels = fig.fit_labels((1.0 - above - below) * fig.bbox.height)
+            if labels == before:
+                break
+            with warnings.catch_warnings():
+                # of labels that leave no room it warns; the picture is drawn all the same
+                warnings.filterwarnings("ignore", "constrained_layout not applied", UserWarning)
+                super().execute(fig)
+            before = labels
+        for axes in fig.axes:
+            axes.set_position(np.round(axes.get_position(original=True).bounds, 3))
+            # to set a position takes the axes out of the layout
+            axes.set_in_layout(True)

@@ -1,0 +1,224 @@
+"""Which part of a result a picture shows: lines and planes through it, and the values of everything else."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..contact.units import with_numbers
+from ..engine.plan import owner_of
+from ..errors import UsageError, did_you_mean
+from ..formatting import quantity
+from ..results.schema import exponents_of, is_input, plain_unit
+from ..results.select import places_of, select
+from ..text import safe_text
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+# numbers of a picture: enough for any that can be looked at, few enough to be held one by one
+MAX_DRAWN = 2**24
+NO_BREAK = "\N{NO-BREAK SPACE}"
+NO_SWEEP = "this is a time history, not the result of a sweep; draw it with --kind loop, or history"
+
+Selection = Mapping[str, float | str] | None
+
+
+def take_line(
+    dataset: xr.Dataset, x: str | None = None, sel: Selection = None, models: Sequence[str] | None = None
+) -> tuple[xr.Dataset, str, tuple[str, ...]]:
+    """Cut a line through a result.
+
+    Parameters
+    ----------
+    dataset : a result
+    x : the coordinate to draw over; by default e, else the first numeric axis
+    sel : values of other axes, by name; an axis that is not named shows its first value
+    models : keys of the models to show; by default all
+
+    Returns
+    -------
+    the dataset along the line, sorted, of which nothing is read yet; what is drawn over; values without a place
+
+    Raises
+    ------
+    UsageError : an axis, a value or a model is not in the result
+    """
+    dataset = _chosen(dataset, sel, models)
+    x = x_axis(dataset, x)
+    line, not_drawn = _sorted_along(_first_of_others(dataset, [dataset[x].dims[0]]), x)
+    if not line[x].size:
+        raise UsageError(f"{safe_text(x)} has no finite value to draw over")
+    return line, x, not_drawn
+
+
+def take_plane(
+    dataset: xr.Dataset,
+    kind: str,
+    x: str | None = None,
+    y: str | None = None,
+    sel: Selection = None,
+    models: Sequence[str] | None = None,
+) -> tuple[xr.Dataset, str, str, tuple[str, ...]]:
+    """Cut a plane through a result: the dataset over two sorted axes, their names, and values without a place.
+
+    For the parameters and errors see `take_line`; `kind` is what needs the plane.
+    """
+    dataset = _chosen(dataset, sel, models)
+    along = [x_axis(dataset, name) for name in (x, y) if name is not None]
+    dims = [dataset[name].dims[0] for name in along]
+    # by default nothing is drawn over an axis of one value, nor over what varies along several
+    plain = dataset.drop_vars([name for name, coordinate in dataset.coords.items() if coordinate.ndim > 1])
+    while len(along) < 2:
+        taken = [dim for dim, size in plain.sizes.items() if dim != "model" and (size == 1 or dim in dims)]
+        try:
+            along.append(x_axis(plain.isel(dict.fromkeys(taken, 0)), None))
+        except UsageError:
+            has = f"{safe_text(along[0])} alone; sweep a second" if along else "none; sweep e and another"
+            raise UsageError(f"{kind} needs two axes; this result has {has}, or use --kind restitution") from None
+        dims.append(dataset[along[-1]].dims[0])
+    if dims[0] == dims[1]:
+        raise UsageError(f"{kind} needs two axes; {safe_text(f'{along[0]} and {along[1]} vary together')}")
+    plane = _first_of_others(dataset, dims)
+    not_drawn: tuple[str, ...] = ()
+    for name in along:
+        values = plane[name].values
+        finite = values[np.isfinite(values)]
+        different = np.unique(finite).size
+        if different < max(2, finite.size):
+            has = "has a value twice" if different > 1 else f"has {different} that can be drawn"
+            raise UsageError(f"{kind} needs different values along each axis; {safe_text(name)} {has}")
+        plane, left_out = _sorted_along(plane, name)
+        not_drawn += left_out
+    first, second = along if x is not None or y is None else along[::-1]
+    return plane, first, second, not_drawn
+
+
+def _chosen(dataset: xr.Dataset, sel: Selection, models: Sequence[str] | None) -> xr.Dataset:
+    """The part of a result that was asked for."""
+    if "model" not in dataset.dims:
+        raise UsageError(NO_SWEEP)
+    if models:
+        dataset = dataset.isel(model=places_of(models, dataset))
+    return select(dataset, sel or {})
+
+
+def _first_of_others(dataset: xr.Dataset, dims: Sequence[object]) -> xr.Dataset:
+    """The result at the first value of every axis that is not drawn over."""
+    return dataset.isel({dim: 0 for dim in dataset.sizes if dim != "model" and dim not in dims})
+
+
+def _sorted_along(dataset: xr.Dataset, name: str) -> tuple[xr.Dataset, tuple[str, ...]]:
+    """The part of a result at the finite values of a coordinate along one axis, in order, and the other values.
+
+    A wall, or a plane, has no place on an axis.
+    """
+    values = dataset[name].values
+    order = np.argsort(values, kind="stable")
+    order = order[np.isfinite(values[order])]
+    not_drawn = tuple(f"{name} = {value}" for value in values[~np.isfinite(values)].tolist())
+    # a file is read in one go where nothing is left out or moved
+    in_order = np.array_equal(order, np.arange(values.size))
+    return (dataset if in_order else dataset.isel({dataset[name].dims[0]: order})), not_drawn
+
+
+def is_ordered(dataset: xr.Dataset, name: str) -> bool:
+    """Whether the points along a coordinate follow each other, so that a line may join them.
+
+    Values of an axis of its own do; those that vary together with others do only if they rise or fall all along.
+    Cases and samples, whose dimension only numbers them, do not.
+    """
+    (dim,) = dataset[name].dims
+    if dim not in dataset.coords or dataset[dim].dtype.kind in "iu":
+        return False
+    values = np.asarray(dataset[name].values, float)
+    values = values[np.isfinite(values)]
+    together = [other for other, coord in dataset.coords.items() if coord.dims == (dim,) and is_input(str(other))]
+    steps = np.diff(values)
+    if dim == name and len(together) <= 1:
+        return True
+    return bool(np.all(steps > 0.0) or np.all(steps < 0.0))
+
+
+def read(data: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
+    """Some variables of a slice or a plane, in memory, with the coordinates.
+
+    Raises
+    ------
+    UsageError : they are more than a picture shows
+    """
+    numbers = sum(data[name].size for name in names)
+    if numbers > MAX_DRAWN:
+        raise UsageError(
+            f"got {numbers:,} numbers to draw, expected at most {MAX_DRAWN:,}; take a shorter axis or fewer models"
+        )
+    return data.assign({name: data[name].compute() for name in names})
+
+
+def x_axis(dataset: xr.Dataset, x: str | None) -> str:
+    """The coordinate to draw over: the one asked for, else e, else the first axis of numbers."""
+    lines = [
+        str(name) for name, coord in dataset.coords.items()
+        if coord.ndim == 1 and coord.dims != ("model",) and coord.dtype.kind in "fiu"
+    ]  # fmt: skip
+    if x is not None:
+        if x not in lines:
+            if x in dataset.coords and dataset[x].ndim > 1:
+                dims = ", ".join(str(dim) for dim in dataset[x].dims)
+                raise UsageError(
+                    f"cannot draw over {safe_text(x)}, which varies over {dims}; select one with --sel"
+                )
+            raise UsageError(f'cannot draw over "{safe_text(x)}"; {did_you_mean(x, lines)}')
+        return x
+    # a number that only counts the points says least, then a parameter of one law
+    for name in ("e", *(dim for dim in dataset.sizes if dim in lines and _says(dataset, str(dim))), *lines):
+        if name in lines and _says(dataset, str(name)):
+            return str(name)
+    if lines:
+        return lines[0]
+    raise UsageError("this result has no numeric axis left to draw over; sweep one, such as e")
+
+
+def _says(dataset: xr.Dataset, name: str) -> bool:
+    return dataset[name].dtype.kind == "f"
+
+
+def conditions_of(dataset: xr.Dataset, *drawn: str) -> str:
+    """The values of everything that is not drawn over, of which each stays on its line.
+
+    A parameter of a law is no condition of the others: it stands beside the law's name, see `own_conditions`.
+    """
+    inputs = {name: value for name, value in scalars_of(dataset).items() if name not in drawn}
+    units = {name: plain_unit(str(dataset[name].attrs.get("units", "1"))) for name in inputs}
+    return described_inputs(inputs, units, exponents_of(dataset))
+
+
+def scalars_of(dataset: xr.Dataset) -> dict[str, object]:
+    """The coordinates of a slice that have one value."""
+    return {str(name): coordinate.values.item() for name, coordinate in dataset.coords.items()
+            if coordinate.ndim == 0 and is_input(str(name))}  # fmt: skip
+
+
+def described_inputs(inputs: Mapping[str, object], units: Mapping[str, str], exponent: str | None = None) -> str:
+    """Inputs with their units in words; `exponent` is n of the laws shown, which may have their own."""
+    parts = []
+    for name, value in inputs.items():
+        if not owner_of(name):
+            n = inputs.get("n")
+            unit = with_numbers(units[name], {"n": n}) if isinstance(n, float) else units[name]
+            text = exponent if name == "n" and exponent else quantity(value, unit)
+            parts.append(safe_text(f"{name} = {text}", 60).replace(" ", NO_BREAK))
+    return ", ".join(parts)
+
+
+def own_conditions(key: str, inputs: Mapping[str, object]) -> str:
+    """The parameters of a law among some inputs, as they stand beside its name.
+
+    >>> own_conditions("bilinear", {"bilinear.K": 1e9, "hertz.K": 2e9, "e": 0.5}).replace(NO_BREAK, " ")
+    'K = 1e+09'
+    """
+    own = ((name.removeprefix(f"{key}."), value) for name, value in inputs.items() if name.startswith(f"{key}."))
+    return ", ".join(safe_text(f"{name} = {quantity(value)}", 60).replace(" ", NO_BREAK) for name, value in own)

@@ -1,0 +1,240 @@
+"""A result as one page of HTML: it needs no network, runs nothing, and shows what a file says as text only.
+
+`page.html.j2` is the page; this module gives it plain values.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from importlib.resources import files
+from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
+
+import numpy as np
+from jinja2 import Environment, FunctionLoader, StrictUndefined, Template
+from markupsafe import Markup
+from numpy.typing import NDArray
+
+from ..config.tables import MATERIAL
+from ..contact.models import catalogue
+from ..engine.plan import owner_of
+from ..errors import UsageError
+from ..formatting import label
+from ..plots.kinds import Choice
+from ..results.attributes import read_attribute
+from ..results.plausibility import material_notes, result_notes
+from ..results.ranking import Ranking, ranking
+from ..results.schema import count_points, exponents_of, is_input
+from ..results.slabs import MAX_SUMMARY_POINTS, is_large
+from ..results.summary import Tally, extremes_of, tally_of
+from ..text import safe_text, with_year
+from .figures import at_text, figures_of, quantity, unit_of, varying
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from ..plots.kinds import Numbers
+
+# at most so many letters of a text are shown, of a line of the config, and so many values and failed points
+MAX_LETTERS, MAX_LINE, MAX_VALUES, MAX_FAILED = 2000, 100_000, 8, 20
+# of more than MANY models the figures show the BEST
+MANY, BEST = 12, 8
+
+
+def page(dataset: xr.Dataset, figures: Callable[[str, Choice], Numbers]) -> str:
+    """A result as one page of HTML.
+
+    Parameters
+    ----------
+    dataset : a result
+    figures : the numbers of a figure, of its kind and of what it shows
+
+    Raises
+    ------
+    UsageError : it is a time history
+    ResultError : its attributes are not those of a result
+    """
+    if "model" not in dataset.dims:
+        raise UsageError("this is a time history; a report is made of the result of a sweep")
+    tally = tally_of(dataset, MAX_FAILED)
+    ranked, headline = _answer(dataset)
+    keys = [str(key) for key in dataset["model"].values]
+    selection = ""
+    if len(keys) > MANY:
+        best = [one.model for one in ranked.models] if ranked else keys
+        selection = f"The figures show {BEST} of the {len(keys)} models: {', '.join(best[:BEST])}."
+        keys = best[:BEST]
+    drawn, left_out = figures_of(dataset, keys, figures)
+    models = [_model(dataset.isel(model=place)) for place in range(dataset.sizes["model"])]
+    lines = str(dataset.attrs.get("config", "")).replace("\r\n", "\n").expandtabs(4).split("\n")
+    return _template().render(
+        title=str(dataset.attrs.get("title", "")) or "Impact of two balls",
+        summary=_summary(dataset),
+        notes=[*material_notes(read_attribute(dataset.attrs, "materials")), *result_notes(tally)],
+        outcomes=list(_outcomes(tally)),
+        axes=[(name, *_about(dataset[name]), *_range(dataset[name])) for name in varying(dataset)],
+        single_values=list(_single_values(dataset)),
+        ranking=ranked,
+        headline=headline,
+        selection=selection,
+        figures=drawn,
+        left_out=left_out,
+        failures=_failures(dataset, tally),
+        facts=_facts(dataset),
+        models=models,
+        evidence=[row for model in models for row in model["evidence"]],
+        config=Markup("\n").join(safe_text(line, MAX_LINE) for line in lines),
+        changes=read_attribute(dataset.attrs, "config_set"),
+    )
+
+
+def _template() -> Template:
+    """The page, in which what is inserted is text."""
+
+    def text(value: object) -> str:
+        return value if isinstance(value, Markup) else safe_text(str(value), MAX_LETTERS)
+
+    environment = Environment(
+        loader=FunctionLoader(lambda name: files(__package__).joinpath(name).read_text(encoding="utf-8")),
+        autoescape=True, finalize=text, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )  # fmt: skip
+    return environment.get_template("page.html.j2")
+
+
+def _summary(dataset: xr.Dataset) -> str:
+    models, axes = dataset.sizes["model"], [str(dim) for dim in dataset.sizes if dim != "model"]
+    points, over = count_points(dataset), f" over {', '.join(axes)}" if axes else ""
+    return (
+        f"{models:,} model{_s(models)} of the impact of two balls{over}, judged by the "
+        f"impulse-momentum solution: {points:,} point{_s(points)}."
+    )
+
+
+def _outcomes(tally: Tally) -> Iterator[str]:
+    """How the points ended."""
+    for status in sorted(tally.counts):
+        yield f"{tally.counts[status]:,} {status.name.lower()}: {status.meaning}"
+    if tally.not_counted:
+        yield f"{tally.not_counted:,} not evaluated: too many different points to count them for a report"
+
+
+def _single_values(dataset: xr.Dataset) -> Iterator[tuple[str, str, str]]:
+    """Name, value and meaning of what has a single value."""
+    for name, coordinate in dataset.coords.items():
+        if coordinate.ndim == 0 and is_input(str(name)):
+            value = (exponents_of(dataset) if name == "n" else None) or quantity(coordinate)
+            yield str(name), value, str(coordinate.attrs.get("long_name", ""))
+    units = {key: rule.unit.removesuffix("1") for key, rule in MATERIAL.items()}
+    for name, material in read_attribute(dataset.attrs, "materials").items():
+        values = (f"{key} = {label(value)} {units.get(key, '')}".strip() for key, value in material.items()
+                  if value is not None)  # fmt: skip
+        yield name, ", ".join(values), "material"
+
+
+def _about(coordinate: xr.DataArray) -> tuple[str, str]:
+    """Meaning and unit of a coordinate."""
+    return str(coordinate.attrs.get("long_name", "")), unit_of(coordinate) or "–"
+
+
+def _range(coordinate: xr.DataArray) -> tuple[str, str, str, str]:
+    """From, to, how many, and how the values are spaced."""
+    ends, large = ("–", "–"), is_large(coordinate.variable)
+    if large:
+        extremes = extremes_of(coordinate.to_dataset(name="values"), "values")
+        ends = (label(extremes.smallest), label(extremes.largest)) if extremes else ends
+    elif coordinate.dtype.kind == "f":
+        smallest, largest = (end.reduce(coordinate.values, axis=None) for end in (np.fmin, np.fmax))
+        ends = label(float(smallest)), label(float(largest))
+    spacing = str(coordinate.attrs.get("equation", "")) or ("–" if large else _spacing(coordinate.values.ravel()))
+    if coordinate.name not in coordinate.dims:
+        spacing = f"varies with {' and '.join(map(str, coordinate.dims))}: {spacing}"
+    return *ends, f"{coordinate.size:,}", spacing
+
+
+def _spacing(values: NDArray[Any]) -> str:
+    """How values are spaced, or which they are.
+
+    >>> _spacing(np.array([0.0, 0.5, 1.0])), _spacing(np.array([1.0, 10.0, 100.0])), _spacing(np.array([2.0, 1.0]))
+    ('even, by 0.5', 'geometric, by 10', '2, 1')
+    """
+    if values.dtype.kind == "f" and values.size > 2 and np.isfinite(values).all():
+        step = (values[-1] - values[0]) / (values.size - 1)
+        if np.allclose(np.diff(values), step, rtol=1e-6, atol=0.0):
+            return f"even, by {step:.6g}"
+        if (values > 0.0).all():
+            ratio = np.log(values[-1] / values[0]) / (values.size - 1)
+            if np.allclose(np.diff(np.log(values)), ratio, rtol=1e-6, atol=0.0):
+                return f"geometric, by {np.exp(ratio):.6g}"
+    return ", ".join(map(label, values[:MAX_VALUES].tolist())) + (", …" if values.size > MAX_VALUES else "")
+
+
+def _answer(dataset: xr.Dataset) -> tuple[Ranking | None, str]:
+    """The models, the best first, if they can be ranked, and the answer in a sentence."""
+    try:
+        ranked = ranking(dataset, max_points=MAX_SUMMARY_POINTS)
+    except UsageError as error:
+        return None, f"The models are not ranked: {error}."
+    return ranked, re.sub("^no ", "No ", f"{ranked.headline}.")
+
+
+def _failures(dataset: xr.Dataset, tally: Tally) -> dict[str, Any]:
+    """What is to be said of failed points, the first of them, and how many more there are."""
+    if "status" not in dataset:
+        return {"sentences": ["The result does not tell which points failed."], "points": [], "more": ""}
+    sentences = [f"The status of {tally.not_counted:,} points was not evaluated."] if tally.not_counted else []
+    if not tally.failed:
+        sentences.append("No other point failed." if tally.not_counted else "No point failed.")
+    axes = [dim for dim in dataset["status"].dims if dim != "model"]
+    points = []
+    for status, model, places in tally.failed_at:
+        point = dataset.isel({"model": model, **dict(zip(axes, places, strict=True))})
+        key = str(point["model"].item())
+        inputs = [name for name in varying(dataset) if owner_of(name) in ("", key)]
+        points.append((key, at_text(point, inputs) or "–", status.meaning))
+    more = tally.failed - len(points)
+    return {"sentences": sentences, "points": points, "more": f"{more:,}" if more > 0 else ""}
+
+
+def _facts(dataset: xr.Dataset) -> list[tuple[str, str]]:
+    """By which program and settings a result was made, and what tells it from others."""
+    attributes, settings = dataset.attrs, ("rtol", "max_steps")
+    packages = read_attribute(attributes, "packages")
+    facts = {
+        "program": f"impact {attributes.get('impact_version', '')}",
+        "packages": ", ".join(f"{name} {version}" for name, version in packages.items()),
+        "solver": ", ".join(f"{name} {attributes[name]:g}" for name in settings if name in attributes),
+        "core": attributes.get("core", ""),
+        "fingerprint": attributes.get("fingerprint", ""),
+        "seal": dataset.encoding.get("seal") or "",
+        "reason": attributes.get("reason", ""),
+        **{f"plug-in {key}": ", ".join(f"{name} {text}" for name, text in plugin if text is not None)
+           for key, plugin in read_attribute(dataset.attrs, "plugins").items()},
+    }  # fmt: skip
+    return [(name, str(fact)) for name, fact in facts.items() if fact]
+
+
+def _model(of_model: xr.Dataset) -> dict[str, Any]:
+    """Where a model comes from, and what the catalogue knows of it."""
+    key, title, year, equation, reference, doi = (
+        str(of_model[name].item()) for name in ("model", "title", "year", "equation", "reference", "doi")
+    )
+    known = catalogue().get(key)
+    # a plug-in, or another version of the program, may mean another law by this name
+    known = known if known is not None and known.equation == equation else None
+    evidence = []
+    if known:
+        about = known.evidence
+        source = [about.source, f"DOI seen in {about.doi}" if about.doi else "", about.note]
+        evidence.append((key, about.state, "; ".join(filter(None, source)) or "–"))
+    is_doi = re.fullmatch(r"10\.[0-9]{4,}/\S+", doi)
+    return {
+        "key": key, "title": with_year(title, year), "equation": equation, "reference": reference, "doi": doi,
+        "link": f"https://doi.org/{quote(doi, safe='/', errors='replace')}" if is_doi else "",
+        "domain": known.domain_text if known else "", "evidence": evidence,
+    }  # fmt: skip
+
+
+def _s(number: int) -> str:
+    return "" if number == 1 else "s"

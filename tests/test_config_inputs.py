@@ -1,0 +1,237 @@
+"""Material properties as axes, masses from radii, tables of cases, the library of materials; what each refuses."""
+# ruff: noqa: E501 (messages are kept whole, so that they can be searched for)
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+import impact
+from impact.config.load import Config, parse_config, read_config
+from impact.contact.materials import Material
+from impact.errors import ConfigError
+
+TEXT = """\
+models = ["hertz", "kelvin-voigt"]
+[sweep]
+v1 = 1.0
+m1 = 1.0
+m2 = 2.0
+material = "block"
+[model.kelvin-voigt]
+C = 5.0
+[materials.block]
+E = 210e9
+nu = 0.3
+rho = 7850
+[materials.other]
+E = [1e9, 2e9]
+nu = 0.3
+"""
+CASES = TEXT.replace("v1 = 1.0\nm1 = 1.0\n", 'e = [0.5, 0.9]\ncases = "cases.csv"\n').replace("C = 5.0\n", "")
+CSV = """\
+v1 [mm/s],"m1 [g]",model.kelvin-voigt.C [N s/m],materials.block.yield_strength [GPa]
+1000,100,5,1
+
+2000,1e2,6.5,1
+"""
+
+
+def read(text: str, *overrides: str) -> Config:
+    return parse_config(text, overrides, name="x.toml")
+
+
+def problems(text: str, *overrides: str) -> list[str]:
+    with pytest.raises(ConfigError) as caught:
+        read(text, *overrides)
+    return list(caught.value.problems)
+
+
+def cases(folder: Path, csv: str | bytes = CSV, *overrides: str, text: str = CASES) -> Config:
+    (folder / "x.toml").write_text(text)
+    (folder / "cases.csv").write_bytes(csv if isinstance(csv, bytes) else csv.encode())
+    return read_config(folder / "x.toml", overrides)
+
+
+def refused(folder: Path, csv: str | bytes, *overrides: str, text: str = CASES) -> list[str]:
+    with pytest.raises(ConfigError) as caught:
+        cases(folder, csv, *overrides, text=text)
+    return [line.replace(f"{folder}/", "") for line in caught.value.problems]
+
+
+def test_a_property_of_a_material_is_an_axis_between_those_of_the_sweep_and_of_models() -> None:
+    config = read(
+        TEXT,
+        "model.kelvin-voigt.C=[1, 2]",
+        'materials.block.E.linspace=["70 GPa","210 GPa",3]',
+        "materials.block.yield_strength=[1e8, 2e8]",
+        "sweep.e=[0.5, 1]",
+    )
+    assert [axis.name for axis in config.axes] == [
+        "e", "materials.block.E", "materials.block.yield_strength", "kelvin-voigt.C",
+    ]  # fmt: skip
+    assert config.axes[1].columns == {"materials.block.E": (70e9, 140e9, 210e9)}
+    assert math.isnan(config.materials["block"].E)
+    assert (config.materials["block"].yield_strength, config.materials["block"].rho) == (None, 7850.0)
+    # what no ball is made of makes no axis
+    assert "other" in config.materials
+    assert read(TEXT).axes == ()
+
+
+def test_a_mass_follows_from_a_radius_and_a_density() -> None:
+    without = TEXT.replace("m1 = 1.0\n", "")
+    assert "m1" not in read(without, "sweep.R1=0.1").scalars
+    needs = "x.toml:2: sweep.m1: missing, expected a number > 0 kg, or inf: mass of ball 1; or "
+    assert problems(without) == [f"{needs}R1 and a material with rho"]
+    assert problems(
+        without.replace('material = "block"\n', ""), "sweep.R1=0.1", "sweep.K=1e9", "models=hertz"
+    ) == [f"{needs}a material with rho beside R1"]
+    assert problems(without.replace("rho = 7850\n", ""), "sweep.R1=0.1", "sweep.R2=0.1") == [
+        "x.toml:8: materials.block.rho: missing, expected a number > 0 kg/m^3, or m1 under [sweep]: "
+        "the mass of ball 1 is not given"
+    ]
+    # all three are taken as they are
+    assert read(TEXT, "sweep.R1=0.1").scalars["m1"] == 1.0
+
+
+def test_parameters_and_properties_are_zipped_by_their_paths() -> None:
+    lists = ("sweep.m1=[1, 2]", "model.kelvin-voigt.C=[3, 4]", "materials.block.E=[5e9, 6e9]")
+    for parameter in ("model.kelvin-voigt.C", "kelvin-voigt.C"):
+        (axis,) = read(TEXT, *lists, f'sweep.zip=[["m1", "{parameter}", "materials.block.E"]]').axes
+        assert axis.columns == {"m1": (1, 2), "kelvin-voigt.C": (3, 4), "materials.block.E": (5e9, 6e9)}
+    assert problems(TEXT, *lists, 'sweep.zip=[["m1", "kelvin-voigt.D"]]') == [
+        '--set sweep.zip=[["m1", "kelvin-voigt.D"]]: sweep.zip[0][1]: got "kelvin-voigt.D", expected an axis; '
+        'did you mean "kelvin-voigt.C"?'
+    ]
+
+
+def test_a_table_of_cases_is_one_axis_and_crosses_the_others(tmp_path: Path) -> None:
+    config = cases(tmp_path)
+    assert [axis.name for axis in config.axes] == ["e", "case"]
+    assert config.axes[1].columns == {
+        "v1": (1.0, 2.0),
+        "m1": (0.1, 0.1),
+        "materials.block.yield_strength": (1e9, 1e9),
+        "kelvin-voigt.C": (5.0, 6.5),
+    }
+    assert config.axes[1].labels == (0, 1)
+    assert read(TEXT, "sweep.cases={v2 = [-1, -1]}").axes[0].columns == {"v2": (-1.0, -1.0)}
+
+
+def test_what_is_stored_needs_no_file(tmp_path: Path) -> None:
+    column = 'sweep.m2={file="cases.csv", column="m1"}'
+    config = cases(tmp_path, CSV.replace("1e2", "200"), column, "sweep.zip=[]")
+    assert config.text == CASES
+    (tmp_path / "cases.csv").unlink()
+    again = parse_config(config.text, config.overrides)
+    assert repr(again) == repr(config)
+    assert again.axes[-1].columns == {"m2": (0.1, 0.2)} or again.axes[1].columns == {"m2": (0.1, 0.2)}
+    # a text from anywhere opens no file
+    assert problems(CASES) == ["cases.csv: not read; a stored config has the values, not the file"]
+
+
+def test_a_mapping_names_files_of_the_working_directory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("drops.csv").write_text("v1 [mm/s], m1\n1,1\n2,2\n")
+    column = {"file": "drops.csv"}
+    sweep = {
+        "v1": {**column, "column": "v1"}, "m1": {**column, "column": "m1"}, "m2": 1, "K": 1e9,
+        "zip": [["v1", "m1"]],
+    }  # fmt: skip
+    (axis,) = read_config({"models": "hertz", "sweep": sweep}).axes
+    assert axis.columns == {"v1": (0.001, 0.002), "m1": (1.0, 2.0)}
+
+
+C = ",kelvin-voigt.C\n"
+BAD_CSV = [
+    ("v1 [kg],m1" + C + "1,1,1\n", ['cases.csv:1: v1: got [kg], expected a unit of m/s, such as "1 m/s"']),
+    ("v1 [furlog],m1" + C + "1,1,1\n",
+     ['cases.csv:1: v1: got [furlog], expected a unit of m/s, such as "1 m/s"; "furlog" is not a known unit']),
+    ("v1,m11" + C + "1,1,1\n", ['cases.csv:1: m11: no such input; did you mean "m1"?']),
+    ("v1,kelvin-voigt.D\n1,1\n", ['cases.csv:1: kelvin-voigt.D: no such input; did you mean "kelvin-voigt.K"?']),
+    ("v1,hetrz.D\n1,1\n", ['cases.csv:1: hetrz.D: no such input; did you mean "hertz"?']),
+    ("v1,materials.block.Y\n1,1\n",
+     ['cases.csv:1: materials.block.Y: no such input; did you mean "materials.block.E"?']),
+    ("v1,v1" + C + "1,1,1\n", ['cases.csv:1: got "v1" twice, expected each column once']),
+    ("v1,m1" + C + "1,,1\nfast,-1,nan\n",
+     ["cases.csv:3: v1: got \"fast\", expected a finite number of m/s, bare or with a unit, such as \"1 m/s\"",
+      "cases.csv:2: m1: got nothing, expected a number > 0 kg, or inf",
+      "cases.csv:3: m1: got -1.0, expected a number > 0 kg, or inf",
+      "cases.csv:3: kelvin-voigt.C: got nan, expected a number >= 0 N s/m"]),
+    ("v1,m1" + C + "1,1\n1,1,1,1\n",
+     ["cases.csv:2: got 2 values, expected 3, one for each column",
+      "cases.csv:3: got 4 values, expected 3, one for each column"]),
+    ("v1,m1" + C, ["cases.csv: got 1 lines, expected a line of names and at least one of values"]),
+    ('v1,m1\n"1,2\n', ["cases.csv:2: not CSV: unexpected end of data"]),
+    (b"v1\n\xff\n", ["cases.csv:2: not UTF-8: byte 0xff"]),
+    ("#" * 2_000_001, ["cases.csv: larger than 2,000,000 bytes, which no config needs"]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("csv", "lines"), BAD_CSV, ids=range(len(BAD_CSV)))
+def test_a_bad_table_of_cases_is_told_by_line_and_column(
+    tmp_path: Path, csv: str | bytes, lines: list[str]
+) -> None:
+    assert refused(tmp_path, csv) == lines
+
+
+@pytest.mark.parametrize(
+    ("override", "line"),
+    [
+        ('sweep.cases="none.csv"', "none.csv: cannot be read: No such file or directory"),
+        ('sweep.cases="."', ": not a regular file, expected a CSV file"),
+        ("sweep.v1=1", "x.toml:4: sweep.cases.v1: given beside sweep.v1, expected one of the two"),
+        ('sweep.e={file="cases.csv", column="model.kelvin-voigt.c"}',
+         'cases.csv:1: got "model.kelvin-voigt.c", expected one of its columns; did you mean "model.kelvin-voigt.C"?'),
+        ('sweep.e={file="cases.csv"}',
+         '--set sweep.e={file="cases.csv"}: sweep.e.column: missing, expected a name in its first line'),
+        ('sweep.e={file="cases.csv", column="m1", unit="g"}',
+         '--set sweep.e={file="cases.csv", column="m1", unit="g"}: sweep.e.unit: unknown key; known: column, file'),
+        ('sweep.zip=[["e", "v1"]]',
+         '--set sweep.zip=[["e", "v1"]]: sweep.zip[0][1]: got "v1", a column of cases, which vary together already'),
+        ("sweep.cases=3",
+         "--set sweep.cases=3: sweep.cases: got 3, expected the name of a CSV file, or a table of lists by config name, "
+         "such as { v1 = [1.0, 2.0] }"),
+        ("sweep.cases={v1 = 3}",
+         "--set sweep.cases={v1 = 3}: sweep.cases.v1: got 3, expected a list of values"),
+    ],
+)  # fmt: skip
+def test_a_file_that_gives_no_values_is_one_line(tmp_path: Path, override: str, line: str) -> None:
+    (problem,) = refused(tmp_path, CSV, override)
+    assert problem.removeprefix(str(tmp_path)) == line
+
+
+def test_values_of_cases_are_checked_where_they_stand() -> None:
+    assert problems(TEXT.replace("v1 = 1.0\n", "cases = { v1 = [\n1,\ntrue], v2 = [1] }\n")) == [
+        "x.toml:5: sweep.cases.v2: got 1 values, expected 2, as in the first column",
+        "x.toml:5: sweep.cases.v1[1]: got true, expected a finite number of m/s",
+    ]
+
+
+def test_common_materials_need_no_table() -> None:
+    text = TEXT.replace("block", "steel")
+    own = read(text)
+    assert own.materials["steel"] == Material(210e9, 0.3, 7850.0)
+    assert own.overrides == ()
+    text = text[: text.index("[materials")]
+    config = read(text, 'sweep.material=["steel", "glass"]')
+    steel = impact.materials()["steel"]
+    assert config.materials["steel"] == Material(steel["E"], steel["nu"], steel["rho"], steel["yield_strength"])  # type: ignore[arg-type]
+    assert set(config.materials) == {"steel", "glass"}
+    # what is stored does not depend on the library
+    assert config.overrides[0].startswith("materials.steel={E = 210000000000.0, nu = 0.3")
+    assert parse_config(config.text, config.overrides) == config
+    changed = read(text, "materials.steel.E=[1e9, 2e9]")
+    assert changed.axes[0].name == "materials.steel.E"
+    assert changed.materials["steel"].rho == steel["rho"]
+    assert repr(parse_config(changed.text, changed.overrides)) == repr(changed)
+    (line,) = problems(text, "sweep.material=stel")
+    assert line.endswith('got "stel", expected a material of [materials]; did you mean "steel"?')
+
+
+def test_every_common_material_has_a_source_and_can_be_used() -> None:
+    for name, record in impact.materials().items():
+        assert record["source"]
+        assert read_config({"models": "hertz", "sweep": {"v1": 1, "R1": 1, "m2": 1, "material": name}}).models

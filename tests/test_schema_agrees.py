@@ -1,0 +1,170 @@
+"""The JSON Schema accepts what the reader accepts, and refuses what it refuses, key by key.
+
+What a schema cannot say: rules between keys, names of materials, units in strings and the values with them, and
+how many values a range has.
+"""
+# ruff: noqa: E501 (what a message says is kept on one line)
+
+from __future__ import annotations
+
+import copy
+import re
+from typing import Any
+
+import jsonschema
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from impact.config.load import json_schema, parse_config, read_config
+from impact.errors import ConfigError
+
+SCHEMA: dict[str, Any] = json_schema()
+VALIDATOR = jsonschema.Draft202012Validator(SCHEMA)
+GOOD: dict[str, Any] = {
+    "models": ["lankarani-nikravesh-1990"],
+    "sweep": {"e": 0.5, "v1": 1.0, "m1": 1.0, "m2": 2.0, "R1": 0.1, "R2": 0.1, "material": "block"},
+    "materials": {"block": {"E": 210e9, "nu": 0.3, "rho": 7850.0}},
+}
+TABLES = {"sweep": "Sweep", "materials.block": "MaterialTable", "solver": "Solver", "output": "Output"}
+KEYS = [
+    "sweep.e", "sweep.v1", "sweep.m1", "sweep.R1", "sweep.n", "sweep.material", "sweep.zip", "sweep.cases",
+    "materials.block.nu", "materials.block.rho", "solver.rtol", "solver.max_steps", "solver.collapse", "output.dtype",
+    "output.variables", "output.chunks", "model.kelvin-voigt.C", "title", "models",
+]  # fmt: skip
+# messages about what a schema cannot say
+BEYOND = re.compile(
+    r"sweep\.cases\.|a unit of|a bare number|got \"\s*[-+.0-9]+[^\"]*[^\"0-9.]|\\x|a material of|on an axis|twice|overflow|two ends|a step other"
+    r"|got no value|got a value|an axis|a scalar|no axis|chunks of|no such input|one length|given beside|missing"
+    r"|as in the first|not read|cannot be read|not a regular|some model matches|models to leave out|left out again|NUL|64 characters"
+)
+NUMBERS = st.integers(-3, 12) | st.floats(-2.0, 11.0) | st.floats(allow_nan=False, allow_infinity=False)
+ATOMS = (
+    NUMBERS | st.booleans() | st.sampled_from(["steel", "1 m/s", "0.5", "1e5", "1 %", "all", "!hertz", "h*", ""])
+)
+LISTS = st.lists(ATOMS, max_size=4)
+ANYTHING = st.one_of(
+    ATOMS,
+    LISTS,
+    st.dictionaries(st.sampled_from(["linspace", "geomspace", "arange", "file", "v2"]), ATOMS | LISTS, max_size=2),
+    st.tuples(NUMBERS, NUMBERS, NUMBERS).map(lambda ends: {"linspace": list(ends)}),
+)
+
+
+def values(schema: dict[str, Any], definitions: dict[str, Any]) -> st.SearchStrategy[Any]:
+    """Values that a schema of the kinds used here accepts."""
+    if "$ref" in schema:
+        return values(definitions[schema["$ref"].rpartition("/")[2]], definitions)
+    choices = schema.get("anyOf") or schema.get("oneOf")
+    if choices:
+        return st.one_of([values(choice, definitions) for choice in choices])
+    if "enum" in schema:
+        return st.sampled_from(schema["enum"])
+    match schema["type"]:
+        case "number":
+            above = schema.get("exclusiveMinimum")
+            low, high = schema.get("minimum", above), schema.get("maximum")
+            return st.floats(low, high, allow_nan=False, allow_infinity=False, exclude_min=above is not None)
+        case "integer":
+            return st.integers(schema.get("minimum"), schema.get("maximum"))
+        case "boolean":
+            return st.booleans()
+        case "string":
+            return st.from_regex(schema["pattern"]) if "pattern" in schema else st.text(max_size=9)
+        case "array" if "prefixItems" in schema:
+            return st.tuples(*(values(item, definitions) for item in schema["prefixItems"])).map(list)
+        case "array":
+            return st.lists(values(schema["items"], definitions), min_size=schema.get("minItems", 0), max_size=4)
+    if "properties" not in schema:
+        rest = values(schema["additionalProperties"], definitions)
+        return st.dictionaries(
+            st.sampled_from(["e", "v2"]), rest, min_size=schema.get("minProperties", 0), max_size=2
+        )
+    entries = {name: values(entry, definitions) for name, entry in schema["properties"].items()}
+    if schema.get("maxProperties") == 1:
+        return st.one_of([st.fixed_dictionaries({name: entry}) for name, entry in entries.items()])
+    return st.fixed_dictionaries(entries)
+
+
+def part(key: str) -> dict[str, Any]:
+    """The schema of a key, with the definitions that it refers to."""
+    table, _, name = key.rpartition(".")
+    definition = SCHEMA["$defs"][TABLES.get(table, table.removeprefix("model."))] if table else SCHEMA
+    schema = definition["properties"][name]
+    used = {one: SCHEMA["$defs"][one] for one in re.findall(r"#/\$defs/([^']*)'", str(schema))}
+    return {**schema, "$defs": used}
+
+
+def with_value(key: str, value: object) -> dict[str, Any]:
+    data = copy.deepcopy(GOOD)
+    table = data
+    *tables, name = key.split(".")
+    for step in tables:
+        table = table.setdefault(step, {})
+    table[name] = value
+    return data
+
+
+def faults_at(key: str, data: dict[str, Any]) -> list[str]:
+    """What is wrong with a key."""
+    try:
+        read_config(data)
+    except ConfigError as error:
+        lines = [line.removeprefix("config: ") for line in error.problems]
+        # a file that is not there is told by its own name
+        return [line for line in lines if line.startswith(key) or "cannot be read" in line or "regular" in line]
+    return []
+
+
+@pytest.mark.parametrize("key", KEYS)
+def test_reader_and_schema_agree_on_a_key(key: str, tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+    schema = part(key)
+    validator = jsonschema.Draft202012Validator(schema)
+
+    @settings(max_examples=20, deadline=None, suppress_health_check=list(HealthCheck))
+    @given(values(schema, SCHEMA["$defs"]) | ANYTHING)
+    def check(value: object) -> None:
+        data = with_value(key, value)
+        faults = faults_at(key, data)
+        if not validator.is_valid(value):
+            assert faults, "the schema refuses what the reader accepts"
+        else:
+            beyond = [line for line in faults if not BEYOND.search(line)]
+            assert not beyond, "the reader refuses what the schema accepts"
+
+    check()
+
+
+@pytest.mark.parametrize(
+    "table", ["", "sweep", "materials.block", "solver", "output", "model", "model.kelvin-voigt"]
+)
+def test_an_unknown_key_is_refused_by_both(table: str) -> None:
+    key = f"{table}.x9" if table else "x9"
+    data = with_value(key, 1)
+    assert not VALIDATOR.is_valid(data)
+    assert any("x9: unknown key" in line for line in faults_at(key, data))
+
+
+def test_schema_requires_what_the_reader_requires() -> None:
+    for key in ("models", "sweep", "sweep.v1", "sweep.m1", "materials.block.E", "materials.block.nu"):
+        data = copy.deepcopy(GOOD)
+        data["sweep"].pop("R1")
+        table: Any = data
+        *tables, name = key.split(".")
+        for step in tables:
+            table = table[step]
+        del table[name]
+        assert not VALIDATOR.is_valid(data), key
+        with pytest.raises(ConfigError, match=f"{key}: missing|models: got nothing"):
+            read_config(data)
+
+
+def test_a_stored_table_of_cases_is_in_the_schema() -> None:
+    data = copy.deepcopy(GOOD)
+    data["sweep"] |= {"cases": {"v1": [1.0, 2.0], "m1": ["1 g", "2 g"]}}
+    del data["sweep"]["v1"], data["sweep"]["m1"]
+    assert VALIDATOR.is_valid(data)
+    config = read_config(data)
+    assert parse_config(config.text, config.overrides) == config
