@@ -3,15 +3,36 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 from functools import partial
+from importlib import import_module
 from typing import Annotated, Any
 
 import typer
 from typer.core import TyperCommand, TyperGroup, TyperOption
 
 from .. import __version__
-from . import compare, config, exits, extend, info, materials, models, plot, recommend, report, run, sweep
+from . import exits
+
+# in the order of the help: the module of the function of the same name, a summary, and an example
+COMMANDS: dict[str, tuple[str, str, str]] = {
+    "sweep": ("sweep", "Run every model over a sweep.", "configs/figure6.toml -o results.h5 --set sweep.m2=2.0"),
+    "merge": ("sweep", "Join the shards of a sweep.", "results.h5.*-of-16.work -o results.h5"),
+    "expand": ("extend", "Write all values of a result, or of a part.", "results.h5 -o full.h5 --sel m2=1.0"),
+    "extend": ("extend", "Add values to the axes of a result.", "results.h5 --set 'sweep.m2=[1.0, 2.0]'"),
+    "plot": ("plot", "Draw a result.", "results.h5 -k restitution -k loop --sel m2=1.0 -o results.svg"),
+    "recommend": ("recommend", "Rank models by the rebound they give.", "results.h5 --tol 2% --sel m2=1.0"),
+    "report": ("report", "Write a report, one page of HTML.", "results.h5 -o report.html"),
+    "run": ("run", "Run one impact.", "--model gharib-hurmuzlu-2012 --at e=0.05 --at m2=2.0 --history out.h5"),
+    "compare": ("compare", "Compare a result with a baseline.", "results.h5 baseline.h5 --plot differences.png"),
+    "bless": ("compare", "Replace a baseline by a result.", 'results.h5 baseline.h5 --reason "finer tolerance"'),
+    "rerun": ("compare", "Repeat the sweep of a result, and compare.", "baseline.h5"),
+    "models": ("models", "Show the catalogue of models.", "gharib-hurmuzlu-2012"),
+    "materials": ("materials", "Show common materials.", "steel"),
+    "info": ("info", "Show what is in a file.", "results.h5"),
+    "init": ("config", "Write a starter config.", "my_sweep.toml"),
+    "schema": ("config", "Print the JSON Schema of a config.", "-o impact.schema.json"),
+    "help": ("main", "Show the help of a command.", "sweep"),
+}
 
 
 class Command(TyperCommand):
@@ -22,10 +43,27 @@ class Command(TyperCommand):
 
 
 class Group(TyperGroup):
-    """The program itself, with the same flags."""
+    """The program itself, which loads the module of a command when the command is used."""
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**settings)
+        self.commands = {name: TyperCommand(name, help=summary) for name, (_, summary, _) in COMMANDS.items()}
 
     def get_params(self, ctx: Any) -> list[Any]:
         return _without_flag_types(super().get_params(ctx))
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        name, command, rest = super().resolve_command(ctx, args)
+        return name, command and load_command(str(name)), rest
+
+
+def load_command(name: str) -> Any:
+    """A command with its parameters."""
+    module, _, example = COMMANDS[name]
+    function = show_help if name == "help" else getattr(import_module(f"{__package__}.{module}"), name)
+    program = typer.Typer(add_completion=False, rich_markup_mode="rich")
+    program.command(name, cls=Command, epilog=f"Example: impact {name} {example}")(function)
+    return typer.main.get_command(program)
 
 
 def _without_flag_types(params: list[Any]) -> list[Any]:
@@ -82,31 +120,6 @@ def show_help(
     name, chosen, _ = group.resolve_command(program, [command])
     assert chosen is not None
     chosen.make_context(name, ["--help"], parent=program)
-
-
-# in the order of the help; each with an example
-COMMANDS: tuple[tuple[Callable[..., None], str], ...] = (
-    (sweep.sweep, "impact sweep configs/figure6.toml -o results.h5 --set sweep.m2=2.0"),
-    (sweep.merge, "impact merge results.h5.*-of-16.work -o results.h5"),
-    (extend.expand, "impact expand results.h5 -o full.h5 --sel m2=1.0"),
-    (extend.extend, "impact extend results.h5 --set 'sweep.m2=[1.0, 2.0]'"),
-    (plot.plot, "impact plot results.h5 -k restitution -k loop --sel m2=1.0 -o results.svg"),
-    (recommend.recommend, "impact recommend results.h5 --tol 2% --sel m2=1.0"),
-    (report.report, "impact report results.h5 -o report.html"),
-    (run.run, "impact run --model gharib-hurmuzlu-2012 --at e=0.05 --at m2=2.0 --history out.h5"),
-    (compare.compare, "impact compare results.h5 baseline.h5 --plot differences.png"),
-    (compare.bless, 'impact bless results.h5 baseline.h5 --reason "finer tolerance"'),
-    (compare.rerun, "impact rerun baseline.h5"),
-    (models.models, "impact models gharib-hurmuzlu-2012"),
-    (materials.materials, "impact materials steel"),
-    (info.info, "impact info results.h5"),
-    (config.init, "impact init my_sweep.toml"),
-    (config.schema, "impact schema -o impact.schema.json"),
-    (show_help, "impact help sweep"),
-)
-for function, example in COMMANDS:
-    name = "help" if function is show_help else function.__name__
-    app.command(name, cls=Command, epilog=f"Example: {example}")(function)
 
 
 def main() -> None:
