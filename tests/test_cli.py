@@ -651,7 +651,9 @@ def test_the_catalogue_keeps_the_restitution_on_a_narrow_terminal(width: int, co
     driver, terminal = pty.openpty()
     fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 50, width, 0, 0))
     words = [sys.executable, "-m", "impact", "models"]
-    with subprocess.Popen(words, stdout=terminal, env=os.environ | {"NO_COLOR": "1"}) as child:
+    # the width of the terminal counts only where no variable has another
+    environment = {name: value for name, value in os.environ.items() if name not in ("COLUMNS", "LINES", "TERM")}
+    with subprocess.Popen(words, stdout=terminal, env=environment | {"NO_COLOR": "1"}) as child:
         os.close(terminal)
         printed = b""
         while True:

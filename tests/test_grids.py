@@ -16,6 +16,7 @@ from matplotlib.patches import PathPatch
 
 import impact
 from impact.errors import UsageError
+from impact.formatting import percentage
 from impact.plots.kinds import draw
 from impact.plots.maps import CONTOURS, NO_VALUE, Grids, edges_of, field_map, validity
 from impact.plots.style import save_figure
@@ -135,8 +136,8 @@ def test_the_closest_model_is_the_one_with_the_smallest_error(bent: xr.Dataset) 
                 assert here[key] == numbers.distance[j][i] == min(here.values())
     assert seen >= {None, "flores-2011", "gharib-hurmuzlu-2012"}
     keys = [key for row in numbers.closest for key in row]
-    assert numbers.shares == {key: 100.0 * keys.count(key) / 63 for key in (*MODELS, None) if key in keys}
-    assert sum(numbers.shares.values()) == pytest.approx(100.0)
+    assert numbers.shares == {key: keys.count(key) / 63 for key in (*MODELS, None) if key in keys}
+    assert sum(numbers.shares.values()) == pytest.approx(1.0)
 
 
 def test_a_tie_goes_to_the_first_and_a_model_without_a_number_is_passed_over(many: xr.Dataset) -> None:
@@ -149,7 +150,7 @@ def test_a_tie_goes_to_the_first_and_a_model_without_a_number_is_passed_over(man
     assert set(validity(odd).shares) == {MODELS[1]}
     odd["e_error"][2, 0] = 0.0
     numbers = validity(odd)
-    assert numbers.shares == pytest.approx({MODELS[1]: 100.0 * 5 / 6, MODELS[2]: 100.0 / 6})
+    assert numbers.shares == pytest.approx({MODELS[1]: 5 / 6, MODELS[2]: 1 / 6})
     draw(numbers, 7.1)
 
 
@@ -223,7 +224,7 @@ def test_the_patches_of_the_closest_are_the_numbers(bent: xr.Dataset) -> None:
         np.testing.assert_array_equal(covered(patch, numbers), np.array(numbers.closest, object) == key)
     texts = [text.get_text() for text in figure.legends[0].get_texts()]
     for text, (key, share) in zip(texts, numbers.shares.items(), strict=False):
-        assert text.startswith(f"{share:.1f} %")
+        assert text.startswith(percentage(share))
         assert (NO_VALUE in text) == (key is None)
     (mesh,) = [one for one in right.collections if isinstance(one, QuadMesh)]
     drawn = np.ma.filled(np.ma.asarray(mesh.get_array()), np.nan).reshape(np.shape(numbers.distance))

@@ -63,6 +63,15 @@ def test_a_modulus_that_is_an_axis_is_no_implausible_number(forked: Forked, tmp_
     assert (done.returncode, done.stderr.count("note: ")) == (0, 0)
 
 
+def test_an_implausible_modulus_among_the_values_of_an_axis_is_noted(forked: Forked, tmp_path: Path) -> None:
+    (tmp_path / "config.toml").write_text(SWEEP.replace('E = "210 GPa"', 'E = ["70 GPa", 210]'))
+    done = forked("sweep", "config.toml", cwd=tmp_path)
+    note = MODULUS.format("210 Pa; did you mean 210 GPa?")
+    assert [line[6:] for line in done.stderr.splitlines() if MODULUS[12:30] in line] == [note]
+    page = impact.report(impact.load(tmp_path / "results.h5"))
+    assert "<p>Note: materials.steel.E: got 210 Pa; did you mean 210 GPa?</p>" in page
+
+
 def test_the_configs_of_the_project_give_no_note(forked: Forked, tmp_path: Path) -> None:
     for config in sorted((ROOT / "configs").glob("*.toml")):
         done = forked("sweep", config, "-o", f"{config.stem}.h5", "--allow-failed", cwd=tmp_path)

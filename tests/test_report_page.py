@@ -440,8 +440,12 @@ def test_the_command_writes_the_page(cli: Run, stored: Path, tmp_path: Path) -> 
     size = f"{written.stat().st_size / 1000:,.0f} kB"
     assert done.stderr == f"results.html: 4 figures, {size}\n"
     assert written.read_text(encoding="utf-8") == build(impact.load(stored))
-    # a second time it is replaced
-    assert cli("report", "results.h5", "-o", "results.html", cwd=tmp_path).returncode == 0
+    # a second time it is replaced only where that is asked for
+    written.write_text("a note", encoding="utf-8")
+    again = cli("report", "results.h5", cwd=tmp_path)
+    assert (again.returncode, written.read_text("utf-8")) == (2, "a note")
+    assert again.stderr == "results.html: exists; give another name, or overwrite it (--overwrite)\n"
+    assert cli("report", "results.h5", "--overwrite", cwd=tmp_path).stderr == done.stderr
 
 
 def test_the_command_replaces_nothing_that_is_no_page(cli: Run, stored: Path, tmp_path: Path) -> None:

@@ -22,6 +22,28 @@ def number(value: object, digits: int = 6) -> str:
     return "–" if value != value else f"{value:.{digits}g}"
 
 
+def decimals(value: float, places: int = 4) -> str:
+    """A number with so many decimals, for columns whose numbers are compared; a missing one is a dash.
+
+    >>> decimals(0.5), decimals(float("nan"))
+    ('0.5000', '–')
+    """
+    return "–" if value != value else f"{value:.{places}f}"
+
+
+def percentage(share: float) -> str:
+    """A share from 0 to 1 in percent; it is 0 or 100 only where none or all are meant.
+
+    >>> [percentage(n / 3000) for n in (0, 1, 2000, 2999, 3000)]
+    ['0%', '<0.1%', '66.7%', '>99.9%', '100%']
+    """
+    if share in (0.0, 1.0):
+        return f"{share:.0%}"
+    if share < 0.001:
+        return "<0.1%"
+    return ">99.9%" if share > 0.999 else f"{share:.1%}"
+
+
 def label(value: object) -> str:
     """A value of an axis: all its digits but those that rounding left, without many zeros.
 

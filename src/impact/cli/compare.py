@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from enum import StrEnum
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..errors import ImpactError, UsageError
+from ..formatting import number
 from ..text import safe_text
 from . import exits
 from .console import dump
@@ -181,9 +183,9 @@ def print_verdict(verdict: Verdict) -> None:
         rows = table("variable", "judged", "tolerance", "differ", "worst", "x tolerance")
         rows.columns[1].justify = "left"
         for one in moved:
-            tolerance = f"{one.tolerance:.3g}" if one.tolerance == one.tolerance else "–"
-            times = f"{one.times:.3g}" if one.tolerance == one.tolerance else "–"
+            tolerance = number(one.tolerance, 3)
+            times = number(one.times if one.tolerance == one.tolerance else math.nan, 3)
             many = f"{one.different} of {one.points}"
-            rows.add_row(cell(one.name), cell(one.judged), tolerance, many, f"{one.worst:.3g}", times)
+            rows.add_row(cell(one.name), cell(one.judged), tolerance, many, number(one.worst, 3), times)
         out.print()
         out.print(rows)

@@ -109,10 +109,10 @@ def _values_text(dataset: xr.Dataset, name: str) -> str:
     coordinate = dataset[name]
     if is_large(coordinate.variable):
         extremes = extremes_of(dataset, name)
-        ends = f"{extremes.smallest:g} … {extremes.largest:g}, " if extremes else ""
+        ends = f"{number(extremes.smallest)} … {number(extremes.largest)}, " if extremes else ""
         return f"{ends}{coordinate.size} values"
     values = coordinate.values.reshape(-1)
     distinct = list(dict.fromkeys(values.tolist()))
     if values.dtype.kind == "f" and len(distinct) > 4:
-        return f"{values.min():g} … {values.max():g}, {values.size} values"
+        return f"{number(values.min())} … {number(values.max())}, {values.size} values"
     return ", ".join(label(value) for value in distinct)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import UsageError, did_you_mean
+from ..formatting import decimals, number
 from ..text import safe_text, with_year
 from . import exits
 from .console import cell, console, dump, print_rows, table
@@ -112,7 +113,7 @@ def _delivered(model: ForceModel) -> dict[str, float]:
     from ..contact.scaling import delivered
 
     found = delivered(model, np.array(ASKED))
-    return {} if found is None else {f"{e:g}": out for e, out in zip(ASKED, found.tolist(), strict=True)}
+    return {} if found is None else {number(e): out for e, out in zip(ASKED, found.tolist(), strict=True)}
 
 
 def _print_models(models: Sequence[ForceModel]) -> None:
@@ -124,7 +125,7 @@ def _print_models(models: Sequence[ForceModel]) -> None:
     out = console(sys.stdout)
     room = out.width - max(len(model.key) for model in models)
     asked, others = _columns(max(room, E_WIDTH))
-    rows = table("model", *(f"e={e:g}" for e in asked), *others)
+    rows = table("model", *(f"e={number(e)}" for e in asked), *others)
     # on the narrowest terminal the keys are folded, so that one value stays
     rows.columns[0].no_wrap = room >= E_WIDTH
     for column in rows.columns[1 + len(asked) :]:
@@ -168,7 +169,7 @@ def _cells(model: ForceModel, asked: Sequence[float], others: Sequence[str]) -> 
 
     delivered = _delivered(model)
     for e in asked:
-        yield f"{delivered[f'{e:g}']:.4f}" if delivered else "–"
+        yield decimals(delivered[number(e)]) if delivered else "–"
     parameters = ", ".join(parameter.name for parameter in model.parameters)
     texts = {
         "equation": model.equation + (f"  [{parameters}]" if parameters else ""),
@@ -187,7 +188,7 @@ def _print_model(model: ForceModel) -> None:
         "model": model.key, "same law as": model.same_as, "title": with_year(model.title, model.year),
         "family": model.family, "equation": model.equation, "reference": model.reference, "doi": model.doi,
         "evidence": str(model.evidence), "said to hold for": model.domain_text or "not stated",
-        "exponent": "the sweep's n" if model.exponent is None else f"n = {model.exponent:g}, its own",
+        "exponent": "the sweep's n" if model.exponent is None else f"n = {number(model.exponent)}, its own",
         "ends at": _release(model), "integrated by": _cores(model),
     }  # fmt: skip
     for place, parameter in enumerate(model.parameters):
@@ -195,14 +196,14 @@ def _print_model(model: ForceModel) -> None:
         rows[" " * place if place else f"[model.{model.key}]"] = _parameter(parameter)
     found = _delivered(model)
     if found:
-        rows["delivers"] = ", ".join(f"{out:.4f} for e = {e}" for e, out in found.items())
+        rows["delivers"] = ", ".join(f"{decimals(out)} for e = {e}" for e, out in found.items())
     print_rows({name: text for name, text in rows.items() if text})
 
 
 def _parameter(one: Parameter) -> str:
-    default = "required" if one.default is None else f"default {one.default:g}"
+    default = "required" if one.default is None else f"default {number(one.default)}"
     unit = "" if one.unit == "1" else f" [{one.unit}]"
-    return f"{one.name}{unit}: {one.meaning}; from {one.least:g} to {one.most:g}, {default}"
+    return f"{one.name}{unit}: {one.meaning}; from {number(one.least)} to {number(one.most)}, {default}"
 
 
 def _release(model: ForceModel) -> str:
@@ -219,7 +220,7 @@ def _cores(model: ForceModel) -> str:
     phases = [name for name, served in (("approach", approach), ("restitution", restitution)) if served]
     if not phases:
         return "numpy"
-    where = "" if model.exponent is not None else f", where n is {', '.join(f'{n:g}' for n in approach)}"
+    where = "" if model.exponent is not None else f", where n is {', '.join(map(number, approach))}"
     only = f" on {phases[0]}, numpy else" if len(phases) == 1 else ""
     return f"numba{only}{where}"
 
@@ -242,7 +243,7 @@ def _check(models: Sequence[ForceModel], *, as_json: bool) -> None:
             for place, one in enumerate(findings):
                 mark = Text("holds", style="green") if one.holds else Text("broken", style="red")
                 key = cell("" if place else model.key)
-                rows.add_row(key, one.clause, mark, f"{one.worst:.2g}", f"{one.bound:.2g}")
+                rows.add_row(key, one.clause, mark, number(one.worst, 2), number(one.bound, 2))
         console(sys.stdout).print(rows)
         for model, findings in found:
             if not any(one.clause == CLOSED_FORM for one in findings):

@@ -10,7 +10,7 @@ import typer
 from ..errors import UsageError
 from ..text import safe_text
 from . import exits
-from .options import Plugins
+from .options import Overwrite, Plugins
 
 ENDINGS = (".html", ".htm")
 
@@ -20,6 +20,7 @@ def report(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="The page: .html. \\[default: RESULT.html]")
     ] = None,
+    overwrite: Overwrite = False,
     plugin: Plugins = None,
 ) -> None:
     """Write a report: one page of HTML with what was swept, the answer, figures, failed points and the config.
@@ -34,9 +35,9 @@ def report(
     if output.suffix.lower() not in ENDINGS:
         raise UsageError(f"{shown}: wants a name that ends in {ENDINGS[0]}")
     for source in (result, *(plugin or ())):
-        backend.check_output(output, overwrite=True, source=source)
+        backend.check_output(output, overwrite=overwrite, source=source)
     page = api.report(api.load(result), plugins=plugin or ())
     content = page.encode()
-    backend.write_whole(output, content, overwrite=True)
+    backend.write_whole(output, content, overwrite=overwrite)
     figures = page.count("<figure>")
     exits.say(f"{shown}: {figures} figure{'' if figures == 1 else 's'}, {len(content) / 1000:,.0f} kB")

@@ -71,7 +71,8 @@ def sweep(
         executor = ExecutorOptions(jobs, threads, scheduler, scheduler_file)
         plan = api.prepare(config, sets or (), plugins or (), max_points)
         if not quiet:
-            for note in material_notes(plan.material_record):
+            columns = {name: values for axis in plan.config.axes for name, values in axis.columns.items()}
+            for note in material_notes(plan.material_record, columns):
                 exits.say(f"note: {safe_text(str(config))}: {note}")
         if shard is not None:
             if dry_run:
@@ -192,20 +193,20 @@ def _print_estimate(plan: Plan, jobs: int, *, as_json: bool) -> None:
     out.print(rows)
     size = f"{expected.bytes:,} bytes (and {expected.kept:,} while it runs)"
     total = f"{expected.points:,} points from {expected.trajectories:,} trajectories"
-    time = f"about {_duration(expected.seconds)} by {expected.core} and what the disk takes"
+    time = f"{_duration(expected.seconds)} by {expected.core} and what the disk takes"
     out.print(f"{total}, {size}, {time}; nothing was written")
     if len(expected.by_workers) > 1:
         many = ", ".join(f"{_duration(seconds)} by {count:,}" for count, seconds in expected.by_workers.items())
-        out.print(f"on a cluster: {expected.wire:,} bytes over the wire; about {many} workers; more are of no use")
+        out.print(f"on a cluster: {expected.wire:,} bytes over the wire; {many} workers; more are of no use")
 
 
 def _duration(seconds: float) -> str:
     """A time as one reads it.
 
-    >>> _duration(7), _duration(7500)
-    ('0:00:07', '2:05:00')
+    >>> _duration(0.2), _duration(7), _duration(7500)
+    ('under a second', 'about 0:00:07', 'about 2:05:00')
     """
-    return str(timedelta(seconds=round(seconds)))
+    return "under a second" if seconds < 1.0 else f"about {timedelta(seconds=round(seconds))}"
 
 
 def merge(

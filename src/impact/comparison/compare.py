@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from ..errors import UsageError
+from ..formatting import number
 from ..results.attributes import read_attribute
 from ..results.backend import load
 from ..results.replay import repeats
@@ -154,7 +155,7 @@ def _materials(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
             path = f"materials.{name}.{field}"
             # what one of them varies is a coordinate
             if a.get(field) != b.get(field) and not (path in new.coords or path in baseline.coords):
-                shown = [f"{v:.12g}" if isinstance(v, float) else v for v in (a.get(field), b.get(field))]
+                shown = [number(v, 12) for v in (a.get(field), b.get(field))]
                 text = f"{path} is {shown[0]}, in BASELINE {shown[1]}"
                 faults.append(Fault("physics config", path, safe_text(text)))
     return sorted(faults, key=lambda fault: fault.name)

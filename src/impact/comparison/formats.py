@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 from xml.etree import ElementTree
 
+from ..formatting import number
 from ..text import safe_text
 from .verdict import KINDS, Judged, Verdict
 
@@ -117,8 +118,8 @@ def as_markdown(report: Report) -> str:
             "|---|--:|--:|--:|---|--:|--:|",
         ]
         for one in differing:
-            numbers = f"{one.worst:.3g} | {one.times:.3g}"
-            values = f"{one.new:.12g} | {one.baseline:.12g}"
+            numbers = f"{number(one.worst, 3)} | {number(one.times, 3)}"
+            values = f"{number(one.new, 12)} | {number(one.baseline, 12)}"
             lines.append(
                 f"| `{one.name}` | {one.different} of {one.points} | {numbers} | {_plain(one.place)} | {values} |"
             )

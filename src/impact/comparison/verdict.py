@@ -9,6 +9,7 @@ from typing import Literal
 import xarray as xr
 
 from ..contact.status import Status
+from ..formatting import number
 from ..results.replay import described, replay
 from ..text import safe_text
 
@@ -84,15 +85,15 @@ class Judged:
             text = f"{many}, the {which}{at}: {', baseline '.join(words)}"
             return f"{text}, which their statuses do not explain" if both else text
         if self.judged == "reported":
-            return f"{many}, by {self.worst:g} at most{at} (not judged)"
-        times = f"{self.times:.3g} x tolerance" if self.times < float("inf") else "where none is allowed"
-        return f"{many}, worst {self.worst:.2g} = {times}{at}"
+            return f"{many}, by {number(self.worst)} at most{at} (not judged)"
+        times = f"{number(self.times, 3)} x tolerance" if self.times < float("inf") else "where none is allowed"
+        return f"{many}, worst {number(self.worst, 2)} = {times}{at}"
 
 
 def _word(name: str, value: float) -> str:
     if name == "status" and value in set(Status):
         return Status(int(value)).name.lower()
-    return f"{value:.10g}".replace("nan", "NaN")
+    return "NaN" if value != value else number(value, 10)
 
 
 @dataclass(frozen=True)
@@ -155,7 +156,7 @@ class Verdict:
             if closest is None or not closest.times:
                 return f"{count}, none differs"
             at = f" at {closest.place}" if closest.place else ""
-            return f"{count}, largest difference {closest.times:.2g} x tolerance: {closest.name}{at}"
+            return f"{count}, largest difference {number(closest.times, 2)} x tolerance: {closest.name}{at}"
         by_kind: dict[Kind, dict[str, None]] = {}
         for fault in self.faults:
             by_kind.setdefault(fault.kind, {})[safe_text(fault.name, 60)] = None

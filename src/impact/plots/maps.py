@@ -19,7 +19,7 @@ from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from ..errors import UsageError, did_you_mean
-from ..formatting import heading
+from ..formatting import heading, percentage
 from ..results.schema import plain_unit
 from ..text import safe_text
 from .curves import label_of
@@ -90,10 +90,10 @@ class Grids:
 
     @property
     def shares(self) -> dict[str | None, float]:
-        """The part of all cells [%] where each model is closest, in the result's order; None is where none is."""
+        """The part of all cells where each model is closest, in the result's order; None is where none is."""
         count = Counter(key for row in self.closest for key in row)
         keys = (*(panel.model for panel in self.panels), None)
-        return {key: 100.0 * count[key] / count.total() for key in keys if count[key]}
+        return {key: count[key] / count.total() for key in keys if count[key]}
 
     @property
     def names(self) -> set[str]:
@@ -329,8 +329,7 @@ def _draw_closest(
             own = looks[key]
             look = {"facecolor": own["color"], "hatch": own["hatch"], "edgecolor": "white", "linewidth": 0}
         axes[0].add_patch(_cells(x, y, closest == key, look))
-        percent = f"{share:.1f} %" if share >= 0.1 else "< 0.1 %"
-        entries.append((Patch(**look), f"{percent}  {names[key] if key else NO_VALUE}"))
+        entries.append((Patch(**look), f"{percentage(share)}  {names[key] if key else NO_VALUE}"))
     shown = np.ma.maximum(np.ma.masked_invalid(numbers.distance), SMALLEST)
     norm = LogNorm(shown.min(), max(shown.max(), 10.0 * shown.min()))
     mesh, rest = _draw_values(numbers, axes[1:], x, y, shown[None], norm, "viridis")

@@ -20,7 +20,7 @@ from ..config.tables import MATERIAL
 from ..contact.models import catalogue
 from ..engine.plan import owner_of
 from ..errors import UsageError
-from ..formatting import label
+from ..formatting import label, number
 from ..plots.kinds import Choice
 from ..results.attributes import read_attribute
 from ..results.plausibility import material_notes, result_notes
@@ -67,11 +67,12 @@ def page(dataset: xr.Dataset, figures: Callable[[str, Choice], Numbers]) -> str:
         keys = best[:BEST]
     drawn, left_out = figures_of(dataset, keys, figures)
     models = [_model(dataset.isel(model=place)) for place in range(dataset.sizes["model"])]
+    moduli = {str(name): dataset[name].values.tolist() for name in dataset.coords if str(name).endswith(".E")}
     lines = str(dataset.attrs.get("config", "")).replace("\r\n", "\n").expandtabs(4).split("\n")
     return _template().render(
         title=str(dataset.attrs.get("title", "")) or "Impact of two balls",
         summary=_summary(dataset),
-        notes=[*material_notes(read_attribute(dataset.attrs, "materials")), *result_notes(tally)],
+        notes=[*material_notes(read_attribute(dataset.attrs, "materials"), moduli), *result_notes(tally)],
         outcomes=list(_outcomes(tally)),
         axes=[(name, *_about(dataset[name]), *_range(dataset[name])) for name in varying(dataset)],
         single_values=list(_single_values(dataset)),
@@ -162,11 +163,11 @@ def _spacing(values: NDArray[Any]) -> str:
     if values.dtype.kind == "f" and values.size > 2 and np.isfinite(values).all():
         step = (values[-1] - values[0]) / (values.size - 1)
         if np.allclose(np.diff(values), step, rtol=1e-6, atol=0.0):
-            return f"even, by {step:.6g}"
+            return f"even, by {number(step)}"
         if (values > 0.0).all():
             ratio = np.log(values[-1] / values[0]) / (values.size - 1)
             if np.allclose(np.diff(np.log(values)), ratio, rtol=1e-6, atol=0.0):
-                return f"geometric, by {np.exp(ratio):.6g}"
+                return f"geometric, by {number(float(np.exp(ratio)))}"
     return ", ".join(map(label, values[:MAX_VALUES].tolist())) + (", …" if values.size > MAX_VALUES else "")
 
 
@@ -204,7 +205,7 @@ def _facts(dataset: xr.Dataset) -> list[tuple[str, str]]:
     facts = {
         "program": f"impact {attributes.get('impact_version', '')}",
         "packages": ", ".join(f"{name} {version}" for name, version in packages.items()),
-        "solver": ", ".join(f"{name} {attributes[name]:g}" for name in settings if name in attributes),
+        "solver": ", ".join(f"{name} {number(attributes[name])}" for name in settings if name in attributes),
         "core": attributes.get("core", ""),
         "fingerprint": attributes.get("fingerprint", ""),
         "seal": dataset.encoding.get("seal") or "",

@@ -28,6 +28,7 @@ from ..engine.build_impacts import Stiffness, has_stiffness_rule, mass_at, value
 from ..engine.plan import Index, Inputs
 from ..engine.trajectories import TrajectoryMap
 from ..errors import ResultError, UsageError
+from ..formatting import number
 from ..text import safe_text
 from .attributes import read_attribute
 from .expand import MAX_STIFFNESS_VALUES, Rows, TrajectoryTable, expand, whole_stiffness
@@ -390,9 +391,9 @@ def check_witnesses(table: TrajectoryTable, variables: Sequence[Variable], store
             at = int(np.argmin(same))
             version = safe_text(str(stored.attrs.get("impact_version", "unknown")), 40)
             raise ResultError(
-                f"its witnesses expand to other numbers: {variable.name} is {got[at]:.12g}, the file has "
-                f"{expected[at]:.12g}; it was made by impact {version}, this is {__version__}: sweep its config "
-                "again, or expand it with that version (impact expand)"
+                f"its witnesses expand to other numbers: {variable.name} is {number(got[at], 12)}, the file has "
+                f"{number(expected[at], 12)}; it was made by impact {version}, this is {__version__}: sweep "
+                "its config again, or expand it with that version (impact expand)"
             )
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 from ..contact.status import Status
+from ..formatting import number
 from ..text import safe_text
 from .summary import MAX_INDENTATION, Tally
 
@@ -12,17 +13,28 @@ from .summary import MAX_INDENTATION, Tally
 MIN_MODULUS_PA, MAX_MODULUS_PA = 1e3, 1e13
 
 
-def material_notes(materials: Mapping[str, Mapping[str, object]]) -> Iterator[str]:
+def material_notes(
+    materials: Mapping[str, Mapping[str, object]], axes: Mapping[str, Sequence[object]]
+) -> Iterator[str]:
     """A sentence for each material whose Young's modulus E [Pa] is implausible.
 
-    >>> list(material_notes({"steel": {"E": 210.0}, "rubber": {"E": 5e6}}))
+    Parameters
+    ----------
+    materials : their properties by name
+    axes : the values of those that are axes, such as "materials.steel.E"
+
+    >>> list(material_notes({"steel": {"E": 210.0}, "rubber": {"E": 5e6}}, {}))
     ['materials.steel.E: got 210 Pa; did you mean 210 GPa?']
+    >>> list(material_notes({"glass": {"E": None}}, {"materials.glass.E": [6e10, 72.0]}))
+    ['materials.glass.E: got 72 Pa; did you mean 72 GPa?']
     """
     for name, material in materials.items():
-        modulus = material.get("E")
-        if isinstance(modulus, float) and not MIN_MODULUS_PA <= modulus <= MAX_MODULUS_PA:
-            hint = f"did you mean {modulus:g} GPa?" if modulus < MIN_MODULUS_PA else "no material is as stiff"
-            yield f"materials.{safe_text(name)}.E: got {modulus:g} Pa; {hint}"
+        for modulus in axes.get(f"materials.{name}.E", [material.get("E")]):
+            if isinstance(modulus, float) and (modulus < MIN_MODULUS_PA or modulus > MAX_MODULUS_PA):
+                too_small = modulus < MIN_MODULUS_PA
+                hint = f"did you mean {number(modulus)} GPa?" if too_small else "no material is as stiff"
+                yield f"materials.{safe_text(name)}.E: got {number(modulus)} Pa; {hint}"
+                break
 
 
 def result_notes(tally: Tally) -> Iterator[str]:

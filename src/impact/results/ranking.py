@@ -16,6 +16,7 @@ from ..config.grid import path_of
 from ..contact.status import FIRST_FAILURE, Status
 from ..engine.plan import owner_of
 from ..errors import UsageError
+from ..formatting import label, number, percentage
 from ..text import safe_text
 from .replay import described
 from .schema import columns_along, foreign_dims, own_dims
@@ -69,7 +70,7 @@ class Ranked:
     @property
     def name(self) -> str:
         """The model, and the parameters that were chosen."""
-        chosen = (f"{path.rpartition('.')[2]} = {value:.6g}" for path, value in self.parameters.items())
+        chosen = (f"{path.rpartition('.')[2]} = {number(value)}" for path, value in self.parameters.items())
         return " with ".join(filter(None, [self.model, ", ".join(chosen)]))
 
     @property
@@ -89,11 +90,7 @@ class Ranked:
         >>> [Ranked("hertz", {}, 3000, n, 0, nan, nan, {}, nan, None).percent for n in (0, 1, 2000, 2999, 3000)]
         ['0%', '<0.1%', '66.7%', '>99.9%', '100%']
         """
-        if self.within == 0 or self.serves_everywhere:
-            return f"{100.0 * self.share:.0f}%"
-        if self.share < 0.001:
-            return "<0.1%"
-        return ">99.9%" if self.share > 0.999 else f"{100.0 * self.share:.1f}%"
+        return percentage(self.share)
 
     @property
     def row(self) -> tuple[str, ...]:
@@ -102,8 +99,8 @@ class Ranked:
         >>> Ranked("hertz", {}, 10, 1, 0, 0.45, 0.9, {"e": 0.1}, 1.0, ((1.0, 1.0),)).row
         ('hertz', '10.0%', '0.9', '0.45', '0', 'e=0.1: e_out 1', '1')
         """
-        errors = ("–" if math.isnan(error) else f"{error:.3g}" for error in (self.max_error, self.mean_error))
-        worst = f"{described(self.at)}: e_out {self.e_out:.4g}" if self.at else "–"
+        errors = (number(error, 3) for error in (self.max_error, self.mean_error))
+        worst = f"{described(self.at)}: e_out {number(self.e_out, 4)}" if self.at else "–"
         return (self.name, self.percent, *errors, f"{self.failed:,}", worst, self._served_text)
 
     @property
@@ -111,7 +108,7 @@ class Ranked:
         """The first ranges of e that it serves."""
         if self.served is None:
             return "–"
-        ranges = [f"{least:.12g}" + (f" to {most:.12g}" if most > least else "") for least, most in self.served]
+        ranges = [label(least) + (f" to {label(most)}" if most > least else "") for least, most in self.served]
         more = f" and {len(ranges) - MAX_RANGES:,} more" if len(ranges) > MAX_RANGES else ""
         return ", ".join(ranges[:MAX_RANGES]) + more or "nowhere"
 
@@ -132,7 +129,15 @@ class Ranking:
     @property
     def headings(self) -> tuple[str, ...]:
         """Of a table of `Ranked.row`; the first and the last two columns are text, the others numbers."""
-        return ("model", f"within {self.tol:g}", "max error", "mean error", "failed", "worst point", "e served")
+        return (
+            "model",
+            f"within {number(self.tol)}",
+            "max error",
+            "mean error",
+            "failed",
+            "worst point",
+            "e served",
+        )
 
     @property
     def best(self) -> tuple[Ranked, ...]:
@@ -143,7 +148,7 @@ class Ranking:
     def headline(self) -> str:
         """The answer in a sentence."""
         first = self.models[0]
-        key, tol, points = safe_text(first.name, 120), f"{self.tol:g}", f"{first.points:,} points"
+        key, tol, points = safe_text(first.name, 120), number(self.tol), f"{first.points:,} points"
         alone = "the only point" if first.points == 1 else ""
         if self.best:
             others = len(self.best) - 1

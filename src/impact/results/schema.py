@@ -21,6 +21,7 @@ from ..contact.powers import Array
 from ..contact.status import Status
 from ..engine.build_impacts import mass_at, restitution_at
 from ..engine.plan import Index, Inputs, Plan, is_foreign, is_own, material_property
+from ..formatting import number
 
 SCHEMA_VERSION = 2
 # models with another exponent are named in at most so many characters
@@ -206,10 +207,10 @@ def exponent_text(by_model: Mapping[str, float]) -> str:
     """
     common = Counter(by_model.values()).most_common(1)[0][0]
     others = {key: n for key, n in by_model.items() if n != common}
-    text = ", ".join(f"{n:g} for {key}" for key, n in others.items())
+    text = ", ".join(f"{number(n)} for {key}" for key, n in others.items())
     if len(text) > MAX_NAMED:
         text = f"{len(others)} of {len(by_model)} models have another n"
-    return f"{common:g}" + (f" ({text})" if text else "")
+    return number(common) + (f" ({text})" if text else "")
 
 
 def exponents_of(dataset: xr.Dataset) -> str | None:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UsageError, did_you_mean
+from ..formatting import label
 from ..text import safe_text
 
 if TYPE_CHECKING:
@@ -65,7 +66,7 @@ def select(dataset: xr.Dataset, sel: Mapping[str, float | str]) -> xr.Dataset:
         if dim in masks and same.any():
             same &= masks[dim]
         if not same.any():
-            shown = ", ".join(f"{one:g}" if values.dtype.kind == "f" else str(one) for one in values[:8].tolist())
+            shown = ", ".join(label(one) for one in values[:8].tolist())
             has = safe_text(shown + (", ..." if values.size > 8 else ""))
             raise UsageError(f"no {safe_text(f'{name} = {value}')} in this result; {safe_text(name)} is {has}")
         masks[dim] = same
