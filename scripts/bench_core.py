@@ -25,6 +25,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
+from pathlib import Path
 from statistics import median
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -50,6 +51,7 @@ PAPER = (
     "exact-hysteresis", "gharib-hurmuzlu-2012", "lankarani-nikravesh-1994", "gharib-hurmuzlu-2012-energetic",
     "bilinear",
 )  # fmt: skip
+FIGURE6 = Path(__file__).parents[1] / "configs" / "figure6.toml"
 ACCURACY = 1e-8
 # ten to a decade
 TOLERANCES = tuple(float(f"{one:.2g}") for one in np.geomspace(1e-6, 1e-12, 61))
@@ -154,7 +156,7 @@ def operations() -> int:
 def starts() -> Table:
     """What a sweep of a few impacts takes from the command line, the middle one of five."""
     table = Table("the start of a sweep", "seconds", box=None)
-    command = [sys.executable, "-m", "impact", "sweep", "configs/figure6.toml", "--quiet", "--overwrite", "-o"]
+    command = [sys.executable, "-m", "impact", "sweep", str(FIGURE6), "--quiet", "--overwrite", "-o"]
 
     def seconds(folder: str, by: str, times: int, **environment: str) -> float:
         taken = []

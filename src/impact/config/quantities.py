@@ -43,7 +43,6 @@ MAX_AXIS = 10**7  # values on one axis, which are held in memory
 MAX_COUNTED = 10**18  # what a message writes out
 MAX_FAULTS = 100  # of one list or table
 MAX_REFUSED = 1000  # values of a config; the rest of a hostile list is not worth its time
-DIGITS = 15  # significant digits of the values of a range
 
 _DIGITS = r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
 NUMBER = re.compile(rf"\s*([-+]?(?:{_DIGITS}|inf\b|nan\b))\s*(.*?)\s*")
@@ -301,9 +300,9 @@ class Range(Table):
                     array = np.arange(first, last, third)
         if not np.isfinite(array).all():
             raise self._fault(f"got {first:g} to {last:g}, expected a range that does not overflow")
-        # the ends were typed
+        # the ends were typed; the others get 15 significant digits
         inner = slice(1, None if self.kind == "arange" else -1)
-        array[inner] = [float(f"{value:.{DIGITS}g}") for value in array[inner].tolist()]
+        array[inner] = [float(f"{value:.15g}") for value in array[inner].tolist()]
         for extreme in (float(array.min()), float(array.max())):
             if not quantity.allows(extreme):
                 raise self._fault(f"got a value {extreme!r}, expected {quantity.expected}")

@@ -362,10 +362,12 @@ def expanded_slabs(
             wanted = [variable for variable in variables if variable.per == "model" or model == 0]
             index = table.inputs.index(where)
             impacts, arrays = _expand(table, model, index, [variable.name for variable in wanted])
+            shape = tuple(part.stop - part.start for part in where)
             values = {}
             for variable in wanted:
-                values[variable.name] = np.empty(tuple(p.stop - p.start for p in where), variable.dtype)
-                values[variable.name][...] = _one(arrays[variable.name], where)
+                array = np.broadcast_to(_one(arrays.pop(variable.name), where), shape)
+                # copied only where it is a view of fewer values, or of another type
+                values[variable.name] = np.asarray(array, variable.dtype, order="C")
             yield model, where, impacts, values
 
 
