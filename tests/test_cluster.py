@@ -112,11 +112,11 @@ def test_the_scheduler_gone(two: Dask, tmp_path: Path, right: bytes, moment: int
 def other_version(folder: Path) -> dict[str, str]:
     """The environment of a process that finds another version of the package."""
     shutil.copytree(ROOT / "src" / "impact", folder / "impact", ignore=shutil.ignore_patterns("__pycache__"))
-    init = folder / "impact" / "__init__.py"
-    text = init.read_text(encoding="utf-8")
+    module = folder / "impact" / "_version.py"
+    text = module.read_text(encoding="utf-8")
     changed = text.replace(f'__version__ = "{impact.__version__}"', '__version__ = "0.0.1"')
     assert changed != text
-    init.write_text(changed, encoding="utf-8")
+    module.write_text(changed, encoding="utf-8")
     return {"PYTHONPATH": str(folder)}
 
 

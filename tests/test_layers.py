@@ -1,17 +1,31 @@
-"""Imports only go down the floors of the house, and each library has its one floor."""
+"""Imports only go down from layer to layer, and each library is imported in one layer."""
 
 from __future__ import annotations
 
 import ast
+from collections.abc import Callable
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
 
 SOURCE = Path(__file__).parent.parent / "src" / "impact"
-FLOORS = {
-    "": 0, "errors": 0, "text": 0, "formatting": 0, "ode": 1, "contact": 2, "config": 3, "engine": 4, "results": 5,
-    "comparison": 6, "plots": 7, "reporting": 8, "api": 9, "cli": 10, "__main__": 11, "atomic": 0,
-}  # fmt: skip
+LAYERS = (
+    {"_version", "atomic", "errors", "formatting", "text"},
+    {"ode"},
+    {"contact"},
+    {"config"},
+    {"engine"},
+    {"results"},
+    {"comparison"},
+    {"plots"},
+    {"reporting"},
+    # the package itself, "", hands out the functions of api
+    {"api", ""},
+    {"cli"},
+    {"__main__"},
+)
+HEIGHT = {part: height for height, parts in enumerate(LAYERS) for part in parts}
 # where each library may be imported
 LIBRARIES = {
     "typer": {"cli"}, "rich": {"cli"}, "matplotlib": {"plots"}, "pandas": {"plots"}, "jinja2": {"reporting"},
@@ -24,49 +38,70 @@ LIBRARIES = {
 MODULES = sorted(SOURCE.rglob("*.py"))
 
 
-def floor_of(path: Path) -> str:
-    """The floor that a module belongs to: the first part of its path."""
+def part_of(path: Path) -> str:
+    """The package or module of the top level that a module belongs to; "" for the package itself."""
     parts = path.relative_to(SOURCE).with_suffix("").parts
     return "" if parts == ("__init__",) else parts[0]
 
 
-def imports(path: Path) -> list[tuple[str, bool]]:
+def imports(path: Path, *, inside_functions: bool = True) -> list[tuple[str, bool]]:
     """What a module imports, as absolute names, and whether for type checking only."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
-    typing_only = {
-        id(inner)
-        for node in ast.walk(tree)
-        if isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING"
-        for inner in ast.walk(node)
-    }
+    nodes = list(ast.walk(tree))
+    typing_only = nodes_inside(
+        tree, lambda node: isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING"
+    )
+    if not inside_functions:
+        in_functions = nodes_inside(tree, lambda node: isinstance(node, ast.FunctionDef))
+        nodes = [node for node in nodes if node not in in_functions]
     package = ["impact", *path.relative_to(SOURCE).parts[:-1]]
-    found = []
-    for node in ast.walk(tree):
+    names = []
+    for node in nodes:
         if isinstance(node, ast.Import):
-            found += [(alias.name, id(node) in typing_only) for alias in node.names]
+            names += [(alias.name, node in typing_only) for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             base = package[: len(package) + 1 - node.level] if node.level else []
             stem = ".".join([*base, *([node.module] if node.module else [])])
-            names = [f"{stem}.{alias.name}" for alias in node.names] if stem == "impact" else [stem]
-            found += [(name, id(node) in typing_only) for name in names]
-    return found
+            # what is imported from a package may be one of its modules
+            is_package = (SOURCE.parent / stem.replace(".", "/")).is_dir()
+            names += [
+                (f"{stem}.{alias.name}" if is_package else stem, node in typing_only) for alias in node.names
+            ]
+    return names
+
+
+def nodes_inside(tree: ast.AST, is_block: Callable[[ast.AST], bool]) -> set[ast.AST]:
+    """The nodes inside some blocks of a tree."""
+    return {inner for node in ast.walk(tree) if is_block(node) for inner in ast.walk(node)}
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(SOURCE)))
 def test_imports_go_down(path: Path) -> None:
-    own = FLOORS[floor_of(path)]
+    part = part_of(path)
     for name, typing_only in imports(path):
-        if name.split(".")[0] == "impact":
-            part = name.split(".")[1] if "." in name else ""
-            target = FLOORS.get(part, 0)
-            # the package itself loads the floors below it lazily, on first use
-            assert target <= own or floor_of(path) == "", f"{path.name} imports {name}, which is above it"
-        elif not typing_only and name.split(".")[0] in LIBRARIES:
-            assert floor_of(path) in LIBRARIES[name.split(".")[0]], f"{path.name} imports {name}"
+        library, _, rest = name.partition(".")
+        if library == "impact":
+            target = rest.partition(".")[0]
+            assert HEIGHT[target] <= HEIGHT[part], f"{path.name} imports {name}, which is above it"
+        elif not typing_only and library in LIBRARIES:
+            assert part in LIBRARIES[library], f"{path.name} imports {name}"
 
 
-def test_every_module_has_a_floor_and_a_docstring() -> None:
+def test_modules_import_each_other_in_one_direction() -> None:
+    names = {".".join(["impact", *path.relative_to(SOURCE).with_suffix("").parts]): path for path in MODULES}
+    graph = {
+        module: [
+            name
+            for name, typing_only in imports(path, inside_functions=False)
+            if name in names and not typing_only
+        ]
+        for module, path in names.items()
+    }
+    TopologicalSorter(graph).prepare()
+
+
+def test_every_module_has_a_layer_and_a_docstring() -> None:
     for path in MODULES:
-        assert floor_of(path) in FLOORS
+        assert part_of(path) in HEIGHT
         text = path.read_text(encoding="utf-8")
         assert not text or ast.get_docstring(ast.parse(text)), f"{path.name} does not say what it holds"

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand, TyperGroup, TyperOption
 
-from .. import __version__
+from .._version import __version__
 from . import exits
 
 # in the order of the help: the module of the function of the same name, a summary, and an example

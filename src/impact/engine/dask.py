@@ -13,6 +13,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
+from .._version import __version__
 from ..errors import ImpactError, StoreError, UnfinishedError, UsageError
 from ..text import safe_text
 from .execute import never, other_version
@@ -182,8 +183,6 @@ def _wait_for(file: Path, shown: str) -> None:
 
 def _check_versions(client: Client) -> None:
     """Refuse a scheduler and workers that have another version of this package, or none: all read what is sent."""
-    from .. import __version__
-
     try:
         places = {"the scheduler": client.run_on_scheduler(eval, VERSION)}
     except ImportError as error:

@@ -18,6 +18,7 @@ from functools import lru_cache, partial
 import numpy as np
 from numpy.typing import NDArray
 
+from .._version import __version__
 from ..config.tables import Solver
 from ..contact.model import ForceModel
 from ..contact.models import catalogue
@@ -89,8 +90,6 @@ def work(key: str, columns: Columns, context: WorkerContext) -> Integrated:
 # the models of the sweeps of which this place was sent something last
 @lru_cache(maxsize=4)
 def _models(context: WorkerContext) -> Mapping[str, ForceModel]:
-    from .. import __version__
-
     here = socket.gethostname()
     if context.version != __version__:
         raise UsageError(other_version(here, __version__, context.version))
@@ -303,8 +302,6 @@ def _submitter(plan: Plan, team: Team) -> Callable[..., Future[Integrated]]:
 
 def context_of(plan: Plan) -> WorkerContext:
     """What the trajectories of a plan are integrated with elsewhere."""
-    from .. import __version__
-
     plugins = plan.plugins
     return WorkerContext(
         __version__,

@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from .._version import __version__
 from ..config.load import Axis, Config
 from ..contact.materials import Material
 from ..contact.model import ForceModel
@@ -204,8 +205,6 @@ class Plan:
     @cached_property
     def physics(self) -> dict[str, object]:
         """What determines the trajectories, as plain data."""
-        from .. import __version__
-
         config = self.config
         return {
             "version": __version__,

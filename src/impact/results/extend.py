@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from .._version import __version__
 from ..config.grid import MAX_POINTS, Axis, path_of
 from ..config.tables import CORES
 from ..contact.simulate import CollisionResult
@@ -113,8 +114,6 @@ def extend(
 
 def _check_whole(before: xr.Dataset, old: Plan, name: str) -> None:
     """Refuse what is no whole result of a sweep of this version."""
-    from .. import __version__
-
     version = safe_text(str(before.attrs.get("impact_version")), 40)
     if version != __version__:
         raise ResultError(f"{name}: was made by impact {version}, this is {__version__}; sweep its config again")

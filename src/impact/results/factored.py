@@ -16,7 +16,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from .. import __version__
+from .._version import __version__
 from ..config.grid import Axis
 from ..contact.formula import Formula
 from ..contact.materials import Material

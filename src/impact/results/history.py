@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import xarray as xr
 
-from .. import __version__
+from .._version import __version__
 from ..contact.history import History
 from .schema import SCHEMA_VERSION
 

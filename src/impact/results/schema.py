@@ -14,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 import xarray as xr
 
-from .. import __version__
+from .._version import __version__
 from ..config.tables import MATERIAL, MATERIALS, SWEEP, own_quantities
 from ..contact.outputs import BY_DEFAULT
 from ..contact.powers import Array
