@@ -61,13 +61,13 @@ def test_generated_pages_are_fresh() -> None:
 def test_the_page_on_sweeps_says_what_is_so() -> None:
     from impact.config.grid import MAX_POINTS
     from impact.config.load import parse_config
-    from impact.config.quantities import MAX_AXIS
+    from impact.config.quantities import MAX_AXIS_VALUES
     from impact.engine.trajectories import MAX_CELLS, RANGE_TRAJECTORIES
     from impact.results.netcdf import CHUNK_VALUES
     from impact.results.sweep import NO_CHECKPOINT_POINTS
 
     page = (ROOT / "docs" / "sweeps.md").read_text(encoding="utf-8")
-    for number in (NO_CHECKPOINT_POINTS, CHUNK_VALUES, MAX_AXIS, RANGE_TRAJECTORIES, MAX_CELLS):
+    for number in (NO_CHECKPOINT_POINTS, CHUNK_VALUES, MAX_AXIS_VALUES, RANGE_TRAJECTORIES, MAX_CELLS):
         assert f"{number:,}" in page
     assert MAX_POINTS == 10**9
     (toml,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
