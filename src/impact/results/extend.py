@@ -352,6 +352,9 @@ class _Places:
                     continue
                 held = variable.isel(model=old_model, **chosen).transpose(*(names[axis] for axis in order)).values
                 shape = tuple(part.size for part in inside)
+                if not array.flags.writeable:
+                    # a view of computed values that was not copied
+                    values[name] = array = array.copy()
                 array[inside or ...] = held.reshape(shape) if array.shape else held
 
         return fill
