@@ -10,7 +10,7 @@ import pytest
 
 import impact
 from impact.errors import ResultError
-from impact.results.sealed import USER_BLOCK, check_seal
+from impact.results.seal import USER_BLOCK, check_seal
 
 from .conftest import ROOT, Run
 

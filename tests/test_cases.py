@@ -22,7 +22,7 @@ from impact.errors import UsageError
 from impact.results.provenance import part_of
 from impact.results.ranking import ranking
 from impact.results.schema import SCHEMA
-from impact.results.select import select
+from impact.results.selection import select
 from impact.results.summary import tally_of
 from impact.results.sweep import sweep_into
 

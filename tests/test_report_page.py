@@ -28,7 +28,7 @@ from impact.errors import UsageError
 from impact.reporting.figures import FIGURES
 from impact.reporting.page import page
 from impact.results.ranking import ranking
-from impact.results.replay import described
+from impact.results.replay_command import described
 
 from .conftest import ROOT, Run
 

@@ -124,7 +124,7 @@ def test_the_numbers_of_the_page() -> None:
 
 
 def test_all_that_a_factored_file_holds_is_named(tmp_path: Path) -> None:
-    from impact.results.validate import TABLE
+    from impact.results.validation import TABLE
 
     named = set(re.findall(r"`(\w+)`", PAGE.partition("## Other readers")[2].partition("## Witnesses")[0]))
     for name in TABLE:

@@ -26,7 +26,7 @@ from impact.api import prepare
 from impact.engine.executors import choose_backend
 from impact.errors import ResultError, StoreError, UnfinishedError, UsageError
 from impact.results.backend import open_result, write_whole
-from impact.results.sealed import write_seal
+from impact.results.seal import write_seal
 from impact.results.sweep import sweep_into
 
 from .conftest import ROOT, Run

@@ -35,11 +35,11 @@ from .errors import UsageError
 from .results.backend import load as load
 from .results.backend import save as save
 from .results.extend import extend as extend_result
-from .results.impact import Impact as Impact
-from .results.impact import impact_of
-from .results.provenance import histories, part_of, single_point, stored_config
+from .results.provenance import part_of, stored_config
 from .results.ranking import Ranking, ranking
-from .results.replay import repeats
+from .results.replay_command import repeats
+from .results.single_impact import Impact as Impact
+from .results.single_impact import histories, impact_of, single_point
 from .results.sweep import sweep_in_memory
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ def init(
 ) -> None:
     """Write a commented starter config, ready to sweep."""
     from ..results import backend
-    from ..results.provenance import STARTER
+    from ..results.single_impact import STARTER
 
     backend.write_whole(path, STARTER.read_bytes(), overwrite=overwrite)
     exits.say(f"{safe_text(str(path))}: written; next: impact sweep {safe_text(str(path))}")

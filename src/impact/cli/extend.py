@@ -39,7 +39,7 @@ def expand(
     with exits.signals() as should_stop:
         from .. import api
         from ..results import backend
-        from ..results.select import places_of, select
+        from ..results.selection import places_of, select
 
         backend.check_output(output, overwrite=overwrite, source=result)
         dataset = select(backend.open_result(result), dict(sel or ()))

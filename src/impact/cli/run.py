@@ -101,8 +101,8 @@ def run_json(impact: Impact) -> dict[str, Any]:
 def print_run(impact: Impact) -> None:
     """One impact: inputs, outputs, the three restitutions, and how far they can be trusted."""
     from ..config.tables import MATERIAL_QUANTITIES
-    from ..results.impact import DERIVED
     from ..results.schema import SCHEMA, plain_unit
+    from ..results.single_impact import DERIVED
 
     rows: dict[str, Any] = {"model": impact.model.key, "equation": impact.model.equation}
     for name, value in impact.point.items():

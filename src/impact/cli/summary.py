@@ -34,7 +34,7 @@ def execute(plan: Plan, should_stop: Callable[[], bool], *, quiet: bool) -> xr.D
 
 def summary(survey: Survey, output: Path) -> dict[str, Any]:
     """Points, counts per status, and the first failed points with their coordinates and the command for each."""
-    from ..results.replay import inputs_of_model, repeats, replay
+    from ..results.replay_command import inputs_of_model, repeats, replay
     from ..results.summary import counted
 
     outline, tally = survey.outline, survey.tally

@@ -13,7 +13,7 @@ from ..engine.plan import material_property, owner_of
 from ..formatting import number
 from ..results.attributes import read_attribute
 from ..results.schema import ABOUT_A_MODEL, SCHEMA, Variable, columns_along, is_case, is_input
-from ..results.select import NUMBERS, ROUNDING, Places, Values, matched
+from ..results.selection import NUMBERS, ROUNDING, Places, Values, matched
 from ..text import safe_text
 from .verdict import Fault, Kind
 

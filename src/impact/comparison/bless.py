@@ -12,7 +12,7 @@ import xarray as xr
 
 from ..errors import ResultError, UsageError
 from ..results.backend import check_output, load, save_with
-from ..results.replay import described, inputs_of_model, repeats
+from ..results.replay_command import described, inputs_of_model, repeats
 from ..results.summary import tally_of
 from ..text import safe_text
 from .compare import check_result, compare

@@ -13,7 +13,7 @@ from ..errors import UsageError
 from ..formatting import number
 from ..results.attributes import read_attribute
 from ..results.backend import load
-from ..results.replay import repeats
+from ..results.replay_command import repeats
 from ..results.schema import ABOUT_A_MODEL, SCHEMA, SCHEMA_VERSION, is_case, is_input
 from ..text import safe_text
 from .align import OF_A_MODEL, align

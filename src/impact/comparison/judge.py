@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 
 from ..contact.status import Status
 from ..errors import UsageError
-from ..results.replay import inputs_of_model
-from ..results.scales import scale_of
-from ..results.schema import Variable, columns_along, is_case
+from ..results.replay_command import inputs_of_model
+from ..results.schema import Variable, columns_along, is_case, scale_of
 from ..results.slabs import (
     MAX_SUMMARY_POINTS,
     SLAB_POINTS,

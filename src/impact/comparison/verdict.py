@@ -10,7 +10,7 @@ import xarray as xr
 
 from ..contact.status import Status
 from ..formatting import number
-from ..results.replay import described, replay
+from ..results.replay_command import described, replay
 from ..text import safe_text
 
 Kind = Literal["nothing in common", "physics config", "labels", "units", "missing variable", "values"]

@@ -12,7 +12,7 @@ from ..engine.plan import owner_of
 from ..errors import UsageError, did_you_mean
 from ..formatting import quantity
 from ..results.schema import exponents_of, is_input, plain_unit
-from ..results.select import places_of, select
+from ..results.selection import places_of, select
 from ..text import safe_text
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from ..formatting import label
 from ..plots.kinds import WIDTHS, Choice, draw
 from ..plots.style import encoded
 from ..results.schema import columns_along, is_input, plain_unit
-from ..results.select import places_of
+from ..results.selection import places_of
 from ..results.slabs import distinct, is_computed, slabs
 
 if TYPE_CHECKING:

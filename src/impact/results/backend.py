@@ -26,9 +26,9 @@ from .expand import TrajectoryTable, in_memory, lazy_dataset
 from .factored import check_witnesses, stored_table, variables_of
 from .netcdf import StoredArray, read_variables, writing
 from .schema import SCHEMA
-from .sealed import MAGIC, check_seal, write_seal
+from .seal import MAGIC, check_seal, write_seal
 from .slabs import slabs
-from .validate import TABLE, is_quantity, schema_violation
+from .validation import TABLE, is_quantity, schema_violation
 
 PLAIN = Output()
 # bytes up to which a result is held in memory

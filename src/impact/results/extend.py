@@ -29,7 +29,7 @@ from .attributes import read_attribute
 from .backend import open_with_table
 from .expand import TrajectoryTable
 from .provenance import stored_config
-from .select import matched
+from .selection import matched
 from .summary import Survey
 from .sweep import Extension, Values, sweep_into
 

@@ -32,8 +32,7 @@ from ..formatting import number
 from ..text import safe_text
 from .attributes import read_attribute
 from .expand import MAX_STIFFNESS_VALUES, Rows, TrajectoryTable, expand, whole_stiffness
-from .scales import scale_of
-from .schema import SCHEMA, Variable, attributes_of, derived_names, is_input
+from .schema import SCHEMA, Variable, attributes_of, derived_names, is_input, scale_of
 
 WITNESSES = 1_000
 # how far a witness may be from what is stored, of the scale that `compare` uses for its variable

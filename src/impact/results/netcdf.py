@@ -28,8 +28,8 @@ from ..errors import ResultError
 from ..text import safe_text
 from .expand import check_memory
 from .schema import SCHEMA_VERSION
-from .sealed import USER_BLOCK
-from .validate import TABLE, is_name
+from .seal import USER_BLOCK
+from .validation import TABLE, is_name
 
 Where = tuple[int | slice, ...]
 Put = Callable[[str, Where, NDArray[Any]], None]

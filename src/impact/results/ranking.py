@@ -18,9 +18,9 @@ from ..engine.plan import owner_of
 from ..errors import UsageError
 from ..formatting import label, number, percentage
 from ..text import safe_text
-from .replay import described
+from .replay_command import described
 from .schema import columns_along, foreign_dims, own_dims
-from .select import places_of, select
+from .selection import places_of, select
 from .slabs import Where, distinct, is_computed, over_varying_dims, slabs, varying_dims
 
 Mask = NDArray[np.bool_]

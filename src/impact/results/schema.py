@@ -13,9 +13,11 @@ from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from .._version import __version__
 from ..config.tables import MATERIAL_KEYS, MATERIAL_QUANTITIES, SWEEP_QUANTITIES, model_quantities
+from ..contact.materials import effective_mass
 from ..contact.outputs import BY_DEFAULT
 from ..contact.powers import Array
 from ..contact.status import Status
@@ -101,7 +103,45 @@ SCHEMA = (
              "contact_time + remaining indentation/(e_out v0)"),
 )  # fmt: skip
 
+# name, unit and meaning of the variables of a time history, over the time t
+HISTORY_VARIABLES = (
+    ("delta", "m", "indentation"),
+    ("v", "m s-1", "rate of the indentation"),
+    ("F", "N", "contact force"),
+    ("x1", "m", "displacement of ball 1 since first contact"),
+    ("x2", "m", "displacement of ball 2 since first contact"),
+    ("v1", "m s-1", "velocity of ball 1"),
+    ("v2", "m s-1", "velocity of ball 2"),
+)
+
 PACKAGES = ("numpy", "h5py", "h5netcdf", "xarray")
+
+
+def scale_of(variable: Variable, read: Callable[[str], NDArray[Any]], *, has_peak: bool) -> NDArray[np.float64]:
+    """The scale of a variable, of a shape that broadcasts to that of the points.
+
+    Parameters
+    ----------
+    variable : which
+    read : gives values by name: v1, v2 [m/s], m1, m2 [kg], the variable itself, `peak_indentation` [m]; arrays
+        that broadcast against each other
+    has_peak : whether the result has `peak_indentation`
+    """
+
+    def number(name: str) -> NDArray[np.float64]:
+        return np.asarray(read(name), float)
+
+    match variable.judged:
+        case "scaled by v0":
+            return np.asarray(np.abs(number("v1") - number("v2")))
+        case "scaled by m v0^2/2":
+            v0 = number("v1") - number("v2")
+            return np.asarray(0.5 * effective_mass(number("m1"), number("m2")) * v0 * v0)
+        case "scaled by the peak" if has_peak:
+            return np.asarray(np.abs(number("peak_indentation")))
+        case "scaled by itself" | "scaled by the peak":
+            return np.asarray(np.abs(number(variable.name)))
+    return np.ones(())
 
 
 def stored(plan: Plan) -> tuple[Variable, ...]:

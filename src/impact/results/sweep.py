@@ -38,7 +38,7 @@ from .factored import check_factored, factored_outline, table_values
 from .netcdf import MAX_LETTERS, is_text, letters
 from .schema import Variable, outline, stored
 from .summary import Survey, Tally, tally_of
-from .validate import is_name
+from .validation import is_name
 
 # bytes that a result takes besides its values, about
 OVERHEAD = 2**16

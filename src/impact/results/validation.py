@@ -18,12 +18,11 @@ from ..engine.plan import material_property
 from ..errors import ResultError
 from ..text import safe_text
 from .attributes import KINDS, read_attribute
-from .history import HISTORY
-from .schema import ABOUT_A_MODEL, SCHEMA, is_case
+from .schema import ABOUT_A_MODEL, HISTORY_VARIABLES, SCHEMA, is_case
 from .slabs import VARIES_ALONG, is_lazy, slabs
 
 COMPUTED = frozenset(one.name for one in SCHEMA)
-FOLLOWED = frozenset(name for name, _, _ in HISTORY)  # over the time t
+FOLLOWED = frozenset(name for name, _, _ in HISTORY_VARIABLES)  # over the time t
 TEXTS = frozenset({"model", *ABOUT_A_MODEL, *MATERIAL_KEYS} - {"year"})
 # the table of a factored file, see `impact.results.factored`
 TABLE = frozenset({
