@@ -10,7 +10,7 @@ import pytest
 import impact
 from impact.config.tables import SWEEP_QUANTITIES
 from impact.results.schema import HISTORY_VARIABLES, SCHEMA
-from impact.results.single_impact import DERIVED
+from impact.results.single_impact import DERIVED_QUANTITIES
 
 from .conftest import ROOT, Run
 
@@ -50,7 +50,7 @@ def test_every_equation_is_there_once() -> None:
 def test_what_the_page_names_exists() -> None:
     known = (
         {one.name for one in SCHEMA}
-        | {name for name, *_ in (*DERIVED, *HISTORY_VARIABLES)}
+        | {name for name, *_ in (*DERIVED_QUANTITIES, *HISTORY_VARIABLES)}
         | SWEEP_QUANTITIES.keys()
     )
     known |= impact.models().keys() | {"e_kinematic"}

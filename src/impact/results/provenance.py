@@ -14,7 +14,7 @@ from ..engine.plugins import Plugins
 from ..errors import ResultError, UsageError
 from ..text import safe_text
 from .attributes import PluginRecord, read_attribute
-from .selection import matched
+from .selection import match_labels
 
 
 def stored_config(
@@ -55,7 +55,7 @@ def stored_config(
     return parse_config(text, [*stored, *overrides], plugins.models, name, max_points)
 
 
-def part_of(config: Config, dataset: xr.Dataset) -> Config:
+def config_of_part(config: Config, dataset: xr.Dataset) -> Config:
     """The part of a config that a result holds: its axes with the values that are labels there.
 
     An axis without such a value keeps its first one, at which a comparison shows the difference.
@@ -68,7 +68,7 @@ def part_of(config: Config, dataset: xr.Dataset) -> Config:
         names = [name for name, labels in held.items() if first is not None and labels.dims == first.dims]
         values = [np.asarray(labels_of[name]) for name in names]
         labels = [np.ravel(held[name].values) for name in names]
-        places = sorted(matched(values, labels)[0].tolist()) if names else []
+        places = sorted(match_labels(values, labels)[0].tolist()) if names else []
         chosen = np.array(places or [0])
         columns = {name: tuple(np.asarray(v)[chosen].tolist()) for name, v in axis.columns.items()}
         numbers = tuple(axis.labels[place] for place in chosen) if axis.numbered else ()
@@ -96,13 +96,19 @@ def check_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str)
     Traceback (most recent call last):
     impact.errors.UsageError: results.h5: made with mine of my.py; give it again with --plugin FILE
     """
-    made = _made_with(attributes, name)
-    given = _given(plugins)
+    made = _stored_plugins(attributes, name)
+    given = _current_plugins(plugins)
     # the hash of a file is not that of a value: given in another way, a model cannot be known to be the same
-    missing = {key: record for key, record in made.items() if key not in given or _way(given[key]) != _way(record)}
+    missing = {
+        key: record
+        for key, record in made.items()
+        if key not in given or _how_to_supply(given[key]) != _how_to_supply(record)
+    }
     if missing:
-        named = ", ".join(f"{key} of {_origin(record) or 'a Python value'}" for key, record in missing.items())
-        ways = " and ".join(sorted({_way(record) for record in missing.values()}))
+        named = ", ".join(
+            f"{key} of {_plugin_origin(record) or 'a Python value'}" for key, record in missing.items()
+        )
+        ways = " and ".join(sorted({_how_to_supply(record) for record in missing.values()}))
         again = "it" if len(missing) == 1 else "them"
         raise UsageError(f"{safe_text(name)}: made with {safe_text(named)}; give {again} again with {ways}")
 
@@ -116,11 +122,12 @@ def changed_plugins(attributes: Mapping[str, object], plugins: Plugins, name: st
     plugins : what is given now, all that the result was made with among them
     name : of the result, for messages
     """
-    given = _given(plugins)
+    given = _current_plugins(plugins)
     return tuple(
-        f"{safe_text(name)}: was made with another version of {safe_text(_origin(record) or f'the model {key}')}: "
+        f"{safe_text(name)}: was made with another version of "
+        f"{safe_text(_plugin_origin(record) or f'the model {key}')}: "
         f"its SHA-256 is {safe_text(record.sha256, 64)}, this one's is {given[key].sha256}"
-        for key, record in _made_with(attributes, name).items()
+        for key, record in _stored_plugins(attributes, name).items()
         if record.sha256 and given[key].sha256 and record.sha256 != given[key].sha256
     )
 
@@ -130,30 +137,30 @@ def unknown_plugins(attributes: Mapping[str, object], plugins: Plugins, name: st
 
     Parameters are those of `changed_plugins`.
     """
-    given = _given(plugins)
+    given = _current_plugins(plugins)
     return tuple(
         f"{safe_text(name)}: the model {safe_text(key)} is a Python value that no file defines, so that it cannot "
         "be known to be the one that the result was made with; expected a model in a Python file"
-        for key, record in _made_with(attributes, name).items()
+        for key, record in _stored_plugins(attributes, name).items()
         if not (record.sha256 and given[key].sha256)
     )
 
 
-def _made_with(attributes: Mapping[str, object], name: str) -> dict[str, PluginRecord]:
+def _stored_plugins(attributes: Mapping[str, object], name: str) -> dict[str, PluginRecord]:
     records: dict[str, PluginRecord] = read_attribute(attributes, "plugins", name, required=True)
     return records
 
 
-def _given(plugins: Plugins) -> dict[str, PluginRecord]:
+def _current_plugins(plugins: Plugins) -> dict[str, PluginRecord]:
     return {key: PluginRecord(**record) for key, record in plugins.record.items()}
 
 
-def _origin(record: PluginRecord) -> str | None:
+def _plugin_origin(record: PluginRecord) -> str | None:
     """The file or the package of a model."""
     return record.package or record.file
 
 
-def _way(record: PluginRecord) -> str:
+def _how_to_supply(record: PluginRecord) -> str:
     """How a model is given again."""
     if record.package:
         return "the package installed"

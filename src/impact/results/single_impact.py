@@ -34,13 +34,13 @@ from .provenance import changed_plugins, check_plugins, stored_config, unknown_p
 from .schema import HISTORY_VARIABLES, SCHEMA_VERSION
 from .seal import is_result
 
-STARTER = files("impact") / "config" / "starter.toml"
+STARTER_CONFIG = files("impact") / "config" / "starter.toml"
 
-Source = str | Path | Mapping[str, object] | xr.Dataset | None
+ConfigSource = str | Path | Mapping[str, object] | xr.Dataset | None
 # from overrides to the config with them
-Read = Callable[[Sequence[str]], Config]
+ReadConfig = Callable[[Sequence[str]], Config]
 # name, unit, meaning of what follows from the inputs and the motion of one impact
-DERIVED = (
+DERIVED_QUANTITIES = (
     ("m1", "kg", "mass of ball 1"),
     ("m2", "kg", "mass of ball 2"),
     ("R1", "m", "radius of ball 1"),
@@ -92,7 +92,7 @@ class Impact:
         return Status(int(self.values["status"]))
 
 
-def impact_of(plan: Plan, first: tuple[str, ...], times: int | None = None) -> Impact:
+def run_single_impact(plan: Plan, first: tuple[str, ...], times: int | None = None) -> Impact:
     """The only impact of a plan; `first` are axes of its source that are at their first value.
 
     `times` is how many points in time its history has, see `impact.contact.history.follow`.
@@ -120,7 +120,7 @@ def impact_of(plan: Plan, first: tuple[str, ...], times: int | None = None) -> I
         first=first,
         values=values,
         materials=plan.materials_used,
-        derived=_derived(law, impacts, values, history),
+        derived=_derived_quantities(law, impacts, values, history),
         exponent=impacts.n[0].item(),
         closing_speed=v0,
         damping=values["lambda"],
@@ -131,7 +131,7 @@ def impact_of(plan: Plan, first: tuple[str, ...], times: int | None = None) -> I
     )
 
 
-def _derived(
+def _derived_quantities(
     law: ForceModel, impacts: Impacts, values: Mapping[str, float], history: History | None
 ) -> dict[str, float]:
     """The quantities of DERIVED."""
@@ -150,7 +150,7 @@ def _derived(
         # the damping of a limit is infinite
         chi = math.inf if values["status"] == Status.LIMIT else chi
         found["rebound_speed_bound"] = v0 / chi if chi else math.inf
-    return {name: found.get(name, math.nan) for name, _, _ in DERIVED}
+    return {name: found.get(name, math.nan) for name, _, _ in DERIVED_QUANTITIES}
 
 
 def history_dataset(history: History, model: str, point: Mapping[str, float | str]) -> xr.Dataset:
@@ -217,7 +217,7 @@ def histories(
         others = {str(name) for name in dataset.coords if owner_of(str(name)) not in ("", key)}
         of_model = {name: value for name, value in at.items() if name not in others}
         config, names = single_point(dataset, (), plugins, key, of_model)
-        impact = impact_of(Plan(config, plugins.of(config.models)), names)
+        impact = run_single_impact(Plan(config, plugins.of(config.models)), names)
         first |= {name: impact.point[name] for name in names}
         if impact.history is None:
             ends[key] = impact.status.meaning
@@ -231,7 +231,7 @@ def histories(
 
 
 def single_point(
-    source: Source,
+    source: ConfigSource,
     overrides: Sequence[str],
     plugins: Plugins,
     model: str | None = None,
@@ -259,11 +259,11 @@ def single_point(
     ConfigError, UsageError : a name is not known here, or a value is not allowed
     ResultError : what a result carries cannot be read
     """
-    read, parted = _reader(source, overrides, plugins)
+    read, parted = _config_reader(source, overrides, plugins)
     # each override, and how it is called in a message: as it was asked for
     asked = {} if model is None else {f"models={json.dumps([model])}": f"--model {model}"}
-    config = _read(read, asked)
-    columns = [_columns(axis) for axis in config.axes]
+    config = _read_with_option_names(read, asked)
+    columns = [_selectable_columns(axis) for axis in config.axes]
     varied = {name for names in columns for name in names}
     if at and {"e", "alpha"} <= at.keys():
         raise UsageError("--at alpha: got alpha beside e, expected one of the two")
@@ -274,36 +274,38 @@ def single_point(
         if name not in known and name not in SWEEP_QUANTITIES:
             raise UsageError(f'no input "{safe_text(name)}" here; {did_you_mean(name, known)}')
         if name not in together:
-            asked[f"{_override_path(name)}={_toml(value)}"] = f"--at {name}={value}"
-    config = _read(read, asked)
+            asked[f"{_override_path(name)}={_toml_value(value)}"] = f"--at {name}={value}"
+    config = _read_with_option_names(read, asked)
 
     scalars = dict(config.scalars)
     first: list[str] = []
     for axis in config.axes:
-        scalars |= {name: values[_place(axis, at)] for name, values in axis.columns.items()}
-        if axis.size > 1 and not any(name in at for name in _columns(axis)):
+        scalars |= {name: values[_position_on_axis(axis, at)] for name, values in axis.columns.items()}
+        if axis.size > 1 and not any(name in at for name in _selectable_columns(axis)):
             first += axis.columns
     return replace(config, axes=(), scalars=scalars, models=config.models[:1]), tuple(first)
 
 
-def _reader(source: Source, overrides: Sequence[str], plugins: Plugins) -> tuple[Read, dict[str, float | str]]:
+def _config_reader(
+    source: ConfigSource, overrides: Sequence[str], plugins: Plugins
+) -> tuple[ReadConfig, dict[str, float | str]]:
     """How the config of a source is read, and the single values of a part of a result."""
     if source is None:
-        text = STARTER.read_text(encoding="utf-8")
+        text = STARTER_CONFIG.read_text(encoding="utf-8")
         first = ["sweep.e=0.5", *overrides]
         return lambda more: parse_config(text, [*first, *more], plugins.models, name="starter"), {}
     if isinstance(source, str | Path) and is_result(Path(source)):
         with open_result(source) as stored:
-            return _stored_reader(stored, overrides, plugins, str(source))
+            return _stored_config_reader(stored, overrides, plugins, str(source))
     if isinstance(source, xr.Dataset):
-        return _stored_reader(source, overrides, plugins, "the result")
+        return _stored_config_reader(source, overrides, plugins, "the result")
     path_or_table = Path(source) if isinstance(source, str) else source
     return lambda more: read_config(path_or_table, [*overrides, *more], plugins.models), {}
 
 
-def _stored_reader(
+def _stored_config_reader(
     dataset: xr.Dataset, overrides: Sequence[str], plugins: Plugins, name: str
-) -> tuple[Read, dict[str, float | str]]:
+) -> tuple[ReadConfig, dict[str, float | str]]:
     attributes = dict(dataset.attrs)
     single = {str(key): label.values.item() for key, label in dataset.coords.items() if label.ndim == 0}
     if "config" in attributes:
@@ -317,14 +319,14 @@ def _stored_reader(
     return read, {key: value for key, value in single.items() if key != "model"}
 
 
-def _columns(axis: Axis) -> dict[str, Sequence[float | str]]:
+def _selectable_columns(axis: Axis) -> dict[str, Sequence[float | str]]:
     """The values along an axis by the names that choose a point of it: its columns, and the number of a case."""
     return {**({axis.numbered: axis.labels} if axis.numbered else {}), **axis.columns}
 
 
-def _place(axis: Axis, at: Mapping[str, float | str]) -> int:
+def _position_on_axis(axis: Axis, at: Mapping[str, float | str]) -> int:
     """The place on an axis where its columns have the values asked for."""
-    columns = _columns(axis)
+    columns = _selectable_columns(axis)
     for place in range(axis.size):
         if all(columns[name][place] == value for name, value in at.items() if name in columns):
             return place
@@ -339,22 +341,22 @@ def _override_path(name: str) -> str:
     ('sweep.v1', 'model.bilinear.K', 'materials."soft steel".E')
     """
     parts = map(str, path_of(name))
-    return ".".join(part if re.fullmatch("[A-Za-z0-9_-]+", part) else _toml(part) for part in parts)
+    return ".".join(part if re.fullmatch("[A-Za-z0-9_-]+", part) else _toml_value(part) for part in parts)
 
 
-def _toml(value: float | str) -> str:
+def _toml_value(value: float | str) -> str:
     return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
 
 
-def _read(read: Read, asked: Mapping[str, str]) -> Config:
+def _read_with_option_names(read: ReadConfig, asked: Mapping[str, str]) -> Config:
     """A config whose problems are called by what was asked for, not by the overrides that stand for it."""
     try:
         return read(list(asked))
     except ConfigError as error:
         names = {f"--set {override}:": f"{name}:" for override, name in asked.items()}
-        raise ConfigError([_renamed(line, names) for line in error.problems]) from None
+        raise ConfigError([_with_option_name(line, names) for line in error.problems]) from None
 
 
-def _renamed(line: str, names: Mapping[str, str]) -> str:
+def _with_option_name(line: str, names: Mapping[str, str]) -> str:
     """A line that begins with one of the names, beginning with what it stands for."""
     return next((safe_text(new) + line[len(old) :] for old, new in names.items() if line.startswith(old)), line)
