@@ -1,4 +1,4 @@
-"""Two results laid point on point by their labels, and what keeps them from fitting."""
+"""Align two results by their labels, and list the differences between their inputs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A new baseline in the place of an old one, with the reason why."""
+"""Replace a baseline by a new result, with the reason for the change."""
 
 from __future__ import annotations
 

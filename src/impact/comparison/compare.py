@@ -1,4 +1,4 @@
-"""Judge a result by a baseline, as the SCHEMA says: the guard of stored datasets against silent changes."""
+"""Compare a result with a baseline, each variable as the SCHEMA prescribes."""
 
 from __future__ import annotations
 

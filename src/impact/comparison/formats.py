@@ -1,4 +1,4 @@
-"""A verdict for whoever reads it: a person in a pull request, a CI server, a program."""
+"""A verdict as JSON, JUnit XML, Markdown or GitHub annotations."""
 
 from __future__ import annotations
 

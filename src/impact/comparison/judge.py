@@ -1,4 +1,4 @@
-"""One variable of two aligned results: how many tolerances apart, slab by slab, and where it is worst."""
+"""Compare one variable of two aligned results: the difference in tolerances, slab by slab, and the worst point."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far a value may be from its baseline: what was asked for, else what the baseline says, else the solver's."""
+"""Tolerances of a comparison: those passed by the caller, else the baseline's, else a multiple of its rtol."""
 
 from __future__ import annotations
 

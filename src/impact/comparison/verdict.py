@@ -1,4 +1,4 @@
-"""What a comparison of two results comes to: a frozen value that says it in a sentence, and where to look."""
+"""The outcome of a comparison: whether two results are equal, what differs, and where."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Attributes of a result that hold JSON: read and validated here only, since the file may come from anywhere."""
+"""JSON attributes of a result, validated when they are read, since the file may come from anywhere."""
 
 from __future__ import annotations
 

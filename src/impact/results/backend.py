@@ -1,6 +1,4 @@
-"""Results on disk: written whole or not at all, and opened as datasets that are read, or computed, when they are
-indexed.
-"""
+"""Save, open and load result files; the xarray backend that opens them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a sweep would take: counted before anything is made, and timed on one block."""
+"""Estimate the size and duration of a sweep: count trajectories, and time one range and one slab."""
 
 from __future__ import annotations
 

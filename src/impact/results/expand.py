@@ -1,4 +1,4 @@
-"""Expand: from the trajectory table of a sweep to the outputs of any part of its grid.
+"""Expand the trajectory table of a sweep into the outputs of any part of its grid.
 
 What is integrated is a table of distinct trajectories per model, in the contact's own units. All else in a result
 is a pure function of the inputs, this table and a place of the grid, and is computed here and nowhere else.

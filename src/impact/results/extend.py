@@ -1,4 +1,4 @@
-"""Extend: more values on the axes of a result, of which only what is new is integrated."""
+"""Extend a result by values of its axes or by models; only new trajectories are integrated."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The factored layout: a result as its axes, its trajectory table and what its laws say, for any number of points.
+"""The factored layout: a file of axes, trajectory table and law metadata, for any number of points.
 
 Some points, the witnesses, are stored in full. When a file is opened they are computed again: where they come to
 other numbers, the file belongs to another version, and is refused.

@@ -1,4 +1,4 @@
-"""A result as netCDF-4 in HDF5: written slab by slab, and read only where it has the structure of a result.
+"""Results as netCDF-4 files in HDF5: written slab by slab, and validated before they are read.
 
 HDF5 can name other files as the place of its data, can declare what it does not hold, and can hold a little under
 many names. A result does none of that: datasets of numbers and letters in one group, and small attributes.

@@ -1,4 +1,4 @@
-"""Plausibility: values that are allowed, and most likely not what was meant."""
+"""Notes on values that are valid but probably not intended."""
 
 from __future__ import annotations
 

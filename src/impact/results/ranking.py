@@ -1,4 +1,4 @@
-"""Which model gives the restitution asked for, over all points of a result, and how wrong the others are."""
+"""Rank the models of a result by how closely they deliver the restitution asked for."""
 
 from __future__ import annotations
 

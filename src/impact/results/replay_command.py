@@ -1,4 +1,4 @@
-"""The command that runs a point of a result again."""
+"""The command that runs one point of a result again."""
 
 from __future__ import annotations
 

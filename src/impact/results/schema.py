@@ -1,4 +1,4 @@
-"""What is in a result: the one SCHEMA, and the labels, units and provenance of the dataset of a plan."""
+"""The SCHEMA of a result: its variables and their comparison scales, coordinates and attributes."""
 
 from __future__ import annotations
 

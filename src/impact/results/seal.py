@@ -1,4 +1,4 @@
-"""Sealed files: 512 bytes that name the format and hold the SHA-256 of everything after them.
+"""Seals of files: 512 bytes with the format, the schema version and the SHA-256 of everything after them.
 
 The seal is checked before the HDF5 library parses a byte, so that every changed bit and every truncation is found.
 It is also the identity of a result: equal inputs give equal files within one installation.

@@ -1,4 +1,4 @@
-"""Which part of a result is asked for: models by their keys, points by values of the axes."""
+"""Select parts of a result: models by key, points by values of axes; match the labels of two results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Shards: a sweep in parts that know nothing of each other, for job arrays without a scheduler of our own.
+"""Shards: parts of a sweep that run independently, for example in a job array, and are merged into one result.
 
 Shard K of N has the ranges K, K + N, K + 2N, ... of trajectories in a work folder that stays; those of all shards
 make the result. A range is a pure function of its plan: it may be in several folders, with the same bits.

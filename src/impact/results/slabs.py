@@ -1,4 +1,4 @@
-"""Slabs of a result of any size, and the axes along which each of its variables varies.
+"""Slabs: parts of a large result that fit in memory; the axes along which a variable varies.
 
 The variables of a large result are computed, or read, when they are indexed. A variable that is computed says in
 `encoding["varies_along"]`, by model, along which axes it varies: along the others it has the same value

@@ -1,4 +1,4 @@
-"""What came out of a sweep in few numbers, slab after slab: counts, worst errors, first failures, extremes."""
+"""Summarize a result of any size: counts by status, largest errors, first failures, extremes."""
 
 from __future__ import annotations
 

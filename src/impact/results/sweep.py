@@ -1,4 +1,4 @@
-"""A sweep into a file: what is finished is kept, the file is a function of it, and appears when it is whole."""
+"""Run a sweep into a file: finished trajectories are kept, and the file appears when it is complete."""
 
 from __future__ import annotations
 

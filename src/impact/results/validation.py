@@ -1,4 +1,4 @@
-"""The names that a result, or a time history, may have, and what commands rely on in it.
+"""Validate a dataset as a result or a time history: its names, axes, types and attributes.
 
 `load` passes over other names, `save` refuses them.
 """
