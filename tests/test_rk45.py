@@ -171,7 +171,7 @@ def test_hardly_a_step_of_an_impact_is_tried_again(rtol):
     law = motion.MotionLaw.of(find("hunt-crossley-1975"), 1.5, strong=False)
     for chi in np.linspace(0.0, 2.0, 9):
         start = motion.start_of_approach(law, (), 1)
-        into = partial(integrate, motion.approach(law), start, (np.array([chi]),), rtol=rtol)
+        into = partial(integrate, motion.approach_problem(law), start, (np.array([chi]),), rtol=rtol)
         assert into(max_steps=int(into(max_steps=1000).steps[0]) + 1).termination[0] == Termination.EVENT_REACHED
 
 
