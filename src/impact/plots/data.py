@@ -12,7 +12,7 @@ import numpy as np
 
 from ..config.cases import HEADER, CsvTable, column_values, read_csv
 from ..config.quantities import Quantity, show
-from ..config.tables import SWEEP
+from ..config.tables import SWEEP_QUANTITIES
 from ..errors import ConfigError, UsageError, did_you_mean
 from ..formatting import number
 from ..results.history import HISTORY
@@ -166,7 +166,7 @@ def _known() -> dict[str, Quantity]:
     """What a column may be called, with its unit."""
     outputs = {one.name: Quantity(plain_unit(one.unit), one.meaning) for one in SCHEMA if one.dtype == "f8"}
     history = {name: Quantity(plain_unit(unit), meaning) for name, unit, meaning in HISTORY}
-    inputs = {name: Quantity(one.unit, one.meaning) for name, one in SWEEP.items()}
+    inputs = {name: Quantity(one.unit, one.meaning) for name, one in SWEEP_QUANTITIES.items()}
     time, impulse = Quantity("s", "time"), Quantity("N s", "impulse")
     sigma = Quantity("1", "standard deviation", least=0.0)
     return {**outputs, **history, **inputs, "t": time, "tau": impulse, SIGMA: sigma}
