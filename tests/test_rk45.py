@@ -234,7 +234,7 @@ def test_the_step_follows_the_error_within_bounds():
     assert (grow, shrink) == (2.0 * rk45.MAX_FACTOR, 2.0 * rk45.MIN_FACTOR)
     assert stay == 2.0 * rk45.SAFETY
     errors = rtol * np.geomspace(1e-2, 1e2, 50)
-    exact = rk45.SAFETY * (rtol / errors) ** (rk45.GAIN / 256)
+    exact = rk45.SAFETY * (rtol / errors) ** (rk45.CONTROLLER_EXPONENT / 256)
     assert rk45.next_step(np.ones(50), errors, rtol) == pytest.approx(exact, rel=0.05)
 
 
