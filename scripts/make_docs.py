@@ -5,18 +5,24 @@ python scripts/make_docs.py
 
 from __future__ import annotations
 
+import ast
 from pathlib import Path
 
 import impact
 from gallery import gallery_page, write_gallery
 from impact.contact.status import Status
 from impact.plots.style import save_figure
-from impact.results.history import HISTORY
-from impact.results.schema import SCHEMA, SCHEMA_VERSION
+from impact.results.schema import HISTORY_VARIABLES, SCHEMA, SCHEMA_VERSION
 from models_page import models_page
 from models_pictures import curves
 
 ROOT = Path(__file__).parent.parent
+PACKAGE = ROOT / "src" / "impact"
+# from the top down
+PACKAGES = (
+    "cli", "api", "reporting", "plots", "comparison", "results", "engine", "config", "contact", "contact/models",
+    "contact/closed_forms", "contact/numba", "ode", "formatting", "text", "errors", "atomic", "_version",
+)  # fmt: skip
 # the figures of the paper that follow one impact, and their kinds
 PAPER_FIGURES = {
     "figure2": "impulse",
@@ -115,11 +121,32 @@ def schema_page() -> str:
         equation = one.equation.replace("|", "\\|")
         variables.append(f"| `{one.name}` | {one.unit} | {dims} | {one.judged} | {one.meaning} | {equation} |")
     statuses = [f"| {status.value} | {status.name.lower()} | {status.meaning} |" for status in Status]
-    history = [f"| `{name}` | {unit} | {meaning} |" for name, unit, meaning in HISTORY]
+    history = [f"| `{name}` | {unit} | {meaning} |" for name, unit, meaning in HISTORY_VARIABLES]
     tables = {"variables": variables, "statuses": statuses, "history": history}
     on_request = ", ".join(f"`{one.name}`" for one in SCHEMA if not one.by_default)
     by_name = {"on_request": on_request, "version": SCHEMA_VERSION}
     return SCHEMA_PAGE.format(**by_name, **{name: "\n".join(rows) for name, rows in tables.items()})
+
+
+def architecture_page(page: str) -> str:
+    """docs/architecture.md with the first line of each module, packages from the top down.
+
+    Parameters
+    ----------
+    page : its text, whose list is replaced
+    """
+    begin, end = "<!-- modules -->\n", "<!-- end of modules -->"
+    before, _, rest = page.partition(begin)
+    lines = []
+    for part in PACKAGES:
+        package = PACKAGE / part
+        lines += ["", f"**{part}**", ""]
+        for module in sorted(package.glob("*.py")) if package.is_dir() else [package.with_suffix(".py")]:
+            summary = ast.get_docstring(ast.parse(module.read_text(encoding="utf-8")))
+            if summary:
+                name = module.relative_to(PACKAGE).with_suffix("").as_posix().removesuffix("/__init__")
+                lines.append(f"- `{name}`: {summary.splitlines()[0]}")
+    return f"{before}{begin}{chr(10).join(lines[1:])}\n{end}{rest.partition(end)[2]}"
 
 
 def write_curves(folder: Path) -> None:
@@ -143,6 +170,8 @@ def write_paper_figures(folder: Path) -> None:
 
 def main() -> None:
     (ROOT / "docs" / "schema.md").write_text(schema_page(), encoding="utf-8")
+    architecture = ROOT / "docs" / "architecture.md"
+    architecture.write_text(architecture_page(architecture.read_text(encoding="utf-8")), encoding="utf-8")
     (ROOT / "docs" / "models.md").write_text(models_page(), encoding="utf-8")
     write_curves(ROOT / "docs" / "models")
     (ROOT / "docs" / "gallery.md").write_text(gallery_page(), encoding="utf-8")

@@ -10,7 +10,7 @@ from typing import Any
 from ..contact.formula import argument_names
 from ..contact.materials import hertz_stiffness
 from ..contact.model import ForceModel, with_base_quantities
-from ..contact.scaling import asked as quantities_of
+from ..contact.scaling import required_quantities
 from .files import as_table
 from .quantities import ConfigProblem
 from .tables import MATERIAL_QUANTITIES, SWEEP_QUANTITIES, model_quantities
@@ -220,4 +220,4 @@ def _depends_on(model: ForceModel, raw: RawConfig) -> set[str]:
     """The quantities that a model needs in a sweep, including those of its stiffness."""
     has_stiffness = "K" in raw.sweep or raw.sets_stiffness(model)
     stiffness = () if has_stiffness else _stiffness_arguments(model)
-    return {*with_base_quantities(quantities_of(model)), *model.domain, *stiffness}
+    return {*with_base_quantities(required_quantities(model)), *model.domain, *stiffness}
