@@ -48,11 +48,15 @@ class Forked:
 
     server: subprocess.Popen[str]
 
-    def __call__(self, *words: str | Path, cwd: Path = ROOT, limit: float = 30.0, **environment: str) -> Done:
+    def __call__(
+        self, *words: str | Path, cwd: Path = ROOT, limit: float = 30.0, code: str = "", stdout: str = "",
+        stderr: str = "", **environment: str,
+    ) -> Done:  # fmt: skip
+        """Run a command line, after some Python code, with streams that may go to a file or a terminal."""
         assert self.server.stdin is not None
         assert self.server.stdout is not None
         request = {"argv": [str(word) for word in words], "cwd": str(cwd), "limit": limit,
-                   "environment": environment}  # fmt: skip
+                   "environment": environment, "code": code, "stdout": stdout, "stderr": stderr}  # fmt: skip
         print(json.dumps(request), file=self.server.stdin, flush=True)
         return Done(**json.loads(self.server.stdout.readline()))
 
@@ -82,7 +86,11 @@ def serve() -> None:
             child = os.fork()
             if child == 0:
                 os.environ |= request["environment"]
-                _command(request["argv"], request["cwd"], out, err)
+                streams = [
+                    os.open(request[name], os.O_WRONLY) if request[name] else file.fileno()
+                    for name, file in (("stdout", out), ("stderr", err))
+                ]
+                _command(request["argv"], request["cwd"], request["code"], *streams)
             done = _wait(child, request["limit"], out, err)
         print(json.dumps(asdict(done)), flush=True)
 
@@ -118,25 +126,30 @@ def _warm_up() -> None:
     gc.freeze()
 
 
-def _command(argv: list[str], cwd: str, out: IO[bytes], err: IO[bytes]) -> NoReturn:
+def _command(argv: list[str], cwd: str, program: str, stdout: int, stderr: int) -> NoReturn:
     """In the child: become the command, and leave as a program does."""
     from impact.cli.main import main
 
     code: object = 99
     try:
         os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
-        os.dup2(out.fileno(), 1)
-        os.dup2(err.fileno(), 2)
+        os.dup2(stdout, 1)
+        os.dup2(stderr, 2)
         os.chdir(cwd)
         sys.argv = ["impact", *argv]
+        exec(program, {})
         main()
     except SystemExit as leaving:
         code = leaving.code or 0
     except BaseException:
         traceback.print_exc()
     finally:
-        sys.stdout.flush()
-        sys.stderr.flush()
+        for stream in (sys.stdout, sys.stderr):
+            try:
+                stream.flush()
+            except OSError:
+                # as the interpreter leaves where it cannot flush
+                code = 120
         # libraries close their files at the exit, and can crash there: os._exit would hide it
         atexit._run_exitfuncs()
         ctypes.CDLL(None).exit(code if isinstance(code, int) else 99)
