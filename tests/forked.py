@@ -9,19 +9,23 @@ from __future__ import annotations
 
 import atexit
 import ctypes
+import fcntl
 import gc
 import io
 import json
 import os
+import pty
 import signal
+import struct
 import subprocess
 import sys
 import tempfile
+import termios
 import threading
 import time
 import traceback
 from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import IO, NoReturn
@@ -75,6 +79,43 @@ def forking() -> Iterator[Forked]:
         finally:
             assert server.stdin is not None
             server.stdin.close()
+
+
+@contextmanager
+def abandoned_pipe(folder: Path) -> Iterator[str]:
+    """The path of a pipe whose reader leaves as soon as there is a writer."""
+    path = folder / "pipe"
+    os.mkfifo(path)
+    reader = threading.Thread(target=lambda: os.close(os.open(path, os.O_RDONLY)))
+    reader.start()
+    yield str(path)
+    reader.join()
+    path.unlink()
+
+
+def printed_on_terminal(
+    forked: Forked, *words: str | Path, width: int = 80, **environment: str
+) -> tuple[Done, str]:
+    """Run a command line whose stdout is a terminal; how it ended and what the terminal shows."""
+    driver, terminal = pty.openpty()
+    fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 50, width, 0, 0))
+    # the width of the terminal counts only where no variable has another
+    code = "import os\nfor name in {'COLUMNS', 'LINES', 'TERM'} - {*%r}:\n    os.environ.pop(name, None)"
+    printed = b""
+
+    def read() -> None:
+        nonlocal printed
+        with suppress(OSError):
+            while True:
+                printed += os.read(driver, 10_000)
+
+    reader = threading.Thread(target=read)
+    reader.start()
+    done = forked(*words, stdout=os.ttyname(terminal), code=code % [*environment], **environment)
+    os.close(terminal)
+    reader.join()
+    os.close(driver)
+    return done, printed.decode()
 
 
 def serve() -> None:

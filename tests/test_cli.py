@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
-import fcntl
 import itertools
 import json
 import os
-import pty
 import re
 import signal
-import struct
 import subprocess
 import sys
-import termios
 import time
 from pathlib import Path
-from threading import Thread
 
 import numpy as np
 import pytest
@@ -26,7 +20,7 @@ from rich.cells import cell_len
 import impact
 
 from .conftest import ROOT, WIDE, Run
-from .forked import Forked
+from .forked import Forked, printed_on_terminal
 
 SMALL = """models = ["hertz", "gharib-hurmuzlu-2012"]
 [sweep]
@@ -652,26 +646,9 @@ def test_models_by_a_pattern(cli: Run) -> None:
 def test_the_catalogue_keeps_the_restitution_on_a_narrow_terminal(
     forked: Forked, width: int, columns: int
 ) -> None:
-    driver, terminal = pty.openpty()
-    fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 50, width, 0, 0))
-    # the width of the terminal counts only where no variable has another
-    code = "import os\nfor name in ('COLUMNS', 'LINES', 'TERM'):\n    os.environ.pop(name, None)"
-    printed = b""
-
-    def read() -> None:
-        nonlocal printed
-        with contextlib.suppress(OSError):
-            while True:
-                printed += os.read(driver, 10_000)
-
-    reader = Thread(target=read)
-    reader.start()
-    done = forked("models", stdout=os.ttyname(terminal), code=code, NO_COLOR="1")
-    os.close(terminal)
-    reader.join()
-    os.close(driver)
+    done, printed = printed_on_terminal(forked, "models", width=width, NO_COLOR="1")
     assert done.returncode == 0
-    lines = re.sub(r"\x1b\[[\d;]*m", "", printed.decode()).splitlines()
+    lines = re.sub(r"\x1b\[[\d;]*m", "", printed).splitlines()
     assert len(re.findall(r"e=0\.\d", lines[0])) == columns
     assert ("equation" in lines[0]) == (width == 120)
     assert max(map(cell_len, lines)) <= width
