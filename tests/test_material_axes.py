@@ -92,8 +92,8 @@ def test_a_sweep_over_properties_is_the_sweeps_at_each_of_their_values(
     singles = [execute(_prepared(config(sweep, table))) for table in tables]
     for layout in LAYOUTS:
         stored = replace(plan, config=replace(plan.config, output=replace(plan.config.output, layout=layout)))
-        survey = sweep_into(tmp_path / layout, stored, overwrite=True)
-        assert survey.tally.points == plan.points
+        outcome = sweep_into(tmp_path / layout, stored, overwrite=True)
+        assert outcome.summary.points == plan.points
         result = impact.load(tmp_path / layout)
         assert result["materials.steel." + first].attrs["units"]
         for number, single in enumerate(singles):

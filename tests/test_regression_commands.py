@@ -25,7 +25,7 @@ import xarray as xr
 import impact
 from impact.atomic import atomic_write
 from impact.errors import ResultError, StoreError, UsageError
-from impact.results.backend import write
+from impact.results.backend import write_sealed
 
 from .conftest import ROOT
 from .forked import Done, Forked, abandoned_pipe, printed_on_terminal
@@ -673,7 +673,7 @@ def test_a_rerun_judges_a_changed_plug_in_with_a_note(forked: Forked, tmp_path: 
 def _stored_as_it_is(dataset: xr.Dataset, path: Path) -> None:
     """A sealed file, which `impact.save` might refuse to write."""
     with atomic_write(path, overwrite=True) as sink:
-        write(sink, dataset, ((str(name), (), one.values) for name, one in dataset.data_vars.items()))
+        write_sealed(sink, dataset, ((str(name), (), one.values) for name, one in dataset.data_vars.items()))
 
 
 def test_a_rerun_of_a_result_whose_config_cannot_be_read(forked: Forked, tmp_path: Path) -> None:

@@ -23,8 +23,8 @@ import impact
 from impact.api import prepare
 from impact.engine.executors import choose_backend
 from impact.errors import ResultError, StoreError, UnfinishedError, UsageError
-from impact.results.backend import open_result, write_whole
-from impact.results.sealed import write_seal
+from impact.results.backend import open_result, write_file
+from impact.results.seal import write_seal
 from impact.results.sweep import sweep_into
 
 from .conftest import ROOT, Run
@@ -232,7 +232,7 @@ def test_a_file_that_appears_meanwhile_is_kept(tmp_path: Path, monkeypatch: pyte
 
     monkeypatch.setattr(os, "fsync", somebody_else_writes)
     with pytest.raises(UsageError, match="appeared"):
-        write_whole(path, b"ours", overwrite=False)
+        write_file(path, b"ours", overwrite=False)
     assert path.read_text() == "somebody else's"
     assert [p.name for p in tmp_path.iterdir()] == ["out.h5"]
 
@@ -287,7 +287,7 @@ def test_a_disk_that_fails_leaves_nothing_behind(tmp_path: Path) -> None:
     resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, limits[1]))
     try:
         with pytest.raises(StoreError, match="not written"):
-            write_whole(tmp_path / "out.h5", b"x" * 100_000, overwrite=False)
+            write_file(tmp_path / "out.h5", b"x" * 100_000, overwrite=False)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
         signal.signal(signal.SIGXFSZ, handler)
@@ -359,10 +359,10 @@ def test_without_hard_links(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
         raise PermissionError(1, "Operation not permitted")
 
     monkeypatch.setattr(os, "link", no_links)
-    write_whole(tmp_path / "out.h5", b"ours", overwrite=False)
+    write_file(tmp_path / "out.h5", b"ours", overwrite=False)
     assert (tmp_path / "out.h5").read_bytes() == b"ours"
     with pytest.raises(UsageError, match="exists"):
-        write_whole(tmp_path / "out.h5", b"other", overwrite=False)
+        write_file(tmp_path / "out.h5", b"other", overwrite=False)
     assert [p.name for p in tmp_path.iterdir()] == ["out.h5"]
 
 

@@ -145,7 +145,7 @@ def plot(
             continue
         save_figure(figure, picture, overwrite=overwrite, style=style)
         for path, content in tables:
-            backend.write_whole(path, content, overwrite=overwrite)
+            backend.write_file(path, content, overwrite=overwrite)
         drawn[name] = numbers
         exits.say(_summary(picture, numbers))
     if not drawn:

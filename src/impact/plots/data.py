@@ -15,8 +15,7 @@ from ..config.quantities import Quantity, show
 from ..config.tables import SWEEP_QUANTITIES
 from ..errors import ConfigError, UsageError, did_you_mean
 from ..formatting import number
-from ..results.history import HISTORY
-from ..results.schema import SCHEMA, plain_unit
+from ..results.schema import HISTORY_VARIABLES, SCHEMA, plain_unit
 from ..text import safe_text
 
 if TYPE_CHECKING:
@@ -165,7 +164,7 @@ def _table_of(points: pd.DataFrame | xr.Dataset) -> CsvTable:
 def _known() -> dict[str, Quantity]:
     """What a column may be called, with its unit."""
     outputs = {one.name: Quantity(plain_unit(one.unit), one.meaning) for one in SCHEMA if one.dtype == "f8"}
-    history = {name: Quantity(plain_unit(unit), meaning) for name, unit, meaning in HISTORY}
+    history = {name: Quantity(plain_unit(unit), meaning) for name, unit, meaning in HISTORY_VARIABLES}
     inputs = {name: Quantity(one.unit, one.meaning) for name, one in SWEEP_QUANTITIES.items()}
     time, impulse = Quantity("s", "time"), Quantity("N s", "impulse")
     sigma = Quantity("1", "standard deviation", least=0.0)

@@ -18,8 +18,8 @@ from ..formatting import label
 from ..plots.kinds import WIDTHS, Choice, draw
 from ..plots.style import encoded
 from ..results.schema import columns_along, is_input, plain_unit
-from ..results.select import places_of
-from ..results.slabs import distinct, is_computed, slabs
+from ..results.selection import model_positions
+from ..results.slabs import distinct_points, is_computed, slabs
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -148,7 +148,7 @@ def _answered(dataset: xr.Dataset, keys: Sequence[str], drawn: Sequence[Hashable
     dims = dataset["status"].dims if "status" in dataset else dataset.dims
     axes = [dim for dim in dims if dim not in ("model", *drawn)]
     first: tuple[int, ...] | None = None
-    for place in places_of(keys, dataset) if "status" in dataset else ():
+    for place in model_positions(keys, dataset) if "status" in dataset else ():
         answered = _first_answered(dataset.isel(model=place), axes)
         first = min(filter(None, (first, answered)), default=None)
         if first is not None and not any(first):
@@ -161,7 +161,7 @@ def _first_answered(of_model: xr.Dataset, axes: Sequence[Hashable]) -> tuple[int
 
     Where the status of more than MAX_SEARCHED points would have to be computed, those of a coarser grid are.
     """
-    status, _ = distinct(of_model, "status")
+    status, _ = distinct_points(of_model, "status")
     ordered = [*axes, *(dim for dim in status.dims if dim not in axes)]
     steps = dict.fromkeys(ordered, 1)
     if is_computed(status):

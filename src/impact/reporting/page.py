@@ -27,7 +27,7 @@ from ..results.plausibility import material_notes, result_notes
 from ..results.ranking import Ranking, ranking
 from ..results.schema import count_points, exponents_of, is_input
 from ..results.slabs import MAX_SUMMARY_POINTS, is_large
-from ..results.summary import Tally, extremes_of, tally_of
+from ..results.summary import Summary, extremes_of, summarize
 from ..text import safe_text, with_year
 from .figures import at_text, figures_of, quantity, unit_of, varying
 
@@ -57,7 +57,7 @@ def page(dataset: xr.Dataset, figures: Callable[[str, Choice], Numbers]) -> str:
     """
     if "model" not in dataset.dims:
         raise UsageError("this is a time history; a report is made of the result of a sweep")
-    tally = tally_of(dataset, MAX_FAILED)
+    tally = summarize(dataset, MAX_FAILED)
     ranked, headline = _answer(dataset)
     keys = [str(key) for key in dataset["model"].values]
     selection = ""
@@ -113,7 +113,7 @@ def _summary(dataset: xr.Dataset) -> str:
     )
 
 
-def _outcomes(tally: Tally) -> Iterator[str]:
+def _outcomes(tally: Summary) -> Iterator[str]:
     """How the points ended."""
     for status in sorted(tally.counts):
         yield f"{tally.counts[status]:,} {status.name.lower()}: {status.meaning}"
@@ -180,7 +180,7 @@ def _answer(dataset: xr.Dataset) -> tuple[Ranking | None, str]:
     return ranked, re.sub("^no ", "No ", f"{ranked.headline}.")
 
 
-def _failures(dataset: xr.Dataset, tally: Tally) -> dict[str, Any]:
+def _failures(dataset: xr.Dataset, tally: Summary) -> dict[str, Any]:
     """What is to be said of failed points, the first of them, and how many more there are."""
     if "status" not in dataset:
         return {"sentences": ["The result does not tell which points failed."], "points": [], "more": ""}
