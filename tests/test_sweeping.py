@@ -429,7 +429,7 @@ def test_chunks_that_are_too_many_or_too_large(blocks: Path) -> None:
     with pytest.raises(ConfigError, match=r"got 1,600,000 chunks of 2 points, expected at most 100,000 of"):
         prepare(blocks, ["output.chunks.e=1"])
     with pytest.raises(ConfigError, match=r"got 80 chunks of 10,000,000 points"):
-        prepare(blocks, ["output.chunks.m1=1", "sweep.e.linspace=[0,1,10000000]"])
+        prepare(blocks, ["output.chunks.m1=1", "sweep.v1={linspace=[1,2,250]}"])
 
 
 def test_what_packs_very_well_is_read_again(tmp_path: Path) -> None:

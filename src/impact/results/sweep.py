@@ -325,8 +325,6 @@ def store_result(
         lengths = [chunks.get(axis.name, axis.size) for axis in plan.config.axes] if chunks else []
         for model, where, impacts, values in expanded_slabs(table, variables, lengths):
             if extension and extension.fill:
-                # expanded values may be read-only views
-                values = {name: array.copy() for name, array in values.items()}
                 extension.fill(model, where, values)
             for name, array in values.items():
                 yield name, (model, *where) if "model" in whole[name].dims else where, array
