@@ -42,8 +42,8 @@ from impact.contact.impacts import Impacts
 from impact.contact.model import ForceModel
 from impact.contact.numba.dispatch import is_installed
 from impact.contact.outputs import OUTPUTS, collide
-from impact.engine.executors import team_of
-from impact.engine.trajectories import RANGE_TRAJECTORIES, even
+from impact.engine.executors import choose_backend
+from impact.engine.trajectories import RANGE_TRAJECTORIES, even_size
 
 # those of the paper whose restitution is e's alone: (10), (19)-(23), (28), (29), (33) and (43)
 PAPER = (
@@ -79,7 +79,7 @@ def core(
     blocks = []
     for place, model in enumerate(models):
         mine = e[place :: len(models)]
-        size = even(mine.size, RANGE_TRAJECTORIES)
+        size = even_size(mine.size, RANGE_TRAJECTORIES)
         blocks += [(model, table1(mine[first : first + size], model)) for first in range(0, mine.size, size)]
 
     def outputs(block: tuple[ForceModel, Impacts]) -> tuple[float, int]:
@@ -87,7 +87,7 @@ def core(
         found = {name: contact[name] for name in OUTPUTS}
         return float(np.max(np.abs(found["closed_form_error"]))), int(found["steps"].sum())
 
-    with team_of(1, threads).executor() as pool:
+    with choose_backend(1, threads).executor() as pool:
         begun = time.perf_counter()
         found = list(pool.map(outputs, blocks))
         seconds = time.perf_counter() - begun
@@ -232,7 +232,7 @@ def sweep(models: list[ForceModel], impacts: int, rtol: float, by: str, jobs: in
         }
     )  # fmt: skip
     begun = time.perf_counter()
-    execute(plan, team_of(jobs, threads))
+    execute(plan, choose_backend(jobs, threads))
     return plan.points / (time.perf_counter() - begun)
 
 

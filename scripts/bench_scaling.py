@@ -34,8 +34,8 @@ from rich.table import Table
 
 from impact.api import prepare
 from impact.engine.dask import cluster
-from impact.engine.execute import context_of, integrate, with_core, work
-from impact.engine.executors import AHEAD, Team, team_of
+from impact.engine.execute import context_of, integrate_columns, integrate_remotely, with_core
+from impact.engine.executors import BLOCKS_IN_FLIGHT, Backend, choose_backend
 from impact.engine.plan import Plan
 from impact.engine.progress import Progress
 from impact.engine.trajectories import (
@@ -109,20 +109,20 @@ class Cost:
         return Cost(*(getattr(self, name) - getattr(then, name) for name in vars(self)))
 
 
-def measured(plan: Plan, team: Team, scheduler: psutil.Process | None = None) -> tuple[float, Cost]:
+def measured(plan: Plan, backend: Backend, scheduler: psutil.Process | None = None) -> tuple[float, Cost]:
     """Seconds that a sweep takes, and what its trajectories alone cost; the best of a few."""
-    return min((_measured(plan, team, scheduler) for _ in range(3)), key=lambda one: one[0])
+    return min((_measured(plan, backend, scheduler) for _ in range(3)), key=lambda one: one[0])
 
 
-def _measured(plan: Plan, team: Team, scheduler: psutil.Process | None) -> tuple[float, Cost]:
+def _measured(plan: Plan, backend: Backend, scheduler: psutil.Process | None) -> tuple[float, Cost]:
     begun, ends = Cost.now(scheduler), []
 
-    def tell(at: Progress) -> None:
+    def on_progress(at: Progress) -> None:
         if at.trajectories in (0, at.of_trajectories) and not at.points:
             ends.append(Cost.now(scheduler))
 
     with tempfile.TemporaryDirectory() as folder:
-        sweep_into(Path(folder) / "results.h5", plan, team=team, tell=tell)
+        sweep_into(Path(folder) / "results.h5", plan, backend=backend, on_progress=on_progress)
     return Cost.now(scheduler).since(begun).clock, ends[-1].since(ends[0])
 
 
@@ -133,15 +133,15 @@ def by_dask(plan: Plan, key: str, columns: Columns, workers: int) -> tuple[float
         dask(Path(folder), workers) as (file, scheduler),
         cluster(file) as joined,
     ):
-        while joined.team.room() < AHEAD * workers:
+        while joined.backend.capacity() < BLOCKS_IN_FLIGHT * workers:
             time.sleep(0.1)
-        with joined.team.executor() as executor:
-            wait([executor.submit(work, key, columns, context_of(plan)) for _ in range(4 * workers)])
+        with joined.backend.executor() as executor:
+            wait([executor.submit(integrate_remotely, key, columns, context_of(plan)) for _ in range(4 * workers)])
         # both do something while nothing is asked of them
         begun = Cost.now(scheduler)
         time.sleep(IDLE)
         idle = Cost.now(scheduler).since(begun)
-        seconds, cost = measured(plan, joined.team, scheduler)
+        seconds, cost = measured(plan, joined.backend, scheduler)
         share = cost.clock / idle.clock
         return seconds, Cost(
             cost.clock, cost.driver - share * idle.driver, cost.scheduler - share * idle.scheduler, cost.wire
@@ -162,14 +162,14 @@ def main() -> None:
     model, columns = plan.models[middle.model], columns_of(plan, maps, middle)
     for _ in range(2):
         begun = time.process_time()
-        integrate(model, columns, plan.config.solver)
+        integrate_columns(model, columns, plan.config.solver)
         alone = time.process_time() - begun
     print(f"{plan.points:,} points, {len(ranges)} ranges, {asked.core}, {os.cpu_count()} cores")
     rows = Table("", "trajectories/s", "ratio", "driver", "scheduler", "bytes", box=None)
-    one, cost = measured(plan, team_of(1))
+    one, cost = measured(plan, choose_backend(1))
     for way, (seconds, cost) in (
         ("1 process", (one, None)),
-        ("2 processes", (measured(plan, team_of(2))[0], None)),
+        ("2 processes", (measured(plan, choose_backend(2))[0], None)),
         ("1 worker of dask", by_dask(plan, model.key, columns, 1)),
         ("2 workers of dask", by_dask(plan, model.key, columns, 2)),
     ):

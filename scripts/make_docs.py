@@ -5,6 +5,7 @@ python scripts/make_docs.py
 
 from __future__ import annotations
 
+import ast
 from pathlib import Path
 
 import impact
@@ -17,6 +18,12 @@ from models_page import models_page
 from models_pictures import curves
 
 ROOT = Path(__file__).parent.parent
+PACKAGE = ROOT / "src" / "impact"
+# from the top down
+PACKAGES = (
+    "cli", "api", "reporting", "plots", "comparison", "results", "engine", "config", "contact", "contact/models",
+    "contact/closed_forms", "contact/numba", "ode", "formatting", "text", "errors", "atomic", "_version",
+)  # fmt: skip
 # the figures of the paper that follow one impact, and their kinds
 PAPER_FIGURES = {
     "figure2": "impulse",
@@ -122,6 +129,27 @@ def schema_page() -> str:
     return SCHEMA_PAGE.format(**by_name, **{name: "\n".join(rows) for name, rows in tables.items()})
 
 
+def architecture_page(page: str) -> str:
+    """docs/architecture.md with the first line of each module, packages from the top down.
+
+    Parameters
+    ----------
+    page : its text, whose list is replaced
+    """
+    begin, end = "<!-- modules -->\n", "<!-- end of modules -->"
+    before, _, rest = page.partition(begin)
+    lines = []
+    for part in PACKAGES:
+        package = PACKAGE / part
+        lines += ["", f"**{part}**", ""]
+        for module in sorted(package.glob("*.py")) if package.is_dir() else [package.with_suffix(".py")]:
+            summary = ast.get_docstring(ast.parse(module.read_text(encoding="utf-8")))
+            if summary:
+                name = module.relative_to(PACKAGE).with_suffix("").as_posix().removesuffix("/__init__")
+                lines.append(f"- `{name}`: {summary.splitlines()[0]}")
+    return f"{before}{begin}{chr(10).join(lines[1:])}\n{end}{rest.partition(end)[2]}"
+
+
 def write_curves(folder: Path) -> None:
     """The small pictures of docs/models.md, and no others."""
     folder.mkdir(exist_ok=True)
@@ -143,6 +171,8 @@ def write_paper_figures(folder: Path) -> None:
 
 def main() -> None:
     (ROOT / "docs" / "schema.md").write_text(schema_page(), encoding="utf-8")
+    architecture = ROOT / "docs" / "architecture.md"
+    architecture.write_text(architecture_page(architecture.read_text(encoding="utf-8")), encoding="utf-8")
     (ROOT / "docs" / "models.md").write_text(models_page(), encoding="utf-8")
     write_curves(ROOT / "docs" / "models")
     (ROOT / "docs" / "gallery.md").write_text(gallery_page(), encoding="utf-8")

@@ -162,7 +162,7 @@ def _watched(note: int) -> None:
     from impact.engine import checkpoint as work
     from impact.results import sweep as sweeping
 
-    sweep_into, store = sweeping.sweep_into, work.Work.store
+    sweep_into, store = sweeping.sweep_into, work.WorkFolder.store
 
     def told(*words: Any, **more: Any) -> Any:
         _tell(note, "begun")
@@ -175,7 +175,7 @@ def _watched(note: int) -> None:
         store(own, part, rebound)
         _tell(note, "kept", part.number)
 
-    sweeping.sweep_into, work.Work.store = told, kept  # type: ignore[method-assign]
+    sweeping.sweep_into, work.WorkFolder.store = told, kept  # type: ignore[method-assign]
 
 
 # ---- the server

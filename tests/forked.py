@@ -9,16 +9,19 @@ from __future__ import annotations
 
 import atexit
 import ctypes
+import gc
+import io
 import json
 import os
 import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import traceback
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import IO, NoReturn
@@ -84,17 +87,35 @@ def serve() -> None:
         print(json.dumps(asdict(done)), flush=True)
 
 
+# what the server does once, so that its children find modules loaded and caches filled
+WARM_UP = (
+    "sweep warm.toml -o warm.h5 --quiet", "info warm.h5", "run warm.h5", "recommend warm.h5", "plot warm.h5",
+    "compare warm.h5 warm.h5", "rerun warm.h5", "models", "expand warm.h5 -o full.h5",
+)  # fmt: skip
+WARM = """models = ["hertz", "gharib-hurmuzlu-2012"]
+[sweep]
+e = [0.5, 1.0]
+v1 = [1.0, 2.0]
+m1 = 1.0
+m2 = 1.0
+K = 6e9
+"""
+
+
 def _warm_up() -> None:
     """Import what the commands import, and what their libraries import on first use."""
-    import impact
-    import impact.cli.info
-    import impact.cli.run
-    import impact.cli.summary
+    from impact.cli.main import app
 
-    point = {"e": [0.5, 1.0], "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6e9}
-    with tempfile.TemporaryDirectory() as folder:
-        impact.save(impact.sweep({"models": "gharib-hurmuzlu-2012", "sweep": point}), f"{folder}/warm.h5")
-        impact.plot(impact.load(f"{folder}/warm.h5")).savefig(f"{folder}/warm.png")
+    before, silence = os.getcwd(), io.StringIO()
+    with tempfile.TemporaryDirectory() as folder, redirect_stdout(silence), redirect_stderr(silence):
+        os.chdir(folder)
+        Path("warm.toml").write_text(WARM, encoding="utf-8")
+        for words in WARM_UP:
+            assert not app(words.split(), standalone_mode=False, prog_name="impact"), words
+        os.chdir(before)
+    assert threading.active_count() == 1
+    # objects that all children share are not examined again in each of them, which would copy their memory
+    gc.freeze()
 
 
 def _command(argv: list[str], cwd: str, out: IO[bytes], err: IO[bytes]) -> NoReturn:

@@ -17,7 +17,7 @@ import pytest
 import impact
 from impact.config.load import read_config
 from impact.contact.status import Status
-from impact.engine.checkpoint import working
+from impact.engine.checkpoint import open_work_folder
 from impact.engine.plan import Plan
 from impact.engine.plugins import read_plugins
 from impact.errors import ModelError, UsageError
@@ -137,11 +137,11 @@ def test_a_model_that_closes_over_values_is_never_taken_for_another(tmp_path: Pa
     for model in (*closed, partly):
         plan = Plan(read_config(config, (), [model]), read_plugins([model]))
         assert finished(tmp_path / "result.h5", plan) is None
-        with working(tmp_path / "work", plan, resume=False, overwrite=True):
+        with open_work_folder(tmp_path / "work", plan, resume=False, overwrite=True):
             pass
         with (
             pytest.raises(UsageError, match="mine-2026 is in no file, so that it cannot be known to be the same"),
-            working(tmp_path / "work", plan, resume=True, overwrite=False),
+            open_work_folder(tmp_path / "work", plan, resume=True, overwrite=False),
         ):
             pass
     in_a_file = Plan(read_config({**config, "models": "hertz"}))

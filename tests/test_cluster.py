@@ -14,7 +14,7 @@ import pytest
 
 import impact
 from impact.api import prepare
-from impact.engine.execute import context_of, with_core, work
+from impact.engine.execute import context_of, integrate_remotely, with_core
 from impact.engine.trajectories import columns_of, trajectory_maps, trajectory_ranges
 
 from .clusters import BLOCKS, CONFIG, Dask, content, dask, in_group, sweep, until
@@ -184,8 +184,8 @@ def test_a_block_executed_twice(two: Dask, tmp_path: Path, right: bytes) -> None
     part = next(trajectory_ranges(maps))
     block = (plan.models[part.model].key, columns_of(plan, maps, part), context_of(plan))
     with Client(two.address, set_as_default=False) as client:
-        done = [client.submit(work, *block, workers=[name], pure=False).result() for name in "ab"]
-    here, _ = work(*block)
+        done = [client.submit(integrate_remotely, *block, workers=[name], pure=False).result() for name in "ab"]
+    here, _ = integrate_remotely(*block)
     for name, values in vars(here).items():
         assert all(getattr(one, name).tobytes() == values.tobytes() for one, _ in done), name
     # one that died of a block takes nothing with it: another executes what it had begun, and the driver killed

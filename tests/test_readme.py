@@ -20,9 +20,11 @@ def blocks(language: str) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", README, re.DOTALL)
 
 
-def test_the_readme_opens_with_the_picture_and_two_commands() -> None:
-    assert README.index("docs/figure6.png") < README.index("make figure")
-    assert blocks("sh")[0].split("\n")[:2] == ["make figure", "make test"]
+def test_the_readme_opens_with_the_installation_the_picture_and_two_commands() -> None:
+    assert README.index("pip install .") < README.index("docs/figure6.png") < README.index("make figure")
+    install, quick_start = (block.splitlines() for block in blocks("sh")[:2])
+    assert "pip install ." in install
+    assert quick_start == ["make figure", "make test"]
     for target in ("help", "figure", "test", "check"):
         assert re.search(rf"^{target}:.*##", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
 
@@ -31,7 +33,7 @@ def test_the_readme_opens_with_the_picture_and_two_commands() -> None:
 def test_the_toml_and_the_commands_of_daily_use(cli: Run, tmp_path: Path) -> None:
     (toml,) = blocks("toml")
     (tmp_path / "config.toml").write_text(toml, encoding="utf-8")
-    commands = [line for block in blocks("sh")[1:] for line in block.splitlines() if line]
+    commands = [line for block in blocks("sh")[2:] for line in block.splitlines() if line]
     assert len(commands) == 14
     (tmp_path / "measured.csv").write_text("e, e_out, sigma\n0.5, 0.45, 0.02\n", encoding="utf-8")
     for line in commands:
@@ -61,13 +63,13 @@ def test_generated_pages_are_fresh() -> None:
 def test_the_page_on_sweeps_says_what_is_so() -> None:
     from impact.config.grid import MAX_POINTS
     from impact.config.load import parse_config
-    from impact.config.quantities import MAX_AXIS
+    from impact.config.quantities import MAX_AXIS_VALUES
     from impact.engine.trajectories import MAX_CELLS, RANGE_TRAJECTORIES
     from impact.results.netcdf import CHUNK_VALUES
     from impact.results.sweep import NO_CHECKPOINT_POINTS
 
     page = (ROOT / "docs" / "sweeps.md").read_text(encoding="utf-8")
-    for number in (NO_CHECKPOINT_POINTS, CHUNK_VALUES, MAX_AXIS, RANGE_TRAJECTORIES, MAX_CELLS):
+    for number in (NO_CHECKPOINT_POINTS, CHUNK_VALUES, MAX_AXIS_VALUES, RANGE_TRAJECTORIES, MAX_CELLS):
         assert f"{number:,}" in page
     assert MAX_POINTS == 10**9
     (toml,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)

@@ -25,7 +25,7 @@ import pytest
 import xarray as xr
 
 import impact
-from impact.atomic import appearing
+from impact.atomic import atomic_write
 from impact.errors import ResultError, StoreError, UsageError
 from impact.results.backend import write
 
@@ -675,7 +675,7 @@ def test_a_rerun_judges_a_changed_plug_in_with_a_note(forked: Forked, tmp_path: 
 
 def _stored_as_it_is(dataset: xr.Dataset, path: Path) -> None:
     """A sealed file, which `impact.save` might refuse to write."""
-    with appearing(path, overwrite=True) as sink:
+    with atomic_write(path, overwrite=True) as sink:
         write(sink, dataset, ((str(name), (), one.values) for name, one in dataset.data_vars.items()))
 
 

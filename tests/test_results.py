@@ -13,7 +13,7 @@ import impact
 from impact.config.load import parse_config
 from impact.contact.outputs import OUTPUTS
 from impact.contact.status import Status
-from impact.engine.execute import run, with_core
+from impact.engine.execute import integrate_ranges, with_core
 from impact.engine.plan import Plan
 from impact.engine.trajectories import trajectory_maps, trajectory_ranges
 from impact.results.expand import Rows, TrajectoryTable, in_memory, lazy_dataset
@@ -180,7 +180,7 @@ def test_sizes_and_order_change_no_bit(wide: xr.Dataset, size: int, collapse: st
     maps = trajectory_maps(plan)
     plan = with_core(plan, maps)
     todo = sorted(trajectory_ranges(maps, size), key=lambda part: hash((part.number, "shuffled")))
-    finished = {(part.model, part.start): rebound for part, rebound in run(plan, maps, todo)}
+    finished = {(part.model, part.start): rebound for part, rebound in integrate_ranges(plan, maps, todo)}
     rows = Rows(maps, lambda model, start, stop: finished[model, start], size)
     table = TrajectoryTable(plan.inputs, plan.models, maps, rows, (None,) * len(plan.models))
     # what the config was overridden with is an attribute

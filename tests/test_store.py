@@ -23,7 +23,7 @@ import xarray as xr
 
 import impact
 from impact.api import prepare
-from impact.engine.executors import team_of
+from impact.engine.executors import choose_backend
 from impact.errors import ResultError, StoreError, UnfinishedError, UsageError
 from impact.results.backend import open_result, write_whole
 from impact.results.sealed import write_seal
@@ -180,8 +180,8 @@ MANY = {
 def test_threads_processes_and_an_interruption_change_no_byte(tmp_path: Path, layout: str) -> None:
     plan = prepare(MANY | {"output": {"layout": layout}})
     sweep_into(tmp_path / "alone.h5", plan)
-    sweep_into(tmp_path / "threads.h5", plan, team=team_of(threads=2))
-    sweep_into(tmp_path / "jobs.h5", plan, team=team_of(jobs=2))
+    sweep_into(tmp_path / "threads.h5", plan, backend=choose_backend(threads=2))
+    sweep_into(tmp_path / "jobs.h5", plan, backend=choose_backend(jobs=2))
     answers = iter([False] * 3 + [True] * 99)
     with pytest.raises(UnfinishedError):
         sweep_into(tmp_path / "again.h5", plan, should_stop=lambda: next(answers))

@@ -26,8 +26,8 @@ import xarray as xr
 import impact
 from impact.api import execute, prepare
 from impact.cli.progress import line, new_bar, update
-from impact.engine.execute import context_of, run, work
-from impact.engine.executors import ALONE, Team, team_of
+from impact.engine.execute import context_of, integrate_ranges, integrate_remotely
+from impact.engine.executors import SERIAL, Backend, choose_backend
 from impact.engine.progress import Progress
 from impact.engine.trajectories import columns_of, trajectory_maps, trajectory_ranges
 from impact.errors import ConfigError, StoreError, UsageError
@@ -100,7 +100,7 @@ def test_a_dry_run_tells_what_goes_over_the_wire_and_how_many_workers_are_of_use
     for part in trajectory_ranges(maps):
         columns, context = columns_of(plan, maps, part), context_of(plan)
         sent += len(pickle.dumps((columns, context)))
-        sent += len(pickle.dumps(work(plan.models[part.model].key, columns, context)))
+        sent += len(pickle.dumps(integrate_remotely(plan.models[part.model].key, columns, context)))
     # one range is weighed for all
     assert found["wire"] == pytest.approx(sent, rel=0.1)
     seconds = {int(count): time for count, time in found["by_workers"].items()}
@@ -243,8 +243,8 @@ def test_several_processes_give_the_same_content(blocks: Path) -> None:
     one = impact.sweep(blocks)
     assert impact.sweep(blocks, jobs=2).identical(one)
     paths = [blocks.parent / f"{name}.h5" for name in ("one", "two")]
-    for path, team in zip(paths, (ALONE, team_of(jobs=2)), strict=True):
-        sweep_into(path, prepare(blocks), team=team)
+    for path, backend in zip(paths, (SERIAL, choose_backend(jobs=2)), strict=True):
+        sweep_into(path, prepare(blocks), backend=backend)
     assert paths[0].read_bytes() == paths[1].read_bytes()
 
 
@@ -265,7 +265,7 @@ def test_a_plug_in_that_is_changed_while_the_sweep_runs_is_what_it_was(blocks: P
     path.write_text(MINE, encoding="utf-8")
     plan = prepare(blocks, ["models=['mine']"], [path])
     path.write_text("raise SystemExit", encoding="utf-8")
-    assert execute(plan, team_of(jobs=2)).identical(execute(plan))
+    assert execute(plan, choose_backend(jobs=2)).identical(execute(plan))
 
 
 @pytest.mark.slow
@@ -295,8 +295,8 @@ def test_no_more_blocks_are_given_than_there_is_room_for(blocks: Path) -> None:
     maps = trajectory_maps(plan)
     todo = list(trajectory_ranges(maps, 500))
     with Counting(2) as executor:
-        team = Team(lambda: nullcontext(executor), lambda: 5, is_here=True)
-        for _ in run(plan, maps, todo, team=team):
+        backend = Backend(lambda: nullcontext(executor), lambda: 5, shares_memory=True)
+        for _ in integrate_ranges(plan, maps, todo, backend=backend):
             waiting -= {future for future in waiting if future.done()}
     assert len(todo) > 100
     assert most == 5

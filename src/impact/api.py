@@ -24,11 +24,11 @@ from .contact.model import Parameter as Parameter
 from .contact.models import catalogue
 from .contact.models.hysteresis import hysteresis as hysteresis
 from .contact.powers import power as power
-from .engine.execute import never
-from .engine.executors import ALONE, Team, team_of
+from .engine.execute import never_stop
+from .engine.executors import SERIAL, Backend, choose_backend
 from .engine.plan import Plan
 from .engine.plugins import read_plugins
-from .engine.progress import Tell
+from .engine.progress import ProgressCallback
 from .engine.trajectories import check_count
 from .errors import ImpactError as ImpactError
 from .errors import UsageError
@@ -74,12 +74,14 @@ def prepare(
 
 def execute(
     plan: Plan,
-    team: Team = ALONE,
-    tell: Tell | None = None,
-    should_stop: Callable[[], bool] = never,
+    backend: Backend = SERIAL,
+    on_progress: ProgressCallback | None = None,
+    should_stop: Callable[[], bool] = never_stop,
 ) -> xr.Dataset:
     """The result of a plan, in memory; for the parameters see `impact.results.sweep.sweep_into`."""
-    return sweep_in_memory(plan, team=team, tell=tell or (lambda progress: None), should_stop=should_stop)
+    return sweep_in_memory(
+        plan, backend=backend, on_progress=on_progress or (lambda progress: None), should_stop=should_stop
+    )
 
 
 def sweep(
@@ -125,7 +127,7 @@ def sweep(
     >>> result["e_out"].values.round(6).tolist()
     [[0.665265, 0.913177]]
     """
-    return execute(prepare(source, overrides, plugins, max_points), team_of(jobs, threads, executor))
+    return execute(prepare(source, overrides, plugins, max_points), choose_backend(jobs, threads, executor))
 
 
 def run(
@@ -312,7 +314,7 @@ def plot(
     style : a style sheet of matplotlib, or the name of one; the user's own rcParams are respected in any case
     title : write the title and the conditions
     labels : texts by the name of an axis, the key of a law, "reference" or "title"
-    equations : name the laws with the plot_data of their equations in the paper
+    equations : name the laws with the numbers of their equations in the paper
     ax : draw into these axes of a figure of one's own, one for each panel, in that figure's style
     plugins : models of one's own, which the kinds that follow a motion need again
 
@@ -339,7 +341,7 @@ def plot(
 def get_plot_data(
     dataset: xr.Dataset, kind: str, choice: Choice, plugins: Sequence[ForceModel | str | Path] = ()
 ) -> PlotData:
-    """The plot_data of a picture; see `plot`."""
+    """The data of a picture; see `plot`."""
     from .plots.kinds import plot_data_of
 
     own = read_plugins(plugins)

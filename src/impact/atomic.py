@@ -108,7 +108,7 @@ class Sink(io.RawIOBase):
 
 
 @contextlib.contextmanager
-def appearing(path: Path, *, overwrite: bool, part: Path | None = None) -> Iterator[Sink]:
+def atomic_write(path: Path, *, overwrite: bool, part: Path | None = None) -> Iterator[Sink]:
     """A file to write to, which has its name when the block ends without an error, and then survives a power cut.
 
     Parameters

@@ -13,7 +13,7 @@ from ..text import safe_text
 from .exits import say
 
 if TYPE_CHECKING:
-    from ..engine.executors import Team
+    from ..engine.executors import Backend
 
 
 @dataclass(frozen=True)
@@ -37,19 +37,19 @@ class ExecutorOptions:
             raise UsageError(f"{asked[0]}: given beside {asked[1]}, expected one of the two")
 
     @contextmanager
-    def team(self, *, quiet: bool, should_stop: Callable[[], bool]) -> Iterator[Team]:
+    def backend(self, *, quiet: bool, should_stop: Callable[[], bool]) -> Iterator[Backend]:
         """Those who integrate; prints the cluster to stderr, and `should_stop` gives up a connection to it."""
         place = self.scheduler if self.scheduler is not None else self.scheduler_file
         if place is None:
-            from ..engine.executors import team_of
+            from ..engine.executors import choose_backend
 
-            yield team_of(self.jobs, self.threads)
+            yield choose_backend(self.jobs, self.threads)
             return
         from ..engine.dask import cluster
 
-        with cluster(place, should_stop) as (team, dashboard, workers):
+        with cluster(place, should_stop) as (backend, dashboard, workers):
             if not quiet:
                 waits = "" if workers else ", waits for some"
                 count = f"{workers} worker{'' if workers == 1 else 's'}{waits}"
                 say(f"{count}; dashboard: {dashboard}" if dashboard else count)
-            yield team
+            yield backend

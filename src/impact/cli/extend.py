@@ -91,10 +91,13 @@ def extend(
 
         target = output or result
         options = ExecutorOptions(jobs, threads)
-        with options.team(quiet=quiet, should_stop=should_stop) as team, progress.progress(quiet=quiet) as report:
+        with (
+            options.backend(quiet=quiet, should_stop=should_stop) as backend,
+            progress.progress(quiet=quiet) as report,
+        ):
             survey, integrated = extending.extend(
                 result, target, sets, read_plugins(plugins or ()), resume=resume, overwrite=overwrite,
-                max_points=max_points, team=team, tell=report, should_stop=should_stop,
+                max_points=max_points, backend=backend, on_progress=report, should_stop=should_stop,
             )  # fmt: skip
         if should_stop():
             raise UnfinishedError(f"{safe_text(str(target))} was stored whole")

@@ -84,12 +84,12 @@ def plot(
         ),
     ] = None,
     equations: Annotated[
-        bool, typer.Option("--equations", help="Name the laws with the plot_data of their equations in the paper.")
+        bool, typer.Option("--equations", help="Name the laws with the numbers of their equations in the paper.")
     ] = False,
     data: Annotated[
         Path | None,
         typer.Option(
-            "--data", metavar="FILE", help="Write the plot_data behind the picture: .csv, .tex or .parquet."
+            "--data", metavar="FILE", help="Write the numbers behind the picture: .csv, .tex or .parquet."
         ),
     ] = None,
     data_form: Annotated[

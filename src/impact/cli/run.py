@@ -100,7 +100,7 @@ def run_json(impact: Impact) -> dict[str, Any]:
 
 def print_run(impact: Impact) -> None:
     """One impact: inputs, outputs, the three restitutions, and how far they can be trusted."""
-    from ..config.tables import MATERIAL
+    from ..config.tables import MATERIAL_QUANTITIES
     from ..results.impact import DERIVED
     from ..results.schema import SCHEMA, plain_unit
 
@@ -110,7 +110,9 @@ def print_run(impact: Impact) -> None:
         rows[name] = quantity(value, _unit_at(impact, _unit_of(impact, name)), 10) + note
     for name, material in impact.materials.items():
         known = {field: value for field, value in asdict(material).items() if value is not None}
-        about = (f"{field} = {quantity(value, MATERIAL[field].unit, 10)}" for field, value in known.items())
+        about = (
+            f"{field} = {quantity(value, MATERIAL_QUANTITIES[field].unit, 10)}" for field, value in known.items()
+        )
         rows[f"[materials.{name}]"] = ", ".join(about)
     for name, unit, meaning in DERIVED:
         if impact.derived[name] == impact.derived[name] and name not in impact.point:
@@ -130,10 +132,16 @@ def print_run(impact: Impact) -> None:
 
 def _unit_of(impact: Impact, name: str) -> str:
     """The unit of an input, which may be a parameter of the model, or a property of a material."""
-    from ..config.tables import MATERIAL, SWEEP, own_quantities
+    from ..config.tables import MATERIAL_QUANTITIES, SWEEP_QUANTITIES, model_quantities
 
     key, _, parameter = name.rpartition(".")
-    known = own_quantities(impact.model) if key == impact.model.key else MATERIAL if key else SWEEP
+    known = (
+        model_quantities(impact.model)
+        if key == impact.model.key
+        else MATERIAL_QUANTITIES
+        if key
+        else SWEEP_QUANTITIES
+    )
     return known[parameter].unit if parameter in known else "1"
 
 

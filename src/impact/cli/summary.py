@@ -29,7 +29,7 @@ def execute(plan: Plan, should_stop: Callable[[], bool], *, quiet: bool) -> xr.D
     from .. import api
 
     with progress(quiet=quiet) as report:
-        return api.execute(plan, tell=report, should_stop=should_stop)
+        return api.execute(plan, on_progress=report, should_stop=should_stop)
 
 
 def summary(survey: Survey, output: Path) -> dict[str, Any]:

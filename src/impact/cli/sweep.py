@@ -117,15 +117,21 @@ def _sweep_whole(
     shown = safe_text(str(output))
     survey = None if overwrite else finished(output, plan)
     if survey is not None:
-        checkpoint.tidy(output, plan)
+        checkpoint.remove_stale_work_folder(output, plan)
         if should_stop():
             raise UnfinishedError(f"{shown} already holds this sweep")
         return survey, False
     for source in sources:
         backend.check_output(output, overwrite=overwrite, source=source)
-    with executor.team(quiet=quiet, should_stop=should_stop) as team, progress(quiet=quiet) as report:
+    with executor.backend(quiet=quiet, should_stop=should_stop) as integrators, progress(quiet=quiet) as report:
         survey = sweep_into(
-            output, plan, resume=resume, overwrite=overwrite, team=team, tell=report, should_stop=should_stop
+            output,
+            plan,
+            resume=resume,
+            overwrite=overwrite,
+            backend=integrators,
+            on_progress=report,
+            should_stop=should_stop,
         )
     if should_stop():
         raise UnfinishedError(f"{shown} was stored whole")
@@ -156,9 +162,16 @@ def _sweep_shard(
     from .progress import progress
 
     part = Shard.parse(shard)
-    with executor.team(quiet=quiet, should_stop=should_stop) as team, progress(quiet=quiet) as report:
+    with executor.backend(quiet=quiet, should_stop=should_stop) as integrators, progress(quiet=quiet) as report:
         done = sweep_shard(
-            output, plan, part, command, overwrite=overwrite, team=team, tell=report, should_stop=should_stop
+            output,
+            plan,
+            part,
+            command,
+            overwrite=overwrite,
+            backend=integrators,
+            on_progress=report,
+            should_stop=should_stop,
         )
     if should_stop():
         raise UnfinishedError(f"{safe_text(str(done.folder))} has the whole shard")
@@ -227,7 +240,7 @@ def merge(
 
         with progress(quiet=quiet) as report:
             survey, twice = merge_shards(
-                folders, output, read_plugins(plugins or ()), overwrite=overwrite, tell=report,
+                folders, output, read_plugins(plugins or ()), overwrite=overwrite, on_progress=report,
                 should_stop=should_stop,
             )  # fmt: skip
         if should_stop():

@@ -22,7 +22,7 @@ from ..text import safe_text
 from .files import MAX_OVERRIDE, read_text, toml_key, toml_text
 from .grid import name_of, path_of
 from .quantities import MAX_FAULTS, Fault, KeyPath, Quantity, nearest, refuse, show
-from .tables import MATERIAL, MATERIALS, SWEEP, own_quantities
+from .tables import MATERIAL_KEYS, MATERIAL_QUANTITIES, SWEEP_QUANTITIES, model_quantities
 
 MAX_CSV = 2_000_000  # bytes of a file, whose values a result stores
 HEADER = re.compile(r"\s*(.*?)\s*(?:\[\s*(.*?)\s*\])?\s*", re.DOTALL)
@@ -37,11 +37,11 @@ def quantity_at(path: KeyPath, known: Mapping[str, ForceModel]) -> Quantity | No
     """
     match path:
         case ("sweep", str(name)):
-            return None if name in MATERIALS else SWEEP[name]
+            return None if name in MATERIAL_KEYS else SWEEP_QUANTITIES[name]
         case ("materials", _, str(key)):
-            return MATERIAL[key]
+            return MATERIAL_QUANTITIES[key]
         case ("model", str(model), str(key)):
-            return own_quantities(known[model])[key]
+            return model_quantities(known[model])[key]
     raise KeyError(path)
 
 
@@ -221,13 +221,13 @@ def _read_cases(table: CsvTable, known: Mapping[str, ForceModel], n: float | Non
 
 def _unknown(name: str, known: Mapping[str, ForceModel]) -> str:
     """A message about a name that is no input."""
-    inputs = [*SWEEP, *MATERIALS]
+    inputs = [*SWEEP_QUANTITIES, *MATERIAL_KEYS]
     key = path_of(name)[1]
     if path_of(name)[0] == "model":
-        inputs = [f"{key}.{own}" for own in own_quantities(known[str(key)])] if key in known else list(known)
+        inputs = [f"{key}.{own}" for own in model_quantities(known[str(key)])] if key in known else list(known)
         name = name if key in known else str(key)
     elif path_of(name)[0] == "materials":
-        inputs = [f"materials.{key}.{own}" for own in MATERIAL]
+        inputs = [f"materials.{key}.{own}" for own in MATERIAL_QUANTITIES]
     return f"no such input; {nearest(name, inputs)}"
 
 

@@ -14,12 +14,12 @@ from .quantities import MAX_FAULTS, Fault, KeyPath, Names, Numbers, Quantity, Ra
 # of all models together, where nothing else is said
 MAX_POINTS = 10**9
 # that can be counted, where they are not stored one by one
-MOST_POINTS = 2**62
+MAX_COUNTED_POINTS = 2**62
 # HDF5 has arrays of 32 dimensions, one of which is that of the models
 MAX_AXES = 31
 FULL = ' in layout "full" (--max-points); layout = "factored" stores any number'
 # chunks of a result, and points of a chunk: a reader opens each, and holds it as a whole
-MAX_CHUNKS, MAX_CHUNK_POINTS = 100_000, 2**22
+MAX_STORED_CHUNKS, MAX_CHUNK_POINTS = 100_000, 2**22
 # bytes that the outputs of a point take at most, by default
 WIDTH = 8 * len(BY_DEFAULT)
 
@@ -106,7 +106,7 @@ def lay_out(
     points = math.prod(sizes[name] or 1 for name in leaders) * models
     if len(leaders) > MAX_AXES:
         faults.append((("sweep",), f"got {len(leaders)} axes, expected at most {MAX_AXES}"))
-    most = max_points if in_full else MOST_POINTS
+    most = max_points if in_full else MAX_COUNTED_POINTS
     if points > most:
         size = f"{points:,} points (axes times models), up to {WIDTH * points / 1e9:,.0f} GB"
         faults.append((("sweep",), f"got {size}, expected at most {most:,} points" + FULL * in_full))
@@ -176,8 +176,8 @@ def chunk_faults(chunks: Mapping[str, int], axes: Sequence[Axis], models: int, v
     size = math.prod(min(chunks.get(name, whole), whole) for name, whole in sizes.items())
     count = math.prod(-(-whole // chunks.get(name, whole)) for name, whole in sizes.items())
     count *= models * variables
-    if size > MAX_CHUNK_POINTS or count > MAX_CHUNKS:
-        expected = f"expected at most {MAX_CHUNKS:,} of at most {MAX_CHUNK_POINTS:,}"
+    if size > MAX_CHUNK_POINTS or count > MAX_STORED_CHUNKS:
+        expected = f"expected at most {MAX_STORED_CHUNKS:,} of at most {MAX_CHUNK_POINTS:,}"
         return [(path, f"got {count:,} chunks of {size:,} points, {expected}")]
     return []
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
 
-from .tables import MATERIAL
+from .tables import MATERIAL_QUANTITIES
 
 
 @cache
@@ -20,6 +20,6 @@ def records() -> Mapping[str, Mapping[str, float | str]]:
 def library() -> Mapping[str, Mapping[str, float | str]]:
     """The same as tables of a config."""
     return {
-        name: {key: value for key, value in record.items() if key in MATERIAL}
+        name: {key: value for key, value in record.items() if key in MATERIAL_QUANTITIES}
         for name, record in records().items()
     }

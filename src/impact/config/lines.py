@@ -13,13 +13,13 @@ from ..contact.model import ForceModel
 from ..text import safe_text
 from . import quantities
 from .quantities import RANGES, Column, Fault, KeyPath, nearest, show
-from .tables import MATERIAL, MODELS, Document, MaterialTable, Output, Solver, Sweep, own_quantities
+from .tables import MATERIAL_QUANTITIES, MODELS, Document, MaterialTable, Output, Solver, Sweep, model_quantities
 
 MAX_LINES = 100
 EXPECTED = {
     "sweep": "a table [sweep] of what to sweep: e or alpha, v1, m1, m2, material, ...",
     "models": MODELS,
-    **{name: f"{quantity.expected}: {quantity.meaning}" for name, quantity in MATERIAL.items()},
+    **{name: f"{quantity.expected}: {quantity.meaning}" for name, quantity in MATERIAL_QUANTITIES.items()},
     **{name: str(info.description) for name, info in Column.model_fields.items()},
 }
 # what else a key might be called
@@ -218,7 +218,7 @@ def _hint(location: KeyPath, known: Mapping[str, ForceModel]) -> str:
         case ("model",):
             keys = known
         case ("model", key):
-            keys = own_quantities(known[str(key)])
+            keys = model_quantities(known[str(key)])
         case (table, *_):
             keys = vars(Solver() if table == "solver" else Output())
     return nearest(name, list(keys), WORDS)

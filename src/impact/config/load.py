@@ -28,9 +28,9 @@ from .rules import Given, cross_faults
 from .tables import (
     DEFAULT_RTOL,
     DEFAULTS,
-    MATERIAL,
-    MATERIALS,
-    SWEEP,
+    MATERIAL_KEYS,
+    MATERIAL_QUANTITIES,
+    SWEEP_QUANTITIES,
     Document,
     MaterialTable,
     Output,
@@ -38,7 +38,7 @@ from .tables import (
     document_type,
     expand_models,
     json_schema,
-    own_quantities,
+    model_quantities,
 )
 
 __all__ = ["DEFAULT_RTOL", "Axis", "Config", "Output", "Solver", "json_schema", "parse_config", "read_config"]
@@ -183,15 +183,19 @@ class _Reader:
             faults = [(path, message) for path, message in faults if not message.startswith("missing")]
         if document is None:
             return None, _of_cases(faults, cases)
-        chosen = {f"{model.key}.{name}": q for model in models for name, q in own_quantities(model).items()}
+        chosen = {f"{model.key}.{name}": q for model in models for name, q in model_quantities(model).items()}
         entries = _entries(document, given, chosen)
         names = [name for name in sweep if name not in ("zip", "cases")]
         names += [f"materials.{key}.{name}" for key, table in given.materials.items() for name in _dict(table)]
         names += [f"{key}.{name}" for key, table in parameters.items() for name in _dict(table)]
         quantities = (
-            SWEEP
+            SWEEP_QUANTITIES
             | chosen
-            | {name: MATERIAL[name.rpartition(".")[2]] for name in entries if name.startswith("materials.")}
+            | {
+                name: MATERIAL_QUANTITIES[name.rpartition(".")[2]]
+                for name in entries
+                if name.startswith("materials.")
+            }
         )
         output = document.output
         in_full = output.layout == "full" or (output.layout == "auto" and bool(output.chunks))
@@ -247,7 +251,7 @@ def read_exponent(sweep: Mapping[str, Any]) -> float | None:
     if isinstance(n, list | dict) or "n" in _dict(sweep.get("cases")):
         return None
     try:
-        return SWEEP["n"].read(n)
+        return SWEEP_QUANTITIES["n"].read(n)
     except PydanticCustomError:
         return math.nan
 
@@ -273,7 +277,7 @@ def _with_library(data: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
     sweep = _dict(data.get("sweep"))
     cases = _dict(sweep.get("cases"))
     named = dict.fromkeys(
-        name for key in MATERIALS for table in (sweep, cases) for name in _listed(table.get(key))
+        name for key in MATERIAL_KEYS for table in (sweep, cases) for name in _listed(table.get(key))
     )
     named |= {str(path[1]): None for path in map(path_of, cases) if path[0] == "materials"}
     tables = {

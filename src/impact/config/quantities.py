@@ -39,7 +39,7 @@ KeyPath: TypeAlias = tuple[str | int, ...]
 Fault: TypeAlias = tuple[KeyPath, str]
 
 MAX_UNIT = 64  # characters of a string with a unit
-MAX_AXIS = 10**7  # values on one axis, which are held in memory
+MAX_AXIS_VALUES = 10**7  # values on one axis, which are held in memory
 MAX_COUNTED = 10**18  # what a message writes out
 MAX_FAULTS = 100  # of one list or table
 MAX_REFUSED = 1000  # values of a config; the rest of a hostile list is not worth its time
@@ -252,9 +252,9 @@ class Range(Table):
             raise faults([(("arange", 2), "got 0, expected a step other than 0")])
         if self.size < 1:
             raise self._fault(f"got no value from {first:g} to {last:g} by {third:g}, expected at least one")
-        if self.size > MAX_AXIS:
+        if self.size > MAX_AXIS_VALUES:
             size = f"{self.size:,}" if self.size <= MAX_COUNTED else f"more than {MAX_COUNTED:,}"
-            raise self._fault(f"got {size} values, expected at most {MAX_AXIS:,} on an axis")
+            raise self._fault(f"got {size} values, expected at most {MAX_AXIS_VALUES:,} on an axis")
         return self
 
     def _fault(self, message: str) -> ValidationError:

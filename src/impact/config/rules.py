@@ -12,7 +12,7 @@ from ..contact.materials import hertz_stiffness
 from ..contact.model import ForceModel, with_base_quantities
 from ..contact.scaling import asked as quantities_of
 from .quantities import Fault
-from .tables import MATERIAL, SWEEP, own_quantities
+from .tables import MATERIAL_QUANTITIES, SWEEP_QUANTITIES, model_quantities
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,10 @@ def cross_faults(given: Given) -> Iterator[Fault]:
 
 def _velocity(given: Given) -> Iterable[Fault]:
     if "v1" not in given.sweep:
-        yield ("sweep", "v1"), f"missing, expected {SWEEP['v1'].expected}: {SWEEP['v1'].meaning}"
+        yield (
+            ("sweep", "v1"),
+            f"missing, expected {SWEEP_QUANTITIES['v1'].expected}: {SWEEP_QUANTITIES['v1'].meaning}",
+        )
 
 
 def _restitution(given: Given) -> Iterable[Fault]:
@@ -139,7 +142,7 @@ def _yield_strengths(given: Given) -> Iterable[Fault]:
         for name in given.without(ball, "yield_strength") if asking else ():
             if name not in reported:
                 reported.add(name)
-                expected = MATERIAL["yield_strength"].expected
+                expected = MATERIAL_QUANTITIES["yield_strength"].expected
                 yield (
                     ("materials", name, "yield_strength"),
                     f"missing, expected {expected} (asked for by {asking})",
@@ -152,13 +155,13 @@ def _masses(given: Given) -> Iterable[Fault]:
         mass, radius = f"m{ball}", f"R{ball}"
         if mass in given.sweep:
             continue
-        about = f"missing, expected {SWEEP[mass].expected}: {SWEEP[mass].meaning}"
+        about = f"missing, expected {SWEEP_QUANTITIES[mass].expected}: {SWEEP_QUANTITIES[mass].meaning}"
         if radius not in given.sweep:
             yield ("sweep", mass), f"{about}; or {radius} and a material with rho"
         elif not {"material", f"material{ball}"} & given.sweep.keys():
             yield ("sweep", mass), f"{about}; or a material with rho beside {radius}"
         for name in given.without(ball, "rho") if radius in given.sweep else ():
-            expected = f"{MATERIAL['rho'].expected}, or {mass} under [sweep]"
+            expected = f"{MATERIAL_QUANTITIES['rho'].expected}, or {mass} under [sweep]"
             yield ("materials", name, "rho"), f"missing, expected {expected}: the mass of ball {ball} is not given"
 
 
@@ -175,7 +178,7 @@ def _radii(given: Given) -> Iterable[Fault]:
                 radii.setdefault(name, []).append(radius)
     for name, missing in radii.items():
         need = f"{next(iter(keys))} needs a radius" if len(keys) == 1 else f"{len(keys)} models need a radius"
-        expected = f"{MATERIAL['rho'].expected}, or {' and '.join(missing)} under [sweep]"
+        expected = f"{MATERIAL_QUANTITIES['rho'].expected}, or {' and '.join(missing)} under [sweep]"
         yield ("materials", name, "rho"), f"missing, expected {expected}: {need}"
 
 
@@ -185,7 +188,7 @@ def _parameters(given: Given) -> Iterable[Fault]:
         table = given.parameters.get(model.key) or {}
         for parameter in model.parameters:
             if parameter.default is None and parameter.name not in table:
-                expected = own_quantities(model)[parameter.name].expected
+                expected = model_quantities(model)[parameter.name].expected
                 about = f"missing, expected {expected}: {parameter.meaning}{given.or_without(model)}"
                 yield ("model", model.key, parameter.name), about
 

@@ -24,7 +24,7 @@ from ..contact.model import ForceModel
 from ..contact.models import built_in, catalogue
 from ..contact.outputs import OUTPUTS
 from .quantities import (
-    MAX_AXIS,
+    MAX_AXIS_VALUES,
     MAX_FAULTS,
     MAX_UNIT,
     RANGE,
@@ -123,8 +123,10 @@ def quantities_of(table: type[Table]) -> dict[str, Quantity]:
     }
 
 
-SWEEP, MATERIAL = quantities_of(Sweep), quantities_of(MaterialTable)
-MATERIALS = {name: str(Sweep.model_fields[name].description) for name in ("material", "material1", "material2")}
+SWEEP_QUANTITIES, MATERIAL_QUANTITIES = quantities_of(Sweep), quantities_of(MaterialTable)
+MATERIAL_KEYS = {
+    name: str(Sweep.model_fields[name].description) for name in ("material", "material1", "material2")
+}
 DEFAULTS = {name: float(Sweep.model_fields[name].default) for name in ("v2", "n")}
 # of a law that has an exponent of its own
 OWN_K = Quantity("N/m^n", "stiffness of this law, in place of the sweep's", 0, above=True)
@@ -186,7 +188,7 @@ class Output:
     ] = "float64"
     compression: Annotated[Literal["none", "gzip"], Field(description="of the variables")] = "none"
     chunks: Annotated[
-        Mapping[str, Annotated[int, whole(1, MAX_AXIS)]],
+        Mapping[str, Annotated[int, whole(1, MAX_AXIS_VALUES)]],
         Field(description="lengths along axes, by name, of the chunks in which variables are stored"),
         expected("a table of lengths by axis, such as { e = 50 }"),
     ] = field(default_factory=dict)
@@ -196,7 +198,7 @@ class Output:
     ] = "auto"
 
 
-def own_quantities(model: ForceModel) -> dict[str, Quantity]:
+def model_quantities(model: ForceModel) -> dict[str, Quantity]:
     """What [model.KEY] may hold: the parameters, and K of a law that has an exponent of its own."""
     stiffness = {} if model.exponent is None else {"K": OWN_K}
     return stiffness | {
@@ -210,7 +212,7 @@ def parameter_table(model: ForceModel) -> type[Table]:
     defaults = {parameter.name: parameter.default for parameter in model.parameters}
     fields: dict[str, Any] = {
         f"field_{place}": (Annotated[Numbers | None, quantity, Field(alias=name)], defaults.get(name))
-        for place, (name, quantity) in enumerate(own_quantities(model).items())
+        for place, (name, quantity) in enumerate(model_quantities(model).items())
     }
     return create_model(model.key, __base__=Table, **fields)
 

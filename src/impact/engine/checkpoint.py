@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from filelock import FileLock, Timeout
 
-from ..atomic import appearing, sync_folder
+from ..atomic import atomic_write, sync_folder
 from ..contact.simulate import TABLE_COLUMNS, CollisionResult
 from ..errors import ImpactError, InUseError, StoreError, UsageError
 from ..text import safe_text
@@ -31,18 +31,18 @@ ELSE = "give the sweep that it is of, another output, or --overwrite to start ag
 TOLD = 3  # differences
 
 
-def folder_of(output: Path) -> Path:
+def work_folder_of(output: Path) -> Path:
     """The work folder of an output."""
     return output.with_name(f"{output.name}.work")
 
 
-def part_of(output: Path) -> Path:
+def partial_file_of(output: Path) -> Path:
     """The name of an output while it is assembled."""
     return output.with_name(f"{output.name}.part")
 
 
 @dataclass(frozen=True)
-class Work:
+class WorkFolder:
     """A work folder that this process has locked; `key` tells what its blocks are of."""
 
     folder: Path
@@ -62,19 +62,21 @@ class Work:
         ------
         StoreError : the disk is full or failed
         """
-        with appearing(self.path(part.number), overwrite=True, part=self.folder / "block.part") as sink:
-            pack(sink, self._of(part), rebound)
+        with atomic_write(self.path(part.number), overwrite=True, part=self.folder / "block.part") as sink:
+            write_block(sink, self._of(part), rebound)
 
     def load(self, part: TrajectoryRange) -> CollisionResult | None:
         """A finished block; None if it is not there, or not whole."""
         # what is no regular file might never end
         if not self.path(part.number).is_file():
             return None
-        return unpack(self.path(part.number), self._of(part), part.size)
+        return read_block(self.path(part.number), self._of(part), part.size)
 
 
 @contextlib.contextmanager
-def working(folder: Path, plan: Plan, *, resume: bool, overwrite: bool, extends: str = "") -> Iterator[Work]:
+def open_work_folder(
+    folder: Path, plan: Plan, *, resume: bool, overwrite: bool, extends: str = ""
+) -> Iterator[WorkFolder]:
     """A work folder, locked.
 
     Parameters
@@ -97,18 +99,18 @@ def working(folder: Path, plan: Plan, *, resume: bool, overwrite: bool, extends:
     try:
         _lock(lock, folder)
         _prepare(folder, record, resume=resume, overwrite=overwrite)
-        yield Work(folder, _key(record))
+        yield WorkFolder(folder, _key(record))
     finally:
         lock.release()
 
 
 @contextlib.contextmanager
-def held(folder: Path, plan: Plan) -> Iterator[Work]:
+def lock_work_folder(folder: Path, plan: Plan) -> Iterator[WorkFolder]:
     """A work folder of a plan as it is, locked.
 
     Raises
     ------
-    InUseError, StoreError : see `working`
+    InUseError, StoreError : see `open_work_folder`
     UsageError : it is of another sweep
     """
     record = _record(plan)
@@ -118,22 +120,22 @@ def held(folder: Path, plan: Plan) -> Iterator[Work]:
     lock = FileLock(folder / LOCK, timeout=0)
     try:
         _lock(lock, folder)
-        yield Work(folder, _key(record))
+        yield WorkFolder(folder, _key(record))
     finally:
         lock.release()
 
 
-def tidy(output: Path, plan: Plan) -> None:
+def remove_stale_work_folder(output: Path, plan: Plan) -> None:
     """Remove what a sweep has left that was killed when its result was whole, if nobody works there."""
-    folder = folder_of(output)
+    folder = work_folder_of(output)
     with contextlib.suppress(ImpactError, Timeout, OSError):
         if folder.is_dir():
             _check(folder)
             plan = with_core(plan, trajectory_maps(plan))
             with FileLock(folder / LOCK, timeout=0):
                 if not os.path.lexists(folder / PLAN) or _is_of(folder, _record(plan), resume=True):
-                    part_of(output).unlink(missing_ok=True)
-                    remove(folder)
+                    partial_file_of(output).unlink(missing_ok=True)
+                    remove_work_folder(folder)
 
 
 def _check(folder: Path) -> None:
@@ -147,7 +149,7 @@ def _check(folder: Path) -> None:
             raise UsageError(f"{shown}: holds {safe_text(strange[0])}, and no {PLAN}; it is not modified")
 
 
-def remove(folder: Path) -> None:
+def remove_work_folder(folder: Path) -> None:
     """Remove a folder whose result is whole; what cannot be, and what others have put there, does no harm."""
     with contextlib.suppress(OSError):
         _clear(folder, plan=True)
@@ -182,7 +184,7 @@ def _prepare(folder: Path, record: Mapping[str, Any], *, resume: bool, overwrite
         _clear(folder)
         # what is removed must not come back beside another plan
         sync_folder(folder)
-        with appearing(folder / PLAN, overwrite=True) as sink:
+        with atomic_write(folder / PLAN, overwrite=True) as sink:
             sink.write(json.dumps(record).encode())
     except OSError as error:
         raise StoreError(f"{shown}: {error.strerror}") from error
@@ -232,12 +234,12 @@ def _told_apart(folder: Path, record: Mapping[str, Any]) -> str | None:
         stored = json.loads((folder / PLAN).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
         return f"its {PLAN} cannot be read"
-    told = list(differences(stored, json.loads(json.dumps(record))))
+    told = list(record_differences(stored, json.loads(json.dumps(record))))
     more = f" and {len(told) - TOLD} more" if len(told) > TOLD else ""
     return f"is of another sweep: {'; '.join(told[:TOLD])}{more}" if told else None
 
 
-def pack(file: Any, of: str, rebound: CollisionResult) -> None:
+def write_block(file: Any, of: str, rebound: CollisionResult) -> None:
     """Write a block.
 
     Parameters
@@ -249,7 +251,7 @@ def pack(file: Any, of: str, rebound: CollisionResult) -> None:
     np.savez(file, of=of, **{name: getattr(rebound, name) for name in TABLE_COLUMNS})
 
 
-def unpack(path: Path, of: str, size: int) -> CollisionResult | None:
+def read_block(path: Path, of: str, size: int) -> CollisionResult | None:
     """A block of so many trajectories; None if it is of something else, or not whole."""
     try:
         with np.load(path, allow_pickle=False) as stored:
@@ -269,15 +271,15 @@ def unpack(path: Path, of: str, size: int) -> CollisionResult | None:
     return CollisionResult(**arrays) if right else None
 
 
-def differences(there: object, here: object, path: str = "") -> Iterator[str]:
+def record_differences(there: object, here: object, path: str = "") -> Iterator[str]:
     """In what two records differ, each with its place."""
     if isinstance(there, dict) and isinstance(here, dict):
         for key in dict.fromkeys((*there, *here)):
             name = key if path in ("", "physics") else f"{path}.{key}"
-            yield from differences(there.get(key), here.get(key), str(name))
+            yield from record_differences(there.get(key), here.get(key), str(name))
     elif isinstance(there, list) and isinstance(here, list) and len(there) == len(here):
         for place, (one, other) in enumerate(zip(there, here, strict=True)):
-            yield from differences(one, other, f"{path}[{place}]")
+            yield from record_differences(one, other, f"{path}[{place}]")
     elif there != here and not (there != there and here != here):
         yield f"{safe_text(path)}: {_shown(there)} there, {_shown(here)} here"
 

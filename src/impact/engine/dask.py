@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 from .._version import __version__
 from ..errors import ImpactError, StoreError, UnfinishedError, UsageError
 from ..text import safe_text
-from .execute import never, other_version
-from .executors import AHEAD, Team
+from .execute import never_stop, other_version
+from .executors import BLOCKS_IN_FLIGHT, Backend
 
 if TYPE_CHECKING:
     from distributed import Client, LocalCluster
@@ -50,13 +50,13 @@ Result = TypeVar("Result")
 class Cluster(NamedTuple):
     """A team, the address of the scheduler's dashboard if it has one, and how many workers there are at first."""
 
-    team: Team
+    backend: Backend
     dashboard: str | None
     workers: int
 
 
 @contextlib.contextmanager
-def cluster(place: str | Path, should_stop: Callable[[], bool] = never) -> Iterator[Cluster]:
+def cluster(place: str | Path, should_stop: Callable[[], bool] = never_stop) -> Iterator[Cluster]:
     """The workers of a scheduler.
 
     Parameters
@@ -90,8 +90,8 @@ def cluster(place: str | Path, should_stop: Callable[[], bool] = never) -> Itera
                 f"{shown}: no answer within {limit:g} s; expected {ADDRESS} (dask: {TIMEOUT})"
             ) from None
         stack.callback(_close, client)
-        team = Team(lambda: _executor(client, shown), _room(client, shown))
-        yield Cluster(team, client.dashboard_link if "dashboard" in info["services"] else None, workers)
+        backend = Backend(lambda: _executor(client, shown), _room(client, shown))
+        yield Cluster(backend, client.dashboard_link if "dashboard" in info["services"] else None, workers)
 
 
 def _timeout() -> float:
@@ -103,7 +103,7 @@ def _timeout() -> float:
     return float(parse_timedelta(dask.config.get(TIMEOUT)))
 
 
-def _within(limit: float, action: Callable[[], Result], should_stop: Callable[[], bool] = never) -> Result:
+def _within(limit: float, action: Callable[[], Result], should_stop: Callable[[], bool] = never_stop) -> Result:
     """The result of an action that may wait forever: it runs in a thread, which is left behind if it does.
 
     Raises
@@ -226,7 +226,7 @@ def _room(client: Client, shown: str) -> Callable[[], int]:
             raise StoreError(f"{shown}: the scheduler has not answered for {limit:g} s")
         if shown == LOCAL and alone > AWAY:
             raise StoreError(f"{shown}: all workers are gone")
-        return 0 if silent > SILENCE_S else min(AHEAD * workers, MOST)
+        return 0 if silent > SILENCE_S else min(BLOCKS_IN_FLIGHT * workers, MOST)
 
     return of_now
 

@@ -28,7 +28,7 @@ from ..contact.status import STATUSES
 from ..errors import StoreError, UsageError
 from ..text import safe_text
 from .build_impacts import exponents
-from .executors import ALONE, Team
+from .executors import SERIAL, Backend
 from .plan import Plan
 from .trajectories import Columns, TrajectoryMap, TrajectoryRange, columns_of
 
@@ -42,10 +42,10 @@ POLL_INTERVAL_S = 0.2
 # what a range comes to, and a line for each distinct error that the law raised
 Integrated = tuple[CollisionResult, dict[str, str]]
 # which trajectories of a range are known already, and what they come to; None where none is
-KnownPart = tuple[NDArray[np.bool_], CollisionResult] | None
-Known = Callable[[TrajectoryRange], KnownPart]
+ReusedPart = tuple[NDArray[np.bool_], CollisionResult] | None
+FindReused = Callable[[TrajectoryRange], ReusedPart]
 # what is being integrated
-Running = dict[Future[Integrated], tuple[TrajectoryRange, KnownPart]]
+Running = dict[Future[Integrated], tuple[TrajectoryRange, ReusedPart]]
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class WorkerContext:
     hashes: tuple[tuple[str, str | None], ...] = ()
 
 
-def integrate(model: ForceModel, columns: Columns, solver: Solver) -> Integrated:
+def integrate_columns(model: ForceModel, columns: Columns, solver: Solver) -> Integrated:
     """Integrate some trajectories of a model; see `impact.engine.trajectories.columns_of`."""
     errors: dict[str, str] = {}
     values = {name: column for name, column in columns.items() if name not in ("n", "status")}
@@ -77,14 +77,14 @@ def integrate(model: ForceModel, columns: Columns, solver: Solver) -> Integrated
     return rebound, errors
 
 
-def work(key: str, columns: Columns, context: WorkerContext) -> Integrated:
+def integrate_remotely(key: str, columns: Columns, context: WorkerContext) -> Integrated:
     """Integrate some trajectories of the model of a key; a pure function, which may run anywhere, and twice.
 
     Raises
     ------
     UsageError : this place has another version, no numba where that is wanted, or not the same models
     """
-    return integrate(_models(context)[key], columns, context.solver)
+    return integrate_columns(_models(context)[key], columns, context.solver)
 
 
 # the models of the sweeps of which this place was sent something last
@@ -138,19 +138,19 @@ def _is_compiled(plan: Plan, own: TrajectoryMap) -> bool:
     return all(any(serves(model, n)) for n in exponents(plan.inputs, model))
 
 
-def never() -> bool:
+def never_stop() -> bool:
     """Do not stop."""
     return False
 
 
-def run(
+def integrate_ranges(
     plan: Plan,
     maps: Sequence[TrajectoryMap],
     todo: Iterable[TrajectoryRange],
     *,
-    team: Team = ALONE,
-    should_stop: Callable[[], bool] = never,
-    known: Known = lambda part: None,
+    backend: Backend = SERIAL,
+    should_stop: Callable[[], bool] = never_stop,
+    known: FindReused = lambda part: None,
 ) -> Iterator[tuple[TrajectoryRange, CollisionResult]]:
     """Integrate range after range; alone in order, with others as they finish.
 
@@ -159,7 +159,7 @@ def run(
     plan : what to run
     maps : its trajectories
     todo : the ranges of them to be integrated
-    team : who integrates
+    backend : who integrates
     should_stop : whether no more are to be begun; those that were are finished
     known : what is known already, and is not integrated again
 
@@ -172,22 +172,24 @@ def run(
     -----
     UserWarning : a law raised an error; once for each law and distinct error
     """
-    submit = _submitter(plan, team)
+    submit = _submitter(plan, backend)
     left, trials = deque(todo), Counter[int]()
     reported: set[str] = set()
     while True:
         running: Running = {}
         try:
-            with team.executor() as executor:
+            with backend.executor() as executor:
 
-                def start(part: TrajectoryRange, before: KnownPart) -> Future[Integrated]:
+                def start(part: TrajectoryRange, before: ReusedPart) -> Future[Integrated]:
                     # no more is held of a range than what it is made of
                     columns = columns_of(plan, maps, part)
                     if before is not None:
                         columns = {name: values[~before[0]] for name, values in columns.items()}
                     return submit(executor, plan.models[part.model].key, columns)
 
-                for part, (rebound, errors) in _finished(start, left, running, known, team.room, should_stop):
+                for part, (rebound, errors) in _finished(
+                    start, left, running, known, backend.capacity, should_stop
+                ):
                     for error in errors.keys() - reported:
                         warnings.warn(errors[error], stacklevel=2)
                     reported |= errors.keys()
@@ -206,18 +208,18 @@ def run(
 
 
 def _finished(
-    start: Callable[[TrajectoryRange, KnownPart], Future[Integrated]],
+    start: Callable[[TrajectoryRange, ReusedPart], Future[Integrated]],
     left: deque[TrajectoryRange],
     running: Running,
-    known: Known,
-    room: Callable[[], int],
+    known: FindReused,
+    capacity: Callable[[], int],
     should_stop: Callable[[], bool],
 ) -> Iterator[tuple[TrajectoryRange, Integrated]]:
     """Submit what is left, as many ranges at a time as there is room for, and take them as they finish."""
     try:
         while left or running:
             # asked in every round, also where nothing is left to submit: it raises if nobody answers any more
-            most = room()
+            most = capacity()
             while left and len(running) < most and not should_stop():
                 part, before = left[0], known(left[0])
                 if before is not None and before[0].all():
@@ -281,13 +283,13 @@ def _form(array: object) -> str:
     return f"{array.dtype} of shape {array.shape}"
 
 
-def _submitter(plan: Plan, team: Team) -> Callable[..., Future[Integrated]]:
+def _submitter(plan: Plan, backend: Backend) -> Callable[..., Future[Integrated]]:
     """What submits the trajectories of a plan to an executor of a team."""
-    if team.is_here:
+    if backend.shares_memory:
         models = {model.key: model for model in plan.models}
 
         def integrate_here(key: str, columns: Columns) -> Integrated:
-            return integrate(models[key], columns, plan.config.solver)
+            return integrate_columns(models[key], columns, plan.config.solver)
 
         return lambda executor, key, columns: executor.submit(integrate_here, key, columns)
     values = [plugin.model.key for plugin in plan.plugins.items if plugin.is_value]
@@ -296,7 +298,7 @@ def _submitter(plan: Plan, team: Team) -> Callable[..., Future[Integrated]]:
             f"{safe_text(', '.join(values))} is given as a Python value, which cannot be sent to other processes; "
             "expected the file that it is in, or jobs=1"
         )
-    integrate_there = partial(work, context=context_of(plan))
+    integrate_there = partial(integrate_remotely, context=context_of(plan))
     return lambda executor, key, columns: executor.submit(integrate_there, key, columns)
 
 

@@ -17,25 +17,25 @@ from typing import Any
 from ..errors import UsageError
 
 # blocks that a worker has before it: the one it works at, and those it goes on with while the driver is busy
-AHEAD = 3
+BLOCKS_IN_FLIGHT = 3
 # blocks that are given to an executor of which nothing else is known
 SOME = 64
 
 
 @dataclass(frozen=True)
-class Team:
+class Backend:
     """Who integrates.
 
     Parameters
     ----------
     executor : makes the executor, and again where it was broken (`concurrent.futures.BrokenExecutor`)
-    room : how many blocks may be given to it before one is finished, at the moment; none if nobody is there
-    is_here : whether it shares our memory; to others numbers, names and source are sent
+    capacity : how many blocks may be given to it before one is finished, at the moment; none if nobody is there
+    shares_memory : whether it shares our memory; to others numbers, names and source are sent
     """
 
     executor: Callable[[], AbstractContextManager[Executor]]
-    room: Callable[[], int]
-    is_here: bool = False
+    capacity: Callable[[], int]
+    shares_memory: bool = False
 
 
 class _AtOnce(Executor):
@@ -50,10 +50,10 @@ class _AtOnce(Executor):
         return future
 
 
-ALONE = Team(_AtOnce, lambda: 1, is_here=True)
+SERIAL = Backend(_AtOnce, lambda: 1, shares_memory=True)
 
 
-def team_of(jobs: int = 1, threads: int = 1, executor: Executor | None = None) -> Team:
+def choose_backend(jobs: int = 1, threads: int = 1, executor: Executor | None = None) -> Backend:
     """The team of some processes, of some threads, or of an executor of any kind.
 
     Raises
@@ -65,10 +65,10 @@ def team_of(jobs: int = 1, threads: int = 1, executor: Executor | None = None) -
     if len(several) > 1:
         raise UsageError(f"got {' and '.join(several)}, wants one of them")
     if executor is not None:
-        return Team(lambda: nullcontext(executor), lambda: SOME, isinstance(executor, ThreadPoolExecutor))
+        return Backend(lambda: nullcontext(executor), lambda: SOME, isinstance(executor, ThreadPoolExecutor))
     if threads > 1:
-        return Team(lambda: ThreadPoolExecutor(threads), lambda: AHEAD * threads, is_here=True)
-    return Team(lambda: _processes(jobs), lambda: AHEAD * jobs) if jobs > 1 else ALONE
+        return Backend(lambda: ThreadPoolExecutor(threads), lambda: BLOCKS_IN_FLIGHT * threads, shares_memory=True)
+    return Backend(lambda: _processes(jobs), lambda: BLOCKS_IN_FLIGHT * jobs) if jobs > 1 else SERIAL
 
 
 class _Processes(ProcessPoolExecutor):

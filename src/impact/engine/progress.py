@@ -27,19 +27,19 @@ class Progress:
     failed: int
 
 
-Tell = Callable[[Progress], None]
+ProgressCallback = Callable[[Progress], None]
 
 
 @dataclass
-class Gauge:
+class ProgressCounter:
     """Counts what is finished, and tells it."""
 
     at: Progress
-    tell: Tell
+    on_progress: ProgressCallback
 
     @classmethod
-    def begin(cls, trajectories: int, points: int, tell: Tell) -> Gauge:
-        return cls(Progress(0, trajectories, 0, points, 0), tell)
+    def begin(cls, trajectories: int, points: int, on_progress: ProgressCallback) -> ProgressCounter:
+        return cls(Progress(0, trajectories, 0, points, 0), on_progress)
 
     @property
     def is_full(self) -> bool:
@@ -51,25 +51,27 @@ class Gauge:
         failed = int(np.count_nonzero(rebound.status >= FIRST_FAILURE))
         self.at = replace(self.at, trajectories=self.at.trajectories + part.size, failed=self.at.failed + failed)
 
-    def say(self) -> None:
-        self.tell(self.at)
+    def report(self) -> None:
+        self.on_progress(self.at)
 
 
 @contextmanager
-def kept(folder: Path, gauge: Gauge, again: str, more: Callable[[Exception], list[str]]) -> Iterator[None]:
+def report_kept_blocks(
+    folder: Path, counter: ProgressCounter, again: str, more: Callable[[Exception], list[str]]
+) -> Iterator[None]:
     """Have an error say what is kept nevertheless.
 
     Parameters
     ----------
     folder : where
-    gauge : how much
+    counter : how much
     again : what goes on with it
     more : what else there is to say of an error
     """
     try:
         yield
     except (StoreError, UnfinishedError, UsageError, MemoryError) as error:
-        of = f"{gauge.at.trajectories:,} of {gauge.at.of_trajectories:,} trajectories"
+        of = f"{counter.at.trajectories:,} of {counter.at.of_trajectories:,} trajectories"
         left = f"{of} are kept in {safe_text(str(folder))}; {again} goes on"
         is_memory = isinstance(error, MemoryError)
         lines = ["out of memory" if is_memory else "", str(error), *more(error), left]

@@ -132,16 +132,16 @@ def trajectory_ranges(maps: Sequence[TrajectoryMap], size: int = RANGE_TRAJECTOR
     """All trajectories in order, in ranges of at most `size`."""
     number = 0
     for own in maps:
-        step = even(own.count, size)
+        step = even_size(own.count, size)
         for start in range(0, own.count, step):
             yield TrajectoryRange(number, own.model, start, min(start + step, own.count))
             number += 1
 
 
-def even(count: int, most: int) -> int:
+def even_size(count: int, most: int) -> int:
     """The size of ranges of at most so many that share a number evenly: a small last one would cost too much.
 
-    >>> even(20_000, 16_384), even(100, 16_384)
+    >>> even_size(20_000, 16_384), even_size(100, 16_384)
     (10000, 100)
     """
     return -(-count // -(-count // most))

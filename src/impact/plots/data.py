@@ -12,7 +12,7 @@ import numpy as np
 
 from ..config.cases import HEADER, CsvTable, column_values, read_csv
 from ..config.quantities import Quantity, show
-from ..config.tables import SWEEP
+from ..config.tables import SWEEP_QUANTITIES
 from ..errors import ConfigError, UsageError, did_you_mean
 from ..formatting import number
 from ..results.history import HISTORY
@@ -175,7 +175,7 @@ def _column_quantities() -> dict[str, Quantity]:
         if variable.dtype == "f8"
     }
     history = {name: Quantity(plain_unit(unit), meaning) for name, unit, meaning in HISTORY}
-    inputs = {name: Quantity(rule.unit, rule.meaning) for name, rule in SWEEP.items()}
+    inputs = {name: Quantity(rule.unit, rule.meaning) for name, rule in SWEEP_QUANTITIES.items()}
     time, impulse = Quantity("s", "time"), Quantity("N s", "impulse")
     sigma = Quantity("1", "standard deviation", least=0.0)
     return {**outputs, **history, **inputs, "t": time, "tau": impulse, SIGMA: sigma}

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..config.tables import SWEEP
+from ..config.tables import SWEEP_QUANTITIES
 from ..contact.models import catalogue
 from ..errors import UsageError
 from ..results.attributes import read_attribute
@@ -167,7 +167,7 @@ def _conditions_text(histories: Sequence[xr.Dataset]) -> str:
     by_model = {str(of_model["model"].item()): _impact_inputs(of_model).get("n") for of_model in histories}
     exponents = {key: n for key, n in by_model.items() if isinstance(n, float)}
     text = exponent_text(exponents) if len(exponents) == len(by_model) else None
-    units = {name: SWEEP[name].unit if name in SWEEP else "1" for name in inputs}
+    units = {name: SWEEP_QUANTITIES[name].unit if name in SWEEP_QUANTITIES else "1" for name in inputs}
     return described_inputs(inputs, units, text)
 
 

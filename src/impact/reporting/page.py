@@ -16,7 +16,7 @@ from jinja2 import Environment, FunctionLoader, StrictUndefined, Template
 from markupsafe import Markup
 from numpy.typing import NDArray
 
-from ..config.tables import MATERIAL
+from ..config.tables import MATERIAL_QUANTITIES
 from ..contact.models import catalogue
 from ..engine.plan import owner_of
 from ..errors import UsageError
@@ -127,7 +127,7 @@ def _single_values(dataset: xr.Dataset) -> Iterator[tuple[str, str, str]]:
         if coordinate.ndim == 0 and is_input(str(name)):
             value = (exponents_of(dataset) if name == "n" else None) or coordinate_text(coordinate)
             yield str(name), value, str(coordinate.attrs.get("long_name", ""))
-    units = {key: rule.unit.removesuffix("1") for key, rule in MATERIAL.items()}
+    units = {key: rule.unit.removesuffix("1") for key, rule in MATERIAL_QUANTITIES.items()}
     for name, material in read_attribute(dataset.attrs, "materials").items():
         values = (f"{key} = {label(value)} {units.get(key, '')}".strip() for key, value in material.items()
                   if value is not None)  # fmt: skip

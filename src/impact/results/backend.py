@@ -18,7 +18,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from xarray.backends import BackendEntrypoint
 
-from ..atomic import Sink, appearing
+from ..atomic import Sink, atomic_write
 from ..config.tables import Output
 from ..errors import ResultError, UnfinishedError, UsageError
 from ..text import safe_text
@@ -87,7 +87,7 @@ def write_whole(path: Path, content: bytes | memoryview, *, overwrite: bool) -> 
     StoreError : the disk is full or failed; nothing is left under the name
     """
     check_output(path, overwrite=overwrite)
-    with appearing(path, overwrite=overwrite) as sink:
+    with atomic_write(path, overwrite=overwrite) as sink:
         sink.write(content)
 
 
@@ -167,7 +167,7 @@ def save(
                     raise UnfinishedError("nothing was written")
                 yield str(name), tuple(where.values()), variable.isel(where).values
 
-    with appearing(path, overwrite=overwrite) as sink:
+    with atomic_write(path, overwrite=overwrite) as sink:
         write(sink, dataset, parts(), output)
         check_readable(sink, path)
 
@@ -179,7 +179,7 @@ def save_with(source: Path, path: Path, attributes: Mapping[str, str]) -> None:
     ------
     StoreError : the disk is full or failed
     """
-    with appearing(path, overwrite=True) as sink, source.open("rb") as file:
+    with atomic_write(path, overwrite=True) as sink, source.open("rb") as file:
         while content := file.read(COPIED_BYTES):
             sink.write(content)
         sink.check()

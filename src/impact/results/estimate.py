@@ -14,8 +14,8 @@ from typing import Literal
 import numpy as np
 
 from ..contact.simulate import TABLE_COLUMNS
-from ..engine.checkpoint import pack
-from ..engine.execute import context_of, integrate, with_core
+from ..engine.checkpoint import write_block
+from ..engine.execute import context_of, integrate_columns, with_core
 from ..engine.plan import Plan
 from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryMap, columns_of, trajectory_maps, trajectory_ranges
 from .expand import expanded_slabs, table_of
@@ -87,12 +87,12 @@ def estimate(plan: Plan, jobs: int = 1) -> Estimate:
     # the first time loads, or even compiles, what integrates
     for _ in range(2):
         with _timed() as integrating:
-            rebound, _ = integrate(model, columns_of(plan, maps, chosen), plan.config.solver)
+            rebound, _ = integrate_columns(model, columns_of(plan, maps, chosen), plan.config.solver)
     with _timed() as driving:
         sent = len(pickle.dumps((columns_of(plan, maps, chosen), context_of(plan)), pickle.HIGHEST_PROTOCOL))
         back = pickle.dumps(rebound, pickle.HIGHEST_PROTOCOL)
         pickle.loads(back)
-        pack(io.BytesIO(), "", rebound)
+        write_block(io.BytesIO(), "", rebound)
     # what became of the trajectories of a slab does not matter for its time: those of the range, again and again
     places = np.arange(RANGE_TRAJECTORIES) % chosen.size
     table = table_of(plan, maps, lambda _, start, stop: rebound.take(places[: stop - start]))

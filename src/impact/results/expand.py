@@ -28,7 +28,7 @@ from ..contact.simulate import CollisionResult
 from ..contact.status import Status
 from ..engine.build_impacts import Stiffness, build_impacts, has_stiffness_rule
 from ..engine.plan import Index, Inputs, Plan, dimensions, owner_of
-from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryMap, axes_of_arrays, even, probe_index
+from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryMap, axes_of_arrays, even_size, probe_index
 from .schema import Variable, attributes_of
 from .slabs import AXES, VARIES_ALONG, aligned_slabs, slabs
 
@@ -73,7 +73,7 @@ class Rows:
 
     def _segments(self, model: int, rows: NDArray[np.intp]) -> CollisionResult:
         count = self.maps[model].count
-        size = even(count, self.segment)
+        size = even_size(count, self.segment)
         found, segment = CollisionResult.blank(rows.size), rows // size
         for number in np.unique(segment).tolist():
             where = np.flatnonzero(segment == number)

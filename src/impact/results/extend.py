@@ -17,11 +17,11 @@ from ..config.grid import MAX_POINTS, Axis, path_of
 from ..config.tables import CORES
 from ..contact.simulate import CollisionResult
 from ..contact.status import OK, Status
-from ..engine.execute import never
-from ..engine.executors import ALONE, Team
+from ..engine.execute import never_stop
+from ..engine.executors import SERIAL, Backend
 from ..engine.plan import Inputs, Plan
 from ..engine.plugins import Plugins
-from ..engine.progress import Tell
+from ..engine.progress import ProgressCallback
 from ..engine.trajectories import TrajectoryMap, TrajectoryRange, check_count, columns_of, trajectory_maps
 from ..errors import ResultError, UsageError
 from ..text import safe_text
@@ -47,9 +47,9 @@ def extend(
     resume: bool = False,
     overwrite: bool = False,
     max_points: int = MAX_POINTS,
-    team: Team = ALONE,
-    tell: Tell = lambda progress: None,
-    should_stop: Callable[[], bool] = never,
+    backend: Backend = SERIAL,
+    on_progress: ProgressCallback = lambda progress: None,
+    should_stop: Callable[[], bool] = never_stop,
 ) -> tuple[Survey, int]:
     """Add values to the axes of a result, or models to it.
 
@@ -59,7 +59,7 @@ def extend(
     output : the file of the larger one, which may be the same
     overrides : changes to its config, such as "sweep.m2=[1.0, 2.0]"; values that the result has are kept
     plugins : models that are not built in, those that it was made with among them
-    resume, overwrite, team, tell, should_stop : see `impact.results.sweep.sweep_into`
+    resume, overwrite, backend, on_progress, should_stop : see `impact.results.sweep.sweep_into`
     max_points : refuse a sweep of more points
 
     Returns
@@ -106,8 +106,8 @@ def extend(
 
         extension = Extension(seal, json.dumps(history), known, fill)
         survey = sweep_into(
-            output, new, resume=resume, overwrite=overwrite, in_place=output == source, team=team, tell=tell,
-            should_stop=should_stop, extension=extension,
+            output, new, resume=resume, overwrite=overwrite, in_place=output == source, backend=backend,
+            on_progress=on_progress, should_stop=should_stop, extension=extension,
         )  # fmt: skip
     return survey, sum(counted.values())
 
@@ -352,6 +352,9 @@ class _Places:
                     continue
                 held = variable.isel(model=old_model, **chosen).transpose(*(names[axis] for axis in order)).values
                 shape = tuple(part.size for part in inside)
+                if not array.flags.writeable:
+                    # a view of computed values that was not copied
+                    values[name] = array = array.copy()
                 array[inside or ...] = held.reshape(shape) if array.shape else held
 
         return fill

@@ -15,7 +15,7 @@ import xarray as xr
 
 from ..config.grid import MAX_POINTS, Axis, path_of
 from ..config.load import Config, parse_config, read_config
-from ..config.tables import SWEEP
+from ..config.tables import SWEEP_QUANTITIES
 from ..engine.plan import Plan, owner_of
 from ..engine.plugins import Plugins
 from ..errors import ConfigError, ResultError, UsageError, did_you_mean
@@ -112,7 +112,7 @@ def single_point(
     together = {name for names in columns if len(names) > 1 for name in names}
     known = [*(name for names in columns for name in names), *config.scalars]
     for name, value in at.items():
-        if name not in known and name not in SWEEP:
+        if name not in known and name not in SWEEP_QUANTITIES:
             raise UsageError(f'no input "{safe_text(name)}" here; {did_you_mean(name, known)}')
         if name not in together:
             asked[f"{_override_path(name)}={_toml(value)}"] = f"--at {name}={value}"

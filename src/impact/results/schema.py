@@ -15,7 +15,7 @@ import numpy as np
 import xarray as xr
 
 from .._version import __version__
-from ..config.tables import MATERIAL, MATERIALS, SWEEP, own_quantities
+from ..config.tables import MATERIAL_KEYS, MATERIAL_QUANTITIES, SWEEP_QUANTITIES, model_quantities
 from ..contact.outputs import BY_DEFAULT
 from ..contact.powers import Array
 from ..contact.status import Status
@@ -170,15 +170,18 @@ def _about(plan: Plan, name: str) -> dict[str, str]:
     """Units and meaning of a coordinate."""
     material, field = material_property(name) or ("", "")
     if material:
-        return {"units": udunits(MATERIAL[field].unit), "long_name": f"{MATERIAL[field].meaning} of {material}"}
+        return {
+            "units": udunits(MATERIAL_QUANTITIES[field].unit),
+            "long_name": f"{MATERIAL_QUANTITIES[field].meaning} of {material}",
+        }
     key, _, own = name.rpartition(".")
     for model in plan.models:
         if model.key == key:
-            quantity = own_quantities(model)[own]
+            quantity = model_quantities(model)[own]
             return {"units": udunits(quantity.unit), "long_name": quantity.meaning}
-    if name in MATERIALS:
-        return {"long_name": MATERIALS[name]}
-    return {"units": udunits(SWEEP[name].unit), "long_name": SWEEP[name].meaning}
+    if name in MATERIAL_KEYS:
+        return {"long_name": MATERIAL_KEYS[name]}
+    return {"units": udunits(SWEEP_QUANTITIES[name].unit), "long_name": SWEEP_QUANTITIES[name].meaning}
 
 
 def udunits(unit: str) -> str:
@@ -224,7 +227,7 @@ def exponents_of(dataset: xr.Dataset) -> str | None:
 
 def is_input(name: str) -> bool:
     """Whether a coordinate has the name of an input: it is not a text about a model, nor the number of a case."""
-    return name in SWEEP or name in MATERIALS or "." in name
+    return name in SWEEP_QUANTITIES or name in MATERIAL_KEYS or "." in name
 
 
 def is_case(name: str) -> bool:

@@ -14,14 +14,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ..atomic import appearing
+from ..atomic import atomic_write
 from ..config.tables import CORES
-from ..engine.checkpoint import Work, held, working
-from ..engine.execute import never, with_core
-from ..engine.executors import ALONE, Team
+from ..engine.checkpoint import WorkFolder, lock_work_folder, open_work_folder
+from ..engine.execute import never_stop, with_core
+from ..engine.executors import SERIAL, Backend
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins
-from ..engine.progress import Gauge, Tell, kept
+from ..engine.progress import ProgressCallback, ProgressCounter, report_kept_blocks
 from ..engine.trajectories import TrajectoryRange, trajectory_maps, trajectory_ranges
 from ..errors import ResultError, StoreError, UnfinishedError, UsageError
 from ..text import safe_text
@@ -91,9 +91,9 @@ def sweep_shard(
     command: Sequence[str],
     *,
     overwrite: bool = False,
-    team: Team = ALONE,
-    tell: Tell = lambda progress: None,
-    should_stop: Callable[[], bool] = never,
+    backend: Backend = SERIAL,
+    on_progress: ProgressCallback = lambda progress: None,
+    should_stop: Callable[[], bool] = never_stop,
 ) -> Share:
     """Integrate a shard of a plan into its work folder, and go on with what is there.
 
@@ -104,7 +104,7 @@ def sweep_shard(
     shard : which part
     command : words that sweep the whole; what makes a shard that is missing is told by them
     overwrite : begin anew
-    team, tell, should_stop : see `impact.results.sweep.sweep_into`
+    backend, on_progress, should_stop : see `impact.results.sweep.sweep_into`
 
     Raises
     ------
@@ -115,9 +115,9 @@ def sweep_shard(
     plan = with_core(plan, maps)
     blocks = list(trajectory_ranges(maps))
     own = [one for one in blocks if shard.has(one)]
-    gauge = Gauge.begin(sum(one.size for one in own), plan.points, tell)
+    counter = ProgressCounter.begin(sum(one.size for one in own), plan.points, on_progress)
     folder = shard.folder(output)
-    with working(folder, plan, resume=not overwrite, overwrite=overwrite) as work:
+    with open_work_folder(folder, plan, resume=not overwrite, overwrite=overwrite) as work_folder:
         attributes = outline(plan).attrs
         about = {
             "shard": [shard.number, shard.of],
@@ -125,11 +125,11 @@ def sweep_shard(
             "core": plan.config.solver.core,
             "attributes": {name: attributes[name] for name in ATTRIBUTES},
         }
-        with appearing(folder / FILE, overwrite=True) as sink:
+        with atomic_write(folder / FILE, overwrite=True) as sink:
             sink.write(json.dumps(about).encode())
-        with kept(folder, gauge, "the same command", lambda error: []):
-            fill(work, plan, maps, own, gauge, team, should_stop)
-    return Share(folder, len(own), len(blocks), gauge.at.trajectories, gauge.at.failed)
+        with report_kept_blocks(folder, counter, "the same command", lambda error: []):
+            fill(work_folder, plan, maps, own, counter, backend, should_stop)
+    return Share(folder, len(own), len(blocks), counter.at.trajectories, counter.at.failed)
 
 
 @dataclass(frozen=True)
@@ -148,8 +148,8 @@ def merge(
     plugins: Plugins,
     *,
     overwrite: bool = False,
-    tell: Tell = lambda progress: None,
-    should_stop: Callable[[], bool] = never,
+    on_progress: ProgressCallback = lambda progress: None,
+    should_stop: Callable[[], bool] = never_stop,
 ) -> tuple[Survey, int]:
     """Store the result that shards make; their folders stay as they are.
 
@@ -159,7 +159,7 @@ def merge(
     output : the file
     plugins : the models of one's own that they were made with
     overwrite : replace the file if it exists
-    tell, should_stop : see `impact.results.sweep.sweep_into`
+    on_progress, should_stop : see `impact.results.sweep.sweep_into`
 
     Returns
     -------
@@ -182,23 +182,23 @@ def merge(
     plan = Plan(config, plugins.of(config.models))
     maps = trajectory_maps(plan)
     blocks = list(trajectory_ranges(maps))
-    gauge = Gauge.begin(sum(own.count for own in maps), plan.points, tell)
+    counter = ProgressCounter.begin(sum(own.count for own in maps), plan.points, on_progress)
     for folder, one in told.items():
         if one.attributes["fingerprint"] != about.attributes["fingerprint"]:
             # what differs in the trajectories is told by its name first
-            with held(folder, plan):
+            with lock_work_folder(folder, plan):
                 raise UsageError(
                     f"{safe_text(str(folder))}: its title or output is not that of {safe_text(str(first))}; "
                     "expected the folders of one sweep"
                 )
     # a folder is locked while it is looked at, one after the other: there may be more of them than open files
-    where, twice = _places([*told], plan, blocks, gauge, should_stop)
+    where, twice = _places([*told], plan, blocks, counter, should_stop)
     lacking = [part for part in blocks if part.number not in where]
     if lacking:
         raise UsageError("\n".join(_missing(output, lacking, told)))
     table = table_of(plan, maps, reader(maps, lambda number: loaded_again(where[number], blocks[number])))
     try:
-        return store_result(output, plan, table, None, overwrite, gauge, should_stop), twice
+        return store_result(output, plan, table, None, overwrite, counter, should_stop), twice
     except (StoreError, UnfinishedError) as error:
         raise type(error)(
             "; ".join(filter(None, [str(error), "the folders have all that is finished"]))
@@ -235,30 +235,30 @@ def _places(
     folders: Sequence[Path],
     plan: Plan,
     blocks: Sequence[TrajectoryRange],
-    gauge: Gauge,
+    counter: ProgressCounter,
     should_stop: Callable[[], bool],
-) -> tuple[dict[int, Work], int]:
+) -> tuple[dict[int, WorkFolder], int]:
     """In which folder each range is, and how many are in several."""
-    where: dict[int, Work] = {}
+    where: dict[int, WorkFolder] = {}
     repeated: set[int] = set()
     for folder in folders:
-        with held(folder, plan) as work:
+        with lock_work_folder(folder, plan) as work_folder:
             for part in blocks:
                 if should_stop():
                     raise UnfinishedError("nothing was written")
-                found = work.load(part)
+                found = work_folder.load(part)
                 if found is None:
                     continue
                 if part.number not in where:
-                    where[part.number] = work
-                    gauge.count(part, found)
-                    gauge.say()
+                    where[part.number] = work_folder
+                    counter.count(part, found)
+                    counter.report()
                     continue
                 repeated.add(part.number)
                 other = loaded_again(where[part.number], part)
                 if any(values.tobytes() != vars(other)[name].tobytes() for name, values in vars(found).items()):
                     raise ResultError(
-                        f"{safe_text(str(work.path(part.number)))}: differs from "
+                        f"{safe_text(str(work_folder.path(part.number)))}: differs from "
                         f"{safe_text(str(where[part.number].path(part.number)))}; expected both to be of "
                         "processors of one kind"
                     )

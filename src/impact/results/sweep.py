@@ -14,19 +14,19 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ..atomic import appearing
+from ..atomic import atomic_write
 from ..contact.impacts import Impacts
 from ..contact.simulate import TABLE_COLUMNS, CollisionResult
-from ..engine.checkpoint import Work, folder_of, part_of, remove, working
-from ..engine.execute import Known, never, run, with_core
-from ..engine.executors import ALONE, Team
+from ..engine.checkpoint import WorkFolder, open_work_folder, partial_file_of, remove_work_folder, work_folder_of
+from ..engine.execute import FindReused, integrate_ranges, never_stop, with_core
+from ..engine.executors import SERIAL, Backend
 from ..engine.plan import Plan, material_property
-from ..engine.progress import Gauge, Tell, kept
+from ..engine.progress import ProgressCallback, ProgressCounter, report_kept_blocks
 from ..engine.trajectories import (
     RANGE_TRAJECTORIES,
     TrajectoryMap,
     TrajectoryRange,
-    even,
+    even_size,
     trajectory_maps,
     trajectory_ranges,
 )
@@ -63,7 +63,7 @@ class Extension:
 
     seal: str
     note: str
-    known: Known
+    known: FindReused
     fill: Callable[[int, tuple[slice, ...], Values], None] | None = None
 
 
@@ -74,9 +74,9 @@ def sweep_into(
     resume: bool = False,
     overwrite: bool = False,
     in_place: bool = False,
-    team: Team = ALONE,
-    tell: Tell = lambda progress: None,
-    should_stop: Callable[[], bool] = never,
+    backend: Backend = SERIAL,
+    on_progress: ProgressCallback = lambda progress: None,
+    should_stop: Callable[[], bool] = never_stop,
     extension: Extension | None = None,
 ) -> Survey:
     """Run a plan, and store its result.
@@ -88,8 +88,8 @@ def sweep_into(
     resume : continue with the work folder that an interrupted sweep left
     overwrite : replace the file if it exists, and a work folder if it is not to be resumed
     in_place : replace the file, and no work folder
-    team : who integrates
-    tell : receives the progress, now and then
+    backend : who integrates
+    on_progress : receives the progress, now and then
     should_stop : whether to stop; what was begun is finished and kept
     extension : what is known already
 
@@ -106,47 +106,54 @@ def sweep_into(
     plan = with_core(plan, maps)
     ranges = list(trajectory_ranges(maps))
     total = sum(own.count for own in maps)
-    gauge = Gauge.begin(total, plan.points, tell)
+    counter = ProgressCounter.begin(total, plan.points, on_progress)
     known = extension.known if extension else lambda part: None
     few = plan.stored_points <= NO_CHECKPOINT_POINTS or plan.layout == "factored"
-    if total <= RANGE_TRAJECTORIES and few and not os.path.lexists(folder_of(output)):
+    if total <= RANGE_TRAJECTORIES and few and not os.path.lexists(work_folder_of(output)):
         finished = {}
-        for part, rebound in run(plan, maps, ranges, known=known):
+        for part, rebound in integrate_ranges(plan, maps, ranges, known=known):
             finished[part.number] = rebound
-            gauge.count(part, rebound)
+            counter.count(part, rebound)
         table = table_of(plan, maps, reader(maps, finished.__getitem__))
         try:
-            return store_result(output, plan, table, None, overwrite or in_place, gauge, should_stop, extension)
+            return store_result(output, plan, table, None, overwrite or in_place, counter, should_stop, extension)
         except UnfinishedError:
             raise UnfinishedError("nothing was written") from None
 
-    folder = folder_of(output)
-    with working(
+    folder = work_folder_of(output)
+    with open_work_folder(
         folder, plan, resume=resume, overwrite=overwrite, extends=extension.seal if extension else ""
-    ) as work:
+    ) as work_folder:
         # another may have stored it since
         check_output(output, overwrite=overwrite or in_place)
         # without the other word a result that is to be replaced would be in the way
         again = "--resume --overwrite" if os.path.lexists(output) and not extension else "--resume"
-        with kept(folder, gauge, again, lambda error: _room(error, output, plan, gauge)):
-            fill(work, plan, maps, ranges, gauge, team, should_stop, known)
-            table = table_of(plan, maps, reader(maps, lambda number: loaded_again(work, ranges[number])))
+        with report_kept_blocks(folder, counter, again, lambda error: _room(error, output, plan, counter)):
+            fill(work_folder, plan, maps, ranges, counter, backend, should_stop, known)
+            table = table_of(plan, maps, reader(maps, lambda number: loaded_again(work_folder, ranges[number])))
             survey = store_result(
-                output, plan, table, part_of(output), overwrite or in_place, gauge, should_stop, extension
+                output,
+                plan,
+                table,
+                partial_file_of(output),
+                overwrite or in_place,
+                counter,
+                should_stop,
+                extension,
             )
-        remove(folder)
+        remove_work_folder(folder)
     return survey
 
 
 def fill(
-    work: Work,
+    work_folder: WorkFolder,
     plan: Plan,
     maps: Sequence[TrajectoryMap],
     ranges: Sequence[TrajectoryRange],
-    gauge: Gauge,
-    team: Team,
+    counter: ProgressCounter,
+    backend: Backend,
     should_stop: Callable[[], bool],
-    known: Known = lambda part: None,
+    known: FindReused = lambda part: None,
 ) -> None:
     """Have all of some ranges in a work folder.
 
@@ -157,21 +164,23 @@ def fill(
     """
     todo: list[TrajectoryRange] = []
     for part in ranges:
-        before = None if should_stop() else work.load(part)
+        before = None if should_stop() else work_folder.load(part)
         if before is None:
             todo.append(part)
         else:
-            gauge.count(part, before)
-    gauge.say()
-    for part, rebound in run(plan, maps, todo, team=team, should_stop=should_stop, known=known):
-        work.store(part, rebound)
-        gauge.count(part, rebound)
-        gauge.say()
-    if not gauge.is_full:
+            counter.count(part, before)
+    counter.report()
+    for part, rebound in integrate_ranges(plan, maps, todo, backend=backend, should_stop=should_stop, known=known):
+        work_folder.store(part, rebound)
+        counter.count(part, rebound)
+        counter.report()
+    if not counter.is_full:
         raise UnfinishedError
 
 
-def sweep_in_memory(plan: Plan, *, team: Team = ALONE, tell: Tell, should_stop: Callable[[], bool]) -> xr.Dataset:
+def sweep_in_memory(
+    plan: Plan, *, backend: Backend = SERIAL, on_progress: ProgressCallback, should_stop: Callable[[], bool]
+) -> xr.Dataset:
     """Run a plan; its result is in memory if it is small, else it is computed when it is indexed.
 
     For the parameters see `sweep_into`.
@@ -183,13 +192,15 @@ def sweep_in_memory(plan: Plan, *, team: Team = ALONE, tell: Tell, should_stop: 
     check_labels(plan)
     maps = trajectory_maps(plan)
     plan = with_core(plan, maps)
-    gauge = Gauge.begin(sum(own.count for own in maps), plan.points, tell)
+    counter = ProgressCounter.begin(sum(own.count for own in maps), plan.points, on_progress)
     finished: dict[int, CollisionResult] = {}
-    for part, rebound in run(plan, maps, trajectory_ranges(maps), team=team, should_stop=should_stop):
+    for part, rebound in integrate_ranges(
+        plan, maps, trajectory_ranges(maps), backend=backend, should_stop=should_stop
+    ):
         finished[part.number] = rebound
-        gauge.count(part, rebound)
-        gauge.say()
-    if not gauge.is_full or should_stop():
+        counter.count(part, rebound)
+        counter.report()
+    if not counter.is_full or should_stop():
         raise UnfinishedError("nothing was written")
     table, variables = table_of(plan, maps, reader(maps, finished.__getitem__)), stored(plan)
     dataset = lazy_dataset(outline(plan), table, variables)
@@ -203,21 +214,21 @@ def reader(
     before = np.cumsum([0, *(-(-own.count // RANGE_TRAJECTORIES) for own in maps)])
 
     def read(model: int, start: int, stop: int) -> CollisionResult:
-        return load(int(before[model]) + start // even(maps[model].count, RANGE_TRAJECTORIES))
+        return load(int(before[model]) + start // even_size(maps[model].count, RANGE_TRAJECTORIES))
 
     return read
 
 
-def loaded_again(work: Work, part: TrajectoryRange) -> CollisionResult:
+def loaded_again(work_folder: WorkFolder, part: TrajectoryRange) -> CollisionResult:
     """A range that was finished.
 
     Raises
     ------
     StoreError : it is damaged
     """
-    rebound = work.load(part)
+    rebound = work_folder.load(part)
     if rebound is None:
-        raise StoreError(f"{safe_text(str(work.path(part.number)))}: cannot be read any more")
+        raise StoreError(f"{safe_text(str(work_folder.path(part.number)))}: cannot be read any more")
     return rebound
 
 
@@ -272,14 +283,14 @@ def finished(path: Path, plan: Plan) -> Survey | None:
     return Survey(dataset, tally_of(dataset), sum(own.count for own in trajectory_maps(plan)))
 
 
-def _room(error: Exception, output: Path, plan: Plan, gauge: Gauge) -> list[str]:
+def _room(error: Exception, output: Path, plan: Plan, counter: ProgressCounter) -> list[str]:
     """On a full disk, how much more room it takes."""
     cause = error.__cause__
     if not isinstance(cause, OSError) or cause.errno not in (errno.ENOSPC, errno.EDQUOT):
         return []
     row = sum(getattr(CollisionResult.blank(1), name).nbytes for name in TABLE_COLUMNS)
-    result = gauge.at.of_trajectories * row if plan.layout == "factored" else outline(plan).nbytes
-    wanted = result + OVERHEAD + (gauge.at.of_trajectories - gauge.at.trajectories) * row
+    result = counter.at.of_trajectories * row if plan.layout == "factored" else outline(plan).nbytes
+    wanted = result + OVERHEAD + (counter.at.of_trajectories - counter.at.trajectories) * row
     free = shutil.disk_usage(output.parent).free
     return [f"it takes {wanted:,} bytes more, {free:,} are free"]
 
@@ -290,18 +301,18 @@ def store_result(
     table: TrajectoryTable,
     part: Path | None,
     overwrite: bool,
-    gauge: Gauge,
+    counter: ProgressCounter,
     should_stop: Callable[[], bool],
     extension: Extension | None = None,
 ) -> Survey:
     """Write the result of a trajectory table in the layout of its plan, and give it its name."""
-    at, variables, tally = gauge.at, stored(plan), Tally()
+    at, variables, tally = counter.at, stored(plan), Tally()
     whole = outline(plan)
     if extension:
         whole = whole.assign_attrs(extended=extension.note)
 
     def check(points: int) -> None:
-        gauge.tell(replace(at, points=points, failed=max(tally.failed, at.failed)))
+        counter.on_progress(replace(at, points=points, failed=max(tally.failed, at.failed)))
         if should_stop():
             raise UnfinishedError
 
@@ -310,6 +321,8 @@ def store_result(
         lengths = [chunks.get(axis.name, axis.size) for axis in plan.config.axes] if chunks else []
         for model, where, impacts, values in expanded_slabs(table, variables, lengths):
             if extension and extension.fill:
+                # expanded values may be read-only views
+                values = {name: array.copy() for name, array in values.items()}
                 extension.fill(model, where, values)
             for name, array in values.items():
                 yield name, (model, *where) if "model" in whole[name].dims else where, array
@@ -324,7 +337,7 @@ def store_result(
 
     is_full = plan.layout == "full"
     made = whole if is_full else factored_outline(whole, table, variables)
-    with appearing(output, overwrite=overwrite, part=part) as sink:
+    with atomic_write(output, overwrite=overwrite, part=part) as sink:
         seal = write(sink, made, full() if is_full else factored(), plan.config.output)
         check_readable(sink, output)
     if not is_full:

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 import xarray as xr
 
-from ..config.tables import MATERIAL, MATERIALS, SWEEP
+from ..config.tables import MATERIAL_KEYS, MATERIAL_QUANTITIES, SWEEP_QUANTITIES
 from ..contact.simulate import TABLE_COLUMNS
 from ..contact.status import STATUSES
 from ..engine.plan import material_property
@@ -24,13 +24,13 @@ from .slabs import VARIES_ALONG, is_lazy, slabs
 
 COMPUTED = frozenset(one.name for one in SCHEMA)
 FOLLOWED = frozenset(name for name, _, _ in HISTORY)  # over the time t
-TEXTS = frozenset({"model", *ABOUT_A_MODEL, *MATERIALS} - {"year"})
+TEXTS = frozenset({"model", *ABOUT_A_MODEL, *MATERIAL_KEYS} - {"year"})
 # the table of a factored file, see `impact.results.factored`
 TABLE = frozenset({
     *(f"trajectory_{name}" for name in TABLE_COLUMNS), "trajectory_of_cell", "law_stiffness",
     "witness_index", *(f"witness_{name}" for name in COMPUTED),
 })  # fmt: skip
-NAMES = COMPUTED | FOLLOWED | TEXTS | TABLE | {"t", "year", "exponent", *SWEEP}
+NAMES = COMPUTED | FOLLOWED | TEXTS | TABLE | {"t", "year", "exponent", *SWEEP_QUANTITIES}
 # a parameter of a model's own: the key of the model, and a name of Python
 OWN = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*\.[^\W\d]\w*")
 
@@ -45,7 +45,7 @@ def is_name(name: str) -> bool:
         return True
     material, key = material_property(name) or ("", "")
     # netCDF separates names by spaces, and HDF5 groups by slashes
-    return key in MATERIAL and material.isprintable() and re.fullmatch(r"[^\s/]+", material) is not None
+    return key in MATERIAL_QUANTITIES and material.isprintable() and re.fullmatch(r"[^\s/]+", material) is not None
 
 
 def is_quantity(name: str, axes: tuple[str, ...]) -> bool:

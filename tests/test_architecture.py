@@ -1,0 +1,71 @@
+"""docs/architecture.md names modules and functions that exist, every module, and the steps in their order."""
+
+from __future__ import annotations
+
+import re
+import sys
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+from .conftest import ROOT
+
+sys.path.insert(0, str(ROOT / "scripts"))
+from make_docs import PACKAGE, architecture_page
+
+PAGE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+NAMES = sorted(set(re.findall(r"`(impact\.[\w.]+)`", PAGE)))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_name_of_the_page_exists(name: str) -> None:
+    module, _, attribute = name.rpartition(".")
+    try:
+        import_module(name)
+    except ModuleNotFoundError:
+        assert hasattr(import_module(module), attribute), name
+
+
+def test_the_list_of_modules_is_fresh_and_complete() -> None:
+    assert architecture_page(PAGE) == PAGE, "run `make docs`"
+    listed = set(re.findall(r"^- `([\w/]+)`: ", PAGE, re.MULTILINE))
+    modules = {
+        path.relative_to(PACKAGE).with_suffix("").as_posix().removesuffix("/__init__")
+        for path in PACKAGE.rglob("*.py")
+        if path.read_text(encoding="utf-8") and path.parent != PACKAGE
+    }
+    assert modules <= listed
+
+
+def test_a_value_of_e_takes_the_steps_of_the_page_in_their_order(tmp_path: Path) -> None:
+    """Each function of the table is called, the first time in the order of the table, by the two commands."""
+    functions = re.findall(r"^\| \d+ \| `(impact\.[\w.]+)` \|", PAGE, re.MULTILINE)
+    assert len(functions) == len(re.findall(r"^\| \d+ \|", PAGE, re.MULTILINE)) > 10
+    codes = {code_of(name): name for name in functions}
+    calls: list[str] = []
+
+    def note(frame: object, event: str, _: object) -> None:
+        name = codes.get(frame.f_code) if event == "call" else None  # type: ignore[attr-defined]
+        if name and name not in calls:
+            calls.append(name)
+
+    import impact
+    from impact.api import prepare
+    from impact.results.sweep import sweep_into
+
+    sys.setprofile(note)
+    try:
+        sweep_into(tmp_path / "results.h5", prepare(ROOT / "configs" / "figure6.toml"))
+        impact.plot(impact.load(tmp_path / "results.h5"))
+    finally:
+        sys.setprofile(None)
+    assert calls == functions
+
+
+def code_of(name: str) -> object:
+    """The code of a function, or of the initialiser or the values of a class."""
+    module, _, attribute = name.rpartition(".")
+    value = getattr(import_module(module), attribute)
+    value = getattr(value, "values", value.__init__) if isinstance(value, type) else value
+    return value.__code__
