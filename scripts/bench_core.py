@@ -96,7 +96,7 @@ def core(
 
 # the operations of one step, counted where the kernel is plain Python
 COUNT = """
-from impact.contact.numba.dispatch import DAMPED, STOP, Form
+from impact.contact.numba.dispatch import END_AT_PEAK, EQ_DAMPED, Form
 from impact.contact.numba.expressions import rk_step
 class Counted(float):
     total = 0
@@ -107,7 +107,7 @@ def counted(name):
     return operation
 for name in ("add", "radd", "sub", "rsub", "mul", "rmul", "truediv", "rtruediv"):
     setattr(Counted, f"__{name}__", counted(f"__{name}__"))
-rk_step(Form(DAMPED, STOP, 2, 3), *map(Counted, (0.5, 0.5, 0.5, 0.1, 0.1, 0.01, 1.0)))
+rk_step(Form(EQ_DAMPED, END_AT_PEAK, 2, 3), *map(Counted, (0.5, 0.5, 0.5, 0.1, 0.1, 0.01, 1.0)))
 print(Counted.total)
 """
 

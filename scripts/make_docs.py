@@ -12,8 +12,7 @@ import impact
 from gallery import gallery_page, write_gallery
 from impact.contact.status import Status
 from impact.plots.style import save_figure
-from impact.results.history import HISTORY
-from impact.results.schema import SCHEMA, SCHEMA_VERSION
+from impact.results.schema import HISTORY_VARIABLES, SCHEMA, SCHEMA_VERSION
 from models_page import models_page
 from models_pictures import curves
 
@@ -122,7 +121,7 @@ def schema_page() -> str:
         equation = one.equation.replace("|", "\\|")
         variables.append(f"| `{one.name}` | {one.unit} | {dims} | {one.judged} | {one.meaning} | {equation} |")
     statuses = [f"| {status.value} | {status.name.lower()} | {status.meaning} |" for status in Status]
-    history = [f"| `{name}` | {unit} | {meaning} |" for name, unit, meaning in HISTORY]
+    history = [f"| `{name}` | {unit} | {meaning} |" for name, unit, meaning in HISTORY_VARIABLES]
     tables = {"variables": variables, "statuses": statuses, "history": history}
     on_request = ", ".join(f"`{one.name}`" for one in SCHEMA if not one.by_default)
     by_name = {"on_request": on_request, "version": SCHEMA_VERSION}

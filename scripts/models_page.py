@@ -11,7 +11,7 @@ from urllib.parse import quote
 
 import numpy as np
 
-from impact.contact.evidence import summary
+from impact.contact.evidence import count_states
 from impact.contact.model import ForceModel, Parameter
 from impact.contact.models import catalogue
 from impact.text import with_year
@@ -236,7 +236,7 @@ def models_page() -> str:
         f"ρ = {MATERIAL['rho']:g} kg/m³; a yield strength is {MATERIAL['yield_strength'] / 1e6:g} MPa",
         damping=DAMPING,
         count=len(catalogue()),
-        evidence=summary(model.evidence for model in catalogue().values()),
+        evidence=count_states(model.evidence for model in catalogue().values()),
         families="\n".join(family_section(family, list(members)) for family, members in families),
         claims=claims(),
         left_out="\n".join(left_out),

@@ -15,7 +15,7 @@ from impact.contact.models.hysteresis import hysteresis
 from impact.contact.outputs import Outputs, collide
 from impact.contact.simulate import RecordedCollision, integrate_phases
 from impact.contact.status import Status
-from impact.contact.velocity_coordinates import STRONG
+from impact.contact.velocity_coordinates import STRONG_DAMPING
 
 from .problems import LAWS, impacts, quadratures, with_parameters
 
@@ -27,7 +27,17 @@ UNDAMPED = [(key, n) for key, n in CASES if find(key).family in ("permanent", "e
 
 # a law of the hysteresis family with any damping ratio: e from 0 to 1 is χ from 0 to 1000
 ANY_CHI = hysteresis("any-chi", title="", year=2026, equation="χ = 1000 e", reference="", chi=lambda e: 1e3 * e)
-CHI = (0.05, 0.3, 1.0, 1.9, STRONG["log"], float(np.nextafter(STRONG["log"], 9.0)), 10.0, 100.0, 1e3)
+CHI = (
+    0.05,
+    0.3,
+    1.0,
+    1.9,
+    STRONG_DAMPING["log"],
+    float(np.nextafter(STRONG_DAMPING["log"], 9.0)),
+    10.0,
+    100.0,
+    1e3,
+)
 
 
 def struck(model, lanes: Impacts) -> Outputs:

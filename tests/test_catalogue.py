@@ -22,7 +22,7 @@ from impact.contact.closed_forms import (
     pade_damping,
     pade_restitution,
 )
-from impact.contact.closed_forms.hysteresis import SMALL_CHI
+from impact.contact.closed_forms.hysteresis import WORK_SERIES_BELOW_CHI
 from impact.contact.models import catalogue, find
 from impact.contact.outputs import collide
 from impact.contact.scaling import delivered
@@ -214,11 +214,13 @@ def test_dashpots_are_monotone_and_have_their_limits(end):
 
 
 def test_restitution_of_damping_by_the_force_on_approach_keeps_its_digits():
-    chi = np.unique([*np.geomspace(1e-12, 1e8, 300), *np.linspace(0.005, 0.05, 100), np.nextafter(SMALL_CHI, 0.0)])
+    chi = np.unique(
+        [*np.geomspace(1e-12, 1e8, 300), *np.linspace(0.005, 0.05, 100), np.nextafter(WORK_SERIES_BELOW_CHI, 0.0)]
+    )
     with mp.workdps(50):
         exact = [mp.sqrt(2 * (c - mp.log(1 + c))) / c for c in map(mp.mpf, chi.tolist())]
         err = abs(np.array(exact) - approach_damped_restitution(chi)).astype(float)
-    # the series below SMALL_CHI leaves out a term of chi to the sixth
+    # the series below WORK_SERIES_BELOW_CHI leaves out a term of chi to the sixth
     assert err.max() < 1.3e-13
     assert err[(chi < 0.003)].max() < 2e-15
     assert np.all(np.diff(approach_damped_restitution(chi[::4])) < 0.0)

@@ -82,7 +82,7 @@ def lazy_and_full(config: object, plugins: list[Any]) -> tuple[xr.Dataset, xr.Da
     """The same sweep, computed when it is indexed and in memory."""
     full = impact.sweep(config, plugins=plugins)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sweeps_of, "SMALL_BYTES", -1)
+        patch.setattr(sweeps_of, "MAX_LOADED_BYTES", -1)
         return impact.sweep(config, plugins=plugins), full
 
 
@@ -159,7 +159,7 @@ def test_a_factored_file_holds_what_a_full_one_does(tmp_path: Path, config: dict
     for name in EVERYTHING:
         same_bits(factored[name], full[name])
     # what the summary prints, for which a factored sweep counts each distinct point once
-    whole, distinct = surveys["full"].tally, surveys["factored"].tally
+    whole, distinct = surveys["full"].summary, surveys["factored"].summary
     np.testing.assert_equal((distinct.counts, distinct.worst), (whole.counts, whole.worst))
     assert distinct.points == whole.points == plans["full"].points
     # of failed points that differ in nothing but an axis along which no status varies, the first is named

@@ -384,6 +384,7 @@ def test_pictures_are_files_of_their_format(figure6: xr.Dataset, tmp_path: Path,
     impact.plot(figure6).savefig(tmp_path / f"two.{kind}")
 
 
+@pytest.mark.slow
 def test_the_same_bytes_in_every_process(stored: Path, tmp_path: Path) -> None:
     sweep = {"e": [0.1, 0.5, 1.0], "v1": {"geomspace": [0.1, 10.0, 5]}, "m1": 1.0, "m2": 1.0, "K": 6e9}
     plane = impact.sweep({"models": ["hertz", "flores-2011", "lankarani-nikravesh-1990"], "sweep": sweep})

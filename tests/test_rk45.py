@@ -103,8 +103,8 @@ def test_recording_changes_no_bit(known):
 lanes = st.tuples(st.floats(-6.0, 4.0).map(lambda x: 10.0**x), st.floats(0.0, 0.5), st.floats(-1.0, 0.5))
 
 
-@settings(max_examples=30, deadline=None)
-@given(rows=st.lists(lanes, min_size=1, max_size=24), seed=st.integers(0, 999))
+@settings(max_examples=10, deadline=None)
+@given(rows=st.lists(lanes, min_size=1, max_size=8), seed=st.integers(0, 999))
 def test_lane_has_the_same_bits_alone_and_in_any_crowd(rows, seed):
     crowd = springs(rows)
     order = np.random.default_rng(seed).permutation(len(rows))
@@ -171,7 +171,7 @@ def test_hardly_a_step_of_an_impact_is_tried_again(rtol):
     law = motion.MotionLaw.of(find("hunt-crossley-1975"), 1.5, strong=False)
     for chi in np.linspace(0.0, 2.0, 9):
         start = motion.start_of_approach(law, (), 1)
-        into = partial(integrate, motion.approach(law), start, (np.array([chi]),), rtol=rtol)
+        into = partial(integrate, motion.approach_problem(law), start, (np.array([chi]),), rtol=rtol)
         assert into(max_steps=int(into(max_steps=1000).steps[0]) + 1).termination[0] == Termination.EVENT_REACHED
 
 
@@ -234,7 +234,7 @@ def test_the_step_follows_the_error_within_bounds():
     assert (grow, shrink) == (2.0 * rk45.MAX_FACTOR, 2.0 * rk45.MIN_FACTOR)
     assert stay == 2.0 * rk45.SAFETY
     errors = rtol * np.geomspace(1e-2, 1e2, 50)
-    exact = rk45.SAFETY * (rtol / errors) ** (rk45.GAIN / 256)
+    exact = rk45.SAFETY * (rtol / errors) ** (rk45.CONTROLLER_EXPONENT / 256)
     assert rk45.next_step(np.ones(50), errors, rtol) == pytest.approx(exact, rel=0.05)
 
 

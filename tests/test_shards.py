@@ -19,6 +19,7 @@ from impact.results.sweep import sweep_into
 
 from .clusters import content, sweep
 from .conftest import Run
+from .forked import Forked
 
 # a block of each law
 CONFIG = """title = "In parts"
@@ -120,13 +121,11 @@ def test_an_unfinished_shard_is_told_from_a_missing_one(cli: Run, folder: Path) 
 
 LIMITED = """import resource
 resource.setrlimit(resource.RLIMIT_NOFILE, (40, 40))
-from impact.cli.main import main
-main()
 """
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a limit of open files")
-def test_more_shards_than_open_files_are_merged(cli: Run, folder: Path) -> None:
+def test_more_shards_than_open_files_are_merged(cli: Run, forked: Forked, folder: Path) -> None:
     # of the 60 only five have a range, and each is a folder with a lock
     found = shards(cli, folder, "1/60", "2/60", "3/60", "4/60", "5/60")
     for number in range(6, 61):
@@ -135,8 +134,7 @@ def test_more_shards_than_open_files_are_merged(cli: Run, folder: Path) -> None:
         told = json.loads((found[-1] / "shard.json").read_text()) | {"shard": [number, 60]}
         (found[-1] / "shard.json").write_text(json.dumps(told))
         (found[-1] / "00000000.npz").unlink()
-    words = [sys.executable, "-c", LIMITED, "merge", *map(str, reversed(found))]
-    done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
+    done = forked("merge", *reversed(found), cwd=folder, code=LIMITED)
     assert done.returncode == 0, done.stderr
     assert content(folder) == right(folder)
 

@@ -6,8 +6,7 @@ from math import prod
 
 import pytest
 
-from impact.ode.rk45 import ERROR
-from impact.ode.rk45 import STAGES as STAGES_NESTED
+from impact.ode.rk45 import ERROR_WEIGHTS, STAGE_WEIGHTS
 from impact.ode.tableau import DENSE_WEIGHTS, A, B, C, E, P
 
 STAGES = range(7)
@@ -108,7 +107,7 @@ def test_interpolant_has_the_rates_of_both_ends():
 
 
 def test_floats_are_the_fractions_with_the_zeros_left_out():
-    for row, nested in zip((*A[1:], E), (*STAGES_NESTED, ERROR), strict=True):
+    for row, nested in zip((*A[1:], E), (*STAGE_WEIGHTS, ERROR_WEIGHTS), strict=True):
         places = [place for place, _ in nested]
         assert places == [i for i, a in enumerate(row) if a != 0]
         # each weight is relative to the next: from the last backwards they are products

@@ -120,7 +120,7 @@ def _print_models(models: Sequence[ForceModel]) -> None:
     """The catalogue, a line a model, family by family, with as many columns as there is room for."""
     from rich.text import Text
 
-    from ..contact.evidence import summary
+    from ..contact.evidence import count_states
 
     out = console(sys.stdout)
     room = out.width - max(len(model.key) for model in models)
@@ -142,7 +142,7 @@ def _print_models(models: Sequence[ForceModel]) -> None:
     if "core" in others:
         out.print('The core is what integrates a law, or a phase of it, where numba is installed (extra "fast").')
     out.print("A law with [parameters] of its own is driven by them; `impact models KEY` describes one in full.")
-    counts = summary(model.evidence for model in models)
+    counts = count_states(model.evidence for model in models)
     out.print(f"Evidence for the formulas of these {len(models)} entries: {counts}.")
 
 

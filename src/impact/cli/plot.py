@@ -148,7 +148,7 @@ def plot(
             continue
         save_figure(figure, picture, overwrite=overwrite, style=style)
         for path, content in tables:
-            backend.write_whole(path, content, overwrite=overwrite)
+            backend.write_file(path, content, overwrite=overwrite)
         drawn[name] = plot_data
         exits.say(_summary_line(picture, plot_data))
     if not drawn:

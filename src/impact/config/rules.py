@@ -10,7 +10,7 @@ from typing import Any
 from ..contact.formula import argument_names
 from ..contact.materials import hertz_stiffness
 from ..contact.model import ForceModel, with_base_quantities
-from ..contact.scaling import asked as quantities_of
+from ..contact.scaling import required_quantities as quantities_of
 from .quantities import Fault
 from .tables import MATERIAL_QUANTITIES, SWEEP_QUANTITIES, model_quantities
 

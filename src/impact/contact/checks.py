@@ -16,9 +16,9 @@ from .powers import Array
 from .status import FIRST_FAILURE, Status
 from .units import dimension
 
-RTOL, MAX_STEPS = 1e-10, 10_000
+CONTRACT_RTOL, CONTRACT_MAX_STEPS = 1e-10, 10_000
 # what rounding leaves of an identity, relative to its largest term
-ROUNDING = 1e-12
+ROUNDING_ERROR = 1e-12
 
 
 @dataclass(frozen=True)
@@ -53,10 +53,12 @@ def sample(model: ForceModel) -> Impacts:
         E2=E2, nu2=nu2, yield_strength2=strength, K=stiffness(n, hertz, effective_mass(m1, m2), v1 - v2),
         parameters={one.name: np.ones(count) for one in model.parameters},
     )  # fmt: skip
-    return replace(impacts, parameters={one.name: _values(model, one, impacts) for one in model.parameters})
+    return replace(
+        impacts, parameters={one.name: _parameter_values(model, one, impacts) for one in model.parameters}
+    )
 
 
-def _values(model: ForceModel, parameter: Parameter, impacts: Impacts) -> Array:
+def _parameter_values(model: ForceModel, parameter: Parameter, impacts: Impacts) -> Array:
     """Values of a parameter: its default, or from its least upwards, by a typical value or each contact's size."""
     if parameter.default is not None:
         return np.full(len(impacts), parameter.default)
@@ -94,17 +96,19 @@ def contract(model: ForceModel) -> Iterator[Finding]:
     )
     size = np.abs(before[0]) + np.abs(before[1])
     lost = np.abs(before[0] + before[1] - after[0] - after[1]) / size
-    yield Finding("momentum is conserved (4)", float(np.max(lost)), ROUNDING)
+    yield Finding("momentum is conserved (4)", float(np.max(lost)), ROUNDING_ERROR)
     rebound = (base["v2_post"] - base["v1_post"]) / impacts.v0 - base["e_out"]
     scale = 1.0 + (np.abs(impacts.v1) + np.abs(impacts.v2)) / impacts.v0
-    yield Finding("velocities part by e_out v0 (5)", worst(rebound / scale), ROUNDING)
-    yield Finding("no energy is gained", float(np.max(base["e_out"][ended], initial=0.0) - 1.0), 10 * RTOL)
-    yield Finding("work balances energy", worst(base["energy_residual"]), 10 * RTOL)
+    yield Finding("velocities part by e_out v0 (5)", worst(rebound / scale), ROUNDING_ERROR)
+    yield Finding(
+        "no energy is gained", float(np.max(base["e_out"][ended], initial=0.0) - 1.0), 10 * CONTRACT_RTOL
+    )
+    yield Finding("work balances energy", worst(base["energy_residual"]), 10 * CONTRACT_RTOL)
     if model.oracle is not None:
-        yield Finding("agrees with its closed form", worst(base["closed_form_error"]), 10 * RTOL)
+        yield Finding("agrees with its closed form", worst(base["closed_form_error"]), 10 * CONTRACT_RTOL)
 
     other = _collide(model, in_other_units(model, impacts))
-    yield Finding("a change of units changes nothing", worst(other["e_out"] - base["e_out"]), 10 * RTOL)
+    yield Finding("a change of units changes nothing", worst(other["e_out"] - base["e_out"]), 10 * CONTRACT_RTOL)
     swapped = replace(
         impacts, v1=-impacts.v2, v2=-impacts.v1, m1=impacts.m2, m2=impacts.m1, R1=impacts.R2, R2=impacts.R1,
         E1=impacts.E2, E2=impacts.E1, nu1=impacts.nu2, nu2=impacts.nu1, yield_strength1=impacts.yield_strength2,
@@ -112,19 +116,19 @@ def contract(model: ForceModel) -> Iterator[Finding]:
     )  # fmt: skip
     other = _collide(model, swapped)
     yield Finding(
-        "swapped balls swap velocities", worst((other["v1_post"] + base["v2_post"]) / impacts.v0), ROUNDING
+        "swapped balls swap velocities", worst((other["v1_post"] + base["v2_post"]) / impacts.v0), ROUNDING_ERROR
     )
     elastic = _collide(model, replace(impacts, e=np.ones(len(impacts))))
     # parameters of its own may damp a law to its limit, whatever e is
     odd = elastic["status"] != Status.OK if "e" in model.quantities else elastic["status"] >= FIRST_FAILURE
     yield Finding("at e = 1 it is ordinary", float(np.count_nonzero(odd)), 0)
-    tight = _collide(model, impacts, RTOL / 100)
-    yield Finding("a tighter tolerance moves nothing", worst(tight["e_out"] - base["e_out"]), 10 * RTOL)
+    tight = _collide(model, impacts, CONTRACT_RTOL / 100)
+    yield Finding("a tighter tolerance moves nothing", worst(tight["e_out"] - base["e_out"]), 10 * CONTRACT_RTOL)
     yield Finding("a lane alone equals the lane in a crowd", float(_alone_differs(model, impacts, base)), 0)
 
 
-def _collide(model: ForceModel, impacts: Impacts, rtol: float = RTOL) -> Outputs:
-    return collide(model, impacts, rtol=rtol, max_steps=MAX_STEPS)
+def _collide(model: ForceModel, impacts: Impacts, rtol: float = CONTRACT_RTOL) -> Outputs:
+    return collide(model, impacts, rtol=rtol, max_steps=CONTRACT_MAX_STEPS)
 
 
 def in_other_units(model: ForceModel, impacts: Impacts) -> Impacts:

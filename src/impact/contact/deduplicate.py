@@ -32,11 +32,11 @@ def deduplicate(
     # a column that does not vary along an axis has length one there, and is sorted without it
     keys: NDArray[Any] = columns[0] if columns else np.zeros((1,) * len(shape), np.intp)
     for values in columns[1:]:
-        keys = _numbers(keys) * values.size + _numbers(values)
+        keys = _ranks(keys) * values.size + _ranks(values)
     _, first, kind = np.unique(np.broadcast_to(keys, shape), return_index=True, return_inverse=True)
     return first, kind.reshape(-1)
 
 
-def _numbers(values: NDArray[Any]) -> NDArray[np.intp]:
+def _ranks(values: NDArray[Any]) -> NDArray[np.intp]:
     """A number for each value, the same where the values are."""
     return np.unique(values, return_inverse=True)[1].reshape(values.shape)

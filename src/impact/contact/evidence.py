@@ -8,8 +8,8 @@ from typing import Literal, get_args
 
 from ..errors import ModelError
 
-State = Literal["seen", "derived", "disputed", "not verified"]
-STATES: tuple[State, ...] = get_args(State)
+EvidenceState = Literal["seen", "derived", "disputed", "not verified"]
+EVIDENCE_STATES: tuple[EvidenceState, ...] = get_args(EvidenceState)
 
 
 @dataclass(frozen=True)
@@ -32,14 +32,14 @@ class Evidence:
     seen in Gharib and Hurmuzlu (2012), equation (19); for e > 0.95
     """
 
-    state: State
+    state: EvidenceState
     source: str = ""
     doi: str = ""
     note: str = ""
 
     def __post_init__(self) -> None:
-        if self.state not in STATES:
-            raise ModelError(f"evidence: got state {self.state!r}, expected one of {', '.join(STATES)}")
+        if self.state not in EVIDENCE_STATES:
+            raise ModelError(f"evidence: got state {self.state!r}, expected one of {', '.join(EVIDENCE_STATES)}")
         if self.state != "not verified" and not self.source:
             raise ModelError(f'evidence: "{self.state}" without a source, expected where')
 
@@ -49,11 +49,11 @@ class Evidence:
         return self.state + source + doi + (f"; {self.note}" if self.note else "")
 
 
-def summary(evidence: Iterable[Evidence]) -> str:
+def count_states(evidence: Iterable[Evidence]) -> str:
     """How many are in each state.
 
-    >>> summary([Evidence("derived", "here"), Evidence("seen", "there"), Evidence("seen", "there")])
+    >>> count_states([Evidence("derived", "here"), Evidence("seen", "there"), Evidence("seen", "there")])
     '2 seen, 1 derived'
     """
     states = [one.state for one in evidence]
-    return ", ".join(f"{states.count(state)} {state}" for state in STATES if state in states)
+    return ", ".join(f"{states.count(state)} {state}" for state in EVIDENCE_STATES if state in states)

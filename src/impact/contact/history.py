@@ -18,7 +18,7 @@ from .status import Status
 from .velocity_coordinates import is_strong
 
 # points at which a step is shown, and at which it is integrated again
-SAMPLES, GAUSS = 4, 5
+SAMPLES_PER_STEP, GAUSS_POINTS = 4, 5
 # halvings of a step after which a moment in it is known to the last bit
 BISECTIONS = 54
 
@@ -77,12 +77,16 @@ def follow(
     grid = None if times is None else np.linspace(0.0, turn + end, times)
     before = None if grid is None else grid[grid <= turn]
     after = None if grid is None else np.minimum(grid[grid > turn] - turn, end)
-    approach = _phase(law, motion.approach(law), collision.approach.recorded, params, before)
-    back = motion.of_restitution(law)
-    restitution = _phase(back, motion.restitution(back), collision.restitution.recorded, collision.params, after)
+    approach = _phase(law, motion.approach_problem(law), collision.approach.recorded, params, before)
+    back = motion.restitution_law(law)
+    restitution = _phase(
+        back, motion.restitution_problem(back), collision.restitution.recorded, collision.params, after
+    )
 
     residual = (
-        collision.params[motion.BRANCH.index("residual") - len(motion.BRANCH)] if model.unloading else np.zeros(1)
+        collision.params[motion.UNLOADING_PARAMS.index("residual") - len(motion.UNLOADING_PARAMS)]
+        if model.unloading
+        else np.zeros(1)
     )
     unit_t = impacts.length / impacts.v0
     t = np.concatenate([approach.t, collision.approach.state[2] + restitution.t]) * unit_t
@@ -128,7 +132,7 @@ def _phase(
     law: motion.MotionLaw, problem: Problem, steps: tuple[Step, ...], params: Params, times: Array | None
 ) -> _Phase:
     """Sample the interpolant of a phase, and integrate force and power over it by Gauss points."""
-    nodes, weights = np.polynomial.legendre.leggauss(GAUSS)
+    nodes, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
     rows: list[Array] = []
     impulse, work = [], []
     fractions = _fractions(steps) if times is None else _fractions_at(steps, times)
@@ -148,7 +152,7 @@ def _phase(
 
 def _fractions(steps: tuple[Step, ...]) -> list[Array]:
     """Some fractions of each step, with the end of the last."""
-    inner = np.arange(SAMPLES) / SAMPLES
+    inner = np.arange(SAMPLES_PER_STEP) / SAMPLES_PER_STEP
     return [step.end * (inner if step is not steps[-1] else np.append(inner, 1.0)) for step in steps]
 
 

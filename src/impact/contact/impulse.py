@@ -7,7 +7,7 @@ import numpy as np
 from .impacts import Impacts
 from .powers import Array, all_within
 
-LARGEST = float(np.finfo(float).max)
+MAX_FLOAT = float(np.finfo(float).max)
 
 
 def velocities_at(impacts: Impacts, impulse: Array) -> tuple[Array, Array]:
@@ -27,6 +27,6 @@ def velocities_after(impacts: Impacts, e: Array) -> tuple[Array, Array]:
     impulse = (1.0 + e) * impacts.m * impacts.v0
     if not impacts.all_approach:
         impulse = np.where(impacts.v0 > 0.0, impulse, 0.0)
-    if not all_within(impulse, -LARGEST, LARGEST):
+    if not all_within(impulse, -MAX_FLOAT, MAX_FLOAT):
         impulse = np.where(np.isfinite(impulse), impulse, np.nan)
     return velocities_at(impacts, impulse)

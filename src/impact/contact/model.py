@@ -26,17 +26,17 @@ BASE_QUANTITIES = {
 }
 NOT_VERIFIED = Evidence("not verified")
 # what else a domain may bound
-IN_DOMAIN = ("v1", "v2", "m1", "m2", "length")
-IN_FORCE = {"x": "indentation", "v": "indentation rate", "elastic": "K δⁿ"}
-IN_UNLOADING = {
+DOMAIN_INPUTS = ("v1", "v2", "m1", "m2", "length")
+FORCE_ARGUMENTS = {"x": "indentation", "v": "indentation rate", "elastic": "K δⁿ"}
+UNLOADING_ARGUMENTS = {
     "peak": "peak indentation",
     "force_at_peak": "force there",
     "residual": "permanent indentation",
     "recovered": "peak indentation above the permanent one",
 }
-IN_MOTION_BACK = {"stretch": "indentation above the permanent one"}
+STRETCH_ARGUMENTS = {"stretch": "indentation above the permanent one"}
 # coefficients that a coordinate of the velocity asks for; the first is the strength of the damping
-COORDINATES = {"v": (), "log": ("chi",), "force": ("c", "q")}
+COORDINATE_COEFFICIENTS = {"v": (), "log": ("chi",), "force": ("c", "q")}
 
 
 def with_base_quantities(names: Iterable[str]) -> frozenset[str]:
@@ -208,23 +208,25 @@ class ForceModel:
         self._check_velocity_coordinate()
         once = {*QUANTITIES, *(parameter.name for parameter in self.parameters)}
         for name, formula in self.coefficients.items():
-            self._check(f"coefficient {name}", formula, once)
+            self._check_arguments(f"coefficient {name}", formula, once)
             once.add(name)
-        self._check("force", self.force, {*once, *IN_FORCE})
-        self._check("unloading", self.unloading, {*once, *IN_FORCE, *IN_UNLOADING, *IN_MOTION_BACK})
+        self._check_arguments("force", self.force, {*once, *FORCE_ARGUMENTS})
+        self._check_arguments(
+            "unloading", self.unloading, {*once, *FORCE_ARGUMENTS, *UNLOADING_ARGUMENTS, *STRETCH_ARGUMENTS}
+        )
         for role in ("residual", "recovered"):
-            self._check(role, getattr(self, role), {*once, "peak", "force_at_peak"})
+            self._check_arguments(role, getattr(self, role), {*once, "peak", "force_at_peak"})
         for formula in self.breakpoints:
-            self._check("breakpoint", formula, {*once, *IN_FORCE})
+            self._check_arguments("breakpoint", formula, {*once, *FORCE_ARGUMENTS})
         for formula in self.unloading_breakpoints:
-            self._check("unloading breakpoint", formula, {*once, *IN_FORCE, *IN_UNLOADING})
-        self._check("oracle", self.oracle, once)
-        self._check(
+            self._check_arguments("unloading breakpoint", formula, {*once, *FORCE_ARGUMENTS, *UNLOADING_ARGUMENTS})
+        self._check_arguments("oracle", self.oracle, once)
+        self._check_arguments(
             "stiffness", self.stiffness, {*QUANTITIES, *(one.name for one in self.parameters)} - {"K", "e"}
         )
 
     def _check_velocity_coordinate(self) -> None:
-        wanted = COORDINATES[self.velocity_coordinate]
+        wanted = COORDINATE_COEFFICIENTS[self.velocity_coordinate]
         is_of_form = {"elastic", *wanted[:1]} <= set(argument_names(self.force)) and not self.breakpoints
         if wanted and not (is_of_form and self.coefficients.keys() >= set(wanted)):
             raise ModelError(
@@ -238,7 +240,7 @@ class ForceModel:
         allowed = {
             "evidence": (known, 'an impact.Evidence, such as Evidence("derived", "our report, equation (3)")'),
             "release": (self.release in ("gap", "force"), '"gap" or "force"'),
-            "velocity_coordinate": (self.velocity_coordinate in COORDINATES, '"v", "log" or "force"'),
+            "velocity_coordinate": (self.velocity_coordinate in COORDINATE_COEFFICIENTS, '"v", "log" or "force"'),
             "coordinate_power": (self.coordinate_power in (2, 4, 6, 8), "2, 4, 6 or 8"),
             "exponent": (self.exponent is None or 1.0 <= self.exponent <= 10.0, "None, or a number from 1 to 10"),
             "parameters": (own, "a tuple of Parameter"),
@@ -246,7 +248,7 @@ class ForceModel:
         for name, (right, wants) in allowed.items():
             if not right:
                 raise ModelError(f"model {self.key}: {name}: got {getattr(self, name)!r}, wants {wants}")
-        taken = {*QUANTITIES, *IN_DOMAIN, *IN_FORCE, *IN_UNLOADING, *IN_MOTION_BACK}
+        taken = {*QUANTITIES, *DOMAIN_INPUTS, *FORCE_ARGUMENTS, *UNLOADING_ARGUMENTS, *STRETCH_ARGUMENTS}
         for name in (*(parameter.name for parameter in self.parameters), *self.coefficients):
             if name in taken:
                 raise ModelError(f'model {self.key}: "{name}" is the name of a quantity, wants another')
@@ -255,7 +257,7 @@ class ForceModel:
             dimension(parameter.unit, {"n": 1.5, **dict.fromkeys(pure, 1.0)})
         bounded = {
             *QUANTITIES,
-            *IN_DOMAIN,
+            *DOMAIN_INPUTS,
             *({"chi"} & self.coefficients.keys()),
             *(one.name for one in self.parameters),
         }
@@ -268,7 +270,7 @@ class ForceModel:
     def __repr__(self) -> str:
         return f"<ForceModel {self.key}>"
 
-    def _check(self, role: str, formula: Formula | None, known: set[str]) -> None:
+    def _check_arguments(self, role: str, formula: Formula | None, known: set[str]) -> None:
         for wish in argument_names(formula):
             if wish not in known:
                 raise ModelError(

@@ -18,38 +18,38 @@ from ..errors import ModelError
 from ..ode.events import choose
 from ..ode.problem import Array, Mask, Params, Problem, Rates
 from .formula import Formula, argument_names, call_by_name
-from .model import IN_FORCE, ForceModel
-from .piecewise import AT, Breakpoint
+from .model import FORCE_ARGUMENTS, ForceModel
+from .piecewise import BREAKPOINT_TOLERANCE, Breakpoint
 from .powers import integer_power, power
 from .velocity_coordinates import VelocityCoordinate, coordinate, force_form, signed_power
 
 # scaled s beyond which a ball is taken to have passed through: no force stopped it
-FAR = 1e8
+MAX_S = 1e8
 # each component is judged against itself: what a strong damping leaves of the velocity is small beside v0 and
 # still decides where the force vanishes; near s = 0 the motion is so smooth that its relative error is small, too
-FLOOR = (1e-200, 1e-200)
+ERROR_FLOOR = (1e-200, 1e-200)
 # first steps for an error of 1: on approach there is no force yet, at the peak it is largest and there is no speed
-FIRST_INWARD, FIRST_OUTWARD = 2.7, 0.87
+APPROACH_STEP, RESTITUTION_STEP = 2.7, 0.87
 # step of the difference that gives the rate of the force at the release, relative to s, at which it may vanish; a
 # step may end at s = 0 itself, and s below this is taken for it
-DIFFERENCE, NEAREST = 1e-7, 1e-12
+RELEASE_STEP, MIN_RELEASE_S = 1e-7, 1e-12
 # what an unloading branch is told besides, in params that follow the law's own
-BRANCH = ("peak", "force_at_peak", "residual", "recovered")
+UNLOADING_PARAMS = ("peak", "force_at_peak", "residual", "recovered")
 # the force of a law without damping is taken to be a power of s below this
-POWER = 16.0
+MAX_FORCE_EXPONENT = 16.0
 # of a coordinate that asks for no coefficient
-NONE = np.empty(0)
+NO_COEFFICIENT = np.empty(0)
 # a damping is critical from this of its square on, which rounding may have made smaller
-CRITICAL = 1.0 + 1e-12
+CRITICAL_MARGIN = 1.0 + 1e-12
 # a speed that counts as zero beside v0
-NO_SPEED = 1e-10
+ZERO_SPEED = 1e-10
 # bounds B x^k of a speed that are tried: the exponents k, and B peak^(k-1) in units of v0/length; and the
 # indentations, relative to the peak, at which each has to hold
 BOUND_EXPONENTS = (1.0, 1.25, 1.5, 2.0)
 BOUND_RATES = np.geomspace(1e-4, 1e4, 65)
 BOUND_INDENTATIONS = 10.0 ** -np.linspace(0.0, 40.0, 81)
 # trajectories that are checked at a time
-MAX_TOGETHER = 4096
+MAX_BOUND_BATCH = 4096
 
 
 @dataclass(frozen=True)
@@ -83,35 +83,35 @@ class MotionLaw:
 
     def strength(self, params: Params) -> Array:
         """The coefficient that the coordinate of the law asks for."""
-        return params[self.names.index(self.coordinate.strength)] if self.coordinate.strength else NONE
+        return params[self.names.index(self.coordinate.strength)] if self.coordinate.strength else NO_COEFFICIENT
 
 
-def approach(law: MotionLaw) -> Problem:
+def approach_problem(law: MotionLaw) -> Problem:
     """From contact to the largest indentation: v falls to zero."""
     return Problem(
         rates=_rates(law, law.model.force, ()),
         event=lambda y, k, params: law.coordinate.stop(y, k),
-        unreachable=lambda y, k, params: np.asarray(y[0] > FAR),
-        floor=FLOOR,
+        unreachable=lambda y, k, params: np.asarray(y[0] > MAX_S),
+        floor=ERROR_FLOOR,
         watch=True,
-        first=FIRST_INWARD,
+        step_at_unit_error=APPROACH_STEP,
     )
 
 
-def restitution(law: MotionLaw) -> Problem:
+def restitution_problem(law: MotionLaw) -> Problem:
     """From the largest indentation to the release: s, or the force, falls to zero.
 
     Where the law has an unloading branch, params of the peak, the force there and the residual indentation
     follow the law's own.
     """
     branch = law.model.unloading
-    rates = _rates(law, branch or law.model.force, BRANCH if branch else ())
+    rates = _rates(law, branch or law.model.force, UNLOADING_PARAMS if branch else ())
 
     def force_event(y: Array, k: Array, params: Params) -> tuple[Array, Array]:
         s, force = y[0], k[4]
-        small = DIFFERENCE * np.clip(np.abs(s), NEAREST, 1.0)
+        small = RELEASE_STEP * np.clip(np.abs(s), MIN_RELEASE_S, 1.0)
         slope = (rates(y + small * k[:2], params)[4] - force) / small
-        return release(s, k[0], force, slope)
+        return release_event(s, k[0], force, slope)
 
     def gap_event(y: Array, k: Array, params: Params) -> tuple[Array, Array]:
         return y[0], k[0]
@@ -125,14 +125,16 @@ def restitution(law: MotionLaw) -> Problem:
 
     event = force_event if law.model.release == "force" else gap_event
     unreachable = overdamped if may_be_overdamped(law.model) else turned_back
-    return Problem(rates=rates, event=event, unreachable=unreachable, floor=FLOOR, first=FIRST_OUTWARD)
+    return Problem(
+        rates=rates, event=event, unreachable=unreachable, floor=ERROR_FLOOR, step_at_unit_error=RESTITUTION_STEP
+    )
 
 
-def release(s: Array, rate: Array, force: Array, slope: Array) -> tuple[Array, Array]:
+def release_event(s: Array, rate: Array, force: Array, slope: Array) -> tuple[Array, Array]:
     """The sooner of s and the force to fall to zero, and its rate; for arrays and for numbers."""
     # without damping the force vanishes with the indentation, as a power of s, and only touches zero: s then
     # tells the end. A force that vanishes before does so in a small part of the time that s still needs
-    sooner = POWER * force * np.abs(rate) < s * np.abs(slope)
+    sooner = MAX_FORCE_EXPONENT * force * np.abs(rate) < s * np.abs(slope)
     by_force = (sooner & (s > 0.0)) | ((force < s) & (s <= 0.0))
     return choose(by_force, force, s), choose(by_force, slope, rate)
 
@@ -150,21 +152,21 @@ def breakpoints(
     residual : permanent indentation, of the restitution phase; None on approach
     """
     model, own = law.model, len(law.names)
-    extra = BRANCH if residual is not None and model.unloading is not None else ()
+    extra = UNLOADING_PARAMS if residual is not None and model.unloading is not None else ()
     # where one force is for both phases, its breakpoints are met again on the way back
     formulas = model.unloading_breakpoints if extra else model.breakpoints
     given = dict(zip(extra, params[own:], strict=False))
     found: list[Breakpoint] = []
     for formula in formulas:
-        if not IN_FORCE.keys().isdisjoint(argument_names(formula)):
-            found.append(_of_motion(law, formula, extra))
+        if not FORCE_ARGUMENTS.keys().isdisjoint(argument_names(formula)):
+            found.append(_breakpoint_of_motion(law, formula, extra))
             continue
         x = np.broadcast_to(law.call(formula, params[:own], given), start.shape[1])
         x = x - (0.0 if residual is None else residual)
         at = power(np.where(x > 0.0, x, np.nan), 1.0 / model.coordinate_power)
         found.append(_at(len(params)))
         # one at which the phase begins is none
-        params = (*params, np.where(np.abs(at - start[0]) > AT * at, at, np.nan))
+        params = (*params, np.where(np.abs(at - start[0]) > BREAKPOINT_TOLERANCE * at, at, np.nan))
     return params, found
 
 
@@ -173,32 +175,32 @@ def _at(place: int) -> Breakpoint:
     return lambda y, params: np.asarray(params[place] - y[0])
 
 
-def _of_motion(law: MotionLaw, formula: Formula, extra: tuple[str, ...]) -> Breakpoint:
+def _breakpoint_of_motion(law: MotionLaw, formula: Formula, extra: tuple[str, ...]) -> Breakpoint:
     """The breakpoint where a function of the motion changes its sign."""
 
     def breakpoint(y: Array, params: Params) -> Array:
-        given = _given(law, {*argument_names(formula)}, extra, y, params)
+        given = _formula_arguments(law, {*argument_names(formula)}, extra, y, params)
         return law.call(formula, params[: len(law.names)], given)
 
     return breakpoint
 
 
-def of_restitution(law: MotionLaw) -> MotionLaw:
+def restitution_law(law: MotionLaw) -> MotionLaw:
     """The law of the restitution phase: a branch of its own is not of the form that a coordinate is for."""
     return law if law.model.unloading is None else replace(law, coordinate=VelocityCoordinate())
 
 
 def start_of_approach(law: MotionLaw, params: Params, n: int) -> Array:
     """s = 0, v = 1."""
-    return _components(law, params, np.zeros(1), 1.0, n)
+    return _components_at(law, params, np.zeros(1), 1.0, n)
 
 
 def start_of_restitution(law: MotionLaw, params: Params, recovered: Array) -> Array:
     """s at the peak above the residual indentation, v = 0."""
-    return _components(law, params, power(recovered, 1.0 / law.model.coordinate_power), 0.0, recovered.size)
+    return _components_at(law, params, power(recovered, 1.0 / law.model.coordinate_power), 0.0, recovered.size)
 
 
-def _components(law: MotionLaw, params: Params, s: Array, v: float, n: int) -> Array:
+def _components_at(law: MotionLaw, params: Params, s: Array, v: float, n: int) -> Array:
     """The components, shape (2, n), at s, of shape (n,) or (1,), where all have a velocity."""
     y = np.empty((2, n))
     y[0] = s
@@ -213,8 +215,8 @@ def indentation(law: MotionLaw, s: Array) -> Array:
 
 def force_at_peak(law: MotionLaw, s: Array, params: Params) -> Array:
     """The force of the approach where it ends."""
-    at_rest, formula = _components(law, params, s, 0.0, s.size), law.model.force
-    force = law.call(formula, params, _given(law, {*argument_names(formula)}, (), at_rest, params))
+    at_rest, formula = _components_at(law, params, s, 0.0, s.size), law.model.force
+    force = law.call(formula, params, _formula_arguments(law, {*argument_names(formula)}, (), at_rest, params))
     return np.broadcast_to(force, s.shape)
 
 
@@ -234,7 +236,9 @@ def unloading_state(law: MotionLaw, params: Params, peak: Array, at_peak: Array)
     return residual, recovered, (*params, *branch)
 
 
-def _given(law: MotionLaw, asked: set[str], extra: tuple[str, ...], y: Array, params: Params) -> dict[str, Array]:
+def _formula_arguments(
+    law: MotionLaw, asked: set[str], extra: tuple[str, ...], y: Array, params: Params
+) -> dict[str, Array]:
     """The velocity, and the indentation in the forms that a formula asks for."""
     p, s = law.model.coordinate_power, y[0]
     given = {"v": law.velocity(y, params)}
@@ -257,7 +261,7 @@ def _rates(law: MotionLaw, formula: Formula, extra: tuple[str, ...]) -> Rates:
     asked = {*argument_names(formula)}
 
     def rates(y: Array, params: Params, out: Array | None = None) -> Array:
-        s, given = y[0], _given(law, asked, extra, y, params)
+        s, given = y[0], _formula_arguments(law, asked, extra, y, params)
         v = given["v"]
         force = law.call(formula, params[:own], given)
         if force.shape != s.shape and force.shape != ():
@@ -300,15 +304,15 @@ def is_overdamped(x: Array, speed: Array, c: Array, n: float, q: float) -> Mask:
     if order == 0.0:
         return np.asarray(speed <= overdamped_speed(c, n, q) * power(x, q + 1.0))
     if order > 0.0:
-        return np.asarray(slow & (power(x, order) <= CRITICAL * rest))
+        return np.asarray(slow & (power(x, order) <= CRITICAL_MARGIN * rest))
     far = power(rest, 1.0 / order)
     left = np.square(bound * power(far, q + 1.0)) + 2.0 / (n + 1.0) * power(far, n + 1.0)
-    return np.asarray(slow & (x >= far) & (left <= NO_SPEED * NO_SPEED))
+    return np.asarray(slow & (x >= far) & (left <= ZERO_SPEED * ZERO_SPEED))
 
 
 def overdamped_speed(c: Array, n: float, q: float) -> Array:
     """What a speed of balls that part with none is below, over x^(q+1), where n = 2q + 1; -inf where none is."""
-    return np.where(CRITICAL * c * c >= 4.0 * (q + 1.0), c / (2.0 * (q + 1.0)), -np.inf)
+    return np.where(CRITICAL_MARGIN * c * c >= 4.0 * (q + 1.0), c / (2.0 * (q + 1.0)), -np.inf)
 
 
 def never_separates(rates: Rates, params: Params, peak: Array, coordinate_power: int) -> Mask:
@@ -326,8 +330,8 @@ def never_separates(rates: Rates, params: Params, peak: Array, coordinate_power:
     coordinate_power : p of x = s^p
     """
     never = np.zeros(peak.size, bool)
-    for first in range(0, peak.size, MAX_TOGETHER):
-        part = slice(first, first + MAX_TOGETHER)
+    for first in range(0, peak.size, MAX_BOUND_BATCH):
+        part = slice(first, first + MAX_BOUND_BATCH)
         some = tuple(column[part] for column in params)
         never[part] = _never_separates(rates, some, peak[part], coordinate_power)
     return never
@@ -347,7 +351,7 @@ def _never_separates(rates: Rates, params: Params, peak: Array, coordinate_power
                 # a formula need not know such a state
                 return never
             falls = k * bound * bound * power(x, 2.0 * k - 1.0)
-            holds = force + falls <= (CRITICAL - 1.0) * falls
+            holds = force + falls <= (CRITICAL_MARGIN - 1.0) * falls
             never |= holds.reshape(peak.size, -1).all(axis=1)
         if never.all():
             break

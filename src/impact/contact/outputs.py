@@ -102,12 +102,14 @@ def collide(
     return outputs(model, impacts, result, names, checked)
 
 
-def _if_any(mask: Mask) -> Mask | None:
+def _mask_if_any(mask: Mask) -> Mask | None:
     """A mask, if anything is in it: None is cheaper than an empty one."""
     return mask if mask.any() else None
 
 
-def _except(value: NDArray[Any], where: Mask | None, otherwise: float | np.int32 | NDArray[Any]) -> NDArray[Any]:
+def _replace_where(
+    value: NDArray[Any], where: Mask | None, otherwise: float | np.int32 | NDArray[Any]
+) -> NDArray[Any]:
     """The value, but another one where a mask is true."""
     return value if where is None else np.where(where, otherwise, value)
 
@@ -115,13 +117,15 @@ def _except(value: NDArray[Any], where: Mask | None, otherwise: float | np.int32
 # ---- what outputs have in common; each function is one value, its arguments are others, by name
 
 
-def _status(result: CollisionResult, not_integrated: Mask | None, checked: NDArray[np.int8]) -> NDArray[np.int8]:
-    return _except(result.status, not_integrated, checked)
+def _status_of_impacts(
+    result: CollisionResult, not_integrated: Mask | None, checked: NDArray[np.int8]
+) -> NDArray[np.int8]:
+    return _replace_where(result.status, not_integrated, checked)
 
 
-def _unknown(failed: Mask | None, missed: Mask | None, status: NDArray[np.int8]) -> Mask | None:
+def _undefined(failed: Mask | None, missed: Mask | None, status: NDArray[np.int8]) -> Mask | None:
     """Where there is no collision of which anything is known."""
-    return failed if missed is None else _if_any(missed | (status >= FIRST_FAILURE))
+    return failed if missed is None else _mask_if_any(missed | (status >= FIRST_FAILURE))
 
 
 def _asked_e(impacts: Impacts) -> Array:
@@ -132,7 +136,7 @@ def _asked_e(impacts: Impacts) -> Array:
 
 def _in_si(failed: Mask | None, missed: Mask | None) -> InSI:
     """Values in a unit of the contact's own, in SI; nothing moves where the balls miss each other."""
-    return lambda value, unit: _except(_except(value * unit, failed, np.nan), missed, 0.0)
+    return lambda value, unit: _replace_where(_replace_where(value * unit, failed, np.nan), missed, 0.0)
 
 
 # ---- outputs
@@ -140,18 +144,18 @@ def _in_si(failed: Mask | None, missed: Mask | None) -> InSI:
 
 def _damping_ratio(result: CollisionResult, not_integrated: Mask | None) -> Array:
     chi = result.chi
-    return _except(_except(chi, not_integrated, np.nan), _if_any(np.isinf(chi)), np.nan)
+    return _replace_where(_replace_where(chi, not_integrated, np.nan), _mask_if_any(np.isinf(chi)), np.nan)
 
 
 def _energy_residual(result: CollisionResult, unknown: Mask | None) -> Array:
     work = result.approach_work + result.restitution_work
-    return _except(work - (1.0 - result.e_out * result.e_out), unknown, np.nan)
+    return _replace_where(work - (1.0 - result.e_out * result.e_out), unknown, np.nan)
 
 
 def _energetic(result: CollisionResult, unknown: Mask | None) -> Array:
     """sqrt(-W_r/W_c), equation (3), from the works that were integrated; 0 where the balls stay together."""
     e = np.sqrt(np.maximum(-result.restitution_work, 0.0) / result.approach_work)
-    return _except(_except(e, _if_any(result.status == LIMIT), 0.0), unknown, np.nan)
+    return _replace_where(_replace_where(e, _mask_if_any(result.status == LIMIT), 0.0), unknown, np.nan)
 
 
 def _in_domain(law: Law, impacts: Impacts, damping_ratio: Array) -> NDArray[np.int8]:
@@ -181,10 +185,10 @@ def _separation_time(
 # by name: a formula of values by name
 FORMULAS: dict[str, Callable[..., Any]] = {
     "checked": lambda law, impacts: check_inputs(law, impacts),
-    "not_integrated": lambda checked: _if_any(checked != OK),
-    "missed": lambda checked: _if_any(checked == NO_IMPACT),
-    "failed": lambda status: _if_any(status >= FIRST_FAILURE),
-    "unknown": _unknown,
+    "not_integrated": lambda checked: _mask_if_any(checked != OK),
+    "missed": lambda checked: _mask_if_any(checked == NO_IMPACT),
+    "failed": lambda status: _mask_if_any(status >= FIRST_FAILURE),
+    "unknown": _undefined,
     "asked_e": _asked_e,
     "in_si": _in_si,
     "velocities": lambda impacts, e_out: velocities_after(impacts, e_out),
@@ -195,20 +199,20 @@ FORMULAS: dict[str, Callable[..., Any]] = {
     "v2_reference": lambda references: references[1],
     "v1_error": lambda v1_post, v1_reference: v1_post - v1_reference,
     "v2_error": lambda v2_post, v2_reference: v2_post - v2_reference,
-    "e_out": lambda result, unknown: _except(result.e_out, unknown, np.nan),
+    "e_out": lambda result, unknown: _replace_where(result.e_out, unknown, np.nan),
     "e_error": lambda e_out, asked_e: e_out - asked_e,
     "peak_indentation": lambda result, impacts, in_si: in_si(result.peak, impacts.length),
     "permanent_indentation": lambda result, impacts, in_si: in_si(result.permanent, impacts.length),
     "peak_force": lambda result, impacts, in_si: in_si(result.force, impacts.energy / impacts.length),
     "contact_time": lambda result, impacts, in_si: in_si(result.contact_time, impacts.time),
     "energy_loss": lambda result, impacts, in_si: in_si(1.0 - result.e_out * result.e_out, 0.5 * impacts.energy),
-    "stiffness": lambda impacts, failed: _except(impacts.K, failed, np.nan),
+    "stiffness": lambda impacts, failed: _replace_where(impacts.K, failed, np.nan),
     "damping_ratio": _damping_ratio,
     "energy_residual": _energy_residual,
     "closed_form_error": lambda e_out, result: e_out - result.exact,
-    "status": _status,
+    "status": _status_of_impacts,
     "in_domain": _in_domain,
-    "steps": lambda result, not_integrated: _except(result.steps, not_integrated, np.int32(0)),
+    "steps": lambda result, not_integrated: _replace_where(result.steps, not_integrated, np.int32(0)),
     # tau_r/tau_c, equation (2): the phases change the momentum by m v0 and e_out m v0
     "e_kinetic": lambda e_out: e_out,
     "e_energetic": _energetic,

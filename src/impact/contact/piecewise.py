@@ -8,24 +8,24 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..ode.problem import COMPONENTS, INTEGRATED, Array, Event, Params, Problem, Solution, Step, Termination
+from ..ode.problem import N_COMPONENTS, N_INTEGRATED, Array, Event, Params, Problem, Solution, Step, Termination
 
 # the force has one formula where this is positive, and another where it is negative; NaN is no breakpoint
 Breakpoint = Callable[[Array, Params], Array]
-Run = Callable[[Problem, Array, Params], Solution]
+IntegratePart = Callable[[Problem, Array, Params], Solution]
 
 # a part has ended at a breakpoint that is nearer than this, in smooth time
-AT = 1e-9
+BREAKPOINT_TOLERANCE = 1e-9
 # step of the difference quotient for the rate of a breakpoint, relative to s
-DIFFERENCE = 1e-7
+BREAKPOINT_RATE_STEP = 1e-7
 # the next part begins so much later, in smooth time: where the other formula holds for sure
-BEYOND = 1e-12
+STEP_BEYOND = 1e-12
 # parts per breakpoint after which a trajectory that crosses them back and forth fails
-MAX_PARTS = 8
+MAX_PARTS_PER_BREAKPOINT = 8
 
 
 def in_parts(
-    run: Run, problem: Problem, breakpoints: Sequence[Breakpoint], start: Array, params: Params
+    run: IntegratePart, problem: Problem, breakpoints: Sequence[Breakpoint], start: Array, params: Params
 ) -> Solution:
     """Integrate a phase.
 
@@ -48,18 +48,18 @@ def in_parts(
     between = replace(problem, event=_first_event(problem, breakpoints))
     recorded: list[Step] = []
     where = np.arange(n)
-    for _ in range(MAX_PARTS * len(breakpoints)):
+    for _ in range(MAX_PARTS_PER_BREAKPOINT * len(breakpoints)):
         own_params = (*(column[where] for column in params), *sides[:, where])
         part = run(between, state[:, where], own_params)
         recorded += part.recorded
         total.maximum[where] = np.fmax(total.maximum[where], part.maximum)
         total.steps[where] += part.steps
         state[:, where] = part.state
-        k = problem.rates(part.state[:COMPONENTS], own_params)
-        met = _reached(problem, breakpoints, part.state[:COMPONENTS], k, own_params)
+        k = problem.rates(part.state[:N_COMPONENTS], own_params)
+        met = _reached(problem, breakpoints, part.state[:N_COMPONENTS], k, own_params)
         further = (part.termination == Termination.EVENT_REACHED) & met.any(axis=0)
         sides[:, where] = np.where(met, -sides[:, where], sides[:, where])
-        state[:, where] += BEYOND * np.minimum(part.state[0], 1.0) * k[:INTEGRATED]
+        state[:, where] += STEP_BEYOND * np.minimum(part.state[0], 1.0) * k[:N_INTEGRATED]
         done = where[~further]
         total.termination[done], total.state[:, done] = part.termination[~further], part.state[:, ~further]
         where = where[further]
@@ -70,8 +70,8 @@ def in_parts(
 
 def _distances(breakpoints: Sequence[Breakpoint], y: Array, k: Array, params: Params) -> list[tuple[Array, Array]]:
     """Each breakpoint on the side where the trajectory is, which falls through zero, and its rate."""
-    small = DIFFERENCE * np.where(y[0] > 0.0, np.minimum(y[0], 1.0), 1.0)
-    ahead = y + small * k[:COMPONENTS]
+    small = BREAKPOINT_RATE_STEP * np.where(y[0] > 0.0, np.minimum(y[0], 1.0), 1.0)
+    ahead = y + small * k[:N_COMPONENTS]
     distances = []
     for breakpoint, side in zip(breakpoints, params[-len(breakpoints) :], strict=True):
         left = side * breakpoint(y, params)
@@ -100,5 +100,5 @@ def _reached(
     """At which breakpoints trajectories have ended, not at the event of the phase; shape (breakpoints, n)."""
     g, dg = problem.event(y, k, params)
     away = np.array([np.abs(left / rate) for left, rate in _distances(breakpoints, y, k, params)])
-    near = np.fmax(np.fmin.reduce(away), AT)
+    near = np.fmax(np.fmin.reduce(away), BREAKPOINT_TOLERANCE)
     return np.asarray((away <= near) & (np.abs(g / dg) > near))

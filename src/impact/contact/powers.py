@@ -25,7 +25,7 @@ def power(base: Array, exponent: float) -> Array:
     >>> power(np.array([16.0]), 0.25)
     array([2.])
     """
-    if not is_built(exponent):
+    if not is_reproducible(exponent):
         return np.power(base, exponent)
     if exponent < 0:
         return 1.0 / power(base, -exponent)
@@ -40,7 +40,7 @@ def power(base: Array, exponent: float) -> Array:
     return result
 
 
-def is_built(exponent: Array | float) -> NDArray[np.bool_]:
+def is_reproducible(exponent: Array | float) -> NDArray[np.bool_]:
     """Whether a power is built from products and roots."""
     quarters = np.multiply(exponent, 4.0)
     return np.asarray((quarters == np.rint(quarters)) & (np.abs(quarters) <= 64.0))
@@ -54,21 +54,21 @@ def powers(base: Array, exponent: Array) -> Array:
     >>> powers(np.array([4.0, 4.0]), np.array([0.5, 2.0]))
     array([ 2., 16.])
     """
-    kinds = distinct(exponent)
+    kinds = distinct_values(exponent)
     if kinds.size == 1:
         return power(base, float(kinds[0]))
     base, exponent = np.broadcast_arrays(base, exponent)
     result = np.power(base, exponent)
-    for one in kinds[is_built(kinds)]:
+    for one in kinds[is_reproducible(kinds)]:
         where = exponent == one
         result[where] = power(base[where], float(one))
     return result
 
 
-def distinct(values: Array) -> Array:
+def distinct_values(values: Array) -> Array:
     """The different ones of some values, in order.
 
-    >>> distinct(np.array([1.5, 1.0, 1.5]))
+    >>> distinct_values(np.array([1.5, 1.0, 1.5]))
     array([1. , 1.5])
     """
     values = values.reshape(-1)

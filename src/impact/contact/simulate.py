@@ -18,8 +18,8 @@ from .formula import argument_names, explained
 from .model import ForceModel
 from .numba import dispatch
 from .piecewise import in_parts
-from .powers import Array, distinct
-from .scaling import Values, chi_of, exact_restitution, with_coefficients, with_units
+from .powers import Array, distinct_values
+from .scaling import LawValues, chi_of, exact_restitution, with_coefficients, with_units
 from .status import LIMIT, OK, Status
 from .velocity_coordinates import VelocityCoordinate, is_strong
 
@@ -150,17 +150,17 @@ def simulate(
     integrate_both = partial(integrate_phases, rtol=rtol, max_steps=max_steps, core=core)
     errors = {} if errors is None else errors
     with np.errstate(all="ignore"):
-        for exponent in distinct(n):
+        for exponent in distinct_values(n):
             chosen = (status == OK) & (n == exponent)
             count, where = int(np.count_nonzero(chosen)), positions(chosen)
             if count:
-                some = _at(values, where)
+                some = _values_at(values, where)
                 part = _isolate_failures(model, float(exponent), some, count, integrate_both, collapse, errors)
                 parts.append((where, part))
     return CollisionResult.joined(n.size, status, parts)
 
 
-def _at(values: Named, where: Positions) -> Named:
+def _values_at(values: Named, where: Positions) -> Named:
     return {name: array[where] for name, array in values.items()}
 
 
@@ -180,7 +180,7 @@ def _isolate_failures(
     """
     try:
         if count == 1:
-            twice = _at(values, np.array([0, 0]))
+            twice = _values_at(values, np.array([0, 0]))
             return _simulate_distinct(model, n, twice, 2, integrate_both, collapse=False).take(np.array([0]))
         return _simulate_distinct(model, n, values, count, integrate_both, collapse)
     except ModelError as error:
@@ -190,7 +190,9 @@ def _isolate_failures(
             errors.setdefault(*explained(model.key, error))
             return result
         for half in np.array_split(np.arange(count), 2):
-            part = _isolate_failures(model, n, _at(values, half), half.size, integrate_both, collapse, errors)
+            part = _isolate_failures(
+                model, n, _values_at(values, half), half.size, integrate_both, collapse, errors
+            )
             result.put(half, part)
         return result
 
@@ -230,7 +232,7 @@ def _simulate_distinct(
     return result
 
 
-def _check_coefficients(model: ForceModel, known: Values, values: Named, count: int) -> NDArray[np.int8]:
+def _check_coefficients(model: ForceModel, known: LawValues, values: Named, count: int) -> NDArray[np.int8]:
     """The status of impacts once their coefficients are known, before they are integrated."""
     status = np.full(count, Status.OK, np.int8)
     coefficients = {name: np.asarray(known[name]) for name in model.coefficients}
@@ -267,10 +269,10 @@ def integrate_phases(
     never_separates : which are known to stay together, where they do not part
     core : "numba" integrates the phases that have a form for it compiled, unless they are recorded
     """
-    back = motion.of_restitution(law)
+    back = motion.restitution_law(law)
     forms: tuple[dispatch.Form | None, dispatch.Form | None] = (None, None)
     if core == "numba" and not record:
-        forms = dispatch.of_approach(law), dispatch.of_restitution(back)
+        forms = dispatch.approach_form(law), dispatch.restitution_form(back)
     workspace = None if all(forms) else Workspace.of(n)
     run = partial(integrate, rtol=rtol, max_steps=max_steps, record=record, workspace=workspace)
 
@@ -283,11 +285,11 @@ def integrate_phases(
         residual: Array | None = None,
     ) -> Solution:
         if form is not None:
-            return dispatch.integrate(form, law, problem, start, params, rtol=rtol, max_steps=max_steps)
+            return dispatch.integrate_compiled(form, law, problem, start, params, rtol=rtol, max_steps=max_steps)
         params, breakpoints = motion.breakpoints(law, params, start, residual)
         return in_parts(run, problem, breakpoints, start, params)
 
-    approach = solve(forms[0], law, motion.approach(law), motion.start_of_approach(law, params, n), params)
+    approach = solve(forms[0], law, motion.approach_problem(law), motion.start_of_approach(law, params, n), params)
     peak = motion.indentation(law, approach.state[0])
     at_peak = motion.force_at_peak(law, approach.state[0], params)
     residual, recovered, params = motion.unloading_state(law, params, peak, at_peak)
@@ -295,7 +297,7 @@ def integrate_phases(
     result = CollisionResult(
         e_out=unknown.copy(), peak=peak, permanent=residual.copy(), force=np.maximum(approach.maximum, at_peak),
         contact_time=approach.state[2].copy(), approach_work=2.0 * approach.state[3], restitution_work=np.zeros(n),
-        steps=approach.steps.copy(), status=_status(approach), chi=unknown, exact=unknown,
+        steps=approach.steps.copy(), status=_status_of_solution(approach), chi=unknown, exact=unknown,
     )  # fmt: skip
 
     # nothing is recovered where the balls stay at their peak
@@ -308,10 +310,10 @@ def integrate_phases(
     if not recovered.size:
         return RecordedCollision(result, approach, None, params)
     start = motion.start_of_restitution(back, params, recovered)
-    restitution = solve(forms[1], back, motion.restitution(back), start, params, residual[where])
+    restitution = solve(forms[1], back, motion.restitution_problem(back), start, params, residual[where])
     _mark_never_separating(back, restitution, params, recovered)
     e_out, work = -back.velocity(restitution.state, params), 2.0 * restitution.state[3]
-    status = _status(restitution)
+    status = _status_of_solution(restitution)
     # held, or parting with no speed after an infinite time: all the energy of such balls is lost
     held = restitution.termination == Termination.EVENT_UNREACHABLE
     if held.any():
@@ -333,11 +335,11 @@ def _mark_never_separating(law: motion.MotionLaw, solution: Solution, params: Pa
     left = np.flatnonzero(unfinished)
     if not left.size or law.model.release != "gap":
         return
-    rates = motion.restitution(replace(law, coordinate=VelocityCoordinate())).rates
+    rates = motion.restitution_problem(replace(law, coordinate=VelocityCoordinate())).rates
     some = tuple(column[left] for column in params)
     never = motion.never_separates(rates, some, recovered[left], law.model.coordinate_power)
     solution.termination[left[never]] = Termination.EVENT_UNREACHABLE
 
 
-def _status(solution: Solution) -> NDArray[np.int8]:
+def _status_of_solution(solution: Solution) -> NDArray[np.int8]:
     return STATUS_OF_TERMINATION.take(solution.termination)

@@ -20,7 +20,7 @@ class Dimension(NamedTuple):
     time: Array | float
 
 
-SYMBOLS = {
+UNIT_DIMENSIONS = {
     "1": Dimension(0, 0, 0),
     "kg": Dimension(1, 0, 0),
     "m": Dimension(0, 1, 0),
@@ -31,8 +31,8 @@ SYMBOLS = {
     "Hz": Dimension(0, 0, -1),
 }
 
-EXPONENT = r"\^(-?[\d.]+|[A-Za-z]\w*|\([^()]*(?:\([^()]*\)[^()]*)*\))"
-FACTOR = re.compile(rf"\s*([*/]?)\s*(1|[A-Za-z]+)(?:{EXPONENT})?")
+EXPONENT_PATTERN = r"\^(-?[\d.]+|[A-Za-z]\w*|\([^()]*(?:\([^()]*\)[^()]*)*\))"
+FACTOR_PATTERN = re.compile(rf"\s*([*/]?)\s*(1|[A-Za-z]+)(?:{EXPONENT_PATTERN})?")
 
 
 def dimension(unit: str, given: Mapping[str, Array | float]) -> Dimension:
@@ -55,11 +55,11 @@ def dimension(unit: str, given: Mapping[str, Array | float]) -> Dimension:
     total: list[Array | float] = [0.0, 0.0, 0.0]
     place = 0
     while place < len(unit):
-        factor = FACTOR.match(unit, place)
-        if factor is None or factor[2] not in SYMBOLS:
-            raise ModelError(f'unit "{unit}": wants powers of {", ".join(SYMBOLS)}, such as "N/m^n"')
-        exponent = _value(factor[3] or "1", given, unit) * (-1 if factor[1] == "/" else 1)
-        for axis, one in enumerate(SYMBOLS[factor[2]]):
+        factor = FACTOR_PATTERN.match(unit, place)
+        if factor is None or factor[2] not in UNIT_DIMENSIONS:
+            raise ModelError(f'unit "{unit}": wants powers of {", ".join(UNIT_DIMENSIONS)}, such as "N/m^n"')
+        exponent = _exponent_value(factor[3] or "1", given, unit) * (-1 if factor[1] == "/" else 1)
+        for axis, one in enumerate(UNIT_DIMENSIONS[factor[2]]):
             # a power of what it is not made of is none, whatever its exponent
             total[axis] += one * exponent if one else 0.0
         place = factor.end()
@@ -74,10 +74,10 @@ def with_numbers(unit: str, given: Mapping[str, float]) -> str:
     """
 
     def power(found: re.Match[str]) -> str:
-        exponent = _value(found[1], given, unit)
+        exponent = _exponent_value(found[1], given, unit)
         return "" if exponent == 1.0 else f"^{exponent:g}"
 
-    return re.sub(EXPONENT, power, unit)
+    return re.sub(EXPONENT_PATTERN, power, unit)
 
 
 @cache
@@ -87,11 +87,11 @@ def names_in(unit: str) -> frozenset[str]:
     >>> sorted(names_in("N s^p/m^(n+p)"))
     ['n', 'p']
     """
-    exponents = (factor[3] for factor in FACTOR.finditer(unit))
+    exponents = (factor[3] for factor in FACTOR_PATTERN.finditer(unit))
     return frozenset(name for one in exponents for name in re.findall(r"[A-Za-z]\w*", one or ""))
 
 
-def _value(text: str, given: Mapping[str, Array | float], unit: str) -> Array | float:
+def _exponent_value(text: str, given: Mapping[str, Array | float], unit: str) -> Array | float:
     """The value of an exponent such as `2`, `n` or `(n+1)/2`."""
 
     def walk(node: ast.expr) -> Array | float:

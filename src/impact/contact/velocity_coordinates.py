@@ -21,12 +21,12 @@ from numpy.typing import NDArray
 
 from ..ode.problem import Array
 from .formula import call_by_name
-from .model import COORDINATES, ForceModel
+from .model import COORDINATE_COEFFICIENTS, ForceModel
 from .powers import integer_power, power
 
 # an impact whose damping is above this takes its law's coordinate; below it v costs less, though it takes up to a
 # third more steps
-STRONG = {"log": 5.0, "force": 2.0}
+STRONG_DAMPING = {"log": 5.0, "force": 2.0}
 
 
 class VelocityCoordinate:
@@ -57,7 +57,7 @@ class VelocityCoordinate:
 class LogCoordinate(VelocityCoordinate):
     """u."""
 
-    strength = COORDINATES["log"][0]
+    strength = COORDINATE_COEFFICIENTS["log"][0]
 
     def of(self, s: Array, v: float, strength: Array) -> Array:
         return np.asarray(np.log1p(strength * v))
@@ -90,7 +90,7 @@ class ForceCoordinate(VelocityCoordinate):
 
     drag: float
     spring: float
-    strength = COORDINATES["force"][0]
+    strength = COORDINATE_COEFFICIENTS["force"][0]
 
     def of(self, s: Array, v: float, strength: Array) -> Array:
         return np.asarray(v + signed_power(s, self.spring) / strength)
@@ -112,10 +112,12 @@ class ForceCoordinate(VelocityCoordinate):
 
 def is_strong(model: ForceModel, values: Mapping[str, Array | float], count: int) -> NDArray[np.bool_]:
     """Which impacts are integrated in their law's own coordinate: by their own damping, never by the batch."""
-    if model.velocity_coordinate not in STRONG:
+    if model.velocity_coordinate not in STRONG_DAMPING:
         return np.zeros(count, bool)
     return np.broadcast_to(
-        np.asarray(values[COORDINATES[model.velocity_coordinate][0]]) > STRONG[model.velocity_coordinate], count
+        np.asarray(values[COORDINATE_COEFFICIENTS[model.velocity_coordinate][0]])
+        > STRONG_DAMPING[model.velocity_coordinate],
+        count,
     )
 
 

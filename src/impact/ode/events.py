@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .problem import COMPONENTS, INTEGRATED, Array, Mask, Problem, Termination
+from .problem import N_COMPONENTS, N_INTEGRATED, Array, Mask, Problem, Termination
 
 if TYPE_CHECKING:
     from .rk45 import State, TrialStep
@@ -100,12 +100,12 @@ def locate_event(
     consists of true steps of order five. Returns the positions of the trajectories that ended, and the offsets of
     their events from the end of the step, as fractions of it.
     """
-    g, dg = problem.event(trial.y[:COMPONENTS], trial.k, state.params)
+    g, dg = problem.event(trial.y[:N_COMPONENTS], trial.k, state.params)
     at = (is_event_ahead(g, dg, trial.h_next) & accepted).nonzero()[0]
     if not at.size:
         return at, g[at]
     g, dg, h = g[at], dg[at], state.h[at]
-    g_before, dg_before = problem.event(state.y[:COMPONENTS], state.k, state.params)
+    g_before, dg_before = problem.event(state.y[:N_COMPONENTS], state.k, state.params)
     offset, sure = event_offset(g, dg, g_before[at], dg_before[at], h)
     near, h_next = before_event(offset, sure, h, trial.h_next[at])
     y, remaining = _step_to_event(problem, state, trial, at, np.where(near, offset, 0.0))
@@ -123,8 +123,8 @@ def _step_to_event(
 ) -> tuple[Array, Array]:
     """The rows an offset from the end of the step and then linearly at the event, and the offset of this part."""
     y, k, params = trial.y[:, at], trial.k[:, at], tuple(column[at] for column in state.params)
-    k_end = problem.rates(y[:COMPONENTS] + offset * k[:COMPONENTS], params)
-    y = y + trapezoid(offset, k, k_end)[:INTEGRATED]
-    k = problem.rates(y[:COMPONENTS], params)
-    remaining = linear_offset(*problem.event(y[:COMPONENTS], k, params))
-    return y + remaining * k[:INTEGRATED], remaining
+    k_end = problem.rates(y[:N_COMPONENTS] + offset * k[:N_COMPONENTS], params)
+    y = y + trapezoid(offset, k, k_end)[:N_INTEGRATED]
+    k = problem.rates(y[:N_COMPONENTS], params)
+    remaining = linear_offset(*problem.event(y[:N_COMPONENTS], k, params))
+    return y + remaining * k[:N_INTEGRATED], remaining

@@ -10,15 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .events import choose
-from .problem import COMPONENTS, INTEGRATED, WATCHED, Array, Mask, Params, Problem
+from .problem import N_COMPONENTS, N_INTEGRATED, WATCHED_ROW, Array, Mask, Params, Problem
 
 if TYPE_CHECKING:
     from .rk45 import State, TrialStep
 
 # step of the difference quotient for the slope of the watched quantity, relative to the step beside it
-DIFFERENCE = 1e-5
+SLOPE_STEP = 1e-5
 # a slope that over that step is less than this of the value counts as zero
-FLAT = 1e-10
+FLAT_SLOPE = 1e-10
 # a maximum is flat, so that a crude location of it is enough
 SECANT_STEPS = 2
 
@@ -59,15 +59,15 @@ def secant_update(left: Array, d_left: Array, right: Array, d_right: Array) -> A
 
 def note_peaks(state: State, trial: TrialStep, accepted: Mask, ended: NDArray[np.intp]) -> None:
     """Note where the watched quantity begins to fall, or a trajectory ends, above all that was noted before."""
-    before, after = state.k[WATCHED], trial.k[WATCHED]
+    before, after = state.k[WATCHED_ROW], trial.k[WATCHED_ROW]
     at = (begins_to_fall(before, after, state.best) & accepted).nonzero()[0]
     if at.size:
         state.best[at] = before[at]
-        state.peak.put(state.index[at], state.y[:COMPONENTS, at], state.h_last[at], state.h[at])
+        state.peak.put(state.index[at], state.y[:N_COMPONENTS, at], state.h_last[at], state.h[at])
     ended = ended[after[ended] > state.best[ended]]
     if ended.size:
         state.best[ended] = after[ended]
-        state.peak.put(state.index[ended], trial.y[:COMPONENTS, ended], state.h[ended], 0.0)
+        state.peak.put(state.index[ended], trial.y[:N_COMPONENTS, ended], state.h[ended], 0.0)
 
 
 def refine_maximum(
@@ -78,26 +78,26 @@ def refine_maximum(
     The secant rule finds where the slope along the trajectory vanishes, by true steps from the candidate into the
     step ahead of it or, where the slope is negative there already, back into the one behind.
     """
-    small = DIFFERENCE * np.maximum(peak.behind, peak.ahead)
+    small = SLOPE_STEP * np.maximum(peak.behind, peak.ahead)
 
     def slope(y: Array, k: Array) -> Array:
-        ahead = problem.rates(y[:COMPONENTS] + small * k[:COMPONENTS], params)
-        return np.asarray((ahead[WATCHED] - k[WATCHED]) / small)
+        ahead = problem.rates(y[:N_COMPONENTS] + small * k[:N_COMPONENTS], params)
+        return np.asarray((ahead[WATCHED_ROW] - k[WATCHED_ROW]) / small)
 
     k = problem.rates(peak.y, params)
     d_peak = slope(peak.y, k)
     h = np.where(d_peak > 0.0, peak.ahead, -peak.behind)
-    at = np.flatnonzero(np.abs(d_peak * h) > FLAT * np.abs(best))
+    at = np.flatnonzero(np.abs(d_peak * h) > FLAT_SLOPE * np.abs(best))
     if not at.size:
         return
     small, params = small[at], tuple(column[at] for column in params)
     h, k, d_peak = h[at], k.take(at, 1), d_peak[at]
-    y = np.zeros((INTEGRATED, at.size))
-    y[:COMPONENTS] = peak.y[:, at]
+    y = np.zeros((N_INTEGRATED, at.size))
+    y[:N_COMPONENTS] = peak.y[:, at]
 
     def slope_after(fraction: Array) -> Array:
         y_end, k_end = take_step(at, y, k, fraction * h)
-        best[at] = np.fmax(best[at], k_end[WATCHED])
+        best[at] = np.fmax(best[at], k_end[WATCHED_ROW])
         return slope(y_end, k_end)
 
     left, right = np.zeros(at.size), np.ones(at.size)

@@ -18,7 +18,7 @@ Params = tuple[Array, ...]
 Event = Callable[[Array, Array, Params], tuple[Array, Array]]
 
 # rows of a state: two components and two quadratures; rates have one row more, the watched quantity
-COMPONENTS, INTEGRATED, WATCHED = 2, 4, 4
+N_COMPONENTS, N_INTEGRATED, WATCHED_ROW = 2, 4, 4
 
 
 class Termination(IntEnum):
@@ -52,7 +52,7 @@ class Problem:
     unreachable : (y, k, params) -> mask of the trajectories that can no longer reach the event
     floor : the local error of each component is judged against rtol max(|y|, floor)
     watch : locate the maximum of the watched quantity
-    first : the length of a step whose error is of the order of 1, by which the first one is chosen
+    step_at_unit_error : length of a step whose error is of the order of 1, from which the first step is chosen
     """
 
     rates: Rates
@@ -60,7 +60,7 @@ class Problem:
     unreachable: Callable[[Array, Array, Params], Mask]
     floor: tuple[float, float]
     watch: bool = False
-    first: float = 1.0
+    step_at_unit_error: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class Step:
         """A copy of a step; rows that a stage does not have are zero, and have no part in it."""
         rows = np.zeros((len(stages), *start.shape))
         for room, stage in zip(rows, stages, strict=True):
-            room[: len(stage)] = stage[:INTEGRATED]
+            room[: len(stage)] = stage[:N_INTEGRATED]
         return cls(start.copy(), length, rows, end)
 
     def at(self, theta: float | Array) -> Array:
@@ -102,10 +102,10 @@ class Solution:
     @classmethod
     def empty(cls, n: int) -> Solution:
         """Arrays for n trajectories, to be filled."""
-        return cls(np.empty((INTEGRATED, n)), np.empty(n), np.empty(n, np.int32), np.empty(n, np.int8))
+        return cls(np.empty((N_INTEGRATED, n)), np.empty(n), np.empty(n, np.int32), np.empty(n, np.int8))
 
     @classmethod
     def blank(cls, n: int) -> Solution:
         """n trajectories of which nothing is known."""
-        unknown = np.full((INTEGRATED, n), np.nan)
+        unknown = np.full((N_INTEGRATED, n), np.nan)
         return cls(unknown, np.full(n, np.nan), np.zeros(n, np.int32), np.zeros(n, np.int8))

@@ -16,12 +16,23 @@ from numpy.typing import NDArray
 
 from .events import choose, locate_event
 from .maximum import PeakCandidate, note_peaks, refine_maximum
-from .problem import COMPONENTS, INTEGRATED, WATCHED, Array, Mask, Params, Problem, Solution, Step, Termination
+from .problem import (
+    N_COMPONENTS,
+    N_INTEGRATED,
+    WATCHED_ROW,
+    Array,
+    Mask,
+    Params,
+    Problem,
+    Solution,
+    Step,
+    Termination,
+)
 from .tableau import A, E
 
 # the controller: a step is multiplied by SAFETY/error^GAIN, within bounds; exponents are in parts of 256. The
 # order of the method suggests a FIFTH, but with a smaller exponent steps vary less, and hardly any is rejected
-SAFETY, MIN_FACTOR, MAX_FACTOR, GAIN, FIFTH = 0.87, 0.2, 3.0, 36, 51
+SAFETY, MIN_FACTOR, MAX_FACTOR, CONTROLLER_EXPONENT, FIRST_STEP_EXPONENT = 0.87, 0.2, 3.0, 36, 51
 MIN_STEP = 1e-16
 # after so many halvings a rate is taken to stay not finite; they are counted over the whole trajectory, since
 # towards a point beyond which there is no rate every halved step is accepted
@@ -30,10 +41,10 @@ MAX_HALVINGS = 20
 COMPACT_ABOVE = 0.125
 RUNNING, EVENT_REACHED = int(Termination.RUNNING), int(Termination.EVENT_REACHED)
 
-Nested = tuple[tuple[int, Array], ...]
+NestedWeights = tuple[tuple[int, Array], ...]
 
 
-def _nested(row: tuple[Fraction, ...]) -> Nested:
+def _nested_weights(row: tuple[Fraction, ...]) -> NestedWeights:
     """A row of weights for `_weighted`: each relative to the next, zeros left out."""
     stages = [stage for stage, weight in enumerate(row) if weight]
     next_weights = [*(row[stage] for stage in stages[1:]), Fraction(1)][: len(stages)]
@@ -42,9 +53,17 @@ def _nested(row: tuple[Fraction, ...]) -> Nested:
     return tuple((stage, np.array(ratio)) for stage, ratio in zip(stages, ratios, strict=True))
 
 
-STAGES, ERROR = tuple(map(_nested, A[1:])), _nested(E)
+STAGE_WEIGHTS, ERROR_WEIGHTS = tuple(map(_nested_weights, A[1:])), _nested_weights(E)
 # rows of the rates that each stage needs: the second has no part in the solution
-STAGE_ROWS = (WATCHED + 1, COMPONENTS, INTEGRATED, INTEGRATED, INTEGRATED, INTEGRATED, WATCHED + 1)
+STAGE_ROWS = (
+    WATCHED_ROW + 1,
+    N_COMPONENTS,
+    N_INTEGRATED,
+    N_INTEGRATED,
+    N_INTEGRATED,
+    N_INTEGRATED,
+    WATCHED_ROW + 1,
+)
 
 
 def _keep_freed_memory() -> None:
@@ -71,7 +90,7 @@ class Workspace:
     @classmethod
     def of(cls, n: int) -> Workspace:
         """For n trajectories, in one block of memory."""
-        rows = (INTEGRATED, WATCHED + 1, *STAGE_ROWS[1:], INTEGRATED, COMPONENTS)
+        rows = (N_INTEGRATED, WATCHED_ROW + 1, *STAGE_ROWS[1:], N_INTEGRATED, N_COMPONENTS)
         block = np.empty((sum(rows), n))
         y, k, *stages, y_end, part = np.split(block, np.cumsum(rows)[:-1])
         return cls(y, k, stages, y_end, part)
@@ -115,7 +134,7 @@ class State:
         n = start.shape[1]
         y, k = workspace.y, workspace.k
         y[: len(start)], y[len(start) :] = start, 0.0
-        start = start[:COMPONENTS]
+        start = start[:N_COMPONENTS]
         np.copyto(k, problem.rates(start, params, k))
         return cls(
             index=np.arange(n),
@@ -237,7 +256,7 @@ def _advance(problem: Problem, state: State, rtol: float, record: bool) -> Step 
     error = local_error(problem, stages, y, y_end, h, workspace)
     trial = TrialStep(y_end, stages[-1], error <= rtol, next_step(h, error, rtol))
     if np.count_nonzero(trial.is_accurate) < error.size:
-        _halve(state, trial, error)
+        _halve_non_finite_steps(state, trial, error)
     accepted = trial.is_accurate & running
     ended, offset = locate_event(problem, state, trial, accepted)
     accepted &= trial.is_accurate
@@ -254,7 +273,7 @@ def _advance(problem: Problem, state: State, rtol: float, record: bool) -> Step 
     state.steps += accepted
     end = 1.0 + offset if ended.size else np.ones(1)
     step = Step.of(y, h, stages, end) if record and accepted[0] else None
-    _move(state, trial)
+    _move_to_ends(state, trial)
     return step
 
 
@@ -262,22 +281,22 @@ def rk_step(
     problem: Problem, y: Array, k: Array, h: Array, params: Params, workspace: Workspace
 ) -> tuple[Array, list[Array]]:
     """One step of length h from rows y whose rates are k: rows at its end, the seven stages; in the workspace."""
-    stages, slopes = [k], [k[:COMPONENTS]]
-    part, y_end, start = workspace.part, workspace.y_end, y[:COMPONENTS]
-    for weights, rows in zip(STAGES[:-1], workspace.stages[:-1], strict=True):
-        _weighted(weights, slopes, part)
+    stages, slopes = [k], [k[:N_COMPONENTS]]
+    part, y_end, start = workspace.part, workspace.y_end, y[:N_COMPONENTS]
+    for weights, rows in zip(STAGE_WEIGHTS[:-1], workspace.stages[:-1], strict=True):
+        _weighted_sum(weights, slopes, part)
         np.multiply(part, h, part)
         np.add(part, start, part)
         stages.append(problem.rates(part, params, rows))
-        slopes.append(stages[-1][:COMPONENTS])
-    _weighted(STAGES[-1], [stage[:INTEGRATED] for stage in stages], y_end)
+        slopes.append(stages[-1][:N_COMPONENTS])
+    _weighted_sum(STAGE_WEIGHTS[-1], [stage[:N_INTEGRATED] for stage in stages], y_end)
     np.multiply(y_end, h, y_end)
     np.add(y_end, y, y_end)
-    stages.append(problem.rates(y_end[:COMPONENTS], params, workspace.stages[-1]))
+    stages.append(problem.rates(y_end[:N_COMPONENTS], params, workspace.stages[-1]))
     return y_end, stages
 
 
-def _weighted(weights: Nested, stages: list[Array], total: Array) -> None:
+def _weighted_sum(weights: NestedWeights, stages: list[Array], total: Array) -> None:
     """The weighted sum of the stages, in order, by Horner's scheme: it needs no memory for terms."""
     (first, weight), *rest = weights
     np.multiply(stages[first], weight, total)
@@ -291,7 +310,7 @@ def local_error(
 ) -> Array:
     """The norm of the local error of a step, shape (n,)."""
     error = workspace.part
-    _weighted(ERROR, [stage[:COMPONENTS] for stage in stages], error)
+    _weighted_sum(ERROR_WEIGHTS, [stage[:N_COMPONENTS] for stage in stages], error)
     np.multiply(error, h, error)
     return error_norm(error[0], error[1], y[0], y[1], y_end[0], y_end[1], problem.floor)
 
@@ -343,17 +362,17 @@ def step_factor(error: Array, rtol: float, exponent: int) -> Array:
 
 def next_step(h: Array, error: Array, rtol: float) -> Array:
     """The length of the next step by the controller."""
-    factor = step_factor(error, rtol, GAIN)
+    factor = step_factor(error, rtol, CONTROLLER_EXPONENT)
     factor = choose(factor < MAX_FACTOR, factor, MAX_FACTOR)
     return h * choose(factor > MIN_FACTOR, factor, MIN_FACTOR)
 
 
 def first_step(problem: Problem, rtol: float) -> float:
     """The length of the first step, which is accepted in ordinary impacts."""
-    return problem.first * float(step_factor(np.ones(1), rtol, FIFTH)[0])
+    return problem.step_at_unit_error * float(step_factor(np.ones(1), rtol, FIRST_STEP_EXPONENT)[0])
 
 
-def _halve(state: State, trial: TrialStep, error: Array) -> None:
+def _halve_non_finite_steps(state: State, trial: TrialStep, error: Array) -> None:
     """Halve a step with a rate that is not finite."""
     at = np.flatnonzero(~trial.is_accurate)
     at = at[~np.isfinite(error[at]) & (state.termination[at] == RUNNING)]
@@ -362,7 +381,7 @@ def _halve(state: State, trial: TrialStep, error: Array) -> None:
     state.termination[at[state.halvings[at] > MAX_HALVINGS]] = Termination.NOT_FINITE
 
 
-def _move(state: State, trial: TrialStep) -> None:
+def _move_to_ends(state: State, trial: TrialStep) -> None:
     """Go to the ends of the accepted steps; a trajectory that has ended stands still until it is removed."""
     stay = (~trial.is_accurate).nonzero()[0]
     if stay.size:

@@ -15,8 +15,7 @@ from ..config.quantities import Quantity, show
 from ..config.tables import SWEEP_QUANTITIES
 from ..errors import ConfigError, UsageError, did_you_mean
 from ..formatting import number
-from ..results.history import HISTORY
-from ..results.schema import SCHEMA, plain_unit
+from ..results.schema import HISTORY_VARIABLES, SCHEMA, plain_unit
 from ..text import safe_text
 
 if TYPE_CHECKING:
@@ -174,7 +173,7 @@ def _column_quantities() -> dict[str, Quantity]:
         for variable in SCHEMA
         if variable.dtype == "f8"
     }
-    history = {name: Quantity(plain_unit(unit), meaning) for name, unit, meaning in HISTORY}
+    history = {name: Quantity(plain_unit(unit), meaning) for name, unit, meaning in HISTORY_VARIABLES}
     inputs = {name: Quantity(rule.unit, rule.meaning) for name, rule in SWEEP_QUANTITIES.items()}
     time, impulse = Quantity("s", "time"), Quantity("N s", "impulse")
     sigma = Quantity("1", "standard deviation", least=0.0)

@@ -13,8 +13,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 from ..contact.models import catalogue
 from ..errors import UsageError, did_you_mean
 from ..formatting import scaled_unit, typographic
-from ..results.history import HISTORY
-from ..results.schema import SCHEMA, is_input
+from ..results.schema import HISTORY_VARIABLES, SCHEMA, is_input
 from ..text import safe_text, with_year
 from .slices import NO_BREAK
 
@@ -70,7 +69,11 @@ def checked_labels(labels: Mapping[str, str], shown: set[str]) -> dict[str, str]
     UsageError : there is no such name, or a text is not valid mathtext
     """
     shown_names = {*shown, "reference", "title"}
-    elsewhere = {*(variable.name for variable in SCHEMA), *(name for name, _, _ in HISTORY), *catalogue()}
+    elsewhere = {
+        *(variable.name for variable in SCHEMA),
+        *(name for name, _, _ in HISTORY_VARIABLES),
+        *catalogue(),
+    }
     for key, text in labels.items():
         if key not in shown_names and key not in elsewhere and not is_input(key):
             names = did_you_mean(key, sorted(shown_names))

@@ -12,7 +12,7 @@ from ..engine.plan import owner_of
 from ..errors import UsageError, did_you_mean
 from ..formatting import quantity
 from ..results.schema import exponents_of, is_input, plain_unit
-from ..results.select import places_of, select
+from ..results.selection import model_positions, select
 from ..text import safe_text
 
 if TYPE_CHECKING:
@@ -102,7 +102,7 @@ def _select(dataset: xr.Dataset, sel: Selection, models: Sequence[str] | None) -
     if "model" not in dataset.dims:
         raise UsageError(NO_SWEEP)
     if models:
-        dataset = dataset.isel(model=places_of(models, dataset))
+        dataset = dataset.isel(model=model_positions(models, dataset))
     return select(dataset, sel or {})
 
 

@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 
 from ..contact.models import catalogue
 from ..errors import UsageError
-from ..results.backend import write_whole
+from ..results.backend import write_file
 from ..text import safe_text
 from .kinds import WIDTHS
 
@@ -194,4 +194,4 @@ def save_figure(
     StoreError : the disk is full or failed
     """
     path = Path(path)
-    write_whole(path, encoded(figure, check_picture(path), style), overwrite=overwrite)
+    write_file(path, encoded(figure, check_picture(path), style), overwrite=overwrite)

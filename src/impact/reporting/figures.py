@@ -18,8 +18,8 @@ from ..formatting import label
 from ..plots.kinds import WIDTHS, Choice, draw
 from ..plots.style import encoded
 from ..results.schema import columns_along, is_input, plain_unit
-from ..results.select import places_of
-from ..results.slabs import distinct, is_computed, slabs
+from ..results.selection import model_positions
+from ..results.slabs import distinct_points, is_computed, slabs
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -156,7 +156,7 @@ def _first_answered_index(
     dims = dataset["status"].dims if "status" in dataset else dataset.dims
     axes = [dim for dim in dims if dim not in ("model", *drawn)]
     first: tuple[int, ...] | None = None
-    for index in places_of(keys, dataset) if "status" in dataset else ():
+    for index in model_positions(keys, dataset) if "status" in dataset else ():
         answered = _first_answered_of_model(dataset.isel(model=index), axes)
         first = min(filter(None, (first, answered)), default=None)
         if first is not None and not any(first):
@@ -169,7 +169,7 @@ def _first_answered_of_model(of_model: xr.Dataset, axes: Sequence[Hashable]) -> 
 
     If the status of more than MAX_SEARCHED points would be computed, a coarser grid is searched.
     """
-    status, _ = distinct(of_model, "status")
+    status, _ = distinct_points(of_model, "status")
     ordered = [*axes, *(dim for dim in status.dims if dim not in axes)]
     steps = dict.fromkeys(ordered, 1)
     if is_computed(status):

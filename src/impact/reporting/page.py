@@ -27,7 +27,7 @@ from ..results.plausibility import material_notes, result_notes
 from ..results.ranking import Ranking, ranking
 from ..results.schema import count_points, exponents_of, is_input
 from ..results.slabs import MAX_SUMMARY_POINTS, is_large
-from ..results.summary import Tally, extremes_of, tally_of
+from ..results.summary import Summary, extremes_of, summarize
 from ..text import safe_text, with_year
 from .figures import at_text, coordinate_text, figures_of, unit_of, varying
 
@@ -57,7 +57,7 @@ def page(dataset: xr.Dataset, get_plot_data: Callable[[str, Choice], PlotData]) 
     """
     if "model" not in dataset.dims:
         raise UsageError("this is a time history; a report is made of the result of a sweep")
-    tally = tally_of(dataset, MAX_FAILED)
+    summary = summarize(dataset, MAX_FAILED)
     ranked, headline = _rank_models(dataset)
     keys = [str(key) for key in dataset["model"].values]
     selection = ""
@@ -72,8 +72,8 @@ def page(dataset: xr.Dataset, get_plot_data: Callable[[str, Choice], PlotData]) 
     return _template().render(
         title=str(dataset.attrs.get("title", "")) or "Impact of two balls",
         summary=_summary_sentence(dataset),
-        notes=[*material_notes(read_attribute(dataset.attrs, "materials"), moduli), *result_notes(tally)],
-        outcomes=list(_outcomes(tally)),
+        notes=[*material_notes(read_attribute(dataset.attrs, "materials"), moduli), *result_notes(summary)],
+        outcomes=list(_outcomes(summary)),
         axes=[(name, *_meaning_and_unit(dataset[name]), *_range(dataset[name])) for name in varying(dataset)],
         single_values=list(_single_values(dataset)),
         ranking=ranked,
@@ -81,7 +81,7 @@ def page(dataset: xr.Dataset, get_plot_data: Callable[[str, Choice], PlotData]) 
         selection=selection,
         figures=drawn,
         left_out=left_out,
-        failures=_failures_section(dataset, tally),
+        failures=_failures_section(dataset, summary),
         facts=_facts(dataset),
         models=models,
         evidence=[row for model in models for row in model["evidence"]],
@@ -113,12 +113,12 @@ def _summary_sentence(dataset: xr.Dataset) -> str:
     )
 
 
-def _outcomes(tally: Tally) -> Iterator[str]:
+def _outcomes(summary: Summary) -> Iterator[str]:
     """Sentences with the number of points by status."""
-    for status in sorted(tally.counts):
-        yield f"{tally.counts[status]:,} {status.name.lower()}: {status.meaning}"
-    if tally.not_counted:
-        yield f"{tally.not_counted:,} not evaluated: too many different points to count them for a report"
+    for status in sorted(summary.counts):
+        yield f"{summary.counts[status]:,} {status.name.lower()}: {status.meaning}"
+    if summary.not_counted:
+        yield f"{summary.not_counted:,} not evaluated: too many different points to count them for a report"
 
 
 def _single_values(dataset: xr.Dataset) -> Iterator[tuple[str, str, str]]:
@@ -180,21 +180,21 @@ def _rank_models(dataset: xr.Dataset) -> tuple[Ranking | None, str]:
     return ranked, re.sub("^no ", "No ", f"{ranked.headline}.")
 
 
-def _failures_section(dataset: xr.Dataset, tally: Tally) -> dict[str, Any]:
+def _failures_section(dataset: xr.Dataset, summary: Summary) -> dict[str, Any]:
     """Sentences about failed points, the first failed points, and the number of the others."""
     if "status" not in dataset:
         return {"sentences": ["The result does not tell which points failed."], "points": [], "more": ""}
-    sentences = [f"The status of {tally.not_counted:,} points was not evaluated."] if tally.not_counted else []
-    if not tally.failed:
-        sentences.append("No other point failed." if tally.not_counted else "No point failed.")
+    sentences = [f"The status of {summary.not_counted:,} points was not evaluated."] if summary.not_counted else []
+    if not summary.failed:
+        sentences.append("No other point failed." if summary.not_counted else "No point failed.")
     axes = [dim for dim in dataset["status"].dims if dim != "model"]
     points = []
-    for status, model, places in tally.failed_at:
+    for status, model, places in summary.failed_at:
         point = dataset.isel({"model": model, **dict(zip(axes, places, strict=True))})
         key = str(point["model"].item())
         inputs = [name for name in varying(dataset) if owner_of(name) in ("", key)]
         points.append((key, at_text(point, inputs) or "–", status.meaning))
-    more = tally.failed - len(points)
+    more = summary.failed - len(points)
     return {"sentences": sentences, "points": points, "more": f"{more:,}" if more > 0 else ""}
 
 

@@ -7,9 +7,9 @@ import numpy as np
 from ..powers import Array, integer_power, power
 
 # Newton's iterations for the resolvent cubic: from beyond its root they come to it from one side
-ITERATIONS = 8
+CUBIC_ITERATIONS = 8
 # halvings of an interval of indentations, to the last bit
-HALVINGS = 60
+BRANCH_HALVINGS = 60
 # of the work of the neck: ∫ (4t⁶/3 − 2t³)(4t³ − 1) dt, t = y/(b R)^(1/3), from the pull-off, t³ = 1/4, to t = 1
 NECK_WORK = (8 / 15 - 4 / 3 + 1 / 2) - (8 / 15 * 4 ** (-10 / 3) - 4 / 3 * 4 ** (-7 / 3) + 1 / 2 * 4 ** (-4 / 3))
 
@@ -33,7 +33,7 @@ def jkr_root(x: Array, R: Array, b: Array) -> Array:
     third = np.where(adhesive, q * q / 8.0, 1.0)
     linear = np.where(adhesive, x * R, 0.0)
     m = 1.6 * np.cbrt(third) * np.ones_like(linear)
-    for _ in range(ITERATIONS):
+    for _ in range(CUBIC_ITERATIONS):
         m = (2.0 * integer_power(m, 3) + third) / (3.0 * m * m + linear)
     inner = np.sqrt(2.0) * q / np.sqrt(m) - 2.0 * m
     y = 0.5 * (np.sqrt(2.0 * m) + np.sqrt(np.maximum(inner, 0.0)))
@@ -107,7 +107,7 @@ def edinburgh_restitution(
     stiff, plastic = K * k2, (1 - 1 / k2) * power(peak, n)
     adhesion = edinburgh_adhesion(peak, K, n, k2, gamma, exponent, R1, R2)
     low, high = np.zeros_like(plastic), np.power(plastic, 1 / n)
-    for _ in range(HALVINGS):
+    for _ in range(BRANCH_HALVINGS):
         middle = 0.5 * (low + high)
         below = stiff * (power(middle, n) - plastic) + adhesion * np.power(middle, exponent) < 0
         low, high = np.where(below, middle, low), np.where(below, high, middle)

@@ -20,7 +20,7 @@ from ..powers import Array
 # below this |t| the slope of h is taken from its series
 SERIES_BELOW_T = 1e-3
 # Newton's iterations for h(t) = L: the start is good to half, the last ones change nothing
-ITERATIONS = 6
+DAMPING_ITERATIONS = 6
 
 
 def _until_peak(zeta: Array) -> Array:
@@ -160,7 +160,7 @@ def _damping(L: Array) -> Array:
     infinite = np.isinf(L)
     L = np.where(infinite, 1.0, L)
     t = np.where(L > 1.0, np.minimum(3.0 * (1.0 - L), 1.0 - L * L), 3.0 * (1.0 - L))
-    for _ in range(ITERATIONS):
+    for _ in range(DAMPING_ITERATIONS):
         value, slope = _root_cotangent(t)
         t = t - (value - L) / slope
     return np.where(infinite, np.inf, L * _root_sine(t))

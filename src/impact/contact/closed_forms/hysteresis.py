@@ -10,9 +10,9 @@ from ..powers import Array, integer_power
 # Below this χ Newton's iteration has lost more digits than the truncated series.
 SERIES_BELOW_CHI = 0.06
 # likewise of χ − ln(1 + χ)
-SMALL_CHI = 0.01
+WORK_SERIES_BELOW_CHI = 0.01
 # Newton's iterations for e: the start is good to 2 %, the third is exact to rounding
-ITERATIONS = 4
+RESTITUTION_ITERATIONS = 4
 RESTITUTION_SERIES = (
     1, -2 / 3, 4 / 9, -44 / 135, 104 / 405, -40 / 189, 7648 / 42525, -2848 / 18225, 31712 / 229635,
     -23429344 / 189448875, 89072576 / 795685275, -1441952704 / 14105329875, 893393408 / 9499507875,
@@ -54,7 +54,7 @@ def delivered_restitution(chi: Array | float) -> Array:
     inner = np.where(small | np.isinf(chi), 1.0, chi)
     t = inner - np.log1p(inner)
     z = np.minimum(inner / (1.0 + inner * (2.0 / 3.0)), 1.0)
-    for _ in range(ITERATIONS):
+    for _ in range(RESTITUTION_ITERATIONS):
         slope = np.expm1(-(z + t))
         z = z + (z + slope) / slope
     e = np.where(np.isinf(chi), 0.0, z / inner)
@@ -92,7 +92,7 @@ def exact_damping_ratio(e: Array | float) -> Array:
 
 def _work_to_peak(chi: Array) -> Array:
     """xₘ^(n+1)/(n+1), the elastic work up to the peak over m v₀²: (χ − ln(1 + χ))/χ²."""
-    small = chi < SMALL_CHI
+    small = chi < WORK_SERIES_BELOW_CHI
     safe = np.where(small | np.isinf(chi), 1.0, chi)
     series = _series((1 / 2, -1 / 3, 1 / 4, -1 / 5, 1 / 6, -1 / 7, 1 / 8, -1 / 9), np.where(small, chi, 0.0))
     integral = np.where(small, series, (safe - np.log1p(safe)) / integer_power(safe, 2))

@@ -7,9 +7,9 @@ import numpy as np
 from ..powers import Array
 
 # Müller and Pöschel (2011), the form [3/6] in w = √g, g = (3/2) A (K/m)^(2/5) v^(1/5), from the zeroth power
-ABOVE = (1.0, 1.07232, 0.574198, 0.141552)
-BELOW = (1.0, 1.07232, 1.72765, 1.37842, 1.19449, 0.467273, 0.235585)
-HALVINGS = 70
+PADE_NUMERATOR = (1.0, 1.07232, 0.574198, 0.141552)
+PADE_DENOMINATOR = (1.0, 1.07232, 1.72765, 1.37842, 1.19449, 0.467273, 0.235585)
+DAMPING_HALVINGS = 70
 
 
 def pade_restitution(g: Array | float) -> Array:
@@ -26,8 +26,10 @@ def pade_restitution(g: Array | float) -> Array:
     # in powers of w, or of 1/w where w is large
     large = w > 1.0
     t = np.where(large, 1.0 / np.where(large, w, 1.0), w)
-    small = np.polyval(ABOVE[::-1], t) / np.polyval(BELOW[::-1], t)
-    return np.asarray(np.where(large, t * t * t * np.polyval(ABOVE, t) / np.polyval(BELOW, t), small))
+    small = np.polyval(PADE_NUMERATOR[::-1], t) / np.polyval(PADE_DENOMINATOR[::-1], t)
+    return np.asarray(
+        np.where(large, t * t * t * np.polyval(PADE_NUMERATOR, t) / np.polyval(PADE_DENOMINATOR, t), small)
+    )
 
 
 def pade_damping(e: Array | float) -> Array:
@@ -44,7 +46,7 @@ def pade_damping(e: Array | float) -> Array:
     low = np.zeros_like(e)
     with np.errstate(divide="ignore"):
         high = 1.0 + 1.0 / np.cbrt(e)
-    for _ in range(HALVINGS):
+    for _ in range(DAMPING_HALVINGS):
         middle = 0.5 * (low + high)
         above = pade_restitution(middle * middle) > e
         low, high = np.where(above, middle, low), np.where(above, high, middle)

@@ -1,4 +1,4 @@
-"""The catalogue: every `ForceModel` in the modules of this package, by name or in their tuples MODELS."""
+"""The catalogue: every `ForceModel` that is a variable, or in a tuple, of a module of this package."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ...errors import ModelError, did_you_mean
 from ...text import safe_text
 from ..model import ForceModel
 
-# families in the order of the paper; a family that is not named comes after these
+# families in the order of the paper; other families follow
 FAMILIES = (
     "elastic",
     "hysteresis",
@@ -29,10 +29,14 @@ FAMILIES = (
 @cache
 def _built_in() -> tuple[ForceModel, ...]:
     modules = [import_module(f"{__name__}.{module.name}") for module in iter_modules(__path__)]
-    values = [v for m in modules for v in (*vars(m).values(), *getattr(m, "MODELS", ()))]
-    found = {id(v): v for v in values if isinstance(v, ForceModel)}
-    rank = {family: place for place, family in enumerate(FAMILIES)}
-    return tuple(sorted(found.values(), key=lambda m: (rank.get(m.family, len(rank)), m.year, m.key)))
+    # a module imports the laws that it renames: each is collected once
+    models: dict[int, ForceModel] = {}
+    for module in modules:
+        for value in vars(module).values():
+            candidates = value if isinstance(value, tuple) else (value,)
+            models.update((id(model), model) for model in candidates if isinstance(model, ForceModel))
+    rank = {family: position for position, family in enumerate(FAMILIES)}
+    return tuple(sorted(models.values(), key=lambda m: (rank.get(m.family, len(rank)), m.year, m.key)))
 
 
 def built_in() -> frozenset[str]:
@@ -41,7 +45,7 @@ def built_in() -> frozenset[str]:
 
 
 def catalogue(plugins: Sequence[ForceModel] = ()) -> Mapping[str, ForceModel]:
-    """All models by key: the built-in ones, then those given.
+    """All models by key: the built-in ones, then the plug-ins.
 
     Raises
     ------
@@ -53,7 +57,7 @@ def catalogue(plugins: Sequence[ForceModel] = ()) -> Mapping[str, ForceModel]:
     models: dict[str, ForceModel] = {}
     for model in (*_built_in(), *plugins):
         if model.key in models:
-            raise ModelError(f"model {model.key}: there are two models of this key")
+            raise ModelError(f"model {model.key}: two models have this key")
         models[model.key] = model
     return MappingProxyType(models)
 
@@ -63,9 +67,9 @@ def find(key: str, plugins: Sequence[ForceModel] = ()) -> ForceModel:
 
     Raises
     ------
-    ModelError : there is none; the message names the nearest one
+    ModelError : no model has this key; the message names the nearest one
     """
-    known = catalogue(plugins)
-    if key not in known:
-        raise ModelError(f'no model "{safe_text(key)}"; {did_you_mean(key, list(known))}')
-    return known[key]
+    models = catalogue(plugins)
+    if key not in models:
+        raise ModelError(f'no model "{safe_text(key)}"; {did_you_mean(key, list(models))}')
+    return models[key]

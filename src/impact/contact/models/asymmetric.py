@@ -65,7 +65,7 @@ EXACT_APPROACH_DASHPOT = approach_dashpot(
     equation="F = K δⁿ + α √(m K) δ^((n−1)/2) δ̇, then F = K δⁿ,  α = ζ √(2(n + 1)),  e = exp(−ζ acos(ζ)/√(1 − "
     "ζ²))",
     reference="the limit that Jankowski (2006) and Mahmoud and Jankowski (2011) approximate",
-    evidence=Evidence("derived", "src/impact/contact/oracles/dashpot.py"),
+    evidence=Evidence("derived", "src/impact/contact/closed_forms/dashpot.py"),
     zeta=lambda e: approach_damping(e),
 )
 

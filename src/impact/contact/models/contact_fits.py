@@ -13,7 +13,7 @@ from .elastoplastic import E_OF_K
 from .sources import IMPACT_MATERIAL
 
 
-def softer(nu1: Array, nu2: Array, Y1: Array, Y2: Array) -> Array:
+def softer_poisson_ratio(nu1: Array, nu2: Array, Y1: Array, Y2: Array) -> Array:
     """Poisson's ratio of the ball that yields; of two equally strong ones that at which they yield first."""
     return np.where(Y1 < Y2, nu1, np.where(Y1 > Y2, nu2, np.minimum(nu1, nu2)))
 
@@ -38,7 +38,7 @@ JACKSON_GREEN_2010 = ForceModel(
     ),
     coefficients={
         "E": E_OF_K,
-        "nu": lambda nu1, nu2, yield_strength1, yield_strength2: softer(
+        "nu": lambda nu1, nu2, yield_strength1, yield_strength2: softer_poisson_ratio(
             nu1, nu2, yield_strength1, yield_strength2
         ),
         "C": lambda nu: 1.295 * np.exp(0.736 * nu),
@@ -68,7 +68,7 @@ def jackson_green(w: Array, slope: Array, C: Array, B: Array) -> Array:
 
 
 # where the second branch of Kogut and Etsion comes down to the elastic one
-MEETS = 1.03 ** (1 / 0.075)
+KOGUT_ETSION_YIELD = 1.03 ** (1 / 0.075)
 
 KOGUT_ETSION_2005 = ForceModel(
     key="kogut-etsion-2005",
@@ -89,16 +89,16 @@ KOGUT_ETSION_2005 = ForceModel(
     ),
     coefficients={
         "E": E_OF_K,
-        "nu": lambda nu1, nu2, yield_strength1, yield_strength2: softer(
+        "nu": lambda nu1, nu2, yield_strength1, yield_strength2: softer_poisson_ratio(
             nu1, nu2, yield_strength1, yield_strength2
         ),
         # the hardness is 2.8 Y
         "dc": lambda E, R_eff, Y_min, nu: np.square(np.pi * (0.454 + 0.41 * nu) * 2.8 * Y_min / (2 * E)) * R_eff,
         "Fc": lambda K, dc: K * power(dc, 1.5),
     },
-    breakpoints=(lambda dc: MEETS * dc, lambda dc: 6 * dc),
+    breakpoints=(lambda dc: KOGUT_ETSION_YIELD * dc, lambda dc: 6 * dc),
     force=lambda elastic, x, dc, Fc: np.where(
-        x < MEETS * dc, elastic, Fc * kogut_etsion(np.maximum(x / dc, MEETS))
+        x < KOGUT_ETSION_YIELD * dc, elastic, Fc * kogut_etsion(np.maximum(x / dc, KOGUT_ETSION_YIELD))
     ),
     unloading=lambda x, peak, residual, force_at_peak, dc: (
         force_at_peak

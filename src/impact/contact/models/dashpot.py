@@ -6,7 +6,8 @@ Such a force pulls before the balls part, so that where the contact ends is part
 
 from __future__ import annotations
 
-from typing import Literal, Unpack
+from dataclasses import replace
+from typing import Any, Literal, Unpack
 
 import numpy as np
 
@@ -17,6 +18,12 @@ from ..formula import Formula
 from ..model import About, ForceModel, Parameter
 from ..powers import Array, power
 from .sources import CHRONO, DEMLAB_VISCOELASTIC, LIGGGHTS, MAPLESIM_HELP, YADE_2025, YADE_BIBLIOGRAPHY
+
+# by where the contact ends
+DELIVERED_RESTITUTION: dict[str, Formula] = {
+    "gap": lambda zeta: gap_restitution(zeta),
+    "force": lambda zeta: force_restitution(zeta),
+}
 
 
 def dashpot(key: str, *, zeta: Formula, release: Literal["gap", "force"], **about: Unpack[About]) -> ForceModel:
@@ -33,7 +40,6 @@ def dashpot(key: str, *, zeta: Formula, release: Literal["gap", "force"], **abou
     >>> print(law.force(elastic=1.0, x=1.0, v=0.5, n=1.0, c=2.0))
     2.0
     """
-    by_gap, by_force = (lambda zeta: gap_restitution(zeta)), (lambda zeta: force_restitution(zeta))
     return ForceModel(
         key,
         **about,
@@ -45,26 +51,41 @@ def dashpot(key: str, *, zeta: Formula, release: Literal["gap", "force"], **abou
         force=lambda elastic, x, v, n, c: dragged(elastic, power(x, (n - 1) / 2), v, c),
         release=release,
         velocity_coordinate="force",
-        oracle=by_gap if release == "gap" else by_force,
+        oracle=DELIVERED_RESTITUTION[release],
         # with n = 3/2 the dashpot goes as the fourth root of the indentation
         coordinate_power=2 if about.get("exponent") == 1.0 else 4,
         family="dashpot",
     )
 
 
-LINEAR = "F = K δ + 2 ζ √(m K) δ̇"
-HERTZIAN = "F = K δ^(3/2) + α √(m K) δ^(1/4) δ̇"
-GENERAL = "F = K δⁿ + α √(m K) δ^((n−1)/2) δ̇"
-BY_LOGARITHM = "ζ = −ln e/√(π² + ln² e)"
-CONSTANT = (Parameter("C", "N s/m", "damping constant of the dashpot", least=0.0),)
-# of the polynomial of Thornton, Cummins and Cleary, from the first power of e
-THORNTON = (
+def with_release(law: ForceModel, release: Literal["gap", "force"], **changes: Any) -> ForceModel:
+    """A law made by `dashpot` with the same damping ratio, whose contact ends elsewhere.
+
+    Parameters
+    ----------
+    law : its `equation` contains "to δ = 0" or "to F = 0"
+    release : where the contact ends
+    changes : other fields of the `ForceModel`: at least its key, title and evidence
+    """
+    ends = {"gap": "to δ = 0", "force": "to F = 0"}
+    equation = law.equation.replace(ends[law.release], ends[release])
+    return replace(law, release=release, equation=equation, oracle=DELIVERED_RESTITUTION[release], **changes)
+
+
+# the forces and damping ratios as texts of `equation`
+LINEAR_DASHPOT = "F = K δ + 2 ζ √(m K) δ̇"
+HERTZIAN_DASHPOT = "F = K δ^(3/2) + α √(m K) δ^(1/4) δ̇"
+GENERAL_DASHPOT = "F = K δⁿ + α √(m K) δ^((n−1)/2) δ̇"
+ZETA_BY_LOGARITHM = "ζ = −ln e/√(π² + ln² e)"
+DASHPOT_CONSTANT = (Parameter("C", "N s/m", "damping constant of the dashpot", least=0.0),)
+# coefficients of the polynomial p(e) of Thornton, Cummins and Cleary, from the zeroth power of e
+THORNTON_POLYNOMIAL = (
     -6.918798, -16.41105, 146.8049, -796.4559, 2928.711, -7206.864, 11494.29, -11342.18, 6276.757, -1489.915,
 )  # fmt: skip
 THORNTON_EQUATION = (
     "F = K δ^(3/2) + 2 β √(m S) δ̇,  S = (3/2) K δ^(1/2),  β = √(1/(1 − (1 + e)² exp(e p(e))) − 1), to F = 0"
 )
-GOLDSMITH = (
+KELVIN_VOIGT_REFERENCE = (
     "Goldsmith W (1960) Impact. Arnold, London; "
     "Cundall PA, Strack ODL (1979) A discrete numerical model for granular assemblies. Géotechnique 29, 47"
 )
@@ -74,45 +95,37 @@ KELVIN_VOIGT = dashpot(
     title="Kelvin and Voigt",
     year=1960,
     equation="F = K δ + C δ̇, to δ = 0",
-    reference=GOLDSMITH,
+    reference=KELVIN_VOIGT_REFERENCE,
     doi="10.1680/geot.1979.29.1.47",
     evidence=Evidence(
         "seen",
         "OpenSees/OpenSees, SRC/material/uniaxial/ViscoelasticGap.cpp @2890cb36f (2026), after Goldsmith (1960)",
         doi=DEMLAB_VISCOELASTIC,
     ),
-    parameters=CONSTANT,
+    parameters=DASHPOT_CONSTANT,
     zeta=lambda C, m, K: C / (2 * np.sqrt(m * K)),
     release="gap",
     exponent=1.0,
 )
 
-KELVIN_VOIGT_NO_TENSION = dashpot(
-    "kelvin-voigt-no-tension",
+KELVIN_VOIGT_NO_TENSION = with_release(
+    KELVIN_VOIGT,
+    "force",
+    key="kelvin-voigt-no-tension",
     title="Kelvin and Voigt, without tension",
-    year=1960,
-    equation="F = K δ + C δ̇, to F = 0",
-    reference=GOLDSMITH,
-    doi="10.1680/geot.1979.29.1.47",
-    evidence=Evidence(
-        "seen",
-        MAPLESIM_HELP,
-        doi=DEMLAB_VISCOELASTIC,
-    ),
-    parameters=CONSTANT,
-    zeta=lambda C, m, K: C / (2 * np.sqrt(m * K)),
-    release="force",
-    exponent=1.0,
+    evidence=Evidence("seen", MAPLESIM_HELP, doi=DEMLAB_VISCOELASTIC),
 )
 
-POUNDING = "Anagnostopoulos SA (1988) Pounding of buildings in series during earthquakes. EESD 16, 443"
+ANAGNOSTOPOULOS_REFERENCE = (
+    "Anagnostopoulos SA (1988) Pounding of buildings in series during earthquakes. EESD 16, 443"
+)
 
 ANAGNOSTOPOULOS_1988 = dashpot(
     "anagnostopoulos-1988",
     title="Anagnostopoulos",
     year=1988,
-    equation=f"{LINEAR},  {BY_LOGARITHM}, to δ = 0",
-    reference=POUNDING,
+    equation=f"{LINEAR_DASHPOT},  {ZETA_BY_LOGARITHM}, to δ = 0",
+    reference=ANAGNOSTOPOULOS_REFERENCE,
     doi="10.1002/eqe.4290160311",
     evidence=Evidence(
         "seen",
@@ -125,25 +138,20 @@ ANAGNOSTOPOULOS_1988 = dashpot(
     exponent=1.0,
 )
 
-ANAGNOSTOPOULOS_1988_NO_TENSION = dashpot(
-    "anagnostopoulos-1988-no-tension",
+ANAGNOSTOPOULOS_1988_NO_TENSION = with_release(
+    ANAGNOSTOPOULOS_1988,
+    "force",
+    key="anagnostopoulos-1988-no-tension",
     title="Anagnostopoulos, without tension",
-    year=1988,
-    equation=f"{LINEAR},  {BY_LOGARITHM}, to F = 0",
-    reference=POUNDING,
-    doi="10.1002/eqe.4290160311",
     evidence=Evidence(
         "seen",
         CHRONO,
         doi="koreascience.or.kr, JAKO201832853252619, references",
         note="the end at zero force is that of codes",
     ),
-    zeta=lambda e: gap_damping(e),
-    release="force",
-    exponent=1.0,
 )
 
-TTI = (
+TSUJI_REFERENCE = (
     "Tsuji Y, Tanaka T, Ishida T (1992) Lagrangian numerical simulation of plug flow of cohesionless particles in "
     "a "
     "horizontal pipe. Powder Technol. 71, 239; Antypov D, Elliott JA (2011) On an analytical solution for the "
@@ -155,8 +163,8 @@ TSUJI_1992 = dashpot(
     "tsuji-1992",
     title="Tsuji, Tanaka and Ishida",
     year=1992,
-    equation=f"{HERTZIAN},  α = −√5 ln e/√(π² + ln² e), to δ = 0",
-    reference=TTI,
+    equation=f"{HERTZIAN_DASHPOT},  α = −√5 ln e/√(π² + ln² e), to δ = 0",
+    reference=TSUJI_REFERENCE,
     doi="10.1016/0032-5910(92)88030-L",
     evidence=Evidence(
         "seen",
@@ -169,13 +177,11 @@ TSUJI_1992 = dashpot(
     exponent=1.5,
 )
 
-TSUJI_1992_NO_TENSION = dashpot(
-    "tsuji-1992-no-tension",
+TSUJI_1992_NO_TENSION = with_release(
+    TSUJI_1992,
+    "force",
+    key="tsuji-1992-no-tension",
     title="Tsuji, Tanaka and Ishida, without tension",
-    year=1992,
-    equation=f"{HERTZIAN},  α = −√5 ln e/√(π² + ln² e), to F = 0",
-    reference=TTI,
-    doi="10.1016/0032-5910(92)88030-L",
     evidence=Evidence(
         "seen",
         "Azeko2xo/woodem, pkg/dem/Hertz.cpp @f94485c (2015), noAttraction; projectchrono/chrono, ChContactSMC.cpp "
@@ -183,16 +189,13 @@ TSUJI_1992_NO_TENSION = dashpot(
         doi=DEMLAB_VISCOELASTIC,
         note="the end at zero force is that of codes",
     ),
-    zeta=lambda e: gap_damping(e),
-    release="force",
-    exponent=1.5,
 )
 
 SCHWAGER_POSCHEL_2007 = dashpot(
     "schwager-poschel-2007",
     title="Schwager and Pöschel",
     year=2007,
-    equation=f"{LINEAR},  e = exp(−2 ζ acos(ζ)/√(1 − ζ²)), to F = 0",
+    equation=f"{LINEAR_DASHPOT},  e = exp(−2 ζ acos(ζ)/√(1 − ζ²)), to F = 0",
     reference="Schwager T, Pöschel T (2007) Coefficient of restitution and linear-dashpot model revisited. "
     "Granul. Matter 9, 465",
     doi="10.1007/s10035-007-0065-z",
@@ -228,7 +231,7 @@ THORNTON_CUMMINS_CLEARY_2013 = dashpot(
 def thornton_zeta(e: Array) -> Array:
     """ζ of Thornton, Cummins and Cleary: their β is √(5/6) times it, since 2 β √(3/2) is α."""
     exponent = np.zeros_like(e)
-    for h in reversed(THORNTON):
+    for h in reversed(THORNTON_POLYNOMIAL):
         exponent = e * (h + exponent)
     beta = np.sqrt(1 / (1 - (1 + e) * (1 + e) * np.exp(exponent)) - 1)
     return np.asarray(2 * np.sqrt(1.5) * beta / np.sqrt(5.0))
@@ -238,7 +241,7 @@ FENG_2026 = dashpot(
     "feng-2026",
     title="Feng",
     year=2026,
-    equation=f"{GENERAL},  α = −√(2(n + 1)) ln e/√(π² + ln² e), to δ = 0",
+    equation=f"{GENERAL_DASHPOT},  α = −√(2(n + 1)) ln e/√(π² + ln² e), to δ = 0",
     reference="Feng YT (2026) Exact phase-space analytical solution for the power-law damped contact oscillator. "
     "arXiv:2603.27764",
     evidence=Evidence("seen", "arXiv:2603.27764"),
@@ -250,9 +253,9 @@ EXACT_DASHPOT_NO_TENSION = dashpot(
     "exact-dashpot-no-tension",
     title="Exact dashpot, without tension",
     year=2026,
-    equation=f"{GENERAL},  α = ζ √(2(n + 1)),  e = exp(−2 ζ acos(ζ)/√(1 − ζ²)), to F = 0",
+    equation=f"{GENERAL_DASHPOT},  α = ζ √(2(n + 1)),  e = exp(−2 ζ acos(ζ)/√(1 − ζ²)), to F = 0",
     reference="Schwager T, Pöschel T (2007) Granul. Matter 9, 465, for n = 1; Feng YT (2026) arXiv:2603.27764",
-    evidence=Evidence("derived", "src/impact/contact/oracles/dashpot.py"),
+    evidence=Evidence("derived", "src/impact/contact/closed_forms/dashpot.py"),
     zeta=lambda e: force_damping(e),
     release="force",
 )

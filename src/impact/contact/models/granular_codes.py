@@ -11,40 +11,41 @@ from ..powers import Array, power
 from .aliases import same_law
 from .dashpot import (
     ANAGNOSTOPOULOS_1988,
-    BY_LOGARITHM,
-    HERTZIAN,
+    HERTZIAN_DASHPOT,
     KELVIN_VOIGT,
     KELVIN_VOIGT_NO_TENSION,
-    LINEAR,
+    LINEAR_DASHPOT,
     SCHWAGER_POSCHEL_2007,
     THORNTON_EQUATION,
     TSUJI_1992,
     TSUJI_1992_NO_TENSION,
+    ZETA_BY_LOGARITHM,
     dashpot,
     thornton_zeta,
+    with_release,
 )
 from .multibody_codes import of_code
 from .rate_dependent import KUWABARA_KONO_AT_SPEED
 from .sources import CHRONO, DEMLAB_VISCOELASTIC, LIGGGHTS, YADE_2025
 
-TANGENT = "F = K δ^(3/2) + 2 β √(m S) δ̇,  S = (3/2) K δ^(1/2)"
-# the stiffness of a linear spring that takes as much energy as Hertz's at a characteristic speed
-CHARACTERISTIC = (Parameter("vc", "m/s", "characteristic speed of the stiffness", default=1.0, least=1e-9),)
-BY_SPEED = "K = (16/15) E* √R* (15 m v_c²/(16 E* √R*))^(1/5)"
+TANGENT_DASHPOT = "F = K δ^(3/2) + 2 β √(m S) δ̇,  S = (3/2) K δ^(1/2)"
+# at this closing speed the linear spring absorbs as much energy as Hertz's
+CHARACTERISTIC_SPEED = (Parameter("vc", "m/s", "characteristic speed of the stiffness", default=1.0, least=1e-9),)
+STIFFNESS_BY_SPEED = "K = (16/15) E* √R* (15 m v_c²/(16 E* √R*))^(1/5)"
 
 
 def in_code(
     law: ForceModel, key: str, title: str, year: int, reference: str, source: str, note: str = ""
 ) -> ForceModel:
-    """A law under the name of a code, with the law's rule for K."""
+    """A law of the catalogue under the name that a code has for it, with the law's own rule for K."""
     evidence = Evidence("seen", source, note=note)
     return of_code(
         same_law(law, key, title=title, year=year, reference=reference, evidence=evidence), law.stiffness
     )
 
 
-def by_speed(E_eff: Array, R_eff: Array, m: Array, vc: Array) -> Array:
-    """K of a linear spring from modulus, radius and a characteristic speed."""
+def stiffness_by_speed(E_eff: Array, R_eff: Array, m: Array, vc: Array) -> Array:
+    """Stiffness K [N/m] of a linear spring from E* [Pa], R* [m], m [kg] and a characteristic speed [m/s]."""
     root = np.sqrt(R_eff) * E_eff
     return 16 / 15 * root * power(15 * m * vc * vc / (16 * root), 0.2)
 
@@ -67,31 +68,25 @@ LIGGGHTS_HOOKE = of_code(
         "liggghts-hooke",
         title="LIGGGHTS hooke (3.0.0 to 3.8.0)",
         year=2014,
-        equation=f"{LINEAR},  {BY_LOGARITHM}, to δ = 0;  {BY_SPEED}",
+        equation=f"{LINEAR_DASHPOT},  {ZETA_BY_LOGARITHM}, to δ = 0;  {STIFFNESS_BY_SPEED}",
         reference=f"{LIGGGHTS_REFERENCE} hooke, without the option viscous",
         evidence=Evidence("seen", f"{LIGGGHTS}normal_model_hooke.h"),
-        parameters=CHARACTERISTIC,
+        parameters=CHARACTERISTIC_SPEED,
         zeta=lambda e: gap_damping(e),
         release="gap",
         exponent=1.0,
     ),
-    stiffness=by_speed,
+    stiffness=stiffness_by_speed,
 )
 
-CHRONO_SMC_HOOKE = of_code(
-    dashpot(
-        "chrono-smc-hooke",
-        title="Chrono SMC, Hooke (sequential core, 2016 to 2026)",
-        year=2016,
-        equation=f"{LINEAR},  {BY_LOGARITHM}, to F = 0;  {BY_SPEED}",
-        reference="Project Chrono, ChContactSMC; LIGGGHTS hooke with limitForce has it too",
-        evidence=Evidence("seen", CHRONO, note="the multicore solver does not cut the tension off"),
-        parameters=CHARACTERISTIC,
-        zeta=lambda e: gap_damping(e),
-        release="force",
-        exponent=1.0,
-    ),
-    stiffness=by_speed,
+CHRONO_SMC_HOOKE = with_release(
+    LIGGGHTS_HOOKE,
+    "force",
+    key="chrono-smc-hooke",
+    title="Chrono SMC, Hooke (sequential core, 2016 to 2026)",
+    year=2016,
+    reference="Project Chrono, ChContactSMC; LIGGGHTS hooke with limitForce has it too",
+    evidence=Evidence("seen", CHRONO, note="the multicore solver does not cut the tension off"),
 )
 
 LIGGGHTS_HOOKE_LIMIT = in_code(
@@ -111,7 +106,7 @@ CHRONO_SMC_PLAINCOULOMB = of_code(
         "chrono-smc-plaincoulomb",
         title="Chrono SMC, PlainCoulomb (sequential core, 2016 to 2026)",
         year=2016,
-        equation=f"{HERTZIAN},  α = −√5 ln e/√(π² + ln² e), to F = 0;  K = (4/3) E* √(1 m)",
+        equation=f"{HERTZIAN_DASHPOT},  α = −√5 ln e/√(π² + ln² e), to F = 0;  K = (4/3) E* √(1 m)",
         reference="Project Chrono, ChContactSMC",
         evidence=Evidence(
             "seen",
@@ -163,7 +158,7 @@ YADE_BETAN = of_code(
         "yade-betan",
         title="YADE HertzMindlin betan, by the traditional formula (since September 2013)",
         year=2013,
-        equation=f"{TANGENT},  β = −ln e/√(π² + ln² e), to F = 0",
+        equation=f"{TANGENT_DASHPOT},  β = −ln e/√(π² + ln² e), to F = 0",
         reference=f"{HERTZ_MINDLIN}, betan, which YADE leaves to the user, by the formula of a linear spring",
         evidence=Evidence("seen", MINDLIN_SOURCE),
         # 2 β √(3/2) is α
@@ -172,25 +167,20 @@ YADE_BETAN = of_code(
         exponent=1.5,
     )
 )
-YADE_BETAN_PULLING = of_code(
-    dashpot(
-        "yade-betan-pulling",
-        title="YADE HertzMindlin betan, by the traditional formula (2010 to September 2013)",
-        year=2010,
-        equation=f"{TANGENT},  β = −ln e/√(π² + ln² e), to δ = 0",
-        reference=f"{HERTZ_MINDLIN}, betan, which YADE leaves to the user, by the formula of a linear spring",
-        evidence=Evidence("seen", f"{CLAMPED_SOURCE}, whose removed lines pull"),
-        zeta=lambda e: np.sqrt(1.2) * gap_damping(e),
-        release="gap",
-        exponent=1.5,
-    )
+YADE_BETAN_PULLING = with_release(
+    YADE_BETAN,
+    "gap",
+    key="yade-betan-pulling",
+    title="YADE HertzMindlin betan, by the traditional formula (2010 to September 2013)",
+    year=2010,
+    evidence=Evidence("seen", f"{CLAMPED_SOURCE}, whose removed lines pull"),
 )
 YADE_BETAN_DIRECT = of_code(
     dashpot(
         "yade-betan-direct",
         title="YADE HertzMindlin betan (since September 2013)",
         year=2013,
-        equation=f"{TANGENT}, to F = 0",
+        equation=f"{TANGENT_DASHPOT}, to F = 0",
         reference=f"{HERTZ_MINDLIN}, betan",
         evidence=Evidence("seen", MINDLIN_SOURCE),
         parameters=(Parameter("betan", "1", "damping ratio β of the tangent stiffness", least=0.0),),
@@ -227,7 +217,7 @@ MFIX_HERTZ = of_code(
         "mfix-hertz",
         title="MFiX DEM, Hertzian (2014 to 21.3.2)",
         year=2014,
-        equation=f"{HERTZIAN},  α = −2 ln e/√(π² + ln² e), to δ = 0",
+        equation=f"{HERTZIAN_DASHPOT},  α = −2 ln e/√(π² + ln² e), to δ = 0",
         reference="MFiX, DES_COLL_MODEL HERTZIAN, whose α has 2 in the place of √5",
         evidence=Evidence("seen", MFIX),
         zeta=lambda e: 2 / np.sqrt(5.0) * gap_damping(e),
@@ -239,8 +229,8 @@ MFIX_HERTZ = of_code(
 # ---- Kratos
 
 KRATOS = "KratosMultiphysics/Kratos, applications/DEMApplication"
-# sphere_strategy.py takes e below the first for it, and no damping above the second
-KRATOS_LEAST, KRATOS_MOST = 0.001, 0.999
+# sphere_strategy.py replaces an e below the first by it, and has no damping above the second
+KRATOS_MIN_E, KRATOS_MAX_E = 0.001, 0.999
 
 KRATOS_HERTZ = of_code(
     dashpot(
@@ -255,7 +245,7 @@ KRATOS_HERTZ = of_code(
             "python_scripts/sphere_strategy.py @4ddf9200",
             note="when the damping of e was added was not seen; the law file @03f57bf0 has δ², by a slip",
         ),
-        zeta=lambda e: np.where(e <= KRATOS_MOST, thornton_zeta(np.clip(e, KRATOS_LEAST, KRATOS_MOST)), 0.0),
+        zeta=lambda e: np.where(e <= KRATOS_MAX_E, thornton_zeta(np.clip(e, KRATOS_MIN_E, KRATOS_MAX_E)), 0.0),
         release="force",
         exponent=1.5,
     )
@@ -265,8 +255,8 @@ KRATOS_LINEAR = of_code(
         "kratos-linear",
         title="Kratos DEM, linear with viscous damping (law files of 2015)",
         year=2015,
-        equation=f"{LINEAR},  e = exp(−2 ζ acos(ζ)/√(1 − ζ²)), e from 0.001, ζ = 0 above e = 0.999, to F = 0;  "
-        "K = 1.432 π 0.31225 E* R*, against a wall without 1.432",
+        equation=f"{LINEAR_DASHPOT},  e = exp(−2 ζ acos(ζ)/√(1 − ζ²)), e from 0.001, ζ = 0 above e = 0.999, "
+        "to F = 0;  K = 1.432 π 0.31225 E* R*, against a wall without 1.432",
         reference="Kratos DEM, DEM_D_Linear_viscous_Coulomb",
         evidence=Evidence(
             "seen",
@@ -275,7 +265,7 @@ KRATOS_LINEAR = of_code(
             note="Kratos finds ζ by bisection to 1e-4, this law exactly; when the damping of e was added was not "
             "seen",
         ),
-        zeta=lambda e: np.where(e <= KRATOS_MOST, force_damping(np.maximum(e, KRATOS_LEAST)), 0.0),
+        zeta=lambda e: np.where(e <= KRATOS_MAX_E, force_damping(np.maximum(e, KRATOS_MIN_E)), 0.0),
         release="force",
         exponent=1.0,
     ),
@@ -299,7 +289,7 @@ DEMLAB_TTI = of_code(
         "demlab-tti",
         title="DEMLab TTI (2021 to 2024)",
         year=2021,
-        equation=f"{HERTZIAN},  α = −2.2664 ln e/√(10.1354 + ln² e), to F = 0",
+        equation=f"{HERTZIAN_DASHPOT},  α = −2.2664 ln e/√(10.1354 + ln² e), to F = 0",
         reference="Rangel R, DEMLab, contact law of Tsuji, Tanaka and Ishida with remove_cohesion, its default",
         evidence=Evidence(
             "seen",

@@ -27,18 +27,18 @@ def of_code(law: ForceModel, stiffness: Formula | None = None) -> ForceModel:
     return replace(law, family="codes", stiffness=stiffness)
 
 
-def series(a: Array, b: Array) -> Array:
+def springs_in_series(a: Array, b: Array) -> Array:
     """Two springs, one behind the other."""
     return a * b / (a + b)
 
 
-def step(t: Array) -> Array:
+def smooth_step(t: Array) -> Array:
     """The cubic from 0 at 0 to 1 at 1, level at both."""
     t = np.minimum(t, 1.0)
     return t * t * (3.0 - 2.0 * t)
 
 
-def flores(e: Array) -> Array:
+def flores_chi(e: Array) -> Array:
     """χ of Flores and others (2011)."""
     return np.asarray(np.divide(8.0 * (1.0 - e), 5.0 * e))
 
@@ -60,9 +60,9 @@ ADAMS_IMPACT = ForceModel(
         Parameter("d", "m", "penetration at which the damping is full", least=1e-9),
     ),
     # below n = 2 the spring outlasts the damping as the gap closes, and pushes once more after the force was zero
-    force=lambda elastic, x, v, c, d: np.maximum(elastic + c * step(x / d) * v, 0),
+    force=lambda elastic, x, v, c, d: np.maximum(elastic + c * smooth_step(x / d) * v, 0),
     # where the force begins or ceases to be zero; over the spring, so that it does not fade with the indentation
-    breakpoints=(lambda d: d, lambda elastic, x, v, c, d: 1 + c * step(x / d) * v / elastic),
+    breakpoints=(lambda d: d, lambda elastic, x, v, c, d: 1 + c * smooth_step(x / d) * v / elastic),
     family="codes",
 )
 
@@ -110,7 +110,7 @@ RECURDYN_EXPONENTS = ForceModel(
 def simbody_stiffness(E1: Array, E2: Array, nu1: Array, nu2: Array, R_eff: Array) -> Array:
     """K of Simbody, which mixes the plane strain moduli by their powers 2/3."""
     k1, k2 = power(E1 / (1 - nu1 * nu1), 2 / 3), power(E2 / (1 - nu2 * nu2), 2 / 3)
-    return 4 / 3 * np.sqrt(R_eff) * series(k1, k2) ** 1.5
+    return 4 / 3 * np.sqrt(R_eff) * springs_in_series(k1, k2) ** 1.5
 
 
 def simbody_dissipation(c1: Array, c2: Array, E1: Array, E2: Array, nu1: Array, nu2: Array) -> Array:
@@ -119,7 +119,7 @@ def simbody_dissipation(c1: Array, c2: Array, E1: Array, E2: Array, nu1: Array, 
     return (c1 * k2 + c2 * k1) / (k1 + k2)
 
 
-SHERMAN = (
+SIMBODY_REFERENCE = (
     "Sherman MA, Seth A, Delp SL (2011) Simbody: multibody dynamics for biomedical research. Procedia IUTAM 2, 241"
 )
 SIMBODY_EVIDENCE = Evidence("seen", SIMBODY, doi="simbody/simbody, CONTRIBUTING.md @f312d0dd (2026)")
@@ -130,7 +130,7 @@ SIMBODY_HUNT_CROSSLEY = of_code(
         title="Simbody and OpenSim HuntCrossleyForce (2010 to 2026)",
         year=2010,
         equation="F = K δ^(3/2) (1 + χ δ̇/v₀),  χ = (3/2) c v₀",
-        reference=SHERMAN,
+        reference=SIMBODY_REFERENCE,
         doi="10.1016/j.piutam.2011.04.023",
         evidence=SIMBODY_EVIDENCE,
         parameters=(
@@ -149,7 +149,7 @@ SIMBODY_HUNT_CROSSLEY_MIXED = of_code(
         year=2010,
         equation="F = K δ^(3/2) (1 + χ δ̇/v₀),  χ = (3/2) c v₀,  c = (c₁ k₂ + c₂ k₁)/(k₁ + k₂),  "
         "k = (E/(1 − ν²))^(2/3)",
-        reference=SHERMAN,
+        reference=SIMBODY_REFERENCE,
         doi="10.1016/j.piutam.2011.04.023",
         evidence=SIMBODY_EVIDENCE,
         parameters=(
@@ -191,7 +191,7 @@ DRAKE_POINT_CONTACT = of_code(
         exponent=1.0,
         chi=lambda d, v0: d * v0,
     ),
-    stiffness=lambda k1, k2: series(k1, k2),
+    stiffness=lambda k1, k2: springs_in_series(k1, k2),
 )
 
 DRAKE_POINT_CONTACT_MIXED = of_code(
@@ -210,7 +210,7 @@ DRAKE_POINT_CONTACT_MIXED = of_code(
         exponent=1.0,
         chi=lambda d1, d2, k1, k2, v0: (k2 * d1 + k1 * d2) / (k1 + k2) * v0,
     ),
-    stiffness=lambda k1, k2: series(k1, k2),
+    stiffness=lambda k1, k2: springs_in_series(k1, k2),
 )
 
 MODELICA_ELASTOGAP = ForceModel(
@@ -259,11 +259,11 @@ MAPLESIM_LIMITED = ForceModel(
     family="codes",
 )
 
-NEUMAYR = (
+MODIA3D_REFERENCE = (
     "Neumayr A, Otter M (2019) Collision handling with elastic response calculation and zero-crossing functions. "
     "EOOLT '19, 57"
 )
-NEUMAYR_DOI = "10.1145/3365984.3365986"
+MODIA3D_DOI = "10.1145/3365984.3365986"
 SMALL_SPEED = Parameter("vs", "m/s", "speed v_s up to which e is reduced", default=0.01, least=1e-9)
 
 MODIA3D_PRESENT = of_code(
@@ -272,8 +272,8 @@ MODIA3D_PRESENT = of_code(
         title="Modia3D (v0.6.0 to v0.12.3, since February 2022)",
         year=2022,
         equation="F = K δ^(3/2) (1 + χ δ̇/v₀),  χ = min(d v₀, 8(1 − ε)/(5ε)),  ε = e where v₀ > v_s, else 0",
-        reference=NEUMAYR,
-        doi=NEUMAYR_DOI,
+        reference=MODIA3D_REFERENCE,
+        doi=MODIA3D_DOI,
         evidence=Evidence(
             "seen",
             f"{MODIA3D} @a418027 (v0.12.3, 2026)",
@@ -281,7 +281,7 @@ MODIA3D_PRESENT = of_code(
         ),
         parameters=(SMALL_SPEED, Parameter("d", "s/m", "largest damping", default=2000.0, least=0.0)),
         exponent=1.5,
-        chi=lambda e, v0, vs, d: np.minimum(d * v0, flores(np.where(v0 > vs, e, 0.0))),
+        chi=lambda e, v0, vs, d: np.minimum(d * v0, flores_chi(np.where(v0 > vs, e, 0.0))),
     )
 )
 
@@ -292,8 +292,8 @@ MODIA3D_EXPONENTIAL = of_code(
         year=2019,
         equation="F = K δ^(3/2) (1 + χ δ̇/v₀),  χ = min(d v₀, 8(1 − ε)/(5ε) v₀/r),  ε = e + (0.01 − e) "
         "0.01^(v₀/v_s),  r = v₀ from v_s on, below it v_s/3 + (v₀²/v_s)(1 − v₀/(3 v_s))",
-        reference=NEUMAYR,
-        doi=NEUMAYR_DOI,
+        reference=MODIA3D_REFERENCE,
+        doi=MODIA3D_DOI,
         evidence=Evidence(
             "seen",
             f"{MODIA3D} at v0.4.0 (2019) and v0.5.2 (2021)",
@@ -302,13 +302,14 @@ MODIA3D_EXPONENTIAL = of_code(
         parameters=(SMALL_SPEED, Parameter("d", "s/m", "largest damping", default=1000.0, least=0.0)),
         exponent=1.5,
         chi=lambda e, v0, vs, d: np.minimum(
-            d * v0, flores(e + (0.01 - e) * np.exp(np.log(0.01) * v0 / vs)) * v0 / regularized(v0, vs)
+            d * v0,
+            flores_chi(e + (0.01 - e) * np.exp(np.log(0.01) * v0 / vs)) * v0 / modia3d_regularized_speed(v0, vs),
         ),
     )
 )
 
 
-def regularized(v0: Array, vs: Array) -> Array:
+def modia3d_regularized_speed(v0: Array, vs: Array) -> Array:
     """The speed that Modia3D divides by, which does not fall below v_s/3."""
     return np.where(v0 >= vs, v0, v0 * (v0 / vs) * (1 - v0 / (3 * vs)) + vs / 3)
 
@@ -326,15 +327,15 @@ CHRONO_SMC_FLORES = of_code(
         ),
         parameters=(Parameter("vc", "m/s", "characteristic speed v_c", least=1e-9),),
         exponent=1.5,
-        chi=lambda e, v0, vc: flores(np.maximum(e, 0.01)) * v0 / vc,
+        chi=lambda e, v0, vc: flores_chi(np.maximum(e, 0.01)) * v0 / vc,
     )
 )
 
-TODOROV = (
+MUJOCO_REFERENCE = (
     "Todorov E (2014) Convex and analytically-invertible dynamics with contacts and constraints: Theory and "
     "implementation in MuJoCo. ICRA, 6054; documentation of MuJoCo, Modeling, Solver parameters"
 )
-TODOROV_DOI = "10.1109/ICRA.2014.6907751"
+MUJOCO_DOI = "10.1109/ICRA.2014.6907751"
 MUJOCO_EVIDENCE = Evidence(
     "seen",
     MUJOCO,
@@ -347,8 +348,8 @@ MUJOCO_SOLREF = ForceModel(
     title="MuJoCo solref, standard format (2.1 to 3.12)",
     year=2014,
     equation="F = m(δ/(τ ζ)² + 2 δ̇/τ), to F = 0",
-    reference=TODOROV,
-    doi=TODOROV_DOI,
+    reference=MUJOCO_REFERENCE,
+    doi=MUJOCO_DOI,
     evidence=MUJOCO_EVIDENCE,
     parameters=(
         Parameter("timeconst", "s", "time constant τ", default=0.02, least=1e-9),
@@ -370,8 +371,8 @@ MUJOCO_SOLREF_DIRECT = ForceModel(
     title="MuJoCo solref, direct format (since 2.0)",
     year=2018,
     equation="F = m(k δ + b δ̇), to F = 0",
-    reference=TODOROV,
-    doi=TODOROV_DOI,
+    reference=MUJOCO_REFERENCE,
+    doi=MUJOCO_DOI,
     evidence=MUJOCO_EVIDENCE,
     parameters=(
         Parameter("k", "1/s^2", "stiffness per effective mass, the negative first number of solref", least=1e-9),
@@ -400,7 +401,7 @@ SIMSCAPE_CONTACT = ForceModel(
         Parameter("b", "N s/m", "damping", least=0.0),
         Parameter("w", "m", "transition region width", least=1e-9),
     ),
-    force=lambda elastic, x, v, b, w: step(x / w) * (elastic + b * v),
+    force=lambda elastic, x, v, b, w: smooth_step(x / w) * (elastic + b * v),
     breakpoints=(lambda w: w,),
     release="force",
     exponent=1.0,

@@ -35,15 +35,15 @@ class CheckedFile(IndexDataCacheFile):
             raise DamagedError from error
         if version != self._version:
             return {}
-        stamp, overloads = _checked(content)
+        stamp, overloads = _unpickle_checked(content)
         return overloads if stamp == self._source_stamp else {}
 
     def _load_data(self, name):
         with open(self._data_path(name), "rb") as file:
-            return _checked(file.read())
+            return _unpickle_checked(file.read())
 
 
-def _checked(content):
+def _unpickle_checked(content):
     if hashlib.sha256(content[DIGEST_BYTES:]).digest() != content[:DIGEST_BYTES]:
         raise DamagedError
     return pickle.loads(content[DIGEST_BYTES:])
@@ -65,18 +65,20 @@ class CheckedCache(FunctionCache):
         try:
             return super().load_overload(sig, target_context)
         except DamagedError:
-            _note(f"compiled code in {self._cache_path} is damaged and is compiled again")
+            _warn_once(f"compiled code in {self._cache_path} is damaged and is compiled again")
             with suppress(OSError):
                 self.flush()
         except OSError as error:
-            _note(f"compiled code in {self._cache_path} cannot be read ({error.strerror}) and is compiled again")
+            _warn_once(
+                f"compiled code in {self._cache_path} cannot be read ({error.strerror}) and is compiled again"
+            )
         return None
 
     def save_overload(self, sig, data):
         try:
             super().save_overload(sig, data)
         except (DamagedError, OSError) as error:
-            _note(f"compiled code is not kept in {self._cache_path}: {getattr(error, 'strerror', 'damaged')}")
+            _warn_once(f"compiled code is not kept in {self._cache_path}: {getattr(error, 'strerror', 'damaged')}")
 
 
 def compiled(**options):
@@ -90,13 +92,13 @@ def compiled(**options):
         try:
             dispatcher._cache = CheckedCache(function)
         except (RuntimeError, OSError):
-            _note("compiled code is not kept: no folder for it can be written to; NUMBA_CACHE_DIR names one")
+            _warn_once("compiled code is not kept: no folder for it can be written to; NUMBA_CACHE_DIR names one")
         return dispatcher
 
     return decorate
 
 
 @cache
-def _note(text):
+def _warn_once(text):
     """Warn once in a process."""
     warnings.warn(text, stacklevel=2)

@@ -16,11 +16,11 @@ from ..powers import integer_power, power
 from ..velocity_coordinates import ForceCoordinate, LogCoordinate, force_form
 
 # the equations of motion: of A xⁿ, of xⁿ (1 + χ v) in v and in "log", of xⁿ + c x^q v in v and in "force"
-SPRING, DAMPED, LOG, DRAGGED, FORCE = range(5)
+EQ_SPRING, EQ_DAMPED, EQ_LOG, EQ_DRAGGED, EQ_FORCE = range(5)
 # what ends a phase: the largest indentation, the gap, no force
-STOP, GAP, NO_FORCE = range(3)
+END_AT_PEAK, END_AT_GAP, END_AT_NO_FORCE = range(3)
 # largest power of s
-MOST = 15
+MAX_WHOLE_POWER = 15
 
 
 @cache
@@ -45,50 +45,54 @@ class Form(NamedTuple):
     bound_power: int = 0
 
 
-def of_approach(law: motion.MotionLaw) -> Form | None:
+def approach_form(law: motion.MotionLaw) -> Form | None:
     """The form of the approach, None where it has none."""
-    return None if law.model.breakpoints else _of_force(law, STOP)
+    return None if law.model.breakpoints else _form_of_force(law, END_AT_PEAK)
 
 
-def of_restitution(law: motion.MotionLaw) -> Form | None:
+def restitution_form(law: motion.MotionLaw) -> Form | None:
     """The form of the restitution phase, None where it has none."""
     model = law.model
-    ending = NO_FORCE if model.release == "force" else GAP
+    ending = END_AT_NO_FORCE if model.release == "force" else END_AT_GAP
     if model.unloading is None:
-        return None if model.breakpoints else _of_force(law, ending)
+        return None if model.breakpoints else _form_of_force(law, ending)
     if model.unloading in force_expressions.POWER_LAWS and not model.unloading_breakpoints:
-        return _whole(SPRING, ending, model.coordinate_power, model.coordinate_power * law.n)
+        return _form_of_whole_powers(EQ_SPRING, ending, model.coordinate_power, model.coordinate_power * law.n)
     return None
 
 
 def serves(model: ForceModel, n: float) -> tuple[bool, bool]:
     """Whether the compiled core integrates the approach, and the restitution phase, of a law."""
     laws = [motion.MotionLaw.of(model, n, strong) for strong in (False, True)]
-    back = [motion.of_restitution(law) for law in laws]
-    return all(map(of_approach, laws)), all(map(of_restitution, back))
+    back = [motion.restitution_law(law) for law in laws]
+    return all(map(approach_form, laws)), all(map(restitution_form, back))
 
 
-def _of_force(law: motion.MotionLaw, ending: int) -> Form | None:
+def _form_of_force(law: motion.MotionLaw, ending: int) -> Form | None:
     model, p = law.model, law.model.coordinate_power
     if model.velocity_coordinate == "force":
         form = force_form(model, law.n)
         q = form.drag / p
-        if ending == GAP and law.n != 2.0 * q + 1.0:
+        if ending == END_AT_GAP and law.n != 2.0 * q + 1.0:
             return None
-        equation = FORCE if isinstance(law.coordinate, ForceCoordinate) else DRAGGED
-        return _whole(equation, ending, p, p * law.n, form.drag, form.spring, p * (q + 1.0))
+        equation = EQ_FORCE if isinstance(law.coordinate, ForceCoordinate) else EQ_DRAGGED
+        return _form_of_whole_powers(equation, ending, p, p * law.n, form.drag, form.spring, p * (q + 1.0))
     if model.velocity_coordinate == "log":
-        return _whole(LOG if isinstance(law.coordinate, LogCoordinate) else DAMPED, ending, p, p * law.n)
-    return _whole(SPRING, ending, p, p * law.n) if model.force is force_expressions.spring else None
+        return _form_of_whole_powers(
+            EQ_LOG if isinstance(law.coordinate, LogCoordinate) else EQ_DAMPED, ending, p, p * law.n
+        )
+    return (
+        _form_of_whole_powers(EQ_SPRING, ending, p, p * law.n) if model.force is force_expressions.spring else None
+    )
 
 
-def _whole(equation: int, ending: int, *exponents: float) -> Form | None:
-    if not all(float(one).is_integer() and 0.0 <= one <= MOST for one in exponents):
+def _form_of_whole_powers(equation: int, ending: int, *exponents: float) -> Form | None:
+    if not all(float(one).is_integer() and 0.0 <= one <= MAX_WHOLE_POWER for one in exponents):
         return None
     return Form(equation, ending, *map(int, exponents))
 
 
-def integrate(
+def integrate_compiled(
     form: Form,
     law: motion.MotionLaw,
     problem: Problem,
@@ -112,15 +116,15 @@ def integrate(
     n = start.shape[1]
     known = dict(zip(law.names, params, strict=False))
     bound = np.zeros(n)
-    if form.equation != SPRING:
-        strength = known["chi" if form.equation in (DAMPED, LOG) else "c"]
-    elif law.model.unloading is not None and form.ending != STOP:
+    if form.equation != EQ_SPRING:
+        strength = known["chi" if form.equation in (EQ_DAMPED, EQ_LOG) else "c"]
+    elif law.model.unloading is not None and form.ending != END_AT_PEAK:
         # what a power law is times is the same at every stretch
         stretch = power(integer_power(start[0], form.coordinate_power), law.n)
         strength = problem.rates(start, params)[4] / stretch
     else:
         strength = np.ones(n)
-    if form.ending == GAP and motion.may_be_overdamped(law.model):
+    if form.ending == END_AT_GAP and motion.may_be_overdamped(law.model):
         bound = motion.overdamped_speed(strength, law.n, form.drag / form.coordinate_power)
     solution = Solution.empty(n)
     rows = (np.ascontiguousarray(start), np.ascontiguousarray(strength), np.ascontiguousarray(bound))

@@ -10,16 +10,21 @@ from ...ode import events, maximum, rk45
 from ...ode.tableau import A as FRACTIONS
 from ...ode.tableau import E as DIFFERENCES
 from .. import force_expressions, motion, velocity_coordinates
-from .dispatch import DAMPED, DRAGGED, FORCE, GAP, LOG, NO_FORCE, SPRING, STOP
+from .dispatch import END_AT_GAP, END_AT_NO_FORCE, END_AT_PEAK, EQ_DAMPED, EQ_DRAGGED, EQ_FORCE, EQ_LOG, EQ_SPRING
 from .simd_math import exponential, inlined, shared, whole_power
 
 A = tuple(tuple(map(float, row)) for row in FRACTIONS)
 E = tuple(map(float, DIFFERENCES))
-FAR, FLOOR, DIFFERENCE, NEAREST = motion.FAR, motion.FLOOR, motion.DIFFERENCE, motion.NEAREST
+MAX_S, ERROR_FLOOR, RELEASE_STEP, MIN_RELEASE_S = (
+    motion.MAX_S,
+    motion.ERROR_FLOOR,
+    motion.RELEASE_STEP,
+    motion.MIN_RELEASE_S,
+)
 
 damped, dragged = shared(force_expressions.damped), shared(force_expressions.dragged)
 rate_of_log, rate_of_force = shared(velocity_coordinates.rate_of_log), shared(velocity_coordinates.rate_of_force)
-velocity_of_force, release = shared(velocity_coordinates.velocity_of_force), shared(motion.release)
+velocity_of_force, release_event = shared(velocity_coordinates.velocity_of_force), shared(motion.release_event)
 step_factor, next_step, error_norm = shared(rk45.step_factor), shared(rk45.next_step), shared(rk45.error_norm)
 is_event_ahead, event_offset = shared(events.is_event_ahead), shared(events.event_offset)
 before_event, at_event = shared(events.before_event), shared(events.at_event)
@@ -45,19 +50,19 @@ def rates(form, s, y, strength):
     weight = form.coordinate_power * whole_power(s, form.coordinate_power - 1)
     # of the force, K δⁿ and the drag with the weight in them: fewer products that a step has to wait for
     weighted = form.coordinate_power * whole_power(s, form.spring + form.coordinate_power - 1)
-    if form.equation == FORCE:
+    if form.equation == EQ_FORCE:
         v = velocity_of_force(y, whole_power(s, form.extra), strength)
         force = strength * whole_power(s, form.drag) * y
         rate_y = rate_of_force(v, whole_power(s, form.extra - 1), form.extra / strength, weight, force)
         return v, rate_y, weight, weight * force * v
-    if form.equation == LOG:
+    if form.equation == EQ_LOG:
         # one division for all stages
         v = (exponential(y) - 1.0) * (1.0 / strength)
         return v, rate_of_log(weighted, 1.0, strength), weight, damped(weighted, v, 1.0, strength) * v
     v = y
-    if form.equation == SPRING:
+    if form.equation == EQ_SPRING:
         pushed = strength * weighted
-    elif form.equation == DAMPED:
+    elif form.equation == EQ_DAMPED:
         pushed = damped(weighted, v, 1.0, strength)
     else:
         pushed = dragged(
@@ -70,11 +75,11 @@ def rates(form, s, y, strength):
 def force(form, s, y, v, strength):
     """The force."""
     elastic = whole_power(s, form.spring)
-    if form.equation == FORCE:
+    if form.equation == EQ_FORCE:
         return strength * whole_power(s, form.drag) * y
-    if form.equation == SPRING:
+    if form.equation == EQ_SPRING:
         return strength * elastic
-    if form.equation == DRAGGED:
+    if form.equation == EQ_DRAGGED:
         return dragged(elastic, whole_power(s, form.drag), v, strength)
     return damped(elastic, v, 1.0, strength)
 
@@ -107,7 +112,7 @@ def rk_step(form, s, y, s1, y1, watched, h, strength):
     s7, y7, _, _ = rates(form, new_s, new_y, strength)
     watched = force(form, new_s, new_y, s7, strength)
     error_s, error_y = h * difference(s1, s3, s4, s5, s6, s7), h * difference(y1, y3, y4, y5, y6, y7)
-    worst = error_norm(error_s, error_y, s, y, new_s, new_y, FLOOR)
+    worst = error_norm(error_s, error_y, s, y, new_s, new_y, ERROR_FLOOR)
     return new_s, new_y, more_t, more_work, s7, y7, watched, worst
 
 
@@ -122,13 +127,13 @@ def slope_of_force(form, s, y, rate_s, rate_y, now, small, strength):
 @inlined
 def event(form, s, y, rate_s, rate_y, now, strength):
     """What falls to zero at the end of the phase, and its rate."""
-    if form.ending == GAP:
+    if form.ending == END_AT_GAP:
         return s, rate_s
-    if form.ending == NO_FORCE:
-        small = DIFFERENCE * min(max(abs(s), NEAREST), 1.0)
+    if form.ending == END_AT_NO_FORCE:
+        small = RELEASE_STEP * min(max(abs(s), MIN_RELEASE_S), 1.0)
         slope = slope_of_force(form, s, y, rate_s, rate_y, now, small, strength)
-        return release(s, rate_s, now, slope)
-    if form.equation == FORCE:
+        return release_event(s, rate_s, now, slope)
+    if form.equation == EQ_FORCE:
         return rate_s, -form.coordinate_power * whole_power(s, form.coordinate_power - 1) * now
     return y, rate_y
 
@@ -136,6 +141,6 @@ def event(form, s, y, rate_s, rate_y, now, strength):
 @inlined
 def is_unreachable(form, s, rate_s, bound):
     """Whether the event cannot be reached any more."""
-    if form.ending == STOP:
-        return s > FAR
-    return -rate_s <= (bound * whole_power(s, form.bound_power) if form.equation >= DRAGGED else 0.0)
+    if form.ending == END_AT_PEAK:
+        return s > MAX_S
+    return -rate_s <= (bound * whole_power(s, form.bound_power) if form.equation >= EQ_DRAGGED else 0.0)

@@ -17,7 +17,7 @@ import numpy as np
 
 from ...ode import maximum, rk45
 from ...ode.problem import Termination
-from .dispatch import STOP, Form
+from .dispatch import END_AT_PEAK, Form
 from .expressions import (
     at_event,
     before_event,
@@ -38,76 +38,82 @@ from .expressions import (
 from .simd_math import inlined, kept_on_disk
 
 # lanes of a unit, and units side by side
-UNIT, UNITS = 32, 2
+LANES, GROUPS = 32, 2
 # rows of the workspace: the state, its rates and the watched quantity, the step and the one before
 (
-    S, Y, T, WORK, RATE_S, RATE_Y, WATCHED, H, H_LAST,
+    S, Y, TIME, WORK, RATE_S, RATE_Y, WATCHED, H, H_LAST,
     # the same before the step
-    S_0, Y_0, T_0, WORK_0, RATE_S_0, RATE_Y_0, WATCHED_0, H_0, H_LAST_0,
+    S_0, Y_0, TIME_0, WORK_0, RATE_S_0, RATE_Y_0, WATCHED_0, H_0, H_LAST_0,
     # the coefficient of the form, the bound of those that are overdamped; the error, and whether `finish_steps`
     # has something to do
-    STRENGTH, BOUND, ERROR, MARKED,
+    STRENGTH, BOUND, LOCAL_ERROR, MARKED,
     # the largest watched value at a step's end, where that was, and the steps beside it
-    BEST, PEAK_S, PEAK_Y, BEHIND, AHEAD,
+    LARGEST_WATCHED, PEAK_S, PEAK_Y, STEP_BEHIND, STEP_AHEAD,
     STEPS, HALVINGS, ENDED,
 ) = range(30)  # fmt: skip
-ROWS = 30
+WORKSPACE_ROWS = 30
 
 MIN_STEP, MAX_HALVINGS = rk45.MIN_STEP, float(rk45.MAX_HALVINGS)
-SLOPE, FLAT, SECANT_STEPS = maximum.DIFFERENCE, maximum.FLAT, maximum.SECANT_STEPS
+SLOPE_STEP, FLAT_SLOPE, SECANT_STEPS = maximum.SLOPE_STEP, maximum.FLAT_SLOPE, maximum.SECANT_STEPS
 RUNNING, EVENT_REACHED = float(Termination.RUNNING), float(Termination.EVENT_REACHED)
-EVENT_UNREACHABLE, MAX_STEPS = float(Termination.EVENT_UNREACHABLE), float(Termination.MAX_STEPS)
+EVENT_UNREACHABLE, TOO_MANY_STEPS = float(Termination.EVENT_UNREACHABLE), float(Termination.MAX_STEPS)
 STEP_UNDERFLOW, NOT_FINITE = float(Termination.STEP_UNDERFLOW), float(Termination.NOT_FINITE)
 
 # numba's cache looks at this file alone; this number in the kernel stands for what else it was compiled from
-_HERE = Path(__file__).parent
-_HOUSE = _HERE.parents[1]
-_SOURCES = sorted((*(_HOUSE / "ode").glob("*.py"), *(_HOUSE / "contact").glob("*.py"), *_HERE.glob("*.py")))
-VERSION = zlib.crc32(b"".join(path.read_bytes() for path in _SOURCES))
+_NUMBA_FOLDER = Path(__file__).parent
+_PACKAGE_FOLDER = _NUMBA_FOLDER.parents[1]
+_SOURCES = sorted(
+    (
+        *(_PACKAGE_FOLDER / "ode").glob("*.py"),
+        *(_PACKAGE_FOLDER / "contact").glob("*.py"),
+        *_NUMBA_FOLDER.glob("*.py"),
+    )
+)
+SOURCE_CRC = zlib.crc32(b"".join(path.read_bytes() for path in _SOURCES))
 
 
 @inlined
 def state_at(w, row, j):
     """s, y, their rates and the watched quantity of a lane: now from row S on, before the step from S_0 on."""
-    row = row * UNIT + j
-    return w[row], w[row + Y * UNIT], w[row + RATE_S * UNIT], w[row + RATE_Y * UNIT], w[row + WATCHED * UNIT]
+    row = row * LANES + j
+    return w[row], w[row + Y * LANES], w[row + RATE_S * LANES], w[row + RATE_Y * LANES], w[row + WATCHED * LANES]
 
 
 @inlined
 def advance(form, w, rtol):
     """Try one step in every lane of a unit. Returns in how many lanes `finish_steps` has something to do."""
     marks = 0
-    for j in range(UNIT):
+    for j in range(LANES):
         s, y, rate_s, rate_y, watched = state_at(w, S, j)
-        t, work, h, h_last = w[T * UNIT + j], w[WORK * UNIT + j], w[H * UNIT + j], w[H_LAST * UNIT + j]
-        strength = w[STRENGTH * UNIT + j]
+        t, work, h, h_last = w[TIME * LANES + j], w[WORK * LANES + j], w[H * LANES + j], w[H_LAST * LANES + j]
+        strength = w[STRENGTH * LANES + j]
         end_s, end_y, more_t, more_work, end_rate_s, end_rate_y, end_watched, error = rk_step(
             form, s, y, rate_s, rate_y, watched, h, strength
         )
-        running = w[ENDED * UNIT + j] == RUNNING
+        running = w[ENDED * LANES + j] == RUNNING
         accepted, finite = running and error <= rtol, error < np.inf
         h_next = next_step(h, error, rtol) if finite else 0.5 * h
 
         gap, rate_of_gap = event(form, end_s, end_y, end_rate_s, end_rate_y, end_watched, strength)
         marked = not finite or is_event_ahead(gap, rate_of_gap, h_next) or h_next < MIN_STEP
-        marked = marked or is_unreachable(form, end_s, end_rate_s, w[BOUND * UNIT + j])
-        if form.ending == STOP:
-            marked = marked or begins_to_fall(watched, end_watched, w[BEST * UNIT + j])
+        marked = marked or is_unreachable(form, end_s, end_rate_s, w[BOUND * LANES + j])
+        if form.ending == END_AT_PEAK:
+            marked = marked or begins_to_fall(watched, end_watched, w[LARGEST_WATCHED * LANES + j])
         marked = running and marked
         marks += 1 if marked else 0
-        w[MARKED * UNIT + j], w[ERROR * UNIT + j] = 1.0 if marked else 0.0, error
+        w[MARKED * LANES + j], w[LOCAL_ERROR * LANES + j] = 1.0 if marked else 0.0, error
 
-        w[S_0 * UNIT + j], w[Y_0 * UNIT + j], w[T_0 * UNIT + j], w[WORK_0 * UNIT + j] = s, y, t, work
-        w[RATE_S_0 * UNIT + j], w[RATE_Y_0 * UNIT + j], w[WATCHED_0 * UNIT + j] = rate_s, rate_y, watched
-        w[H_0 * UNIT + j], w[H_LAST_0 * UNIT + j] = h, h_last
-        w[S * UNIT + j], w[Y * UNIT + j] = end_s if accepted else s, end_y if accepted else y
-        w[T * UNIT + j] = t + more_t if accepted else t
-        w[WORK * UNIT + j] = work + more_work if accepted else work
-        w[RATE_S * UNIT + j] = end_rate_s if accepted else rate_s
-        w[RATE_Y * UNIT + j] = end_rate_y if accepted else rate_y
-        w[WATCHED * UNIT + j] = end_watched if accepted else watched
-        w[H_LAST * UNIT + j], w[H * UNIT + j] = h if accepted else h_last, h_next
-        w[STEPS * UNIT + j] += 1.0 if accepted else 0.0
+        w[S_0 * LANES + j], w[Y_0 * LANES + j], w[TIME_0 * LANES + j], w[WORK_0 * LANES + j] = s, y, t, work
+        w[RATE_S_0 * LANES + j], w[RATE_Y_0 * LANES + j], w[WATCHED_0 * LANES + j] = rate_s, rate_y, watched
+        w[H_0 * LANES + j], w[H_LAST_0 * LANES + j] = h, h_last
+        w[S * LANES + j], w[Y * LANES + j] = end_s if accepted else s, end_y if accepted else y
+        w[TIME * LANES + j] = t + more_t if accepted else t
+        w[WORK * LANES + j] = work + more_work if accepted else work
+        w[RATE_S * LANES + j] = end_rate_s if accepted else rate_s
+        w[RATE_Y * LANES + j] = end_rate_y if accepted else rate_y
+        w[WATCHED * LANES + j] = end_watched if accepted else watched
+        w[H_LAST * LANES + j], w[H * LANES + j] = h if accepted else h_last, h_next
+        w[STEPS * LANES + j] += 1.0 if accepted else 0.0
     return marks
 
 
@@ -152,37 +158,37 @@ def locate_event(form, start, end, h, h_next, strength, accepted):
 @inlined
 def note_peak(w, j, falls, highest, start, end, s, y):
     """Note that the watched quantity begins to fall at the start of a step, or is highest where the lane ends."""
-    h, h_last = w[H_0 * UNIT + j], w[H_LAST_0 * UNIT + j]
-    best, peak_s, peak_y = w[BEST * UNIT + j], w[PEAK_S * UNIT + j], w[PEAK_Y * UNIT + j]
-    behind, ahead = w[BEHIND * UNIT + j], w[AHEAD * UNIT + j]
-    w[BEST * UNIT + j] = end[4] if highest else start[4] if falls else best
-    w[PEAK_S * UNIT + j] = s if highest else start[0] if falls else peak_s
-    w[PEAK_Y * UNIT + j] = y if highest else start[1] if falls else peak_y
-    w[BEHIND * UNIT + j] = h if highest else h_last if falls else behind
-    w[AHEAD * UNIT + j] = 0.0 if highest else h if falls else ahead
+    h, h_last = w[H_0 * LANES + j], w[H_LAST_0 * LANES + j]
+    best, peak_s, peak_y = w[LARGEST_WATCHED * LANES + j], w[PEAK_S * LANES + j], w[PEAK_Y * LANES + j]
+    behind, ahead = w[STEP_BEHIND * LANES + j], w[STEP_AHEAD * LANES + j]
+    w[LARGEST_WATCHED * LANES + j] = end[4] if highest else start[4] if falls else best
+    w[PEAK_S * LANES + j] = s if highest else start[0] if falls else peak_s
+    w[PEAK_Y * LANES + j] = y if highest else start[1] if falls else peak_y
+    w[STEP_BEHIND * LANES + j] = h if highest else h_last if falls else behind
+    w[STEP_AHEAD * LANES + j] = 0.0 if highest else h if falls else ahead
 
 
 @inlined
 def finish_steps(form, w, rtol, is_last):
     """Do what is rare: end trajectories, shorten the steps before an event, note peaks. Returns how many go on."""
     going = 0
-    for j in range(UNIT):
+    for j in range(LANES):
         # all is read first, whatever is chosen below, so that the loop has no branch
         start, end = state_at(w, S_0, j), state_at(w, S, j)
-        t_0, work_0, h_last_0 = w[T_0 * UNIT + j], w[WORK_0 * UNIT + j], w[H_LAST_0 * UNIT + j]
-        t, work, h, h_last = w[T * UNIT + j], w[WORK * UNIT + j], w[H_0 * UNIT + j], w[H_LAST * UNIT + j]
-        strength, bound, best = w[STRENGTH * UNIT + j], w[BOUND * UNIT + j], w[BEST * UNIT + j]
-        marked, error, ended = w[MARKED * UNIT + j] != 0.0, w[ERROR * UNIT + j], w[ENDED * UNIT + j]
-        halvings = w[HALVINGS * UNIT + j] + (1.0 if marked and not error < np.inf else 0.0)
+        t_0, work_0, h_last_0 = w[TIME_0 * LANES + j], w[WORK_0 * LANES + j], w[H_LAST_0 * LANES + j]
+        t, work, h, h_last = w[TIME * LANES + j], w[WORK * LANES + j], w[H_0 * LANES + j], w[H_LAST * LANES + j]
+        strength, bound, best = w[STRENGTH * LANES + j], w[BOUND * LANES + j], w[LARGEST_WATCHED * LANES + j]
+        marked, error, ended = w[MARKED * LANES + j] != 0.0, w[LOCAL_ERROR * LANES + j], w[ENDED * LANES + j]
+        halvings = w[HALVINGS * LANES + j] + (1.0 if marked and not error < np.inf else 0.0)
         ended = NOT_FINITE if halvings > MAX_HALVINGS else ended
         accepted = marked and error <= rtol
         located, crossed, s, y, more_t, more_work, h_next = locate_event(
-            form, start, end, h, w[H * UNIT + j], strength, accepted
+            form, start, end, h, w[H * LANES + j], strength, accepted
         )
         accepted = accepted and not crossed
         ended = EVENT_REACHED if located else ended
         s, y = s if located else end[0], y if located else end[1]
-        if form.ending == STOP:
+        if form.ending == END_AT_PEAK:
             falls = accepted and begins_to_fall(start[4], end[4], best)
             highest = located and end[4] > (start[4] if falls else best)
             note_peak(w, j, falls, highest, start, end, s, y)
@@ -190,84 +196,84 @@ def finish_steps(form, w, rtol, is_last):
         unreachable = accepted and is_unreachable(form, s, end[2], bound)
         ended = EVENT_UNREACHABLE if unreachable and ended == RUNNING else ended
         ended = STEP_UNDERFLOW if ended == RUNNING and h_next < MIN_STEP else ended
-        ended = MAX_STEPS if ended == RUNNING and is_last else ended
+        ended = TOO_MANY_STEPS if ended == RUNNING and is_last else ended
         going += 1 if ended == RUNNING else 0
-        w[ENDED * UNIT + j], w[HALVINGS * UNIT + j], w[H * UNIT + j] = ended, halvings, h_next
-        w[S * UNIT + j], w[Y * UNIT + j] = start[0] if crossed else s, start[1] if crossed else y
-        w[T * UNIT + j] = t_0 if crossed else t + (more_t if located else 0.0)
-        w[WORK * UNIT + j] = work_0 if crossed else work + (more_work if located else 0.0)
-        w[RATE_S * UNIT + j] = start[2] if crossed else end[2]
-        w[RATE_Y * UNIT + j] = start[3] if crossed else end[3]
-        w[WATCHED * UNIT + j] = start[4] if crossed else end[4]
-        w[H_LAST * UNIT + j] = h_last_0 if crossed else h_last
-        w[STEPS * UNIT + j] -= 1.0 if crossed else 0.0
+        w[ENDED * LANES + j], w[HALVINGS * LANES + j], w[H * LANES + j] = ended, halvings, h_next
+        w[S * LANES + j], w[Y * LANES + j] = start[0] if crossed else s, start[1] if crossed else y
+        w[TIME * LANES + j] = t_0 if crossed else t + (more_t if located else 0.0)
+        w[WORK * LANES + j] = work_0 if crossed else work + (more_work if located else 0.0)
+        w[RATE_S * LANES + j] = start[2] if crossed else end[2]
+        w[RATE_Y * LANES + j] = start[3] if crossed else end[3]
+        w[WATCHED * LANES + j] = start[4] if crossed else end[4]
+        w[H_LAST * LANES + j] = h_last_0 if crossed else h_last
+        w[STEPS * LANES + j] -= 1.0 if crossed else 0.0
     return going
 
 
 @inlined
 def begin(form, w, first, lanes, start, strength, bound, first_step):
     """Put the impacts from the first into a unit; where there are too few, the last one again."""
-    for j in range(UNIT):
+    for j in range(LANES):
         i = min(first + j, lanes - 1)
         s, y = start[0, i], start[1, i]
         rate_s, rate_y, _, _ = rates(form, s, y, strength[i])
         watched = force(form, s, y, rate_s, strength[i])
-        w[S * UNIT + j], w[Y * UNIT + j], w[T * UNIT + j], w[WORK * UNIT + j] = s, y, 0.0, 0.0
-        w[RATE_S * UNIT + j], w[RATE_Y * UNIT + j], w[WATCHED * UNIT + j] = rate_s, rate_y, watched
-        w[H * UNIT + j], w[H_LAST * UNIT + j] = first_step, 0.0
-        w[STRENGTH * UNIT + j], w[BOUND * UNIT + j] = strength[i], bound[i]
-        w[BEST * UNIT + j], w[PEAK_S * UNIT + j], w[PEAK_Y * UNIT + j] = -np.inf, s, y
-        w[BEHIND * UNIT + j], w[AHEAD * UNIT + j] = 0.0, 0.0
-        w[STEPS * UNIT + j], w[HALVINGS * UNIT + j], w[ENDED * UNIT + j] = 0.0, 0.0, RUNNING
+        w[S * LANES + j], w[Y * LANES + j], w[TIME * LANES + j], w[WORK * LANES + j] = s, y, 0.0, 0.0
+        w[RATE_S * LANES + j], w[RATE_Y * LANES + j], w[WATCHED * LANES + j] = rate_s, rate_y, watched
+        w[H * LANES + j], w[H_LAST * LANES + j] = first_step, 0.0
+        w[STRENGTH * LANES + j], w[BOUND * LANES + j] = strength[i], bound[i]
+        w[LARGEST_WATCHED * LANES + j], w[PEAK_S * LANES + j], w[PEAK_Y * LANES + j] = -np.inf, s, y
+        w[STEP_BEHIND * LANES + j], w[STEP_AHEAD * LANES + j] = 0.0, 0.0
+        w[STEPS * LANES + j], w[HALVINGS * LANES + j], w[ENDED * LANES + j] = 0.0, 0.0, RUNNING
 
 
 @inlined
 def refine_maximum(form, w):
     """Raise the largest watched values to the maxima beside them; see `impact.ode.maximum.refine_maximum`."""
     # rows of the same numbers by other names: the span of the search, the step of the difference, both ends
-    span, small, right, slope_right = T, H_LAST, WORK, H_0
+    span, small, right, slope_right = TIME, H_LAST, WORK, H_0
     some = 0
-    for j in range(UNIT):
-        s, y, strength = w[PEAK_S * UNIT + j], w[PEAK_Y * UNIT + j], w[STRENGTH * UNIT + j]
+    for j in range(LANES):
+        s, y, strength = w[PEAK_S * LANES + j], w[PEAK_Y * LANES + j], w[STRENGTH * LANES + j]
         rate_s, rate_y, _, _ = rates(form, s, y, strength)
         watched = force(form, s, y, rate_s, strength)
-        w[RATE_S * UNIT + j], w[RATE_Y * UNIT + j], w[WATCHED * UNIT + j] = rate_s, rate_y, watched
-        step = SLOPE * max(w[BEHIND * UNIT + j], w[AHEAD * UNIT + j])
+        w[RATE_S * LANES + j], w[RATE_Y * LANES + j], w[WATCHED * LANES + j] = rate_s, rate_y, watched
+        step = SLOPE_STEP * max(w[STEP_BEHIND * LANES + j], w[STEP_AHEAD * LANES + j])
         slope = slope_of_force(form, s, y, rate_s, rate_y, watched, step, strength)
-        reach = w[AHEAD * UNIT + j] if slope > 0.0 else -w[BEHIND * UNIT + j]
-        reach = reach if abs(slope * reach) > FLAT * abs(w[BEST * UNIT + j]) else 0.0
+        reach = w[STEP_AHEAD * LANES + j] if slope > 0.0 else -w[STEP_BEHIND * LANES + j]
+        reach = reach if abs(slope * reach) > FLAT_SLOPE * abs(w[LARGEST_WATCHED * LANES + j]) else 0.0
         some += 1 if reach != 0.0 else 0
-        w[small * UNIT + j], w[slope_right * UNIT + j] = step, slope
-        w[span * UNIT + j], w[H * UNIT + j], w[right * UNIT + j] = reach, reach, 0.0
+        w[small * LANES + j], w[slope_right * LANES + j] = step, slope
+        w[span * LANES + j], w[H * LANES + j], w[right * LANES + j] = reach, reach, 0.0
     for count in range(SECANT_STEPS + 1 if some else 0):
-        for j in range(UNIT):
+        for j in range(LANES):
             s, y, _, _, rate_s, rate_y, watched, _ = rk_step(
-                form, w[PEAK_S * UNIT + j], w[PEAK_Y * UNIT + j], w[RATE_S * UNIT + j], w[RATE_Y * UNIT + j],
-                w[WATCHED * UNIT + j], w[H * UNIT + j], w[STRENGTH * UNIT + j],
+                form, w[PEAK_S * LANES + j], w[PEAK_Y * LANES + j], w[RATE_S * LANES + j], w[RATE_Y * LANES + j],
+                w[WATCHED * LANES + j], w[H * LANES + j], w[STRENGTH * LANES + j],
             )  # fmt: skip
             slope = slope_of_force(
-                form, s, y, rate_s, rate_y, watched, w[small * UNIT + j], w[STRENGTH * UNIT + j]
+                form, s, y, rate_s, rate_y, watched, w[small * LANES + j], w[STRENGTH * LANES + j]
             )
-            reach, found = w[span * UNIT + j], w[BEST * UNIT + j]
-            w[BEST * UNIT + j] = watched if reach != 0.0 and watched > found else found
-            here = 1.0 if count == 0 else w[H * UNIT + j] / reach
-            before, slope_before = w[right * UNIT + j], w[slope_right * UNIT + j]
-            w[right * UNIT + j], w[slope_right * UNIT + j] = here, slope
-            w[H * UNIT + j] = secant_update(before, slope_before, here, slope) * reach
+            reach, found = w[span * LANES + j], w[LARGEST_WATCHED * LANES + j]
+            w[LARGEST_WATCHED * LANES + j] = watched if reach != 0.0 and watched > found else found
+            here = 1.0 if count == 0 else w[H * LANES + j] / reach
+            before, slope_before = w[right * LANES + j], w[slope_right * LANES + j]
+            w[right * LANES + j], w[slope_right * LANES + j] = here, slope
+            w[H * LANES + j] = secant_update(before, slope_before, here, slope) * reach
 
 
 @inlined
 def end_all(form, w, first, lanes, state, best, steps, end):
     """Write down how the impacts of a unit have ended."""
-    for j in range(min(UNIT, lanes - first)):
-        i, reached = first + j, w[ENDED * UNIT + j] == EVENT_REACHED
+    for j in range(min(LANES, lanes - first)):
+        i, reached = first + j, w[ENDED * LANES + j] == EVENT_REACHED
         for row in range(4):
-            state[row, i] = w[(S + row) * UNIT + j] if reached else np.nan
-        steps[i], end[i] = int(w[STEPS * UNIT + j]), int(w[ENDED * UNIT + j])
-    if form.ending == STOP:
+            state[row, i] = w[(S + row) * LANES + j] if reached else np.nan
+        steps[i], end[i] = int(w[STEPS * LANES + j]), int(w[ENDED * LANES + j])
+    if form.ending == END_AT_PEAK:
         refine_maximum(form, w)
-    for j in range(min(UNIT, lanes - first)):
-        best[first + j] = w[BEST * UNIT + j] if w[ENDED * UNIT + j] == EVENT_REACHED else np.nan
+    for j in range(min(LANES, lanes - first)):
+        best[first + j] = w[LARGEST_WATCHED * LANES + j] if w[ENDED * LANES + j] == EVENT_REACHED else np.nan
 
 
 def _kernel(form: Form, version: int):
@@ -276,25 +282,25 @@ def _kernel(form: Form, version: int):
     @kept_on_disk
     def integrate(start, strength, bound, first_step, rtol, max_steps, state, best, steps, end):
         lanes = start.shape[1] if version >= 0 else 0
-        w = np.zeros((UNITS, ROWS * UNIT))
+        w = np.zeros((GROUPS, WORKSPACE_ROWS * LANES))
         # the first impact of each unit, and how often a step of it was tried
-        first, trials = np.arange(0, UNITS * UNIT, UNIT), np.zeros(UNITS, np.int64)
-        for unit in range(UNITS):
+        first, trials = np.arange(0, GROUPS * LANES, LANES), np.zeros(GROUPS, np.int64)
+        for unit in range(GROUPS):
             begin(form, w[unit], first[unit], lanes, start, strength, bound, first_step)
-        waiting, living = UNITS * UNIT, min(UNITS, -(-lanes // UNIT))
+        waiting, living = GROUPS * LANES, min(GROUPS, -(-lanes // LANES))
         while living:
-            for unit in range(UNITS):
+            for unit in range(GROUPS):
                 if first[unit] >= lanes:
                     continue
-                mine = w[unit]
+                rows = w[unit]
                 trials[unit] += 1
                 is_last = trials[unit] >= max_steps
-                if (advance(form, mine, rtol) or is_last) and not finish_steps(form, mine, rtol, is_last):
-                    end_all(form, mine, first[unit], lanes, state, best, steps, end)
+                if (advance(form, rows, rtol) or is_last) and not finish_steps(form, rows, rtol, is_last):
+                    end_all(form, rows, first[unit], lanes, state, best, steps, end)
                     first[unit], trials[unit] = waiting, 0
-                    waiting += UNIT
+                    waiting += LANES
                     if first[unit] < lanes:
-                        begin(form, mine, first[unit], lanes, start, strength, bound, first_step)
+                        begin(form, rows, first[unit], lanes, start, strength, bound, first_step)
                     else:
                         living -= 1
 
@@ -309,5 +315,5 @@ def kernel(form: Form) -> Callable[..., None]:
     """The integrator of a form."""
     if form not in KERNELS:
         # threads that come at once all take the first one's
-        KERNELS.setdefault(form, _kernel(form, VERSION))
+        KERNELS.setdefault(form, _kernel(form, SOURCE_CRC))
     return KERNELS[form]

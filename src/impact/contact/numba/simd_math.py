@@ -43,22 +43,22 @@ _integer_of, _number_of = _reinterpreted(types.int64, types.float64), _reinterpr
 
 # what the shared formulas are written with, in its version for numbers
 @overload(events.choose, jit_options={"forceinline": True})
-def _choose(condition, this, other):
+def _compiled_choose(condition, this, other):
     return lambda condition, this, other: this if condition else other
 
 
 @overload(events.smaller, jit_options={"forceinline": True})
-def _smaller(one, other):
+def _compiled_smaller(one, other):
     return lambda one, other: one if one < other else other
 
 
 @overload(rk45.larger, jit_options={"forceinline": True})
-def _larger(one, other):
+def _compiled_larger(one, other):
     return lambda one, other: one if one > other else other
 
 
 @overload(rk45.larger_quotient, jit_options=JIT_OPTIONS)
-def _larger_quotient(one, divisor, other, other_divisor):
+def _compiled_larger_quotient(one, divisor, other, other_divisor):
     def by_one_division(one, divisor, other, other_divisor):
         one, other = one * other_divisor, other * divisor
         # a sum, since the larger of NaN and a number need not be NaN
@@ -68,22 +68,22 @@ def _larger_quotient(one, divisor, other, other_divisor):
 
 
 @overload(rk45.bits, jit_options={"forceinline": True})
-def _bits(number):
+def _compiled_bits(number):
     return lambda number: _integer_of(number)
 
 
 @overload(rk45.from_bits, jit_options={"forceinline": True})
-def _from_bits(whole):
+def _compiled_from_bits(whole):
     return lambda whole: _number_of(whole)
 
 
-ONE = int(np.float64(1.0).view(np.int64))
+ONE_BITS = int(np.float64(1.0).view(np.int64))
 # a number so large that its last bit is worth 1, ln 2 in two parts, the series of the exponential from its end
-LARGE, PER_LN2 = 6755399441055744.0, 1.4426950408889634
-LN2, REST_OF_LN2 = 0.6931471803691238, 1.9082149292705877e-10
+INTEGER_SHIFT, PER_LN2 = 6755399441055744.0, 1.4426950408889634
+LN2_HIGH, LN2_LOW = 0.6931471803691238, 1.9082149292705877e-10
 # of even powers and of odd ones, each from its end, so that a processor can go along both at once
-EVEN = tuple(1.0 / math.factorial(power) for power in range(12, -1, -2))
-ODD = tuple(1.0 / math.factorial(power) for power in range(13, 0, -2))
+EVEN_SERIES = tuple(1.0 / math.factorial(power) for power in range(12, -1, -2))
+ODD_SERIES = tuple(1.0 / math.factorial(power) for power in range(13, 0, -2))
 LEAST_EXPONENT = -700.0
 
 
@@ -91,15 +91,15 @@ LEAST_EXPONENT = -700.0
 def exponential(x):
     """eˣ, as a vector too: that of the C library is one number at a time."""
     x = max(x, LEAST_EXPONENT)
-    shifted = x * PER_LN2 + LARGE
-    times = shifted - LARGE
-    r = (x - times * LN2) - times * REST_OF_LN2
-    square, even, odd = r * r, EVEN[0], ODD[0]
-    for weight in EVEN[1:]:
+    shifted = x * PER_LN2 + INTEGER_SHIFT
+    times = shifted - INTEGER_SHIFT
+    r = (x - times * LN2_HIGH) - times * LN2_LOW
+    square, even, odd = r * r, EVEN_SERIES[0], ODD_SERIES[0]
+    for weight in EVEN_SERIES[1:]:
         even = even * square + weight
-    for weight in ODD[1:]:
+    for weight in ODD_SERIES[1:]:
         odd = odd * square + weight
-    return (odd * r + even) * rk45.from_bits((rk45.bits(shifted) << 52) + ONE)
+    return (odd * r + even) * rk45.from_bits((rk45.bits(shifted) << 52) + ONE_BITS)
 
 
 @inlined
