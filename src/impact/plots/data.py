@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..config.cases import HEADER, CsvTable, column_values, read_csv
+from ..config.cases import COLUMN_HEADER, CsvTable, column_values, read_csv
 from ..config.quantities import Quantity, show
 from ..config.tables import SWEEP_QUANTITIES
 from ..errors import ConfigError, UsageError, did_you_mean
@@ -159,7 +159,7 @@ def _csv_table(points: pd.DataFrame | xr.Dataset) -> CsvTable:
         frame = dataset.to_dataframe().reset_index()
     cells: dict[str, list[tuple[int, str]]] = {}
     for name, values in frame.items():
-        parts = HEADER.fullmatch(str(name))
+        parts = COLUMN_HEADER.fullmatch(str(name))
         assert parts is not None
         units[parts[1]] = parts[2] or units.get(parts[1], "")
         cells[parts[1]] = [(row, repr(value)) for row, value in enumerate(values.tolist(), 1)]
