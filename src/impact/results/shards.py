@@ -82,6 +82,7 @@ class ShardProgress:
     of_blocks: int
     trajectories: int
     failed: int
+    shard: Shard
 
 
 def sweep_shard(
@@ -129,7 +130,7 @@ def sweep_shard(
             sink.write(json.dumps(about).encode())
         with report_kept_blocks(folder, counter, "the same command", lambda error: []):
             complete_ranges(work_folder, plan, maps, own, counter, backend, should_stop)
-    return ShardProgress(folder, len(own), len(blocks), counter.at.trajectories, counter.at.failed)
+    return ShardProgress(folder, len(own), len(blocks), counter.at.trajectories, counter.at.failed, shard)
 
 
 @dataclass(frozen=True)

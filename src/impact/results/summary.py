@@ -173,12 +173,18 @@ class SweepOutcome:
     ----------
     dataset : its coordinates and attributes; the values of its variables may be placeholders
     summary : of its points
-    trajectories : how many were integrated, where that is known
+    trajectories : number of different trajectories, where it is known
+    is_new : whether the file was written now; False if it held this sweep already
+    integrated : how many trajectories were integrated now, where that is counted
+    repeated_blocks : blocks that were in more than one shard
     """
 
     dataset: xr.Dataset
     summary: Summary
     trajectories: int | None = None
+    is_new: bool = True
+    integrated: int | None = None
+    repeated_blocks: int = 0
 
 
 def counts_by_name(counts: Mapping[Status, int]) -> dict[str, int]:
