@@ -117,6 +117,18 @@ def test_impulses_and_works_balance_momentum_and_energy() -> None:
         assert shot.e_kinetic == pytest.approx(derived["tau_r"] / derived["tau_c"], rel=1e-14)
 
 
+def test_a_history_conserves_momentum_at_each_moment() -> None:
+    shot = impact.run(model="hunt-crossley-1975", at={"e": 0.6, "v1": 2.0, "v2": -1.0, "m1": 1.0, "m2": 3.0})
+    history = shot.history
+    assert history is not None
+    t, delta, v, x1, x2, v1, v2 = (history[name].values for name in ("t", "delta", "v", "x1", "x2", "v1", "v2"))
+    assert v1 + 3.0 * v2 == pytest.approx(np.full_like(t, -1.0), abs=1e-12)
+    assert x1 + 3.0 * x2 == pytest.approx(-t, abs=1e-15)
+    assert v1 - v2 == pytest.approx(v, abs=1e-12)
+    assert x1 - x2 == pytest.approx(delta, abs=1e-15)
+    assert (v1[-1], v2[-1]) == pytest.approx((shot.values["v1_post"], shot.values["v2_post"]), abs=1e-8)
+
+
 @pytest.mark.parametrize("key", ["exact-hysteresis", "gharib-hurmuzlu-2012", "lankarani-nikravesh-1994"])
 def test_limits_of_restitutions_impulses_and_works_at_e_0(key: str) -> None:
     shot = impact.run(model=key, at={"e": 0.0})

@@ -183,6 +183,18 @@ def test_what_a_folder_says_may_be_anything(cli: Run, folder: Path, text: str) -
     assert "is no shard, wants a folder that impact sweep --shard K/N makes" in done.stderr
 
 
+def test_blocks_in_two_shards_have_to_be_equal(cli: Run, folder: Path) -> None:
+    whole, part = shards(cli, folder, "1/1", "1/5")
+    assert "in more than one folder, with the same bits" in merged(cli, folder, whole, part)
+    (path,) = part.glob("0*.npz")
+    with np.load(path) as stored:
+        arrays = {name: stored[name] for name in stored.files}
+    np.savez(path, **{**arrays, "contact_time": np.nextafter(arrays["contact_time"], 1.0)})
+    done = cli("merge", whole, part, "--overwrite", cwd=folder)
+    assert done.returncode == 2
+    assert f"{path}: differs from {whole / path.name}; expected both" in done.stderr
+
+
 @pytest.mark.slow
 def test_shards_that_overlap_are_one_where_their_bits_are(cli: Run, folder: Path) -> None:
     found = shards(cli, folder, "1/2", "2/2", "1/3")

@@ -23,6 +23,7 @@ import impact
 from impact.api import prepare
 from impact.engine.executors import choose_backend
 from impact.errors import ResultError, StoreError, UnfinishedError, UsageError
+from impact.results import sweep as sweeps_of
 from impact.results.backend import open_result, write_file
 from impact.results.seal import write_seal
 from impact.results.sweep import sweep_into
@@ -195,6 +196,18 @@ def test_threads_processes_and_an_interruption_change_no_byte(tmp_path: Path, la
 def test_equal_inputs_give_equal_bytes(figure6: xr.Dataset, stored: Path, tmp_path: Path) -> None:
     impact.save(figure6, tmp_path / "again.h5")
     assert (tmp_path / "again.h5").read_bytes() == stored.read_bytes()
+
+
+def test_a_sweep_whose_file_cannot_be_read_is_not_published(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*arguments: object) -> None:
+        raise StoreError("cannot be read")
+
+    monkeypatch.setattr(sweeps_of, "check_readable", refuse)
+    with pytest.raises(StoreError, match="cannot be read"):
+        sweep_into(tmp_path / "out.h5", prepare(ROOT / "configs" / "figure6.toml", ["sweep.e=0.5"]))
+    assert not (tmp_path / "out.h5").exists()
 
 
 def test_an_output_that_exists_is_kept(figure6: xr.Dataset, tmp_path: Path) -> None:
