@@ -21,7 +21,7 @@ import numpy as np
 from h5py import h5a, h5d, h5p, h5s, h5t, h5z
 from scipy.io import netcdf_file
 
-from impact.results.sealed import write_seal
+from impact.results.seal import write_seal
 
 SECRET = b"the secret 1234567"
 UTF8 = h5py.string_dtype()

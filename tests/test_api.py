@@ -21,7 +21,7 @@ from impact.engine.checkpoint import open_work_folder
 from impact.engine.plan import Plan
 from impact.engine.plugins import read_plugins
 from impact.errors import ModelError, UsageError
-from impact.results.sweep import finished
+from impact.results.sweep import find_finished
 
 SWEEP = {"e": [0.2, 0.8], "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6e9}
 
@@ -136,7 +136,7 @@ def test_a_model_that_closes_over_values_is_never_taken_for_another(tmp_path: Pa
     impact.save(impact.sweep(config, plugins=closed[:1]), tmp_path / "result.h5")
     for model in (*closed, partly):
         plan = Plan(read_config(config, (), [model]), read_plugins([model]))
-        assert finished(tmp_path / "result.h5", plan) is None
+        assert find_finished(tmp_path / "result.h5", plan) is None
         with open_work_folder(tmp_path / "work", plan, resume=False, overwrite=True):
             pass
         with (
@@ -146,7 +146,7 @@ def test_a_model_that_closes_over_values_is_never_taken_for_another(tmp_path: Pa
             pass
     in_a_file = Plan(read_config({**config, "models": "hertz"}))
     impact.save(impact.sweep({**config, "models": "hertz"}), tmp_path / "hertz.h5")
-    assert finished(tmp_path / "hertz.h5", in_a_file) is not None
+    assert find_finished(tmp_path / "hertz.h5", in_a_file) is not None
 
 
 def test_a_force_of_the_wrong_shape_is_an_error_of_the_model() -> None:

@@ -10,7 +10,7 @@ import xarray as xr
 
 import impact
 from impact.contact.status import Status
-from impact.results.summary import tally_of
+from impact.results.summary import summarize
 
 from .conftest import ROOT
 
@@ -49,7 +49,7 @@ def test_every_kind_of_axis_is_in_one(baselines: list[xr.Dataset]) -> None:
 
 
 def test_points_of_every_fate_that_a_config_can_ask_for_are_in_one(baselines: list[xr.Dataset]) -> None:
-    found = {status for baseline in baselines for status in tally_of(baseline).counts}
+    found = {status for baseline in baselines for status in summarize(baseline).counts}
     assert found == {
         Status.OK, Status.NO_IMPACT, Status.LIMIT, Status.MAX_STEPS, Status.INVALID_PARAMETER, Status.OUT_OF_RANGE,
     }  # fmt: skip

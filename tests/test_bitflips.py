@@ -10,7 +10,7 @@ import pytest
 
 import impact
 from impact.errors import ResultError
-from impact.results.sealed import USER_BLOCK, check_seal
+from impact.results.seal import USER_BLOCK_BYTES, check_seal
 
 from .conftest import ROOT, Run
 
@@ -71,14 +71,14 @@ def test_each_flip_of_the_header_is_found(good: Path, tmp_path: Path) -> None:
     """In the magic line, the schema version, the digest and the padding."""
     content = good.read_bytes()
     places = [(place, 1 << place % 8) for place in range(130)]
-    check_flips(tmp_path / "flip.h5", content, iter([*places, *flips(USER_BLOCK, OF_HEADER, 2)]))
+    check_flips(tmp_path / "flip.h5", content, iter([*places, *flips(USER_BLOCK_BYTES, OF_HEADER, 2)]))
 
 
 def test_the_commands_refuse_a_flipped_bit(good: Path, cli: Run, tmp_path: Path) -> None:
     content = good.read_bytes()
     (tmp_path / "good.h5").write_bytes(content)
     # in the digest, in the padding, and anywhere
-    for place, bit in [(40, 1), (USER_BLOCK - 1, 128), *flips(len(content), OF_COMMANDS, 3)]:
+    for place, bit in [(40, 1), (USER_BLOCK_BYTES - 1, 128), *flips(len(content), OF_COMMANDS, 3)]:
         (tmp_path / "flip.h5").write_bytes(content[:place] + bytes([content[place] ^ bit]) + content[place + 1 :])
         for command in COMMANDS:
             done = cli(*command, cwd=tmp_path)

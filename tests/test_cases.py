@@ -19,11 +19,11 @@ from impact.config.load import Axis
 from impact.engine.plan import MAX_FULL_REPEATED, Plan
 from impact.engine.trajectories import trajectory_maps
 from impact.errors import UsageError
-from impact.results.provenance import part_of
+from impact.results.provenance import config_of_part
 from impact.results.ranking import ranking
 from impact.results.schema import SCHEMA
-from impact.results.select import select
-from impact.results.summary import tally_of
+from impact.results.selection import select
+from impact.results.summary import summarize
 from impact.results.sweep import sweep_into
 
 LAYOUTS = ("full", "factored")
@@ -108,8 +108,8 @@ def cases() -> dict[str, list[Any]]:
 def test_a_file_of_either_layout_holds_the_cases(tmp_path: Path, cases: dict[str, list[Any]]) -> None:
     plan = plan_of(cases)
     for layout in LAYOUTS:
-        survey = sweep_into(tmp_path / layout, in_layout(plan, layout))
-        assert survey.tally.points == plan.points == 24
+        outcome = sweep_into(tmp_path / layout, in_layout(plan, layout))
+        assert outcome.summary.points == plan.points == 24
     full, factored = (impact.load(tmp_path / layout) for layout in LAYOUTS)
     assert impact.compare(factored, full).equal
     for result in (full, factored):
@@ -145,7 +145,7 @@ def test_cases_are_compared_by_their_numbers(cases: dict[str, list[Any]]) -> Non
 def test_a_part_of_the_cases_is_repeated_under_their_numbers(cases: dict[str, list[Any]]) -> None:
     plan = plan_of(cases)
     held = execute(plan).isel(case=[1, 2])
-    again = execute(replace(plan, config=part_of(plan.config, held)))
+    again = execute(replace(plan, config=config_of_part(plan.config, held)))
     assert again["case"].values.tolist() == [1, 2]
     assert impact.compare(again, held).equal
 
@@ -203,7 +203,7 @@ def ten() -> tuple[Plan, xr.Dataset]:
 
 def test_ten_laws_with_axes_of_their_own_cost_what_each_alone_does(ten: tuple[Plan, xr.Dataset]) -> None:
     plan, result = ten
-    assert plan.points == len(OWN) * len(VALUES) * len(SPEEDS) == tally_of(result).points
+    assert plan.points == len(OWN) * len(VALUES) * len(SPEEDS) == summarize(result).points
     assert plan.stored_points == len(OWN) * len(VALUES) ** len(OWN) * len(SPEEDS)
     # what is stored is bounded
     assert plan.stored_points > MAX_FULL_REPEATED
@@ -236,11 +236,11 @@ def test_points_are_counted_alike_in_every_place(tmp_path: Path, cli: Any) -> No
     plan = own_axes(["kelvin-voigt", "ismail-stronge-2008", "johnson-1985"])
     assert plan.layout == "full"
     for layout in LAYOUTS:
-        survey = sweep_into(tmp_path / f"{layout}.h5", in_layout(plan, layout))
-        counts = summary(survey, tmp_path / f"{layout}.h5")
+        outcome = sweep_into(tmp_path / f"{layout}.h5", in_layout(plan, layout))
+        counts = summary(outcome, tmp_path / f"{layout}.h5")
         assert counts["points"] == sum(counts["status"].values()) == plan.points == 24
         stored = impact.load(tmp_path / f"{layout}.h5")
-        assert tally_of(stored).counts == survey.tally.counts
+        assert summarize(stored).counts == outcome.summary.counts
         assert json.loads(cli("info", tmp_path / f"{layout}.h5", "--json").stdout)["points"] == 24
 
 

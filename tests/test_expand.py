@@ -14,12 +14,14 @@ from hypothesis import strategies as st
 import impact
 from impact.api import prepare
 from impact.contact.outputs import check_inputs
+from impact.contact.status import Status
 from impact.engine.build_impacts import build_impacts
 from impact.results import sweep as sweeps_of
 from impact.results.expand import CHECKS, checks_that_may_fail
 from impact.results.schema import SCHEMA
 from impact.results.sweep import sweep_into
 
+from .problems import impacts
 from .test_collapse import DASHPOT, MATERIALS, NEEDS, OWN, SPEED
 
 # a rule of K of its own, which asks for the exponent, a speed and the masses
@@ -82,7 +84,7 @@ def lazy_and_full(config: object, plugins: list[Any]) -> tuple[xr.Dataset, xr.Da
     """The same sweep, computed when it is indexed and in memory."""
     full = impact.sweep(config, plugins=plugins)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sweeps_of, "SMALL_BYTES", -1)
+        patch.setattr(sweeps_of, "MAX_LOADED_BYTES", -1)
         return impact.sweep(config, plugins=plugins), full
 
 
@@ -133,6 +135,15 @@ def test_what_is_not_checked_never_fails(config: dict[str, object]) -> None:
         assert np.array_equal(np.broadcast_to(found, shape), np.broadcast_to(expected, shape)), law.key
 
 
+@pytest.mark.parametrize(
+    ("checks", "status"),
+    [({"v0"}, Status.NO_IMPACT), ({"length"}, Status.NO_IMPACT), ({"e"}, Status.OK), (set(), Status.OK)],
+)
+def test_balls_that_part_are_found_by_their_speed_or_their_sizes(checks: set[str], status: Status) -> None:
+    checked = check_inputs(impact.models()["hertz"], impacts(v1=-1.0), frozenset(checks))
+    assert np.broadcast_to(checked, 1).tolist() == [status]
+
+
 def test_a_plain_sweep_needs_no_checks_and_one_that_may_fail_has_them() -> None:
     sweep = {"e": [0.1, 0.9], "v1": [1.0, 2.0], "m1": 1.0, "m2": [1.0, 2.0], "K": 1e9}
 
@@ -159,7 +170,7 @@ def test_a_factored_file_holds_what_a_full_one_does(tmp_path: Path, config: dict
     for name in EVERYTHING:
         same_bits(factored[name], full[name])
     # what the summary prints, for which a factored sweep counts each distinct point once
-    whole, distinct = surveys["full"].tally, surveys["factored"].tally
+    whole, distinct = surveys["full"].summary, surveys["factored"].summary
     np.testing.assert_equal((distinct.counts, distinct.worst), (whole.counts, whole.worst))
     assert distinct.points == whole.points == plans["full"].points
     # of failed points that differ in nothing but an axis along which no status varies, the first is named

@@ -72,7 +72,7 @@ def check_kills(sweeps: Sweeps, count: int | None) -> None:
     tally.end()
 
 
-@pytest.mark.parametrize(("text", "count"), [(TEXT, 20), (FACTORED, 8)])
+@pytest.mark.parametrize(("text", "count"), [(TEXT, 10), (FACTORED, 4)])
 def test_killed_at_an_operation(sweeps: Sweeps, text: str, count: int) -> None:
     check_kills(sweeps.of(text), count)
 

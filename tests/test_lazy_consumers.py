@@ -19,8 +19,8 @@ from impact.errors import UsageError
 from impact.plots.kinds import KINDS, Choice
 from impact.plots.slices import MAX_DRAWN
 from impact.reporting.figures import figures_of
-from impact.results.slabs import SLAB_POINTS, distinct, slabs, varying_dims
-from impact.results.summary import extremes_of, tally_of
+from impact.results.slabs import SLAB_POINTS, distinct_points, slabs, varying_dims
+from impact.results.summary import extremes_of, summarize
 
 from .lazy import Reads, computed, stretched
 
@@ -117,7 +117,7 @@ def test_a_file_without_the_axes_of_its_variables_is_read_slab_by_slab(small: xr
     computed, _ = stretched(small, axes)
     assert impact.recommend(dataset) == impact.recommend(computed)
     assert reads.total == {"e_error": points, "status": points}
-    tally, few = tally_of(dataset), tally_of(computed)
+    tally, few = summarize(dataset), summarize(computed)
     assert (tally.points, tally.counts, tally.worst) == (few.points, few.counts, few.worst)
     assert reads.total["v1_error"] == points
     assert max(reads.largest.values()) <= SLAB_POINTS
@@ -128,7 +128,7 @@ def test_the_tally_of_all_points_is_that_of_the_few_that_differ(
 ) -> None:
     dataset, reads = big
     reads.clear()
-    tally, few = tally_of(dataset), tally_of(small)
+    tally, few = summarize(dataset), summarize(small)
     assert max(reads.total.values()) <= OWN
     assert (tally.points, tally.not_counted) == (OWN * WEIGHT, 0)
     assert tally.counts == {status: WEIGHT * count for status, count in few.counts.items()}
@@ -146,10 +146,10 @@ def test_what_is_too_much_to_evaluate_is_missing(small: xr.Dataset, capsys: pyte
     # the figures of the report are over e and v2
     order = ["e", "v2", *BIG]
     dataset, reads = stretched(small, BIG, added={"e_error": many, "status": many}, order=order)
-    tally = tally_of(dataset)
+    tally = summarize(dataset)
     assert (tally.points, tally.not_counted, tally.counts) == (OWN * WEIGHT, OWN * WEIGHT, {})
     assert "e_error" not in tally.worst
-    np.testing.assert_equal(tally.worst["v1_error"], tally_of(small).worst["v1_error"])
+    np.testing.assert_equal(tally.worst["v1_error"], summarize(small).worst["v1_error"])
     assert extremes_of(dataset, "e_error") is None
     print_info(dataset, Path("big.h5"))
     lines = capsys.readouterr().out.splitlines()
@@ -163,7 +163,7 @@ def test_what_is_too_much_to_evaluate_is_missing(small: xr.Dataset, capsys: pyte
     assert "v2\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}0" in page
     assert "is left out" not in page
     assert reads.total["status"] < 2**23
-    assert tally_of(stretched(small, {"m1": BIG["m1"]}, added={"status": ["m1"]})[0], max_points=10).not_counted
+    assert summarize(stretched(small, {"m1": BIG["m1"]}, added={"status": ["m1"]})[0], max_points=10).not_counted
 
 
 def test_info_evaluates_the_few_points_that_differ(
@@ -278,12 +278,12 @@ def test_a_picture_reads_what_it_draws(small: xr.Dataset, big: tuple[xr.Dataset,
     sel = {"v2": 0.0, **({"e": 0.5} if kind in ("loop", "history", "impulse") else {})}
     plane = kind in ("map", "validity")
     choice = Choice(sel=sel, models=MODELS[:3], x="e", y="K" if plane else None)
-    numbers = impact.api.pictured(dataset, kind, choice, [BROKEN])
+    numbers = impact.api.get_plot_data(dataset, kind, choice, [BROKEN])
     expected = 0 if "e" in sel else 3 * 10 * (1_000 if plane else 1)
     assert max(reads.total.values(), default=0) == expected
     assert list(islice(numbers.rows(), 3))
     if not plane:
-        assert list(numbers.rows()) == list(impact.api.pictured(small, kind, choice, [BROKEN]).rows())
+        assert list(numbers.rows()) == list(impact.api.get_plot_data(small, kind, choice, [BROKEN]).rows())
         return
     error = small["e_error"].sel(model="lankarani-nikravesh-1990", v2=0.0).values
     assert numbers.panels[1].values[7] == tuple(error.tolist())
@@ -292,7 +292,7 @@ def test_a_picture_reads_what_it_draws(small: xr.Dataset, big: tuple[xr.Dataset,
 def test_a_map_reads_no_model_that_it_leaves_out(small: xr.Dataset) -> None:
     many = small.isel(model=[0] * 42).assign_coords(model=[f"model-{number}" for number in range(42)])
     dataset, reads = stretched(many, BIG)
-    numbers = impact.api.pictured(dataset, "map", Choice(x="e", y="v2"))
+    numbers = impact.api.get_plot_data(dataset, "map", Choice(x="e", y="v2"))
     assert (len(numbers.panels), len(numbers.left_out)) == (12, 30)
     assert reads.total == {"e_error": 12 * 10 * 3}
 
@@ -312,7 +312,7 @@ def test_along_which_axes_a_variable_varies_is_asked_of_each_model(small: xr.Dat
     assert varying_dims(dataset.sel(model="hertz"), "e_out") == ()
     assert varying_dims(dataset.sel(model=["hertz"]), "e_out") == ("model",)
     assert varying_dims(dataset, "e_out") == ("model", "e", "v2")
-    variable, weight = distinct(dataset.sel(model="hertz"), "e_out")
+    variable, weight = distinct_points(dataset.sel(model="hertz"), "e_out")
     assert (variable.shape, weight) == ((1, 1, 1, 1), 4 * 2 * 10 * 3)
     # of a model by another name nothing is known, and what is in memory varies along all axes
     renamed = dataset.sel(model=["hertz"]).assign_coords(model=["mine"])

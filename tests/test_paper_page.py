@@ -9,9 +9,8 @@ import pytest
 
 import impact
 from impact.config.tables import SWEEP_QUANTITIES
-from impact.results.history import HISTORY
-from impact.results.impact import DERIVED
-from impact.results.schema import SCHEMA
+from impact.results.schema import HISTORY_VARIABLES, SCHEMA
+from impact.results.single_impact import DERIVED_QUANTITIES
 
 from .conftest import ROOT, Run
 
@@ -49,7 +48,11 @@ def test_every_equation_is_there_once() -> None:
 
 
 def test_what_the_page_names_exists() -> None:
-    known = {one.name for one in SCHEMA} | {name for name, *_ in (*DERIVED, *HISTORY)} | SWEEP_QUANTITIES.keys()
+    known = (
+        {one.name for one in SCHEMA}
+        | {name for name, *_ in (*DERIVED_QUANTITIES, *HISTORY_VARIABLES)}
+        | SWEEP_QUANTITIES.keys()
+    )
     known |= impact.models().keys() | {"e_kinematic"}
     for section in ("Equations", "Table 1"):
         for row in rows(section):

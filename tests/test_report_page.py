@@ -28,7 +28,7 @@ from impact.errors import UsageError
 from impact.reporting.figures import FIGURES
 from impact.reporting.page import page
 from impact.results.ranking import ranking
-from impact.results.replay import described
+from impact.results.replay_command import describe_point
 
 from .conftest import ROOT, Run
 
@@ -85,7 +85,7 @@ class Seen(HTMLParser):
 
 
 def build(dataset: xr.Dataset, plugins: Sequence[impact.ForceModel | Path] = ()) -> str:
-    return page(dataset, lambda kind, choice: api.pictured(dataset, kind, choice, plugins))
+    return page(dataset, lambda kind, choice: api.get_plot_data(dataset, kind, choice, plugins))
 
 
 def table(text: str, label: str) -> list[list[str]]:
@@ -198,7 +198,7 @@ def test_the_answer_is_that_of_the_ranking(pages: dict[str, str], wide: xr.Datas
             assert (share, failed) == (one.percent, f"{one.failed:,}")
             assert float(mean) == pytest.approx(one.mean_error, rel=5e-3)
             assert float(most) == pytest.approx(one.max_error, rel=5e-3)
-            assert worst == f"{described(one.at)}: e_out {one.e_out:.4g}"
+            assert worst == f"{describe_point(one.at)}: e_out {one.e_out:.4g}"
             ends = [float(number) for number in re.findall(r"[\d.]+", serves)]
             assert ends == [end for least, most in one.served or () for end in dict.fromkeys((least, most))]
 

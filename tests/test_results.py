@@ -16,8 +16,8 @@ from impact.contact.status import Status
 from impact.engine.execute import integrate_ranges, with_core
 from impact.engine.plan import Plan
 from impact.engine.trajectories import trajectory_maps, trajectory_ranges
-from impact.results.expand import Rows, TrajectoryTable, in_memory, lazy_dataset
-from impact.results.schema import SCHEMA, outline, stored
+from impact.results.expand import TrajectoryRows, TrajectoryTable, in_memory, lazy_dataset
+from impact.results.schema import SCHEMA, dataset_template, stored_variables
 
 from .conftest import WIDE
 
@@ -181,12 +181,12 @@ def test_sizes_and_order_change_no_bit(wide: xr.Dataset, size: int, collapse: st
     plan = with_core(plan, maps)
     todo = sorted(trajectory_ranges(maps, size), key=lambda part: hash((part.number, "shuffled")))
     finished = {(part.model, part.start): rebound for part, rebound in integrate_ranges(plan, maps, todo)}
-    rows = Rows(maps, lambda model, start, stop: finished[model, start], size)
+    rows = TrajectoryRows(maps, lambda model, start, stop: finished[model, start], size)
     table = TrajectoryTable(plan.inputs, plan.models, maps, rows, (None,) * len(plan.models))
     # what the config was overridden with is an attribute
-    about = outline(plan).assign_attrs(config_set=wide.attrs["config_set"])
-    dataset = lazy_dataset(about, table, stored(plan))
-    assert in_memory(dataset, table, stored(plan)).identical(wide)
+    about = dataset_template(plan).assign_attrs(config_set=wide.attrs["config_set"])
+    dataset = lazy_dataset(about, table, stored_variables(plan))
+    assert in_memory(dataset, table, stored_variables(plan)).identical(wide)
     # of any part the numbers are those of the whole
     part = {"e": [2, 0], "v1": slice(None, None, -1), "material2": 1}
     assert dataset.isel(part).load().identical(wide.isel(part))
@@ -215,7 +215,7 @@ def test_the_materials_that_a_ball_has_are_attributes(wide: xr.Dataset, figure6:
     hard = {"E": 210e9, "nu": 0.3, "rho": 7850.0, "yield_strength": None}
     assert json.loads(wide.attrs["materials"]) == {"hard": hard, "soft": soft}
     more = ["materials.idle={E=1e9, nu=0.3, rho=1}", 'materials.hard.yield_strength="250 MPa"']
-    found = json.loads(outline(Plan(parse_config(WIDE, more))).attrs["materials"])
+    found = json.loads(dataset_template(Plan(parse_config(WIDE, more))).attrs["materials"])
     assert found == {"hard": {**hard, "yield_strength": 250e6}, "soft": soft}
     assert list(json.loads(figure6.attrs["materials"])) == ["table1"]
     without = impact.sweep({"models": "hertz", "sweep": {"e": 1.0, **TABLE1}})

@@ -14,15 +14,15 @@ import h5py
 import pytest
 
 import impact
-from impact.comparison.judge import MAX_POINTS as MAX_COMPARED
+from impact.comparison.judge import MAX_COMPARED_POINTS as MAX_COMPARED
 from impact.config.grid import MAX_AXES, MAX_CHUNK_POINTS, MAX_COUNTED_POINTS, MAX_POINTS, MAX_STORED_CHUNKS
 from impact.config.quantities import MAX_AXIS_VALUES
 from impact.engine.plan import MAX_FULL_POINTS
 from impact.plots.slices import MAX_DRAWN
-from impact.results.backend import SMALL_BYTES
+from impact.results.backend import MAX_LOADED_BYTES
 from impact.results.expand import MAX_STIFFNESS_VALUES
-from impact.results.factored import WITNESS_TOLERANCE, WITNESSES
-from impact.results.netcdf import MAX_LETTERS
+from impact.results.factored import N_WITNESSES, WITNESS_TOLERANCE
+from impact.results.netcdf import MAX_LABEL_BYTES
 from impact.results.ranking import MAX_RANKED_POINTS
 from impact.results.slabs import MAX_SUMMARY_POINTS
 
@@ -115,18 +115,18 @@ def test_a_law_that_cannot_be_factored_is_refused_before_it_is_integrated(cli: R
 def test_the_numbers_of_the_page() -> None:
     assert (MAX_FULL_POINTS, MAX_POINTS, MAX_COMPARED, MAX_STIFFNESS_VALUES) == (10**7, 10**9, 10**10, 10**6)
     assert (MAX_SUMMARY_POINTS, MAX_RANKED_POINTS, MAX_DRAWN, MAX_COUNTED_POINTS) == (2**26, 2**30, 2**24, 2**62)
-    assert (SMALL_BYTES, MAX_LETTERS, MAX_AXES, WITNESS_TOLERANCE) == (512 * 2**20, 4 * 10**6, 31, 1e-12)
+    assert (MAX_LOADED_BYTES, MAX_LABEL_BYTES, MAX_AXES, WITNESS_TOLERANCE) == (512 * 2**20, 4 * 10**6, 31, 1e-12)
     shown = "10^7 10^9 10^10 10^6 2^26 2^30 2^24 2^62 1e-12"
     for text in ("512 MB", "4 MB", "| 31;", *shown.split()):
         assert text in PAGE
-    for number in (MAX_AXIS_VALUES, WITNESSES, MAX_STORED_CHUNKS, MAX_CHUNK_POINTS):
+    for number in (MAX_AXIS_VALUES, N_WITNESSES, MAX_STORED_CHUNKS, MAX_CHUNK_POINTS):
         assert f"{number:,}" in PAGE
 
 
 def test_all_that_a_factored_file_holds_is_named(tmp_path: Path) -> None:
-    from impact.results.validate import TABLE
+    from impact.results.validation import TABLE_VARIABLES
 
     named = set(re.findall(r"`(\w+)`", PAGE.partition("## Other readers")[2].partition("## Witnesses")[0]))
-    for name in TABLE:
+    for name in TABLE_VARIABLES:
         group, _, rest = name.partition("_")
         assert name in named or f"_{rest}" in named or (group == "witness" and "witness_e_out" in named), name

@@ -31,8 +31,8 @@ from impact.engine.executors import SERIAL, Backend, choose_backend
 from impact.engine.progress import Progress
 from impact.engine.trajectories import columns_of, trajectory_maps, trajectory_ranges
 from impact.errors import ConfigError, StoreError, UsageError
-from impact.results.summary import tally_of
-from impact.results.sweep import finished, sweep_into
+from impact.results.summary import summarize
+from impact.results.sweep import find_finished, sweep_into
 
 from .conftest import ROOT, WIDE, Run
 from .forked import Forked
@@ -223,17 +223,17 @@ def test_what_is_held_is_counted_in_parts_as_in_memory(blocks: Path) -> None:
     plan = prepare(blocks)
     output = blocks.parent / "results.h5"
     swept = sweep_into(output, plan)
-    found = finished(output, plan)
+    found = find_finished(output, plan)
     assert found is not None
-    assert found.tally == swept.tally == tally_of(impact.load(output))
+    assert found.summary == swept.summary == summarize(impact.load(output))
     assert found.trajectories == swept.trajectories == 40_001
-    assert finished(output, prepare(blocks, ["sweep.v1=2"])) is None
+    assert find_finished(output, prepare(blocks, ["sweep.v1=2"])) is None
     with output.open("r+b") as file:
         file.seek(-1_000, os.SEEK_END)
         byte = file.read(1)
         file.seek(-1_000, os.SEEK_END)
         file.write(bytes([byte[0] ^ 1]))
-    assert finished(output, plan) is None
+    assert find_finished(output, plan) is None
 
 
 # ---- several processes
@@ -387,7 +387,7 @@ def test_stored_as_it_was_asked_to(wide: xr.Dataset, tmp_path: Path, name: str) 
     assert loaded["e"].dtype == np.float64
     # how it is stored is no difference to what it is
     assert impact.compare(loaded, wide).equal
-    assert finished(tmp_path / "wide.h5", plan).tally == swept.tally
+    assert find_finished(tmp_path / "wide.h5", plan).summary == swept.summary
 
 
 def test_what_half_the_digits_lose_is_no_difference_and_more_is(wide: xr.Dataset) -> None:
@@ -429,7 +429,7 @@ def test_chunks_that_are_too_many_or_too_large(blocks: Path) -> None:
     with pytest.raises(ConfigError, match=r"got 1,600,000 chunks of 2 points, expected at most 100,000 of"):
         prepare(blocks, ["output.chunks.e=1"])
     with pytest.raises(ConfigError, match=r"got 80 chunks of 10,000,000 points"):
-        prepare(blocks, ["output.chunks.m1=1", "sweep.e.linspace=[0,1,10000000]"])
+        prepare(blocks, ["output.chunks.m1=1", "sweep.v1={linspace=[1,2,250]}"])
 
 
 def test_what_packs_very_well_is_read_again(tmp_path: Path) -> None:
@@ -438,6 +438,6 @@ def test_what_packs_very_well_is_read_again(tmp_path: Path) -> None:
         "sweep": {"v1": {"linspace": [1, 2, 4_000]}, "m1": {"linspace": [1, 2, 2_500]}, "m2": 1, "K": 1e9},
     }  # fmt: skip
     swept = sweep_into(tmp_path / "flat.h5", prepare(config))
-    assert (tmp_path / "flat.h5").stat().st_size < swept.outline.nbytes / 300
+    assert (tmp_path / "flat.h5").stat().st_size < swept.dataset.nbytes / 300
     with impact.load(tmp_path / "flat.h5") as loaded:
         assert loaded["e_out"].min() == loaded["e_out"].max() > 0.999

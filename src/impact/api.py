@@ -35,11 +35,11 @@ from .errors import UsageError
 from .results.backend import load as load
 from .results.backend import save as save
 from .results.extend import extend as extend_result
-from .results.impact import Impact as Impact
-from .results.impact import impact_of
-from .results.provenance import histories, part_of, single_point, stored_config
+from .results.provenance import config_of_part, stored_config
 from .results.ranking import Ranking, ranking
-from .results.replay import repeats
+from .results.replay_command import command_start
+from .results.single_impact import Impact as Impact
+from .results.single_impact import histories, run_single_impact, single_point
 from .results.sweep import sweep_in_memory
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from .plots.kinds import Choice, Numbers
+    from .plots.kinds import Choice, PlotData
 
 
 def prepare(
@@ -165,7 +165,7 @@ def run(
         raise UsageError(f"times: got {times}, expected a whole number >= 2")
     own = read_plugins(plugins)
     config, first = single_point(source, overrides, own, model, at)
-    return impact_of(Plan(config, own.of(config.models)), first, times)
+    return run_single_impact(Plan(config, own.of(config.models)), first, times)
 
 
 def extend(
@@ -252,14 +252,14 @@ def rerun(
     changes = [f"models={json.dumps(keys)}", *solver, 'solver.core="auto"']
     config = stored_config(stored.attrs, changes, own, str(result), max_points, allow_changed_plugins=True)
     whole = Plan(config, own.of(config.models))
-    plan = replace(whole, config=part_of(config, stored))
+    plan = replace(whole, config=config_of_part(config, stored))
     check_count(plan, max_points, str(result))
     verdict = compare(execute(plan), stored, tol=tol, subset=subset)
     if plan.points < whole.points:
         part = f"repeated {plan.points:,} of {whole.points:,} points of the config: the file holds no others"
         verdict = replace(verdict, notes=(part, *verdict.notes))
     files = [word for one in plugins if isinstance(one, str | Path) for word in ("--plugin", str(one))]
-    again = ("impact", "run", str(result), *files) if repeats(str(result), stored) else ()
+    again = ("impact", "run", str(result), *files) if command_start(str(result), stored) else ()
     return replace(verdict, new="the rerun", baseline=str(result), repeats=again)
 
 
@@ -334,18 +334,18 @@ def plot(
     from .plots.kinds import Choice, draw
 
     choice = Choice(x, y, variable, sel, models, log, equations)
-    numbers = pictured(dataset, kind, choice, plugins)
-    return draw(numbers, width, height, style=style, title=title, labels=labels, points=points, ax=ax)
+    plot_data = get_plot_data(dataset, kind, choice, plugins)
+    return draw(plot_data, width, height, style=style, title=title, labels=labels, points=points, ax=ax)
 
 
-def pictured(
+def get_plot_data(
     dataset: xr.Dataset, kind: str, choice: Choice, plugins: Sequence[ForceModel | str | Path] = ()
-) -> Numbers:
-    """The numbers of a picture; see `plot`."""
-    from .plots.kinds import numbers_of
+) -> PlotData:
+    """The data of a picture; see `plot`."""
+    from .plots.kinds import plot_data_of
 
     own = read_plugins(plugins)
-    return numbers_of(kind, dataset, choice, lambda: histories(dataset, choice.models, choice.sel or {}, own))
+    return plot_data_of(kind, dataset, choice, lambda: histories(dataset, choice.models, choice.sel or {}, own))
 
 
 def materials() -> dict[str, dict[str, float | str]]:
@@ -411,4 +411,4 @@ def report(dataset: xr.Dataset, *, plugins: Sequence[ForceModel | str | Path] = 
     """
     from .reporting.page import page
 
-    return page(dataset, lambda kind, choice: pictured(dataset, kind, choice, plugins))
+    return page(dataset, lambda kind, choice: get_plot_data(dataset, kind, choice, plugins))

@@ -19,9 +19,9 @@ def init(
 ) -> None:
     """Write a commented starter config, ready to sweep."""
     from ..results import backend
-    from ..results.provenance import STARTER
+    from ..results.single_impact import STARTER_CONFIG
 
-    backend.write_whole(path, STARTER.read_bytes(), overwrite=overwrite)
+    backend.write_file(path, STARTER_CONFIG.read_bytes(), overwrite=overwrite)
     exits.say(f"{safe_text(str(path))}: written; next: impact sweep {safe_text(str(path))}")
 
 
@@ -37,5 +37,5 @@ def schema(
     if output is None:
         print(text, end="")
     else:
-        backend.write_whole(output, text.encode(), overwrite=overwrite)
+        backend.write_file(output, text.encode(), overwrite=overwrite)
         exits.say(f"{safe_text(str(output))}: written")

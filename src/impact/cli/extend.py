@@ -39,14 +39,14 @@ def expand(
     with exits.signals() as should_stop:
         from .. import api
         from ..results import backend
-        from ..results.select import places_of, select
+        from ..results.selection import model_positions, select
 
         backend.check_output(output, overwrite=overwrite, source=result)
         dataset = select(backend.open_result(result), dict(sel or ()))
         if "model" not in dataset.dims:
             raise UsageError(f"{safe_text(str(result))}: is a time history, expected a result of a sweep")
         if model:
-            dataset = dataset.isel(model=places_of(model, dataset))
+            dataset = dataset.isel(model=model_positions(model, dataset))
         points = 1
         for size in dataset.sizes.values():
             points *= size
@@ -95,12 +95,12 @@ def extend(
             options.backend(quiet=quiet, should_stop=should_stop) as backend,
             progress.progress(quiet=quiet) as report,
         ):
-            survey, integrated = extending.extend(
+            outcome, integrated = extending.extend(
                 result, target, sets, read_plugins(plugins or ()), resume=resume, overwrite=overwrite,
                 max_points=max_points, backend=backend, on_progress=report, should_stop=should_stop,
             )  # fmt: skip
         if should_stop():
             raise UnfinishedError(f"{safe_text(str(target))} was stored whole")
     if not quiet:
-        exits.say(f"{integrated:,} of {survey.trajectories:,} trajectories were integrated for it")
-    summary.conclude(survey, target, fresh=True, quiet=quiet, as_json=as_json, allow_failed=allow_failed)
+        exits.say(f"{integrated:,} of {outcome.trajectories:,} trajectories were integrated for it")
+    summary.conclude(outcome, target, fresh=True, quiet=quiet, as_json=as_json, allow_failed=allow_failed)

@@ -55,11 +55,11 @@ def print_info(dataset: xr.Dataset, path: Path) -> None:
     """What is in a file, of any size; "–" where more would have to be evaluated than a summary is worth."""
     from ..results.attributes import read_attribute
     from ..results.schema import count_points, exponents_of, plain_unit
-    from ..results.summary import counted, extremes_of, tally_of
+    from ..results.summary import counts_by_name, extremes_of, summarize
     from .summary import worst_errors
 
     attributes = dataset.attrs
-    tally = tally_of(dataset) if "model" in dataset.dims else None
+    tally = summarize(dataset) if "model" in dataset.dims else None
     sizes = " × ".join(f"{name} {size}" for name, size in dataset.sizes.items())
     rows: dict[str, Any] = {"file": path, "title": attributes.get("title", ""), "dimensions": sizes}
     rows["points"] = f"{count_points(dataset):,}"
@@ -81,7 +81,7 @@ def print_info(dataset: xr.Dataset, path: Path) -> None:
     if read_attribute(attributes, "config_set"):
         rows["config_set"] = attributes["config_set"]
     if tally and tally.counts:
-        rows["status"] = ", ".join(f"{count:,} {name}" for name, count in counted(tally.counts).items())
+        rows["status"] = ", ".join(f"{count:,} {name}" for name, count in counts_by_name(tally.counts).items())
     if tally and tally.not_counted:
         rows["not evaluated"] = f"the status of {tally.not_counted:,} points"
     print_rows(rows)

@@ -38,6 +38,6 @@ def report(
         backend.check_output(output, overwrite=overwrite, source=source)
     page = api.report(api.load(result), plugins=plugin or ())
     content = page.encode()
-    backend.write_whole(output, content, overwrite=overwrite)
+    backend.write_file(output, content, overwrite=overwrite)
     figures = page.count("<figure>")
     exits.say(f"{shown}: {figures} figure{'' if figures == 1 else 's'}, {len(content) / 1000:,.0f} kB")

@@ -101,8 +101,8 @@ def run_json(impact: Impact) -> dict[str, Any]:
 def print_run(impact: Impact) -> None:
     """One impact: inputs, outputs, the three restitutions, and how far they can be trusted."""
     from ..config.tables import MATERIAL_QUANTITIES
-    from ..results.impact import DERIVED
     from ..results.schema import SCHEMA, plain_unit
+    from ..results.single_impact import DERIVED_QUANTITIES
 
     rows: dict[str, Any] = {"model": impact.model.key, "equation": impact.model.equation}
     for name, value in impact.point.items():
@@ -114,7 +114,7 @@ def print_run(impact: Impact) -> None:
             f"{field} = {quantity(value, MATERIAL_QUANTITIES[field].unit, 10)}" for field, value in known.items()
         )
         rows[f"[materials.{name}]"] = ", ".join(about)
-    for name, unit, meaning in DERIVED:
+    for name, unit, meaning in DERIVED_QUANTITIES:
         if impact.derived[name] == impact.derived[name] and name not in impact.point:
             rows[name] = f"{quantity(impact.derived[name], _unit_at(impact, plain_unit(unit)), 10)}  {meaning}"
     rows["status"] = f"{impact.status.name.lower()}: {impact.status.meaning}"

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from ..engine.plan import Plan
-    from ..results.summary import Survey, Tally
+    from ..results.summary import Summary, SweepOutcome
 
 
 def execute(plan: Plan, should_stop: Callable[[], bool], *, quiet: bool) -> xr.Dataset:
@@ -32,52 +32,54 @@ def execute(plan: Plan, should_stop: Callable[[], bool], *, quiet: bool) -> xr.D
         return api.execute(plan, on_progress=report, should_stop=should_stop)
 
 
-def summary(survey: Survey, output: Path) -> dict[str, Any]:
+def summary(outcome: SweepOutcome, output: Path) -> dict[str, Any]:
     """Points, counts per status, and the first failed points with their coordinates and the command for each."""
-    from ..results.replay import inputs_of_model, repeats, replay
-    from ..results.summary import counted
+    from ..results.replay_command import command_start, inputs_of_model, replay_command
+    from ..results.summary import counts_by_name
 
-    outline, tally = survey.outline, survey.tally
-    begin = repeats(str(output), outline)
+    dataset, totals = outcome.dataset, outcome.summary
+    command = command_start(str(output), dataset)
     failures = []
-    for status, model, places in tally.failed_at:
-        point = outline["status"].isel(dict(zip(outline["status"].dims, (model, *places), strict=True)))
-        at = inputs_of_model({str(dim): point[dim].values.item() for dim in outline["status"].dims})
-        again = replay(begin, at) if begin else None
+    for status, model, places in totals.failed_at:
+        point = dataset["status"].isel(dict(zip(dataset["status"].dims, (model, *places), strict=True)))
+        at = inputs_of_model({str(dim): point[dim].values.item() for dim in dataset["status"].dims})
+        again = replay_command(command, at) if command else None
         failures.append({"status": status.name.lower(), "at": at, "replay": again})
     return {
-        "output": str(output), "points": tally.points, "models": outline.sizes["model"],
-        "trajectories": survey.trajectories, "status": counted(tally.counts), "failed": tally.failed,
-        "first_failed": failures, "layout": outline.encoding.get("layout"), "seal": outline.encoding.get("seal"),
+        "output": str(output), "points": totals.points, "models": dataset.sizes["model"],
+        "trajectories": outcome.trajectories, "status": counts_by_name(totals.counts), "failed": totals.failed,
+        "first_failed": failures, "layout": dataset.encoding.get("layout"), "seal": dataset.encoding.get("seal"),
     }  # fmt: skip
 
 
-def conclude(survey: Survey, output: Path, *, fresh: bool, quiet: bool, as_json: bool, allow_failed: bool) -> None:
+def conclude(
+    outcome: SweepOutcome, output: Path, *, fresh: bool, quiet: bool, as_json: bool, allow_failed: bool
+) -> None:
     """Print what came out of a sweep, and end with the exit code that it has.
 
     Parameters
     ----------
-    survey : the result
+    outcome : the result
     output : its file
     fresh : whether it was stored just now
     quiet, as_json, allow_failed : as the options of those names
     """
     from ..results.plausibility import result_notes
 
-    outcome = summary(survey, output)
+    fields = summary(outcome, output)
     if not quiet:
         if fresh:
             with exits.readers_may_leave(sys.stderr):
-                print_summary(survey, outcome)
-            for note in result_notes(survey.tally):
+                print_summary(outcome, fields)
+            for note in result_notes(outcome.summary):
                 exits.say(f"note: {note}")
         else:
             exits.say(f"{safe_text(str(output))}: already holds this sweep; nothing to do")
     if as_json:
-        print(dump(outcome))
-    if outcome["failed"] and not allow_failed:
+        print(dump(fields))
+    if fields["failed"] and not allow_failed:
         if quiet or not fresh:
-            exits.say(failed_line(outcome), error=True)
+            exits.say(failed_line(fields), error=True)
         raise typer.Exit(exits.LANES_FAILED)
 
 
@@ -88,11 +90,11 @@ def failed_line(found: Mapping[str, Any]) -> str:
     return f"{safe_text(found['output'])}: {counts}"
 
 
-def print_summary(survey: Survey, found: Mapping[str, Any]) -> None:
+def print_summary(outcome: SweepOutcome, found: Mapping[str, Any]) -> None:
     """What came out of a sweep, on stderr."""
     out = console(sys.stderr)
-    if survey.tally.worst:
-        out.print(worst_errors(survey.outline, survey.tally))
+    if outcome.summary.worst:
+        out.print(worst_errors(outcome.dataset, outcome.summary))
     counts = ", ".join(f"{count:,} {name}" for name, count in found["status"].items())
     distinct = f" from {found['trajectories']:,} trajectories" if found["trajectories"] is not None else ""
     out.print(cell(f"{found['output']}: {found['points']:,} points{distinct} ({counts})"))
@@ -107,15 +109,15 @@ def print_summary(survey: Survey, found: Mapping[str, Any]) -> None:
         out.print(cell(f"and {more:,} more"))
 
 
-def worst_errors(outline: xr.Dataset, tally: Tally) -> Table:
+def worst_errors(dataset: xr.Dataset, totals: Summary) -> Table:
     """The largest errors per model, as far as the result has them."""
     columns = {
         "e_error": "max |e_out − e|", "v1_error": "max |v1 error|", "v2_error": "max |v2 error|",
         "closed_form_error": "max |e_out − exact|", "energy_residual": "max |residual|",
     }  # fmt: skip
-    held = [name for name in columns if name in tally.worst]
+    held = [name for name in columns if name in totals.worst]
     rows = table("model", *(columns[name] for name in held))
-    for place, key in enumerate(outline["model"].values):
-        largest = (tally.worst[name].get(place, float("nan")) for name in held)
+    for model, key in enumerate(dataset["model"].values):
+        largest = (totals.worst[name].get(model, float("nan")) for name in held)
         rows.add_row(cell(key), *(number(value, 3) for value in largest))
     return rows

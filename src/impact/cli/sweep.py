@@ -21,7 +21,7 @@ from .options import AllowFailed, Jobs, Json, MaxPoints, Output, Overwrite, Plug
 
 if TYPE_CHECKING:
     from ..engine.plan import Plan
-    from ..results.summary import Survey
+    from ..results.summary import SweepOutcome
 
 # how equal points are found where they are not compared over the whole grid
 COLLAPSE = {
@@ -90,11 +90,11 @@ def sweep(
             if should_stop():
                 raise UnfinishedError("nothing was written")
             return
-        survey, fresh = _sweep_whole(
+        outcome, fresh = _sweep_whole(
             plan, output, (config, *(plugins or ())), executor, resume=resume, overwrite=overwrite, quiet=quiet,
             should_stop=should_stop,
         )  # fmt: skip
-    summary.conclude(survey, output, fresh=fresh, quiet=quiet, as_json=as_json, allow_failed=allow_failed)
+    summary.conclude(outcome, output, fresh=fresh, quiet=quiet, as_json=as_json, allow_failed=allow_failed)
 
 
 def _sweep_whole(
@@ -107,24 +107,24 @@ def _sweep_whole(
     overwrite: bool,
     quiet: bool,
     should_stop: Callable[[], bool],
-) -> tuple[Survey, bool]:
-    """The survey of the result of a plan, and whether it was made just now: the file may hold it already."""
+) -> tuple[SweepOutcome, bool]:
+    """The stored result of a plan, and whether it was written now: the file may hold it already."""
     from ..engine import checkpoint
     from ..results import backend
-    from ..results.sweep import finished, sweep_into
+    from ..results.sweep import find_finished, sweep_into
     from .progress import progress
 
     shown = safe_text(str(output))
-    survey = None if overwrite else finished(output, plan)
-    if survey is not None:
+    outcome = None if overwrite else find_finished(output, plan)
+    if outcome is not None:
         checkpoint.remove_stale_work_folder(output, plan)
         if should_stop():
             raise UnfinishedError(f"{shown} already holds this sweep")
-        return survey, False
+        return outcome, False
     for source in sources:
         backend.check_output(output, overwrite=overwrite, source=source)
     with executor.backend(quiet=quiet, should_stop=should_stop) as integrators, progress(quiet=quiet) as report:
-        survey = sweep_into(
+        outcome = sweep_into(
             output,
             plan,
             resume=resume,
@@ -135,7 +135,7 @@ def _sweep_whole(
         )
     if should_stop():
         raise UnfinishedError(f"{shown} was stored whole")
-    return survey, True
+    return outcome, True
 
 
 def _sweep_shard(
@@ -239,7 +239,7 @@ def merge(
         from .progress import progress
 
         with progress(quiet=quiet) as report:
-            survey, twice = merge_shards(
+            outcome, twice = merge_shards(
                 folders, output, read_plugins(plugins or ()), overwrite=overwrite, on_progress=report,
                 should_stop=should_stop,
             )  # fmt: skip
@@ -247,4 +247,4 @@ def merge(
             raise UnfinishedError(f"{safe_text(str(output))} was stored whole")
     if twice and not quiet:
         exits.say(f"{twice:,} blocks were in more than one folder, with the same bits")
-    summary.conclude(survey, output, fresh=True, quiet=quiet, as_json=as_json, allow_failed=allow_failed)
+    summary.conclude(outcome, output, fresh=True, quiet=quiet, as_json=as_json, allow_failed=allow_failed)

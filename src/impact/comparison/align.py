@@ -1,4 +1,4 @@
-"""Two results laid point on point by their labels, and what keeps them from fitting."""
+"""Align two results by their labels, and list the differences between their inputs."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ import xarray as xr
 from ..engine.plan import material_property, owner_of
 from ..formatting import number
 from ..results.attributes import read_attribute
-from ..results.schema import ABOUT_A_MODEL, SCHEMA, Variable, columns_along, is_case, is_input
-from ..results.select import NUMBERS, ROUNDING, Places, Values, matched
+from ..results.schema import MODEL_METADATA, SCHEMA, SchemaVariable, columns_along, is_case, is_input
+from ..results.selection import LABEL_RTOL, NUMBER_DTYPE_KINDS, IndexArray, Labels, match_labels
 from ..text import safe_text
-from .verdict import Fault, Kind
+from .verdict import Fault, FaultKind
 
-NAMED = 3  # labels of one side that a message names
+MAX_NAMED_LABELS = 3  # labels of one side that a message names
 # coordinates that vary with the model
-OF_A_MODEL = ("model", "exponent", *ABOUT_A_MODEL)
+MODEL_COORDINATES = ("model", "exponent", *MODEL_METADATA)
 
 
 @dataclass(frozen=True)
@@ -36,9 +36,9 @@ class Side:
 
     dataset: xr.Dataset
     coords: xr.Dataset
-    places: Mapping[str, Places]
+    places: Mapping[str, IndexArray]
 
-    def read(self, name: str, where: Mapping[str, slice]) -> Values:
+    def read(self, name: str, where: Mapping[str, slice]) -> Labels:
         """The values of a variable or a coordinate at some of the common points.
 
         Parameters
@@ -58,7 +58,7 @@ class Side:
         return values[tuple(slice(None) if dim in variable.dims else np.newaxis for dim in where)]
 
 
-def _as_slice(places: Places) -> Places | slice:
+def _as_slice(places: IndexArray) -> IndexArray | slice:
     """Neighbouring places as a slice, which files and computed variables read faster."""
     first = int(places[0])
     is_range = np.array_equal(places, np.arange(first, first + len(places)))
@@ -93,37 +93,40 @@ def align(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Aligned:
     new, baseline : results
     subset : points that only one of them has are no fault
     """
-    new, baseline = _without_foreign_axes(new, baseline), _without_foreign_axes(baseline, new)
-    a, b = _coordinates(new, baseline), _coordinates(baseline, new)
-    faults = _inputs_of_one_side(a, b)
-    places: dict[str, tuple[Places, Places]] = {}
+    new, baseline = _drop_foreign_axes(new, baseline), _drop_foreign_axes(baseline, new)
+    a, b = _comparable_coordinates(new, baseline), _comparable_coordinates(baseline, new)
+    faults = _faults_of_missing_inputs(a, b)
+    places: dict[str, tuple[IndexArray, IndexArray]] = {}
     for axis in map(str, dict.fromkeys((*b.dims, *baseline.dims, *a.dims, *new.dims))):
-        columns = _columns(a, axis), _columns(b, axis)
+        columns = _label_columns(a, axis), _label_columns(b, axis)
         if columns[0] != columns[1] or not columns[0]:
-            text = f"what varies along the axis {safe_text(axis)} is {_listed(columns[0])}"
-            faults.append(Fault("nothing in common", axis, f"{text}, in BASELINE {_listed(columns[1])}"))
+            text = f"what varies along the axis {safe_text(axis)} is {_join_names(columns[0])}"
+            faults.append(Fault("nothing in common", axis, f"{text}, in BASELINE {_join_names(columns[1])}"))
             continue
-        places[axis] = matched([a[name].values for name in columns[0]], [b[name].values for name in columns[0]])
+        places[axis] = match_labels(
+            [a[name].values for name in columns[0]], [b[name].values for name in columns[0]]
+        )
         # the axis has its first column's name
         names = [*(n for n in columns[0] if n == axis), *(n for n in columns[0] if n != axis)]
         labels = [[coords[name].values for name in names] for coords in (a, b)]
-        faults += _labels(labels[0], labels[1], names, places[axis], subset=subset)
+        faults += _label_faults(labels[0], labels[1], names, places[axis], subset=subset)
     for name in sorted(str(name) for name in a.coords.keys() & b.coords.keys() if is_input(str(name))):
-        if a[name].ndim == b[name].ndim == 0 and not _same(a[name].values, b[name].values):
-            kind: Kind = "nothing in common" if subset else "physics config"
-            text = f"{safe_text(name)} is {_shown(a[name].values)}, in BASELINE {_shown(b[name].values)}"
+        if a[name].ndim == b[name].ndim == 0 and not _labels_agree(a[name].values, b[name].values):
+            kind: FaultKind = "nothing in common" if subset else "physics config"
+            values = f"{_format_value(a[name].values)}, in BASELINE {_format_value(b[name].values)}"
+            text = f"{safe_text(name)} is {values}"
             faults.append(Fault(kind, name, text))
     if any(fault.kind == "nothing in common" for fault in faults):
         nowhere = Side(new, xr.Dataset(), {}), Side(baseline, xr.Dataset(), {})
         return Aligned(*nowhere, {}, {}, tuple(faults))
     here, there = ({axis: pair[side] for axis, pair in places.items()} for side in (0, 1))
     a, b = a.isel(here), b.isel(there)
-    faults += _derived(a, b)
+    faults += _derived_faults(a, b)
     dims = {}
     for variable in SCHEMA:
         if variable.name in new and variable.name in baseline:
-            axes = _axes(variable, baseline, new)
-            if set(axes) == set(_axes(variable, new, baseline)):
+            axes = _axes_of_both(variable, baseline, new)
+            if set(axes) == set(_axes_of_both(variable, new, baseline)):
                 dims[variable.name] = axes
             else:
                 faults.append(Fault("labels", variable.name, f"{variable.name} varies along other axes"))
@@ -131,20 +134,20 @@ def align(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Aligned:
     return Aligned(Side(new, a, here), Side(baseline, b, there), sizes, dims, tuple(faults))
 
 
-def _without_foreign_axes(result: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
+def _drop_foreign_axes(result: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
     """A result without the parameters of models that the other has not got; the others do not vary with them."""
     models = {str(key) for key in np.ravel(other["model"].values)}
     foreign = [str(name) for name in result.coords if owner_of(str(name)) not in models | {""}]
     return result.isel({name: 0 for name in foreign if name in result.dims}).drop_vars(foreign)
 
 
-def _coordinates(result: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
+def _comparable_coordinates(result: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
     """The coordinates of a result, in memory; a single value that the other varies is an axis of length one."""
     materials = read_attribute(result.attrs, "materials")
     coords = _with_materials(result.coords.to_dataset().compute(), materials, other)
     if "model" not in result.dims:
         # one model was picked out; it is still a label
-        coords = _with_axis(coords, "model", OF_A_MODEL)
+        coords = _with_axis(coords, "model", MODEL_COORDINATES)
     for axis in map(str, other.dims):
         if axis not in coords.dims and axis in coords and coords[axis].ndim == 0:
             coords = _with_axis(coords, axis, [n for n in other.coords if axis in other.variables[n].dims])
@@ -180,14 +183,14 @@ def _with_axis(coords: xr.Dataset, axis: str, names: Iterable[Hashable]) -> xr.D
     )
 
 
-def _axes(variable: Variable, result: xr.Dataset, other: xr.Dataset) -> tuple[str, ...]:
+def _axes_of_both(variable: SchemaVariable, result: xr.Dataset, other: xr.Dataset) -> tuple[str, ...]:
     """The axes of a variable of a result, those of length one that only the other varies before its own."""
     added = [str(dim) for dim in dict.fromkeys(("model", *other.dims)) if dim not in result.dims]
     of_variable = [dim for dim in added if dim != "model" or variable.per == "model"]
     return (*reversed(of_variable), *map(str, result.variables[variable.name].dims))
 
 
-def _inputs_of_one_side(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
+def _faults_of_missing_inputs(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
     faults = []
     for name in sorted(str(name) for name in new.coords.keys() ^ baseline.coords.keys()):
         if is_input(name):
@@ -196,25 +199,25 @@ def _inputs_of_one_side(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
     return faults
 
 
-def _columns(dataset: xr.Dataset, axis: str) -> list[str]:
+def _label_columns(dataset: xr.Dataset, axis: str) -> list[str]:
     """The coordinates that tell the places on an axis: its numbers, or its own and the others of its zip group."""
     if axis == "model" or (is_case(axis) and axis in dataset.coords):
         return [axis]
     return sorted(columns_along(dataset, axis))
 
 
-def _labels(
-    new: Sequence[Values],
-    baseline: Sequence[Values],
+def _label_faults(
+    new: Sequence[Labels],
+    baseline: Sequence[Labels],
     names: Sequence[str],
-    places: tuple[Places, Places],
+    places: tuple[IndexArray, IndexArray],
     *,
     subset: bool,
 ) -> list[Fault]:
     """The labels of an axis that only one side has; those of a zip group with all their columns."""
     axis = names[0]
     if not len(places[0]):
-        sides = f"{_some(new, names)}, in BASELINE {_some(baseline, names)}"
+        sides = f"{_first_labels(new, names)}, in BASELINE {_first_labels(baseline, names)}"
         return [Fault("nothing in common", axis, f"no value of {safe_text(axis)} is in both: {sides}")]
     if subset:
         return []
@@ -222,58 +225,63 @@ def _labels(
     for columns, common, side in ((new, places[0], "NEW"), (baseline, places[1], "BASELINE")):
         unmatched = [np.delete(values, common) for values in columns]
         if len(unmatched[0]):
-            texts.append(f"{len(unmatched[0])} of {len(columns[0])} in {side} only: {_some(unmatched, names)}")
+            texts.append(
+                f"{len(unmatched[0])} of {len(columns[0])} in {side} only: {_first_labels(unmatched, names)}"
+            )
     return [Fault("labels", axis, f"{safe_text(axis)}: {'; '.join(texts)}")] if texts else []
 
 
-def _derived(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
+def _derived_faults(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
     """Coordinates along several axes, or along models, that have other values: e by alpha, the exponent."""
     faults = []
     for name in sorted(str(name) for name in new.coords.keys() & baseline.coords.keys()):
         if name == "exponent" or (is_input(name) and baseline[name].ndim):
             a, b = new[name], baseline[name]
             # e = 1 - alpha v0 is rounded as 1 is
-            rounding = ROUNDING if name == "e" else 0.0
-            if set(a.dims) != set(b.dims) or not _same(a.transpose(*b.dims).values, b.values, rounding):
-                faults.append(_fault_of_values(name, a, b))
+            rounding = LABEL_RTOL if name == "e" else 0.0
+            if set(a.dims) != set(b.dims) or not _labels_agree(a.transpose(*b.dims).values, b.values, rounding):
+                faults.append(_value_fault(name, a, b))
     return faults
 
 
-def _fault_of_values(name: str, new: xr.DataArray, baseline: xr.DataArray) -> Fault:
+def _value_fault(name: str, new: xr.DataArray, baseline: xr.DataArray) -> Fault:
     """That a coordinate has other values; of an input of numbered points, which they are."""
     axis = str(baseline.dims[0])
     if not is_case(axis) or new.dims != (axis,) or baseline.dims != (axis,):
         return Fault("labels", name, f"the coordinate {safe_text(name)} has other values")
-    differ = [n for n in range(baseline.size) if not _same(new.values[n : n + 1], baseline.values[n : n + 1])]
+    differ = [
+        n for n in range(baseline.size) if not _labels_agree(new.values[n : n + 1], baseline.values[n : n + 1])
+    ]
     numbers, a, b = (
-        [_shown(array.values[n]) for n in differ[:NAMED]] for array in (baseline[axis], new, baseline)
+        [_format_value(array.values[n]) for n in differ[:MAX_NAMED_LABELS]]
+        for array in (baseline[axis], new, baseline)
     )
     shown = "; ".join(
         f"{x} at {axis} {number}, in BASELINE {y}" for number, x, y in zip(numbers, a, b, strict=True)
     )
-    more = f"; and {len(differ) - NAMED} more" if len(differ) > NAMED else ""
+    more = f"; and {len(differ) - MAX_NAMED_LABELS} more" if len(differ) > MAX_NAMED_LABELS else ""
     return Fault("physics config", name, f"{safe_text(name)} is {shown}{more}")
 
 
-def _same(a: Values, b: Values, rounding: float = 0.0) -> bool:
+def _labels_agree(a: Labels, b: Labels, rounding: float = 0.0) -> bool:
     """Whether all are the same but for rounding, relative, and to so much where they are computed."""
-    if a.dtype.kind in NUMBERS and b.dtype.kind in NUMBERS:
-        return bool(np.isclose(a, b, rtol=ROUNDING, atol=rounding, equal_nan=True).all())
+    if a.dtype.kind in NUMBER_DTYPE_KINDS and b.dtype.kind in NUMBER_DTYPE_KINDS:
+        return bool(np.isclose(a, b, rtol=LABEL_RTOL, atol=rounding, equal_nan=True).all())
     return bool(np.all(a.astype(str) == b.astype(str)))
 
 
-def _some(columns: Sequence[Values], names: Sequence[str]) -> str:
+def _first_labels(columns: Sequence[Labels], names: Sequence[str]) -> str:
     """The first few labels."""
     shown = []
-    for first, *others in zip(*(values[:NAMED] for values in columns), strict=True):
-        more = (f" with {safe_text(n)}={_shown(v)}" for n, v in zip(names[1:], others, strict=True))
-        shown.append(_shown(first) + "".join(more))
-    return ", ".join(shown) + (", ..." if len(columns[0]) > NAMED else "")
+    for first, *others in zip(*(values[:MAX_NAMED_LABELS] for values in columns), strict=True):
+        more = (f" with {safe_text(n)}={_format_value(v)}" for n, v in zip(names[1:], others, strict=True))
+        shown.append(_format_value(first) + "".join(more))
+    return ", ".join(shown) + (", ..." if len(columns[0]) > MAX_NAMED_LABELS else "")
 
 
-def _shown(value: Any) -> str:
+def _format_value(value: Any) -> str:
     return safe_text(number(np.asarray(value).item(), 12), 60)
 
 
-def _listed(names: Sequence[str]) -> str:
+def _join_names(names: Sequence[str]) -> str:
     return safe_text(", ".join(names)) or "nothing"

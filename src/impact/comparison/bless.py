@@ -1,4 +1,4 @@
-"""A new baseline in the place of an old one, with the reason why."""
+"""Replace a baseline by a new result, with the reason for the change."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from pathlib import Path
 import xarray as xr
 
 from ..errors import ResultError, UsageError
-from ..results.backend import check_output, load, save_with
-from ..results.replay import described, inputs_of_model, repeats
-from ..results.summary import tally_of
+from ..results.backend import check_output, load, save_with_attributes
+from ..results.replay_command import command_start, describe_point, inputs_of_model
+from ..results.summary import summarize
 from ..text import safe_text
-from .compare import check_result, compare
-from .tolerances import Tolerances, in_effect
+from .compare import check_comparable, compare
+from .tolerances import Tolerances, effective_tolerances
 from .verdict import Verdict
 
 
@@ -63,35 +63,35 @@ def bless(
     new, baseline = Path(new), Path(baseline)
     check_output(baseline, overwrite=True, source=new)
     result = load(new)
-    check_result(result, str(new))
+    check_comparable(result, str(new))
     if not allow_failed:
-        _check_failed(result, new)
-    before = _standing(baseline)
+        _check_no_failures(result, new)
+    before = _load_baseline(baseline)
     verdict = None
     if before is not None:
         found = compare(result, before, tol=tol)
-        verdict = replace(found, new=str(new), baseline=str(baseline), repeats=repeats(str(new), result))
+        verdict = replace(found, new=str(new), baseline=str(baseline), repeats=command_start(str(new), result))
         show(verdict)
-    kept = in_effect(tol, result.attrs if before is None else before.attrs)
-    save_with(new, baseline, {"reason": reason, "tolerances": json.dumps(kept)})
+    kept = effective_tolerances(tol, result.attrs if before is None else before.attrs)
+    save_with_attributes(new, baseline, {"reason": reason, "tolerances": json.dumps(kept)})
     return verdict
 
 
-def _check_failed(result: xr.Dataset, path: Path) -> None:
+def _check_no_failures(result: xr.Dataset, path: Path) -> None:
     """Refuse a result with failed points, whose NaN every later failure would equal."""
-    tally = tally_of(result[["status"]] if "status" in result else result)
+    tally = summarize(result[["status"]] if "status" in result else result)
     if tally.not_counted:
         count = f"{tally.not_counted:,} points are too many to look for failures"
         raise UsageError(f"{safe_text(str(path))}: {count}; expected fewer, or --allow-failed")
     if tally.failed:
         status, model, places = tally.failed_at[0]
         point = result["status"].isel(dict(zip(result["status"].dims, (model, *places), strict=True)))
-        at = described(inputs_of_model({str(dim): point[dim].item() for dim in result["status"].dims}))
+        at = describe_point(inputs_of_model({str(dim): point[dim].item() for dim in result["status"].dims}))
         count = f"{tally.failed:,} of {tally.points:,} points failed, the first at {at} ({status.name.lower()})"
         raise UsageError(f"{safe_text(str(path))}: {count}; expected none, or --allow-failed")
 
 
-def _standing(baseline: Path) -> xr.Dataset | None:
+def _load_baseline(baseline: Path) -> xr.Dataset | None:
     """The baseline as it is, if there is one; what is no result is not written over."""
     if not baseline.exists():
         return None

@@ -1,4 +1,4 @@
-"""Judge a result by a baseline, as the SCHEMA says: the guard of stored datasets against silent changes."""
+"""Compare a result with a baseline, each variable as the SCHEMA prescribes."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from ..errors import UsageError
 from ..formatting import number
 from ..results.attributes import read_attribute
 from ..results.backend import load
-from ..results.replay import repeats
-from ..results.schema import ABOUT_A_MODEL, SCHEMA, SCHEMA_VERSION, is_case, is_input
+from ..results.replay_command import command_start
+from ..results.schema import MODEL_METADATA, SCHEMA, SCHEMA_VERSION, is_case, is_input
 from ..text import safe_text
-from .align import OF_A_MODEL, align
-from .judge import boxes_of, group_size, judge
-from .tolerances import ALL, Tolerances, in_effect
+from .align import MODEL_COORDINATES, align
+from .judge import group_size, judge, representative_boxes
+from .tolerances import ALL_VARIABLES, Tolerances, effective_tolerances
 from .verdict import Fault, Judged, Verdict
 
 
@@ -67,13 +67,13 @@ def compare(
     names = files[0] or "NEW", files[1] or "BASELINE"
     a, b = (load(source) if isinstance(source, str | Path) else source for source in (new, baseline))
     for dataset, name in zip((a, b), names, strict=True):
-        check_result(dataset, name)
-    strange = sorted({*_strange(a), *_strange(b)})
-    a, b = a.drop_vars(_strange(a)), b.drop_vars(_strange(b))
-    tolerances = in_effect(tol, b.attrs)
+        check_comparable(dataset, name)
+    strange = sorted({*_unknown_variables(a), *_unknown_variables(b)})
+    a, b = a.drop_vars(_unknown_variables(a)), b.drop_vars(_unknown_variables(b))
+    tolerances = effective_tolerances(tol, b.attrs)
     aligned = align(a, b, subset=subset)
-    faults = [*aligned.faults, *_materials(a, b), *_units(a, b)]
-    notes = [*_notes(a, b), *_texts(aligned.new.coords, aligned.baseline.coords)]
+    faults = [*aligned.faults, *_material_faults(a, b), *_unit_faults(a, b)]
+    notes = [*_attribute_notes(a, b), *_model_metadata_notes(aligned.new.coords, aligned.baseline.coords)]
     notes += [safe_text(f"not judged: {', '.join(strange)}")] if strange else []
     if any(fault.kind == "labels" for fault in faults) and not subset:
         notes.append("--subset judges what both have")
@@ -87,16 +87,16 @@ def compare(
     largest: dict[str, Mapping[str, np.ndarray]] = {}
     common = [variable for variable in SCHEMA if variable.name in aligned.dims]
     # for all before the first is judged: a refusal comes at once
-    boxes = boxes_of(common, aligned)
+    boxes = representative_boxes(common, aligned)
     for variable in common:
-        tolerance = tolerances.get(variable.name, tolerances[ALL])
+        tolerance = tolerances.get(variable.name, tolerances[ALL_VARIABLES])
         outcome, largest[variable.name] = judge(variable, aligned, tolerance, boxes[variable.name])
         judged.append(outcome)
     if not judged and not faults:
         faults.append(Fault("nothing in common", "", "the two have no variable in common"))
     return Verdict(
         new=names[0], baseline=names[1], faults=tuple(faults), variables=tuple(judged), notes=tuple(notes),
-        repeats=repeats(files[0], a) or repeats(files[1], b),
+        repeats=command_start(files[0], a) or command_start(files[1], b),
         worst_along=_along_axes(largest, aligned.baseline.coords),
     )  # fmt: skip
 
@@ -113,7 +113,7 @@ def _along_axes(largest: Mapping[str, Mapping[str, np.ndarray]], coords: xr.Data
     return along
 
 
-def check_result(dataset: xr.Dataset, name: str) -> None:
+def check_comparable(dataset: xr.Dataset, name: str) -> None:
     """Refuse what is no result of a sweep.
 
     Raises
@@ -121,7 +121,7 @@ def check_result(dataset: xr.Dataset, name: str) -> None:
     UsageError : it is a time history, or lacks what every result has
     """
     shown = safe_text(name)
-    is_current = _alike(dataset.attrs.get("schema_version"), SCHEMA_VERSION)
+    is_current = _attributes_equal(dataset.attrs.get("schema_version"), SCHEMA_VERSION)
     if not is_current or "rtol" not in dataset.attrs:
         about = "a time history" if "t" in dataset.coords else "not a result"
         raise UsageError(f"{shown}: is {about}; compare takes results of a sweep")
@@ -138,14 +138,14 @@ def check_result(dataset: xr.Dataset, name: str) -> None:
             raise UsageError(f"{shown}: {name} does not vary along all axes; compare takes whole results")
 
 
-def _strange(dataset: xr.Dataset) -> list[str]:
+def _unknown_variables(dataset: xr.Dataset) -> list[str]:
     """The variables that no result has."""
-    known = {*OF_A_MODEL, *(variable.name for variable in SCHEMA)}
+    known = {*MODEL_COORDINATES, *(variable.name for variable in SCHEMA)}
     names = [str(name) for name in dataset.variables if name not in known]
     return [name for name in names if not (is_input(name) or is_case(name))]
 
 
-def _materials(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
+def _material_faults(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
     """Properties that differ between materials of the same name."""
     materials = [read_attribute(dataset.attrs, "materials") for dataset in (new, baseline)]
     faults = []
@@ -161,22 +161,22 @@ def _materials(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
     return sorted(faults, key=lambda fault: fault.name)
 
 
-def _units(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
+def _unit_faults(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
     faults = []
     for name in [str(name) for name in baseline.variables if name in new.variables]:
         a, b = (dataset.variables[name].attrs.get("units") for dataset in (new, baseline))
-        if not _alike(a, b):
+        if not _attributes_equal(a, b):
             text = f"{name} is in {a}, in BASELINE in {b}"
             faults.append(Fault("units", name, safe_text(text)))
     return faults
 
 
-def _notes(new: xr.Dataset, baseline: xr.Dataset) -> list[str]:
+def _attribute_notes(new: xr.Dataset, baseline: xr.Dataset) -> list[str]:
     """What may explain a difference, and is no difference by itself."""
     notes = []
     for name in ("rtol", "max_steps", "impact_version"):
         a, b = (dataset.attrs.get(name) for dataset in (new, baseline))
-        if not _alike(a, b):
+        if not _attributes_equal(a, b):
             notes.append(safe_text(f"{name} is {a}, in BASELINE {b}", 400))
     for name in ("packages", "plugins"):
         a, b = (read_attribute(dataset.attrs, name) for dataset in (new, baseline))
@@ -188,15 +188,15 @@ def _notes(new: xr.Dataset, baseline: xr.Dataset) -> list[str]:
     return notes
 
 
-def _alike(a: Any, b: Any) -> bool:
+def _attributes_equal(a: Any, b: Any) -> bool:
     """Whether two attributes are equal; from elsewhere, they may be arrays."""
     return bool(np.array_equal(a, b))
 
 
-def _texts(new: xr.Dataset, baseline: xr.Dataset) -> list[str]:
+def _model_metadata_notes(new: xr.Dataset, baseline: xr.Dataset) -> list[str]:
     """Models about which another thing is said."""
     notes = []
-    for name in ABOUT_A_MODEL:
+    for name in MODEL_METADATA:
         if name in new.coords and name in baseline.coords:
             columns = (np.ravel(column) for column in (baseline["model"], new[name], baseline[name]))
             for key, a, b in zip(*columns, strict=True):

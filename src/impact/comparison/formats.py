@@ -1,4 +1,4 @@
-"""A verdict for whoever reads it: a person in a pull request, a CI server, a program."""
+"""A verdict as JSON, JUnit XML, Markdown or GitHub annotations."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from xml.etree import ElementTree
 
 from ..formatting import number
 from ..text import safe_text
-from .verdict import KINDS, Judged, Verdict
+from .verdict import FAULT_KINDS, Judged, Verdict
 
 PROGRAM = "impact compare"
 # differences that an annotation names
-ANNOTATED = 3
+MAX_ANNOTATED = 3
 
 
 @dataclass(frozen=True)
-class Case:
+class ReportCase:
     """One thing that was looked at: a variable, or one kind of fault; `texts` say what is wrong with it."""
 
     name: str
@@ -34,7 +34,7 @@ class Report:
     baseline: str
     equal: bool | None
     headline: str
-    cases: tuple[Case, ...] = ()
+    cases: tuple[ReportCase, ...] = ()
     notes: tuple[str, ...] = ()
     variables: tuple[Judged, ...] = ()
 
@@ -42,12 +42,12 @@ class Report:
 def report_of(verdict: Verdict) -> Report:
     """The report of a verdict: a case for each kind of fault, and for each variable, the worst first."""
     faults = (
-        Case(kind, tuple(fault.text for fault in verdict.faults if fault.kind == kind))
-        for kind in KINDS
+        ReportCase(kind, tuple(fault.text for fault in verdict.faults if fault.kind == kind))
+        for kind in FAULT_KINDS
         if kind != "values"
     )
     values = (
-        Case(one.name) if one.is_equal else Case(one.name, (one.text,), verdict.replay(one))
+        ReportCase(one.name) if one.is_equal else ReportCase(one.name, (one.text,), verdict.replay(one))
         for one in verdict.ranked
     )
     return Report(
@@ -66,10 +66,12 @@ def as_data(report: Report) -> dict[str, Any]:
     return {
         "equal": report.equal, "headline": report.headline, "new": report.new, "baseline": report.baseline,
         "faults": [
-            {"kind": case.name, "text": text} for case in report.cases if case.name in KINDS for text in case.texts
+            {"kind": case.name, "text": text}
+            for case in report.cases if case.name in FAULT_KINDS
+            for text in case.texts
         ],
         "variables": [
-            {**vars(one), "at": _safe(one.at), "equal": one.is_equal, "text": one.text,
+            {**vars(one), "at": _safe_inputs(one.at), "equal": one.is_equal, "text": one.text,
              "replay": next((case.replay for case in report.cases if case.name == one.name), "")}
             for one in report.variables
         ],
@@ -77,14 +79,14 @@ def as_data(report: Report) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _safe(at: Mapping[str, float | str]) -> dict[str, float | str]:
+def _safe_inputs(at: Mapping[str, float | str]) -> dict[str, float | str]:
     return {safe_text(name): safe_text(v, 2000) if isinstance(v, str) else v for name, v in at.items()}
 
 
 def as_junit(report: Report) -> str:
     """JUnit XML: a suite with a test for each kind of fault and each variable."""
     failed = [case for case in report.cases if case.texts]
-    cases = report.cases or (Case("readable"),)
+    cases = report.cases or (ReportCase("readable"),)
     numbers = {"tests": len(cases), "failures": len(failed), "errors": int(report.equal is None), "skipped": 0}
     counts = {name: str(number) for name, number in numbers.items()}
     root = ElementTree.Element("testsuites", counts)
@@ -107,9 +109,11 @@ def as_junit(report: Report) -> str:
 def as_markdown(report: Report) -> str:
     """Markdown for a pull request or a job summary."""
     sign = {True: "✅", False: "❌", None: "⚠️"}[report.equal]
-    lines = [f"### {sign} {PROGRAM}: {_plain(report.headline)}", ""]
-    lines += [f"`{_code(report.new)}` against the baseline `{_code(report.baseline)}`", ""]
-    told = [f"- {_plain(text)}" for case in report.cases if case.name in KINDS for text in case.texts]
+    lines = [f"### {sign} {PROGRAM}: {_escape_markdown(report.headline)}", ""]
+    lines += [f"`{_escape_code(report.new)}` against the baseline `{_escape_code(report.baseline)}`", ""]
+    told = [
+        f"- {_escape_markdown(text)}" for case in report.cases if case.name in FAULT_KINDS for text in case.texts
+    ]
     lines += [*told, ""] if told else []
     differing = [one for one in report.variables if not one.is_equal]
     if differing:
@@ -120,13 +124,12 @@ def as_markdown(report: Report) -> str:
         for one in differing:
             numbers = f"{number(one.worst, 3)} | {number(one.times, 3)}"
             values = f"{number(one.new, 12)} | {number(one.baseline, 12)}"
-            lines.append(
-                f"| `{one.name}` | {one.different} of {one.points} | {numbers} | {_plain(one.place)} | {values} |"
-            )
+            counts, point = f"{one.different} of {one.points}", _escape_markdown(one.place)
+            lines.append(f"| `{one.name}` | {counts} | {numbers} | {point} | {values} |")
         repeats = dict.fromkeys(case.replay for case in report.cases if case.replay)
         # a fence of four, because a name may hold three
         lines += ["", "````sh", *repeats, "````", ""] if repeats else [""]
-    lines += [f"- note: {_plain(note)}" for note in report.notes]
+    lines += [f"- note: {_escape_markdown(note)}" for note in report.notes]
     return "\n".join(lines).rstrip() + "\n"
 
 
@@ -135,28 +138,28 @@ def as_github(report: Report) -> str:
     differing = [case for case in report.cases if case.texts]
     worst = [(text, case.replay) for case in differing for text in case.texts]
     lines = [report.headline]
-    for text, replay in worst[:ANNOTATED]:
+    for text, replay in worst[:MAX_ANNOTATED]:
         lines += [text, replay] if replay and replay not in lines else [text]
-    lines += [f"and {len(worst) - ANNOTATED} more"] if len(worst) > ANNOTATED else []
+    lines += [f"and {len(worst) - MAX_ANNOTATED} more"] if len(worst) > MAX_ANNOTATED else []
     lines += [f"note: {note}" for note in report.notes]
     return _annotation("notice" if report.equal else "error", report.baseline, "\n".join(lines))
 
 
 def _annotation(level: str, file: str, text: str) -> str:
-    where = "".join(ESCAPED.get(letter, letter) for letter in file)
-    message = "".join(letter if letter in ":," else ESCAPED.get(letter, letter) for letter in text)
+    where = "".join(GITHUB_ESCAPES.get(letter, letter) for letter in file)
+    message = "".join(letter if letter in ":," else GITHUB_ESCAPES.get(letter, letter) for letter in text)
     return f"::{level} file={where},title={PROGRAM}::{message}"
 
 
 # what a workflow command cannot hold as it is; the last two in its properties only
-ESCAPED: Mapping[str, str] = {"%": "%25", "\r": "%0D", "\n": "%0A", ":": "%3A", ",": "%2C"}
+GITHUB_ESCAPES: Mapping[str, str] = {"%": "%25", "\r": "%0D", "\n": "%0A", ":": "%3A", ",": "%2C"}
 
 
-def _plain(text: str) -> str:
+def _escape_markdown(text: str) -> str:
     """Text that Markdown shows as it is."""
     return re.sub(r"([\\`*_{}\[\]<>|~#!&$@])", r"\\\1", text)
 
 
-def _code(text: str) -> str:
+def _escape_code(text: str) -> str:
     """Text within backticks, which know no escapes."""
     return text.replace("`", "'").replace("|", "¦")

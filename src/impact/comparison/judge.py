@@ -1,4 +1,4 @@
-"""One variable of two aligned results: how many tolerances apart, slab by slab, and where it is worst."""
+"""Compare one variable of two aligned results: the difference in tolerances, slab by slab, and the worst point."""
 
 from __future__ import annotations
 
@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 
 from ..contact.status import Status
 from ..errors import UsageError
-from ..results.replay import inputs_of_model
-from ..results.scales import scale_of
-from ..results.schema import Variable, columns_along, is_case
+from ..results.replay_command import inputs_of_model
+from ..results.schema import SchemaVariable, columns_along, is_case, scale_of
 from ..results.slabs import (
     MAX_SUMMARY_POINTS,
     SLAB_POINTS,
@@ -28,38 +27,37 @@ from ..results.slabs import (
 from .align import Aligned, Side
 from .verdict import Judged
 
-Array = NDArray[Any]
 # a part of the common points, by axis; along the axes that are not in it, the first place stands for all
 Box = Mapping[str, slice]
 
 # points of one variable that are compared at most: an hour
-MAX_POINTS = 10**10
+MAX_COMPARED_POINTS = 10**10
 # an axis with more places has its largest ratios by groups of neighbours: a picture shows no more
-MAX_PLACES = 2**14
+MAX_RATIO_GROUPS = 2**14
 # what a law may not have, or a sweep without e: NaN where all went well
-OPTIONAL = ("damping_ratio", "lambda", "closed_form_error", "e_error", "v1_error", "v2_error")
+OPTIONAL_VARIABLES = ("damping_ratio", "lambda", "closed_form_error", "e_error", "v1_error", "v2_error")
 # |difference|/scale is that of a trajectory: |Delta v1_post|/v0 = (m/m1) |Delta e_out| <= |Delta e_out|
-DIMENSIONLESS = ("scaled by v0", "scaled by the peak", "scaled by itself", "scaled by m v0^2/2")
+DIMENSIONLESS_SCALES = ("scaled by v0", "scaled by the peak", "scaled by itself", "scaled by m v0^2/2")
 # coordinates that the scale of a point is computed from
 SCALE_INPUTS = {"scaled by v0": ("v1", "v2"), "scaled by m v0^2/2": ("v1", "v2", "m1", "m2")}
 
 
-def boxes_of(variables: Sequence[Variable], aligned: Aligned) -> dict[str, list[Box]]:
+def representative_boxes(variables: Sequence[SchemaVariable], aligned: Aligned) -> dict[str, list[Box]]:
     """By variable, the parts of the common points that stand for all of them; see `compare` for the rule.
 
     Raises
     ------
-    UsageError : a variable has more than `MAX_POINTS` points that none of the others stands for
+    UsageError : a variable has more than `MAX_COMPARED_POINTS` points that none of the others stands for
     """
     boxes: dict[str, list[Box]] = {}
     for variable in variables:
-        if any(_says_how_it_varies(side, variable.name) for side in (aligned.new, aligned.baseline)):
+        if any(_declares_dims(side, variable.name) for side in (aligned.new, aligned.baseline)):
             boxes[variable.name] = []
         else:
             boxes[variable.name] = [_box(aligned.dims[variable.name], aligned.sizes, slice(None))]
     reduced = [variable for variable in variables if not boxes[variable.name]]
     for model in range(aligned.sizes.get("model", 0)) if reduced else ():
-        sides = [_of_model(side, model) for side in (aligned.new, aligned.baseline)]
+        sides = [_dataset_of_model(side, model) for side in (aligned.new, aligned.baseline)]
         for variable in reduced:
             if "model" in aligned.dims[variable.name]:
                 dims = _representative_dims(variable, aligned, sides)
@@ -70,18 +68,18 @@ def boxes_of(variables: Sequence[Variable], aligned: Aligned) -> dict[str, list[
             boxes[variable.name].append(_box(dims, aligned.sizes, slice(None)))
     for name, parts in boxes.items():
         points = sum(math.prod(part.stop - part.start for part in box.values()) for box in parts)
-        if points > MAX_POINTS:
-            expected = f"expected at most {MAX_POINTS:,}; select a part of the results"
+        if points > MAX_COMPARED_POINTS:
+            expected = f"expected at most {MAX_COMPARED_POINTS:,}; select a part of the results"
             raise UsageError(f"{name}: got {points:,} points to compare, {expected}")
     return boxes
 
 
-def _says_how_it_varies(side: Side, name: str) -> bool:
+def _declares_dims(side: Side, name: str) -> bool:
     variable = side.dataset.variables[name]
     return is_lazy(variable) and VARIES_ALONG in variable.encoding
 
 
-def _of_model(side: Side, model: int) -> xr.Dataset:
+def _dataset_of_model(side: Side, model: int) -> xr.Dataset:
     """The whole result of the model at a common place."""
     place = int(side.places["model"][model])
     return side.dataset.isel(model=slice(place, place + 1)) if "model" in side.dataset.dims else side.dataset
@@ -91,7 +89,9 @@ def _box(dims: Iterable[str], sizes: Mapping[str, int], models: slice) -> Box:
     return {dim: slice(*(models if dim == "model" else slice(None)).indices(sizes[dim])[:2]) for dim in dims}
 
 
-def _representative_dims(variable: Variable, aligned: Aligned, sides: Sequence[xr.Dataset]) -> tuple[str, ...]:
+def _representative_dims(
+    variable: SchemaVariable, aligned: Aligned, sides: Sequence[xr.Dataset]
+) -> tuple[str, ...]:
     """The axes of a variable whose points stand for all the others.
 
     Parameters
@@ -114,7 +114,7 @@ def _representative_dims(variable: Variable, aligned: Aligned, sides: Sequence[x
     if variable.per == "model" and variable.judged not in ("exact", "reported"):
         # the status says whether a NaN is an answer
         candidates.insert(0, full | varying("status"))
-    if variable.judged in DIMENSIONLESS and all("e_out" in side for side in sides):
+    if variable.judged in DIMENSIONLESS_SCALES and all("e_out" in side for side in sides):
         candidates.append(varying("e_out"))
     chosen = []
     for dims in candidates:
@@ -142,8 +142,8 @@ class Worst:
 
 
 def judge(
-    variable: Variable, aligned: Aligned, tol: float, boxes: Iterable[Box]
-) -> tuple[Judged, dict[str, Array]]:
+    variable: SchemaVariable, aligned: Aligned, tol: float, boxes: Iterable[Box]
+) -> tuple[Judged, dict[str, NDArray[Any]]]:
     """One variable at all common points: |new - baseline| in tolerances, inf where nothing is allowed.
 
     Parameters
@@ -151,13 +151,13 @@ def judge(
     variable : that both have, along the same axes
     aligned : the two results
     tol : relative to the scale of a point
-    boxes : the points to read, see `boxes_of`; each counts for all that it stands for
+    boxes : the points to read, see `representative_boxes`; each counts for all that it stands for
 
     Returns
     -------
     Judged : the numbers
     dict : by axis, the largest ratio at each of its places, or in groups of neighbours if they are more than
-        `MAX_PLACES`; constant along an axis of which the first place stands for all
+        `MAX_RATIO_GROUPS`; constant along an axis of which the first place stands for all
     """
     dims = aligned.dims[variable.name]
     shape = tuple(aligned.sizes[dim] for dim in dims)
@@ -174,7 +174,7 @@ def judge(
             different += int(np.count_nonzero(ratio > 1.0)) * weight
             if not ratio.max():
                 continue
-            worst = _worse(worst, _worst(variable, where, ratio, difference, a, b), shape)
+            worst = _worse(worst, _worst_of_slab(variable, where, ratio, difference, a, b), shape)
             for axis, dim in enumerate(dims):
                 maxima = ratio.max(axis=tuple(other for other in range(len(dims)) if other != axis))
                 size, part = aligned.sizes[dim], slab.get(dim)
@@ -187,7 +187,7 @@ def judge(
         tolerance=math.nan if variable.judged in ("exact", "reported") else tol,
         points=math.prod(shape), different=different,
         worst=worst.difference if worst else 0.0, times=worst.times if worst else 0.0,
-        at=_labels(aligned.new.coords, dict(zip(dims, worst.index, strict=True))) if worst else {},
+        at=_inputs_of_point(aligned.new.coords, dict(zip(dims, worst.index, strict=True))) if worst else {},
         new=worst.new if worst else math.nan, baseline=worst.baseline if worst else math.nan,
     ), largest  # fmt: skip
 
@@ -198,7 +198,7 @@ def group_size(places: int) -> int:
     >>> group_size(101), group_size(10**6)
     (1, 62)
     """
-    return -(-places // MAX_PLACES)
+    return -(-places // MAX_RATIO_GROUPS)
 
 
 def _slabs(name: str, aligned: Aligned, box: Box) -> Iterator[dict[str, slice]]:
@@ -215,8 +215,13 @@ def _slabs(name: str, aligned: Aligned, box: Box) -> Iterator[dict[str, slice]]:
 
 
 def _ratio(
-    variable: Variable, aligned: Aligned, where: Mapping[str, slice], a: Array, b: Array, tol: float
-) -> tuple[Array, Array]:
+    variable: SchemaVariable,
+    aligned: Aligned,
+    where: Mapping[str, slice],
+    a: NDArray[Any],
+    b: NDArray[Any],
+    tol: float,
+) -> tuple[NDArray[Any], NDArray[Any]]:
     """The difference of the values of a slab, in tolerances and in the variable's unit."""
     with np.errstate(all="ignore"):
         difference = np.where(a == b, 0.0, np.abs(a.astype(float) - b.astype(float)))
@@ -244,16 +249,21 @@ def _ratio(
     return ratio, difference
 
 
-def _may_be_missing(variable: Variable, aligned: Aligned, where: Mapping[str, slice]) -> Array | bool:
+def _may_be_missing(variable: SchemaVariable, aligned: Aligned, where: Mapping[str, slice]) -> NDArray[Any] | bool:
     """Where NaN in both is no difference: both points ended alike, and not with an answer that has this value."""
     if variable.per == "axes" or not all("status" in side.dataset for side in (aligned.new, aligned.baseline)):
         return True
     new, baseline = (side.read("status", where) for side in (aligned.new, aligned.baseline))
-    return np.asarray((new == baseline) & ((baseline != Status.OK) | (variable.name in OPTIONAL)))
+    return np.asarray((new == baseline) & ((baseline != Status.OK) | (variable.name in OPTIONAL_VARIABLES)))
 
 
-def _worst(
-    variable: Variable, where: Mapping[str, slice], ratio: Array, difference: Array, a: Array, b: Array
+def _worst_of_slab(
+    variable: SchemaVariable,
+    where: Mapping[str, slice],
+    ratio: NDArray[Any],
+    difference: NDArray[Any],
+    a: NDArray[Any],
+    b: NDArray[Any],
 ) -> Worst:
     """The point of a slab with the largest ratio, among equals the first with the largest difference.
 
@@ -275,7 +285,7 @@ def _worse(first: Worst | None, second: Worst, shape: Sequence[int]) -> Worst:
     return max(first, second, key=lambda point: (point.times, point.size, [-place for place in point.index]))
 
 
-def _labels(coords: xr.Dataset, index: Mapping[str, int]) -> dict[str, float | str]:
+def _inputs_of_point(coords: xr.Dataset, index: Mapping[str, int]) -> dict[str, float | str]:
     """The inputs of a point of the new result: with them a config, read again here, has the point."""
     at = {
         name: coords.variables[name].values[place].item()

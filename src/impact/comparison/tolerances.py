@@ -1,4 +1,4 @@
-"""How far a value may be from its baseline: what was asked for, else what the baseline says, else the solver's."""
+"""Tolerances of a comparison: those passed by the caller, else the baseline's, else a multiple of its rtol."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from ..text import safe_text
 Tolerances = Mapping[str, float]
 
 # the name under which a tolerance is for all variables that have none of their own
-ALL = "all"
+ALL_VARIABLES = "all"
 # without one, a value may differ by this many tolerances of the solver
-SOLVER_TOLERANCES = 10.0
-JUDGED = {variable.name: variable.judged for variable in SCHEMA}
-WITH_TOLERANCE = [name for name, judged in JUDGED.items() if judged not in ("exact", "reported")]
+DEFAULT_RTOL_FACTOR = 10.0
+JUDGED_BY_NAME = {variable.name: variable.judged for variable in SCHEMA}
+TOLERANCE_VARIABLES = [name for name, judged in JUDGED_BY_NAME.items() if judged not in ("exact", "reported")]
 
 
-def in_effect(tol: float | Tolerances | None, attributes: Mapping[str, Any]) -> dict[str, float]:
+def effective_tolerances(tol: float | Tolerances | None, attributes: Mapping[str, Any]) -> dict[str, float]:
     """Tolerances by variable, "all" for the others: those asked for, else the baseline's, else its solver's.
 
     Parameters
@@ -36,36 +36,36 @@ def in_effect(tol: float | Tolerances | None, attributes: Mapping[str, Any]) -> 
     UsageError : a name is no variable with a tolerance, or a value is not a number from 0 up
     ResultError : what the baseline carries is not that
 
-    >>> in_effect({"e_out": 1e-6}, {"rtol": 1e-10, "tolerances": '{"all": 1e-8}'})
+    >>> effective_tolerances({"e_out": 1e-6}, {"rtol": 1e-10, "tolerances": '{"all": 1e-8}'})
     {'all': 1e-08, 'e_out': 1e-06}
-    >>> in_effect(1e-7, {"rtol": 1e-10, "tolerances": '{"v1_post": 1e-8}'})
+    >>> effective_tolerances(1e-7, {"rtol": 1e-10, "tolerances": '{"v1_post": 1e-8}'})
     {'all': 1e-07}
-    >>> in_effect(None, {"rtol": 1e-10})
+    >>> effective_tolerances(None, {"rtol": 1e-10})
     {'all': 1e-09}
     """
-    asked = dict(tol or {}) if isinstance(tol, Mapping | None) else {ALL: tol}
-    _check(asked)
-    if ALL in asked:
+    asked = dict(tol or {}) if isinstance(tol, Mapping | None) else {ALL_VARIABLES: tol}
+    _check_tolerances(asked)
+    if ALL_VARIABLES in asked:
         return asked
     rtol = attributes["rtol"]
     if not _is_number(rtol) or not 0.0 < rtol <= 1.0:
         raise ResultError("the attribute rtol of the baseline is not that of a result")
     try:
         kept = read_attribute(attributes, "tolerances")
-        _check(kept)
+        _check_tolerances(kept)
     except (ResultError, UsageError):
         raise ResultError("the attribute tolerances of the baseline is not that of a result") from None
-    return {ALL: SOLVER_TOLERANCES * float(rtol), **kept, **asked}
+    return {ALL_VARIABLES: DEFAULT_RTOL_FACTOR * float(rtol), **kept, **asked}
 
 
-def _check(tolerances: Mapping[str, Any]) -> None:
+def _check_tolerances(tolerances: Mapping[str, Any]) -> None:
     for name, value in tolerances.items():
-        if name != ALL and name not in WITH_TOLERANCE:
+        if name != ALL_VARIABLES and name not in TOLERANCE_VARIABLES:
             has_none = {"exact": "has none, it is judged exactly;", "reported": "has none, it is not judged;"}
-            how = has_none[JUDGED[name]] if name in JUDGED else "no variable of a result;"
-            raise UsageError(f"--tol {safe_text(str(name))}: {how} {did_you_mean(str(name), WITH_TOLERANCE)}")
+            how = has_none[JUDGED_BY_NAME[name]] if name in JUDGED_BY_NAME else "no variable of a result;"
+            raise UsageError(f"--tol {safe_text(str(name))}: {how} {did_you_mean(str(name), TOLERANCE_VARIABLES)}")
         if not _is_number(value) or not 0.0 <= value <= sys.float_info.max:
-            shown = value if name == ALL else f"{name}={value}"
+            shown = value if name == ALL_VARIABLES else f"{name}={value}"
             raise UsageError(f"--tol {safe_text(str(shown))}: wants a number from 0 up, such as --tol 1e-8")
 
 

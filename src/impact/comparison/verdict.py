@@ -1,4 +1,4 @@
-"""What a comparison of two results comes to: a frozen value that says it in a sentence, and where to look."""
+"""The outcome of a comparison: whether two results are equal, what differs, and where."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ import xarray as xr
 
 from ..contact.status import Status
 from ..formatting import number
-from ..results.replay import described, replay
+from ..results.replay_command import describe_point, replay_command
 from ..text import safe_text
 
-Kind = Literal["nothing in common", "physics config", "labels", "units", "missing variable", "values"]
+FaultKind = Literal["nothing in common", "physics config", "labels", "units", "missing variable", "values"]
 # in the order in which a verdict tells them: what explains the most first
-KINDS: tuple[Kind, ...] = (
+FAULT_KINDS: tuple[FaultKind, ...] = (
     "nothing in common", "physics config", "labels", "units", "missing variable", "values",
 )  # fmt: skip
-NAMED = 4  # of the things of one kind that the first line names
+MAX_NAMED_FAULTS = 4  # of the things of one kind that the first line names
 
 
 @dataclass(frozen=True)
 class Fault:
     """One thing, other than a value, in which two results differ: of what kind, its name, a sentence."""
 
-    kind: Kind
+    kind: FaultKind
     name: str
     text: str
 
@@ -69,7 +69,7 @@ class Judged:
         >>> steps.place
         'model=hertz, e=0.3'
         """
-        return described(self.at)
+        return describe_point(self.at)
 
     @property
     def text(self) -> str:
@@ -79,7 +79,7 @@ class Judged:
         many = f"{self.name}: {self.different} of {self.points} differ"
         at = f" at {self.place}" if self.place else ""
         if self.judged == "exact" or self.worst != self.worst:
-            words = (_word(self.name, value) for value in (self.new, self.baseline))
+            words = (_format_outcome(self.name, value) for value in (self.new, self.baseline))
             both = self.new != self.new and self.baseline != self.baseline
             which = "first" if self.judged == "exact" else "worst"
             text = f"{many}, the {which}{at}: {', baseline '.join(words)}"
@@ -90,7 +90,7 @@ class Judged:
         return f"{many}, worst {number(self.worst, 2)} = {times}{at}"
 
 
-def _word(name: str, value: float) -> str:
+def _format_outcome(name: str, value: float) -> str:
     if name == "status" and value in set(Status):
         return Status(int(value)).name.lower()
     return "NaN" if value != value else number(value, 10)
@@ -157,22 +157,22 @@ class Verdict:
                 return f"{count}, none differs"
             at = f" at {closest.place}" if closest.place else ""
             return f"{count}, largest difference {number(closest.times, 2)} x tolerance: {closest.name}{at}"
-        by_kind: dict[Kind, dict[str, None]] = {}
+        by_kind: dict[FaultKind, dict[str, None]] = {}
         for fault in self.faults:
             by_kind.setdefault(fault.kind, {})[safe_text(fault.name, 60)] = None
         for variable in self.differing:
             by_kind.setdefault("values", {})[safe_text(variable.name, 60)] = None
         parts = []
-        for kind in (kind for kind in KINDS if kind in by_kind):
+        for kind in (kind for kind in FAULT_KINDS if kind in by_kind):
             names = [name for name in by_kind[kind] if name]
-            more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
-            parts.append(f"{kind} ({', '.join(names[:NAMED])}{more})" if names else kind)
+            more = f" and {len(names) - MAX_NAMED_FAULTS} more" if len(names) > MAX_NAMED_FAULTS else ""
+            parts.append(f"{kind} ({', '.join(names[:MAX_NAMED_FAULTS])}{more})" if names else kind)
         return f"not equal: {', '.join(parts)}"
 
     @property
     def lines(self) -> tuple[str, ...]:
         """What differs, a line each; after a value's the command that repeats its worst point."""
-        faults = sorted(self.faults, key=lambda fault: KINDS.index(fault.kind))
+        faults = sorted(self.faults, key=lambda fault: FAULT_KINDS.index(fault.kind))
         lines = [f"{fault.kind}: {fault.text}" for fault in faults]
         for variable in self.differing:
             command = f"  {self.replay(variable)}"
@@ -184,7 +184,7 @@ class Verdict:
         """The command that runs the worst point of a variable again; empty where there is none."""
         if not self.repeats or not variable.at:
             return ""
-        return replay(self.repeats, variable.at)
+        return replay_command(self.repeats, variable.at)
 
     def __str__(self) -> str:
         return "\n".join([self.headline, *self.lines, *(f"note: {note}" for note in self.notes)])

@@ -1,4 +1,4 @@
-"""Attributes of a result that hold JSON: read and validated here only, since the file may come from anywhere."""
+"""JSON attributes of a result, validated when they are read, since the file may come from anywhere."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class PluginRecord(BaseModel):
     package: str | None = None
 
 
-KINDS: Mapping[str, Any] = {
+ATTRIBUTE_TYPES: Mapping[str, Any] = {
     "axes": list[str],
     "config_set": list[str],
     "extended": list[Any],
@@ -41,7 +41,7 @@ def read_attribute(attributes: Mapping[Any, Any], name: str, source: str = "", *
     Parameters
     ----------
     attributes : of a result
-    name : one of `KINDS`
+    name : one of `ATTRIBUTE_TYPES`
     source : name of the result, for messages
     required : refuse a result without the attribute; else its value is empty there
 
@@ -55,7 +55,7 @@ def read_attribute(attributes: Mapping[Any, Any], name: str, source: str = "", *
     Traceback (most recent call last):
     impact.errors.ResultError: r.h5: attribute plugins: no JSON of the right kind
     """
-    kind = KINDS[name]
+    kind = ATTRIBUTE_TYPES[name]
     if name not in attributes and not required:
         return [] if kind in (list[str], list[Any]) else {}
     text = attributes.get(name)
@@ -70,4 +70,4 @@ def read_attribute(attributes: Mapping[Any, Any], name: str, source: str = "", *
 
 @cache
 def _adapter(name: str) -> TypeAdapter[Any]:
-    return TypeAdapter(KINDS[name])
+    return TypeAdapter(ATTRIBUTE_TYPES[name])

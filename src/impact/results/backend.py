@@ -1,6 +1,4 @@
-"""Results on disk: written whole or not at all, and opened as datasets that are read, or computed, when they are
-indexed.
-"""
+"""Save, open and load result files; the xarray backend that opens them."""
 
 from __future__ import annotations
 
@@ -23,18 +21,18 @@ from ..config.tables import Output
 from ..errors import ResultError, UnfinishedError, UsageError
 from ..text import safe_text
 from .expand import TrajectoryTable, in_memory, lazy_dataset
-from .factored import check_witnesses, stored_table, variables_of
-from .netcdf import StoredArray, read_variables, writing
+from .factored import check_witnesses, stored_table, witness_variables
+from .netcdf import StoredArray, open_for_writing, read_variables
 from .schema import SCHEMA
-from .sealed import MAGIC, check_seal, write_seal
+from .seal import MAGIC, check_seal, write_seal
 from .slabs import slabs
-from .validate import TABLE, is_quantity, schema_violation
+from .validation import TABLE_VARIABLES, is_quantity, schema_violation
 
-PLAIN = Output()
+DEFAULT_OUTPUT = Output()
 # bytes up to which a result is held in memory
-SMALL_BYTES = 2**29
+MAX_LOADED_BYTES = 2**29
 # what is copied of a file at a time
-COPIED_BYTES = 2**22
+COPY_BUFFER_BYTES = 2**22
 
 
 def check_output(path: Path, *, overwrite: bool, source: Path | None = None) -> None:
@@ -50,7 +48,7 @@ def check_output(path: Path, *, overwrite: bool, source: Path | None = None) -> 
         raise UsageError(f"{shown}: the folder {safe_text(str(folder))} does not exist")
     if not os.access(folder, os.W_OK | os.X_OK):
         raise UsageError(f"{shown}: the folder {safe_text(str(folder))} cannot be written to")
-    _check_name(path)
+    _check_name_length(path)
     try:
         mode = path.lstat().st_mode
     except FileNotFoundError:
@@ -65,7 +63,7 @@ def check_output(path: Path, *, overwrite: bool, source: Path | None = None) -> 
         raise UsageError(f"{shown}: exists; give another name, or overwrite it (--overwrite)")
 
 
-def _check_name(path: Path) -> None:
+def _check_name_length(path: Path) -> None:
     """Refuse a name with which the files beside it, such as RESULT.12345678.part, would be too long."""
     try:
         most = os.pathconf(path.parent, "PC_NAME_MAX")
@@ -78,7 +76,7 @@ def _check_name(path: Path) -> None:
         raise UsageError(f"{shown}: got a name of {length} bytes, expected at most {most - room}")
 
 
-def write_whole(path: Path, content: bytes | memoryview, *, overwrite: bool) -> None:
+def write_file(path: Path, content: bytes | memoryview, *, overwrite: bool) -> None:
     """Write a file so that its name appears only when it is complete, and stays after a power cut.
 
     Raises
@@ -91,11 +89,11 @@ def write_whole(path: Path, content: bytes | memoryview, *, overwrite: bool) -> 
         sink.write(content)
 
 
-def write(
+def write_sealed(
     sink: Sink,
     outline: xr.Dataset,
     values: Iterable[tuple[str, tuple[int | slice, ...], NDArray[Any]]],
-    output: Output = PLAIN,
+    output: Output = DEFAULT_OUTPUT,
 ) -> str:
     """Write and seal a dataset.
 
@@ -110,7 +108,7 @@ def write(
     -------
     str : the seal
     """
-    with writing(sink, outline, output) as put:
+    with open_for_writing(sink, outline, output) as put:
         for name, where, part in values:
             put(name, where, part)
     seal = write_seal(sink)
@@ -123,7 +121,7 @@ def save(
     path: str | Path,
     *,
     overwrite: bool = False,
-    output: Output = PLAIN,
+    output: Output = DEFAULT_OUTPUT,
     should_stop: Callable[[], bool] = lambda: False,
 ) -> None:
     """Store a dataset as a sealed netCDF-4 file, with all of its values.
@@ -168,11 +166,11 @@ def save(
                 yield str(name), tuple(where.values()), variable.isel(where).values
 
     with atomic_write(path, overwrite=overwrite) as sink:
-        write(sink, dataset, parts(), output)
+        write_sealed(sink, dataset, parts(), output)
         check_readable(sink, path)
 
 
-def save_with(source: Path, path: Path, attributes: Mapping[str, str]) -> None:
+def save_with_attributes(source: Path, path: Path, attributes: Mapping[str, str]) -> None:
     """Copy a result with other attributes, in the layout that it has; a file that exists is replaced.
 
     Raises
@@ -180,7 +178,7 @@ def save_with(source: Path, path: Path, attributes: Mapping[str, str]) -> None:
     StoreError : the disk is full or failed
     """
     with atomic_write(path, overwrite=True) as sink, source.open("rb") as file:
-        while content := file.read(COPIED_BYTES):
+        while content := file.read(COPY_BUFFER_BYTES):
             sink.write(content)
         sink.check()
         # what is stored of an attribute depends on what stood there before: they are written anew
@@ -235,13 +233,13 @@ def open_with_table(path: str | Path) -> tuple[xr.Dataset, TrajectoryTable | Non
     except OSError as error:
         raise ResultError(f"{shown}: is not a readable result ({safe_text(str(error), 80)})") from error
     try:
-        dataset, table, unknown = _dataset(file)
+        dataset, table, unknown = _read_dataset(file)
         odd = schema_violation(dataset)
         if odd:
             raise ResultError(f"is not a readable result ({odd})")
     except ResultError as error:
         file.close()
-        raise _named(shown, error) from None
+        raise _with_file_name(shown, error) from None
     except MemoryError:
         file.close()
         raise
@@ -257,7 +255,7 @@ def open_with_table(path: str | Path) -> tuple[xr.Dataset, TrajectoryTable | Non
     return dataset, table
 
 
-def _named(shown: str, error: ResultError) -> ResultError:
+def _with_file_name(shown: str, error: ResultError) -> ResultError:
     """An error that begins with the name of its file."""
     return error if str(error).startswith(f"{shown}: ") else ResultError(f"{shown}: {error}")
 
@@ -274,7 +272,7 @@ def load(path: str | Path) -> xr.Dataset:
     impact.errors.ResultError: README.md: is not a readable result ...
     """
     dataset, table = open_with_table(path)
-    if dataset.nbytes > SMALL_BYTES:
+    if dataset.nbytes > MAX_LOADED_BYTES:
         return dataset
     with dataset:
         shown = safe_text(str(path))
@@ -287,16 +285,16 @@ def load(path: str | Path) -> xr.Dataset:
         except MemoryError:
             raise
         except ResultError as error:
-            raise _named(shown, error) from None
+            raise _with_file_name(shown, error) from None
         except Exception as error:
             raise ResultError(f"{shown}: is not a readable result ({safe_text(str(error), 80)})") from error
 
 
-def _dataset(file: h5py.File) -> tuple[xr.Dataset, TrajectoryTable | None, tuple[str, ...]]:
+def _read_dataset(file: h5py.File) -> tuple[xr.Dataset, TrajectoryTable | None, tuple[str, ...]]:
     """The dataset in a file, its trajectory table if it has one, and names that are no part of a result."""
     variables, attributes, unknown = read_variables(file)
     given = [name for name, variable in variables.items() if not is_quantity(name, tuple(map(str, variable.dims)))]
-    table = {name for name in variables if name in TABLE}
+    table = {name for name in variables if name in TABLE_VARIABLES}
     coordinates = {name: variables[name].load() for name in given if name not in table}
     if "laws" not in attributes:
         computed = {name: variable for name, variable in variables.items() if name not in coordinates}
@@ -309,7 +307,7 @@ def _dataset(file: h5py.File) -> tuple[xr.Dataset, TrajectoryTable | None, tuple
     arrays = {name: StoredArray(name, file[name]) for name in table}
     sizes = {name: array.shape[0] for name, array in arrays.items()}
     found = stored_table(stored, sizes, lambda name, part: arrays[name].read((part,)))
-    quantities = variables_of(stored)
+    quantities = witness_variables(stored)
     check_witnesses(found, quantities, stored)
     outline = stored.drop_vars(witnesses).drop_attrs(deep=False)
     kept = {name: value for name, value in attributes.items() if name not in ("axes", "laws")}

@@ -1,4 +1,4 @@
-"""What a sweep would take: counted before anything is made, and timed on one block."""
+"""Estimate the size and duration of a sweep: count trajectories, and time one range and one slab."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from ..engine.execute import context_of, integrate_columns, with_core
 from ..engine.plan import Plan
 from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryMap, columns_of, trajectory_maps, trajectory_ranges
 from .expand import expanded_slabs, table_of
-from .factored import factored_outline
-from .schema import outline, stored
+from .factored import factored_template
+from .schema import dataset_template, stored_variables
 
 # numbers of workers of which the time is told
-WORKERS = (1, 2, 8, 32, 128, 512)
+WORKER_COUNTS = (1, 2, 8, 32, 128, 512)
 # what the driver does for a block that goes elsewhere is about so many times what is timed here: the rest is that
 # of dask, as scripts/bench_scaling.py measures it
-DASK = 2.0
+DASK_OVERHEAD = 2.0
 
 
 @dataclass(frozen=True)
-class Collapse:
+class ModelCounts:
     """How the points of a model collapse.
 
     Parameters
@@ -60,7 +60,7 @@ class Estimate:
 
     points: int
     trajectories: int
-    models: tuple[Collapse, ...]
+    models: tuple[ModelCounts, ...]
     bytes: int
     kept: int
     seconds: float
@@ -97,22 +97,22 @@ def estimate(plan: Plan, jobs: int = 1) -> Estimate:
     places = np.arange(RANGE_TRAJECTORIES) % chosen.size
     table = table_of(plan, maps, lambda _, start, stop: rebound.take(places[: stop - start]))
     with _timed() as assembling:
-        _, _, _, values = next(expanded_slabs(table, stored(plan)))
+        _, _, _, values = next(expanded_slabs(table, stored_variables(plan)))
         for array in values.values():
             hashlib.sha256(array.tobytes())
     slab = values["status"].size
     is_full = plan.layout == "full"
-    each, own = integrating() / chosen.size, DASK * driving() / chosen.size
+    each, own = integrating() / chosen.size, DASK_OVERHEAD * driving() / chosen.size
     after = assembling() / slab * plan.stored_points if is_full else 0.0
     busy = min(max(round(each / own), 1), len(ranges))
     kept = total * sum(getattr(rebound, name).itemsize for name in TABLE_COLUMNS)
-    whole = outline(plan)
-    counts = [*(count for count in WORKERS if count < busy), busy]
+    whole = dataset_template(plan)
+    counts = [*(count for count in WORKER_COUNTS if count < busy), busy]
     return Estimate(
         plan.points,
         total,
-        tuple(_collapse(plan, own_map) for own_map in maps),
-        (whole if is_full else factored_outline(whole, table, stored(plan))).nbytes,
+        tuple(_model_counts(plan, own_map) for own_map in maps),
+        (whole if is_full else factored_template(whole, table, stored_variables(plan))).nbytes,
         kept,
         each * total / jobs + after,
         plan.config.solver.core,
@@ -130,10 +130,10 @@ def _timed() -> Iterator[Callable[[], float]]:
     ended = time.perf_counter()
 
 
-def _collapse(plan: Plan, own: TrajectoryMap) -> Collapse:
+def _model_counts(plan: Plan, own: TrajectoryMap) -> ModelCounts:
     axes = tuple(plan.config.axes[axis].name for axis in own.axes)
     key = plan.models[own.model].key
     within: Literal["plan", "block", "not"] = "block" if not own.is_shared else "plan"
     if not plan.config.solver.collapse:
         within = "not"
-    return Collapse(key, plan.inputs.points_of(key), own.cells, own.count, axes, within)
+    return ModelCounts(key, plan.inputs.points_of(key), own.cells, own.count, axes, within)

@@ -1,4 +1,4 @@
-"""Expand: from the trajectory table of a sweep to the outputs of any part of its grid.
+"""Expand the trajectory table of a sweep into the outputs of any part of its grid.
 
 What is integrated is a table of distinct trajectories per model, in the contact's own units. All else in a result
 is a pure function of the inputs, this table and a place of the grid, and is computed here and nowhere else.
@@ -29,19 +29,19 @@ from ..contact.status import Status
 from ..engine.build_impacts import Stiffness, build_impacts, has_stiffness_rule
 from ..engine.plan import Index, Inputs, Plan, dimensions, owner_of
 from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryMap, axes_of_arrays, even_size, probe_index
-from .schema import Variable, attributes_of
-from .slabs import AXES, VARIES_ALONG, aligned_slabs, slabs
+from .schema import SchemaVariable, attributes_of
+from .slabs import ORIGINAL_DIMS, VARIES_ALONG, aligned_slabs, slabs
 
 # values up to which a law's rule of K is looked at as a whole, and stored in a file
 MAX_STIFFNESS_VALUES = 10**6
 # sizes of a contact within these are far from what a floating-point number can hold, whatever rounding adds
-SAFE_SIZES = (1e-250, 1e250)
+SAFE_MAGNITUDES = (1e-250, 1e250)
 # bytes that are computed or read at once, at most
-MAX_BYTES = 16 * 2**30
+MAX_INDEXED_BYTES = 16 * 2**30
 
 
 @dataclass(frozen=True)
-class Rows:
+class TrajectoryRows:
     """The integrated trajectories of each model, of which no more is held than what is asked for needs.
 
     Parameters
@@ -98,7 +98,7 @@ class TrajectoryTable:
     inputs: Inputs
     laws: tuple[Law, ...]
     maps: tuple[TrajectoryMap, ...]
-    rows: Rows
+    rows: TrajectoryRows
     stiffness: tuple[Stiffness | None, ...]
 
     @cached_property
@@ -113,8 +113,10 @@ class TrajectoryTable:
 def table_of(
     plan: Plan, maps: Sequence[TrajectoryMap], read: Callable[[int, int, int], CollisionResult]
 ) -> TrajectoryTable:
-    """The trajectory table of a plan; for `read` see `Rows`."""
-    return TrajectoryTable(plan.inputs, plan.models, tuple(maps), Rows(maps, read), (None,) * len(plan.models))
+    """The trajectory table of a plan; for `read` see `TrajectoryRows`."""
+    return TrajectoryTable(
+        plan.inputs, plan.models, tuple(maps), TrajectoryRows(maps, read), (None,) * len(plan.models)
+    )
 
 
 def expand(table: TrajectoryTable, model: int, index: Index, names: Sequence[str]) -> dict[str, NDArray[Any]]:
@@ -160,14 +162,16 @@ def varies_along(table: TrajectoryTable, model: int, names: Sequence[str]) -> di
         }
     shapes = [array.shape for check in table.checks[model] for array in looked_at[check]]
     checked = np.broadcast_shapes((1,) * dimensions(index), *shapes)
-    status = _some(checked, Status.NO_IMPACT, Status.OUT_OF_RANGE)
+    status = _alternating_statuses(checked, Status.NO_IMPACT, Status.OUT_OF_RANGE)
     shape = table.maps[model].rows(index).shape
     rebound = CollisionResult.blank(1).take(np.zeros(shape, np.intp))
-    values = outputs(law, impacts, replace(rebound, status=_some(shape, Status.MAX_STEPS)), names, status)
+    values = outputs(
+        law, impacts, replace(rebound, status=_alternating_statuses(shape, Status.MAX_STEPS)), names, status
+    )
     return {name: tuple(sorted(axes_of_arrays([values[name]]))) for name in names}
 
 
-def _some(shape: tuple[int, ...], *statuses: Status) -> NDArray[np.int8]:
+def _alternating_statuses(shape: tuple[int, ...], *statuses: Status) -> NDArray[np.int8]:
     """Each of some statuses at some places, where there are several."""
     found = np.full(shape, Status.OK, np.int8)
     if found.size > 1:
@@ -207,7 +211,7 @@ def checks_that_may_fail(inputs: Inputs, law: Law, stiffness: Stiffness | None =
     with np.errstate(all="ignore"):
         impacts = build_impacts(corners, law, corners.index())
         sizes = [impacts.m, impacts.K, impacts.length, impacts.energy, impacts.time]
-        if not all(np.all((size > SAFE_SIZES[0]) & (size < SAFE_SIZES[1])) for size in sizes):
+        if not all(np.all((size > SAFE_MAGNITUDES[0]) & (size < SAFE_MAGNITUDES[1])) for size in sizes):
             failing.add("length")
         if "alpha" in inputs.names():
             asked = 1.0 - np.multiply.outer(
@@ -257,7 +261,7 @@ class ExpandedArray(BackendArray):
     variable : which
     """
 
-    def __init__(self, table: TrajectoryTable, variable: Variable) -> None:
+    def __init__(self, table: TrajectoryTable, variable: SchemaVariable) -> None:
         self.table, self.variable = table, variable
         self.shape = ((len(table.laws),) if variable.per == "model" else ()) + table.inputs.shape
         self.dtype = np.dtype(variable.dtype)
@@ -278,14 +282,14 @@ class ExpandedArray(BackendArray):
             for where in slabs(dict(enumerate(out.shape))):
                 part = tuple(where.values())
                 index = np.ix_(*(axis[chosen] for axis, chosen in zip(axes, part, strict=True)))
-                out[part or ...] = _one(
+                out[part or ...] = _without_dummy_axis(
                     expand(self.table, model, index, [self.variable.name])[self.variable.name], part
                 )
         kept = tuple(0 if isinstance(part, int | np.integer) else slice(None) for part in key)
         return np.asarray(values[kept])
 
 
-def _one(values: NDArray[Any], where: tuple[slice, ...]) -> NDArray[Any]:
+def _without_dummy_axis(values: NDArray[Any], where: tuple[slice, ...]) -> NDArray[Any]:
     """Values of a slab; of a plan without axes the only cell has an axis."""
     return values if where else values.reshape(())
 
@@ -297,7 +301,7 @@ def check_memory(name: str, shape: Sequence[int], dtype: np.dtype[Any]) -> None:
     ------
     MemoryError : so it is
     """
-    size, most = math.prod(shape) * dtype.itemsize, max_bytes()
+    size, most = math.prod(shape) * dtype.itemsize, max_indexed_bytes()
     if size > most:
         raise MemoryError(
             f"{name}: {math.prod(shape):,} values take {size:,} bytes, expected at most {most:,}; select a part "
@@ -305,16 +309,16 @@ def check_memory(name: str, shape: Sequence[int], dtype: np.dtype[Any]) -> None:
         )
 
 
-def max_bytes() -> int:
+def max_indexed_bytes() -> int:
     """The bytes that may be computed or read at once: half of this machine's memory, at most 16 GiB."""
     try:
         whole = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (ValueError, OSError, AttributeError):
-        return MAX_BYTES
-    return min(MAX_BYTES, whole // 2)
+        return MAX_INDEXED_BYTES
+    return min(MAX_INDEXED_BYTES, whole // 2)
 
 
-def lazy_dataset(outline: xr.Dataset, table: TrajectoryTable, variables: Sequence[Variable]) -> xr.Dataset:
+def lazy_dataset(outline: xr.Dataset, table: TrajectoryTable, variables: Sequence[SchemaVariable]) -> xr.Dataset:
     """A result whose variables are computed when they are read.
 
     Parameters
@@ -335,7 +339,7 @@ def lazy_dataset(outline: xr.Dataset, table: TrajectoryTable, variables: Sequenc
         }
         array = indexing.LazilyIndexedArray(ExpandedArray(table, variable))
         computed[variable.name] = xr.Variable(
-            dims, array, attributes_of(variable), {VARIES_ALONG: by_model, AXES: tuple(dims)}
+            dims, array, attributes_of(variable), {VARIES_ALONG: by_model, ORIGINAL_DIMS: tuple(dims)}
         )
     dataset = outline.drop_vars(list(outline.data_vars)).assign(computed)
     for dim in map(str, dataset.dims):
@@ -344,7 +348,7 @@ def lazy_dataset(outline: xr.Dataset, table: TrajectoryTable, variables: Sequenc
 
 
 def expanded_slabs(
-    table: TrajectoryTable, variables: Sequence[Variable], lengths: Sequence[int] = ()
+    table: TrajectoryTable, variables: Sequence[SchemaVariable], lengths: Sequence[int] = ()
 ) -> Iterator[tuple[int, tuple[slice, ...], Impacts, dict[str, NDArray[Any]]]]:
     """All values of a result, slab by slab: the model, the place, the impacts, and values by name.
 
@@ -365,13 +369,13 @@ def expanded_slabs(
             shape = tuple(part.stop - part.start for part in where)
             values = {}
             for variable in wanted:
-                array = np.broadcast_to(_one(arrays.pop(variable.name), where), shape)
+                array = np.broadcast_to(_without_dummy_axis(arrays.pop(variable.name), where), shape)
                 # copied only where it is a view of fewer values, or of another type
                 values[variable.name] = np.asarray(array, variable.dtype, order="C")
             yield model, where, impacts, values
 
 
-def in_memory(dataset: xr.Dataset, table: TrajectoryTable, variables: Sequence[Variable]) -> xr.Dataset:
+def in_memory(dataset: xr.Dataset, table: TrajectoryTable, variables: Sequence[SchemaVariable]) -> xr.Dataset:
     """A result with all of its values in memory."""
     arrays = {variable.name: np.empty(dataset[variable.name].shape, variable.dtype) for variable in variables}
     for model, where, _, values in expanded_slabs(table, variables):

@@ -1,4 +1,4 @@
-"""Extend: more values on the axes of a result, of which only what is new is integrated."""
+"""Extend a result by values of its axes or by models; only new trajectories are integrated."""
 
 from __future__ import annotations
 
@@ -29,13 +29,12 @@ from .attributes import read_attribute
 from .backend import open_with_table
 from .expand import TrajectoryTable
 from .provenance import stored_config
-from .select import matched
-from .summary import Survey
-from .sweep import Extension, Values, sweep_into
+from .selection import IndexArray, match_labels
+from .summary import SweepOutcome
+from .sweep import Extension, SlabValues, sweep_into
 
-Places = NDArray[np.intp]
 # statuses that are given before anything is integrated
-CHECKED = (Status.NO_IMPACT, Status.INVALID_PARAMETER, Status.OUT_OF_RANGE)
+CHECKED_STATUSES = (Status.NO_IMPACT, Status.INVALID_PARAMETER, Status.OUT_OF_RANGE)
 
 
 def extend(
@@ -50,7 +49,7 @@ def extend(
     backend: Backend = SERIAL,
     on_progress: ProgressCallback = lambda progress: None,
     should_stop: Callable[[], bool] = never_stop,
-) -> tuple[Survey, int]:
+) -> tuple[SweepOutcome, int]:
     """Add values to the axes of a result, or models to it.
 
     Parameters
@@ -83,13 +82,13 @@ def extend(
             # the trajectories that are known are of this core
             solver = replace(new.config.solver, core=str(before.attrs["core"]))
             new = replace(new, config=replace(new.config, solver=solver))
-        _check_same(old, new, name)
+        _check_changes(old, new, name)
         check_count(new, max_points, str(source))
-        axes = tuple(_axis_places(axis, old.inputs, name) for axis in new.config.axes)
-        _check_kept(old, axes, name)
+        axes = tuple(_axis_positions(axis, old.inputs, name) for axis in new.config.axes)
+        _check_none_lost(old, axes, name)
         seal = str(before.encoding["seal"])
         history = [*read_attribute(before.attrs, "extended", str(source)), {"seal": seal, "set": list(overrides)}]
-        places = _Places(old, new, trajectory_maps(new), axes)
+        places = _OldPositions(old, new, trajectory_maps(new), axes)
         counted: dict[int, int] = {}
 
         # a full result has no trajectories to hand on to a table, only the values of its points
@@ -105,11 +104,11 @@ def extend(
             return found
 
         extension = Extension(seal, json.dumps(history), known, fill)
-        survey = sweep_into(
+        outcome = sweep_into(
             output, new, resume=resume, overwrite=overwrite, in_place=output == source, backend=backend,
             on_progress=on_progress, should_stop=should_stop, extension=extension,
         )  # fmt: skip
-    return survey, sum(counted.values())
+    return outcome, sum(counted.values())
 
 
 def _check_whole(before: xr.Dataset, old: Plan, name: str) -> None:
@@ -131,10 +130,10 @@ def _extended_plan(
     for axis in asked.axes:
         name = axis.name
         was = np.atleast_1d(old.inputs.values(name)) if _has_value(old.inputs, name) else np.array([])
-        is_there = len(matched([np.asarray(axis.columns[name])], [was])[0]) == was.size if was.size else True
+        is_there = len(match_labels([np.asarray(axis.columns[name])], [was])[0]) == was.size if was.size else True
         if len(axis.columns) == 1 and not axis.numbered and not is_there:
             values = [*was.tolist(), *(value for value in axis.columns[name] if value not in was.tolist())]
-            more.append(f"{'.'.join(map(str, path_of(name)))}={_toml(values)}")
+            more.append(f"{'.'.join(map(str, path_of(name)))}={_toml_array(values)}")
     missing = [model.key for model in old.models if model not in asked.models]
     if missing:
         keys = [*(model.key for model in old.models), *(m.key for m in asked.models if m not in old.models)]
@@ -149,13 +148,13 @@ def _has_value(inputs: Inputs, name: str) -> bool:
     return inputs.values(name).item(0) is not None
 
 
-def _toml(values: Sequence[object]) -> str:
+def _toml_array(values: Sequence[object]) -> str:
     return (
         "[" + ", ".join(json.dumps(v, ensure_ascii=False) if isinstance(v, str) else repr(v) for v in values) + "]"
     )
 
 
-def _check_same(old: Plan, new: Plan, name: str) -> None:
+def _check_changes(old: Plan, new: Plan, name: str) -> None:
     """Refuse changes of anything but values of axes and models."""
     before, after = dict(old.physics), dict(new.physics)
     free = ("models", "axes", "scalars", "materials", "plugins")
@@ -191,14 +190,14 @@ def _check_same(old: Plan, new: Plan, name: str) -> None:
 
 
 @dataclass(frozen=True)
-class _AxisPlaces:
+class _AxisPositions:
     """Where the values of an axis stand in the old result: its axis there, if any, and places; -1 is new."""
 
     axis: int | None
-    places: Places
+    places: IndexArray
 
 
-def _check_kept(old: Plan, axes: Sequence[_AxisPlaces], name: str) -> None:
+def _check_none_lost(old: Plan, axes: Sequence[_AxisPositions], name: str) -> None:
     """Refuse a plan that lacks a value of the smaller one."""
     for number, axis in enumerate(old.config.axes):
         held = {place for own in axes if own.axis == number for place in own.places.tolist()}
@@ -212,7 +211,7 @@ def _check_kept(old: Plan, axes: Sequence[_AxisPlaces], name: str) -> None:
             )
 
 
-def _axis_places(axis: Axis, old: Inputs, name: str) -> _AxisPlaces:
+def _axis_positions(axis: Axis, old: Inputs, name: str) -> _AxisPositions:
     """Where the values of an axis stood.
 
     Raises
@@ -244,19 +243,19 @@ def _axis_places(axis: Axis, old: Inputs, name: str) -> _AxisPlaces:
     else:
         place = {row: number for number, row in enumerate(before)}
         found = [place.get(row, -1) for row in rows]
-    return _AxisPlaces(next(iter(axes), None), np.array(found, np.intp))
+    return _AxisPositions(next(iter(axes), None), np.array(found, np.intp))
 
 
 @dataclass(frozen=True)
-class _Places:
+class _OldPositions:
     """Where the trajectories and points of the larger sweep stand in the smaller one."""
 
     old: Plan
     new: Plan
     maps: Sequence[TrajectoryMap]
-    axes: tuple[_AxisPlaces, ...]
+    axes: tuple[_AxisPositions, ...]
     # by model, for each trajectory the one that it was before, or -1
-    _rows: dict[int, Places] = field(default_factory=dict)
+    _rows: dict[int, IndexArray] = field(default_factory=dict)
 
     def model(self, model: int) -> int | None:
         """The place that a model had."""
@@ -276,7 +275,7 @@ class _Places:
         held = table.rows.take(model, np.maximum(before, 0))
         # what was checked beforehand at the values of the smaller sweep need not hold at those of the larger one
         status = columns_of(self.new, self.maps, part)["status"]
-        is_known &= np.where(status == OK, ~np.isin(held.status, CHECKED), held.status == status)
+        is_known &= np.where(status == OK, ~np.isin(held.status, CHECKED_STATUSES), held.status == status)
         rebound = CollisionResult.blank(part.size)
         rebound.put(np.flatnonzero(is_known), held.take(np.flatnonzero(is_known)))
         return is_known, rebound
@@ -295,14 +294,14 @@ class _Places:
             is_old = ~needed[part.start : part.stop]
         return is_old, CollisionResult.blank(part.size)
 
-    def _is_old(self, own: TrajectoryMap, cells: Places) -> NDArray[np.bool_]:
+    def _is_old(self, own: TrajectoryMap, cells: IndexArray) -> NDArray[np.bool_]:
         along = np.unravel_index(cells, own.shape) if own.shape else ()
         is_old = np.ones(cells.shape, bool)
         for axis, place in zip(own.axes, along, strict=True):
             is_old &= self.axes[axis].places[place] >= 0
         return is_old
 
-    def _old_rows(self, part: TrajectoryRange, before: TrajectoryMap) -> Places:
+    def _old_rows(self, part: TrajectoryRange, before: TrajectoryMap) -> IndexArray:
         own = self.maps[part.model]
         if own.of_cell is None:
             return self._rows_of_cells(own, before, np.arange(part.start, part.stop))
@@ -313,7 +312,7 @@ class _Places:
             self._rows[part.model] = rows
         return self._rows[part.model][part.start : part.stop]
 
-    def _rows_of_cells(self, own: TrajectoryMap, before: TrajectoryMap, cells: Places) -> Places:
+    def _rows_of_cells(self, own: TrajectoryMap, before: TrajectoryMap, cells: IndexArray) -> IndexArray:
         """The trajectory that each cell had, or -1."""
         along = dict(zip(own.axes, np.unravel_index(cells, own.shape) if own.shape else (), strict=True))
         index = [np.zeros(cells.shape, np.intp) for _ in self.old.config.axes]
@@ -327,11 +326,11 @@ class _Places:
         rows = before.rows(tuple(index)) if index else np.zeros(cells.shape, np.intp)
         return np.where(self._is_old(own, cells), rows, -1)
 
-    def filler(self, before: xr.Dataset) -> Callable[[int, tuple[slice, ...], Values], None]:
+    def filler(self, before: xr.Dataset) -> Callable[[int, tuple[slice, ...], SlabValues], None]:
         """What puts the values that the smaller result holds into those of a slab."""
         names = [axis.name for axis in self.old.config.axes]
 
-        def fill(model: int, where: tuple[slice, ...], values: Values) -> None:
+        def fill(model: int, where: tuple[slice, ...], values: SlabValues) -> None:
             old_model = self.model(model)
             if old_model is None:
                 return

@@ -1,4 +1,4 @@
-"""The factored layout: a result as its axes, its trajectory table and what its laws say, for any number of points.
+"""The factored layout: a file of axes, trajectory table and law metadata, for any number of points.
 
 Some points, the witnesses, are stored in full. When a file is opened they are computed again: where they come to
 other numbers, the file belongs to another version, and is refused.
@@ -31,21 +31,20 @@ from ..errors import ResultError, UsageError
 from ..formatting import number
 from ..text import safe_text
 from .attributes import read_attribute
-from .expand import MAX_STIFFNESS_VALUES, Rows, TrajectoryTable, expand, whole_stiffness
-from .scales import scale_of
-from .schema import SCHEMA, Variable, attributes_of, derived_names, is_input
+from .expand import MAX_STIFFNESS_VALUES, TrajectoryRows, TrajectoryTable, expand, whole_stiffness
+from .schema import SCHEMA, SchemaVariable, attributes_of, derived_names, is_input, scale_of
 
-WITNESSES = 1_000
+N_WITNESSES = 1_000
 # how far a witness may be from what is stored, of the scale that `compare` uses for its variable
 WITNESS_TOLERANCE = 1e-12
 SLAB_ROWS = 2**16
 # what a file says of a law, as JSON
-LAW_KINDS: Mapping[str, type] = {
+LAW_FIELD_TYPES: Mapping[str, type] = {
     "parameters": list, "domain": dict, "asks_for_e": bool, "is_permanent": bool, "axes": list,
     "trajectories": int, "is_shared": bool,
 }  # fmt: skip
 
-Read = Callable[[str, slice], NDArray[Any]]
+ReadVariable = Callable[[str, slice], NDArray[Any]]
 
 
 @dataclass(frozen=True)
@@ -61,7 +60,9 @@ class StoredLaw:
     stiffness: Formula | None = None
 
 
-def factored_outline(outline: xr.Dataset, table: TrajectoryTable, variables: Sequence[Variable]) -> xr.Dataset:
+def factored_template(
+    outline: xr.Dataset, table: TrajectoryTable, variables: Sequence[SchemaVariable]
+) -> xr.Dataset:
     """What a factored file holds: coordinates, attributes, and variables whose values do not count yet.
 
     Parameters
@@ -93,17 +94,23 @@ def factored_outline(outline: xr.Dataset, table: TrajectoryTable, variables: Seq
     rows, cells = (
         sum(sizes) for sizes in zip(*((own.count, own.cells * own.is_shared) for own in table.maps), strict=True)
     )
-    witnesses = len(witness_places(len(table.laws) * table.inputs.cells))
+    witnesses = len(witness_indices(len(table.laws) * table.inputs.cells))
     blank = CollisionResult.blank(1)
     held: dict[str, Any] = {
-        f"trajectory_{name}": _blank("trajectory", rows, getattr(blank, name).dtype, f"{name} of a trajectory")
+        f"trajectory_{name}": _placeholder(
+            "trajectory", rows, getattr(blank, name).dtype, f"{name} of a trajectory"
+        )
         for name in TABLE_COLUMNS
     }
     if cells:
-        held["trajectory_of_cell"] = _blank("cell", cells, np.dtype("i4"), "number of the trajectory of a cell")
+        held["trajectory_of_cell"] = _placeholder(
+            "cell", cells, np.dtype("i4"), "number of the trajectory of a cell"
+        )
     if stiffness:
-        held["law_stiffness"] = _blank("stiffness_value", stiffness, np.dtype("f8"), "K by the rules of the laws")
-    held["witness_index"] = _blank("witness", witnesses, np.dtype("i8"), "place in C order of (model, axes)")
+        held["law_stiffness"] = _placeholder(
+            "stiffness_value", stiffness, np.dtype("f8"), "K by the rules of the laws"
+        )
+    held["witness_index"] = _placeholder("witness", witnesses, np.dtype("i8"), "place in C order of (model, axes)")
     for variable in variables:
         attributes = attributes_of(variable)
         held[f"witness_{variable.name}"] = (
@@ -135,12 +142,12 @@ def _too_many_stiffness_values(law: Law) -> UsageError:
     )
 
 
-def _blank(dim: str, size: int, dtype: np.dtype[Any], meaning: str) -> tuple[Any, ...]:
+def _placeholder(dim: str, size: int, dtype: np.dtype[Any], meaning: str) -> tuple[Any, ...]:
     return dim, np.broadcast_to(np.zeros((), dtype), size), {"long_name": meaning}
 
 
 def table_values(
-    table: TrajectoryTable, variables: Sequence[Variable]
+    table: TrajectoryTable, variables: Sequence[SchemaVariable]
 ) -> Iterator[tuple[str, slice, NDArray[Any]]]:
     """The values of a factored file: name, place and values, no more than a little at a time."""
     start = cell = 0
@@ -161,42 +168,42 @@ def table_values(
             assert K is not None
             yield "law_stiffness", slice(value, value + K.size), K.reshape(-1)
             value += K.size
-    places = witness_places(len(table.laws) * table.inputs.cells)
+    places = witness_indices(len(table.laws) * table.inputs.cells)
     yield "witness_index", slice(0, len(places)), places
-    for name, values in witnesses_of(table, variables, places).items():
+    for name, values in witness_values(table, variables, places).items():
         yield f"witness_{name}", slice(0, len(places)), values
 
 
-def witness_places(points: int) -> NDArray[np.int64]:
+def witness_indices(points: int) -> NDArray[np.int64]:
     """Places of witnesses, spread over all points: multiples of the golden section, the first and the last.
 
-    >>> witness_places(3).tolist()
+    >>> witness_indices(3).tolist()
     [0, 1, 2]
     """
-    if points <= WITNESSES:
+    if points <= N_WITNESSES:
         return np.arange(points)
     step = int(points * 0.6180339887498949)
     # without a common factor all places differ
     while math.gcd(step, points) > 1:
         step += 1
-    return np.array(sorted({points - 1, *(place * step % points for place in range(WITNESSES - 1))}), np.int64)
+    return np.array(sorted({points - 1, *(place * step % points for place in range(N_WITNESSES - 1))}), np.int64)
 
 
-def witnesses_of(
-    table: TrajectoryTable, variables: Sequence[Variable], places: NDArray[np.int64]
+def witness_values(
+    table: TrajectoryTable, variables: Sequence[SchemaVariable], places: NDArray[np.int64]
 ) -> dict[str, NDArray[Any]]:
     """The values of some points of a result, by name; arrays of shape (places,)."""
     models, cells = np.divmod(places, table.inputs.cells)
     found = {variable.name: np.empty(places.size, variable.dtype) for variable in variables}
     for model in np.unique(models).tolist():
         where = np.flatnonzero(models == model)
-        values = expand(table, model, _cells(table.inputs, cells[where]), list(found))
+        values = expand(table, model, _unravel_cells(table.inputs, cells[where]), list(found))
         for name, array in found.items():
             array[where] = np.broadcast_to(values[name], where.shape)
     return found
 
 
-def _cells(inputs: Inputs, cells: NDArray[np.int64]) -> Index:
+def _unravel_cells(inputs: Inputs, cells: NDArray[np.int64]) -> Index:
     """The places of some cells along each axis."""
     index = []
     for size in reversed(inputs.shape):
@@ -205,7 +212,7 @@ def _cells(inputs: Inputs, cells: NDArray[np.int64]) -> Index:
     return tuple(reversed(index))
 
 
-def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: Read) -> TrajectoryTable:
+def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: ReadVariable) -> TrajectoryTable:
     """The trajectory table of a factored file.
 
     Parameters
@@ -218,15 +225,15 @@ def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: Read) -> T
     ------
     ResultError : what it says of its laws does not fit what it holds
     """
-    laws = _laws(dataset)
-    inputs = inputs_of(dataset)
+    laws = _read_laws(dataset)
+    inputs = read_inputs(dataset)
     places = {axis.name: place for place, axis in enumerate(inputs.axes)}
     maps, rules, stored = [], [], []
     starts = [0]
     cell = value = 0
     try:
         for model, (key, about) in enumerate(laws.items()):
-            if any(type(about[name]) is not kind for name, kind in LAW_KINDS.items()):
+            if any(type(about[name]) is not kind for name, kind in LAW_FIELD_TYPES.items()):
                 raise TypeError
             axes = tuple(places[name] for name in about["axes"])
             if len({*axes}) < len(axes):
@@ -249,16 +256,16 @@ def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: Read) -> T
             if about["stiffness_axes"] is not None:
                 chosen = tuple(places[name] for name in about["stiffness_axes"])
                 size = math.prod(inputs.shape[axis] for axis in chosen)
-                rule = _rule(inputs, chosen, read("law_stiffness", slice(value, value + size)))
+                rule = _stiffness_lookup(inputs, chosen, read("law_stiffness", slice(value, value + size)))
                 value += size
             rules.append(rule)
-            stored.append(_law(key, about))
+            stored.append(_stored_law(key, about))
         held = {f"trajectory_{name}": starts[-1] for name in TABLE_COLUMNS}
         held |= {"trajectory_of_cell": cell} if cell else {}
         held |= {"law_stiffness": value} if value else {}
         if held != {name: size for name, size in sizes.items() if not name.startswith("witness_")}:
             raise ValueError
-        _check_status(sizes["trajectory_status"], read)
+        _check_trajectory_statuses(sizes["trajectory_status"], read)
     except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError):
         raise ResultError("is not a readable result (its laws do not fit its table)") from None
 
@@ -266,10 +273,10 @@ def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: Read) -> T
         part = slice(starts[model] + start, starts[model] + stop)
         return CollisionResult(**{name: read(f"trajectory_{name}", part) for name in TABLE_COLUMNS})
 
-    return TrajectoryTable(inputs, tuple(stored), tuple(maps), Rows(maps, rows), tuple(rules))
+    return TrajectoryTable(inputs, tuple(stored), tuple(maps), TrajectoryRows(maps, rows), tuple(rules))
 
 
-def _check_status(rows: int, read: Read) -> None:
+def _check_trajectory_statuses(rows: int, read: ReadVariable) -> None:
     """Refuse a status that has no meaning, which a computed one would have as well."""
     for first in range(0, rows, SLAB_ROWS):
         values = read("trajectory_status", slice(first, min(first + SLAB_ROWS, rows)))
@@ -277,14 +284,14 @@ def _check_status(rows: int, read: Read) -> None:
             raise ValueError
 
 
-def _laws(dataset: xr.Dataset) -> dict[str, dict[str, Any]]:
+def _read_laws(dataset: xr.Dataset) -> dict[str, dict[str, Any]]:
     laws: dict[str, dict[str, Any]] = read_attribute(dataset.attrs, "laws", required=True)
     if list(laws) != [str(key) for key in dataset["model"].values]:
         raise ResultError("is not a readable result (laws: not those of its models)")
     return laws
 
 
-def _law(key: str, about: Mapping[str, Any]) -> StoredLaw:
+def _stored_law(key: str, about: Mapping[str, Any]) -> StoredLaw:
     return StoredLaw(
         key=key,
         exponent=None if about["exponent"] is None else float(about["exponent"]),
@@ -295,7 +302,7 @@ def _law(key: str, about: Mapping[str, Any]) -> StoredLaw:
     )
 
 
-def _rule(inputs: Inputs, axes: tuple[int, ...], values: Array) -> Stiffness:
+def _stiffness_lookup(inputs: Inputs, axes: tuple[int, ...], values: Array) -> Stiffness:
     """K at some cells, from its values over the axes that it depends on."""
     K = values.reshape([size if axis in axes else 1 for axis, size in enumerate(inputs.shape)] or (1,))
 
@@ -308,11 +315,11 @@ def _rule(inputs: Inputs, axes: tuple[int, ...], values: Array) -> Stiffness:
     return at
 
 
-def inputs_of(dataset: xr.Dataset) -> Inputs:
+def read_inputs(dataset: xr.Dataset) -> Inputs:
     """What a sweep gave a value to, from the coordinates of its result."""
     derived = derived_names(dataset.coords)
     scalars: dict[str, Any] = {}
-    axes: dict[str, dict[str, Any]] = {name: {} for name in axis_names(dataset)}
+    axes: dict[str, dict[str, Any]] = {name: {} for name in read_axis_names(dataset)}
     for name, variable in dataset.coords.items():
         if not is_input(str(name)) or name in derived:
             continue
@@ -327,7 +334,8 @@ def inputs_of(dataset: xr.Dataset) -> Inputs:
     try:
         stored = read_attribute(dataset.attrs, "materials", required=True)
         materials = {
-            name: Material(**{"E": np.nan, "nu": np.nan, **_numbers(about)}) for name, about in stored.items()
+            name: Material(**{"E": np.nan, "nu": np.nan, **_fixed_properties(about)})
+            for name, about in stored.items()
         }
     except (TypeError, ValueError):
         raise ResultError("is not a readable result (materials: no JSON of the right kind)") from None
@@ -340,12 +348,12 @@ def inputs_of(dataset: xr.Dataset) -> Inputs:
     return Inputs(scalars, tuple(ordered), materials)
 
 
-def _numbers(properties: Mapping[str, float | None]) -> dict[str, float]:
+def _fixed_properties(properties: Mapping[str, float | None]) -> dict[str, float]:
     """The properties of a material that are no axes."""
     return {key: value for key, value in properties.items() if value is not None}
 
 
-def axis_names(dataset: xr.Dataset) -> list[str]:
+def read_axis_names(dataset: xr.Dataset) -> list[str]:
     """The axes of the grid of a factored file, in their order."""
     names: list[str] = read_attribute(dataset.attrs, "axes", required=True)
     along = [name for name in names if name in dataset.coords and dataset.coords[name].dims == (name,)]
@@ -354,7 +362,7 @@ def axis_names(dataset: xr.Dataset) -> list[str]:
     return names
 
 
-def check_witnesses(table: TrajectoryTable, variables: Sequence[Variable], stored: xr.Dataset) -> None:
+def check_witnesses(table: TrajectoryTable, variables: Sequence[SchemaVariable], stored: xr.Dataset) -> None:
     """Refuse a file whose witnesses expand to other numbers than it holds.
 
     Parameters
@@ -369,11 +377,11 @@ def check_witnesses(table: TrajectoryTable, variables: Sequence[Variable], store
     """
     places = np.asarray(stored["witness_index"].values, np.int64)
     points = len(table.laws) * table.inputs.cells
-    if not np.array_equal(places, witness_places(points)):
+    if not np.array_equal(places, witness_indices(points)):
         raise ResultError("is not a readable result (its witnesses are not spread as they have to be)")
-    here = witnesses_of(table, variables, places)
+    here = witness_values(table, variables, places)
     cells = places % table.inputs.cells
-    index = _cells(table.inputs, cells)
+    index = _unravel_cells(table.inputs, cells)
     known = {name: values_at(table.inputs, name, index) for name in ("v1", "v2")}
     known |= {f"m{ball}": mass_at(table.inputs, ball, index) for ball in "12"}
     for variable in variables:
@@ -397,7 +405,7 @@ def check_witnesses(table: TrajectoryTable, variables: Sequence[Variable], store
             )
 
 
-def variables_of(stored: xr.Dataset) -> tuple[Variable, ...]:
+def witness_variables(stored: xr.Dataset) -> tuple[SchemaVariable, ...]:
     """The variables of a result of which a file has witnesses, with the dtypes that these have."""
     return tuple(
         replace(variable, dtype=stored[f"witness_{variable.name}"].dtype.str[1:])

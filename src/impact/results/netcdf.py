@@ -1,4 +1,4 @@
-"""A result as netCDF-4 in HDF5: written slab by slab, and read only where it has the structure of a result.
+"""Results as netCDF-4 files in HDF5: written slab by slab, and validated before they are read.
 
 HDF5 can name other files as the place of its data, can declare what it does not hold, and can hold a little under
 many names. A result does none of that: datasets of numbers and letters in one group, and small attributes.
@@ -28,32 +28,32 @@ from ..errors import ResultError
 from ..text import safe_text
 from .expand import check_memory
 from .schema import SCHEMA_VERSION
-from .sealed import USER_BLOCK
-from .validate import TABLE, is_name
+from .seal import USER_BLOCK_BYTES
+from .validation import TABLE_VARIABLES, is_name
 
-Where = tuple[int | slice, ...]
-Put = Callable[[str, Where, NDArray[Any]], None]
+Region = tuple[int | slice, ...]
+WriteRegion = Callable[[str, Region, NDArray[Any]], None]
 # values of a chunk of a compressed variable, where none is asked for
 CHUNK_VALUES = 2**16
 # what no result comes near
 MAX_DATASETS = 1_000
 MAX_ATTRIBUTES = 10_000
-MAX_NUMBERS = 64  # of an attribute
-MAX_TEXT = 80_000_000  # bytes of all attributes; a config may have 64 MB
-MAX_LETTERS = 4_000_000  # bytes of all labels
-MAX_CHUNKS = 200_000  # of all datasets together
+MAX_ATTRIBUTE_VALUES = 64  # of an attribute
+MAX_ATTRIBUTE_BYTES = 80_000_000  # bytes of all attributes; a config may have 64 MB
+MAX_LABEL_BYTES = 4_000_000  # bytes of all labels
+MAX_CHUNKS_OF_FILE = 200_000  # of all datasets together
 # what is compressed may be so many times the file, which is as much as deflate can, where it is more than little
-EXPANSION, SMALL = 1_100, 2**26
+MAX_COMPRESSION_RATIO, ALWAYS_ALLOWED_BYTES = 1_100, 2**26
 # what netCDF writes for other readers
-INTERNAL = frozenset({
+NETCDF_ATTRIBUTES = frozenset({
     "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_NCProperties", "coordinates", "CLASS", "_Netcdf4Dimid",
     "_Netcdf4Coordinates", "_Encoding",
 })  # fmt: skip
-UNREAD = frozenset({"NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_NCProperties", "coordinates"})
+SKIPPED_ATTRIBUTES = frozenset({"NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_NCProperties", "coordinates"})
 
 
 @contextmanager
-def writing(sink: Sink, outline: xr.Dataset, output: Output) -> Iterator[Put]:
+def open_for_writing(sink: Sink, outline: xr.Dataset, output: Output) -> Iterator[WriteRegion]:
     """Write a dataset into a file: its coordinates and attributes at once, its variables as they come.
 
     Parameters
@@ -68,10 +68,12 @@ def writing(sink: Sink, outline: xr.Dataset, output: Output) -> Iterator[Put]:
     """
     # variables in the order in which they are made
     with (
-        h5py.File(sink, "w", track_order=True, userblock_size=USER_BLOCK) as plain,
+        h5py.File(sink, "w", track_order=True, userblock_size=USER_BLOCK_BYTES) as plain,
         h5netcdf.File(plain, "w") as file,
     ):
-        texts = {str(name): letters(variable) for name, variable in outline.coords.items() if is_text(variable)}
+        texts = {
+            str(name): encode_text(variable) for name, variable in outline.coords.items() if is_text(variable)
+        }
         widths = dict.fromkeys(sorted(values.shape[-1] for values in texts.values()))
         file.dimensions = {
             **{str(name): size for name, size in outline.sizes.items()},
@@ -83,24 +85,25 @@ def writing(sink: Sink, outline: xr.Dataset, output: Output) -> Iterator[Put]:
                 values = texts[str(name)]
                 dims = (*variable.dims, f"string{values.shape[-1]}")
                 added = file.create_variable(str(name), dims, values.dtype, data=values)
-                _describe(added, {**variable.attrs, "_Encoding": "utf-8"})
+                _set_attributes(added, {**variable.attrs, "_Encoding": "utf-8"})
             else:
                 added = file.create_variable(str(name), variable.dims, variable.dtype, data=variable.values)
-                _describe(added, variable.attrs)
+                _set_attributes(added, variable.attrs)
         for name, variable in outline.data_vars.items():
-            storage = _storage(variable, output)
+            storage = _storage_options(variable, output)
             added = file.create_variable(str(name), variable.dims, variable.dtype, **storage)
             near = [other for other in coordinates if {*outline[other].dims} <= {*variable.dims}]
-            _describe(
-                added, variable.attrs if name in TABLE else {**variable.attrs, "coordinates": " ".join(near)}
+            _set_attributes(
+                added,
+                variable.attrs if name in TABLE_VARIABLES else {**variable.attrs, "coordinates": " ".join(near)},
             )
-        _describe(file, dict(outline.attrs))
+        _set_attributes(file, dict(outline.attrs))
         sink.check()
 
         # written to by h5py itself, which asks less each time
         made = {str(name): plain[str(name)] for name in outline.data_vars}
 
-        def put(name: str, where: Where, values: NDArray[Any]) -> None:
+        def put(name: str, where: Region, values: NDArray[Any]) -> None:
             made[name][where or ...] = values
             sink.check()
 
@@ -112,14 +115,14 @@ def is_text(variable: xr.DataArray | xr.Variable) -> bool:
     return variable.dtype.kind not in "fiub"
 
 
-def letters(variable: xr.DataArray) -> NDArray[np.bytes_]:
+def encode_text(variable: xr.DataArray) -> NDArray[np.bytes_]:
     """Texts as letters, the netCDF classic convention: an array of single bytes with one more axis."""
     encoded = [str(text).encode() for text in np.asarray(variable.values, object).reshape(-1)]
     width = max(1, *map(len, encoded)) if encoded else 1
     return np.array(encoded, f"S{width}").reshape(variable.shape)[..., np.newaxis].view("S1")
 
 
-def _describe(holder: Any, attributes: Mapping[Any, Any]) -> None:
+def _set_attributes(holder: Any, attributes: Mapping[Any, Any]) -> None:
     """Attributes, those of text as so many bytes, a number that a reader knows beforehand."""
     for name, value in attributes.items():
         if isinstance(value, str):
@@ -128,7 +131,7 @@ def _describe(holder: Any, attributes: Mapping[Any, Any]) -> None:
         holder.attrs[str(name)] = value
 
 
-def _storage(variable: xr.DataArray, output: Output) -> dict[str, Any]:
+def _storage_options(variable: xr.DataArray, output: Output) -> dict[str, Any]:
     """How a variable is stored: in one piece unless it is compressed, or chunks are asked for."""
     if not variable.ndim or (output.compression == "none" and not output.chunks):
         return {}
@@ -205,22 +208,26 @@ def read_variables(file: h5py.File) -> tuple[dict[str, xr.Variable], dict[str, o
     ------
     ResultError : it holds what a result never does
     """
-    _check_schema(file)
-    datasets = {name: h5py.Dataset(dataset) for name, dataset in _datasets(file).items()}
-    dims = _check_data(file, datasets)
+    _check_schema_version(file)
+    datasets = {name: h5py.Dataset(dataset) for name, dataset in _open_datasets(file).items()}
+    dims = _check_sizes(file, datasets)
     known = {name: dataset for name, dataset in datasets.items() if is_name(name)}
     # a dimension without values of its own stands in the file as well
-    unknown = [name for name in datasets if name not in known and not _is_bare(datasets[name], name, dims)]
+    unknown = [
+        name
+        for name in datasets
+        if name not in known and not _is_dimension_without_values(datasets[name], name, dims)
+    ]
     holders = {"": file, **known}
     if sum(h5a.get_num_attrs(holder.id) for holder in holders.values()) > MAX_ATTRIBUTES:
-        raise _odd(f"more than {MAX_ATTRIBUTES:,} attributes")
-    if sum(_text(name, holder) for name, holder in holders.items()) > MAX_TEXT:
-        raise _odd(f"more than {MAX_TEXT:,} bytes of text")
+        raise _unreadable(f"more than {MAX_ATTRIBUTES:,} attributes")
+    if sum(_attribute_text_bytes(name, holder) for name, holder in holders.items()) > MAX_ATTRIBUTE_BYTES:
+        raise _unreadable(f"more than {MAX_ATTRIBUTE_BYTES:,} bytes of text")
     variables = {}
     for name, dataset in known.items():
         if not dataset.id.get_storage_size():
-            raise _odd("declares what the file does not hold", name)
-        attributes = _attributes(dataset)
+            raise _unreadable("declares what the file does not hold", name)
+        attributes = _read_attributes(dataset)
         if dataset.dtype.kind == "S":
             values = StoredArray(name, dataset).read((slice(None),) * dataset.ndim)
             texts = values.view(f"S{values.shape[-1]}")[..., 0]
@@ -229,90 +236,92 @@ def read_variables(file: h5py.File) -> tuple[dict[str, xr.Variable], dict[str, o
             array = indexing.LazilyIndexedArray(StoredArray(name, dataset))
             chunks = {"chunksizes": dataset.chunks} if dataset.chunks else None
             variables[name] = xr.Variable(dims[name], array, attributes, chunks)
-    return variables, _attributes(file), tuple(sorted(unknown))
+    return variables, _read_attributes(file), tuple(sorted(unknown))
 
 
-def _odd(what: str, name: str = "") -> ResultError:
+def _unreadable(what: str, name: str = "") -> ResultError:
     return ResultError(f"is not a readable result ({safe_text(name, 40)}{': ' if name else ''}{what})")
 
 
-def _check_schema(file: h5py.File) -> None:
+def _check_schema_version(file: h5py.File) -> None:
     if not h5a.exists(file.id, b"schema_version"):
         raise ResultError("is not a result of impact")
     attribute = h5a.open(file.id, b"schema_version")
-    if not _is_number(attribute.get_type()) or attribute.shape not in ((), (1,)):
-        raise _odd("schema_version: not a number")
+    if not _is_number_type(attribute.get_type()) or attribute.shape not in ((), (1,)):
+        raise _unreadable("schema_version: not a number")
     found = np.ravel(file.attrs["schema_version"])[0]
     if found != SCHEMA_VERSION:
         raise ResultError(f"has schema version {found}, this program reads {SCHEMA_VERSION}")
 
 
-def _datasets(file: h5py.File) -> dict[str, h5d.DatasetID]:
+def _open_datasets(file: h5py.File) -> dict[str, h5d.DatasetID]:
     """The datasets of the file, by name; no link is followed out of it, or to the same thing twice."""
     root = file.id
     if root.get_num_objs() > MAX_DATASETS:
-        raise _odd(f"more than {MAX_DATASETS:,} datasets")
+        raise _unreadable(f"more than {MAX_DATASETS:,} datasets")
     found: dict[str, h5d.DatasetID] = {}
     objects = set()
     for link in root:
         name = link.decode(errors="surrogateescape")
         info = root.links.get_info(link)
         if info.type != h5l.TYPE_HARD:
-            raise _odd("a link to somewhere else", name)
+            raise _unreadable("a link to somewhere else", name)
         objects.add(info.u)
         found[name] = h5o.open(root, link)
         if not isinstance(found[name], h5d.DatasetID):
-            raise _odd("not a dataset", name)
+            raise _unreadable("not a dataset", name)
     if len(objects) < len(found):
-        raise _odd("a dataset of two names")
+        raise _unreadable("a dataset of two names")
     return found
 
 
-def _check_data(file: h5py.File, datasets: Mapping[str, h5py.Dataset]) -> dict[str, tuple[str, ...]]:
+def _check_sizes(file: h5py.File, datasets: Mapping[str, h5py.Dataset]) -> dict[str, tuple[str, ...]]:
     """The dimensions of each dataset, all of which the file itself holds."""
     size = file.id.get_filesize()
     chunks = compressed = plain = text = 0
     for name, dataset in datasets.items():
-        declared = _declared(name, dataset.id)
+        declared = _declared_bytes(name, dataset.id)
         if dataset.chunks:
-            chunks += _chunks(dataset)
+            chunks += _count_chunks(dataset)
         if dataset.compression:
             compressed += declared
         else:
             plain += declared
         text += declared if dataset.dtype.kind == "S" else 0
-    if plain > size or compressed > max(SMALL, EXPANSION * size):
-        raise _odd("more data than such a file may hold")
-    if chunks > MAX_CHUNKS:
-        raise _odd(f"more than {MAX_CHUNKS:,} chunks")
+    if plain > size or compressed > max(ALWAYS_ALLOWED_BYTES, MAX_COMPRESSION_RATIO * size):
+        raise _unreadable("more data than such a file may hold")
+    if chunks > MAX_CHUNKS_OF_FILE:
+        raise _unreadable(f"more than {MAX_CHUNKS_OF_FILE:,} chunks")
     # of one that is missing, any number of values would be read as zeros
-    missing = [name for name, one in datasets.items() if one.chunks and one.id.get_num_chunks() != _chunks(one)]
+    missing = [
+        name for name, one in datasets.items() if one.chunks and one.id.get_num_chunks() != _count_chunks(one)
+    ]
     if missing:
-        raise _odd("declares what the file does not hold", missing[0])
-    if text > MAX_LETTERS:
-        raise _odd(f"more than {MAX_LETTERS:,} bytes of labels")
-    return _dimensions(datasets)
+        raise _unreadable("declares what the file does not hold", missing[0])
+    if text > MAX_LABEL_BYTES:
+        raise _unreadable(f"more than {MAX_LABEL_BYTES:,} bytes of labels")
+    return _dims_by_dataset(datasets)
 
 
-def _chunks(dataset: h5py.Dataset) -> int:
+def _count_chunks(dataset: h5py.Dataset) -> int:
     return math.prod(-(-n // c) for n, c in zip(dataset.shape, dataset.chunks, strict=True))
 
 
-def _is_number(kind: h5t.TypeID) -> bool:
+def _is_number_type(kind: h5t.TypeID) -> bool:
     """Whether it is an integer or floating-point number of the usual bits."""
     plain = isinstance(kind, h5t.TypeIntegerID | h5t.TypeFloatID) and kind.get_size() <= 8
     return plain and h5t.py_create(kind.dtype).equal(kind)
 
 
-def _is_letter(kind: h5t.TypeID) -> bool:
+def _is_byte_type(kind: h5t.TypeID) -> bool:
     return isinstance(kind, h5t.TypeStringID) and not kind.is_variable_str() and kind.get_size() == 1
 
 
-def _declared(name: str, dataset: h5d.DatasetID) -> int:
+def _declared_bytes(name: str, dataset: h5d.DatasetID) -> int:
     """The bytes of a dataset, which is stored in the file in one piece, or in chunks of one size."""
     kind, shape = dataset.get_type(), dataset.shape
-    if not (_is_number(kind) or (_is_letter(kind) and shape)):
-        raise _odd("neither numbers nor labels", name)
+    if not (_is_number_type(kind) or (_is_byte_type(kind) and shape)):
+        raise _unreadable("neither numbers nor labels", name)
     plist = dataset.get_create_plist()
     declared = math.prod(shape) * kind.get_size() if shape is not None else 0
     if plist.get_layout() == h5d.CHUNKED:
@@ -326,11 +335,11 @@ def _declared(name: str, dataset: h5d.DatasetID) -> int:
         held = dataset.get_storage_size() in (0, declared)
         stored = plist.get_layout() == h5d.CONTIGUOUS and not plist.get_external_count() and held
     if not stored or not declared:
-        raise _odd("not stored in this file, in one piece or in chunks of one size", name)
+        raise _unreadable("not stored in this file, in one piece or in chunks of one size", name)
     return declared if dataset.get_storage_size() else 0
 
 
-def _dimensions(datasets: Mapping[str, h5py.Dataset]) -> dict[str, tuple[str, ...]]:
+def _dims_by_dataset(datasets: Mapping[str, h5py.Dataset]) -> dict[str, tuple[str, ...]]:
     """The dimensions of each dataset, by the numbers that netCDF gives to them and to their values."""
     numbers = {
         name: np.ravel(dataset.attrs.get("_Netcdf4Coordinates", ())).tolist() for name, dataset in datasets.items()
@@ -347,34 +356,34 @@ def _dimensions(datasets: Mapping[str, h5py.Dataset]) -> dict[str, tuple[str, ..
         if not own and name in sizes:
             own = (name,)
         if len({*own}) != len(own) or tuple(sizes.get(dim) for dim in own) != dataset.shape:
-            raise _odd("its axes are not those of the file", name)
+            raise _unreadable("its axes are not those of the file", name)
         dims[name] = own
     return dims
 
 
-def _is_bare(dataset: h5py.Dataset, name: str, dims: Mapping[str, tuple[str, ...]]) -> bool:
+def _is_dimension_without_values(dataset: h5py.Dataset, name: str, dims: Mapping[str, tuple[str, ...]]) -> bool:
     """Whether it is a dimension without values of its own."""
     return dims[name] == (name,) and not dataset.id.get_storage_size()
 
 
-def _text(name: str, holder: h5py.File | h5py.Dataset) -> int:
+def _attribute_text_bytes(name: str, holder: h5py.File | h5py.Dataset) -> int:
     """The bytes of text of the attributes that are read; each has a kind and a size that one may read."""
     total = 0
-    for key in (key for key in holder.attrs if key not in UNREAD):
+    for key in (key for key in holder.attrs if key not in SKIPPED_ATTRIBUTES):
         attribute = holder.attrs.get_id(key)
         kind, shape = attribute.get_type(), attribute.shape
         if isinstance(kind, h5t.TypeStringID) and not kind.is_variable_str() and shape == ():
             total += kind.get_size()
-        elif not _is_number(kind) or shape is None or math.prod(shape) > MAX_NUMBERS:
-            raise _odd("an attribute of an unusual kind or size", f"{name}@{key}")
+        elif not _is_number_type(kind) or shape is None or math.prod(shape) > MAX_ATTRIBUTE_VALUES:
+            raise _unreadable("an attribute of an unusual kind or size", f"{name}@{key}")
     return total
 
 
-def _attributes(holder: h5py.File | h5py.Dataset) -> dict[str, object]:
+def _read_attributes(holder: h5py.File | h5py.Dataset) -> dict[str, object]:
     """Attributes as they were before they were stored."""
     found: dict[str, object] = {}
     for name in holder.attrs:
-        if name not in INTERNAL:
+        if name not in NETCDF_ATTRIBUTES:
             value = holder.attrs[name]
             array = np.ravel(value)
             found[name] = value.decode() if isinstance(value, bytes) else array[0] if array.size == 1 else value

@@ -1,4 +1,4 @@
-"""Plausibility: values that are allowed, and most likely not what was meant."""
+"""Notes on values that are valid but probably not intended."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from ..contact.status import Status
 from ..formatting import number
 from ..text import safe_text
-from .summary import MAX_INDENTATION, Tally
+from .summary import MAX_SMALL_INDENTATION, Summary
 
 # Young's moduli outside are most likely in another unit: gels have 1e3 Pa, diamond has 1e12 Pa
 MIN_MODULUS_PA, MAX_MODULUS_PA = 1e3, 1e13
@@ -37,13 +37,13 @@ def material_notes(
                 break
 
 
-def result_notes(tally: Tally) -> Iterator[str]:
+def result_notes(tally: Summary) -> Iterator[str]:
     """A sentence for each thing that is implausible in what came out of a sweep."""
     if tally.points and not tally.not_counted and tally.counts.keys() == {Status.NO_IMPACT}:
         yield f"none of {tally.points:,} points is an impact: v1 <= v2, the balls do not approach"
     if tally.deep:
         many = f"{tally.deep:,} of {tally.points:,} points"
-        limit = f"{MAX_INDENTATION:.0%} of the smaller radius"
+        limit = f"{MAX_SMALL_INDENTATION:.0%} of the smaller radius"
         yield (
             f"peak indentation above {limit} at {many}, at most {tally.deepest:.0%}; Hertz theory assumes small "
             "indentation"

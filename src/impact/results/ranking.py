@@ -1,4 +1,4 @@
-"""Which model gives the restitution asked for, over all points of a result, and how wrong the others are."""
+"""Rank the models of a result by how closely they deliver the restitution asked for."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from ..engine.plan import owner_of
 from ..errors import UsageError
 from ..formatting import label, number, percentage
 from ..text import safe_text
-from .replay import described
+from .replay_command import describe_point
 from .schema import columns_along, foreign_dims, own_dims
-from .select import places_of, select
-from .slabs import Where, distinct, is_computed, over_varying_dims, slabs, varying_dims
+from .selection import model_positions, select
+from .slabs import Slab, distinct_points, is_computed, over_varying_dims, slabs, varying_dims
 
 Mask = NDArray[np.bool_]
 # points up to which variables that are computed are ranked: some minutes
 MAX_RANKED_POINTS = 2**30
 # values of a law's own parameters, in all combinations
-MAX_CHOICES = 2**24
-JUDGED = ("e_error", "status")
+MAX_PARAMETER_COMBINATIONS = 2**24
+RANKED_VARIABLES = ("e_error", "status")
 # ranges of e that a table names
 MAX_RANGES = 8
 # bits of a double, and of the upper part in which it is summed
@@ -100,7 +100,7 @@ class Ranked:
         ('hertz', '10.0%', '0.9', '0.45', '0', 'e=0.1: e_out 1', '1')
         """
         errors = (number(error, 3) for error in (self.max_error, self.mean_error))
-        worst = f"{described(self.at)}: e_out {number(self.e_out, 4)}" if self.at else "–"
+        worst = f"{describe_point(self.at)}: e_out {number(self.e_out, 4)}" if self.at else "–"
         return (self.name, self.percent, *errors, f"{self.failed:,}", worst, self._served_text)
 
     @property
@@ -188,23 +188,23 @@ def ranking(
     UsageError : the result has no errors of e to judge by, or has not got what is asked for; tol is not positive;
         too many points would have to be evaluated
     """
-    _check(dataset, tol)
-    chosen = places_of(models, dataset) if models else range(dataset.sizes["model"])
-    selected = select(dataset[list(JUDGED)], sel or {})
-    by_model = [_part_of_model(selected, place) for place in chosen]
-    evaluated = [_evaluated(of_model)[0] for of_model in by_model if is_computed(of_model.variables["e_error"])]
+    _check_rankable(dataset, tol)
+    chosen = model_positions(models, dataset) if models else range(dataset.sizes["model"])
+    selected = select(dataset[list(RANKED_VARIABLES)], sel or {})
+    by_model = [_select_model(selected, place) for place in chosen]
+    evaluated = [_reduce_dims(of_model)[0] for of_model in by_model if is_computed(of_model.variables["e_error"])]
     points = sum(math.prod(of_model.sizes.values()) for of_model in evaluated)
     if points > max_points:
         raise UsageError(
             f"got {points:,} different points to rank, expected at most {max_points:,}; select values of axes"
         )
-    ranked = [_ranked(of_model, tol) for of_model in by_model]
+    ranked = [_rank_model(of_model, tol) for of_model in by_model]
     if not any(one.points for one in ranked):
         raise UsageError("there is nothing to judge: at no point is an e asked for of balls that meet")
-    return Ranking(tol, tuple(sorted(ranked, key=_order)))
+    return Ranking(tol, tuple(sorted(ranked, key=_sort_key)))
 
 
-def _check(dataset: xr.Dataset, tol: float) -> None:
+def _check_rankable(dataset: xr.Dataset, tol: float) -> None:
     """Refuse what cannot be ranked."""
     if not 0.0 < tol < math.inf:
         raise UsageError(f"tol: got {tol:g}, wants a positive finite number")
@@ -212,7 +212,7 @@ def _check(dataset: xr.Dataset, tol: float) -> None:
         raise UsageError("this is a time history; models are ranked by the result of a sweep")
     if "model" not in dataset.dims:
         raise UsageError("model is no axis of this result; select models as a list, sel(model=[...])")
-    missing = [name for name in JUDGED if name not in dataset]
+    missing = [name for name in RANKED_VARIABLES if name not in dataset]
     if missing:
         raise UsageError(f"this result has no {', '.join(missing)}; sweep without [output] variables, or add them")
     if "e" not in dataset.coords or not _asks_for_e(dataset):
@@ -222,33 +222,33 @@ def _check(dataset: xr.Dataset, tol: float) -> None:
         raise UsageError("e_error, status and e of this result do not lie along the axes of a sweep")
 
 
-def _order(one: Ranked) -> tuple[float, ...]:
+def _sort_key(one: Ranked) -> tuple[float, ...]:
     # a model that failed everywhere has no errors
     return (-one.share, *(math.inf if math.isnan(error) else error for error in (one.max_error, one.mean_error)))
 
 
 def _asks_for_e(dataset: xr.Dataset) -> bool:
     """Whether there is a point at which an e is asked for."""
-    e, _ = distinct(dataset, "e")
+    e, _ = distinct_points(dataset, "e")
     return any(not np.isnan(e.isel(where).values).all() for where in slabs(e.sizes))
 
 
-def _part_of_model(dataset: xr.Dataset, place: int) -> xr.Dataset:
+def _select_model(dataset: xr.Dataset, place: int) -> xr.Dataset:
     """A model of a result, without the axes of other models' parameters."""
     first = dict.fromkeys(foreign_dims(dataset, str(dataset["model"].values[place])), 0)
     return dataset.isel({"model": place, **first})
 
 
-def _evaluated(of_model: xr.Dataset) -> tuple[xr.Dataset, int]:
+def _reduce_dims(of_model: xr.Dataset) -> tuple[xr.Dataset, int]:
     """What is judged of a model, over the axes along which it or e varies, and how often each point counts."""
     along_one = of_model.variables["e"].ndim == 1
     return over_varying_dims(
-        of_model, JUDGED, *(of_model.variables["e"].dims if along_one else varying_dims(of_model, "e"))
+        of_model, RANKED_VARIABLES, *(of_model.variables["e"].dims if along_one else varying_dims(of_model, "e"))
     )
 
 
 @dataclass(frozen=True)
-class _Judged:
+class _JudgedSlab:
     """Points of a slab: e and its error, and which are judged, failed, known, and within the tolerance."""
 
     asked: NDArray[Any]
@@ -260,30 +260,32 @@ class _Judged:
     within: Mask
 
 
-def _judge(evaluated: xr.Dataset, where: Where, sizes: Mapping[Hashable, int], tol: float) -> _Judged:
-    error, status, asked = (_laid_out(evaluated.variables[name], where, sizes) for name in (*JUDGED, "e"))
+def _judge_slab(evaluated: xr.Dataset, where: Slab, sizes: Mapping[Hashable, int], tol: float) -> _JudgedSlab:
+    error, status, asked = (
+        _read_slab(evaluated.variables[name], where, sizes) for name in (*RANKED_VARIABLES, "e")
+    )
     distance = np.abs(np.asarray(error, float))
     judged = ~np.isnan(asked) & (status != Status.NO_IMPACT)
     failed = judged & (status >= FIRST_FAILURE)
     known = judged & ~failed & ~np.isnan(distance)
-    return _Judged(asked, error, distance, judged, failed, known, known & (distance <= tol))
+    return _JudgedSlab(asked, error, distance, judged, failed, known, known & (distance <= tol))
 
 
-def _choose(of_model: xr.Dataset, own: Sequence[Hashable], tol: float) -> dict[Hashable, int]:
+def _best_parameters(of_model: xr.Dataset, own: Sequence[Hashable], tol: float) -> dict[Hashable, int]:
     """The place on each axis of a model's own parameters at which it does best over all other axes."""
-    evaluated, _ = over_varying_dims(of_model, JUDGED, *own, *varying_dims(of_model, "e"))
+    evaluated, _ = over_varying_dims(of_model, RANKED_VARIABLES, *own, *varying_dims(of_model, "e"))
     shape = tuple(evaluated.sizes[dim] for dim in own)
-    if math.prod(shape) > MAX_CHOICES:
+    if math.prod(shape) > MAX_PARAMETER_COMBINATIONS:
         raise UsageError(
             f"got {math.prod(shape):,} combinations of parameters of {of_model['model'].item()}, expected at most "
-            f"{MAX_CHOICES:,}; select values of them"
+            f"{MAX_PARAMETER_COMBINATIONS:,}; select values of them"
         )
     dims = evaluated.variables["e_error"].dims
     sizes = {dim: evaluated.sizes[dim] for dim in (*own, *(dim for dim in dims if dim not in own))}
     points, within, errors = np.zeros(shape, int), np.zeros(shape, int), np.full(shape, np.nan)
     others = tuple(range(len(own), len(sizes)))
     for where in slabs(sizes):
-        part = _judge(evaluated, where, sizes, tol)
+        part = _judge_slab(evaluated, where, sizes, tol)
         place = tuple(where[dim] for dim in own)
         points[place] += part.judged.sum(axis=others)
         within[place] += part.within.sum(axis=others)
@@ -294,15 +296,15 @@ def _choose(of_model: xr.Dataset, own: Sequence[Hashable], tol: float) -> dict[H
     return dict(zip(own, (int(at) for at in np.unravel_index(best, shape)), strict=True))
 
 
-def _ranked(of_model: xr.Dataset, tol: float) -> Ranked:
+def _rank_model(of_model: xr.Dataset, tol: float) -> Ranked:
     """How well a model does, from its e_error and status, of the shape of the axes, and the e asked for."""
     key = str(of_model["model"].item())
     own = [dim for dim in own_dims(of_model, key) if dim in of_model.variables["e_error"].dims]
-    best = _choose(of_model, own, tol) if own else {}
-    chosen = _inputs(of_model, best)
+    best = _best_parameters(of_model, own, tol) if own else {}
+    chosen = _inputs_at(of_model, best)
     of_model = of_model.isel(best)
     axes = of_model.variables["e_error"].dims
-    evaluated, weight = _evaluated(of_model)
+    evaluated, weight = _reduce_dims(of_model)
     sizes = {dim: evaluated.sizes[dim] for dim in evaluated.variables["e_error"].dims}
     e, along_one = evaluated.variables["e"], of_model.variables["e"].ndim == 1
     # along e, where it varies along one axis: whether there is a point to judge, and one that is not within tol
@@ -311,7 +313,7 @@ def _ranked(of_model: xr.Dataset, tol: float) -> Ranked:
     total, max_error, e_out = Fraction(), math.nan, math.nan
     worst: dict[Hashable, int] | None = None
     for where in slabs(sizes):
-        part = _judge(evaluated, where, sizes, tol)
+        part = _judge_slab(evaluated, where, sizes, tol)
         distance, known = part.distance, part.known
         points += weight * int(part.judged.sum())
         known_points += weight * int(known.sum())
@@ -335,15 +337,15 @@ def _ranked(of_model: xr.Dataset, tol: float) -> Ranked:
         # an error without bound comes from a file that was not written by a sweep
         mean_error = max_error if math.isinf(max_error) else float(total / known_points)
         asked_there = e.isel({dim: worst[dim] for dim in e.dims}).values.item()
-        at = {**_inputs(of_model, {dim: worst.get(dim, 0) for dim in axes}), **chosen, "e": float(asked_there)}
+        at = {**_inputs_at(of_model, {dim: worst.get(dim, 0) for dim in axes}), **chosen, "e": float(asked_there)}
     parameters = {".".join(map(str, path_of(name))): chosen[name] for name in chosen if owner_of(name) == key}
-    served = _served(e.values, asked_at, missed_at) if along_one else None
+    served = _served_ranges(e.values, asked_at, missed_at) if along_one else None
     return Ranked(
         key, parameters, points, within_points, failed_points, mean_error, max_error, at, e_out, served,
     )  # fmt: skip
 
 
-def _laid_out(variable: xr.Variable, where: Where, sizes: Mapping[Hashable, int]) -> NDArray[Any]:
+def _read_slab(variable: xr.Variable, where: Slab, sizes: Mapping[Hashable, int]) -> NDArray[Any]:
     """The values of a slab, with all dimensions in the order of `sizes`."""
     part = variable.isel({dim: where[dim] for dim in variable.dims})
     shape = {dim: where[dim].stop - where[dim].start for dim in sizes}
@@ -372,7 +374,7 @@ def _exact_sum(values: NDArray[np.float64]) -> Fraction:
     return total * Fraction(2) ** (least - MANTISSA_BITS)
 
 
-def _inputs(of_model: xr.Dataset, places: Mapping[Hashable, int]) -> dict[str, float | str]:
+def _inputs_at(of_model: xr.Dataset, places: Mapping[Hashable, int]) -> dict[str, float | str]:
     """What is swept, at a place along each axis, without the parameters of other models."""
     variables, key = of_model.variables, str(of_model["model"].item())
     return {
@@ -383,7 +385,7 @@ def _inputs(of_model: xr.Dataset, places: Mapping[Hashable, int]) -> dict[str, f
     }
 
 
-def _served(e: NDArray[Any], asked: Mask, missed: Mask) -> tuple[tuple[float, float], ...]:
+def _served_ranges(e: NDArray[Any], asked: Mask, missed: Mask) -> tuple[tuple[float, float], ...]:
     """The ranges of neighbouring values of e at which every judged point is within the tolerance."""
     # in order, each value once: that of alpha and of speeds that vary with it may come again
     values, place = np.unique(e[asked], return_inverse=True)

@@ -1,4 +1,4 @@
-"""What is in a result: the one SCHEMA, and the labels, units and provenance of the dataset of a plan."""
+"""The SCHEMA of a result: its variables and their comparison scales, coordinates and attributes."""
 
 from __future__ import annotations
 
@@ -13,9 +13,11 @@ from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from .._version import __version__
 from ..config.tables import MATERIAL_KEYS, MATERIAL_QUANTITIES, SWEEP_QUANTITIES, model_quantities
+from ..contact.materials import effective_mass
 from ..contact.outputs import BY_DEFAULT
 from ..contact.powers import Array
 from ..contact.status import Status
@@ -25,13 +27,13 @@ from ..formatting import number
 
 SCHEMA_VERSION = 2
 # models with another exponent are named in at most so many characters
-MAX_NAMED = 48
+MAX_EXPONENT_LETTERS = 48
 # coordinates along `model` that are texts about it
-ABOUT_A_MODEL = ("title", "year", "equation", "reference", "doi")
+MODEL_METADATA = ("title", "year", "equation", "reference", "doi")
 
 
 @dataclass(frozen=True)
-class Variable:
+class SchemaVariable:
     """One variable of a result.
 
     `per` says whether it depends on the model or on the axes alone; `judged` how a comparison judges it: by its
@@ -54,71 +56,116 @@ class Variable:
 
 
 SCHEMA = (
-    Variable("v1_post", "m s-1", "model", "scaled by v0", "velocity of ball 1 after the impact",
+    SchemaVariable("v1_post", "m s-1", "model", "scaled by v0", "velocity of ball 1 after the impact",
              "v1+ = v1 - (1 + e_out)(m/m1) v0"),
-    Variable("v2_post", "m s-1", "model", "scaled by v0", "velocity of ball 2 after the impact",
+    SchemaVariable("v2_post", "m s-1", "model", "scaled by v0", "velocity of ball 2 after the impact",
              "v2+ = v2 + (1 + e_out)(m/m2) v0"),
-    Variable("v1_reference", "m s-1", "axes", "scaled by v0", "velocity of ball 1 by impulse and momentum",
+    SchemaVariable("v1_reference", "m s-1", "axes", "scaled by v0", "velocity of ball 1 by impulse and momentum",
              "v1+ = v1 - (1 + e)(m/m1) v0  (6)"),
-    Variable("v2_reference", "m s-1", "axes", "scaled by v0", "velocity of ball 2 by impulse and momentum",
+    SchemaVariable("v2_reference", "m s-1", "axes", "scaled by v0", "velocity of ball 2 by impulse and momentum",
              "v2+ = v2 + (1 + e)(m/m2) v0  (7)"),
-    Variable("v1_error", "m s-1", "model", "scaled by v0", "error of the velocity of ball 1",
+    SchemaVariable("v1_error", "m s-1", "model", "scaled by v0", "error of the velocity of ball 1",
              "v1_post - v1_reference"),
-    Variable("v2_error", "m s-1", "model", "scaled by v0", "error of the velocity of ball 2",
+    SchemaVariable("v2_error", "m s-1", "model", "scaled by v0", "error of the velocity of ball 2",
              "v2_post - v2_reference"),
-    Variable("e_out", "1", "model", "scaled by 1", "restitution that the model delivers",
+    SchemaVariable("e_out", "1", "model", "scaled by 1", "restitution that the model delivers",
              "(v2+ - v1+)/(v1 - v2)  (5)"),
-    Variable("e_error", "1", "model", "scaled by 1", "delivered minus asked restitution", "e_out - e"),
-    Variable("peak_indentation", "m", "model", "scaled by the peak", "largest indentation", "δₘ at v = 0"),
-    Variable("permanent_indentation", "m", "model", "scaled by the peak", "indentation at the release",
+    SchemaVariable("e_error", "1", "model", "scaled by 1", "delivered minus asked restitution", "e_out - e"),
+    SchemaVariable("peak_indentation", "m", "model", "scaled by the peak", "largest indentation", "δₘ at v = 0"),
+    SchemaVariable("permanent_indentation", "m", "model", "scaled by the peak", "indentation at the release",
              "δₚ at the end of the contact"),
-    Variable("peak_force", "N", "model", "scaled by itself", "largest contact force", "max F over the approach"),
-    Variable("contact_time", "s", "model", "scaled by itself", "contact time", "from first contact to release"),
-    Variable("energy_loss", "J", "model", "scaled by m v0^2/2", "kinetic energy lost",
+    SchemaVariable("peak_force", "N", "model", "scaled by itself", "largest contact force",
+             "max F over the approach"),
+    SchemaVariable("contact_time", "s", "model", "scaled by itself", "contact time",
+             "from first contact to release"),
+    SchemaVariable("energy_loss", "J", "model", "scaled by m v0^2/2", "kinetic energy lost",
              "m v0²(1 - e_out²)/2"),
-    Variable("stiffness", "N m-n", "model", "scaled by itself",
+    SchemaVariable("stiffness", "N m-n", "model", "scaled by itself",
              "contact stiffness used; n is the coordinate exponent; where n is not 1.5 and no K is given it is "
              "F_m/delta_m^n of the Hertz peak", "K  (12)"),
-    Variable("damping_ratio", "1", "model", "scaled by itself", "dimensionless damping, where the law has one",
+    SchemaVariable("damping_ratio", "1", "model", "scaled by itself",
+             "dimensionless damping, where the law has one",
              "χ = λ v0/K"),
-    Variable("energy_residual", "1", "model", "bounded by 10 rtol", "residual of the work balance",
+    SchemaVariable("energy_residual", "1", "model", "bounded by 10 rtol", "residual of the work balance",
              "[work of the force - m v0²(1 - e_out²)/2]/(m v0²/2)"),
-    Variable("closed_form_error", "1", "model", "bounded by 10 rtol",
+    SchemaVariable("closed_form_error", "1", "model", "bounded by 10 rtol",
              "distance from the closed form, where one exists", "e_out - exact e_out"),
-    Variable("status", "1", "model", "exact", "how the point ended", "see flag_meanings", "i1"),
-    Variable("in_domain", "1", "model", "exact", "1 where the law is said to hold",
+    SchemaVariable("status", "1", "model", "exact", "how the point ended", "see flag_meanings", "i1"),
+    SchemaVariable("in_domain", "1", "model", "exact", "1 where the law is said to hold",
              "1 inside every stated interval", "i1"),
-    Variable("steps", "1", "model", "reported", "accepted steps of the integrator",
+    SchemaVariable("steps", "1", "model", "reported", "accepted steps of the integrator",
              "approach + restitution", "i4"),
-    Variable("e_kinetic", "1", "model", "scaled by 1",
+    SchemaVariable("e_kinetic", "1", "model", "scaled by 1",
              "kinetic restitution; the impulses are the changes of the momentum, so that it is e_out",
              "τ_r/τ_c  (2)"),
-    Variable("e_energetic", "1", "model", "scaled by 1",
+    SchemaVariable("e_energetic", "1", "model", "scaled by 1",
              "energetic restitution, from the integrated works of the two phases", "√(-W_r/W_c)  (3)"),
-    Variable("lambda", "N s m-(n+1)", "model", "scaled by itself",
+    SchemaVariable("lambda", "N s m-(n+1)", "model", "scaled by itself",
              "damping factor, where the law has one; n is the coordinate exponent", "λ = χ K/v0  (18)"),
-    Variable("separation_time", "s", "model", "scaled by itself", "time until the surfaces part",
+    SchemaVariable("separation_time", "s", "model", "scaled by itself", "time until the surfaces part",
              "contact_time + remaining indentation/(e_out v0)"),
 )  # fmt: skip
 
-PACKAGES = ("numpy", "h5py", "h5netcdf", "xarray")
+# name, unit and meaning of the variables of a time history, over the time t
+HISTORY_VARIABLES = (
+    ("delta", "m", "indentation"),
+    ("v", "m s-1", "rate of the indentation"),
+    ("F", "N", "contact force"),
+    ("x1", "m", "displacement of ball 1 since first contact"),
+    ("x2", "m", "displacement of ball 2 since first contact"),
+    ("v1", "m s-1", "velocity of ball 1"),
+    ("v2", "m s-1", "velocity of ball 2"),
+)
+
+RECORDED_PACKAGES = ("numpy", "h5py", "h5netcdf", "xarray")
 
 
-def stored(plan: Plan) -> tuple[Variable, ...]:
+def scale_of(
+    variable: SchemaVariable, read: Callable[[str], NDArray[Any]], *, has_peak: bool
+) -> NDArray[np.float64]:
+    """The scale of a variable, of a shape that broadcasts to that of the points.
+
+    Parameters
+    ----------
+    variable : which
+    read : gives values by name: v1, v2 [m/s], m1, m2 [kg], the variable itself, `peak_indentation` [m]; arrays
+        that broadcast against each other
+    has_peak : whether the result has `peak_indentation`
+    """
+
+    def number(name: str) -> NDArray[np.float64]:
+        return np.asarray(read(name), float)
+
+    match variable.judged:
+        case "scaled by v0":
+            return np.asarray(np.abs(number("v1") - number("v2")))
+        case "scaled by m v0^2/2":
+            v0 = number("v1") - number("v2")
+            return np.asarray(0.5 * effective_mass(number("m1"), number("m2")) * v0 * v0)
+        case "scaled by the peak" if has_peak:
+            return np.asarray(np.abs(number("peak_indentation")))
+        case "scaled by itself" | "scaled by the peak":
+            return np.asarray(np.abs(number(variable.name)))
+    return np.ones(())
+
+
+def stored_variables(plan: Plan) -> tuple[SchemaVariable, ...]:
     """The variables of the result of a plan; the status is always there: without it a NaN would have no reason."""
     chosen = {"status", *(plan.config.output.variables or BY_DEFAULT)}
     return tuple(replace(one, dtype=plan.config.output.dtype if one.dtype == "f8" else one.dtype)
                  for one in SCHEMA if one.name in chosen)  # fmt: skip
 
 
-def outline(plan: Plan) -> xr.Dataset:
+def dataset_template(plan: Plan) -> xr.Dataset:
     """The dataset of a plan without its values: each variable is zero, of no memory, and not to be written to.
 
     It has no index yet: to be stored it needs none, and making one takes longer than all the rest.
     """
     axes = tuple(axis.name for axis in plan.config.axes)
-    dataset = xr.Dataset(coords=xr.Coordinates(_coordinates(plan), indexes={}), attrs=_provenance(plan))
-    for one in stored(plan):
+    dataset = xr.Dataset(
+        coords=xr.Coordinates(_plan_coordinates(plan), indexes={}), attrs=_provenance_attributes(plan)
+    )
+    for one in stored_variables(plan):
         dims, shape = (
             (axes, plan.shape) if one.per == "axes" else (("model", *axes), (len(plan.models), *plan.shape))
         )
@@ -126,7 +173,7 @@ def outline(plan: Plan) -> xr.Dataset:
     return dataset
 
 
-def attributes_of(variable: Variable) -> dict[str, object]:
+def attributes_of(variable: SchemaVariable) -> dict[str, object]:
     found: dict[str, object] = {
         "units": variable.unit, "long_name": variable.meaning, "equation": variable.equation,
     }  # fmt: skip
@@ -139,7 +186,7 @@ def attributes_of(variable: Variable) -> dict[str, object]:
     return found
 
 
-def _coordinates(plan: Plan) -> dict[str, object]:
+def _plan_coordinates(plan: Plan) -> dict[str, object]:
     models = plan.models
 
     def texts(field: str) -> tuple[str, list[str], dict[str, str]]:
@@ -154,19 +201,19 @@ def _coordinates(plan: Plan) -> dict[str, object]:
         if axis.numbered:
             found[axis.name] = (axis.name, list(axis.labels), {"long_name": "number of the case"})
         for name, values in axis.columns.items():
-            found[name] = (axis.name, list(values), _about(plan, name))
+            found[name] = (axis.name, list(values), _coordinate_attributes(plan, name))
     for name, value in plan.config.scalars.items():
-        found[name] = ((), value, _about(plan, name))
-    found["exponent"] = _exponent(plan)
+        found[name] = ((), value, _coordinate_attributes(plan, name))
+    found["exponent"] = _exponent_coordinate(plan)
     if "alpha" in plan.inputs.names():
-        found["e"] = _restitution(plan)
+        found["e"] = _restitution_coordinate(plan)
     for ball in "12":
         if f"m{ball}" not in plan.inputs.names():
-            found[f"m{ball}"] = _mass(plan, ball)
+            found[f"m{ball}"] = _mass_coordinate(plan, ball)
     return found
 
 
-def _about(plan: Plan, name: str) -> dict[str, str]:
+def _coordinate_attributes(plan: Plan, name: str) -> dict[str, str]:
     """Units and meaning of a coordinate."""
     material, field = material_property(name) or ("", "")
     if material:
@@ -211,7 +258,7 @@ def exponent_text(by_model: Mapping[str, float]) -> str:
     common = Counter(by_model.values()).most_common(1)[0][0]
     others = {key: n for key, n in by_model.items() if n != common}
     text = ", ".join(f"{number(n)} for {key}" for key, n in others.items())
-    if len(text) > MAX_NAMED:
+    if len(text) > MAX_EXPONENT_LETTERS:
         text = f"{len(others)} of {len(by_model)} models have another n"
     return number(common) + (f" ({text})" if text else "")
 
@@ -276,7 +323,7 @@ def count_points(dataset: xr.Dataset) -> int:
     return sum(math.prod(part.sizes.values()) for part in parts_of_models(dataset))
 
 
-def _exponent(plan: Plan) -> tuple[tuple[str, ...], object, dict[str, str]]:
+def _exponent_coordinate(plan: Plan) -> tuple[tuple[str, ...], object, dict[str, str]]:
     """The compliance exponent of each model: its own, or the sweep's, which may be an axis."""
     about = {"units": "1", "long_name": "compliance exponent n"}
     own = np.array([np.nan if model.exponent is None else model.exponent for model in plan.models])
@@ -288,19 +335,19 @@ def _exponent(plan: Plan) -> tuple[tuple[str, ...], object, dict[str, str]]:
     return ("model", axis.name), np.where(np.isnan(own)[:, None], values, own[:, None]), about
 
 
-def _restitution(plan: Plan) -> tuple[tuple[str, ...], object, dict[str, str]]:
+def _restitution_coordinate(plan: Plan) -> tuple[tuple[str, ...], object, dict[str, str]]:
     about = {"units": "1", "long_name": "restitution asked for", "equation": "e = 1 - alpha (v1 - v2)  (24)"}
-    return *_derived(plan, ("alpha", "v1", "v2"), restitution_at), about
+    return *_derived_values(plan, ("alpha", "v1", "v2"), restitution_at), about
 
 
-def _mass(plan: Plan, ball: str) -> tuple[tuple[str, ...], object, dict[str, str]]:
+def _mass_coordinate(plan: Plan, ball: str) -> tuple[tuple[str, ...], object, dict[str, str]]:
     of_materials = [f"materials.{name}.rho" for name in plan.inputs.materials_of(ball)]
     names = (f"R{ball}", "material", f"material{ball}", *of_materials)
-    about = {**_about(plan, f"m{ball}"), "equation": "m = (4/3) pi R^3 rho"}
-    return *_derived(plan, names, lambda inputs, index: mass_at(inputs, ball, index)), about
+    about = {**_coordinate_attributes(plan, f"m{ball}"), "equation": "m = (4/3) pi R^3 rho"}
+    return *_derived_values(plan, names, lambda inputs, index: mass_at(inputs, ball, index)), about
 
 
-def _derived(
+def _derived_values(
     plan: Plan, names: Sequence[str], formula: Callable[[Inputs, Index], Array]
 ) -> tuple[tuple[str, ...], Array]:
     """What is computed from inputs, with its dimensions: the axes of those."""
@@ -311,7 +358,7 @@ def _derived(
     return tuple(plan.config.axes[axis].name for axis in axes), values.reshape(shape)
 
 
-def _provenance(plan: Plan) -> dict[str, object]:
+def _provenance_attributes(plan: Plan) -> dict[str, object]:
     config = plan.config
     return {
         "title": config.title,
@@ -323,7 +370,7 @@ def _provenance(plan: Plan) -> dict[str, object]:
         "max_steps": config.solver.max_steps,
         "core": config.solver.core,
         "impact_version": __version__,
-        "packages": json.dumps({name: version(name) for name in PACKAGES}),
+        "packages": json.dumps({name: version(name) for name in RECORDED_PACKAGES}),
         "plugins": json.dumps(plan.plugins.record),
         "materials": json.dumps(plan.material_record),
     }

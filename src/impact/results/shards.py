@@ -1,4 +1,4 @@
-"""Shards: a sweep in parts that know nothing of each other, for job arrays without a scheduler of our own.
+"""Shards: parts of a sweep that run independently, for example in a job array, and are merged into one result.
 
 Shard K of N has the ranges K, K + N, K + 2N, ... of trajectories in a work folder that stays; those of all shards
 make the result. A range is a pure function of its plan: it may be in several folders, with the same bits.
@@ -28,14 +28,14 @@ from ..text import safe_text
 from .backend import check_output
 from .expand import table_of
 from .provenance import stored_config
-from .schema import outline
-from .summary import Survey
-from .sweep import check_storable, fill, loaded_again, reader, store_result
+from .schema import dataset_template
+from .summary import SweepOutcome
+from .sweep import check_storable, complete_ranges, range_reader, reload_range, store_result
 
 # what a folder says of its shard, beside the plan
-FILE = "shard.json"
-MAX_MISSING = 5  # shards that are named
-ATTRIBUTES = ("config", "config_set", "plugins", "fingerprint")
+SHARD_FILE_NAME = "shard.json"
+MAX_LISTED_SHARDS = 5  # shards that are named
+RECORDED_ATTRIBUTES = ("config", "config_set", "plugins", "fingerprint")
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class Shard:
 
 
 @dataclass(frozen=True)
-class Share:
+class ShardProgress:
     """What a shard has finished."""
 
     folder: Path
@@ -94,7 +94,7 @@ def sweep_shard(
     backend: Backend = SERIAL,
     on_progress: ProgressCallback = lambda progress: None,
     should_stop: Callable[[], bool] = never_stop,
-) -> Share:
+) -> ShardProgress:
     """Integrate a shard of a plan into its work folder, and go on with what is there.
 
     Parameters
@@ -118,22 +118,22 @@ def sweep_shard(
     counter = ProgressCounter.begin(sum(one.size for one in own), plan.points, on_progress)
     folder = shard.folder(output)
     with open_work_folder(folder, plan, resume=not overwrite, overwrite=overwrite) as work_folder:
-        attributes = outline(plan).attrs
+        attributes = dataset_template(plan).attrs
         about = {
             "shard": [shard.number, shard.of],
             "command": list(command),
             "core": plan.config.solver.core,
-            "attributes": {name: attributes[name] for name in ATTRIBUTES},
+            "attributes": {name: attributes[name] for name in RECORDED_ATTRIBUTES},
         }
-        with atomic_write(folder / FILE, overwrite=True) as sink:
+        with atomic_write(folder / SHARD_FILE_NAME, overwrite=True) as sink:
             sink.write(json.dumps(about).encode())
         with report_kept_blocks(folder, counter, "the same command", lambda error: []):
-            fill(work_folder, plan, maps, own, counter, backend, should_stop)
-    return Share(folder, len(own), len(blocks), counter.at.trajectories, counter.at.failed)
+            complete_ranges(work_folder, plan, maps, own, counter, backend, should_stop)
+    return ShardProgress(folder, len(own), len(blocks), counter.at.trajectories, counter.at.failed)
 
 
 @dataclass(frozen=True)
-class _Told:
+class _ShardRecord:
     """What a folder says of its shard."""
 
     shard: Shard
@@ -150,7 +150,7 @@ def merge(
     overwrite: bool = False,
     on_progress: ProgressCallback = lambda progress: None,
     should_stop: Callable[[], bool] = never_stop,
-) -> tuple[Survey, int]:
+) -> tuple[SweepOutcome, int]:
     """Store the result that shards make; their folders stay as they are.
 
     Parameters
@@ -174,7 +174,7 @@ def merge(
     StoreError, UnfinishedError : nothing was stored; the folders have all of it
     """
     check_output(output, overwrite=overwrite)
-    told = {folder: _told(folder) for folder in {one.resolve(): one for one in folders}.values()}
+    told = {folder: _read_record(folder) for folder in {one.resolve(): one for one in folders}.values()}
     first, about = next(iter(told.items()))
     config = stored_config(about.attributes, [], plugins, str(first))
     # the core that it was settled on, whichever is here
@@ -192,11 +192,11 @@ def merge(
                     "expected the folders of one sweep"
                 )
     # a folder is locked while it is looked at, one after the other: there may be more of them than open files
-    where, twice = _places([*told], plan, blocks, counter, should_stop)
+    where, twice = _locate_ranges([*told], plan, blocks, counter, should_stop)
     lacking = [part for part in blocks if part.number not in where]
     if lacking:
-        raise UsageError("\n".join(_missing(output, lacking, told)))
-    table = table_of(plan, maps, reader(maps, lambda number: loaded_again(where[number], blocks[number])))
+        raise UsageError("\n".join(_missing_shards(output, lacking, told)))
+    table = table_of(plan, maps, range_reader(maps, lambda number: reload_range(where[number], blocks[number])))
     try:
         return store_result(output, plan, table, None, overwrite, counter, should_stop), twice
     except (StoreError, UnfinishedError) as error:
@@ -205,7 +205,7 @@ def merge(
         ) from error
 
 
-def _told(folder: Path) -> _Told:
+def _read_record(folder: Path) -> _ShardRecord:
     """What a folder says of its shard; it may come from anywhere.
 
     Raises
@@ -213,25 +213,25 @@ def _told(folder: Path) -> _Told:
     UsageError : it is no shard
     """
     try:
-        if not (folder / FILE).is_file():
+        if not (folder / SHARD_FILE_NAME).is_file():
             raise ValueError
-        found = json.loads((folder / FILE).read_text(encoding="utf-8"))
+        found = json.loads((folder / SHARD_FILE_NAME).read_text(encoding="utf-8"))
         number, of = found["shard"]
         command, core, attributes = found["command"], found["core"], found["attributes"]
         right = (
             isinstance(number, int) and isinstance(of, int) and 1 <= number <= of
             and isinstance(command, list) and all(isinstance(one, str) for one in command)
-            and core in CORES and {*ATTRIBUTES} <= attributes.keys()
+            and core in CORES and {*RECORDED_ATTRIBUTES} <= attributes.keys()
         )  # fmt: skip
         if not right:
             raise ValueError
     except (OSError, ValueError, TypeError, AttributeError, KeyError, RecursionError):
         shown = safe_text(str(folder))
         raise UsageError(f"{shown}: is no shard, wants a folder that impact sweep --shard K/N makes") from None
-    return _Told(Shard(number, of), tuple(command), core, attributes)
+    return _ShardRecord(Shard(number, of), tuple(command), core, attributes)
 
 
-def _places(
+def _locate_ranges(
     folders: Sequence[Path],
     plan: Plan,
     blocks: Sequence[TrajectoryRange],
@@ -255,7 +255,7 @@ def _places(
                     counter.report()
                     continue
                 repeated.add(part.number)
-                other = loaded_again(where[part.number], part)
+                other = reload_range(where[part.number], part)
                 if any(values.tobytes() != vars(other)[name].tobytes() for name, values in vars(found).items()):
                     raise ResultError(
                         f"{safe_text(str(work_folder.path(part.number)))}: differs from "
@@ -265,7 +265,9 @@ def _places(
     return where, len(repeated)
 
 
-def _missing(output: Path, lacking: Sequence[TrajectoryRange], told: Mapping[Path, _Told]) -> list[str]:
+def _missing_shards(
+    output: Path, lacking: Sequence[TrajectoryRange], told: Mapping[Path, _ShardRecord]
+) -> list[str]:
     """A line for each shard that is missing or unfinished, with what makes it."""
     about = next(iter(told.values()))
     folders = {one.shard: folder for folder, one in told.items()}
@@ -274,11 +276,15 @@ def _missing(output: Path, lacking: Sequence[TrajectoryRange], told: Mapping[Pat
         shard = Shard(part.number % about.shard.of + 1, about.shard.of)
         blocks[shard] = blocks.get(shard, 0) + 1
     lines = []
-    for shard in sorted(blocks, key=lambda one: one.number)[:MAX_MISSING]:
+    for shard in sorted(blocks, key=lambda one: one.number)[:MAX_LISTED_SHARDS]:
         again = safe_text(shlex.join([*about.command, "--shard", str(shard)]), 500)
         lacks = f"lacks {blocks[shard]:,} block{'' if blocks[shard] == 1 else 's'}"
         if shard in folders:
             lines.append(f"{safe_text(str(folders[shard]))}: shard {shard} {lacks}; {again} finishes it")
         else:
             lines.append(f"{safe_text(str(output))}: shard {shard} is missing; {again} makes it")
-    return [*lines, f"and {len(blocks) - MAX_MISSING:,} more shards"] if len(blocks) > MAX_MISSING else lines
+    return (
+        [*lines, f"and {len(blocks) - MAX_LISTED_SHARDS:,} more shards"]
+        if len(blocks) > MAX_LISTED_SHARDS
+        else lines
+    )

@@ -1,4 +1,4 @@
-"""Slabs of a result of any size, and the axes along which each of its variables varies.
+"""Slabs: parts of a large result that fit in memory; the axes along which a variable varies.
 
 The variables of a large result are computed, or read, when they are indexed. A variable that is computed says in
 `encoding["varies_along"]`, by model, along which axes it varies: along the others it has the same value
@@ -18,12 +18,12 @@ import xarray as xr
 SLAB_POINTS = 2**17
 # points up to which something is computed in full that nothing but a summary asks for: a few seconds
 MAX_SUMMARY_POINTS = 2**26
-VARIES_ALONG, AXES = "varies_along", "axes"
+VARIES_ALONG, ORIGINAL_DIMS = "varies_along", "axes"
 
-Where = dict[Hashable, slice]
+Slab = dict[Hashable, slice]
 
 
-def slabs(sizes: Mapping[Hashable, int], points: int = SLAB_POINTS) -> Iterator[Where]:
+def slabs(sizes: Mapping[Hashable, int], points: int = SLAB_POINTS) -> Iterator[Slab]:
     """All points in C order, in slabs of at most so many.
 
     >>> list(slabs({"e": 2, "v1": 3}, 2))[:2]
@@ -41,7 +41,7 @@ def slabs(sizes: Mapping[Hashable, int], points: int = SLAB_POINTS) -> Iterator[
 
 def aligned_slabs(
     sizes: Mapping[Hashable, int], lengths: Sequence[int], points: int = SLAB_POINTS
-) -> Iterator[Where]:
+) -> Iterator[Slab]:
     """All points, in slabs of whole chunks of some lengths along the axes, as many as make up about `points`.
 
     >>> [where["v1"] for where in aligned_slabs({"e": 2, "v1": 4}, (2, 2), 4)]
@@ -53,7 +53,7 @@ def aligned_slabs(
     yield from _tiles(sizes, wide)
 
 
-def _tiles(sizes: Mapping[Hashable, int], lengths: Sequence[int]) -> Iterator[Where]:
+def _tiles(sizes: Mapping[Hashable, int], lengths: Sequence[int]) -> Iterator[Slab]:
     # an axis without values has no slab
     steps = [range(0, size, max(1, length)) for size, length in zip(sizes.values(), lengths, strict=True)]
     for starts in itertools.product(*steps):
@@ -91,11 +91,11 @@ def varying_dims(dataset: xr.Dataset, name: str) -> tuple[Hashable, ...]:
     # of a model that was given another key nothing is known
     along = {"model", *(dim for key in keys for dim in by_model.get(key, variable.dims))}
     # an axis that was renamed since is not known
-    along |= {*variable.dims} - {*variable.encoding.get(AXES, variable.dims)}
+    along |= {*variable.dims} - {*variable.encoding.get(ORIGINAL_DIMS, variable.dims)}
     return tuple(dim for dim in variable.dims if dim in along)
 
 
-def distinct(dataset: xr.Dataset, name: str) -> tuple[xr.Variable, int]:
+def distinct_points(dataset: xr.Dataset, name: str) -> tuple[xr.Variable, int]:
     """A variable with one place, the first, along each dimension on which it does not vary.
 
     Returns

@@ -1,4 +1,4 @@
-"""What came out of a sweep in few numbers, slab after slab: counts, worst errors, first failures, extremes."""
+"""Summarize a result of any size: counts by status, largest errors, first failures, extremes."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from numpy.typing import NDArray
 
 from ..contact.status import FIRST_FAILURE, Status
 from .schema import parts_of_models
-from .slabs import MAX_SUMMARY_POINTS, distinct, is_computed, slabs
+from .slabs import MAX_SUMMARY_POINTS, distinct_points, is_computed, slabs
 
 # the errors of which the largest is told
-ERRORS = ("e_error", "v1_error", "v2_error", "closed_form_error", "energy_residual")
+ERROR_VARIABLES = ("e_error", "v1_error", "v2_error", "closed_form_error", "energy_residual")
 MAX_FAILED_AT = 3
 # of the smaller radius, above which an indentation is not small
-MAX_INDENTATION = 0.1
+MAX_SMALL_INDENTATION = 0.1
 
 
 @dataclass
-class Tally:
+class Summary:
     """What came out.
 
     Parameters
@@ -35,8 +35,8 @@ class Tally:
     failed_at : the first points that failed: status, place of the model, and places on the axes
     max_failed_at : how many of these are kept
     not_counted : how many points have a status that was not evaluated
-    deep, deepest : how many points have a peak indentation above `MAX_INDENTATION`, and the largest one, in units
-        of the smaller radius; of points whose radii are known
+    deep, deepest : how many points have a peak indentation above `MAX_SMALL_INDENTATION`, and the largest one, in
+        units of the smaller radius; of points whose radii are known
     """
 
     points: int = 0
@@ -60,7 +60,7 @@ class Tally:
         start: Sequence[int],
         radius: NDArray[Any] | None = None,
         weight: int = 1,
-    ) -> Tally:
+    ) -> Summary:
         """Count some points of one model.
 
         Parameters
@@ -73,7 +73,7 @@ class Tally:
         """
         if "status" in values:
             self._count(values["status"], model, start, weight)
-        for name in ERRORS:
+        for name in ERROR_VARIABLES:
             if name in values:
                 self._judge(name, model, values[name])
         if radius is not None and "peak_indentation" in values:
@@ -83,7 +83,7 @@ class Tally:
     def _measure(self, indentation: NDArray[Any], radius: NDArray[Any], weight: int) -> None:
         if np.isfinite(radius).any():
             share = indentation / (radius if indentation.shape else radius.reshape(()))
-            self.deep += weight * int(np.count_nonzero(share > MAX_INDENTATION))
+            self.deep += weight * int(np.count_nonzero(share > MAX_SMALL_INDENTATION))
             self.deepest = float(np.fmax.reduce(share, axis=None, initial=self.deepest))
 
     def _count(self, status: NDArray[np.int8], model: int, start: Sequence[int], weight: int) -> None:
@@ -103,9 +103,9 @@ class Tally:
         by_model[model] = float(np.fmax(by_model.get(model, np.nan), largest))
 
 
-def tally_of(
+def summarize(
     dataset: xr.Dataset, max_failed_at: int = MAX_FAILED_AT, max_points: float = MAX_SUMMARY_POINTS
-) -> Tally:
+) -> Summary:
     """What came out, of a result of any size.
 
     Each variable is evaluated over the axes along which it varies, one model after another, and each of its points
@@ -120,11 +120,11 @@ def tally_of(
         along each axis on which the status does not vary
     max_points : of a variable that is computed, for one model
     """
-    tally = Tally(max_failed_at=max_failed_at)
-    names = [name for name in ("status", *ERRORS) if name in dataset]
+    tally = Summary(max_failed_at=max_failed_at)
+    names = [name for name in ("status", *ERROR_VARIABLES) if name in dataset]
     for model, of_model in enumerate(parts_of_models(dataset)):
         for name in names:
-            variable, weight = distinct(of_model, name)
+            variable, weight = distinct_points(of_model, name)
             if variable.size <= max_points or not is_computed(variable):
                 for where in slabs(variable.sizes):
                     start = [where[dim].start for dim in variable.dims]
@@ -149,7 +149,7 @@ def extremes_of(dataset: xr.Dataset, name: str) -> Extremes | None:
     None of one that is computed, and varies over more than `MAX_SUMMARY_POINTS` points of all models together.
     """
     of_models = parts_of_models(dataset) if "model" in dataset.variables[name].dims else (dataset,)
-    parts = [distinct(part, name) for part in of_models]
+    parts = [distinct_points(part, name) for part in of_models]
     evaluations = sum(variable.size for variable, _ in parts)
     if evaluations > MAX_SUMMARY_POINTS and is_computed(dataset.variables[name]):
         return None
@@ -166,21 +166,21 @@ def extremes_of(dataset: xr.Dataset, name: str) -> Extremes | None:
 
 
 @dataclass(frozen=True)
-class Survey:
+class SweepOutcome:
     """A result that may be too large to hold: what it is, and what came out.
 
     Parameters
     ----------
-    outline : the dataset with its coordinates and attributes; the values of its variables do not count
-    tally : of its points
+    dataset : its coordinates and attributes; the values of its variables may be placeholders
+    summary : of its points
     trajectories : how many were integrated, where that is known
     """
 
-    outline: xr.Dataset
-    tally: Tally
+    dataset: xr.Dataset
+    summary: Summary
     trajectories: int | None = None
 
 
-def counted(counts: Mapping[Status, int]) -> dict[str, int]:
+def counts_by_name(counts: Mapping[Status, int]) -> dict[str, int]:
     """Counts by the names of the statuses, in their order."""
     return {status.name.lower(): counts[status] for status in sorted(counts)}

@@ -1,4 +1,4 @@
-"""A sweep into a file: what is finished is kept, the file is a function of it, and appears when it is whole."""
+"""Run a sweep into a file: finished trajectories are kept, and the file appears when it is complete."""
 
 from __future__ import annotations
 
@@ -32,20 +32,20 @@ from ..engine.trajectories import (
 )
 from ..errors import ResultError, StoreError, UnfinishedError, UsageError
 from ..text import safe_text
-from .backend import SMALL_BYTES, check_output, check_readable, open_result, write
+from .backend import MAX_LOADED_BYTES, check_output, check_readable, open_result, write_sealed
 from .expand import TrajectoryTable, expanded_slabs, in_memory, lazy_dataset, table_of
-from .factored import check_factored, factored_outline, table_values
-from .netcdf import MAX_LETTERS, is_text, letters
-from .schema import Variable, outline, stored
-from .summary import Survey, Tally, tally_of
-from .validate import is_name
+from .factored import check_factored, factored_template, table_values
+from .netcdf import MAX_LABEL_BYTES, encode_text, is_text
+from .schema import SchemaVariable, dataset_template, stored_variables
+from .summary import Summary, SweepOutcome, summarize
+from .validation import is_name
 
 # bytes that a result takes besides its values, about
-OVERHEAD = 2**16
+OVERHEAD_BYTES = 2**16
 # points up to which a sweep of one range keeps nothing: it is repeated faster than it is read
 NO_CHECKPOINT_POINTS = 2**20
 
-Values = dict[str, NDArray[Any]]
+SlabValues = dict[str, NDArray[Any]]
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Extension:
     seal: str
     note: str
     known: FindReused
-    fill: Callable[[int, tuple[slice, ...], Values], None] | None = None
+    fill: Callable[[int, tuple[slice, ...], SlabValues], None] | None = None
 
 
 def sweep_into(
@@ -78,7 +78,7 @@ def sweep_into(
     on_progress: ProgressCallback = lambda progress: None,
     should_stop: Callable[[], bool] = never_stop,
     extension: Extension | None = None,
-) -> Survey:
+) -> SweepOutcome:
     """Run a plan, and store its result.
 
     Parameters
@@ -114,7 +114,7 @@ def sweep_into(
         for part, rebound in integrate_ranges(plan, maps, ranges, known=known):
             finished[part.number] = rebound
             counter.count(part, rebound)
-        table = table_of(plan, maps, reader(maps, finished.__getitem__))
+        table = table_of(plan, maps, range_reader(maps, finished.__getitem__))
         try:
             return store_result(output, plan, table, None, overwrite or in_place, counter, should_stop, extension)
         except UnfinishedError:
@@ -128,10 +128,14 @@ def sweep_into(
         check_output(output, overwrite=overwrite or in_place)
         # without the other word a result that is to be replaced would be in the way
         again = "--resume --overwrite" if os.path.lexists(output) and not extension else "--resume"
-        with report_kept_blocks(folder, counter, again, lambda error: _room(error, output, plan, counter)):
-            fill(work_folder, plan, maps, ranges, counter, backend, should_stop, known)
-            table = table_of(plan, maps, reader(maps, lambda number: loaded_again(work_folder, ranges[number])))
-            survey = store_result(
+        with report_kept_blocks(
+            folder, counter, again, lambda error: _missing_space(error, output, plan, counter)
+        ):
+            complete_ranges(work_folder, plan, maps, ranges, counter, backend, should_stop, known)
+            table = table_of(
+                plan, maps, range_reader(maps, lambda number: reload_range(work_folder, ranges[number]))
+            )
+            outcome = store_result(
                 output,
                 plan,
                 table,
@@ -142,10 +146,10 @@ def sweep_into(
                 extension,
             )
         remove_work_folder(folder)
-    return survey
+    return outcome
 
 
-def fill(
+def complete_ranges(
     work_folder: WorkFolder,
     plan: Plan,
     maps: Sequence[TrajectoryMap],
@@ -202,12 +206,12 @@ def sweep_in_memory(
         counter.report()
     if not counter.is_full or should_stop():
         raise UnfinishedError("nothing was written")
-    table, variables = table_of(plan, maps, reader(maps, finished.__getitem__)), stored(plan)
-    dataset = lazy_dataset(outline(plan), table, variables)
-    return in_memory(dataset, table, variables) if dataset.nbytes <= SMALL_BYTES else dataset
+    table, variables = table_of(plan, maps, range_reader(maps, finished.__getitem__)), stored_variables(plan)
+    dataset = lazy_dataset(dataset_template(plan), table, variables)
+    return in_memory(dataset, table, variables) if dataset.nbytes <= MAX_LOADED_BYTES else dataset
 
 
-def reader(
+def range_reader(
     maps: Sequence[TrajectoryMap], load: Callable[[int], CollisionResult]
 ) -> Callable[[int, int, int], CollisionResult]:
     """The finished ranges of a plan as what a `TrajectoryTable` reads; `load` gives the one of a number."""
@@ -219,7 +223,7 @@ def reader(
     return read
 
 
-def loaded_again(work_folder: WorkFolder, part: TrajectoryRange) -> CollisionResult:
+def reload_range(work_folder: WorkFolder, part: TrajectoryRange) -> CollisionResult:
     """A range that was finished.
 
     Raises
@@ -257,14 +261,14 @@ def check_labels(plan: Plan) -> None:
         raise UsageError(
             f"{safe_text(odd[0])}: expected a material name without spaces and slashes, to be an axis"
         )
-    size = sum(letters(one).size for one in outline(plan).coords.values() if is_text(one))
-    if size > MAX_LETTERS:
+    size = sum(encode_text(one).size for one in dataset_template(plan).coords.values() if is_text(one))
+    if size > MAX_LABEL_BYTES:
         raise UsageError(
-            f"its labels take {size:,} bytes, expected at most {MAX_LETTERS:,}: give materials shorter names"
+            f"its labels take {size:,} bytes, expected at most {MAX_LABEL_BYTES:,}: give materials shorter names"
         )
 
 
-def finished(path: Path, plan: Plan) -> Survey | None:
+def find_finished(path: Path, plan: Plan) -> SweepOutcome | None:
     """What a file holds, if it is the whole result of a plan."""
     # a model without a hash cannot be known to be the same; of a name that is too long, pathlib would raise
     if None in plan.plugins.hashes.values() or os.path.islink(path) or not os.path.isfile(path):
@@ -280,17 +284,17 @@ def finished(path: Path, plan: Plan) -> Survey | None:
     if dict(dataset.sizes) != {"model": len(plan.models), **axes}:
         dataset.close()
         return None
-    return Survey(dataset, tally_of(dataset), sum(own.count for own in trajectory_maps(plan)))
+    return SweepOutcome(dataset, summarize(dataset), sum(own.count for own in trajectory_maps(plan)))
 
 
-def _room(error: Exception, output: Path, plan: Plan, counter: ProgressCounter) -> list[str]:
+def _missing_space(error: Exception, output: Path, plan: Plan, counter: ProgressCounter) -> list[str]:
     """On a full disk, how much more room it takes."""
     cause = error.__cause__
     if not isinstance(cause, OSError) or cause.errno not in (errno.ENOSPC, errno.EDQUOT):
         return []
     row = sum(getattr(CollisionResult.blank(1), name).nbytes for name in TABLE_COLUMNS)
-    result = counter.at.of_trajectories * row if plan.layout == "factored" else outline(plan).nbytes
-    wanted = result + OVERHEAD + (counter.at.of_trajectories - counter.at.trajectories) * row
+    result = counter.at.of_trajectories * row if plan.layout == "factored" else dataset_template(plan).nbytes
+    wanted = result + OVERHEAD_BYTES + (counter.at.of_trajectories - counter.at.trajectories) * row
     free = shutil.disk_usage(output.parent).free
     return [f"it takes {wanted:,} bytes more, {free:,} are free"]
 
@@ -304,10 +308,10 @@ def store_result(
     counter: ProgressCounter,
     should_stop: Callable[[], bool],
     extension: Extension | None = None,
-) -> Survey:
+) -> SweepOutcome:
     """Write the result of a trajectory table in the layout of its plan, and give it its name."""
-    at, variables, tally = counter.at, stored(plan), Tally()
-    whole = outline(plan)
+    at, variables, tally = counter.at, stored_variables(plan), Summary()
+    whole = dataset_template(plan)
     if extension:
         whole = whole.assign_attrs(extended=extension.note)
 
@@ -321,13 +325,11 @@ def store_result(
         lengths = [chunks.get(axis.name, axis.size) for axis in plan.config.axes] if chunks else []
         for model, where, impacts, values in expanded_slabs(table, variables, lengths):
             if extension and extension.fill:
-                # expanded values may be read-only views
-                values = {name: array.copy() for name, array in values.items()}
                 extension.fill(model, where, values)
             for name, array in values.items():
                 yield name, (model, *where) if "model" in whole[name].dims else where, array
             axes = plan.inputs.axes_of_model(table.laws[model].key)
-            _add(tally, axes, model, where, impacts, values)
+            _add_slab(tally, axes, model, where, impacts, values)
             check(tally.points)
 
     def factored() -> Iterator[tuple[str, tuple[slice], NDArray[Any]]]:
@@ -336,29 +338,34 @@ def store_result(
             check(0)
 
     is_full = plan.layout == "full"
-    made = whole if is_full else factored_outline(whole, table, variables)
+    made = whole if is_full else factored_template(whole, table, variables)
     with atomic_write(output, overwrite=overwrite, part=part) as sink:
-        seal = write(sink, made, full() if is_full else factored(), plan.config.output)
+        seal = write_sealed(sink, made, full() if is_full else factored(), plan.config.output)
         check_readable(sink, output)
     if not is_full:
         whole = lazy_dataset(whole, table, variables)
         is_small = plan.stored_points <= NO_CHECKPOINT_POINTS
-        tally = _tally_of_points(table, variables) if is_small else tally_of(whole)
+        tally = _summarize_points(table, variables) if is_small else summarize(whole)
     whole.encoding = {"source": str(output), "seal": seal, "layout": plan.layout}
-    return Survey(whole, tally, at.of_trajectories)
+    return SweepOutcome(whole, tally, at.of_trajectories)
 
 
-def _tally_of_points(table: TrajectoryTable, variables: Sequence[Variable]) -> Tally:
-    """What came out, point by point: unlike `tally_of` it knows the radii."""
-    tally = Tally()
+def _summarize_points(table: TrajectoryTable, variables: Sequence[SchemaVariable]) -> Summary:
+    """What came out, point by point: unlike `summarize` it knows the radii."""
+    tally = Summary()
     for model, where, impacts, values in expanded_slabs(table, variables):
         axes = table.inputs.axes_of_model(table.laws[model].key)
-        _add(tally, axes, model, where, impacts, values)
+        _add_slab(tally, axes, model, where, impacts, values)
     return tally
 
 
-def _add(
-    tally: Tally, axes: Collection[int], model: int, where: tuple[slice, ...], impacts: Impacts, values: Values
+def _add_slab(
+    tally: Summary,
+    axes: Collection[int],
+    model: int,
+    where: tuple[slice, ...],
+    impacts: Impacts,
+    values: SlabValues,
 ) -> None:
     """Count the points of a slab, those that differ by parameters of other models once."""
     if any(part.start > 0 for axis, part in enumerate(where) if axis not in axes):

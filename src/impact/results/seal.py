@@ -1,4 +1,4 @@
-"""Sealed files: 512 bytes that name the format and hold the SHA-256 of everything after them.
+"""Seals of files: 512 bytes with the format, the schema version and the SHA-256 of everything after them.
 
 The seal is checked before the HDF5 library parses a byte, so that every changed bit and every truncation is found.
 It is also the identity of a result: equal inputs give equal files within one installation.
@@ -16,26 +16,26 @@ from ..errors import ResultError
 from .schema import SCHEMA_VERSION
 
 # HDF5 leaves so many bytes at the beginning of a file to others: its "user block"
-USER_BLOCK = 512
+USER_BLOCK_BYTES = 512
 MAGIC = b"impact result\n"
 HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
-AGAIN = "sweep its config again: impact sweep CONFIG.toml -o RESULT --overwrite"
+SWEEP_AGAIN = "sweep its config again: impact sweep CONFIG.toml -o RESULT --overwrite"
 
 
-def header(seal: str) -> bytes:
+def render_header(seal: str) -> bytes:
     """The first bytes of a sealed file.
 
-    >>> header("0" * 64)[:24], len(header("0" * 64))
+    >>> render_header("0" * 64)[:24], len(render_header("0" * 64))
     (b'impact result\\nschema 2\\ns', 512)
     """
-    return MAGIC + f"schema {SCHEMA_VERSION}\nsha256 {seal}\n".encode().ljust(USER_BLOCK - len(MAGIC), b"\0")
+    return MAGIC + f"schema {SCHEMA_VERSION}\nsha256 {seal}\n".encode().ljust(USER_BLOCK_BYTES - len(MAGIC), b"\0")
 
 
 def write_seal(file: Any) -> str:
     """Seal a file that is open to read and write, and whose user block is empty so far; returns the seal."""
     seal = _digest(file)
     file.seek(0)
-    file.write(header(seal))
+    file.write(render_header(seal))
     return seal
 
 
@@ -46,19 +46,21 @@ def check_seal(path: Path) -> str:
     ------
     ResultError : the file does not exist, is no sealed result, is of another schema version, or is damaged
     """
-    with opened(path) as file:
-        found = file.read(USER_BLOCK)
+    with open_regular_file(path) as file:
+        found = file.read(USER_BLOCK_BYTES)
         if found.startswith(HDF5_MAGIC):
             raise ResultError(
-                f"is of schema version 1, or no result of impact; expected version {SCHEMA_VERSION}: {AGAIN}"
+                f"is of schema version 1, or no result of impact; expected version {SCHEMA_VERSION}: {SWEEP_AGAIN}"
             )
         if not found.startswith(MAGIC):
             raise ResultError("is not a readable result (it does not begin as a sealed file of impact does)")
         version = found[len(MAGIC) :].partition(b"\n")[0].removeprefix(b"schema ")
         if version.isdigit() and int(version) != SCHEMA_VERSION and len(version) < 5:
-            raise ResultError(f"has schema version {int(version)}, this program reads {SCHEMA_VERSION}; {AGAIN}")
+            raise ResultError(
+                f"has schema version {int(version)}, this program reads {SCHEMA_VERSION}; {SWEEP_AGAIN}"
+            )
         seal = _digest(file)
-    if found != header(seal):
+    if found != render_header(seal):
         raise ResultError("is damaged: its content does not have the SHA-256 that it was sealed with")
     return seal
 
@@ -72,7 +74,7 @@ def is_result(path: Path) -> bool:
 
 
 @contextmanager
-def opened(path: Path) -> Iterator[BinaryIO]:
+def open_regular_file(path: Path) -> Iterator[BinaryIO]:
     """A regular file, opened to read."""
     if not path.is_file():
         raise ResultError("is not a regular file" if path.exists() else "does not exist")
@@ -81,5 +83,5 @@ def opened(path: Path) -> Iterator[BinaryIO]:
 
 
 def _digest(file: Any) -> str:
-    file.seek(USER_BLOCK)
+    file.seek(USER_BLOCK_BYTES)
     return hashlib.file_digest(file, "sha256").hexdigest()

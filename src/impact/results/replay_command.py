@@ -1,4 +1,4 @@
-"""The command that runs a point of a result again."""
+"""The command that runs one point of a result again."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from ..formatting import number
 from ..text import safe_text
 from .attributes import read_attribute
 
-T = TypeVar("T")
+InputValue = TypeVar("InputValue")
 
 
-def repeats(path: str, dataset: xr.Dataset) -> tuple[str, ...]:
+def command_start(path: str, dataset: xr.Dataset) -> tuple[str, ...]:
     """How a command begins that runs a point of a result again; empty for a dataset that is in no file.
 
     So it is where a model was given as a value: no command can give it again.
 
-    >>> repeats("new.h5", xr.Dataset(attrs={"plugins": '{"mine": {"file": "my.py", "sha256": ""}}'}))
+    >>> command_start("new.h5", xr.Dataset(attrs={"plugins": '{"mine": {"file": "my.py", "sha256": ""}}'}))
     ('impact', 'run', 'new.h5', '--plugin', 'my.py')
     """
     files = [record.file for record in read_attribute(dataset.attrs, "plugins").values() if not record.package]
@@ -30,7 +30,7 @@ def repeats(path: str, dataset: xr.Dataset) -> tuple[str, ...]:
     return ("impact", "run", path, *(word for file in dict.fromkeys(files) for word in ("--plugin", str(file))))
 
 
-def inputs_of_model(at: Mapping[str, T]) -> dict[str, T]:
+def inputs_of_model(at: Mapping[str, InputValue]) -> dict[str, InputValue]:
     """The inputs of a point without the parameters of other models.
 
     >>> inputs_of_model({"model": "mine", "e": 0.5, "mine.c": 2.0, "other.c": 3.0, "materials.steel.E": 2e11})
@@ -39,21 +39,21 @@ def inputs_of_model(at: Mapping[str, T]) -> dict[str, T]:
     return {name: value for name, value in at.items() if owner_of(name) in ("", at.get("model"))}
 
 
-def described(at: Mapping[str, float | str]) -> str:
+def describe_point(at: Mapping[str, float | str]) -> str:
     """The inputs of a point in a message, without the digits that rounding left.
 
-    >>> described({"model": "hertz", "e": 0.1 + 0.2})
+    >>> describe_point({"model": "hertz", "e": 0.1 + 0.2})
     'model=hertz, e=0.3'
     """
     return ", ".join(f"{safe_text(name)}={safe_text(number(value, 12), 60)}" for name, value in at.items())
 
 
-def replay(begin: Sequence[str], at: Mapping[str, object]) -> str:
+def replay_command(begin: Sequence[str], at: Mapping[str, object]) -> str:
     """The whole command: how it begins, and the model and the inputs of the point.
 
-    >>> replay(("impact", "run", "new.h5"), {"model": "hertz", "case": 3})
+    >>> replay_command(("impact", "run", "new.h5"), {"model": "hertz", "case": 3})
     'impact run new.h5 --model hertz --at case=3'
-    >>> replay(("impact", "run", "new.h5"), {"model": "hertz", "e": 0.5, "material": "soft steel"})
+    >>> replay_command(("impact", "run", "new.h5"), {"model": "hertz", "e": 0.5, "material": "soft steel"})
     "impact run new.h5 --model hertz --at e=0.5 --at 'material=soft steel'"
     """
     words = list(begin)

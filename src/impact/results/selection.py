@@ -1,4 +1,4 @@
-"""Which part of a result is asked for: models by their keys, points by values of the axes."""
+"""Select parts of a result: models by key, points by values of axes; match the labels of two results."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ if TYPE_CHECKING:
 Mask = NDArray[np.bool_]
 
 # a value given by hand matches one that was computed when it differs by rounding only
-SAME = 1e-9
+SELECTION_RTOL = 1e-9
 # two labels are the same when they differ by the rounding of a range at most: powers and logarithms differ in
 # their last bits from one processor to another
-ROUNDING = 1e-12
-NUMBERS = "fiu"
+LABEL_RTOL = 1e-12
+NUMBER_DTYPE_KINDS = "fiu"
 
-Values = NDArray[Any]
-Places = NDArray[np.intp]
+Labels = NDArray[Any]
+IndexArray = NDArray[np.intp]
 
 
-def places_of(models: Sequence[str], dataset: xr.Dataset) -> list[int]:
+def model_positions(models: Sequence[str], dataset: xr.Dataset) -> list[int]:
     """The places of models along `model`, in the order of their keys; one that is named twice counts once.
 
     Raises
@@ -62,7 +62,7 @@ def select(dataset: xr.Dataset, sel: Mapping[str, float | str]) -> xr.Dataset:
             raise UsageError(f'no axis "{safe_text(name)}" in this result; {did_you_mean(name, axes)}')
         (dim,) = dataset[name].dims
         values = dataset[name].values
-        same = _same(values, value)
+        same = _matches_value(values, value)
         if dim in masks and same.any():
             same &= masks[dim]
         if not same.any():
@@ -70,39 +70,39 @@ def select(dataset: xr.Dataset, sel: Mapping[str, float | str]) -> xr.Dataset:
             has = safe_text(shown + (", ..." if values.size > 8 else ""))
             raise UsageError(f"no {safe_text(f'{name} = {value}')} in this result; {safe_text(name)} is {has}")
         masks[dim] = same
-    return dataset.isel({dim: _places(dataset[dim], same) for dim, same in masks.items()})
+    return dataset.isel({dim: _matching_positions(dataset[dim], same) for dim, same in masks.items()})
 
 
-def _places(labels: xr.DataArray, same: Mask) -> int | Places:
+def _matching_positions(labels: xr.DataArray, same: Mask) -> int | IndexArray:
     """The place that is asked for; several of an axis whose points are numbered, which may be alike otherwise."""
     is_numbered = labels.dtype.kind in "iu" and np.count_nonzero(same) > 1
     return np.flatnonzero(same) if is_numbered else int(np.argmax(same))
 
 
-def _same(values: np.ndarray, value: float | str) -> Mask:
+def _matches_value(values: np.ndarray, value: float | str) -> Mask:
     """Which values are the one asked for."""
-    if values.dtype.kind not in NUMBERS:
+    if values.dtype.kind not in NUMBER_DTYPE_KINDS:
         return np.asarray(values.astype(str) == str(value))
-    number = _number(value)
-    return np.asarray(np.isclose(values, np.nan if number is None else number, rtol=SAME, atol=0.0))
+    number = _as_number(value)
+    return np.asarray(np.isclose(values, np.nan if number is None else number, rtol=SELECTION_RTOL, atol=0.0))
 
 
-def _number(value: float | str) -> float | None:
+def _as_number(value: float | str) -> float | None:
     try:
         return float(value)
     except ValueError:
         return None
 
 
-def matched(new: Sequence[Values], baseline: Sequence[Values]) -> tuple[Places, Places]:
+def match_labels(new: Sequence[Labels], baseline: Sequence[Labels]) -> tuple[IndexArray, IndexArray]:
     """The places of equal labels on an axis in both, in the order of the baseline."""
     pairs = list(zip(new, baseline, strict=True))
     if all(np.array_equal(a, b) for a, b in pairs) and any(_is_increasing(a) for a, _ in pairs):
         # as of most pairs; sorting a long axis takes ten times its memory
         places = np.arange(len(new[0]))
         return places, places
-    for rounding in (ROUNDING, 0.0):
-        rows = np.stack([_numbered(a, b, rounding) for a, b in zip(new, baseline, strict=True)], axis=1)
+    for rounding in (LABEL_RTOL, 0.0):
+        rows = np.stack([_number_labels(a, b, rounding) for a, b in zip(new, baseline, strict=True)], axis=1)
         # only a column of labels with a row for each is unique on an axis: what rounding would merge is told apart
         _, row = np.unique(rows, axis=0, return_inverse=True)
         own, other = row[: len(new[0])], row[len(new[0]) :]
@@ -115,13 +115,13 @@ def matched(new: Sequence[Values], baseline: Sequence[Values]) -> tuple[Places, 
     return here[order], there[order]
 
 
-def _is_increasing(values: Values) -> bool:
-    return values.dtype.kind in NUMBERS and bool((values[1:] > values[:-1]).all())
+def _is_increasing(values: Labels) -> bool:
+    return values.dtype.kind in NUMBER_DTYPE_KINDS and bool((values[1:] > values[:-1]).all())
 
 
-def _numbered(new: Values, baseline: Values, rounding: float) -> Places:
+def _number_labels(new: Labels, baseline: Labels, rounding: float) -> IndexArray:
     """A number for each label of both, equal where the labels are."""
-    numbers = new.dtype.kind in NUMBERS and baseline.dtype.kind in NUMBERS
+    numbers = new.dtype.kind in NUMBER_DTYPE_KINDS and baseline.dtype.kind in NUMBER_DTYPE_KINDS
     new, baseline = (one.astype(float if numbers else str) for one in (new, baseline))
     values, number = np.unique(np.concatenate([new, baseline]), return_inverse=True)
     if numbers:

@@ -1,4 +1,4 @@
-"""The names that a result, or a time history, may have, and what commands rely on in it.
+"""Validate a dataset as a result or a time history: its names, axes, types and attributes.
 
 `load` passes over other names, `save` refuses them.
 """
@@ -17,22 +17,27 @@ from ..contact.status import STATUSES
 from ..engine.plan import material_property
 from ..errors import ResultError
 from ..text import safe_text
-from .attributes import KINDS, read_attribute
-from .history import HISTORY
-from .schema import ABOUT_A_MODEL, SCHEMA, is_case
+from .attributes import ATTRIBUTE_TYPES, read_attribute
+from .schema import HISTORY_VARIABLES, MODEL_METADATA, SCHEMA, is_case
 from .slabs import VARIES_ALONG, is_lazy, slabs
 
-COMPUTED = frozenset(one.name for one in SCHEMA)
-FOLLOWED = frozenset(name for name, _, _ in HISTORY)  # over the time t
-TEXTS = frozenset({"model", *ABOUT_A_MODEL, *MATERIAL_KEYS} - {"year"})
+RESULT_VARIABLES = frozenset(one.name for one in SCHEMA)
+HISTORY_NAMES = frozenset(name for name, _, _ in HISTORY_VARIABLES)  # over the time t
+TEXT_COORDINATES = frozenset({"model", *MODEL_METADATA, *MATERIAL_KEYS} - {"year"})
 # the table of a factored file, see `impact.results.factored`
-TABLE = frozenset({
+TABLE_VARIABLES = frozenset({
     *(f"trajectory_{name}" for name in TABLE_COLUMNS), "trajectory_of_cell", "law_stiffness",
-    "witness_index", *(f"witness_{name}" for name in COMPUTED),
+    "witness_index", *(f"witness_{name}" for name in RESULT_VARIABLES),
 })  # fmt: skip
-NAMES = COMPUTED | FOLLOWED | TEXTS | TABLE | {"t", "year", "exponent", *SWEEP_QUANTITIES}
+ALLOWED_NAMES = (
+    RESULT_VARIABLES
+    | HISTORY_NAMES
+    | TEXT_COORDINATES
+    | TABLE_VARIABLES
+    | {"t", "year", "exponent", *SWEEP_QUANTITIES}
+)
 # a parameter of a model's own: the key of the model, and a name of Python
-OWN = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*\.[^\W\d]\w*")
+PARAMETER_NAME = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*\.[^\W\d]\w*")
 
 
 def is_name(name: str) -> bool:
@@ -41,7 +46,7 @@ def is_name(name: str) -> bool:
     >>> is_name("e_out"), is_name("ismail-stronge-2008.gamma"), is_name("materials.steel.E"), is_name("twice")
     (True, True, True, False)
     """
-    if name in NAMES or OWN.fullmatch(name) or is_case(name):
+    if name in ALLOWED_NAMES or PARAMETER_NAME.fullmatch(name) or is_case(name):
         return True
     material, key = material_property(name) or ("", "")
     # netCDF separates names by spaces, and HDF5 groups by slashes
@@ -50,18 +55,18 @@ def is_name(name: str) -> bool:
 
 def is_quantity(name: str, axes: tuple[str, ...]) -> bool:
     """Whether it was computed; what was given is a coordinate. A velocity of a ball is one or the other."""
-    return name in COMPUTED or (name in FOLLOWED and axes == ("t",))
+    return name in RESULT_VARIABLES or (name in HISTORY_NAMES and axes == ("t",))
 
 
 # attributes of a result that the program reads: text, some of which is JSON, and numbers
-TEXT = ("title", "config", "config_set", "fingerprint", "impact_version", "packages", "plugins")
-NUMBERS = ("rtol", "max_steps")
+TEXT_ATTRIBUTES = ("title", "config", "config_set", "fingerprint", "impact_version", "packages", "plugins")
+NUMBER_ATTRIBUTES = ("rtol", "max_steps")
 # attributes that say that a file is factored, which a dataset has not
-FACTORED = ("laws", "axes")
+FACTORED_ATTRIBUTES = ("laws", "axes")
 # statuses that are looked at at a time
-MAX_STATUS = 2**22
+STATUS_SLAB_POINTS = 2**22
 # of a variable of a result
-DTYPES = {
+ALLOWED_DTYPES = {
     variable.name: [np.dtype(variable.dtype)] if variable.dtype != "f8" else [np.dtype("f8"), np.dtype("f4")]
     for variable in SCHEMA
 }
@@ -69,56 +74,62 @@ DTYPES = {
 
 def schema_violation(dataset: xr.Dataset) -> str | None:
     """The first reason why a dataset is no result and no time history, or None."""
-    checks = (_names, _axes, _kinds, _json, _history if "t" in dataset.dims else _result)
+    checks = (
+        _name_violations,
+        _axis_violations,
+        _type_violations,
+        _attribute_violations,
+        _history_violations if "t" in dataset.dims else _result_violations,
+    )
     return next((safe_text(fault) for check in checks for fault in check(dataset)), None)
 
 
-def _names(dataset: xr.Dataset) -> Iterator[str]:
+def _name_violations(dataset: xr.Dataset) -> Iterator[str]:
     unknown = sorted({str(name) for name in (*dataset.variables, *dataset.dims) if not is_name(str(name))})
     if unknown:
         yield f"{', '.join(unknown)}: no name of a result"
 
 
-def _axes(dataset: xr.Dataset) -> Iterator[str]:
+def _axis_violations(dataset: xr.Dataset) -> Iterator[str]:
     for name, size in dataset.sizes.items():
         if name not in dataset.coords or not size:
             yield f"its axis {name} has no values"
 
 
-def _kinds(dataset: xr.Dataset) -> Iterator[str]:
+def _type_violations(dataset: xr.Dataset) -> Iterator[str]:
     for name, variable in dataset.variables.items():
-        if variable.dtype.kind not in ("UO" if name in TEXTS else "iuf"):
+        if variable.dtype.kind not in ("UO" if name in TEXT_COORDINATES else "iuf"):
             yield f"{name}: neither numbers nor labels, or one for the other"
-        wrong = name in DTYPES and variable.dtype not in DTYPES[str(name)]
+        wrong = name in ALLOWED_DTYPES and variable.dtype not in ALLOWED_DTYPES[str(name)]
         if wrong:
-            yield f"{name}: got {variable.dtype}, expected {' or '.join(map(str, DTYPES[str(name)]))}"
+            yield f"{name}: got {variable.dtype}, expected {' or '.join(map(str, ALLOWED_DTYPES[str(name)]))}"
         if not all(isinstance(variable.attrs.get(about, ""), str) for about in ("units", "long_name")):
             yield f"{name}: units or long_name that are no text"
 
 
-def _json(dataset: xr.Dataset) -> Iterator[str]:
-    for key in FACTORED:
+def _attribute_violations(dataset: xr.Dataset) -> Iterator[str]:
+    for key in FACTORED_ATTRIBUTES:
         if key in dataset.attrs:
             yield f"{key}: an attribute of files in layout factored"
-    for key in KINDS:
+    for key in ATTRIBUTE_TYPES:
         try:
             read_attribute(dataset.attrs, key)
         except ResultError as error:
             yield str(error)
 
 
-def _history(dataset: xr.Dataset) -> Iterator[str]:
+def _history_violations(dataset: xr.Dataset) -> Iterator[str]:
     for name, one in dataset.variables.items():
         if one.dims != (() if name == "model" else ("t",)):
             yield f"{name}: does not lie along t alone"
 
 
-def _result(dataset: xr.Dataset) -> Iterator[str]:
+def _result_violations(dataset: xr.Dataset) -> Iterator[str]:
     if "model" not in dataset.dims:
         yield "model is no axis; select models as a list, sel(model=[...])"
     elif not dataset.indexes["model"].is_unique:
         yield "a model stands twice in it"
-    for name in ABOUT_A_MODEL:
+    for name in MODEL_METADATA:
         if name not in dataset or dataset[name].dims != ("model",):
             yield f"{name} of the models is missing"
     for one in SCHEMA:
@@ -126,10 +137,10 @@ def _result(dataset: xr.Dataset) -> Iterator[str]:
             yield f"{one.name}: lies along model"
     if "status" in dataset and _has_unknown_status(dataset["status"]):
         yield "status: a number without a meaning"
-    for key in TEXT:
+    for key in TEXT_ATTRIBUTES:
         if not isinstance(dataset.attrs.get(key), str):
             yield f"no {key}, or not as text"
-    for key in NUMBERS:
+    for key in NUMBER_ATTRIBUTES:
         if not isinstance(dataset.attrs.get(key), int | float | np.number):
             yield f"no {key}, or not as a number"
 
@@ -138,5 +149,5 @@ def _has_unknown_status(status: xr.DataArray) -> bool:
     """Whether a status has no meaning; one that is computed always has."""
     if is_lazy(status.variable) and VARIES_ALONG in status.encoding:
         return False
-    parts = (status.isel(where).values for where in slabs(status.sizes, MAX_STATUS))
+    parts = (status.isel(where).values for where in slabs(status.sizes, STATUS_SLAB_POINTS))
     return any(not np.isin(np.unique(part), STATUSES).all() for part in parts)

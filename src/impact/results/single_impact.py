@@ -1,0 +1,362 @@
+"""One impact by one model: its config, from a file or a point of a result, its outputs and its time history."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from importlib.resources import files
+from pathlib import Path
+
+import xarray as xr
+
+from .._version import __version__
+from ..config.grid import Axis, path_of
+from ..config.load import Config, parse_config, read_config
+from ..config.tables import SWEEP_QUANTITIES
+from ..contact.force_expressions import returning, stiffer
+from ..contact.history import History, follow
+from ..contact.impacts import Impacts
+from ..contact.materials import Material
+from ..contact.model import ForceModel
+from ..contact.outputs import collide
+from ..contact.status import Status
+from ..engine.build_impacts import build_impacts
+from ..engine.plan import Plan, owner_of
+from ..engine.plugins import Plugins
+from ..errors import ConfigError, UsageError, did_you_mean
+from ..text import safe_text
+from .backend import open_result
+from .provenance import changed_plugins, check_plugins, stored_config, unknown_plugins
+from .schema import HISTORY_VARIABLES, SCHEMA_VERSION
+from .seal import is_result
+
+STARTER_CONFIG = files("impact") / "config" / "starter.toml"
+
+ConfigSource = str | Path | Mapping[str, object] | xr.Dataset | None
+# from overrides to the config with them
+ReadConfig = Callable[[Sequence[str]], Config]
+# name, unit, meaning of what follows from the inputs and the motion of one impact
+DERIVED_QUANTITIES = (
+    ("m1", "kg", "mass of ball 1"),
+    ("m2", "kg", "mass of ball 2"),
+    ("R1", "m", "radius of ball 1"),
+    ("R2", "m", "radius of ball 2"),
+    ("m", "kg", "effective mass (17)"),
+    ("K_r", "N m-n", "unloading stiffness (42)"),
+    ("tau_c", "N s", "impulse of the approach"),
+    ("tau_r", "N s", "impulse of the restitution"),
+    ("W_c", "J", "work of the approach (38)"),
+    ("W_r", "J", "work of the restitution (39)"),
+    ("rebound_speed_bound", "m s-1", "K/lambda, bound of the rebound speed (26)"),
+)
+
+
+@dataclass(frozen=True)
+class Impact:
+    """One impact by one model.
+
+    Parameters
+    ----------
+    model : the model
+    point : the inputs by their config names; a name in `first` is an axis of the source at its first value
+    values : the outputs under the names of the result file, in SI
+    materials : those of the balls, by name
+    derived : the quantities of DERIVED by name, in SI; NaN where one does not apply
+    exponent : compliance exponent n of the law
+    damping : damping factor lambda = chi K/v0 [N s/m^(n+1)], NaN where the law has none
+    e_kinematic, e_kinetic, e_energetic : restitution from velocities, impulses and works, equations (1) to (3);
+        the last two by quadrature of the force over the history, 0 where the balls stay together
+    history : the time history as a dataset over t, or None where there is no motion to follow
+    """
+
+    model: ForceModel
+    point: Mapping[str, float | str]
+    first: tuple[str, ...]
+    values: Mapping[str, float]
+    materials: Mapping[str, Material]
+    derived: Mapping[str, float]
+    exponent: float
+    closing_speed: float
+    damping: float
+    e_kinematic: float
+    e_kinetic: float
+    e_energetic: float
+    history: xr.Dataset | None
+
+    @property
+    def status(self) -> Status:
+        return Status(int(self.values["status"]))
+
+
+def run_single_impact(plan: Plan, first: tuple[str, ...], times: int | None = None) -> Impact:
+    """The only impact of a plan; `first` are axes of its source that are at their first value.
+
+    `times` is how many points in time its history has, see `impact.contact.history.follow`.
+    """
+    config = plan.config
+    law = config.models[0]
+    impacts = build_impacts(plan.inputs, law, ())
+    solver = config.solver
+    errors: dict[str, str] = {}
+    collision = collide(law, impacts, rtol=solver.rtol, max_steps=solver.max_steps, errors=errors)
+    values = {name: array[0].item() for name, array in collision.items()}
+    for error in errors.values():
+        warnings.warn(error, stacklevel=2)
+    going = values["status"] == Status.OK
+    history = follow(law, impacts, rtol=solver.rtol, max_steps=solver.max_steps, times=times) if going else None
+    v0 = impacts.v0[0].item()
+    # a law may have an n of its own, in place of the one given
+    point = {**config.scalars, "n": impacts.n[0].item()}
+    if "alpha" in config.scalars:
+        point["e"] = impacts.e[0].item()
+    without_history = 0.0 if values["status"] == Status.LIMIT else math.nan
+    return Impact(
+        model=law,
+        point=point,
+        first=first,
+        values=values,
+        materials=plan.materials_used,
+        derived=_derived_quantities(law, impacts, values, history),
+        exponent=impacts.n[0].item(),
+        closing_speed=v0,
+        damping=values["lambda"],
+        e_kinematic=(values["v2_post"] - values["v1_post"]) / v0 if v0 > 0.0 else float("nan"),
+        e_kinetic=history.e_kinetic if history else without_history,
+        e_energetic=history.e_energetic if history else without_history,
+        history=history_dataset(history, law.key, point) if history else None,
+    )
+
+
+def _derived_quantities(
+    law: ForceModel, impacts: Impacts, values: Mapping[str, float], history: History | None
+) -> dict[str, float]:
+    """The quantities of DERIVED."""
+    found = {name: getattr(impacts, name)[0].item() for name in ("m1", "m2", "R1", "R2", "m")}
+    if law.unloading in (returning, stiffer) and values["status"] in (Status.OK, Status.LIMIT):
+        recovered = values["peak_indentation"] - values["permanent_indentation"]
+        found["K_r"] = values["peak_force"] / recovered ** impacts.n[0].item() if recovered else math.inf
+    if history is not None:
+        found |= {name: getattr(history, name) for name in ("tau_c", "tau_r", "W_c", "W_r")}
+    elif values["status"] == Status.LIMIT:
+        # all that the balls bring is taken from them, and nothing given back
+        found["tau_c"], found["W_c"] = (impacts.m * impacts.v0)[0].item(), 0.5 * impacts.energy[0].item()
+        found["tau_r"] = found["W_r"] = 0.0
+    if "chi" in law.coefficients and law.unloading is None:
+        chi, v0 = values["damping_ratio"], impacts.v0[0].item()
+        # the damping of a limit is infinite
+        chi = math.inf if values["status"] == Status.LIMIT else chi
+        found["rebound_speed_bound"] = v0 / chi if chi else math.inf
+    return {name: found.get(name, math.nan) for name, _, _ in DERIVED_QUANTITIES}
+
+
+def history_dataset(history: History, model: str, point: Mapping[str, float | str]) -> xr.Dataset:
+    """The time history of one impact, over the time t since first contact.
+
+    Parameters
+    ----------
+    history : the history
+    model : key of the model
+    point : the inputs of the impact by their config names, kept in the attribute `inputs`
+    """
+    dataset = xr.Dataset(
+        {
+            name: ("t", getattr(history, name), {"units": unit, "long_name": meaning})
+            for name, unit, meaning in HISTORY_VARIABLES
+        },
+        coords={"t": ("t", history.t, {"units": "s", "long_name": "time since first contact"}), "model": model},
+    )
+    dataset.attrs = {
+        "title": f"Time history of one impact, {model}",
+        "schema_version": SCHEMA_VERSION,
+        "impact_version": __version__,
+        "inputs": json.dumps(dict(point)),
+        "e_kinetic": history.e_kinetic,
+        "e_energetic": history.e_energetic,
+    }
+    return dataset
+
+
+def histories(
+    dataset: xr.Dataset,
+    models: Sequence[str] | None,
+    at: Mapping[str, float | str],
+    plugins: Plugins,
+) -> list[xr.Dataset]:
+    """Time histories of one point by several models; of a time history, itself.
+
+    Parameters
+    ----------
+    dataset : a result, or a time history
+    models : keys; by default all
+    at : values of the axes, which need not be on the grid; one that is not named takes its first value. A
+        parameter of one model is no input of the others
+    plugins : models that are not built in
+
+    Raises
+    ------
+    UsageError : a model or an axis is not in the result, or no model has a motion to follow there
+    """
+    if "t" in dataset.dims:
+        return [dataset]
+    known = [str(key) for key in dataset["model"].values.ravel()]
+    for key in models or ():
+        if key not in known:
+            raise UsageError(f'no model "{safe_text(key)}" in this result; {did_you_mean(key, known)}')
+    check_plugins(dataset.attrs, plugins, "the result")
+    for changed in changed_plugins(dataset.attrs, plugins, "the result"):
+        # the motion of another law is not that of the result
+        raise UsageError(changed)
+    followed: list[xr.Dataset] = []
+    ends: dict[str, str] = {}
+    first: dict[str, float | str] = {}
+    for key in dict.fromkeys(models or known):
+        others = {str(name) for name in dataset.coords if owner_of(str(name)) not in ("", key)}
+        of_model = {name: value for name, value in at.items() if name not in others}
+        config, names = single_point(dataset, (), plugins, key, of_model)
+        impact = run_single_impact(Plan(config, plugins.of(config.models)), names)
+        first |= {name: impact.point[name] for name in names}
+        if impact.history is None:
+            ends[key] = impact.status.meaning
+        else:
+            followed.append(impact.history)
+    if not followed:
+        where = ", ".join(f"{name} = {value}" for name, value in {**first, **at}.items())
+        reason = next(iter(ends.values()))
+        raise UsageError(f"no motion to draw at {safe_text(where)}: {reason}; choose a point, such as --sel e=0.5")
+    return followed
+
+
+def single_point(
+    source: ConfigSource,
+    overrides: Sequence[str],
+    plugins: Plugins,
+    model: str | None = None,
+    at: Mapping[str, float | str] | None = None,
+) -> tuple[Config, tuple[str, ...]]:
+    """The config of a single impact.
+
+    Parameters
+    ----------
+    source : path of a TOML file or of a result, a mapping of the shape of the former, a result, or None for the
+        starter at e = 0.5; a part of a result stands for the values that it was taken at
+    overrides : changes to its config
+    plugins : models that are not built in; one that has changed since the result was made gives a warning
+    model : key of the model; by default the config's first
+    at : values by config name, which need not be on the grid. Those that vary together, in a zip group or in
+        numbered cases, have to be; the number of a case is chosen by the name of its dimension
+
+    Returns
+    -------
+    (Config, names) : a config without axes, and the names of the axes that were not named: they took their first
+        value
+
+    Raises
+    ------
+    ConfigError, UsageError : a name is not known here, or a value is not allowed
+    ResultError : what a result carries cannot be read
+    """
+    read, parted = _config_reader(source, overrides, plugins)
+    # each override, and how it is called in a message: as it was asked for
+    asked = {} if model is None else {f"models={json.dumps([model])}": f"--model {model}"}
+    config = _read_with_option_names(read, asked)
+    columns = [_selectable_columns(axis) for axis in config.axes]
+    varied = {name for names in columns for name in names}
+    if at and {"e", "alpha"} <= at.keys():
+        raise UsageError("--at alpha: got alpha beside e, expected one of the two")
+    at = {**{name: value for name, value in parted.items() if name in varied}, **(at or {})}
+    together = {name for names in columns if len(names) > 1 for name in names}
+    known = [*(name for names in columns for name in names), *config.scalars]
+    for name, value in at.items():
+        if name not in known and name not in SWEEP_QUANTITIES:
+            raise UsageError(f'no input "{safe_text(name)}" here; {did_you_mean(name, known)}')
+        if name not in together:
+            asked[f"{_override_path(name)}={_toml_value(value)}"] = f"--at {name}={value}"
+    config = _read_with_option_names(read, asked)
+
+    scalars = dict(config.scalars)
+    first: list[str] = []
+    for axis in config.axes:
+        scalars |= {name: values[_position_on_axis(axis, at)] for name, values in axis.columns.items()}
+        if axis.size > 1 and not any(name in at for name in _selectable_columns(axis)):
+            first += axis.columns
+    return replace(config, axes=(), scalars=scalars, models=config.models[:1]), tuple(first)
+
+
+def _config_reader(
+    source: ConfigSource, overrides: Sequence[str], plugins: Plugins
+) -> tuple[ReadConfig, dict[str, float | str]]:
+    """How the config of a source is read, and the single values of a part of a result."""
+    if source is None:
+        text = STARTER_CONFIG.read_text(encoding="utf-8")
+        first = ["sweep.e=0.5", *overrides]
+        return lambda more: parse_config(text, [*first, *more], plugins.models, name="starter"), {}
+    if isinstance(source, str | Path) and is_result(Path(source)):
+        with open_result(source) as stored:
+            return _stored_config_reader(stored, overrides, plugins, str(source))
+    if isinstance(source, xr.Dataset):
+        return _stored_config_reader(source, overrides, plugins, "the result")
+    path_or_table = Path(source) if isinstance(source, str) else source
+    return lambda more: read_config(path_or_table, [*overrides, *more], plugins.models), {}
+
+
+def _stored_config_reader(
+    dataset: xr.Dataset, overrides: Sequence[str], plugins: Plugins, name: str
+) -> tuple[ReadConfig, dict[str, float | str]]:
+    attributes = dict(dataset.attrs)
+    single = {str(key): label.values.item() for key, label in dataset.coords.items() if label.ndim == 0}
+    if "config" in attributes:
+        check_plugins(attributes, plugins, name)
+        for note in (*changed_plugins(attributes, plugins, name), *unknown_plugins(attributes, plugins, name)):
+            warnings.warn(note, stacklevel=4)
+
+    def read(more: Sequence[str]) -> Config:
+        return stored_config(attributes, [*overrides, *more], plugins, name, allow_changed_plugins=True)
+
+    return read, {key: value for key, value in single.items() if key != "model"}
+
+
+def _selectable_columns(axis: Axis) -> dict[str, Sequence[float | str]]:
+    """The values along an axis by the names that choose a point of it: its columns, and the number of a case."""
+    return {**({axis.numbered: axis.labels} if axis.numbered else {}), **axis.columns}
+
+
+def _position_on_axis(axis: Axis, at: Mapping[str, float | str]) -> int:
+    """The place on an axis where its columns have the values asked for."""
+    columns = _selectable_columns(axis)
+    for place in range(axis.size):
+        if all(columns[name][place] == value for name, value in at.items() if name in columns):
+            return place
+    asked = ", ".join(f"{name} = {value}" for name, value in at.items() if name in columns)
+    raise UsageError(f"{safe_text(asked)}: not on the zipped axis {axis.name}; these values vary together")
+
+
+def _override_path(name: str) -> str:
+    """The path of an input in an override, as TOML writes it.
+
+    >>> _override_path("v1"), _override_path("bilinear.K"), _override_path("materials.soft steel.E")
+    ('sweep.v1', 'model.bilinear.K', 'materials."soft steel".E')
+    """
+    parts = map(str, path_of(name))
+    return ".".join(part if re.fullmatch("[A-Za-z0-9_-]+", part) else _toml_value(part) for part in parts)
+
+
+def _toml_value(value: float | str) -> str:
+    return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
+
+
+def _read_with_option_names(read: ReadConfig, asked: Mapping[str, str]) -> Config:
+    """A config whose problems are called by what was asked for, not by the overrides that stand for it."""
+    try:
+        return read(list(asked))
+    except ConfigError as error:
+        names = {f"--set {override}:": f"{name}:" for override, name in asked.items()}
+        raise ConfigError([_with_option_name(line, names) for line in error.problems]) from None
+
+
+def _with_option_name(line: str, names: Mapping[str, str]) -> str:
+    """A line that begins with one of the names, beginning with what it stands for."""
+    return next((safe_text(new) + line[len(old) :] for old, new in names.items() if line.startswith(old)), line)
