@@ -266,7 +266,7 @@ def test_any_executor_integrates(blocks: Path) -> None:
             assert impact.sweep(blocks, executor=executor).identical(one)
         # it is not shut down
         assert threads.submit(len, "abc").result() == 3
-    with pytest.raises(UsageError, match="got jobs = 2 and an executor, wants one of them"):
+    with pytest.raises(UsageError, match="got jobs = 2 and an executor, expected one of them"):
         impact.sweep(blocks, jobs=2, executor=threads)
 
 
