@@ -371,7 +371,7 @@ def test_lack_of_memory_keeps_what_is_finished_and_is_a_storage_error(cli: Run, 
     assert done.returncode == 4
     assert done.stderr == (
         "out of memory; no room for 1 GiB; 20,000 of 40,000 trajectories are kept in results.h5.work; "
-        "--resume goes on\n"
+        "--resume continues\n"
     )
 
 
@@ -561,7 +561,7 @@ def test_a_signal_leaves_nothing_half_written(tmp_path: Path, number: signal.Sig
     child.send_signal(number)
     _, told = child.communicate(timeout=60)
     assert child.returncode == code
-    assert told.endswith(" of 300,000 trajectories are kept in results.h5.work; --resume goes on\n")
+    assert told.endswith(" of 300,000 trajectories are kept in results.h5.work; --resume continues\n")
     assert "Traceback" not in told
     assert sorted(p.name for p in tmp_path.iterdir()) == ["long.toml", "results.h5.work"]
 
@@ -608,8 +608,8 @@ def test_an_internal_error_is_one_line_and_a_report(forked: Forked, tmp_path: Pa
 def test_a_cluster_without_dask_names_the_extra(forked: Forked, small: Path, tmp_path: Path) -> None:
     hidden = "import sys; sys.modules['distributed'] = None"
     done = forked("sweep", small, "--scheduler", "local", cwd=tmp_path, code=hidden)
-    wants = 'wants dask.distributed, which is not installed: pip install "impact-sweep[distributed]"'
-    assert (done.returncode, done.stderr) == (2, f"--scheduler local: {wants}\n")
+    expected = 'expected dask.distributed, which is not installed: pip install "impact-sweep[distributed]"'
+    assert (done.returncode, done.stderr) == (2, f"--scheduler local: {expected}\n")
 
 
 def test_one_of_those_who_integrate_is_asked_for(cli: Run, small: Path, tmp_path: Path) -> None:

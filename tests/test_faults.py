@@ -307,7 +307,7 @@ def check_kept(done: Done, folder: Path) -> set[int]:
     """A storage error is one line that says how to go on, and what was finished stands there."""
     assert done.returncode == 4, done
     assert (done.stderr.count("\n"), done.stdout) == (1, "")
-    assert done.stderr.endswith("; --resume goes on\n"), done
+    assert done.stderr.endswith("; --resume continues\n"), done
     assert not (folder / RESULT).exists()
     assert done.kept <= kept_in(folder)
     return kept_in(folder)

@@ -262,7 +262,7 @@ def expand_cases(
             problems.append((cases_path, _unknown_input_message(name, models)))
             new["sweep"].pop(name, None)
             continue
-        if _has_value(data, path):
+        if _contains_path(data, path):
             problems.append((cases_path, f"given beside {'.'.join(map(str, path))}, expected one of the two"))
         if len(values) != n_cases or not values:
             problems.append(
@@ -277,7 +277,7 @@ def expand_cases(
     return new, names, problems
 
 
-def _has_value(data: Mapping[str, Any], path: KeyPath) -> bool:
+def _contains_path(data: Mapping[str, Any], path: KeyPath) -> bool:
     """Whether the data has a value at a path."""
     for key in path[:-1]:
         data = as_table(data.get(str(key)))

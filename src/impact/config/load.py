@@ -33,7 +33,7 @@ from .grid import MAX_POINTS, Axis, build_grid, chunk_problems, name_of, path_of
 from .library import library
 from .lines import SourceLocations, key_lines, problem_lines, validation_problems
 from .quantities import Column, ConfigProblem, KeyPath, Names, Numbers, Table, ValidationContext
-from .rules import RawConfig, names_in, rule_problems
+from .rules import RawConfig, listed_names, rule_problems
 from .tables import (
     DEFAULT_RTOL,
     MATERIAL_KEYS,
@@ -289,7 +289,7 @@ def _add_library_materials(data: Mapping[str, Any]) -> tuple[dict[str, Any], lis
     sweep = as_table(data.get("sweep"))
     cases = as_table(sweep.get("cases"))
     names = dict.fromkeys(
-        name for key in MATERIAL_KEYS for table in (sweep, cases) for name in names_in(table.get(key))
+        name for key in MATERIAL_KEYS for table in (sweep, cases) for name in listed_names(table.get(key))
     )
     names |= {str(path[1]): None for path in map(path_of, cases) if path[0] == "materials"}
     materials = {

@@ -225,7 +225,7 @@ def _float_to_int(value: object) -> object:
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
-def whole_number(least: int, most: int | None = None) -> ReadAs:
+def bounded_int(least: int, most: int | None = None) -> ReadAs:
     """The type of whole numbers in an interval."""
     description = (
         f"a whole number of at least {least:,}" if most is None else f"a whole number from {least:,} to {most:,}"
@@ -536,7 +536,7 @@ def number_type(quantity: Quantity) -> Any:
 def numbers_type(quantity: Quantity) -> Any:
     """The type of a number, list, range or column of a file; the form decides which type validates it."""
     number, end = number_type(quantity), number_type(replace(quantity, infinite=False))
-    any_number, count = number_type(Quantity(quantity.unit, "")), whole_number(1).type
+    any_number, count = number_type(Quantity(quantity.unit, "")), bounded_int(1).type
     triple = cast(Any, tuple)
     types = {
         "linspace": triple[end, end, count],

@@ -16,7 +16,7 @@ from .quantities import ConfigProblem
 from .tables import MATERIAL_QUANTITIES, SWEEP_QUANTITIES, model_quantities
 
 
-def names_in(value: object) -> list[str]:
+def listed_names(value: object) -> list[str]:
     """The names in a name or a list of names."""
     return [name for name in (value if isinstance(value, list) else [value]) if isinstance(name, str)]
 
@@ -54,7 +54,7 @@ class RawConfig:
 
     def materials_of(self, ball: str) -> list[str]:
         """Names of the materials that a ball, "1" or "2", may have."""
-        return names_in(self.sweep.get("material", self.sweep.get(f"material{ball}")))
+        return listed_names(self.sweep.get("material", self.sweep.get(f"material{ball}")))
 
     def materials_without(self, ball: str, key: str) -> Iterator[str]:
         """The materials of a ball whose tables lack a key."""

@@ -37,6 +37,7 @@ from .quantities import (
     ReadAs,
     Table,
     ValidationContext,
+    bounded_int,
     expected,
     known_name,
     located_errors,
@@ -45,7 +46,6 @@ from .quantities import (
     simplify_schema,
     suggest,
     value_error,
-    whole_number,
 )
 
 DEFAULT_TITLE = "Impact sweep"
@@ -149,7 +149,7 @@ class Solver:
 
     rtol: Annotated[float, Quantity("1", "relative tolerance of the integration", 1e-13, 1e-4)] = DEFAULT_RTOL
     max_steps: Annotated[
-        int, whole_number(1, MAX_SOLVER_STEPS), Field(description="steps that one impact may take")
+        int, bounded_int(1, MAX_SOLVER_STEPS), Field(description="steps that one impact may take")
     ] = 10_000
     collapse: Annotated[
         bool, Field(strict=True, description="integrate impacts that are the same once"), expected("true or false")
@@ -195,7 +195,7 @@ class Output:
     ] = "float64"
     compression: Annotated[Literal["none", "gzip"], Field(description="of the variables")] = "none"
     chunks: Annotated[
-        Mapping[str, Annotated[int, whole_number(1, MAX_AXIS_VALUES)]],
+        Mapping[str, Annotated[int, bounded_int(1, MAX_AXIS_VALUES)]],
         Field(description="lengths along axes, by name, of the chunks in which variables are stored"),
         expected("a table of lengths by axis, such as { e = 50 }"),
     ] = field(default_factory=dict)

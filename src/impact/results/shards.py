@@ -115,7 +115,7 @@ def sweep_shard(
     plan = with_core(plan, maps)
     blocks = list(trajectory_ranges(maps))
     own = [one for one in blocks if shard.has(one)]
-    counter = ProgressCounter.begin(sum(one.size for one in own), plan.points, on_progress)
+    counter = ProgressCounter.start(sum(one.size for one in own), plan.points, on_progress)
     folder = shard.folder(output)
     with open_work_folder(folder, plan, resume=not overwrite, overwrite=overwrite) as work_folder:
         attributes = dataset_template(plan).attrs
@@ -129,7 +129,7 @@ def sweep_shard(
             sink.write(json.dumps(about).encode())
         with report_kept_blocks(folder, counter, "the same command", lambda error: []):
             complete_ranges(work_folder, plan, maps, own, counter, backend, should_stop)
-    return ShardProgress(folder, len(own), len(blocks), counter.at.trajectories, counter.at.failed)
+    return ShardProgress(folder, len(own), len(blocks), counter.progress.trajectories, counter.progress.failed)
 
 
 @dataclass(frozen=True)
@@ -182,7 +182,7 @@ def merge(
     plan = Plan(config, plugins.of(config.models))
     maps = trajectory_maps(plan)
     blocks = list(trajectory_ranges(maps))
-    counter = ProgressCounter.begin(sum(own.count for own in maps), plan.points, on_progress)
+    counter = ProgressCounter.start(sum(own.count for own in maps), plan.points, on_progress)
     for folder, one in told.items():
         if one.attributes["fingerprint"] != about.attributes["fingerprint"]:
             # what differs in the trajectories is told by its name first
