@@ -232,7 +232,7 @@ def test_collapse_changes_no_bit(key, rows):
 
 @settings(max_examples=10, deadline=None)
 @given(key=st.sampled_from(sorted(LAWS)), seed=st.integers(0, 999), size=st.integers(5, 20))
-def test_lane_has_the_same_bits_in_any_order_and_block(key, seed, size):
+def test_trajectory_has_the_same_bits_in_any_order_and_block(key, seed, size):
     chance = np.random.default_rng(seed)
     e, n = chance.uniform(0.0, 1.0, 20), find(key).exponent or 1.5
     lanes = with_parameters(find(key), impacts(n, e=e, v1=chance.uniform(0.1, 10.0, 20)), 1.0 - e)

@@ -139,7 +139,7 @@ def test_what_is_not_checked_never_fails(config: dict[str, object]) -> None:
     ("checks", "status"),
     [({"v0"}, Status.NO_IMPACT), ({"length"}, Status.NO_IMPACT), ({"e"}, Status.OK), (set(), Status.OK)],
 )
-def test_balls_that_part_are_found_by_their_speed_or_their_sizes(checks: set[str], status: Status) -> None:
+def test_balls_that_part_have_a_status_by_their_speed_or_their_sizes(checks: set[str], status: Status) -> None:
     checked = check_inputs(impact.models()["hertz"], impacts(v1=-1.0), frozenset(checks))
     assert np.broadcast_to(checked, 1).tolist() == [status]
 
