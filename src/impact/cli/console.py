@@ -1,4 +1,4 @@
-"""How the commands print: plain text, whatever a file's strings hold, and as wide as there is room."""
+"""Output of the commands: tables and JSON, with control characters of a file escaped."""
 
 from __future__ import annotations
 
@@ -14,31 +14,31 @@ from rich.text import Text
 from ..formatting import number
 from ..text import safe_text
 
-# width of a table that no terminal limits
-WIDE = 160
+# width of a table that is not printed on a terminal
+PIPE_WIDTH = 160
 
 
 def console(stream: Any) -> Console:
-    """A console that prints text as it is: no markup, no guessing, no wrapping at 80 in a pipe."""
-    width = None if stream.isatty() else WIDE
+    """A console without markup and highlighting, which does not wrap at 80 columns in a pipe."""
+    width = None if stream.isatty() else PIPE_WIDTH
     return Console(file=stream, markup=False, highlight=False, emoji=False, width=width)
 
 
 def table(*headings: str) -> Table:
     """A table without lines; its first column is text, the others are numbers."""
     rows = Table(box=None, pad_edge=False, header_style="bold")
-    for place, heading in enumerate(headings):
-        rows.add_column(heading, justify="left" if place == 0 else "right", overflow="fold", no_wrap=place == 0)
+    for index, heading in enumerate(headings):
+        rows.add_column(heading, justify="left" if index == 0 else "right", overflow="fold", no_wrap=index == 0)
     return rows
 
 
 def cell(value: Any) -> Text:
-    """A value as plain text that no markup and no control character can touch."""
+    """A value as plain text, with control characters escaped and without markup."""
     return Text(safe_text(number(value)))
 
 
 def print_rows(rows: Mapping[str, Any]) -> None:
-    """Names and what they are, a line each."""
+    """Print names and values, one per line."""
     grid = Table.grid(padding=(0, 2))
     grid.add_column(no_wrap=True)
     grid.add_column(overflow="fold")
@@ -48,16 +48,16 @@ def print_rows(rows: Mapping[str, Any]) -> None:
 
 
 def dump(value: Any) -> str:
-    """Strict JSON in ASCII: what is not a number is null, and a wall's mass is "inf"."""
+    """Strict JSON in ASCII: NaN is null, and an infinite mass is "inf"."""
 
-    def plain(value: Any) -> Any:
+    def to_json(value: Any) -> Any:
         match value:
             case float():
                 return value if abs(value) < float("inf") else None if value != value else str(value)
             case dict():
-                return {str(name): plain(item) for name, item in value.items()}
+                return {str(name): to_json(element) for name, element in value.items()}
             case list() | tuple():
-                return [plain(item) for item in value]
+                return [to_json(element) for element in value]
         return value
 
-    return json.dumps(plain(value), allow_nan=False)
+    return json.dumps(to_json(value), allow_nan=False)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ExecutorOptions:
-    """What was asked for.
+    """The options of the command line that select an executor.
 
     Raises
     ------
@@ -31,23 +31,23 @@ class ExecutorOptions:
     scheduler_file: Path | None = None
 
     def __post_init__(self) -> None:
-        given = {f"--{name.replace('_', '-')}": value for name, value in vars(self).items()}
-        asked = [f"{name} {safe_text(str(value))}" for name, value in given.items() if value not in (1, None)]
+        options = {f"--{name.replace('_', '-')}": value for name, value in vars(self).items()}
+        asked = [f"{name} {safe_text(str(value))}" for name, value in options.items() if value not in (1, None)]
         if len(asked) > 1:
             raise UsageError(f"{asked[0]}: given beside {asked[1]}, expected one of the two")
 
     @contextmanager
     def backend(self, *, quiet: bool, should_stop: Callable[[], bool]) -> Iterator[Backend]:
-        """Those who integrate; prints the cluster to stderr, and `should_stop` gives up a connection to it."""
-        place = self.scheduler if self.scheduler is not None else self.scheduler_file
-        if place is None:
+        """The backend; prints the size of a cluster on stderr. `should_stop` ends an attempt to connect."""
+        address = self.scheduler if self.scheduler is not None else self.scheduler_file
+        if address is None:
             from ..engine.executors import choose_backend
 
             yield choose_backend(self.jobs, self.threads)
             return
         from ..engine.dask import cluster
 
-        with cluster(place, should_stop) as (backend, dashboard, workers):
+        with cluster(address, should_stop) as (backend, dashboard, workers):
             if not quiet:
                 waits = "" if workers else ", waits for some"
                 count = f"{workers} worker{'' if workers == 1 else 's'}{waits}"

@@ -1,4 +1,4 @@
-"""The command `materials`: the materials that need no table in a config, and where their numbers are from."""
+"""The command `materials`: common materials that need no table in a config, with their sources."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from ..text import safe_text
 from .console import dump
 from .options import JsonOption
 
-UNITS = {"E": "GPa", "nu": "-", "rho": "kg/m3", "yield_strength": "MPa"}
-SCALES = {"GPa": 1e9, "MPa": 1e6}
+DISPLAY_UNITS = {"E": "GPa", "nu": "-", "rho": "kg/m3", "yield_strength": "MPa"}
+SI_PER_UNIT = {"GPa": 1e9, "MPa": 1e6}
 
 
 def materials(
@@ -23,22 +23,22 @@ def materials(
     """Common materials that a config may name without a table: E, nu, rho, yield strength, source."""
     from .. import api
 
-    known = api.materials()
-    if name is not None and name not in known:
-        raise UsageError(f'no material "{safe_text(name)}"; {did_you_mean(name, list(known))}')
-    shown = known if name is None else {name: known[name]}
+    catalogue = api.materials()
+    if name is not None and name not in catalogue:
+        raise UsageError(f'no material "{safe_text(name)}"; {did_you_mean(name, list(catalogue))}')
+    shown = catalogue if name is None else {name: catalogue[name]}
     if as_json:
         print(dump(shown))
         return
     from .console import cell, console, table
 
-    rows = table("material", *(f"{key} [{unit}]" for key, unit in UNITS.items()), "what", "source")
+    rows = table("material", *(f"{key} [{unit}]" for key, unit in DISPLAY_UNITS.items()), "what", "source")
     for column in rows.columns[-2:]:
         column.justify = "left"
     for key, record in shown.items():
         numbers = [
-            cell(float(record[field]) / SCALES.get(unit, 1.0)) if field in record else cell("–")
-            for field, unit in UNITS.items()
+            cell(float(record[field]) / SI_PER_UNIT.get(unit, 1.0)) if field in record else cell("–")
+            for field, unit in DISPLAY_UNITS.items()
         ]
         rows.add_row(key, *numbers, cell(record["about"]), cell(record["source"]))
     console(sys.stdout).print(rows)

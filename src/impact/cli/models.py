@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from ..contact.model import ForceModel, Parameter
 
 # where a table of the catalogue shows the delivered restitution
-ASKED = (0.1, 0.3, 0.5, 0.7, 0.9)
+E_VALUES = (0.1, 0.3, 0.5, 0.7, 0.9)
 # characters that a column of the catalogue takes, with the space before it
 E_WIDTH, EQUATION_WIDTH, DOMAIN_WIDTH, CORE_WIDTH = 8, 32, 26, 7
 # exponents for which the compiled core is reported
@@ -59,8 +59,11 @@ def models(
     from ..engine.plugins import read_plugins
 
     if check is not None:
-        own = [plugin.model for plugin in read_plugins([check]).items if plugin.source is not None]
-        _check([model for model in own if key in (None, model.key)] or [find(str(key), own)], as_json=as_json)
+        plugin_models = [plugin.model for plugin in read_plugins([check]).items if plugin.source is not None]
+        _check_contract(
+            [model for model in plugin_models if key in (None, model.key)] or [find(str(key), plugin_models)],
+            as_json=as_json,
+        )
         return
     others = read_plugins(plugins or ()).models
     is_pattern = key is None or bool({*"*?["} & {*key})
@@ -95,12 +98,12 @@ def _of_family(family: str | None, models: Sequence[ForceModel]) -> Sequence[For
 
 def model_json(model: ForceModel) -> dict[str, Any]:
     """A model's declaration as plain data."""
-    own = [vars(parameter) for parameter in model.parameters]
+    parameters = [vars(parameter) for parameter in model.parameters]
     names = ("key", "title", "year", "family", "equation", "reference", "doi", "same_as")
     return {
         **{name: getattr(model, name) for name in names}, "evidence": vars(model.evidence),
         "domain": {name: list(ends) for name, ends in model.domain.items()},
-        "domain_source": model.domain_source, "parameters": own,
+        "domain_source": model.domain_source, "parameters": parameters,
         "exponent": model.exponent, "release": model.release, "delivered_restitution": _delivered(model),
         "integrated_by": _cores(model),
     }  # fmt: skip
@@ -112,8 +115,8 @@ def _delivered(model: ForceModel) -> dict[str, float]:
 
     from ..contact.scaling import delivered
 
-    found = delivered(model, np.array(ASKED))
-    return {} if found is None else {number(e): out for e, out in zip(ASKED, found.tolist(), strict=True)}
+    values = delivered(model, np.array(E_VALUES))
+    return {} if values is None else {number(e): out for e, out in zip(E_VALUES, values.tolist(), strict=True)}
 
 
 def _print_models(models: Sequence[ForceModel]) -> None:
@@ -124,7 +127,7 @@ def _print_models(models: Sequence[ForceModel]) -> None:
 
     out = console(sys.stdout)
     room = out.width - max(len(model.key) for model in models)
-    asked, others = _columns(max(room, E_WIDTH))
+    asked, others = _catalogue_columns(max(room, E_WIDTH))
     rows = table("model", *(f"e={number(e)}" for e in asked), *others)
     # on the narrowest terminal the keys are folded, so that one value stays
     rows.columns[0].no_wrap = room >= E_WIDTH
@@ -135,7 +138,7 @@ def _print_models(models: Sequence[ForceModel]) -> None:
     for family, members in groupby(models, lambda model: model.family):
         rows.add_row(Text(f"family:{family}", style="dim"))
         for model in members:
-            rows.add_row(model.key, *_cells(model, asked, others))
+            rows.add_row(model.key, *_model_cells(model, asked, others))
     out.print(rows)
     if asked:
         out.print("\nThe columns e=... show the restitution that a model delivers when it is asked for e.")
@@ -146,14 +149,14 @@ def _print_models(models: Sequence[ForceModel]) -> None:
     out.print(f"Evidence for the formulas of these {len(models)} entries: {counts}.")
 
 
-def _columns(room: int) -> tuple[tuple[float, ...], tuple[str, ...]]:
+def _catalogue_columns(room: int) -> tuple[tuple[float, ...], tuple[str, ...]]:
     """The values of e, and the other columns, that a table of the catalogue shows beside the keys.
 
-    >>> _columns(3), _columns(20), _columns(43)
+    >>> _catalogue_columns(3), _catalogue_columns(20), _catalogue_columns(43)
     (((), ()), ((0.1, 0.9), ()), ((0.1, 0.3, 0.5, 0.7, 0.9), ()))
     """
-    count = min(len(ASKED), room // E_WIDTH)
-    asked = {0: (), 1: (0.5,), 2: (0.1, 0.9), 3: (0.1, 0.5, 0.9)}.get(count, ASKED[: count - 1] + ASKED[-1:])
+    count = min(len(E_VALUES), room // E_WIDTH)
+    asked = {0: (), 1: (0.5,), 2: (0.1, 0.9), 3: (0.1, 0.5, 0.9)}.get(count, E_VALUES[: count - 1] + E_VALUES[-1:])
     room -= E_WIDTH * len(asked)
     others = []
     for name, width in (("equation", EQUATION_WIDTH), ("core", CORE_WIDTH), ("said to hold for", DOMAIN_WIDTH)):
@@ -163,7 +166,7 @@ def _columns(room: int) -> tuple[tuple[float, ...], tuple[str, ...]]:
     return asked, tuple(others)
 
 
-def _cells(model: ForceModel, asked: Sequence[float], others: Sequence[str]) -> Iterator[Text | str]:
+def _model_cells(model: ForceModel, asked: Sequence[float], others: Sequence[str]) -> Iterator[Text | str]:
     """The cells of a model in a table of the catalogue."""
     from rich.text import Text
 
@@ -191,19 +194,20 @@ def _print_model(model: ForceModel) -> None:
         "exponent": "the sweep's n" if model.exponent is None else f"n = {number(model.exponent)}, its own",
         "ends at": _release(model), "integrated by": _cores(model),
     }  # fmt: skip
-    for place, parameter in enumerate(model.parameters):
+    for index, parameter in enumerate(model.parameters):
         # the table is named once
-        rows[" " * place if place else f"[model.{model.key}]"] = _parameter(parameter)
-    found = _delivered(model)
-    if found:
-        rows["delivers"] = ", ".join(f"{decimals(out)} for e = {e}" for e, out in found.items())
+        rows[" " * index if index else f"[model.{model.key}]"] = _parameter(parameter)
+    delivered = _delivered(model)
+    if delivered:
+        rows["delivers"] = ", ".join(f"{decimals(out)} for e = {e}" for e, out in delivered.items())
     print_rows({name: text for name, text in rows.items() if text})
 
 
-def _parameter(one: Parameter) -> str:
-    default = "required" if one.default is None else f"default {number(one.default)}"
-    unit = "" if one.unit == "1" else f" [{one.unit}]"
-    return f"{one.name}{unit}: {one.meaning}; from {number(one.least)} to {number(one.most)}, {default}"
+def _parameter(parameter: Parameter) -> str:
+    default = "required" if parameter.default is None else f"default {number(parameter.default)}"
+    unit = "" if parameter.unit == "1" else f" [{parameter.unit}]"
+    limits = f"from {number(parameter.least)} to {number(parameter.most)}"
+    return f"{parameter.name}{unit}: {parameter.meaning}; {limits}, {default}"
 
 
 def _release(model: ForceModel) -> str:
@@ -225,28 +229,28 @@ def _cores(model: ForceModel) -> str:
     return f"numba{only}{where}"
 
 
-def _check(models: Sequence[ForceModel], *, as_json: bool) -> None:
+def _check_contract(models: Sequence[ForceModel], *, as_json: bool) -> None:
     """Print what came of every clause of the contract; exit 1 if one does not hold."""
     from rich.text import Text
 
     from ..contact.checks import contract
 
-    found = [(model, list(contract(model))) for model in models]
-    broken = [finding for _, findings in found for finding in findings if not finding.holds]
+    findings_by_model = [(model, list(contract(model))) for model in models]
+    broken = [finding for _, findings in findings_by_model for finding in findings if not finding.holds]
     if as_json:
-        print(dump([{"model": model.key, "holds": all(one.holds for one in findings),
-                     "clauses": list(_clauses(findings))} for model, findings in found]))  # fmt: skip
+        print(dump([{"model": model.key, "holds": all(finding.holds for finding in findings),
+                     "clauses": list(_clauses(findings))} for model, findings in findings_by_model]))  # fmt: skip
     else:
         rows = table("model", "clause", "", "worst", "bound")
         rows.columns[1].justify = "left"
-        for model, findings in found:
-            for place, one in enumerate(findings):
-                mark = Text("holds", style="green") if one.holds else Text("broken", style="red")
-                key = cell("" if place else model.key)
-                rows.add_row(key, one.clause, mark, number(one.worst, 2), number(one.bound, 2))
+        for model, findings in findings_by_model:
+            for index, finding in enumerate(findings):
+                mark = Text("holds", style="green") if finding.holds else Text("broken", style="red")
+                key = cell("" if index else model.key)
+                rows.add_row(key, finding.clause, mark, number(finding.worst, 2), number(finding.bound, 2))
         console(sys.stdout).print(rows)
-        for model, findings in found:
-            if not any(one.clause == CLOSED_FORM for one in findings):
+        for model, findings in findings_by_model:
+            if not any(finding.clause == CLOSED_FORM for finding in findings):
                 exits.print_line(
                     f"{model.key}: has no oracle, so that its restitution was compared with no closed form"
                 )
@@ -258,5 +262,5 @@ CLOSED_FORM = "agrees with its closed form"
 
 
 def _clauses(findings: Sequence[Finding]) -> Iterator[dict[str, Any]]:
-    for one in findings:
-        yield {"clause": one.clause, "holds": one.holds, "worst": one.worst, "bound": one.bound}
+    for finding in findings:
+        yield {"clause": finding.clause, "holds": finding.holds, "worst": finding.worst, "bound": finding.bound}

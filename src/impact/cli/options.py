@@ -7,7 +7,15 @@ from typing import Annotated
 
 import typer
 
-from .params import Setting, Tolerance, complete_model, once, setting, tolerance, whole_number
+from .params import (
+    Setting,
+    Tolerance,
+    complete_model,
+    parse_setting,
+    parse_tolerance,
+    parse_whole_number,
+    reject_duplicates,
+)
 
 ResultArgument = Annotated[Path, typer.Argument(help="A result of `impact sweep`.")]
 OutputOption = Annotated[Path, typer.Option("-o", "--output", help="The result file.")]
@@ -27,7 +35,7 @@ PluginOption = Annotated[
 SelectOption = Annotated[
     list[Setting] | None,
     typer.Option(
-        "--sel", metavar="NAME=VALUE", parser=setting, callback=once,
+        "--sel", metavar="NAME=VALUE", parser=parse_setting, callback=reject_duplicates,
         help="Value of an axis, such as m2=1.0; may be repeated.",
     ),
 ]  # fmt: skip
@@ -38,25 +46,25 @@ ModelOption = Annotated[
     ),
 ]
 JobsOption = Annotated[
-    int, typer.Option("--jobs", "-j", metavar="N", parser=whole_number, help="Processes that integrate.")
+    int, typer.Option("--jobs", "-j", metavar="N", parser=parse_whole_number, help="Processes that integrate.")
 ]
 ThreadsOption = Annotated[
     int,
     typer.Option(
-        "--threads", metavar="N", parser=whole_number, help="Threads that integrate, in place of processes."
+        "--threads", metavar="N", parser=parse_whole_number, help="Threads that integrate, in place of processes."
     ),
 ]
 MaxPointsOption = Annotated[
     int,
     typer.Option(
-        "--max-points", metavar="N", parser=whole_number,
+        "--max-points", metavar="N", parser=parse_whole_number,
         help="Refuse more: points in layout full, else trajectories.",
     ),
 ]  # fmt: skip
 ToleranceOption = Annotated[
     list[Tolerance] | None,
     typer.Option(
-        "--tol", metavar="[NAME=]VALUE", parser=tolerance, callback=once,
+        "--tol", metavar="[NAME=]VALUE", parser=parse_tolerance, callback=reject_duplicates,
         help="Tolerance relative to the scale of a point, such as 1e-8 or 5%, for all variables or for one; may "
         "be repeated. \\[default: the baseline's, else 10 times its solver's rtol]",
     ),

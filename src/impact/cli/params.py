@@ -1,4 +1,4 @@
-"""Types of options and arguments: how their words are read, checked and completed."""
+"""Types of options and arguments: parsing, validation and shell completion."""
 
 from __future__ import annotations
 
@@ -27,36 +27,36 @@ class Tolerance(NamedTuple):
 T = TypeVar("T", Setting, Tolerance)
 
 
-def setting(word: str) -> Setting:
-    """Read NAME=VALUE.
+def parse_setting(word: str) -> Setting:
+    """Parse NAME=VALUE.
 
-    >>> setting("m2=1e3"), setting("material=steel")
+    >>> parse_setting("m2=1e3"), parse_setting("material=steel")
     (Setting(name='m2', value=1000.0), Setting(name='material', value='steel'))
     """
     name, _, value = word.partition("=")
     if not name or not value:
-        raise refused(word, "NAME=VALUE, such as m2=1.0")
+        raise invalid_value(word, "NAME=VALUE, such as m2=1.0")
     try:
         return Setting(name, float(value))
     except ValueError:
         return Setting(name, value)
 
 
-def tolerance(word: str) -> Tolerance:
-    """Read VALUE or NAME=VALUE, where VALUE may be in percent.
+def parse_tolerance(word: str) -> Tolerance:
+    """Parse VALUE or NAME=VALUE, where VALUE may be in percent.
 
-    >>> tolerance("1e-8"), tolerance("v1_post=5%")
+    >>> parse_tolerance("1e-8"), parse_tolerance("v1_post=5%")
     (Tolerance(name='all', value=1e-08), Tolerance(name='v1_post', value=0.05))
     """
     name, _, value = word.rpartition("=")
-    read = _number(value)
+    read = _float_or_nan(value)
     if math.isnan(read):
-        raise refused(word, "VALUE or NAME=VALUE, such as 1e-8, 5% or v1_post=1e-6")
+        raise invalid_value(word, "VALUE or NAME=VALUE, such as 1e-8, 5% or v1_post=1e-6")
     return Tolerance(name or "all", read)
 
 
-def once(settings: list[T] | None) -> list[T] | None:
-    """Refuse a name that is given twice among the values of a repeated option."""
+def reject_duplicates(settings: list[T] | None) -> list[T] | None:
+    """Raise an error if a name occurs twice among the values of a repeated option."""
     names = [name for name, _ in settings or ()]
     for name in names:
         if names.count(name) > 1:
@@ -64,27 +64,27 @@ def once(settings: list[T] | None) -> list[T] | None:
     return settings
 
 
-def whole_number(word: str | int) -> int:
-    """Read a whole number of at least 1; a default, which is a number, too.
+def parse_whole_number(word: str | int) -> int:
+    """Parse a whole number of at least 1; a default, which is a number, too.
 
-    >>> whole_number("8"), whole_number("1e9")
+    >>> parse_whole_number("8"), parse_whole_number("1e9")
     (8, 1000000000)
     """
-    read = _number(str(word))
+    read = _float_or_nan(str(word))
     if not (read >= 1.0 and read.is_integer()):
-        raise refused(word, "a whole number of at least 1, such as 8 or 1e9")
+        raise invalid_value(word, "a whole number of at least 1, such as 8 or 1e9")
     return int(read)
 
 
-def number(word: str | float) -> float:
-    """Read a number, which may be in percent; a default, which is one, too.
+def parse_number(word: str | float) -> float:
+    """Parse a number, which may be in percent; a default, which is one, too.
 
-    >>> number("0.02"), number("5%")
+    >>> parse_number("0.02"), parse_number("5%")
     (0.02, 0.05)
     """
-    read = _number(str(word))
+    read = _float_or_nan(str(word))
     if math.isnan(read):
-        raise refused(word, "a number, such as 0.02 or 2%")
+        raise invalid_value(word, "a number, such as 0.02 or 2%")
     return read
 
 
@@ -103,12 +103,12 @@ def complete_family(incomplete: str) -> list[str]:
     return [family for family in FAMILIES if family.startswith(incomplete)]
 
 
-def refused(word: object, expected: str) -> typer.BadParameter:
+def invalid_value(word: object, expected: str) -> typer.BadParameter:
     """The error of a word that is not what is expected."""
     return typer.BadParameter(f'got "{safe_text(str(word))}", expected {expected}')
 
 
-def _number(word: str) -> float:
+def _float_or_nan(word: str) -> float:
     """A number, which may be in percent; NaN where a word is none."""
     try:
         return float(word.removesuffix("%")) / (100.0 if word.endswith("%") else 1.0)

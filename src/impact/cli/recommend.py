@@ -9,20 +9,22 @@ import typer
 
 from .console import dump
 from .options import JsonOption, ModelOption, ResultArgument, SelectOption
-from .params import number
+from .params import parse_number
 
 if TYPE_CHECKING:
     from ..results.ranking import Ranking
 
-# of a longer ranking the table shows the beginning
-ROWS = 30
+# rows of the table; the rest is only counted
+MAX_ROWS = 30
 
 
 def recommend(
     result: ResultArgument,
     tol: Annotated[
         float,
-        typer.Option("--tol", metavar="VALUE", parser=number, help="What |e_out − e| may be, such as 0.02 or 2%."),
+        typer.Option(
+            "--tol", metavar="VALUE", parser=parse_number, help="What |e_out − e| may be, such as 0.02 or 2%."
+        ),
     ] = 0.01,
     sel: SelectOption = None,
     model: ModelOption = None,
@@ -41,8 +43,8 @@ def recommend(
 def ranking_json(ranking: Ranking) -> dict[str, Any]:
     """A ranking as plain data."""
     return {
-        "headline": ranking.headline, "tol": ranking.tol, "best": [one.model for one in ranking.best],
-        "models": [{**vars(one), "share": one.share} for one in ranking.models],
+        "headline": ranking.headline, "tol": ranking.tol, "best": [row.model for row in ranking.best],
+        "models": [{**vars(row), "share": row.share} for row in ranking.models],
     }  # fmt: skip
 
 
@@ -55,10 +57,10 @@ def _print_ranking(ranking: Ranking) -> None:
     rows = table(*ranking.headings)
     for column in rows.columns[5:]:
         column.justify = "left"
-    for one in ranking.models[:ROWS]:
-        rows.add_row(*map(cell, one.row))
+    for row in ranking.models[:MAX_ROWS]:
+        rows.add_row(*map(cell, row.row))
     out.print()
     out.print(rows)
-    more = len(ranking.models) - ROWS
+    more = len(ranking.models) - MAX_ROWS
     if more > 0:
         out.print(f"and {more:,} more (--json has all)")

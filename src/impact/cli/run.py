@@ -14,7 +14,7 @@ from ..text import safe_text
 from . import exits
 from .console import dump, print_rows
 from .options import JsonOption, OverwriteOption, PluginOption, SetOption
-from .params import Setting, complete_model, once, setting, whole_number
+from .params import Setting, complete_model, parse_setting, parse_whole_number, reject_duplicates
 
 if TYPE_CHECKING:
     from ..api import Impact
@@ -38,8 +38,8 @@ def run(
         typer.Option(
             "--at",
             metavar="NAME=VALUE",
-            parser=setting,
-            callback=once,
+            parser=parse_setting,
+            callback=reject_duplicates,
             help="Value of an input, such as e=0.05; may be repeated.",
         ),
     ] = None,
@@ -53,7 +53,7 @@ def run(
         typer.Option(
             "--times",
             metavar="N",
-            parser=whole_number,
+            parser=parse_whole_number,
             help="Points in time of the history, uniform from contact to release. \\[default: the integrator's]",
         ),
     ] = None,
@@ -109,9 +109,10 @@ def print_run(impact: Impact) -> None:
         note = "  (first value of its axis)" if name in impact.first else ""
         rows[name] = quantity(value, _unit_at(impact, _unit_of(impact, name)), 10) + note
     for name, material in impact.materials.items():
-        known = {field: value for field, value in asdict(material).items() if value is not None}
+        properties = {field: value for field, value in asdict(material).items() if value is not None}
         about = (
-            f"{field} = {quantity(value, MATERIAL_QUANTITIES[field].unit, 10)}" for field, value in known.items()
+            f"{field} = {quantity(value, MATERIAL_QUANTITIES[field].unit, 10)}"
+            for field, value in properties.items()
         )
         rows[f"[materials.{name}]"] = ", ".join(about)
     for name, unit, meaning in DERIVED_QUANTITIES:
@@ -135,19 +136,19 @@ def _unit_of(impact: Impact, name: str) -> str:
     from ..config.tables import MATERIAL_QUANTITIES, SWEEP_QUANTITIES, model_quantities
 
     key, _, parameter = name.rpartition(".")
-    known = (
+    quantities = (
         model_quantities(impact.model)
         if key == impact.model.key
         else MATERIAL_QUANTITIES
         if key
         else SWEEP_QUANTITIES
     )
-    return known[parameter].unit if parameter in known else "1"
+    return quantities[parameter].unit if parameter in quantities else "1"
 
 
 def _unit_at(impact: Impact, unit: str) -> str:
     """A unit with the values of n and of the parameters that its exponents have."""
     from ..contact.units import with_numbers
 
-    own = {name.rpartition(".")[2]: value for name, value in impact.point.items() if isinstance(value, float)}
-    return with_numbers(unit, {**own, "n": impact.exponent})
+    values = {name.rpartition(".")[2]: value for name, value in impact.point.items() if isinstance(value, float)}
+    return with_numbers(unit, {**values, "n": impact.exponent})
