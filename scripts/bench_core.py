@@ -277,7 +277,7 @@ def side_by_side(asked: argparse.Namespace, models: list[ForceModel], cores: lis
     for (by, threads), found in engines.items():
         _, worst, steps = found[0]
         if worst > ACCURACY:
-            raise SystemExit(f"the core is off by {worst:.2g}, wants {ACCURACY:g}")
+            raise SystemExit(f"the core is off by {worst:.2g}, expected at most {ACCURACY:g}")
         rates = [rate for rate, _, _ in found]
         ratios = [rate / one for rate, one in zip(rates, base, strict=True)]
         gain = gained(rates, [rate for rate, _, _ in engines[by, 1]])
