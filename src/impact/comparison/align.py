@@ -31,12 +31,12 @@ class Side:
     dataset : the result; the values of its variables are read when they are asked for
     coords : its coordinates at the common points, in memory; what only the other result varies is an axis of
         length one
-    places : by axis, the places of the common points in the result, in the order of the baseline
+    positions : by axis, the positions of the common points in the result, in the order of the baseline
     """
 
     dataset: xr.Dataset
     coords: xr.Dataset
-    places: Mapping[str, IndexArray]
+    positions: Mapping[str, IndexArray]
 
     def read(self, name: str, where: Mapping[str, slice]) -> Labels:
         """The values of a variable or a coordinate at some of the common points.
@@ -51,18 +51,18 @@ class Side:
             index: dict[Hashable, Any] = {dim: where[str(dim)] for dim in variable.dims}
         else:
             variable = self.dataset.variables[name]
-            index = {dim: _as_slice(self.places[str(dim)][where[str(dim)]]) for dim in variable.dims}
+            index = {dim: _as_slice(self.positions[str(dim)][where[str(dim)]]) for dim in variable.dims}
         # in memory before it is transposed: a lazy array would then be read point by point
         values = np.asarray(variable.isel(index).values)
         values = values.transpose([variable.dims.index(dim) for dim in where if dim in variable.dims])
         return values[tuple(slice(None) if dim in variable.dims else np.newaxis for dim in where)]
 
 
-def _as_slice(places: IndexArray) -> IndexArray | slice:
+def _as_slice(positions: IndexArray) -> IndexArray | slice:
     """Neighbouring places as a slice, which files and computed variables read faster."""
-    first = int(places[0])
-    is_range = np.array_equal(places, np.arange(first, first + len(places)))
-    return slice(first, first + len(places)) if is_range else places
+    first = int(positions[0])
+    is_range = np.array_equal(positions, np.arange(first, first + len(positions)))
+    return slice(first, first + len(positions)) if is_range else positions
 
 
 @dataclass(frozen=True)
@@ -96,20 +96,20 @@ def align(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Aligned:
     new, baseline = _drop_foreign_axes(new, baseline), _drop_foreign_axes(baseline, new)
     a, b = _comparable_coordinates(new, baseline), _comparable_coordinates(baseline, new)
     faults = _faults_of_missing_inputs(a, b)
-    places: dict[str, tuple[IndexArray, IndexArray]] = {}
+    positions: dict[str, tuple[IndexArray, IndexArray]] = {}
     for axis in map(str, dict.fromkeys((*b.dims, *baseline.dims, *a.dims, *new.dims))):
         columns = _label_columns(a, axis), _label_columns(b, axis)
         if columns[0] != columns[1] or not columns[0]:
             text = f"what varies along the axis {safe_text(axis)} is {_join_names(columns[0])}"
             faults.append(Fault("nothing in common", axis, f"{text}, in BASELINE {_join_names(columns[1])}"))
             continue
-        places[axis] = match_labels(
+        positions[axis] = match_labels(
             [a[name].values for name in columns[0]], [b[name].values for name in columns[0]]
         )
         # the axis has its first column's name
         names = [*(n for n in columns[0] if n == axis), *(n for n in columns[0] if n != axis)]
         labels = [[coords[name].values for name in names] for coords in (a, b)]
-        faults += _label_faults(labels[0], labels[1], names, places[axis], subset=subset)
+        faults += _label_faults(labels[0], labels[1], names, positions[axis], subset=subset)
     for name in sorted(str(name) for name in a.coords.keys() & b.coords.keys() if is_input(str(name))):
         if a[name].ndim == b[name].ndim == 0 and not _labels_agree(a[name].values, b[name].values):
             kind: FaultKind = "nothing in common" if subset else "physics config"
@@ -119,8 +119,8 @@ def align(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Aligned:
     if any(fault.kind == "nothing in common" for fault in faults):
         nowhere = Side(new, xr.Dataset(), {}), Side(baseline, xr.Dataset(), {})
         return Aligned(*nowhere, {}, {}, tuple(faults))
-    here, there = ({axis: pair[side] for axis, pair in places.items()} for side in (0, 1))
-    a, b = a.isel(here), b.isel(there)
+    new_positions, baseline_positions = ({axis: pair[side] for axis, pair in positions.items()} for side in (0, 1))
+    a, b = a.isel(new_positions), b.isel(baseline_positions)
     faults += _derived_faults(a, b)
     dims = {}
     for variable in SCHEMA:
@@ -130,8 +130,8 @@ def align(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Aligned:
                 dims[variable.name] = axes
             else:
                 faults.append(Fault("labels", variable.name, f"{variable.name} varies along other axes"))
-    sizes = {axis: len(pair[0]) for axis, pair in places.items()}
-    return Aligned(Side(new, a, here), Side(baseline, b, there), sizes, dims, tuple(faults))
+    sizes = {axis: len(pair[0]) for axis, pair in positions.items()}
+    return Aligned(Side(new, a, new_positions), Side(baseline, b, baseline_positions), sizes, dims, tuple(faults))
 
 
 def _drop_foreign_axes(result: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
@@ -210,19 +210,19 @@ def _label_faults(
     new: Sequence[Labels],
     baseline: Sequence[Labels],
     names: Sequence[str],
-    places: tuple[IndexArray, IndexArray],
+    positions: tuple[IndexArray, IndexArray],
     *,
     subset: bool,
 ) -> list[Fault]:
     """The labels of an axis that only one side has; those of a zip group with all their columns."""
     axis = names[0]
-    if not len(places[0]):
+    if not len(positions[0]):
         sides = f"{_first_labels(new, names)}, in BASELINE {_first_labels(baseline, names)}"
         return [Fault("nothing in common", axis, f"no value of {safe_text(axis)} is in both: {sides}")]
     if subset:
         return []
     texts = []
-    for columns, common, side in ((new, places[0], "NEW"), (baseline, places[1], "BASELINE")):
+    for columns, common, side in ((new, positions[0], "NEW"), (baseline, positions[1], "BASELINE")):
         unmatched = [np.delete(values, common) for values in columns]
         if len(unmatched[0]):
             texts.append(

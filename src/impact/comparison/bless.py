@@ -66,29 +66,31 @@ def bless(
     check_comparable(result, str(new))
     if not allow_failed:
         _check_no_failures(result, new)
-    before = _load_baseline(baseline)
+    old_baseline = _load_baseline(baseline)
     verdict = None
-    if before is not None:
-        found = compare(result, before, tol=tol)
-        verdict = replace(found, new=str(new), baseline=str(baseline), repeats=command_start(str(new), result))
+    if old_baseline is not None:
+        comparison = compare(result, old_baseline, tol=tol)
+        repeats = command_start(str(new), result)
+        verdict = replace(comparison, new=str(new), baseline=str(baseline), repeats=repeats)
         show(verdict)
-    kept = effective_tolerances(tol, result.attrs if before is None else before.attrs)
-    save_with_attributes(new, baseline, {"reason": reason, "tolerances": json.dumps(kept)})
+    tolerances = effective_tolerances(tol, result.attrs if old_baseline is None else old_baseline.attrs)
+    save_with_attributes(new, baseline, {"reason": reason, "tolerances": json.dumps(tolerances)})
     return verdict
 
 
 def _check_no_failures(result: xr.Dataset, path: Path) -> None:
     """Refuse a result with failed points, whose NaN every later failure would equal."""
-    tally = summarize(result[["status"]] if "status" in result else result)
-    if tally.not_counted:
-        count = f"{tally.not_counted:,} points are too many to look for failures"
+    summary = summarize(result[["status"]] if "status" in result else result)
+    if summary.not_counted:
+        count = f"{summary.not_counted:,} points are too many to look for failures"
         raise UsageError(f"{safe_text(str(path))}: {count}; expected fewer, or --allow-failed")
-    if tally.failed:
-        status, model, places = tally.failed_at[0]
-        point = result["status"].isel(dict(zip(result["status"].dims, (model, *places), strict=True)))
+    if summary.failed:
+        status, model, indices = summary.failed_at[0]
+        point = result["status"].isel(dict(zip(result["status"].dims, (model, *indices), strict=True)))
         at = describe_point(inputs_of_model({str(dim): point[dim].item() for dim in result["status"].dims}))
-        count = f"{tally.failed:,} of {tally.points:,} points failed, the first at {at} ({status.name.lower()})"
-        raise UsageError(f"{safe_text(str(path))}: {count}; expected none, or --allow-failed")
+        count = f"{summary.failed:,} of {summary.points:,} points failed"
+        first = f"the first at {at} ({status.name.lower()})"
+        raise UsageError(f"{safe_text(str(path))}: {count}, {first}; expected none, or --allow-failed")
 
 
 def _load_baseline(baseline: Path) -> xr.Dataset | None:

@@ -140,8 +140,8 @@ def check_comparable(dataset: xr.Dataset, name: str) -> None:
 
 def _unknown_variables(dataset: xr.Dataset) -> list[str]:
     """The variables that no result has."""
-    known = {*MODEL_COORDINATES, *(variable.name for variable in SCHEMA)}
-    names = [str(name) for name in dataset.variables if name not in known]
+    standard_names = {*MODEL_COORDINATES, *(variable.name for variable in SCHEMA)}
+    names = [str(name) for name in dataset.variables if name not in standard_names]
     return [name for name in names if not (is_input(name) or is_case(name))]
 
 

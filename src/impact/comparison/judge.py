@@ -81,8 +81,8 @@ def _declares_dims(side: Side, name: str) -> bool:
 
 def _dataset_of_model(side: Side, model: int) -> xr.Dataset:
     """The whole result of the model at a common place."""
-    place = int(side.places["model"][model])
-    return side.dataset.isel(model=slice(place, place + 1)) if "model" in side.dataset.dims else side.dataset
+    position = int(side.positions["model"][model])
+    return side.dataset.isel(model=slice(position, position + 1)) if "model" in side.dataset.dims else side.dataset
 
 
 def _box(dims: Iterable[str], sizes: Mapping[str, int], models: slice) -> Box:
@@ -192,13 +192,13 @@ def judge(
     ), largest  # fmt: skip
 
 
-def group_size(places: int) -> int:
+def group_size(size: int) -> int:
     """How many neighbouring places of an axis have one largest ratio.
 
     >>> group_size(101), group_size(10**6)
     (1, 62)
     """
-    return -(-places // MAX_RATIO_GROUPS)
+    return -(-size // MAX_RATIO_GROUPS)
 
 
 def _slabs(name: str, aligned: Aligned, box: Box) -> Iterator[dict[str, slice]]:
@@ -273,7 +273,7 @@ def _worst_of_slab(
     index = np.unravel_index(int(np.argmax(np.where(ratio == ratio.max(), sizes, -1.0))), ratio.shape)
     return Worst(
         float(ratio[index]), float(sizes[index]),
-        tuple(part.start + int(place) for part, place in zip(where.values(), index, strict=True)),
+        tuple(part.start + int(offset) for part, offset in zip(where.values(), index, strict=True)),
         float(difference[index]), float(a[index]), float(b[index]),
     )  # fmt: skip
 
@@ -282,14 +282,14 @@ def _worse(first: Worst | None, second: Worst, shape: Sequence[int]) -> Worst:
     """The worse of two points, among equals the first in the order of the baseline."""
     if first is None:
         return second
-    return max(first, second, key=lambda point: (point.times, point.size, [-place for place in point.index]))
+    return max(first, second, key=lambda point: (point.times, point.size, [-index for index in point.index]))
 
 
 def _inputs_of_point(coords: xr.Dataset, index: Mapping[str, int]) -> dict[str, float | str]:
     """The inputs of a point of the new result: with them a config, read again here, has the point."""
     at = {
-        name: coords.variables[name].values[place].item()
-        for dim, place in index.items()
+        name: coords.variables[name].values[position].item()
+        for dim, position in index.items()
         for name in dict.fromkeys([dim, *columns_along(coords, dim)])
     }
     return {

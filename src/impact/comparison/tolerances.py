@@ -43,19 +43,19 @@ def effective_tolerances(tol: float | Tolerances | None, attributes: Mapping[str
     >>> effective_tolerances(None, {"rtol": 1e-10})
     {'all': 1e-09}
     """
-    asked = dict(tol or {}) if isinstance(tol, Mapping | None) else {ALL_VARIABLES: tol}
-    _check_tolerances(asked)
-    if ALL_VARIABLES in asked:
-        return asked
+    requested = dict(tol or {}) if isinstance(tol, Mapping | None) else {ALL_VARIABLES: tol}
+    _check_tolerances(requested)
+    if ALL_VARIABLES in requested:
+        return requested
     rtol = attributes["rtol"]
     if not _is_number(rtol) or not 0.0 < rtol <= 1.0:
         raise ResultError("the attribute rtol of the baseline is not that of a result")
     try:
-        kept = read_attribute(attributes, "tolerances")
-        _check_tolerances(kept)
+        stored = read_attribute(attributes, "tolerances")
+        _check_tolerances(stored)
     except (ResultError, UsageError):
         raise ResultError("the attribute tolerances of the baseline is not that of a result") from None
-    return {ALL_VARIABLES: DEFAULT_RTOL_FACTOR * float(rtol), **kept, **asked}
+    return {ALL_VARIABLES: DEFAULT_RTOL_FACTOR * float(rtol), **stored, **requested}
 
 
 def _check_tolerances(tolerances: Mapping[str, Any]) -> None:

@@ -66,14 +66,14 @@ def check_output(path: Path, *, overwrite: bool, source: Path | None = None) -> 
 def _check_name_length(path: Path) -> None:
     """Refuse a name with which the files beside it, such as RESULT.12345678.part, would be too long."""
     try:
-        most = os.pathconf(path.parent, "PC_NAME_MAX")
+        limit = os.pathconf(path.parent, "PC_NAME_MAX")
     except (OSError, ValueError, AttributeError):
         return
-    room = len(".12345678.part")
+    suffix_length = len(".12345678.part")
     length = len(os.fsencode(path.name))
-    if length > most - room:
+    if length > limit - suffix_length:
         shown = safe_text(str(path), 60)
-        raise UsageError(f"{shown}: got a name of {length} bytes, expected at most {most - room}")
+        raise UsageError(f"{shown}: got a name of {length} bytes, expected at most {limit - suffix_length}")
 
 
 def write_file(path: Path, content: bytes | memoryview, *, overwrite: bool) -> None:
@@ -91,7 +91,7 @@ def write_file(path: Path, content: bytes | memoryview, *, overwrite: bool) -> N
 
 def write_sealed(
     sink: Sink,
-    outline: xr.Dataset,
+    template: xr.Dataset,
     values: Iterable[tuple[str, tuple[int | slice, ...], NDArray[Any]]],
     output: Output = DEFAULT_OUTPUT,
 ) -> str:
@@ -100,7 +100,7 @@ def write_sealed(
     Parameters
     ----------
     sink : the file
-    outline : the dataset; the values of its variables do not count
+    template : the dataset; the values of its variables do not count
     values : those, as name, place and values
     output : how they are stored
 
@@ -108,9 +108,9 @@ def write_sealed(
     -------
     str : the seal
     """
-    with open_for_writing(sink, outline, output) as put:
-        for name, where, part in values:
-            put(name, where, part)
+    with open_for_writing(sink, template, output) as write_region:
+        for name, region, array in values:
+            write_region(name, region, array)
     seal = write_seal(sink)
     sink.check()
     return seal
@@ -153,9 +153,9 @@ def save(
         raise UsageError(
             f"{safe_text(str(path))}: this dataset is not a result of impact: it has no schema_version"
         )
-    odd = schema_violation(dataset)
-    if odd:
-        raise UsageError(f"{safe_text(str(path))}: {odd}; dataset.to_netcdf(path) stores anything")
+    violation = schema_violation(dataset)
+    if violation:
+        raise UsageError(f"{safe_text(str(path))}: {violation}; dataset.to_netcdf(path) stores anything")
     check_output(path, overwrite=overwrite)
 
     def parts() -> Iterator[tuple[str, tuple[slice, ...], NDArray[Any]]]:
@@ -234,9 +234,9 @@ def open_with_table(path: str | Path) -> tuple[xr.Dataset, TrajectoryTable | Non
         raise ResultError(f"{shown}: is not a readable result ({safe_text(str(error), 80)})") from error
     try:
         dataset, table, unknown = _read_dataset(file)
-        odd = schema_violation(dataset)
-        if odd:
-            raise ResultError(f"is not a readable result ({odd})")
+        violation = schema_violation(dataset)
+        if violation:
+            raise ResultError(f"is not a readable result ({violation})")
     except ResultError as error:
         file.close()
         raise _with_file_name(shown, error) from None
@@ -280,8 +280,12 @@ def load(path: str | Path) -> xr.Dataset:
             if table is None:
                 return dataset.load()
             # all variables of a slab together: they have much in common
-            held = [replace(one, dtype=dataset[one.name].dtype.str[1:]) for one in SCHEMA if one.name in dataset]
-            return in_memory(dataset, table, held)
+            variables = [
+                replace(variable, dtype=dataset[variable.name].dtype.str[1:])
+                for variable in SCHEMA
+                if variable.name in dataset
+            ]
+            return in_memory(dataset, table, variables)
         except MemoryError:
             raise
         except ResultError as error:
@@ -293,27 +297,28 @@ def load(path: str | Path) -> xr.Dataset:
 def _read_dataset(file: h5py.File) -> tuple[xr.Dataset, TrajectoryTable | None, tuple[str, ...]]:
     """The dataset in a file, its trajectory table if it has one, and names that are no part of a result."""
     variables, attributes, unknown = read_variables(file)
-    given = [name for name, variable in variables.items() if not is_quantity(name, tuple(map(str, variable.dims)))]
-    table = {name for name in variables if name in TABLE_VARIABLES}
-    coordinates = {name: variables[name].load() for name in given if name not in table}
+    dims = {name: tuple(map(str, variable.dims)) for name, variable in variables.items()}
+    coordinate_names = [name for name in variables if not is_quantity(name, dims[name])]
+    table_names = {name for name in variables if name in TABLE_VARIABLES}
+    coordinates = {name: variables[name].load() for name in coordinate_names if name not in table_names}
     if "laws" not in attributes:
         computed = {name: variable for name, variable in variables.items() if name not in coordinates}
         dataset = xr.Dataset(computed, coordinates, attributes)
         dataset.encoding = {"layout": "full"}
         return dataset, None, unknown
-    witnesses = {name: variables[name].load() for name in table if name.startswith("witness_")}
+    witnesses = {name: variables[name].load() for name in table_names if name.startswith("witness_")}
     stored = xr.Dataset(witnesses, coordinates, attributes)
 
-    arrays = {name: StoredArray(name, file[name]) for name in table}
+    arrays = {name: StoredArray(name, file[name]) for name in table_names}
     sizes = {name: array.shape[0] for name, array in arrays.items()}
-    found = stored_table(stored, sizes, lambda name, part: arrays[name].read((part,)))
+    trajectory_table = stored_table(stored, sizes, lambda name, part: arrays[name].read((part,)))
     quantities = witness_variables(stored)
-    check_witnesses(found, quantities, stored)
-    outline = stored.drop_vars(witnesses).drop_attrs(deep=False)
-    kept = {name: value for name, value in attributes.items() if name not in ("axes", "laws")}
-    dataset = lazy_dataset(outline.assign_attrs(kept), found, quantities)
+    check_witnesses(trajectory_table, quantities, stored)
+    template = stored.drop_vars(witnesses).drop_attrs(deep=False)
+    dataset_attributes = {name: value for name, value in attributes.items() if name not in ("axes", "laws")}
+    dataset = lazy_dataset(template.assign_attrs(dataset_attributes), trajectory_table, quantities)
     dataset.encoding = {"layout": "factored"}
-    return dataset, found, unknown
+    return dataset, trajectory_table, unknown
 
 
 class ImpactBackend(BackendEntrypoint):

@@ -79,7 +79,7 @@ def estimate(plan: Plan, jobs: int = 1) -> Estimate:
     """
     maps = trajectory_maps(plan)
     plan = with_core(plan, maps)
-    total = sum(own.count for own in maps)
+    total = sum(seconds_per_trajectory_of_driver.count for seconds_per_trajectory_of_driver in maps)
     ranges = list(trajectory_ranges(maps))
     # one in the middle is neither the first values nor the last
     chosen = ranges[len(ranges) // 2]
@@ -102,10 +102,10 @@ def estimate(plan: Plan, jobs: int = 1) -> Estimate:
             hashlib.sha256(array.tobytes())
     slab = values["status"].size
     is_full = plan.layout == "full"
-    each, own = integrating() / chosen.size, DASK_OVERHEAD * driving() / chosen.size
-    after = assembling() / slab * plan.stored_points if is_full else 0.0
-    busy = min(max(round(each / own), 1), len(ranges))
-    kept = total * sum(getattr(rebound, name).itemsize for name in TABLE_COLUMNS)
+    each, seconds_per_trajectory_of_driver = integrating() / chosen.size, DASK_OVERHEAD * driving() / chosen.size
+    writing_seconds = assembling() / slab * plan.stored_points if is_full else 0.0
+    busy = min(max(round(each / seconds_per_trajectory_of_driver), 1), len(ranges))
+    work_folder_bytes = total * sum(getattr(rebound, name).itemsize for name in TABLE_COLUMNS)
     whole = dataset_template(plan)
     counts = [*(count for count in WORKER_COUNTS if count < busy), busy]
     return Estimate(
@@ -113,11 +113,11 @@ def estimate(plan: Plan, jobs: int = 1) -> Estimate:
         total,
         tuple(_model_counts(plan, own_map) for own_map in maps),
         (whole if is_full else factored_template(whole, table, stored_variables(plan))).nbytes,
-        kept,
-        each * total / jobs + after,
+        work_folder_bytes,
+        each * total / jobs + writing_seconds,
         plan.config.solver.core,
         round((sent + len(back)) / chosen.size * total),
-        {count: max(each / count, own) * total + after for count in counts},
+        {count: max(each / count, seconds_per_trajectory_of_driver) * total + writing_seconds for count in counts},
     )
 
 
@@ -130,10 +130,10 @@ def _timed() -> Iterator[Callable[[], float]]:
     ended = time.perf_counter()
 
 
-def _model_counts(plan: Plan, own: TrajectoryMap) -> ModelCounts:
-    axes = tuple(plan.config.axes[axis].name for axis in own.axes)
-    key = plan.models[own.model].key
-    within: Literal["plan", "block", "not"] = "block" if not own.is_shared else "plan"
+def _model_counts(plan: Plan, trajectory_map: TrajectoryMap) -> ModelCounts:
+    axes = tuple(plan.config.axes[axis].name for axis in trajectory_map.axes)
+    key = plan.models[trajectory_map.model].key
+    within: Literal["plan", "block", "not"] = "block" if not trajectory_map.is_shared else "plan"
     if not plan.config.solver.collapse:
         within = "not"
-    return ModelCounts(key, plan.inputs.points_of(key), own.cells, own.count, axes, within)
+    return ModelCounts(key, plan.inputs.points_of(key), trajectory_map.cells, trajectory_map.count, axes, within)

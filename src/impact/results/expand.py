@@ -59,14 +59,14 @@ class TrajectoryRows:
 
     def take(self, model: int, rows: NDArray[np.intp]) -> CollisionResult:
         """Some trajectories of a model, arrays of the shape of `rows`."""
-        own = self.maps[model]
-        if not own.is_shared:
+        trajectory_map = self.maps[model]
+        if not trajectory_map.is_shared:
             flat = self._segments(model, rows.reshape(-1))
             return flat.take(np.arange(rows.size).reshape(rows.shape))
         whole = self._whole.get(model)
         if whole is None:
             # any of them may be needed at any time
-            whole = self._segments(model, np.arange(own.count))
+            whole = self._segments(model, np.arange(trajectory_map.count))
             self._whole.clear()
             self._whole[model] = whole
         return whole.take(rows)
@@ -74,12 +74,12 @@ class TrajectoryRows:
     def _segments(self, model: int, rows: NDArray[np.intp]) -> CollisionResult:
         count = self.maps[model].count
         size = even_size(count, self.segment)
-        found, segment = CollisionResult.blank(rows.size), rows // size
+        trajectories, segment = CollisionResult.blank(rows.size), rows // size
         for number in np.unique(segment).tolist():
             where = np.flatnonzero(segment == number)
             start = number * size
-            found.put(where, self.read(model, start, min(start + size, count)).take(rows[where] - start))
-        return found
+            trajectories.put(where, self.read(model, start, min(start + size, count)).take(rows[where] - start))
+        return trajectories
 
 
 @dataclass(frozen=True)
@@ -155,12 +155,12 @@ def varies_along(table: TrajectoryTable, model: int, names: Sequence[str]) -> di
     impacts = build_impacts(inputs, law, index, table.stiffness[model])
     # where something may fail, something does: masks then have all the axes that they may have
     with np.errstate(all="ignore"):
-        looked_at = {
+        checked_arrays = {
             "e": [impacts.e],
             "v0": [impacts.v0],
             "length": [impacts.v0, impacts.length, impacts.energy, impacts.time],
         }
-    shapes = [array.shape for check in table.checks[model] for array in looked_at[check]]
+    shapes = [array.shape for check in table.checks[model] for array in checked_arrays[check]]
     checked = np.broadcast_shapes((1,) * dimensions(index), *shapes)
     status = _alternating_statuses(checked, Status.NO_IMPACT, Status.OUT_OF_RANGE)
     shape = table.maps[model].rows(index).shape
@@ -173,11 +173,11 @@ def varies_along(table: TrajectoryTable, model: int, names: Sequence[str]) -> di
 
 def _alternating_statuses(shape: tuple[int, ...], *statuses: Status) -> NDArray[np.int8]:
     """Each of some statuses at some places, where there are several."""
-    found = np.full(shape, Status.OK, np.int8)
-    if found.size > 1:
-        for place, status in enumerate(statuses):
-            found.reshape(-1)[place :: len(statuses) + 1] = status
-    return found
+    status_array = np.full(shape, Status.OK, np.int8)
+    if status_array.size > 1:
+        for offset, status in enumerate(statuses):
+            status_array.reshape(-1)[offset :: len(statuses) + 1] = status
+    return status_array
 
 
 def checks_that_may_fail(inputs: Inputs, law: Law, stiffness: Stiffness | None = None) -> frozenset[str]:
@@ -214,12 +214,12 @@ def checks_that_may_fail(inputs: Inputs, law: Law, stiffness: Stiffness | None =
         if not all(np.all((size > SAFE_MAGNITUDES[0]) & (size < SAFE_MAGNITUDES[1])) for size in sizes):
             failing.add("length")
         if "alpha" in inputs.names():
-            asked = 1.0 - np.multiply.outer(
+            restitution = 1.0 - np.multiply.outer(
                 np.asarray(inputs.values("alpha"), float), np.array([slowest, fastest])
             )
         else:
-            asked = np.asarray(inputs.values("e") if "e" in inputs.names() else np.nan, float)
-    if "e" in law.quantities and not np.all((asked >= 0.0) & (asked <= 1.0)):
+            restitution = np.asarray(inputs.values("e") if "e" in inputs.names() else np.nan, float)
+    if "e" in law.quantities and not np.all((restitution >= 0.0) & (restitution <= 1.0)):
         failing.add("e")
     return frozenset(failing)
 
@@ -228,9 +228,9 @@ def _closing_speeds(inputs: Inputs) -> tuple[float, float, float]:
     """The least and greatest closing speed v1 - v2 [m/s], and a bound from below of the positive ones."""
     v1, v2 = (np.asarray(inputs.values(name), float) for name in ("v1", "v2"))
     slowest, fastest = float(v1.min() - v2.max()), float(v1.max() - v2.min())
-    known = np.abs(np.concatenate([v1.reshape(-1), v2.reshape(-1)]))
+    magnitudes = np.abs(np.concatenate([v1.reshape(-1), v2.reshape(-1)]))
     # the difference of two numbers is no smaller than the spacing of the smaller one
-    bound = float(known[known > 0.0].min(initial=np.inf)) * float(np.finfo(float).eps) / 2.0
+    bound = float(magnitudes[magnitudes > 0.0].min(initial=np.inf)) * float(np.finfo(float).eps) / 2.0
     return slowest, fastest, slowest if slowest > 0.0 else bound
 
 
@@ -270,12 +270,12 @@ class ExpandedArray(BackendArray):
         return indexing.explicit_indexing_adapter(key, self.shape, indexing.IndexingSupport.OUTER, self._read)
 
     def _read(self, key: tuple[Any, ...]) -> NDArray[Any]:
-        places = [np.atleast_1d(np.arange(size)[part]) for size, part in zip(self.shape, key, strict=True)]
-        shape = tuple(part.size for part in places)
+        positions = [np.atleast_1d(np.arange(size)[part]) for size, part in zip(self.shape, key, strict=True)]
+        shape = tuple(part.size for part in positions)
         check_memory(self.variable.name, shape, self.dtype)
         values = np.empty(shape, self.dtype)
         of_models = self.variable.per == "model"
-        models, axes = (places[0], places[1:]) if of_models else (np.zeros(1, np.intp), places)
+        models, axes = (positions[0], positions[1:]) if of_models else (np.zeros(1, np.intp), positions)
         for row, model in enumerate(models.tolist()):
             # an array even where there is no axis
             out = values[row, ...] if of_models else values
@@ -285,8 +285,8 @@ class ExpandedArray(BackendArray):
                 out[part or ...] = _without_dummy_axis(
                     expand(self.table, model, index, [self.variable.name])[self.variable.name], part
                 )
-        kept = tuple(0 if isinstance(part, int | np.integer) else slice(None) for part in key)
-        return np.asarray(values[kept])
+        selected = tuple(0 if isinstance(part, int | np.integer) else slice(None) for part in key)
+        return np.asarray(values[selected])
 
 
 def _without_dummy_axis(values: NDArray[Any], where: tuple[slice, ...]) -> NDArray[Any]:
@@ -301,10 +301,10 @@ def check_memory(name: str, shape: Sequence[int], dtype: np.dtype[Any]) -> None:
     ------
     MemoryError : so it is
     """
-    size, most = math.prod(shape) * dtype.itemsize, max_indexed_bytes()
-    if size > most:
+    size, limit = math.prod(shape) * dtype.itemsize, max_indexed_bytes()
+    if size > limit:
         raise MemoryError(
-            f"{name}: {math.prod(shape):,} values take {size:,} bytes, expected at most {most:,}; select a part "
+            f"{name}: {math.prod(shape):,} values take {size:,} bytes, expected at most {limit:,}; select a part "
             "first, such as result.isel(...) or result.sel(...)"
         )
 
@@ -318,12 +318,12 @@ def max_indexed_bytes() -> int:
     return min(MAX_INDEXED_BYTES, whole // 2)
 
 
-def lazy_dataset(outline: xr.Dataset, table: TrajectoryTable, variables: Sequence[SchemaVariable]) -> xr.Dataset:
+def lazy_dataset(template: xr.Dataset, table: TrajectoryTable, variables: Sequence[SchemaVariable]) -> xr.Dataset:
     """A result whose variables are computed when they are read.
 
     Parameters
     ----------
-    outline : its coordinates and attributes
+    template : its coordinates and attributes
     table : of the sweep
     variables : those that it has
     """
@@ -334,14 +334,14 @@ def lazy_dataset(outline: xr.Dataset, table: TrajectoryTable, variables: Sequenc
     for variable in variables:
         dims = ["model", *axes] if variable.per == "model" else axes
         by_model = {
-            law.key: tuple(axes[axis] for axis in own[variable.name])
-            for law, own in zip(table.laws, along, strict=True)
+            law.key: tuple(axes[axis] for axis in axes_by_variable[variable.name])
+            for law, axes_by_variable in zip(table.laws, along, strict=True)
         }
         array = indexing.LazilyIndexedArray(ExpandedArray(table, variable))
         computed[variable.name] = xr.Variable(
             dims, array, attributes_of(variable), {VARIES_ALONG: by_model, ORIGINAL_DIMS: tuple(dims)}
         )
-    dataset = outline.drop_vars(list(outline.data_vars)).assign(computed)
+    dataset = template.drop_vars(list(template.data_vars)).assign(computed)
     for dim in map(str, dataset.dims):
         dataset = dataset if dim in dataset.xindexes else dataset.set_xindex(dim)
     return dataset
@@ -361,14 +361,14 @@ def expanded_slabs(
     """
     sizes: dict[Hashable, int] = dict(enumerate(table.inputs.shape))
     for model in range(len(table.laws)):
-        for places in aligned_slabs(sizes, lengths) if lengths else slabs(sizes):
-            where = tuple(places.values())
-            wanted = [variable for variable in variables if variable.per == "model" or model == 0]
+        for slab in aligned_slabs(sizes, lengths) if lengths else slabs(sizes):
+            where = tuple(slab.values())
+            slab_variables = [variable for variable in variables if variable.per == "model" or model == 0]
             index = table.inputs.index(where)
-            impacts, arrays = _expand(table, model, index, [variable.name for variable in wanted])
+            impacts, arrays = _expand(table, model, index, [variable.name for variable in slab_variables])
             shape = tuple(part.stop - part.start for part in where)
             values = {}
-            for variable in wanted:
+            for variable in slab_variables:
                 array = np.broadcast_to(_without_dummy_axis(arrays.pop(variable.name), where), shape)
                 # copied only where it is a view of fewer values, or of another type
                 values[variable.name] = np.asarray(array, variable.dtype, order="C")
@@ -380,8 +380,8 @@ def in_memory(dataset: xr.Dataset, table: TrajectoryTable, variables: Sequence[S
     arrays = {variable.name: np.empty(dataset[variable.name].shape, variable.dtype) for variable in variables}
     for model, where, _, values in expanded_slabs(table, variables):
         for name, part in values.items():
-            place: tuple[Any, ...] = (model, *where) if "model" in dataset[name].dims else where
-            arrays[name][place or ...] = part
+            region: tuple[Any, ...] = (model, *where) if "model" in dataset[name].dims else where
+            arrays[name][region or ...] = part
     return dataset.assign(
         {name: (dataset[name].dims, array, dataset[name].attrs) for name, array in arrays.items()}
     )

@@ -61,13 +61,13 @@ class StoredLaw:
 
 
 def factored_template(
-    outline: xr.Dataset, table: TrajectoryTable, variables: Sequence[SchemaVariable]
+    result_template: xr.Dataset, table: TrajectoryTable, variables: Sequence[SchemaVariable]
 ) -> xr.Dataset:
     """What a factored file holds: coordinates, attributes, and variables whose values do not count yet.
 
     Parameters
     ----------
-    outline : coordinates and attributes of the result
+    result_template : coordinates and attributes of the result
     table : of the sweep
     variables : of the result
 
@@ -76,13 +76,13 @@ def factored_template(
     UsageError : a law's rule of K takes too many values to be stored
     """
     laws, stiffness = {}, 0
-    for law, own, rule in zip(table.laws, table.maps, table.stiffness, strict=True):
+    for law, trajectory_map, rule in zip(table.laws, table.maps, table.stiffness, strict=True):
         about: dict[str, Any] = {
             "exponent": law.exponent, "parameters": [parameter.name for parameter in law.parameters],
             "domain": {name: list(ends) for name, ends in law.domain.items()}, "asks_for_e": "e" in law.quantities,
             "is_permanent": law.is_permanent,
-            "axes": [table.inputs.axes[axis].name for axis in own.axes], "trajectories": own.count,
-            "is_shared": own.is_shared, "stiffness_axes": None,
+            "axes": [table.inputs.axes[axis].name for axis in trajectory_map.axes],
+            "trajectories": trajectory_map.count, "is_shared": trajectory_map.is_shared, "stiffness_axes": None,
         }  # fmt: skip
         if rule is not None or has_stiffness_rule(table.inputs, law):
             axes, K = whole_stiffness(table.inputs, law, rule)
@@ -91,36 +91,38 @@ def factored_template(
             about["stiffness_axes"] = [table.inputs.axes[axis].name for axis in axes]
             stiffness += K.size
         laws[law.key] = about
-    rows, cells = (
-        sum(sizes) for sizes in zip(*((own.count, own.cells * own.is_shared) for own in table.maps), strict=True)
-    )
+    rows = sum(trajectory_map.count for trajectory_map in table.maps)
+    cells = sum(trajectory_map.cells for trajectory_map in table.maps if trajectory_map.is_shared)
     witnesses = len(witness_indices(len(table.laws) * table.inputs.cells))
     blank = CollisionResult.blank(1)
-    held: dict[str, Any] = {
+    variables_of_file: dict[str, Any] = {
         f"trajectory_{name}": _placeholder(
             "trajectory", rows, getattr(blank, name).dtype, f"{name} of a trajectory"
         )
         for name in TABLE_COLUMNS
     }
     if cells:
-        held["trajectory_of_cell"] = _placeholder(
+        variables_of_file["trajectory_of_cell"] = _placeholder(
             "cell", cells, np.dtype("i4"), "number of the trajectory of a cell"
         )
     if stiffness:
-        held["law_stiffness"] = _placeholder(
+        variables_of_file["law_stiffness"] = _placeholder(
             "stiffness_value", stiffness, np.dtype("f8"), "K by the rules of the laws"
         )
-    held["witness_index"] = _placeholder("witness", witnesses, np.dtype("i8"), "place in C order of (model, axes)")
+    variables_of_file["witness_index"] = _placeholder(
+        "witness", witnesses, np.dtype("i8"), "place in C order of (model, axes)"
+    )
     for variable in variables:
         attributes = attributes_of(variable)
-        held[f"witness_{variable.name}"] = (
+        variables_of_file[f"witness_{variable.name}"] = (
             "witness", np.broadcast_to(np.zeros((), variable.dtype), witnesses), attributes,
         )  # fmt: skip
     order = [axis.name for axis in table.inputs.axes]
-    made = xr.Dataset(held, outline.coords, {**outline.attrs, "axes": json.dumps(order), "laws": json.dumps(laws)})
+    attributes = {**result_template.attrs, "axes": json.dumps(order), "laws": json.dumps(laws)}
+    template = xr.Dataset(variables_of_file, result_template.coords, attributes)
     # without a variable that names them, the coordinates would be variables to a reader of netCDF
-    names = [str(name) for name in outline.coords if name not in outline.dims]
-    return made.assign_attrs(coordinates=" ".join(names))
+    names = [str(name) for name in result_template.coords if name not in result_template.dims]
+    return template.assign_attrs(coordinates=" ".join(names))
 
 
 def check_factored(inputs: Inputs, laws: Sequence[Law]) -> None:
@@ -151,16 +153,16 @@ def table_values(
 ) -> Iterator[tuple[str, slice, NDArray[Any]]]:
     """The values of a factored file: name, place and values, no more than a little at a time."""
     start = cell = 0
-    for model, own in enumerate(table.maps):
-        for first in range(0, own.count, SLAB_ROWS):
-            rows = np.arange(first, min(first + SLAB_ROWS, own.count))
+    for model, trajectory_map in enumerate(table.maps):
+        for first in range(0, trajectory_map.count, SLAB_ROWS):
+            rows = np.arange(first, min(first + SLAB_ROWS, trajectory_map.count))
             part = table.rows.take(model, rows)
             for name in TABLE_COLUMNS:
                 yield f"trajectory_{name}", slice(start + first, start + first + rows.size), getattr(part, name)
-        start += own.count
-        if own.of_cell is not None:
-            yield "trajectory_of_cell", slice(cell, cell + own.cells), own.of_cell
-            cell += own.cells
+        start += trajectory_map.count
+        if trajectory_map.of_cell is not None:
+            yield "trajectory_of_cell", slice(cell, cell + trajectory_map.cells), trajectory_map.of_cell
+            cell += trajectory_map.cells
     value = 0
     for law, rule in zip(table.laws, table.stiffness, strict=True):
         if rule is not None or has_stiffness_rule(table.inputs, law):
@@ -168,10 +170,10 @@ def table_values(
             assert K is not None
             yield "law_stiffness", slice(value, value + K.size), K.reshape(-1)
             value += K.size
-    places = witness_indices(len(table.laws) * table.inputs.cells)
-    yield "witness_index", slice(0, len(places)), places
-    for name, values in witness_values(table, variables, places).items():
-        yield f"witness_{name}", slice(0, len(places)), values
+    indices = witness_indices(len(table.laws) * table.inputs.cells)
+    yield "witness_index", slice(0, len(indices)), indices
+    for name, values in witness_values(table, variables, indices).items():
+        yield f"witness_{name}", slice(0, len(indices)), values
 
 
 def witness_indices(points: int) -> NDArray[np.int64]:
@@ -186,29 +188,29 @@ def witness_indices(points: int) -> NDArray[np.int64]:
     # without a common factor all places differ
     while math.gcd(step, points) > 1:
         step += 1
-    return np.array(sorted({points - 1, *(place * step % points for place in range(N_WITNESSES - 1))}), np.int64)
+    return np.array(sorted({points - 1, *(number * step % points for number in range(N_WITNESSES - 1))}), np.int64)
 
 
 def witness_values(
-    table: TrajectoryTable, variables: Sequence[SchemaVariable], places: NDArray[np.int64]
+    table: TrajectoryTable, variables: Sequence[SchemaVariable], indices: NDArray[np.int64]
 ) -> dict[str, NDArray[Any]]:
     """The values of some points of a result, by name; arrays of shape (places,)."""
-    models, cells = np.divmod(places, table.inputs.cells)
-    found = {variable.name: np.empty(places.size, variable.dtype) for variable in variables}
+    models, cells = np.divmod(indices, table.inputs.cells)
+    values_by_name = {variable.name: np.empty(indices.size, variable.dtype) for variable in variables}
     for model in np.unique(models).tolist():
         where = np.flatnonzero(models == model)
-        values = expand(table, model, _unravel_cells(table.inputs, cells[where]), list(found))
-        for name, array in found.items():
+        values = expand(table, model, _unravel_cells(table.inputs, cells[where]), list(values_by_name))
+        for name, array in values_by_name.items():
             array[where] = np.broadcast_to(values[name], where.shape)
-    return found
+    return values_by_name
 
 
 def _unravel_cells(inputs: Inputs, cells: NDArray[np.int64]) -> Index:
     """The places of some cells along each axis."""
     index = []
     for size in reversed(inputs.shape):
-        cells, place = np.divmod(cells, size)
-        index.append(place)
+        cells, position = np.divmod(cells, size)
+        index.append(position)
     return tuple(reversed(index))
 
 
@@ -227,7 +229,7 @@ def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: ReadVariab
     """
     laws = _read_laws(dataset)
     inputs = read_inputs(dataset)
-    places = {axis.name: place for place, axis in enumerate(inputs.axes)}
+    axis_numbers = {axis.name: number for number, axis in enumerate(inputs.axes)}
     maps, rules, stored = [], [], []
     starts = [0]
     cell = value = 0
@@ -235,45 +237,45 @@ def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: ReadVariab
         for model, (key, about) in enumerate(laws.items()):
             if any(type(about[name]) is not kind for name, kind in LAW_FIELD_TYPES.items()):
                 raise TypeError
-            axes = tuple(places[name] for name in about["axes"])
+            axes = tuple(axis_numbers[name] for name in about["axes"])
             if len({*axes}) < len(axes):
                 raise ValueError
             shape = tuple(inputs.shape[axis] for axis in axes)
-            own = TrajectoryMap(model, axes, shape)
+            trajectory_map = TrajectoryMap(model, axes, shape)
             if about["is_shared"]:
-                of_cell = read("trajectory_of_cell", slice(cell, cell + own.cells))
+                of_cell = read("trajectory_of_cell", slice(cell, cell + trajectory_map.cells))
                 count = int(about["trajectories"])
                 # the cell from which a trajectory was taken is not needed to read it
-                own = TrajectoryMap(model, axes, shape, np.broadcast_to(np.intp(0), count), of_cell)
-                cell += own.cells
-                if of_cell.dtype.kind != "i" or of_cell.shape != (own.cells,):
+                trajectory_map = TrajectoryMap(model, axes, shape, np.broadcast_to(np.intp(0), count), of_cell)
+                cell += trajectory_map.cells
+                if of_cell.dtype.kind != "i" or of_cell.shape != (trajectory_map.cells,):
                     raise ValueError
                 if of_cell.min() < 0 or of_cell.max() >= count:
                     raise ValueError
-            maps.append(own)
-            starts.append(starts[-1] + own.count)
+            maps.append(trajectory_map)
+            starts.append(starts[-1] + trajectory_map.count)
             rule = None
             if about["stiffness_axes"] is not None:
-                chosen = tuple(places[name] for name in about["stiffness_axes"])
+                chosen = tuple(axis_numbers[name] for name in about["stiffness_axes"])
                 size = math.prod(inputs.shape[axis] for axis in chosen)
                 rule = _stiffness_lookup(inputs, chosen, read("law_stiffness", slice(value, value + size)))
                 value += size
             rules.append(rule)
             stored.append(_stored_law(key, about))
-        held = {f"trajectory_{name}": starts[-1] for name in TABLE_COLUMNS}
-        held |= {"trajectory_of_cell": cell} if cell else {}
-        held |= {"law_stiffness": value} if value else {}
-        if held != {name: size for name, size in sizes.items() if not name.startswith("witness_")}:
+        expected_sizes = {f"trajectory_{name}": starts[-1] for name in TABLE_COLUMNS}
+        expected_sizes |= {"trajectory_of_cell": cell} if cell else {}
+        expected_sizes |= {"law_stiffness": value} if value else {}
+        if expected_sizes != {name: size for name, size in sizes.items() if not name.startswith("witness_")}:
             raise ValueError
         _check_trajectory_statuses(sizes["trajectory_status"], read)
     except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError):
         raise ResultError("is not a readable result (its laws do not fit its table)") from None
 
-    def rows(model: int, start: int, stop: int) -> CollisionResult:
+    def read_rows(model: int, start: int, stop: int) -> CollisionResult:
         part = slice(starts[model] + start, starts[model] + stop)
         return CollisionResult(**{name: read(f"trajectory_{name}", part) for name in TABLE_COLUMNS})
 
-    return TrajectoryTable(inputs, tuple(stored), tuple(maps), TrajectoryRows(maps, rows), tuple(rules))
+    return TrajectoryTable(inputs, tuple(stored), tuple(maps), TrajectoryRows(maps, read_rows), tuple(rules))
 
 
 def _check_trajectory_statuses(rows: int, read: ReadVariable) -> None:
@@ -310,7 +312,7 @@ def _stiffness_lookup(inputs: Inputs, axes: tuple[int, ...], values: Array) -> S
         if not index:
             return K
         zero = np.zeros((1,) * index[0].ndim, np.intp)
-        return np.asarray(K[tuple(place if axis in axes else zero for axis, place in enumerate(index))])
+        return np.asarray(K[tuple(positions if axis in axes else zero for axis, positions in enumerate(index))])
 
     return at
 
@@ -375,18 +377,18 @@ def check_witnesses(table: TrajectoryTable, variables: Sequence[SchemaVariable],
     ------
     ResultError : so it is; with both versions
     """
-    places = np.asarray(stored["witness_index"].values, np.int64)
+    indices = np.asarray(stored["witness_index"].values, np.int64)
     points = len(table.laws) * table.inputs.cells
-    if not np.array_equal(places, witness_indices(points)):
+    if not np.array_equal(indices, witness_indices(points)):
         raise ResultError("is not a readable result (its witnesses are not spread as they have to be)")
-    here = witness_values(table, variables, places)
-    cells = places % table.inputs.cells
+    expanded = witness_values(table, variables, indices)
+    cells = indices % table.inputs.cells
     index = _unravel_cells(table.inputs, cells)
-    known = {name: values_at(table.inputs, name, index) for name in ("v1", "v2")}
-    known |= {f"m{ball}": mass_at(table.inputs, ball, index) for ball in "12"}
+    inputs = {name: values_at(table.inputs, name, index) for name in ("v1", "v2")}
+    inputs |= {f"m{ball}": mass_at(table.inputs, ball, index) for ball in "12"}
     for variable in variables:
-        expected, got = stored[f"witness_{variable.name}"].values, here[variable.name]
-        columns = {**known, variable.name: expected}
+        expected, got = stored[f"witness_{variable.name}"].values, expanded[variable.name]
+        columns = {**inputs, variable.name: expected}
         has_peak = "witness_peak_indentation" in stored
         if has_peak:
             columns["peak_indentation"] = stored["witness_peak_indentation"].values

@@ -53,13 +53,13 @@ SKIPPED_ATTRIBUTES = frozenset({"NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_NC
 
 
 @contextmanager
-def open_for_writing(sink: Sink, outline: xr.Dataset, output: Output) -> Iterator[WriteRegion]:
+def open_for_writing(sink: Sink, template: xr.Dataset, output: Output) -> Iterator[WriteRegion]:
     """Write a dataset into a file: its coordinates and attributes at once, its variables as they come.
 
     Parameters
     ----------
     sink : the file
-    outline : the dataset; the values of its variables do not count
+    template : the dataset; the values of its variables do not count
     output : how it is stored
 
     Yields
@@ -72,15 +72,15 @@ def open_for_writing(sink: Sink, outline: xr.Dataset, output: Output) -> Iterato
         h5netcdf.File(plain, "w") as file,
     ):
         texts = {
-            str(name): encode_text(variable) for name, variable in outline.coords.items() if is_text(variable)
+            str(name): encode_text(variable) for name, variable in template.coords.items() if is_text(variable)
         }
         widths = dict.fromkeys(sorted(values.shape[-1] for values in texts.values()))
         file.dimensions = {
-            **{str(name): size for name, size in outline.sizes.items()},
+            **{str(name): size for name, size in template.sizes.items()},
             **{f"string{width}": width for width in widths},
         }
-        coordinates = [str(name) for name in outline.coords if name not in outline.dims]
-        for name, variable in outline.coords.items():
+        coordinates = [str(name) for name in template.coords if name not in template.dims]
+        for name, variable in template.coords.items():
             if name in texts:
                 values = texts[str(name)]
                 dims = (*variable.dims, f"string{values.shape[-1]}")
@@ -89,25 +89,27 @@ def open_for_writing(sink: Sink, outline: xr.Dataset, output: Output) -> Iterato
             else:
                 added = file.create_variable(str(name), variable.dims, variable.dtype, data=variable.values)
                 _set_attributes(added, variable.attrs)
-        for name, variable in outline.data_vars.items():
+        for name, variable in template.data_vars.items():
             storage = _storage_options(variable, output)
             added = file.create_variable(str(name), variable.dims, variable.dtype, **storage)
-            near = [other for other in coordinates if {*outline[other].dims} <= {*variable.dims}]
+            related = [other for other in coordinates if {*template[other].dims} <= {*variable.dims}]
             _set_attributes(
                 added,
-                variable.attrs if name in TABLE_VARIABLES else {**variable.attrs, "coordinates": " ".join(near)},
+                variable.attrs
+                if name in TABLE_VARIABLES
+                else {**variable.attrs, "coordinates": " ".join(related)},
             )
-        _set_attributes(file, dict(outline.attrs))
+        _set_attributes(file, dict(template.attrs))
         sink.check()
 
         # written to by h5py itself, which asks less each time
-        made = {str(name): plain[str(name)] for name in outline.data_vars}
+        datasets = {str(name): plain[str(name)] for name in template.data_vars}
 
-        def put(name: str, where: Region, values: NDArray[Any]) -> None:
-            made[name][where or ...] = values
+        def write_region(name: str, region: Region, values: NDArray[Any]) -> None:
+            datasets[name][region or ...] = values
             sink.check()
 
-        yield put
+        yield write_region
     sink.check()
 
 
@@ -126,8 +128,8 @@ def _set_attributes(holder: Any, attributes: Mapping[Any, Any]) -> None:
     """Attributes, those of text as so many bytes, a number that a reader knows beforehand."""
     for name, value in attributes.items():
         if isinstance(value, str):
-            written = value.encode()
-            value = np.array(written, h5py.string_dtype("utf-8", max(len(written), 1)))
+            encoded = value.encode()
+            value = np.array(encoded, h5py.string_dtype("utf-8", max(len(encoded), 1)))
         holder.attrs[str(name)] = value
 
 
@@ -171,17 +173,17 @@ class StoredArray(BackendArray):
         ResultError : they cannot be read
         MemoryError : they are too many to be read at once
         """
-        places = [np.atleast_1d(np.arange(size)[part]) for size, part in zip(self.shape, key, strict=True)]
-        check_memory(self.name, tuple(part.size for part in places), self.dtype)
+        positions = [np.atleast_1d(np.arange(size)[part]) for size, part in zip(self.shape, key, strict=True)]
+        check_memory(self.name, tuple(part.size for part in positions), self.dtype)
         try:
-            self._check_chunks(places)
+            self._check_chunks(positions)
             return np.asarray(self.dataset[key])
         except (OSError, RuntimeError, ValueError, zlib.error) as error:
             path = safe_text(str(self.dataset.file.filename)) if self.dataset else "the result"
             reason = f"{safe_text(self.name, 40)}: {safe_text(str(error), 80)}"
             raise ResultError(f"{path}: is not a readable result ({reason})") from error
 
-    def _check_chunks(self, places: Sequence[NDArray[np.intp]]) -> None:
+    def _check_chunks(self, positions: Sequence[NDArray[np.intp]]) -> None:
         """Unpack the chunks that hold some values, no further than their size.
 
         HDF5 unpacks one to whatever it holds, and reads on behind one that holds less.
@@ -190,7 +192,7 @@ class StoredArray(BackendArray):
             return
         chunks = self.dataset.chunks
         size = math.prod(chunks) * self.dtype.itemsize
-        for corner in product(*(np.unique(p // c * c).tolist() for p, c in zip(places, chunks, strict=True))):
+        for corner in product(*(np.unique(p // c * c).tolist() for p, c in zip(positions, chunks, strict=True))):
             if corner not in self._checked:
                 unfiltered, packed = self.dataset.id.read_direct_chunk(corner)
                 if unfiltered or len(zlib.decompressobj().decompress(packed, size + 1)) != size:
@@ -211,20 +213,20 @@ def read_variables(file: h5py.File) -> tuple[dict[str, xr.Variable], dict[str, o
     _check_schema_version(file)
     datasets = {name: h5py.Dataset(dataset) for name, dataset in _open_datasets(file).items()}
     dims = _check_sizes(file, datasets)
-    known = {name: dataset for name, dataset in datasets.items() if is_name(name)}
+    accepted = {name: dataset for name, dataset in datasets.items() if is_name(name)}
     # a dimension without values of its own stands in the file as well
     unknown = [
         name
         for name in datasets
-        if name not in known and not _is_dimension_without_values(datasets[name], name, dims)
+        if name not in accepted and not _is_dimension_without_values(datasets[name], name, dims)
     ]
-    holders = {"": file, **known}
+    holders = {"": file, **accepted}
     if sum(h5a.get_num_attrs(holder.id) for holder in holders.values()) > MAX_ATTRIBUTES:
         raise _unreadable(f"more than {MAX_ATTRIBUTES:,} attributes")
     if sum(_attribute_text_bytes(name, holder) for name, holder in holders.items()) > MAX_ATTRIBUTE_BYTES:
         raise _unreadable(f"more than {MAX_ATTRIBUTE_BYTES:,} bytes of text")
     variables = {}
-    for name, dataset in known.items():
+    for name, dataset in accepted.items():
         if not dataset.id.get_storage_size():
             raise _unreadable("declares what the file does not hold", name)
         attributes = _read_attributes(dataset)
@@ -249,9 +251,9 @@ def _check_schema_version(file: h5py.File) -> None:
     attribute = h5a.open(file.id, b"schema_version")
     if not _is_number_type(attribute.get_type()) or attribute.shape not in ((), (1,)):
         raise _unreadable("schema_version: not a number")
-    found = np.ravel(file.attrs["schema_version"])[0]
-    if found != SCHEMA_VERSION:
-        raise ResultError(f"has schema version {found}, this program reads {SCHEMA_VERSION}")
+    version = np.ravel(file.attrs["schema_version"])[0]
+    if version != SCHEMA_VERSION:
+        raise ResultError(f"has schema version {version}, this program reads {SCHEMA_VERSION}")
 
 
 def _open_datasets(file: h5py.File) -> dict[str, h5d.DatasetID]:
@@ -259,7 +261,7 @@ def _open_datasets(file: h5py.File) -> dict[str, h5d.DatasetID]:
     root = file.id
     if root.get_num_objs() > MAX_DATASETS:
         raise _unreadable(f"more than {MAX_DATASETS:,} datasets")
-    found: dict[str, h5d.DatasetID] = {}
+    datasets: dict[str, h5d.DatasetID] = {}
     objects = set()
     for link in root:
         name = link.decode(errors="surrogateescape")
@@ -267,12 +269,12 @@ def _open_datasets(file: h5py.File) -> dict[str, h5d.DatasetID]:
         if info.type != h5l.TYPE_HARD:
             raise _unreadable("a link to somewhere else", name)
         objects.add(info.u)
-        found[name] = h5o.open(root, link)
-        if not isinstance(found[name], h5d.DatasetID):
+        datasets[name] = h5o.open(root, link)
+        if not isinstance(datasets[name], h5d.DatasetID):
             raise _unreadable("not a dataset", name)
-    if len(objects) < len(found):
+    if len(objects) < len(datasets):
         raise _unreadable("a dataset of two names")
-    return found
+    return datasets
 
 
 def _check_sizes(file: h5py.File, datasets: Mapping[str, h5py.Dataset]) -> dict[str, tuple[str, ...]]:
@@ -294,7 +296,9 @@ def _check_sizes(file: h5py.File, datasets: Mapping[str, h5py.Dataset]) -> dict[
         raise _unreadable(f"more than {MAX_CHUNKS_OF_FILE:,} chunks")
     # of one that is missing, any number of values would be read as zeros
     missing = [
-        name for name, one in datasets.items() if one.chunks and one.id.get_num_chunks() != _count_chunks(one)
+        name
+        for name, dataset in datasets.items()
+        if dataset.chunks and dataset.id.get_num_chunks() != _count_chunks(dataset)
     ]
     if missing:
         raise _unreadable("declares what the file does not hold", missing[0])
@@ -325,7 +329,7 @@ def _declared_bytes(name: str, dataset: h5d.DatasetID) -> int:
     plist = dataset.get_create_plist()
     declared = math.prod(shape) * kind.get_size() if shape is not None else 0
     if plist.get_layout() == h5d.CHUNKED:
-        filters = [plist.get_filter(place)[0] for place in range(plist.get_nfilters())]
+        filters = [plist.get_filter(number)[0] for number in range(plist.get_nfilters())]
         whole = shape == dataset.get_space().get_simple_extent_dims(maxdims=True)
         # a chunk that is larger than the whole would be unpacked to its own size
         fits = whole and all(c <= n for c, n in zip(plist.get_chunk(), shape, strict=True))
@@ -352,12 +356,13 @@ def _dims_by_dataset(datasets: Mapping[str, h5py.Dataset]) -> dict[str, tuple[st
     sizes = {name: datasets[name].shape[0] for name in scales.values() if datasets[name].shape}
     dims = {}
     for name, dataset in datasets.items():
-        own = tuple(scales.get(number, "") for number in numbers[name])
-        if not own and name in sizes:
-            own = (name,)
-        if len({*own}) != len(own) or tuple(sizes.get(dim) for dim in own) != dataset.shape:
+        dataset_dims = tuple(scales.get(number, "") for number in numbers[name])
+        if not dataset_dims and name in sizes:
+            dataset_dims = (name,)
+        shape = tuple(sizes.get(dim) for dim in dataset_dims)
+        if len({*dataset_dims}) != len(dataset_dims) or shape != dataset.shape:
             raise _unreadable("its axes are not those of the file", name)
-        dims[name] = own
+        dims[name] = dataset_dims
     return dims
 
 
@@ -381,10 +386,11 @@ def _attribute_text_bytes(name: str, holder: h5py.File | h5py.Dataset) -> int:
 
 def _read_attributes(holder: h5py.File | h5py.Dataset) -> dict[str, object]:
     """Attributes as they were before they were stored."""
-    found: dict[str, object] = {}
+    attributes: dict[str, object] = {}
     for name in holder.attrs:
         if name not in NETCDF_ATTRIBUTES:
             value = holder.attrs[name]
             array = np.ravel(value)
-            found[name] = value.decode() if isinstance(value, bytes) else array[0] if array.size == 1 else value
-    return found
+            number_or_array = array[0] if array.size == 1 else value
+            attributes[name] = value.decode() if isinstance(value, bytes) else number_or_array
+    return attributes

@@ -37,14 +37,14 @@ def material_notes(
                 break
 
 
-def result_notes(tally: Summary) -> Iterator[str]:
+def result_notes(summary: Summary) -> Iterator[str]:
     """A sentence for each thing that is implausible in what came out of a sweep."""
-    if tally.points and not tally.not_counted and tally.counts.keys() == {Status.NO_IMPACT}:
-        yield f"none of {tally.points:,} points is an impact: v1 <= v2, the balls do not approach"
-    if tally.deep:
-        many = f"{tally.deep:,} of {tally.points:,} points"
+    if summary.points and not summary.not_counted and summary.counts.keys() == {Status.NO_IMPACT}:
+        yield f"none of {summary.points:,} points is an impact: v1 <= v2, the balls do not approach"
+    if summary.deep:
+        many = f"{summary.deep:,} of {summary.points:,} points"
         limit = f"{MAX_SMALL_INDENTATION:.0%} of the smaller radius"
         yield (
-            f"peak indentation above {limit} at {many}, at most {tally.deepest:.0%}; Hertz theory assumes small "
+            f"peak indentation above {limit} at {many}, at most {summary.deepest:.0%}; Hertz theory assumes small "
             "indentation"
         )

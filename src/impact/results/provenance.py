@@ -68,10 +68,10 @@ def config_of_part(config: Config, dataset: xr.Dataset) -> Config:
         names = [name for name, labels in held.items() if first is not None and labels.dims == first.dims]
         values = [np.asarray(labels_of[name]) for name in names]
         labels = [np.ravel(held[name].values) for name in names]
-        places = sorted(match_labels(values, labels)[0].tolist()) if names else []
-        chosen = np.array(places or [0])
+        positions = sorted(match_labels(values, labels)[0].tolist()) if names else []
+        chosen = np.array(positions or [0])
         columns = {name: tuple(np.asarray(v)[chosen].tolist()) for name, v in axis.columns.items()}
-        numbers = tuple(axis.labels[place] for place in chosen) if axis.numbered else ()
+        numbers = tuple(axis.labels[position] for position in chosen) if axis.numbered else ()
         axes.append(replace(axis, columns=columns, numbers=numbers))
     return replace(config, axes=tuple(axes))
 
@@ -96,13 +96,13 @@ def check_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str)
     Traceback (most recent call last):
     impact.errors.UsageError: results.h5: made with mine of my.py; give it again with --plugin FILE
     """
-    made = _stored_plugins(attributes, name)
-    given = _current_plugins(plugins)
+    stored = _stored_plugins(attributes, name)
+    current = _current_plugins(plugins)
     # the hash of a file is not that of a value: given in another way, a model cannot be known to be the same
     missing = {
         key: record
-        for key, record in made.items()
-        if key not in given or _how_to_supply(given[key]) != _how_to_supply(record)
+        for key, record in stored.items()
+        if key not in current or _how_to_supply(current[key]) != _how_to_supply(record)
     }
     if missing:
         named = ", ".join(
@@ -122,13 +122,13 @@ def changed_plugins(attributes: Mapping[str, object], plugins: Plugins, name: st
     plugins : what is given now, all that the result was made with among them
     name : of the result, for messages
     """
-    given = _current_plugins(plugins)
+    current = _current_plugins(plugins)
     return tuple(
         f"{safe_text(name)}: was made with another version of "
         f"{safe_text(_plugin_origin(record) or f'the model {key}')}: "
-        f"its SHA-256 is {safe_text(record.sha256, 64)}, this one's is {given[key].sha256}"
+        f"its SHA-256 is {safe_text(record.sha256, 64)}, this one's is {current[key].sha256}"
         for key, record in _stored_plugins(attributes, name).items()
-        if record.sha256 and given[key].sha256 and record.sha256 != given[key].sha256
+        if record.sha256 and current[key].sha256 and record.sha256 != current[key].sha256
     )
 
 
@@ -137,12 +137,12 @@ def unknown_plugins(attributes: Mapping[str, object], plugins: Plugins, name: st
 
     Parameters are those of `changed_plugins`.
     """
-    given = _current_plugins(plugins)
+    current = _current_plugins(plugins)
     return tuple(
         f"{safe_text(name)}: the model {safe_text(key)} is a Python value that no file defines, so that it cannot "
         "be known to be the one that the result was made with; expected a model in a Python file"
         for key, record in _stored_plugins(attributes, name).items()
-        if not (record.sha256 and given[key].sha256)
+        if not (record.sha256 and current[key].sha256)
     )
 
 

@@ -142,7 +142,7 @@ class Ranking:
     @property
     def best(self) -> tuple[Ranked, ...]:
         """The models that are within the tolerance at all points."""
-        return tuple(one for one in self.models if one.serves_everywhere)
+        return tuple(ranked for ranked in self.models if ranked.serves_everywhere)
 
     @property
     def headline(self) -> str:
@@ -191,7 +191,7 @@ def ranking(
     _check_rankable(dataset, tol)
     chosen = model_positions(models, dataset) if models else range(dataset.sizes["model"])
     selected = select(dataset[list(RANKED_VARIABLES)], sel or {})
-    by_model = [_select_model(selected, place) for place in chosen]
+    by_model = [_select_model(selected, position) for position in chosen]
     evaluated = [_reduce_dims(of_model)[0] for of_model in by_model if is_computed(of_model.variables["e_error"])]
     points = sum(math.prod(of_model.sizes.values()) for of_model in evaluated)
     if points > max_points:
@@ -199,7 +199,7 @@ def ranking(
             f"got {points:,} different points to rank, expected at most {max_points:,}; select values of axes"
         )
     ranked = [_rank_model(of_model, tol) for of_model in by_model]
-    if not any(one.points for one in ranked):
+    if not any(model.points for model in ranked):
         raise UsageError("there is nothing to judge: at no point is an e asked for of balls that meet")
     return Ranking(tol, tuple(sorted(ranked, key=_sort_key)))
 
@@ -222,9 +222,10 @@ def _check_rankable(dataset: xr.Dataset, tol: float) -> None:
         raise UsageError("e_error, status and e of this result do not lie along the axes of a sweep")
 
 
-def _sort_key(one: Ranked) -> tuple[float, ...]:
+def _sort_key(ranked: Ranked) -> tuple[float, ...]:
     # a model that failed everywhere has no errors
-    return (-one.share, *(math.inf if math.isnan(error) else error for error in (one.max_error, one.mean_error)))
+    errors = (ranked.max_error, ranked.mean_error)
+    return (-ranked.share, *(math.inf if math.isnan(error) else error for error in errors))
 
 
 def _asks_for_e(dataset: xr.Dataset) -> bool:
@@ -233,10 +234,10 @@ def _asks_for_e(dataset: xr.Dataset) -> bool:
     return any(not np.isnan(e.isel(where).values).all() for where in slabs(e.sizes))
 
 
-def _select_model(dataset: xr.Dataset, place: int) -> xr.Dataset:
+def _select_model(dataset: xr.Dataset, position: int) -> xr.Dataset:
     """A model of a result, without the axes of other models' parameters."""
-    first = dict.fromkeys(foreign_dims(dataset, str(dataset["model"].values[place])), 0)
-    return dataset.isel({"model": place, **first})
+    first = dict.fromkeys(foreign_dims(dataset, str(dataset["model"].values[position])), 0)
+    return dataset.isel({"model": position, **first})
 
 
 def _reduce_dims(of_model: xr.Dataset) -> tuple[xr.Dataset, int]:
@@ -256,7 +257,7 @@ class _JudgedSlab:
     distance: NDArray[np.float64]
     judged: Mask
     failed: Mask
-    known: Mask
+    evaluable: Mask
     within: Mask
 
 
@@ -267,40 +268,41 @@ def _judge_slab(evaluated: xr.Dataset, where: Slab, sizes: Mapping[Hashable, int
     distance = np.abs(np.asarray(error, float))
     judged = ~np.isnan(asked) & (status != Status.NO_IMPACT)
     failed = judged & (status >= FIRST_FAILURE)
-    known = judged & ~failed & ~np.isnan(distance)
-    return _JudgedSlab(asked, error, distance, judged, failed, known, known & (distance <= tol))
+    evaluable = judged & ~failed & ~np.isnan(distance)
+    return _JudgedSlab(asked, error, distance, judged, failed, evaluable, evaluable & (distance <= tol))
 
 
-def _best_parameters(of_model: xr.Dataset, own: Sequence[Hashable], tol: float) -> dict[Hashable, int]:
+def _best_parameters(of_model: xr.Dataset, parameter_dims: Sequence[Hashable], tol: float) -> dict[Hashable, int]:
     """The place on each axis of a model's own parameters at which it does best over all other axes."""
-    evaluated, _ = over_varying_dims(of_model, RANKED_VARIABLES, *own, *varying_dims(of_model, "e"))
-    shape = tuple(evaluated.sizes[dim] for dim in own)
+    evaluated, _ = over_varying_dims(of_model, RANKED_VARIABLES, *parameter_dims, *varying_dims(of_model, "e"))
+    shape = tuple(evaluated.sizes[dim] for dim in parameter_dims)
     if math.prod(shape) > MAX_PARAMETER_COMBINATIONS:
         raise UsageError(
             f"got {math.prod(shape):,} combinations of parameters of {of_model['model'].item()}, expected at most "
             f"{MAX_PARAMETER_COMBINATIONS:,}; select values of them"
         )
     dims = evaluated.variables["e_error"].dims
-    sizes = {dim: evaluated.sizes[dim] for dim in (*own, *(dim for dim in dims if dim not in own))}
+    other_dims = (dim for dim in dims if dim not in parameter_dims)
+    sizes = {dim: evaluated.sizes[dim] for dim in (*parameter_dims, *other_dims)}
     points, within, errors = np.zeros(shape, int), np.zeros(shape, int), np.full(shape, np.nan)
-    others = tuple(range(len(own), len(sizes)))
+    others = tuple(range(len(parameter_dims), len(sizes)))
     for where in slabs(sizes):
         part = _judge_slab(evaluated, where, sizes, tol)
-        place = tuple(where[dim] for dim in own)
-        points[place] += part.judged.sum(axis=others)
-        within[place] += part.within.sum(axis=others)
-        largest = np.fmax.reduce(np.where(part.known, part.distance, np.nan), axis=others, initial=np.nan)
-        errors[place] = np.fmax(errors[place], largest)
+        parameter_slab = tuple(where[dim] for dim in parameter_dims)
+        points[parameter_slab] += part.judged.sum(axis=others)
+        within[parameter_slab] += part.within.sum(axis=others)
+        largest = np.fmax.reduce(np.where(part.evaluable, part.distance, np.nan), axis=others, initial=np.nan)
+        errors[parameter_slab] = np.fmax(errors[parameter_slab], largest)
     share = within / np.maximum(points, 1)
     best = np.lexsort((np.where(np.isnan(errors), np.inf, errors).reshape(-1), -share.reshape(-1)))[0]
-    return dict(zip(own, (int(at) for at in np.unravel_index(best, shape)), strict=True))
+    return dict(zip(parameter_dims, (int(at) for at in np.unravel_index(best, shape)), strict=True))
 
 
 def _rank_model(of_model: xr.Dataset, tol: float) -> Ranked:
     """How well a model does, from its e_error and status, of the shape of the axes, and the e asked for."""
     key = str(of_model["model"].item())
-    own = [dim for dim in own_dims(of_model, key) if dim in of_model.variables["e_error"].dims]
-    best = _best_parameters(of_model, own, tol) if own else {}
+    parameter_dims = [dim for dim in own_dims(of_model, key) if dim in of_model.variables["e_error"].dims]
+    best = _best_parameters(of_model, parameter_dims, tol) if parameter_dims else {}
     chosen = _inputs_at(of_model, best)
     of_model = of_model.isel(best)
     axes = of_model.variables["e_error"].dims
@@ -309,25 +311,25 @@ def _rank_model(of_model: xr.Dataset, tol: float) -> Ranked:
     e, along_one = evaluated.variables["e"], of_model.variables["e"].ndim == 1
     # along e, where it varies along one axis: whether there is a point to judge, and one that is not within tol
     asked_at, missed_at = np.zeros(e.shape, bool), np.zeros(e.shape, bool)
-    points = known_points = within_points = failed_points = 0
+    points = evaluable_points = within_points = failed_points = 0
     total, max_error, e_out = Fraction(), math.nan, math.nan
     worst: dict[Hashable, int] | None = None
     for where in slabs(sizes):
         part = _judge_slab(evaluated, where, sizes, tol)
-        distance, known = part.distance, part.known
+        distance, evaluable = part.distance, part.evaluable
         points += weight * int(part.judged.sum())
-        known_points += weight * int(known.sum())
+        evaluable_points += weight * int(evaluable.sum())
         within_points += weight * int(part.within.sum())
         failed_points += weight * int(part.failed.sum())
-        if known.any():
-            total += weight * _exact_sum(distance[known & np.isfinite(distance)])
-            index = np.unravel_index(int(np.argmax(np.where(known, distance, -1.0))), distance.shape)
+        if evaluable.any():
+            total += weight * _exact_sum(distance[evaluable & np.isfinite(distance)])
+            index = np.unravel_index(int(np.argmax(np.where(evaluable, distance, -1.0))), distance.shape)
             if worst is None or distance[index] > max_error:
                 max_error = float(distance[index])
                 e_out = float(part.asked[index]) + float(part.error[index])
                 worst = {dim: where[dim].start + int(at) for dim, at in zip(sizes, index, strict=True)}
         if along_one:
-            others = tuple(place for place, dim in enumerate(sizes) if dim not in e.dims)
+            others = tuple(axis for axis, dim in enumerate(sizes) if dim not in e.dims)
             along = where[e.dims[0]]
             asked_at[along] |= np.logical_or.reduce(part.judged, axis=others)
             missed_at[along] |= np.logical_or.reduce(part.judged & ~part.within, axis=others)
@@ -335,7 +337,7 @@ def _rank_model(of_model: xr.Dataset, tol: float) -> Ranked:
     mean_error = math.nan
     if worst is not None:
         # an error without bound comes from a file that was not written by a sweep
-        mean_error = max_error if math.isinf(max_error) else float(total / known_points)
+        mean_error = max_error if math.isinf(max_error) else float(total / evaluable_points)
         asked_there = e.isel({dim: worst[dim] for dim in e.dims}).values.item()
         at = {**_inputs_at(of_model, {dim: worst.get(dim, 0) for dim in axes}), **chosen, "e": float(asked_there)}
     parameters = {".".join(map(str, path_of(name))): chosen[name] for name in chosen if owner_of(name) == key}
@@ -374,12 +376,12 @@ def _exact_sum(values: NDArray[np.float64]) -> Fraction:
     return total * Fraction(2) ** (least - MANTISSA_BITS)
 
 
-def _inputs_at(of_model: xr.Dataset, places: Mapping[Hashable, int]) -> dict[str, float | str]:
+def _inputs_at(of_model: xr.Dataset, positions: Mapping[Hashable, int]) -> dict[str, float | str]:
     """What is swept, at a place along each axis, without the parameters of other models."""
     variables, key = of_model.variables, str(of_model["model"].item())
     return {
-        name: variables[name].values[place].item()
-        for dim, place in places.items()
+        name: variables[name].values[position].item()
+        for dim, position in positions.items()
         for name in dict.fromkeys([str(dim), *columns_along(of_model, dim)])
         if owner_of(name) in ("", key)
     }
@@ -388,7 +390,7 @@ def _inputs_at(of_model: xr.Dataset, places: Mapping[Hashable, int]) -> dict[str
 def _served_ranges(e: NDArray[Any], asked: Mask, missed: Mask) -> tuple[tuple[float, float], ...]:
     """The ranges of neighbouring values of e at which every judged point is within the tolerance."""
     # in order, each value once: that of alpha and of speeds that vary with it may come again
-    values, place = np.unique(e[asked], return_inverse=True)
-    served = np.bincount(place, missed[asked], values.size) == 0
+    values, value_index = np.unique(e[asked], return_inverse=True)
+    served = np.bincount(value_index, missed[asked], values.size) == 0
     edges = np.diff(np.concatenate(([0], served, [0])))
     return tuple(zip(values[edges[:-1] == 1].tolist(), values[edges[1:] == -1].tolist(), strict=True))

@@ -48,7 +48,7 @@ def describe_point(at: Mapping[str, float | str]) -> str:
     return ", ".join(f"{safe_text(name)}={safe_text(number(value, 12), 60)}" for name, value in at.items())
 
 
-def replay_command(begin: Sequence[str], at: Mapping[str, object]) -> str:
+def replay_command(start: Sequence[str], at: Mapping[str, object]) -> str:
     """The whole command: how it begins, and the model and the inputs of the point.
 
     >>> replay_command(("impact", "run", "new.h5"), {"model": "hertz", "case": 3})
@@ -56,8 +56,8 @@ def replay_command(begin: Sequence[str], at: Mapping[str, object]) -> str:
     >>> replay_command(("impact", "run", "new.h5"), {"model": "hertz", "e": 0.5, "material": "soft steel"})
     "impact run new.h5 --model hertz --at e=0.5 --at 'material=soft steel'"
     """
-    words = list(begin)
+    words = list(start)
     for name, value in at.items():
-        given = repr(value) if isinstance(value, float) else str(value)
-        words += ["--model", given] if name == "model" else ["--at", f"{name}={given}"]
+        text = repr(value) if isinstance(value, float) else str(value)
+        words += ["--model", text] if name == "model" else ["--at", f"{name}={text}"]
     return safe_text(shlex.join(words), 2000)

@@ -152,8 +152,8 @@ def scale_of(
 def stored_variables(plan: Plan) -> tuple[SchemaVariable, ...]:
     """The variables of the result of a plan; the status is always there: without it a NaN would have no reason."""
     chosen = {"status", *(plan.config.output.variables or BY_DEFAULT)}
-    return tuple(replace(one, dtype=plan.config.output.dtype if one.dtype == "f8" else one.dtype)
-                 for one in SCHEMA if one.name in chosen)  # fmt: skip
+    return tuple(replace(variable, dtype=plan.config.output.dtype if variable.dtype == "f8" else variable.dtype)
+                 for variable in SCHEMA if variable.name in chosen)  # fmt: skip
 
 
 def dataset_template(plan: Plan) -> xr.Dataset:
@@ -165,25 +165,26 @@ def dataset_template(plan: Plan) -> xr.Dataset:
     dataset = xr.Dataset(
         coords=xr.Coordinates(_plan_coordinates(plan), indexes={}), attrs=_provenance_attributes(plan)
     )
-    for one in stored_variables(plan):
+    for variable in stored_variables(plan):
         dims, shape = (
-            (axes, plan.shape) if one.per == "axes" else (("model", *axes), (len(plan.models), *plan.shape))
+            (axes, plan.shape) if variable.per == "axes" else (("model", *axes), (len(plan.models), *plan.shape))
         )
-        dataset[one.name] = (dims, np.broadcast_to(np.zeros((), one.dtype), shape), attributes_of(one))
+        zeros = np.broadcast_to(np.zeros((), variable.dtype), shape)
+        dataset[variable.name] = (dims, zeros, attributes_of(variable))
     return dataset
 
 
 def attributes_of(variable: SchemaVariable) -> dict[str, object]:
-    found: dict[str, object] = {
+    attributes: dict[str, object] = {
         "units": variable.unit, "long_name": variable.meaning, "equation": variable.equation,
     }  # fmt: skip
     if variable.name == "status":
-        found["flag_values"] = np.array([int(status) for status in Status], np.int8)
-        found["flag_meanings"] = " ".join(status.name.lower() for status in Status)
+        attributes["flag_values"] = np.array([int(status) for status in Status], np.int8)
+        attributes["flag_meanings"] = " ".join(status.name.lower() for status in Status)
     if variable.name == "in_domain":
-        found["flag_values"] = np.array([0, 1], np.int8)
-        found["flag_meanings"] = "outside_claimed_domain within_claimed_domain"
-    return found
+        attributes["flag_values"] = np.array([0, 1], np.int8)
+        attributes["flag_meanings"] = "outside_claimed_domain within_claimed_domain"
+    return attributes
 
 
 def _plan_coordinates(plan: Plan) -> dict[str, object]:
@@ -192,25 +193,25 @@ def _plan_coordinates(plan: Plan) -> dict[str, object]:
     def texts(field: str) -> tuple[str, list[str], dict[str, str]]:
         return "model", [str(getattr(model, field)) for model in models], {"long_name": f"{field} of the model"}
 
-    found: dict[str, object] = {
+    coordinates: dict[str, object] = {
         "model": ("model", [model.key for model in models], {"long_name": "contact force model"}),
         **{field: texts(field) for field in ("title", "equation", "reference", "doi")},
         "year": ("model", [model.year for model in models], {"long_name": "year of the model"}),
     }
     for axis in plan.config.axes:
         if axis.numbered:
-            found[axis.name] = (axis.name, list(axis.labels), {"long_name": "number of the case"})
+            coordinates[axis.name] = (axis.name, list(axis.labels), {"long_name": "number of the case"})
         for name, values in axis.columns.items():
-            found[name] = (axis.name, list(values), _coordinate_attributes(plan, name))
+            coordinates[name] = (axis.name, list(values), _coordinate_attributes(plan, name))
     for name, value in plan.config.scalars.items():
-        found[name] = ((), value, _coordinate_attributes(plan, name))
-    found["exponent"] = _exponent_coordinate(plan)
+        coordinates[name] = ((), value, _coordinate_attributes(plan, name))
+    coordinates["exponent"] = _exponent_coordinate(plan)
     if "alpha" in plan.inputs.names():
-        found["e"] = _restitution_coordinate(plan)
+        coordinates["e"] = _restitution_coordinate(plan)
     for ball in "12":
         if f"m{ball}" not in plan.inputs.names():
-            found[f"m{ball}"] = _mass_coordinate(plan, ball)
-    return found
+            coordinates[f"m{ball}"] = _mass_coordinate(plan, ball)
+    return coordinates
 
 
 def _coordinate_attributes(plan: Plan, name: str) -> dict[str, str]:
@@ -221,10 +222,10 @@ def _coordinate_attributes(plan: Plan, name: str) -> dict[str, str]:
             "units": udunits(MATERIAL_QUANTITIES[field].unit),
             "long_name": f"{MATERIAL_QUANTITIES[field].meaning} of {material}",
         }
-    key, _, own = name.rpartition(".")
+    key, _, parameter = name.rpartition(".")
     for model in plan.models:
         if model.key == key:
-            quantity = model_quantities(model)[own]
+            quantity = model_quantities(model)[parameter]
             return {"units": udunits(quantity.unit), "long_name": quantity.meaning}
     if name in MATERIAL_KEYS:
         return {"long_name": MATERIAL_KEYS[name]}
@@ -237,7 +238,7 @@ def udunits(unit: str) -> str:
     >>> udunits("m/s"), udunits("N/m^n"), udunits("kg/m^3"), udunits("1")
     ('m s-1', 'N m-n', 'kg m-3', '1')
     """
-    return re.sub(r"/\s*([A-Za-z]+)(?:\^(\S+))?", lambda found: f" {found[1]}-{found[2] or 1}", unit)
+    return re.sub(r"/\s*([A-Za-z]+)(?:\^(\S+))?", lambda match: f" {match[1]}-{match[2] or 1}", unit)
 
 
 def plain_unit(unit: str) -> str:
@@ -246,7 +247,7 @@ def plain_unit(unit: str) -> str:
     >>> plain_unit("m s-1"), plain_unit("N m-1.5"), plain_unit("kg")
     ('m/s', 'N/m^1.5', 'kg')
     """
-    return re.sub(r" ([A-Za-z]+)-(\S+)", lambda found: f"/{found[1]}" + f"^{found[2]}" * (found[2] != "1"), unit)
+    return re.sub(r" ([A-Za-z]+)-(\S+)", lambda match: f"/{match[1]}" + f"^{match[2]}" * (match[2] != "1"), unit)
 
 
 def exponent_text(by_model: Mapping[str, float]) -> str:
@@ -326,13 +327,13 @@ def count_points(dataset: xr.Dataset) -> int:
 def _exponent_coordinate(plan: Plan) -> tuple[tuple[str, ...], object, dict[str, str]]:
     """The compliance exponent of each model: its own, or the sweep's, which may be an axis."""
     about = {"units": "1", "long_name": "compliance exponent n"}
-    own = np.array([np.nan if model.exponent is None else model.exponent for model in plan.models])
+    law_exponents = np.array([np.nan if model.exponent is None else model.exponent for model in plan.models])
     axes = plan.inputs.axes_of("n")
     if not axes:
-        return ("model",), np.where(np.isnan(own), plan.config.scalars["n"], own), about
+        return ("model",), np.where(np.isnan(law_exponents), plan.config.scalars["n"], law_exponents), about
     axis = plan.config.axes[axes[0]]
     values = np.asarray(axis.columns["n"], float)
-    return ("model", axis.name), np.where(np.isnan(own)[:, None], values, own[:, None]), about
+    return ("model", axis.name), np.where(np.isnan(law_exponents)[:, None], values, law_exponents[:, None]), about
 
 
 def _restitution_coordinate(plan: Plan) -> tuple[tuple[str, ...], object, dict[str, str]]:

@@ -47,20 +47,20 @@ def check_seal(path: Path) -> str:
     ResultError : the file does not exist, is no sealed result, is of another schema version, or is damaged
     """
     with open_regular_file(path) as file:
-        found = file.read(USER_BLOCK_BYTES)
-        if found.startswith(HDF5_MAGIC):
+        header = file.read(USER_BLOCK_BYTES)
+        if header.startswith(HDF5_MAGIC):
             raise ResultError(
                 f"is of schema version 1, or no result of impact; expected version {SCHEMA_VERSION}: {SWEEP_AGAIN}"
             )
-        if not found.startswith(MAGIC):
+        if not header.startswith(MAGIC):
             raise ResultError("is not a readable result (it does not begin as a sealed file of impact does)")
-        version = found[len(MAGIC) :].partition(b"\n")[0].removeprefix(b"schema ")
+        version = header[len(MAGIC) :].partition(b"\n")[0].removeprefix(b"schema ")
         if version.isdigit() and int(version) != SCHEMA_VERSION and len(version) < 5:
             raise ResultError(
                 f"has schema version {int(version)}, this program reads {SCHEMA_VERSION}; {SWEEP_AGAIN}"
             )
         seal = _digest(file)
-    if found != render_header(seal):
+    if header != render_header(seal):
         raise ResultError("is damaged: its content does not have the SHA-256 that it was sealed with")
     return seal
 

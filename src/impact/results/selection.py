@@ -35,11 +35,11 @@ def model_positions(models: Sequence[str], dataset: xr.Dataset) -> list[int]:
     ------
     UsageError : a model is not in the result
     """
-    known = [str(key) for key in dataset["model"].values]
+    keys = [str(key) for key in dataset["model"].values]
     for key in models:
-        if key not in known:
-            raise UsageError(f'no model "{safe_text(key)}" in this result; {did_you_mean(key, known)}')
-    return [known.index(key) for key in dict.fromkeys(models)]
+        if key not in keys:
+            raise UsageError(f'no model "{safe_text(key)}" in this result; {did_you_mean(key, keys)}')
+    return [keys.index(key) for key in dict.fromkeys(models)]
 
 
 def select(dataset: xr.Dataset, sel: Mapping[str, float | str]) -> xr.Dataset:
@@ -66,7 +66,7 @@ def select(dataset: xr.Dataset, sel: Mapping[str, float | str]) -> xr.Dataset:
         if dim in masks and same.any():
             same &= masks[dim]
         if not same.any():
-            shown = ", ".join(label(one) for one in values[:8].tolist())
+            shown = ", ".join(label(value_of_axis) for value_of_axis in values[:8].tolist())
             has = safe_text(shown + (", ..." if values.size > 8 else ""))
             raise UsageError(f"no {safe_text(f'{name} = {value}')} in this result; {safe_text(name)} is {has}")
         masks[dim] = same
@@ -99,20 +99,20 @@ def match_labels(new: Sequence[Labels], baseline: Sequence[Labels]) -> tuple[Ind
     pairs = list(zip(new, baseline, strict=True))
     if all(np.array_equal(a, b) for a, b in pairs) and any(_is_increasing(a) for a, _ in pairs):
         # as of most pairs; sorting a long axis takes ten times its memory
-        places = np.arange(len(new[0]))
-        return places, places
+        positions = np.arange(len(new[0]))
+        return positions, positions
     for rounding in (LABEL_RTOL, 0.0):
         rows = np.stack([_number_labels(a, b, rounding) for a, b in zip(new, baseline, strict=True)], axis=1)
         # only a column of labels with a row for each is unique on an axis: what rounding would merge is told apart
         _, row = np.unique(rows, axis=0, return_inverse=True)
-        own, other = row[: len(new[0])], row[len(new[0]) :]
-        if len(np.unique(own)) == len(own) and len(np.unique(other)) == len(other):
+        new_rows, baseline_rows = row[: len(new[0])], row[len(new[0]) :]
+        if len(np.unique(new_rows)) == len(new_rows) and len(np.unique(baseline_rows)) == len(baseline_rows):
             break
     else:
         raise UsageError("an axis has two points of the same labels; compare takes results of a sweep")
-    _, here, there = np.intersect1d(own, other, return_indices=True)
-    order = np.argsort(there, kind="stable")
-    return here[order], there[order]
+    _, new_positions, baseline_positions = np.intersect1d(new_rows, baseline_rows, return_indices=True)
+    order = np.argsort(baseline_positions, kind="stable")
+    return new_positions[order], baseline_positions[order]
 
 
 def _is_increasing(values: Labels) -> bool:
@@ -122,7 +122,7 @@ def _is_increasing(values: Labels) -> bool:
 def _number_labels(new: Labels, baseline: Labels, rounding: float) -> IndexArray:
     """A number for each label of both, equal where the labels are."""
     numbers = new.dtype.kind in NUMBER_DTYPE_KINDS and baseline.dtype.kind in NUMBER_DTYPE_KINDS
-    new, baseline = (one.astype(float if numbers else str) for one in (new, baseline))
+    new, baseline = (labels.astype(float if numbers else str) for labels in (new, baseline))
     values, number = np.unique(np.concatenate([new, baseline]), return_inverse=True)
     if numbers:
         another = ~np.isclose(values[1:], values[:-1], rtol=rounding, atol=0.0)

@@ -56,8 +56,8 @@ class Shard:
         >>> Shard.parse("3/16")
         Shard(number=3, of=16)
         """
-        found = re.fullmatch(r"([0-9]{1,9})/([0-9]{1,9})", text)
-        shard = cls(*map(int, found.groups())) if found else cls(0, 0)
+        match = re.fullmatch(r"([0-9]{1,9})/([0-9]{1,9})", text)
+        shard = cls(*map(int, match.groups())) if match else cls(0, 0)
         if not 1 <= shard.number <= shard.of:
             raise UsageError(f"--shard {safe_text(text)}: wants K/N with K from 1 to N, such as 3/16")
         return shard
@@ -114,22 +114,22 @@ def sweep_shard(
     maps = trajectory_maps(plan)
     plan = with_core(plan, maps)
     blocks = list(trajectory_ranges(maps))
-    own = [one for one in blocks if shard.has(one)]
-    counter = ProgressCounter.begin(sum(one.size for one in own), plan.points, on_progress)
+    shard_blocks = [block for block in blocks if shard.has(block)]
+    counter = ProgressCounter.begin(sum(block.size for block in shard_blocks), plan.points, on_progress)
     folder = shard.folder(output)
     with open_work_folder(folder, plan, resume=not overwrite, overwrite=overwrite) as work_folder:
         attributes = dataset_template(plan).attrs
-        about = {
+        record = {
             "shard": [shard.number, shard.of],
             "command": list(command),
             "core": plan.config.solver.core,
             "attributes": {name: attributes[name] for name in RECORDED_ATTRIBUTES},
         }
         with atomic_write(folder / SHARD_FILE_NAME, overwrite=True) as sink:
-            sink.write(json.dumps(about).encode())
+            sink.write(json.dumps(record).encode())
         with report_kept_blocks(folder, counter, "the same command", lambda error: []):
-            complete_ranges(work_folder, plan, maps, own, counter, backend, should_stop)
-    return ShardProgress(folder, len(own), len(blocks), counter.at.trajectories, counter.at.failed)
+            complete_ranges(work_folder, plan, maps, shard_blocks, counter, backend, should_stop)
+    return ShardProgress(folder, len(shard_blocks), len(blocks), counter.at.trajectories, counter.at.failed)
 
 
 @dataclass(frozen=True)
@@ -174,17 +174,17 @@ def merge(
     StoreError, UnfinishedError : nothing was stored; the folders have all of it
     """
     check_output(output, overwrite=overwrite)
-    told = {folder: _read_record(folder) for folder in {one.resolve(): one for one in folders}.values()}
-    first, about = next(iter(told.items()))
-    config = stored_config(about.attributes, [], plugins, str(first))
+    records = {folder: _read_record(folder) for folder in {path.resolve(): path for path in folders}.values()}
+    first, first_record = next(iter(records.items()))
+    config = stored_config(first_record.attributes, [], plugins, str(first))
     # the core that it was settled on, whichever is here
-    config = replace(config, solver=replace(config.solver, core=about.core))
+    config = replace(config, solver=replace(config.solver, core=first_record.core))
     plan = Plan(config, plugins.of(config.models))
     maps = trajectory_maps(plan)
     blocks = list(trajectory_ranges(maps))
-    counter = ProgressCounter.begin(sum(own.count for own in maps), plan.points, on_progress)
-    for folder, one in told.items():
-        if one.attributes["fingerprint"] != about.attributes["fingerprint"]:
+    counter = ProgressCounter.begin(sum(trajectory_map.count for trajectory_map in maps), plan.points, on_progress)
+    for folder, record in records.items():
+        if record.attributes["fingerprint"] != first_record.attributes["fingerprint"]:
             # what differs in the trajectories is told by its name first
             with lock_work_folder(folder, plan):
                 raise UsageError(
@@ -192,13 +192,13 @@ def merge(
                     "expected the folders of one sweep"
                 )
     # a folder is locked while it is looked at, one after the other: there may be more of them than open files
-    where, twice = _locate_ranges([*told], plan, blocks, counter, should_stop)
-    lacking = [part for part in blocks if part.number not in where]
-    if lacking:
-        raise UsageError("\n".join(_missing_shards(output, lacking, told)))
+    where, n_repeated = _locate_ranges([*records], plan, blocks, counter, should_stop)
+    missing = [part for part in blocks if part.number not in where]
+    if missing:
+        raise UsageError("\n".join(_missing_shards(output, missing, records)))
     table = table_of(plan, maps, range_reader(maps, lambda number: reload_range(where[number], blocks[number])))
     try:
-        return store_result(output, plan, table, None, overwrite, counter, should_stop), twice
+        return store_result(output, plan, table, None, overwrite, counter, should_stop), n_repeated
     except (StoreError, UnfinishedError) as error:
         raise type(error)(
             "; ".join(filter(None, [str(error), "the folders have all that is finished"]))
@@ -215,15 +215,15 @@ def _read_record(folder: Path) -> _ShardRecord:
     try:
         if not (folder / SHARD_FILE_NAME).is_file():
             raise ValueError
-        found = json.loads((folder / SHARD_FILE_NAME).read_text(encoding="utf-8"))
-        number, of = found["shard"]
-        command, core, attributes = found["command"], found["core"], found["attributes"]
-        right = (
+        fields = json.loads((folder / SHARD_FILE_NAME).read_text(encoding="utf-8"))
+        number, of = fields["shard"]
+        command, core, attributes = fields["command"], fields["core"], fields["attributes"]
+        is_valid = (
             isinstance(number, int) and isinstance(of, int) and 1 <= number <= of
-            and isinstance(command, list) and all(isinstance(one, str) for one in command)
+            and isinstance(command, list) and all(isinstance(word, str) for word in command)
             and core in CORES and {*RECORDED_ATTRIBUTES} <= attributes.keys()
         )  # fmt: skip
-        if not right:
+        if not is_valid:
             raise ValueError
     except (OSError, ValueError, TypeError, AttributeError, KeyError, RecursionError):
         shown = safe_text(str(folder))
@@ -246,17 +246,19 @@ def _locate_ranges(
             for part in blocks:
                 if should_stop():
                     raise UnfinishedError("nothing was written")
-                found = work_folder.load(part)
-                if found is None:
+                trajectories = work_folder.load(part)
+                if trajectories is None:
                     continue
                 if part.number not in where:
                     where[part.number] = work_folder
-                    counter.count(part, found)
+                    counter.count(part, trajectories)
                     counter.report()
                     continue
                 repeated.add(part.number)
                 other = reload_range(where[part.number], part)
-                if any(values.tobytes() != vars(other)[name].tobytes() for name, values in vars(found).items()):
+                if any(
+                    values.tobytes() != vars(other)[name].tobytes() for name, values in vars(trajectories).items()
+                ):
                     raise ResultError(
                         f"{safe_text(str(work_folder.path(part.number)))}: differs from "
                         f"{safe_text(str(where[part.number].path(part.number)))}; expected both to be of "
@@ -266,18 +268,18 @@ def _locate_ranges(
 
 
 def _missing_shards(
-    output: Path, lacking: Sequence[TrajectoryRange], told: Mapping[Path, _ShardRecord]
+    output: Path, missing: Sequence[TrajectoryRange], records: Mapping[Path, _ShardRecord]
 ) -> list[str]:
     """A line for each shard that is missing or unfinished, with what makes it."""
-    about = next(iter(told.values()))
-    folders = {one.shard: folder for folder, one in told.items()}
+    first_record = next(iter(records.values()))
+    folders = {record.shard: folder for folder, record in records.items()}
     blocks: dict[Shard, int] = {}
-    for part in lacking:
-        shard = Shard(part.number % about.shard.of + 1, about.shard.of)
+    for part in missing:
+        shard = Shard(part.number % first_record.shard.of + 1, first_record.shard.of)
         blocks[shard] = blocks.get(shard, 0) + 1
     lines = []
-    for shard in sorted(blocks, key=lambda one: one.number)[:MAX_LISTED_SHARDS]:
-        again = safe_text(shlex.join([*about.command, "--shard", str(shard)]), 500)
+    for shard in sorted(blocks, key=lambda shard: shard.number)[:MAX_LISTED_SHARDS]:
+        again = safe_text(shlex.join([*first_record.command, "--shard", str(shard)]), 500)
         lacks = f"lacks {blocks[shard]:,} block{'' if blocks[shard] == 1 else 's'}"
         if shard in folders:
             lines.append(f"{safe_text(str(folders[shard]))}: shard {shard} {lacks}; {again} finishes it")

@@ -135,22 +135,22 @@ def _derived_quantities(
     law: ForceModel, impacts: Impacts, values: Mapping[str, float], history: History | None
 ) -> dict[str, float]:
     """The quantities of DERIVED."""
-    found = {name: getattr(impacts, name)[0].item() for name in ("m1", "m2", "R1", "R2", "m")}
+    quantities = {name: getattr(impacts, name)[0].item() for name in ("m1", "m2", "R1", "R2", "m")}
     if law.unloading in (returning, stiffer) and values["status"] in (Status.OK, Status.LIMIT):
         recovered = values["peak_indentation"] - values["permanent_indentation"]
-        found["K_r"] = values["peak_force"] / recovered ** impacts.n[0].item() if recovered else math.inf
+        quantities["K_r"] = values["peak_force"] / recovered ** impacts.n[0].item() if recovered else math.inf
     if history is not None:
-        found |= {name: getattr(history, name) for name in ("tau_c", "tau_r", "W_c", "W_r")}
+        quantities |= {name: getattr(history, name) for name in ("tau_c", "tau_r", "W_c", "W_r")}
     elif values["status"] == Status.LIMIT:
         # all that the balls bring is taken from them, and nothing given back
-        found["tau_c"], found["W_c"] = (impacts.m * impacts.v0)[0].item(), 0.5 * impacts.energy[0].item()
-        found["tau_r"] = found["W_r"] = 0.0
+        quantities["tau_c"], quantities["W_c"] = (impacts.m * impacts.v0)[0].item(), 0.5 * impacts.energy[0].item()
+        quantities["tau_r"] = quantities["W_r"] = 0.0
     if "chi" in law.coefficients and law.unloading is None:
         chi, v0 = values["damping_ratio"], impacts.v0[0].item()
         # the damping of a limit is infinite
         chi = math.inf if values["status"] == Status.LIMIT else chi
-        found["rebound_speed_bound"] = v0 / chi if chi else math.inf
-    return {name: found.get(name, math.nan) for name, _, _ in DERIVED_QUANTITIES}
+        quantities["rebound_speed_bound"] = v0 / chi if chi else math.inf
+    return {name: quantities.get(name, math.nan) for name, _, _ in DERIVED_QUANTITIES}
 
 
 def history_dataset(history: History, model: str, point: Mapping[str, float | str]) -> xr.Dataset:
@@ -202,10 +202,10 @@ def histories(
     """
     if "t" in dataset.dims:
         return [dataset]
-    known = [str(key) for key in dataset["model"].values.ravel()]
+    keys = [str(key) for key in dataset["model"].values.ravel()]
     for key in models or ():
-        if key not in known:
-            raise UsageError(f'no model "{safe_text(key)}" in this result; {did_you_mean(key, known)}')
+        if key not in keys:
+            raise UsageError(f'no model "{safe_text(key)}" in this result; {did_you_mean(key, keys)}')
     check_plugins(dataset.attrs, plugins, "the result")
     for changed in changed_plugins(dataset.attrs, plugins, "the result"):
         # the motion of another law is not that of the result
@@ -213,7 +213,7 @@ def histories(
     followed: list[xr.Dataset] = []
     ends: dict[str, str] = {}
     first: dict[str, float | str] = {}
-    for key in dict.fromkeys(models or known):
+    for key in dict.fromkeys(models or keys):
         others = {str(name) for name in dataset.coords if owner_of(str(name)) not in ("", key)}
         of_model = {name: value for name, value in at.items() if name not in others}
         config, names = single_point(dataset, (), plugins, key, of_model)
@@ -261,21 +261,21 @@ def single_point(
     """
     read, parted = _config_reader(source, overrides, plugins)
     # each override, and how it is called in a message: as it was asked for
-    asked = {} if model is None else {f"models={json.dumps([model])}": f"--model {model}"}
-    config = _read_with_option_names(read, asked)
+    option_names = {} if model is None else {f"models={json.dumps([model])}": f"--model {model}"}
+    config = _read_with_option_names(read, option_names)
     columns = [_selectable_columns(axis) for axis in config.axes]
     varied = {name for names in columns for name in names}
     if at and {"e", "alpha"} <= at.keys():
         raise UsageError("--at alpha: got alpha beside e, expected one of the two")
     at = {**{name: value for name, value in parted.items() if name in varied}, **(at or {})}
     together = {name for names in columns if len(names) > 1 for name in names}
-    known = [*(name for names in columns for name in names), *config.scalars]
+    inputs = [*(name for names in columns for name in names), *config.scalars]
     for name, value in at.items():
-        if name not in known and name not in SWEEP_QUANTITIES:
-            raise UsageError(f'no input "{safe_text(name)}" here; {did_you_mean(name, known)}')
+        if name not in inputs and name not in SWEEP_QUANTITIES:
+            raise UsageError(f'no input "{safe_text(name)}" here; {did_you_mean(name, inputs)}')
         if name not in together:
-            asked[f"{_override_path(name)}={_toml_value(value)}"] = f"--at {name}={value}"
-    config = _read_with_option_names(read, asked)
+            option_names[f"{_override_path(name)}={_toml_value(value)}"] = f"--at {name}={value}"
+    config = _read_with_option_names(read, option_names)
 
     scalars = dict(config.scalars)
     first: list[str] = []
@@ -327,11 +327,11 @@ def _selectable_columns(axis: Axis) -> dict[str, Sequence[float | str]]:
 def _position_on_axis(axis: Axis, at: Mapping[str, float | str]) -> int:
     """The place on an axis where its columns have the values asked for."""
     columns = _selectable_columns(axis)
-    for place in range(axis.size):
-        if all(columns[name][place] == value for name, value in at.items() if name in columns):
-            return place
-    asked = ", ".join(f"{name} = {value}" for name, value in at.items() if name in columns)
-    raise UsageError(f"{safe_text(asked)}: not on the zipped axis {axis.name}; these values vary together")
+    for position in range(axis.size):
+        if all(columns[name][position] == value for name, value in at.items() if name in columns):
+            return position
+    requested = ", ".join(f"{name} = {value}" for name, value in at.items() if name in columns)
+    raise UsageError(f"{safe_text(requested)}: not on the zipped axis {axis.name}; these values vary together")
 
 
 def _override_path(name: str) -> str:
@@ -348,12 +348,12 @@ def _toml_value(value: float | str) -> str:
     return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
 
 
-def _read_with_option_names(read: ReadConfig, asked: Mapping[str, str]) -> Config:
+def _read_with_option_names(read: ReadConfig, option_names: Mapping[str, str]) -> Config:
     """A config whose problems are called by what was asked for, not by the overrides that stand for it."""
     try:
-        return read(list(asked))
+        return read(list(option_names))
     except ConfigError as error:
-        names = {f"--set {override}:": f"{name}:" for override, name in asked.items()}
+        names = {f"--set {override}:": f"{name}:" for override, name in option_names.items()}
         raise ConfigError([_with_option_name(line, names) for line in error.problems]) from None
 
 

@@ -102,8 +102,8 @@ def distinct_points(dataset: xr.Dataset, name: str) -> tuple[xr.Variable, int]:
     -------
     (xarray.Variable, int) : with all dimensions of the variable, and how often each of its points counts
     """
-    kept, variable = varying_dims(dataset, name), dataset.variables[name]
-    fixed = [dim for dim in variable.dims if dim not in kept]
+    varying, variable = varying_dims(dataset, name), dataset.variables[name]
+    fixed = [dim for dim in variable.dims if dim not in varying]
     weight = math.prod(variable.sizes[dim] for dim in fixed)
     return variable.isel(dict.fromkeys(fixed, slice(0, 1))), weight
 
@@ -119,8 +119,8 @@ def over_varying_dims(dataset: xr.Dataset, names: Sequence[str], *more: Hashable
     names : of the variables
     more : dimensions that are kept in any case
     """
-    kept = {*more, *(dim for name in names for dim in varying_dims(dataset, name))}
+    varying = {*more, *(dim for name in names for dim in varying_dims(dataset, name))}
     dims = dict.fromkeys(dim for name in names for dim in dataset.variables[name].dims)
-    fixed = [dim for dim in dims if dim not in kept]
+    fixed = [dim for dim in dims if dim not in varying]
     weight = math.prod(dataset.sizes[dim] for dim in fixed)
     return dataset[list(names)].isel(dict.fromkeys(fixed, 0)), weight

@@ -90,8 +90,8 @@ class Summary:
         self.points += weight * status.size
         times = np.bincount(status.reshape(-1))
         for number in np.flatnonzero(times).tolist():
-            known = Status(number)
-            self.counts[known] = self.counts.get(known, 0) + weight * int(times[number])
+            status_code = Status(number)
+            self.counts[status_code] = self.counts.get(status_code, 0) + weight * int(times[number])
         if times[FIRST_FAILURE:].any() and len(self.failed_at) < self.max_failed_at:
             for at in np.argwhere(status >= FIRST_FAILURE)[: self.max_failed_at - len(self.failed_at)].tolist():
                 places = tuple(first + offset for first, offset in zip(start, at, strict=True))
@@ -120,7 +120,7 @@ def summarize(
         along each axis on which the status does not vary
     max_points : of a variable that is computed, for one model
     """
-    tally = Summary(max_failed_at=max_failed_at)
+    summary = Summary(max_failed_at=max_failed_at)
     names = [name for name in ("status", *ERROR_VARIABLES) if name in dataset]
     for model, of_model in enumerate(parts_of_models(dataset)):
         for name in names:
@@ -128,11 +128,11 @@ def summarize(
             if variable.size <= max_points or not is_computed(variable):
                 for where in slabs(variable.sizes):
                     start = [where[dim].start for dim in variable.dims]
-                    tally.add({name: variable.isel(where).values}, model, start, weight=weight)
+                    summary.add({name: variable.isel(where).values}, model, start, weight=weight)
             elif name == "status":
-                tally.points += weight * variable.size
-                tally.not_counted += weight * variable.size
-    return tally
+                summary.points += weight * variable.size
+                summary.not_counted += weight * variable.size
+    return summary
 
 
 class Extremes(NamedTuple):

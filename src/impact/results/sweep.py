@@ -56,14 +56,14 @@ class Extension:
     ----------
     seal : of the result that is extended
     note : what the new one says of it
-    known : the trajectories that are not integrated again
+    find_reused : returns the trajectories of a range that are not integrated again
     fill : puts known values into those of a slab, given the model, the place and the values; None where all are
         computed from the trajectories
     """
 
     seal: str
     note: str
-    known: FindReused
+    find_reused: FindReused
     fill: Callable[[int, tuple[slice, ...], SlabValues], None] | None = None
 
 
@@ -105,13 +105,13 @@ def sweep_into(
     maps = trajectory_maps(plan)
     plan = with_core(plan, maps)
     ranges = list(trajectory_ranges(maps))
-    total = sum(own.count for own in maps)
+    total = sum(trajectory_map.count for trajectory_map in maps)
     counter = ProgressCounter.begin(total, plan.points, on_progress)
-    known = extension.known if extension else lambda part: None
+    find_reused = extension.find_reused if extension else lambda part: None
     few = plan.stored_points <= NO_CHECKPOINT_POINTS or plan.layout == "factored"
     if total <= RANGE_TRAJECTORIES and few and not os.path.lexists(work_folder_of(output)):
         finished = {}
-        for part, rebound in integrate_ranges(plan, maps, ranges, known=known):
+        for part, rebound in integrate_ranges(plan, maps, ranges, known=find_reused):
             finished[part.number] = rebound
             counter.count(part, rebound)
         table = table_of(plan, maps, range_reader(maps, finished.__getitem__))
@@ -131,7 +131,7 @@ def sweep_into(
         with report_kept_blocks(
             folder, counter, again, lambda error: _missing_space(error, output, plan, counter)
         ):
-            complete_ranges(work_folder, plan, maps, ranges, counter, backend, should_stop, known)
+            complete_ranges(work_folder, plan, maps, ranges, counter, backend, should_stop, find_reused)
             table = table_of(
                 plan, maps, range_reader(maps, lambda number: reload_range(work_folder, ranges[number]))
             )
@@ -157,7 +157,7 @@ def complete_ranges(
     counter: ProgressCounter,
     backend: Backend,
     should_stop: Callable[[], bool],
-    known: FindReused = lambda part: None,
+    find_reused: FindReused = lambda part: None,
 ) -> None:
     """Have all of some ranges in a work folder.
 
@@ -174,7 +174,9 @@ def complete_ranges(
         else:
             counter.count(part, before)
     counter.report()
-    for part, rebound in integrate_ranges(plan, maps, todo, backend=backend, should_stop=should_stop, known=known):
+    for part, rebound in integrate_ranges(
+        plan, maps, todo, backend=backend, should_stop=should_stop, known=find_reused
+    ):
         work_folder.store(part, rebound)
         counter.count(part, rebound)
         counter.report()
@@ -196,7 +198,7 @@ def sweep_in_memory(
     check_labels(plan)
     maps = trajectory_maps(plan)
     plan = with_core(plan, maps)
-    counter = ProgressCounter.begin(sum(own.count for own in maps), plan.points, on_progress)
+    counter = ProgressCounter.begin(sum(trajectory_map.count for trajectory_map in maps), plan.points, on_progress)
     finished: dict[int, CollisionResult] = {}
     for part, rebound in integrate_ranges(
         plan, maps, trajectory_ranges(maps), backend=backend, should_stop=should_stop
@@ -215,10 +217,10 @@ def range_reader(
     maps: Sequence[TrajectoryMap], load: Callable[[int], CollisionResult]
 ) -> Callable[[int, int, int], CollisionResult]:
     """The finished ranges of a plan as what a `TrajectoryTable` reads; `load` gives the one of a number."""
-    before = np.cumsum([0, *(-(-own.count // RANGE_TRAJECTORIES) for own in maps)])
+    first_range = np.cumsum([0, *(-(-trajectory_map.count // RANGE_TRAJECTORIES) for trajectory_map in maps)])
 
     def read(model: int, start: int, stop: int) -> CollisionResult:
-        return load(int(before[model]) + start // even_size(maps[model].count, RANGE_TRAJECTORIES))
+        return load(int(first_range[model]) + start // even_size(maps[model].count, RANGE_TRAJECTORIES))
 
     return read
 
@@ -261,7 +263,8 @@ def check_labels(plan: Plan) -> None:
         raise UsageError(
             f"{safe_text(odd[0])}: expected a material name without spaces and slashes, to be an axis"
         )
-    size = sum(encode_text(one).size for one in dataset_template(plan).coords.values() if is_text(one))
+    coordinates = dataset_template(plan).coords.values()
+    size = sum(encode_text(coordinate).size for coordinate in coordinates if is_text(coordinate))
     if size > MAX_LABEL_BYTES:
         raise UsageError(
             f"its labels take {size:,} bytes, expected at most {MAX_LABEL_BYTES:,}: give materials shorter names"
@@ -284,7 +287,8 @@ def find_finished(path: Path, plan: Plan) -> SweepOutcome | None:
     if dict(dataset.sizes) != {"model": len(plan.models), **axes}:
         dataset.close()
         return None
-    return SweepOutcome(dataset, summarize(dataset), sum(own.count for own in trajectory_maps(plan)))
+    trajectories = sum(trajectory_map.count for trajectory_map in trajectory_maps(plan))
+    return SweepOutcome(dataset, summarize(dataset), trajectories)
 
 
 def _missing_space(error: Exception, output: Path, plan: Plan, counter: ProgressCounter) -> list[str]:
@@ -294,9 +298,9 @@ def _missing_space(error: Exception, output: Path, plan: Plan, counter: Progress
         return []
     row = sum(getattr(CollisionResult.blank(1), name).nbytes for name in TABLE_COLUMNS)
     result = counter.at.of_trajectories * row if plan.layout == "factored" else dataset_template(plan).nbytes
-    wanted = result + OVERHEAD_BYTES + (counter.at.of_trajectories - counter.at.trajectories) * row
+    needed = result + OVERHEAD_BYTES + (counter.at.of_trajectories - counter.at.trajectories) * row
     free = shutil.disk_usage(output.parent).free
-    return [f"it takes {wanted:,} bytes more, {free:,} are free"]
+    return [f"it takes {needed:,} bytes more, {free:,} are free"]
 
 
 def store_result(
@@ -310,13 +314,13 @@ def store_result(
     extension: Extension | None = None,
 ) -> SweepOutcome:
     """Write the result of a trajectory table in the layout of its plan, and give it its name."""
-    at, variables, tally = counter.at, stored_variables(plan), Summary()
+    at, variables, summary = counter.at, stored_variables(plan), Summary()
     whole = dataset_template(plan)
     if extension:
         whole = whole.assign_attrs(extended=extension.note)
 
     def check(points: int) -> None:
-        counter.on_progress(replace(at, points=points, failed=max(tally.failed, at.failed)))
+        counter.on_progress(replace(at, points=points, failed=max(summary.failed, at.failed)))
         if should_stop():
             raise UnfinishedError
 
@@ -331,8 +335,8 @@ def store_result(
             for name, array in values.items():
                 yield name, (model, *where) if "model" in whole[name].dims else where, array
             axes = plan.inputs.axes_of_model(table.laws[model].key)
-            _add_slab(tally, axes, model, where, impacts, values)
-            check(tally.points)
+            _add_slab(summary, axes, model, where, impacts, values)
+            check(summary.points)
 
     def factored() -> Iterator[tuple[str, tuple[slice], NDArray[Any]]]:
         for name, where, array in table_values(table, variables):
@@ -340,29 +344,29 @@ def store_result(
             check(0)
 
     is_full = plan.layout == "full"
-    made = whole if is_full else factored_template(whole, table, variables)
+    template = whole if is_full else factored_template(whole, table, variables)
     with atomic_write(output, overwrite=overwrite, part=part) as sink:
-        seal = write_sealed(sink, made, full() if is_full else factored(), plan.config.output)
+        seal = write_sealed(sink, template, full() if is_full else factored(), plan.config.output)
         check_readable(sink, output)
     if not is_full:
         whole = lazy_dataset(whole, table, variables)
         is_small = plan.stored_points <= NO_CHECKPOINT_POINTS
-        tally = _summarize_points(table, variables) if is_small else summarize(whole)
+        summary = _summarize_points(table, variables) if is_small else summarize(whole)
     whole.encoding = {"source": str(output), "seal": seal, "layout": plan.layout}
-    return SweepOutcome(whole, tally, at.of_trajectories)
+    return SweepOutcome(whole, summary, at.of_trajectories)
 
 
 def _summarize_points(table: TrajectoryTable, variables: Sequence[SchemaVariable]) -> Summary:
     """What came out, point by point: unlike `summarize` it knows the radii."""
-    tally = Summary()
+    summary = Summary()
     for model, where, impacts, values in expanded_slabs(table, variables):
         axes = table.inputs.axes_of_model(table.laws[model].key)
-        _add_slab(tally, axes, model, where, impacts, values)
-    return tally
+        _add_slab(summary, axes, model, where, impacts, values)
+    return summary
 
 
 def _add_slab(
-    tally: Summary,
+    summary: Summary,
     axes: Collection[int],
     model: int,
     where: tuple[slice, ...],
@@ -375,4 +379,4 @@ def _add_slab(
     first = tuple(slice(None) if axis in axes else slice(1) for axis in range(len(where)))
     counted = {name: array[first or ...] for name, array in values.items()}
     radius = np.fmin(impacts.R1, impacts.R2)
-    tally.add(counted, model, [place.start for place in where], radius)
+    summary.add(counted, model, [part.start for part in where], radius)

@@ -21,7 +21,7 @@ from .attributes import ATTRIBUTE_TYPES, read_attribute
 from .schema import HISTORY_VARIABLES, MODEL_METADATA, SCHEMA, is_case
 from .slabs import VARIES_ALONG, is_lazy, slabs
 
-RESULT_VARIABLES = frozenset(one.name for one in SCHEMA)
+RESULT_VARIABLES = frozenset(variable.name for variable in SCHEMA)
 HISTORY_NAMES = frozenset(name for name, _, _ in HISTORY_VARIABLES)  # over the time t
 TEXT_COORDINATES = frozenset({"model", *MODEL_METADATA, *MATERIAL_KEYS} - {"year"})
 # the table of a factored file, see `impact.results.factored`
@@ -119,8 +119,8 @@ def _attribute_violations(dataset: xr.Dataset) -> Iterator[str]:
 
 
 def _history_violations(dataset: xr.Dataset) -> Iterator[str]:
-    for name, one in dataset.variables.items():
-        if one.dims != (() if name == "model" else ("t",)):
+    for name, variable in dataset.variables.items():
+        if variable.dims != (() if name == "model" else ("t",)):
             yield f"{name}: does not lie along t alone"
 
 
@@ -132,9 +132,9 @@ def _result_violations(dataset: xr.Dataset) -> Iterator[str]:
     for name in MODEL_METADATA:
         if name not in dataset or dataset[name].dims != ("model",):
             yield f"{name} of the models is missing"
-    for one in SCHEMA:
-        if one.name in dataset and one.per == "axes" and "model" in dataset[one.name].dims:
-            yield f"{one.name}: lies along model"
+    for variable in SCHEMA:
+        if variable.name in dataset and variable.per == "axes" and "model" in dataset[variable.name].dims:
+            yield f"{variable.name}: lies along model"
     if "status" in dataset and _has_unknown_status(dataset["status"]):
         yield "status: a number without a meaning"
     for key in TEXT_ATTRIBUTES:
