@@ -29,25 +29,25 @@ def bless(
     allow_failed: bool = False,
     show: Callable[[Verdict], None] = lambda verdict: None,
 ) -> Verdict | None:
-    """Let a result take the place of a baseline, which then carries the reason and the tolerances it is judged by.
+    """Replace a baseline by a result, and store the reason and the tolerances in it.
 
     Parameters
     ----------
     new, baseline : files; the baseline need not exist yet
     reason : why the numbers changed
-    tol : see `compare`; the new baseline carries them, so that a coarser solver does not loosen the guard
+    tol : see `compare`; stored in the new baseline, so that a coarser solver does not loosen later comparisons
     allow_failed : accept a result with failed points
-    show : is told the verdict before anything is written; if it raises an error nothing is
+    show : called with the verdict before anything is written; an exception prevents the replacement
 
     Returns
     -------
-    Verdict, or None : how the two differed; None where there was no baseline
+    Verdict or None : the comparison with the old baseline; None if there was none
 
     Raises
     ------
     ResultError : one of the files is not a readable result
-    UsageError : the reason is empty, a tolerance is not right, the two are one file, or points failed
-    StoreError : the disk is full or failed; the baseline is as it was
+    UsageError : the reason is empty, a tolerance is invalid, both paths are the same file, or points failed
+    StoreError : the disk is full or failed; the baseline is unchanged
 
     >>> import impact, tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -57,7 +57,7 @@ def bless(
     'first'
     """
     if not reason.strip():
-        raise UsageError("--reason: empty, wants why the numbers changed")
+        raise UsageError("--reason: got an empty text, expected why the numbers changed")
     if re.search("[\0\ud800-\udfff]", reason):
         raise UsageError(f'--reason: got "{safe_text(reason, 60)}", expected UTF-8 text without NUL')
     new, baseline = Path(new), Path(baseline)
@@ -79,7 +79,7 @@ def bless(
 
 
 def _check_no_failures(result: xr.Dataset, path: Path) -> None:
-    """Refuse a result with failed points, whose NaN every later failure would equal."""
+    """Refuse a result with failed points, since later failures would equal their NaNs."""
     summary = summarize(result[["status"]] if "status" in result else result)
     if summary.not_counted:
         count = f"{summary.not_counted:,} points are too many to look for failures"
@@ -94,7 +94,7 @@ def _check_no_failures(result: xr.Dataset, path: Path) -> None:
 
 
 def _load_baseline(baseline: Path) -> xr.Dataset | None:
-    """The baseline as it is, if there is one; what is no result is not written over."""
+    """The current baseline, or None; a file that is not a result is not replaced."""
     if not baseline.exists():
         return None
     try:

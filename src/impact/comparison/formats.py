@@ -13,13 +13,13 @@ from ..text import safe_text
 from .verdict import FAULT_KINDS, Judged, Verdict
 
 PROGRAM = "impact compare"
-# differences that an annotation names
+# differences that an annotation lists
 MAX_ANNOTATED = 3
 
 
 @dataclass(frozen=True)
 class ReportCase:
-    """One thing that was looked at: a variable, or one kind of fault; `texts` say what is wrong with it."""
+    """One test of a report: a variable or a kind of fault; `texts` describe its failures."""
 
     name: str
     texts: tuple[str, ...] = ()
@@ -28,7 +28,7 @@ class ReportCase:
 
 @dataclass(frozen=True)
 class Report:
-    """What the formats are made from: a verdict, or the reason why there is none (`equal` is None then)."""
+    """The data of all formats: a verdict, or the error that prevented one (`equal` is None)."""
 
     new: str
     baseline: str
@@ -59,12 +59,12 @@ def report_of(verdict: Verdict) -> Report:
 
 
 def report_of_error(new: str, baseline: str, error: str) -> Report:
-    """The report where one of the two could not be read."""
+    """The report of an error that prevented the comparison."""
     return Report(safe_text(new), safe_text(baseline), None, "; ".join(error.splitlines()))
 
 
 def as_data(report: Report) -> dict[str, Any]:
-    """Plain data, for JSON; `equal` is null where there is no verdict."""
+    """The report as a dict for JSON; `equal` is null if there is no verdict."""
     return {
         "equal": report.equal, "headline": report.headline, "new": report.new, "baseline": report.baseline,
         "faults": [
@@ -129,7 +129,7 @@ def as_markdown(report: Report) -> str:
             counts, point = f"{variable.different} of {variable.points}", _escape_markdown(variable.place)
             lines.append(f"| `{variable.name}` | {counts} | {numbers} | {point} | {values} |")
         repeats = dict.fromkeys(case.replay for case in report.cases if case.replay)
-        # a fence of four, because a name may hold three
+        # a fence of four backticks, since a name may contain three
         lines += ["", "````sh", *repeats, "````", ""] if repeats else [""]
     lines += [f"- note: {_escape_markdown(note)}" for note in report.notes]
     return "\n".join(lines).rstrip() + "\n"
@@ -153,15 +153,15 @@ def _annotation(level: str, file: str, text: str) -> str:
     return f"::{level} file={where},title={PROGRAM}::{message}"
 
 
-# what a workflow command cannot hold as it is; the last two in its properties only
+# characters that a workflow command must escape; the last two in its properties only
 GITHUB_ESCAPES: Mapping[str, str] = {"%": "%25", "\r": "%0D", "\n": "%0A", ":": "%3A", ",": "%2C"}
 
 
 def _escape_markdown(text: str) -> str:
-    """Text that Markdown shows as it is."""
+    """Text that Markdown shows literally."""
     return re.sub(r"([\\`*_{}\[\]<>|~#!&$@])", r"\\\1", text)
 
 
 def _escape_code(text: str) -> str:
-    """Text within backticks, which know no escapes."""
+    """Text for code spans, which have no escapes."""
     return text.replace("`", "'").replace("|", "¦")

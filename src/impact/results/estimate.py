@@ -22,23 +22,25 @@ from .expand import expanded_slabs, table_of
 from .factored import factored_template
 from .schema import dataset_template, stored_variables
 
-# numbers of workers of which the time is told
+# numbers of workers for which the time is estimated
 WORKER_COUNTS = (1, 2, 8, 32, 128, 512)
-# what the driver does for a block that goes elsewhere is about so many times what is timed here: the rest is that
-# of dask, as scripts/bench_scaling.py measures it
+# the time of the driver for a block on a remote worker over the time that is measured by `estimate`: the rest is
+# spent in dask, see scripts/bench_scaling.py
 DASK_OVERHEAD = 2.0
 
 
 @dataclass(frozen=True)
 class ModelCounts:
-    """How the points of a model collapse.
+    """The points and the distinct trajectories of a model.
 
     Parameters
     ----------
     model : its key
-    points, cells, trajectories : of its own; of the product of the axes that its values come from; integrated
-    axes : those axes
-    within : where equal values are found: over the whole "plan", within a "block" only, or "not" at all
+    points : number of points of the model
+    cells : number of cells of the axes that the trajectories depend on
+    trajectories : number of distinct trajectories, which are integrated
+    axes : the axes that the trajectories depend on
+    within : scope of deduplication: the whole "plan", each "block", or "not" at all
     """
 
     model: str
@@ -51,11 +53,19 @@ class ModelCounts:
 
 @dataclass(frozen=True)
 class Estimate:
-    """What a sweep would take: bytes of the result before it is packed, and of what is kept while it runs.
+    """The size and the duration of a sweep.
 
-    The writing to the disk comes on top of the seconds. `core` is what would integrate; `wire` are the bytes that
-    go to workers elsewhere and come back, `by_workers` the seconds with some of them; the last number is the
-    largest that is of use, because then the driver is busy.
+    Parameters
+    ----------
+    points, trajectories : numbers of all models together
+    models : the numbers of each model
+    bytes : of the result before compression
+    kept : bytes of the work folder
+    seconds : without the time of the disk
+    core : the core that would integrate
+    wire : bytes that are sent to remote workers and back
+    by_workers : seconds by number of remote workers; the last number is the largest that helps, since then the
+        driver is busy all the time
     """
 
     points: int
@@ -81,10 +91,10 @@ def estimate(plan: Plan, jobs: int = 1) -> Estimate:
     plan = with_core(plan, maps)
     total = sum(seconds_per_trajectory_of_driver.count for seconds_per_trajectory_of_driver in maps)
     ranges = list(trajectory_ranges(maps))
-    # one in the middle is neither the first values nor the last
+    # a range in the middle, to avoid the extreme values at both ends
     chosen = ranges[len(ranges) // 2]
     model = plan.models[chosen.model]
-    # the first time loads, or even compiles, what integrates
+    # the first run loads or compiles the core
     for _ in range(2):
         with _timed() as integrating:
             rebound, _ = integrate_columns(model, columns_of(plan, maps, chosen), plan.config.solver)
@@ -93,7 +103,7 @@ def estimate(plan: Plan, jobs: int = 1) -> Estimate:
         back = pickle.dumps(rebound, pickle.HIGHEST_PROTOCOL)
         pickle.loads(back)
         write_block(io.BytesIO(), "", rebound)
-    # what became of the trajectories of a slab does not matter for its time: those of the range, again and again
+    # the time of a slab does not depend on the values of its trajectories: repeat those of the range
     places = np.arange(RANGE_TRAJECTORIES) % chosen.size
     table = table_of(plan, maps, lambda _, start, stop: rebound.take(places[: stop - start]))
     with _timed() as assembling:
@@ -123,7 +133,7 @@ def estimate(plan: Plan, jobs: int = 1) -> Estimate:
 
 @contextmanager
 def _timed() -> Iterator[Callable[[], float]]:
-    """How many seconds it took, when it is over."""
+    """A function that returns the seconds that the block took."""
     begun = time.perf_counter()
     ended = begun
     yield lambda: ended - begun

@@ -33,7 +33,7 @@ from .selection import IndexArray, match_labels
 from .summary import SweepOutcome
 from .sweep import Extension, SlabValues, sweep_into
 
-# statuses that are given before anything is integrated
+# statuses that are assigned before integration
 CHECKED_STATUSES = (Status.NO_IMPACT, Status.INVALID_PARAMETER, Status.OUT_OF_RANGE)
 
 
@@ -55,21 +55,21 @@ def extend(
     Parameters
     ----------
     source : the result
-    output : the file of the larger one, which may be the same
+    output : the file of the extended result, which may be the same
     overrides : changes to its config, such as "sweep.m2=[1.0, 2.0]"; values that the result has are kept
-    plugins : models that are not built in, those that it was made with among them
+    plugins : models that are not built in, including those of the result
     resume, overwrite, backend, on_progress, should_stop : see `impact.results.sweep.sweep_into`
     max_points : refuse a sweep of more points
 
     Returns
     -------
-    The larger result, in all variables and coordinates what a sweep of its config at once gives, and how many
-    trajectories were integrated for it.
+    The extended result, with the same variables and coordinates as a single sweep of its config, and the number of
+    trajectories that were integrated for it.
 
     Raises
     ------
-    ResultError : the source is not a readable result, or of another version of this program
-    UsageError : what is changed is more than values of axes and models; see also `sweep_into`
+    ResultError : the source is not a readable result, or was written by another version of impact
+    UsageError : the overrides change more than values of axes and models; see also `sweep_into`
     """
     name = safe_text(str(source))
     before, table = open_with_table(source)
@@ -79,7 +79,7 @@ def extend(
         _check_whole(before, old, name)
         new = _extended_plan(before, old, overrides, plugins, source, max_points)
         if before.attrs.get("core") in CORES:
-            # the trajectories that are known are of this core
+            # the existing trajectories were integrated by this core
             solver = replace(new.config.solver, core=str(before.attrs["core"]))
             new = replace(new, config=replace(new.config, solver=solver))
         _check_changes(old, new, name)
@@ -91,7 +91,7 @@ def extend(
         old_positions = _OldPositions(old, new, trajectory_maps(new), axes)
         n_integrated: dict[int, int] = {}
 
-        # a full result has no trajectories to hand on to a table, only the values of its points
+        # a full result has no trajectories, only the values of its points
         fill = old_positions.filler(before) if table is None and new.layout == "full" else None
 
         def find_reused(part: TrajectoryRange) -> tuple[NDArray[np.bool_], CollisionResult] | None:
@@ -112,19 +112,19 @@ def extend(
 
 
 def _check_whole(before: xr.Dataset, old: Plan, name: str) -> None:
-    """Refuse what is no whole result of a sweep of this version."""
+    """Refuse a result that is incomplete or was written by another version."""
     version = safe_text(str(before.attrs.get("impact_version")), 40)
     if version != __version__:
         raise ResultError(f"{name}: was made by impact {version}, this is {__version__}; sweep its config again")
     sizes = {"model": len(old.models), **{axis.name: axis.size for axis in old.config.axes}}
     if before.attrs.get("fingerprint") != old.fingerprint or dict(before.sizes) != sizes:
-        raise UsageError(f"{name}: is a part of the result of its config, expected the whole")
+        raise UsageError(f"{name}: got a part of the result of its config, expected the whole")
 
 
 def _extended_plan(
     before: xr.Dataset, old: Plan, overrides: Sequence[str], plugins: Plugins, source: Path, max_points: int
 ) -> Plan:
-    """The plan with the overrides, in which the values and models that the result has are kept."""
+    """The plan with the overrides, and all values and models of the result."""
     config = stored_config(before.attrs, overrides, plugins, str(source), max_points)
     appended_overrides = []
     for axis in config.axes:
@@ -148,7 +148,7 @@ def _extended_plan(
 
 
 def _has_value(inputs: Inputs, name: str) -> bool:
-    """Whether an axis or a scalar had a value, be it a property of a material."""
+    """Whether an axis or a scalar, which may be a property of a material, had a value."""
     return inputs.values(name).item(0) is not None
 
 
@@ -174,7 +174,7 @@ def _check_changes(old: Plan, new: Plan, name: str) -> None:
         if key in used and used[key][field] != value and f"materials.{key}.{field}" not in swept
     ]
     outputs = old.config.output, new.config.output
-    # values that are copied have the variables and the digits of the result
+    # copied values have the variables and the precision of the result
     changed += [
         f"output.{key}" for key in ("variables", "dtype") if getattr(outputs[0], key) != getattr(outputs[1], key)
     ]
@@ -190,19 +190,19 @@ def _check_changes(old: Plan, new: Plan, name: str) -> None:
             "such as --set 'sweep.m2=[1.0, 2.0]', or more models"
         )
     if old.models == new.models and old.config.axes == new.config.axes:
-        raise UsageError(f"{name}: has all of that already; expected more values of an axis, or more models")
+        raise UsageError(f"{name}: already has all of these; expected more values of an axis, or more models")
 
 
 @dataclass(frozen=True)
 class _AxisPositions:
-    """Where the values of an axis stand in the old result: its axis there, if any, and places; -1 is new."""
+    """The old axis that an axis corresponds to, if any, and the old positions of its values; -1 is new."""
 
     axis: int | None
     positions: IndexArray
 
 
 def _check_none_lost(old: Plan, axes: Sequence[_AxisPositions], name: str) -> None:
-    """Refuse a plan that lacks a value of the smaller one."""
+    """Refuse a plan that lacks a value of the old one."""
     for number, axis in enumerate(old.config.axes):
         positions = {
             position for new_axis in axes if new_axis.axis == number for position in new_axis.positions.tolist()
@@ -218,11 +218,11 @@ def _check_none_lost(old: Plan, axes: Sequence[_AxisPositions], name: str) -> No
 
 
 def _axis_positions(axis: Axis, old: Inputs, name: str) -> _AxisPositions:
-    """Where the values of an axis stood.
+    """The positions that the values of an axis have in the old result.
 
     Raises
     ------
-    UsageError : its columns were axes of their own
+    UsageError : its columns were several axes, or its points had other labels or another order
     """
     axes = {axis_number for column in axis.columns for axis_number in old.axes_of(column)}
     if len(axes) > 1:
@@ -238,7 +238,7 @@ def _axis_positions(axis: Axis, old: Inputs, name: str) -> _AxisPositions:
     if {old.axes[axis_number].numbered for axis_number in axes} - {axis.numbered}:
         raise UsageError(f"{name}: the points of {safe_text(axis.name)} had other labels; sweep the new config")
     if axes and axis.numbered:
-        # a case keeps its number: those that the result has come first, as they were
+        # a case keeps its number: the cases of the result come first, unchanged
         changed = [number for number, row in enumerate(before) if rows[number : number + 1] != [row]]
         if changed:
             raise UsageError(
@@ -254,17 +254,17 @@ def _axis_positions(axis: Axis, old: Inputs, name: str) -> _AxisPositions:
 
 @dataclass(frozen=True)
 class _OldPositions:
-    """Where the trajectories and points of the larger sweep stand in the smaller one."""
+    """The trajectories and points of the old sweep that those of the new one equal."""
 
     old: Plan
     new: Plan
     maps: Sequence[TrajectoryMap]
     axes: tuple[_AxisPositions, ...]
-    # by model, for each trajectory the one that it was before, or -1
+    # by model, for each trajectory its row in the old table, or -1
     _rows: dict[int, IndexArray] = field(default_factory=dict)
 
     def model(self, model: int) -> int | None:
-        """The place that a model had."""
+        """The number that a model had in the old plan, or None."""
         keys = [model_of_old_plan.key for model_of_old_plan in self.old.models]
         key = self.new.models[model].key
         return keys.index(key) if key in keys else None
@@ -272,14 +272,14 @@ class _OldPositions:
     def from_table(
         self, part: TrajectoryRange, table: TrajectoryTable
     ) -> tuple[NDArray[np.bool_], CollisionResult] | None:
-        """The trajectories of a range that the smaller result has in its table."""
+        """The trajectories of a range that the old result has in its table."""
         model = self.model(part.model)
         if model is None:
             return None
         old_rows = self._old_rows(part, table.maps[model])
         is_known = old_rows >= 0
         held = table.rows.take(model, np.maximum(old_rows, 0))
-        # what was checked beforehand at the values of the smaller sweep need not hold at those of the larger one
+        # a status that was assigned before integration may differ between the two sweeps
         status = columns_of(self.new, self.maps, part)["status"]
         is_known &= np.where(status == OK, ~np.isin(held.status, CHECKED_STATUSES), held.status == status)
         rebound = CollisionResult.blank(part.size)
@@ -287,7 +287,7 @@ class _OldPositions:
         return is_known, rebound
 
     def not_needed(self, part: TrajectoryRange) -> tuple[NDArray[np.bool_], CollisionResult] | None:
-        """The trajectories of a range that only points have which the smaller result holds in full."""
+        """The trajectories of a range that are needed only by points that the old result holds in full."""
         trajectory_map = self.maps[part.model]
         others = [axis for axis in range(len(self.axes)) if axis not in trajectory_map.axes]
         if self.model(part.model) is None or any((self.axes[axis].positions < 0).any() for axis in others):
@@ -321,7 +321,7 @@ class _OldPositions:
     def _rows_of_cells(
         self, trajectory_map: TrajectoryMap, old_map: TrajectoryMap, cells: IndexArray
     ) -> IndexArray:
-        """The trajectory that each cell had, or -1."""
+        """The old row of each cell's trajectory, or -1."""
         coordinates = np.unravel_index(cells, trajectory_map.shape) if trajectory_map.shape else ()
         along = dict(zip(trajectory_map.axes, coordinates, strict=True))
         index = [np.zeros(cells.shape, np.intp) for _ in self.old.config.axes]
@@ -336,7 +336,7 @@ class _OldPositions:
         return np.where(self._is_old(trajectory_map, cells), rows, -1)
 
     def filler(self, before: xr.Dataset) -> Callable[[int, tuple[slice, ...], SlabValues], None]:
-        """What puts the values that the smaller result holds into those of a slab."""
+        """A function that copies the values of the old result into the values of a slab."""
         names = [axis.name for axis in self.old.config.axes]
 
         def fill(model: int, where: tuple[slice, ...], values: SlabValues) -> None:
@@ -352,7 +352,7 @@ class _OldPositions:
                 for axis, part in zip(self.axes, parts, strict=True)
                 if axis.axis is not None
             }
-            # where the axes of the smaller result stand among those of this slab
+            # the order of the axes of the old result among those of this slab
             order = [axis.axis for axis in self.axes if axis.axis is not None]
             for name, array in values.items():
                 variable = before[name]

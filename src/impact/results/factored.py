@@ -1,7 +1,7 @@
 """The factored layout: a file of axes, trajectory table and law metadata, for any number of points.
 
-Some points, the witnesses, are stored in full. When a file is opened they are computed again: where they come to
-other numbers, the file belongs to another version, and is refused.
+Some points, the witnesses, are stored in full. When a file is opened they are computed again: if they differ, the
+file was written by a version that computes other numbers, and is refused.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ from .expand import MAX_STIFFNESS_VALUES, TrajectoryRows, TrajectoryTable, expan
 from .schema import SCHEMA, SchemaVariable, attributes_of, derived_names, is_input, scale_of
 
 N_WITNESSES = 1_000
-# how far a witness may be from what is stored, of the scale that `compare` uses for its variable
+# tolerance of a witness, relative to the scale that `compare` uses for its variable
 WITNESS_TOLERANCE = 1e-12
 SLAB_ROWS = 2**16
-# what a file says of a law, as JSON
+# fields of a law in the JSON attribute `laws`, and their types
 LAW_FIELD_TYPES: Mapping[str, type] = {
     "parameters": list, "domain": dict, "asks_for_e": bool, "is_permanent": bool, "axes": list,
     "trajectories": int, "is_shared": bool,
@@ -49,7 +49,7 @@ ReadVariable = Callable[[str, slice], NDArray[Any]]
 
 @dataclass(frozen=True)
 class StoredLaw:
-    """What a file keeps of a law: all that outputs depend on besides the trajectory, and no formula."""
+    """A law as stored in a file: everything that outputs depend on besides the trajectory, without formulas."""
 
     key: str
     exponent: float | None
@@ -63,7 +63,7 @@ class StoredLaw:
 def factored_template(
     result_template: xr.Dataset, table: TrajectoryTable, variables: Sequence[SchemaVariable]
 ) -> xr.Dataset:
-    """What a factored file holds: coordinates, attributes, and variables whose values do not count yet.
+    """The dataset of a factored file: coordinates, attributes, and variables with placeholder values.
 
     Parameters
     ----------
@@ -120,13 +120,13 @@ def factored_template(
     order = [axis.name for axis in table.inputs.axes]
     attributes = {**result_template.attrs, "axes": json.dumps(order), "laws": json.dumps(laws)}
     template = xr.Dataset(variables_of_file, result_template.coords, attributes)
-    # without a variable that names them, the coordinates would be variables to a reader of netCDF
+    # readers of netCDF take coordinates that no variable names for variables
     names = [str(name) for name in result_template.coords if name not in result_template.dims]
     return template.assign_attrs(coordinates=" ".join(names))
 
 
 def check_factored(inputs: Inputs, laws: Sequence[Law]) -> None:
-    """Refuse laws that cannot be stored so, before anything is integrated.
+    """Refuse laws that cannot be stored in this layout, before integration.
 
     Raises
     ------
@@ -139,8 +139,8 @@ def check_factored(inputs: Inputs, laws: Sequence[Law]) -> None:
 
 def _too_many_stiffness_values(law: Law) -> UsageError:
     return UsageError(
-        f"output.layout: {law.key} has a rule of K that takes more than {MAX_STIFFNESS_VALUES:,} values here, "
-        'expected at most so many to be factored; set output.layout = "full"'
+        f"output.layout: {law.key} has a rule of K that takes more than {MAX_STIFFNESS_VALUES:,} values, "
+        'the limit of the factored layout; set output.layout = "full"'
     )
 
 
@@ -151,7 +151,7 @@ def _placeholder(dim: str, size: int, dtype: np.dtype[Any], meaning: str) -> tup
 def table_values(
     table: TrajectoryTable, variables: Sequence[SchemaVariable]
 ) -> Iterator[tuple[str, slice, NDArray[Any]]]:
-    """The values of a factored file: name, place and values, no more than a little at a time."""
+    """The values of a factored file, a few at a time: name of the variable, region and values."""
     start = cell = 0
     for model, trajectory_map in enumerate(table.maps):
         for first in range(0, trajectory_map.count, SLAB_ROWS):
@@ -177,7 +177,7 @@ def table_values(
 
 
 def witness_indices(points: int) -> NDArray[np.int64]:
-    """Places of witnesses, spread over all points: multiples of the golden section, the first and the last.
+    """Indices of witnesses, spread over all points by the golden section, with the first and the last point.
 
     >>> witness_indices(3).tolist()
     [0, 1, 2]
@@ -185,7 +185,7 @@ def witness_indices(points: int) -> NDArray[np.int64]:
     if points <= N_WITNESSES:
         return np.arange(points)
     step = int(points * 0.6180339887498949)
-    # without a common factor all places differ
+    # without a common factor all indices differ
     while math.gcd(step, points) > 1:
         step += 1
     return np.array(sorted({points - 1, *(number * step % points for number in range(N_WITNESSES - 1))}), np.int64)
@@ -194,7 +194,7 @@ def witness_indices(points: int) -> NDArray[np.int64]:
 def witness_values(
     table: TrajectoryTable, variables: Sequence[SchemaVariable], indices: NDArray[np.int64]
 ) -> dict[str, NDArray[Any]]:
-    """The values of some points of a result, by name; arrays of shape (places,)."""
+    """The values of some points of a result, by name; arrays of shape (len(indices),)."""
     models, cells = np.divmod(indices, table.inputs.cells)
     values_by_name = {variable.name: np.empty(indices.size, variable.dtype) for variable in variables}
     for model in np.unique(models).tolist():
@@ -206,7 +206,7 @@ def witness_values(
 
 
 def _unravel_cells(inputs: Inputs, cells: NDArray[np.int64]) -> Index:
-    """The places of some cells along each axis."""
+    """The index of some cells along each axis, from their index in C order."""
     index = []
     for size in reversed(inputs.shape):
         cells, position = np.divmod(cells, size)
@@ -219,13 +219,13 @@ def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: ReadVariab
 
     Parameters
     ----------
-    dataset : its coordinates and attributes
-    sizes : the lengths of the variables of the table
-    read : values of a variable of the table, from one place to another
+    dataset : coordinates and attributes of the file
+    sizes : lengths of the variables of the table
+    read : returns a slice of a variable of the table: `read(name, slice)`
 
     Raises
     ------
-    ResultError : what it says of its laws does not fit what it holds
+    ResultError : the attribute `laws` does not fit the variables
     """
     laws = _read_laws(dataset)
     inputs = read_inputs(dataset)
@@ -245,7 +245,7 @@ def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: ReadVariab
             if about["is_shared"]:
                 of_cell = read("trajectory_of_cell", slice(cell, cell + trajectory_map.cells))
                 count = int(about["trajectories"])
-                # the cell from which a trajectory was taken is not needed to read it
+                # the first cell of a trajectory is not needed to read it
                 trajectory_map = TrajectoryMap(model, axes, shape, np.broadcast_to(np.intp(0), count), of_cell)
                 cell += trajectory_map.cells
                 if of_cell.dtype.kind != "i" or of_cell.shape != (trajectory_map.cells,):
@@ -279,7 +279,7 @@ def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: ReadVariab
 
 
 def _check_trajectory_statuses(rows: int, read: ReadVariable) -> None:
-    """Refuse a status that has no meaning, which a computed one would have as well."""
+    """Refuse unknown statuses, since the computed ones would be unknown as well."""
     for first in range(0, rows, SLAB_ROWS):
         values = read("trajectory_status", slice(first, min(first + SLAB_ROWS, rows)))
         if values.dtype != np.int8 or not np.isin(np.unique(values), STATUSES).all():
@@ -305,7 +305,7 @@ def _stored_law(key: str, about: Mapping[str, Any]) -> StoredLaw:
 
 
 def _stiffness_lookup(inputs: Inputs, axes: tuple[int, ...], values: Array) -> Stiffness:
-    """K at some cells, from its values over the axes that it depends on."""
+    """A function that looks K up at some cells, from its values over the axes that it depends on."""
     K = values.reshape([size if axis in axes else 1 for axis, size in enumerate(inputs.shape)] or (1,))
 
     def at(index: Index) -> Array:
@@ -318,7 +318,7 @@ def _stiffness_lookup(inputs: Inputs, axes: tuple[int, ...], values: Array) -> S
 
 
 def read_inputs(dataset: xr.Dataset) -> Inputs:
-    """What a sweep gave a value to, from the coordinates of its result."""
+    """The inputs of a sweep, from the coordinates of its result."""
     derived = derived_names(dataset.coords)
     scalars: dict[str, Any] = {}
     axes: dict[str, dict[str, Any]] = {name: {} for name in read_axis_names(dataset)}
@@ -340,8 +340,8 @@ def read_inputs(dataset: xr.Dataset) -> Inputs:
             for name, about in stored.items()
         }
     except (TypeError, ValueError):
-        raise ResultError("is not a readable result (materials: no JSON of the right kind)") from None
-    # an axis is named by its first column, if it is not numbered
+        raise ResultError("is not a readable result (materials: not JSON of the expected type)") from None
+    # an axis that is not numbered has the name of its first column
     ordered = (
         Axis({name: columns[name], **columns}) if name in columns else Axis(columns, numbered=name)
         for name, columns in axes.items()
@@ -351,7 +351,7 @@ def read_inputs(dataset: xr.Dataset) -> Inputs:
 
 
 def _fixed_properties(properties: Mapping[str, float | None]) -> dict[str, float]:
-    """The properties of a material that are no axes."""
+    """The properties of a material that are not axes."""
     return {key: value for key, value in properties.items() if value is not None}
 
 
@@ -365,7 +365,7 @@ def read_axis_names(dataset: xr.Dataset) -> list[str]:
 
 
 def check_witnesses(table: TrajectoryTable, variables: Sequence[SchemaVariable], stored: xr.Dataset) -> None:
-    """Refuse a file whose witnesses expand to other numbers than it holds.
+    """Refuse a file whose witnesses expand to other numbers than those stored.
 
     Parameters
     ----------
@@ -375,12 +375,12 @@ def check_witnesses(table: TrajectoryTable, variables: Sequence[SchemaVariable],
 
     Raises
     ------
-    ResultError : so it is; with both versions
+    ResultError : a witness differs; the message names both versions
     """
     indices = np.asarray(stored["witness_index"].values, np.int64)
     points = len(table.laws) * table.inputs.cells
     if not np.array_equal(indices, witness_indices(points)):
-        raise ResultError("is not a readable result (its witnesses are not spread as they have to be)")
+        raise ResultError("is not a readable result (its witnesses are not at the expected positions)")
     expanded = witness_values(table, variables, indices)
     cells = indices % table.inputs.cells
     index = _unravel_cells(table.inputs, cells)
@@ -408,7 +408,7 @@ def check_witnesses(table: TrajectoryTable, variables: Sequence[SchemaVariable],
 
 
 def witness_variables(stored: xr.Dataset) -> tuple[SchemaVariable, ...]:
-    """The variables of a result of which a file has witnesses, with the dtypes that these have."""
+    """The variables of a file's witnesses, with their dtypes in the file."""
     return tuple(
         replace(variable, dtype=stored[f"witness_{variable.name}"].dtype.str[1:])
         for variable in SCHEMA

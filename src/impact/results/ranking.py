@@ -24,36 +24,35 @@ from .selection import model_positions, select
 from .slabs import Slab, distinct_points, is_computed, over_varying_dims, slabs, varying_dims
 
 Mask = NDArray[np.bool_]
-# points up to which variables that are computed are ranked: some minutes
+# lazy results with more points are not ranked; this many take some minutes
 MAX_RANKED_POINTS = 2**30
-# values of a law's own parameters, in all combinations
+# combinations of the values of a law's own parameters
 MAX_PARAMETER_COMBINATIONS = 2**24
 RANKED_VARIABLES = ("e_error", "status")
-# ranges of e that a table names
+# ranges of e that a table lists
 MAX_RANGES = 8
-# bits of a double, and of the upper part in which it is summed
+# bits of a double, and of the upper of the two parts in which it is summed
 MANTISSA_BITS, UPPER_BITS = 53, 27
 
 
 @dataclass(frozen=True)
 class Ranked:
-    """How well one model gives the restitution asked for, with the values of its own parameters that do it best.
+    """How well one model delivers the target restitution, with the best values of its own parameters.
 
     Parameters
     ----------
     model : its key
-    parameters : those values by the path in the config, such as "model.bilinear.K"; where they are axes
-    points : those judged, where an e was asked for and the balls meet
-    within : those of them where |e_out - e| is within the tolerance
-    failed : those of them that failed, which are not within it
-    mean_error, max_error : of |e_out - e| over those that did not fail; NaN where all did
-    at : the point with the largest error: what is swept, by config name, and e; empty where all failed
-    e_out : the restitution delivered there
-    served : the ranges of e, least and greatest, in which all points are within the tolerance; None where e does
-        not vary along one axis
+    parameters : the best values by path in the config, such as "model.bilinear.K"; empty if none is an axis
+    points : number of points with a target e and an impact
+    within : number of those points with |e_out - e| within the tolerance
+    failed : number of those points that failed; they are not within the tolerance
+    mean_error, max_error : of |e_out - e| over the points that did not fail; NaN if all failed
+    at : the point with the largest error: its swept inputs by config name, and e; empty if all failed
+    e_out : the delivered restitution at that point
+    served : the ranges of e, as (least, greatest), in which all points are within the tolerance; None unless e
+        varies along one axis
 
-    A mean error is the exact mean of its numbers, rounded once: it does not depend on their order, nor on whether
-    they are in memory.
+    A mean error is the exact mean, rounded once: it depends neither on the order of the points nor on slabs.
     """
 
     model: str
@@ -84,7 +83,7 @@ class Ranked:
 
     @property
     def percent(self) -> str:
-        """The share as text, which is 0 or 100 only where none or all are within the tolerance.
+        """The share as text: 0% and 100% mean exactly none and all.
 
         >>> nan = math.nan
         >>> [Ranked("hertz", {}, 3000, n, 0, nan, nan, {}, nan, None).percent for n in (0, 1, 2000, 2999, 3000)]
@@ -120,7 +119,7 @@ class Ranking:
     Parameters
     ----------
     tol : the tolerance of |e_out - e|
-    models : those judged, the best first; among equals in the order of the result
+    models : the ranked models, the best first; equal ones in the order of the result
     """
 
     tol: float
@@ -128,7 +127,7 @@ class Ranking:
 
     @property
     def headings(self) -> tuple[str, ...]:
-        """Of a table of `Ranked.row`; the first and the last two columns are text, the others numbers."""
+        """Headings of a table of `Ranked.row`; the first and the last two columns are text, the others numbers."""
         return (
             "model",
             f"within {number(self.tol)}",
@@ -166,27 +165,26 @@ def ranking(
     models: Sequence[str] | None = None,
     max_points: int = MAX_RANKED_POINTS,
 ) -> Ranking:
-    """Rank the models of a result by how well they give the restitution asked for.
+    """Rank the models of a result by how well they deliver the target restitution.
 
-    Judged is |e_out - e| at all points where an e was asked for and the balls meet. A point that failed, or that
-    no restitution can have (1 - alpha v0 below 0), is judged too: it is not within the tolerance.
-    Axes of a model's own parameters are choices: the model is judged over all other axes, with the values that
-    give the largest share of points within the tolerance, among equals the smallest error.
-    The result may be of any size: points that differ along axes on which nothing varies are evaluated once, and
-    count as often as they occur.
+    The criterion is |e_out - e| at all points with a target e and an impact. A point that failed, or whose target
+    e is below 0 (1 - alpha v0 < 0), counts as not within the tolerance. The values of a model's own parameters are
+    chosen: the model is ranked over all other axes, with the values that give the largest share of points within
+    the tolerance, and among those the smallest error. The result may be of any size: points that differ only along
+    axes on which nothing varies are evaluated once, and counted as often as they occur.
 
     Parameters
     ----------
     dataset : a result
-    tol : what |e_out - e| may be
-    sel : values of axes, by name; all points of the others are judged
+    tol : tolerance of |e_out - e|
+    sel : values of axes, by name
     models : keys of the models to rank; by default all
-    max_points : how many points may be evaluated, where variables are computed when they are indexed
+    max_points : limit of the points to evaluate of a lazy result
 
     Raises
     ------
-    UsageError : the result has no errors of e to judge by, or has not got what is asked for; tol is not positive;
-        too many points would have to be evaluated
+    UsageError : the result has no target e, lacks a model or value that is selected, or has too many points; or
+        tol is not positive
     """
     _check_rankable(dataset, tol)
     chosen = model_positions(models, dataset) if models else range(dataset.sizes["model"])
@@ -200,23 +198,23 @@ def ranking(
         )
     ranked = [_rank_model(of_model, tol) for of_model in by_model]
     if not any(model.points for model in ranked):
-        raise UsageError("there is nothing to judge: at no point is an e asked for of balls that meet")
+        raise UsageError("nothing to rank: no point has both a target e and an impact")
     return Ranking(tol, tuple(sorted(ranked, key=_sort_key)))
 
 
 def _check_rankable(dataset: xr.Dataset, tol: float) -> None:
-    """Refuse what cannot be ranked."""
+    """Refuse a dataset or a tolerance by which models cannot be ranked."""
     if not 0.0 < tol < math.inf:
-        raise UsageError(f"tol: got {tol:g}, wants a positive finite number")
+        raise UsageError(f"tol: got {tol:g}, expected a positive finite number")
     if "t" in dataset.dims:
         raise UsageError("this is a time history; models are ranked by the result of a sweep")
     if "model" not in dataset.dims:
-        raise UsageError("model is no axis of this result; select models as a list, sel(model=[...])")
+        raise UsageError("model is not an axis of this result; select models as a list, sel(model=[...])")
     missing = [name for name in RANKED_VARIABLES if name not in dataset]
     if missing:
         raise UsageError(f"this result has no {', '.join(missing)}; sweep without [output] variables, or add them")
     if "e" not in dataset.coords or not _asks_for_e(dataset):
-        raise UsageError("this sweep asks for no e, by which models are ranked; give it e or alpha")
+        raise UsageError("this sweep has no target e, by which models are ranked; add e or alpha")
     dims = set(dataset["e_error"].dims)
     if "model" not in dims or dims != set(dataset["status"].dims) or not dims.issuperset(dataset["e"].dims):
         raise UsageError("e_error, status and e of this result do not lie along the axes of a sweep")
@@ -229,19 +227,19 @@ def _sort_key(ranked: Ranked) -> tuple[float, ...]:
 
 
 def _asks_for_e(dataset: xr.Dataset) -> bool:
-    """Whether there is a point at which an e is asked for."""
+    """Whether any point has a target e."""
     e, _ = distinct_points(dataset, "e")
     return any(not np.isnan(e.isel(where).values).all() for where in slabs(e.sizes))
 
 
 def _select_model(dataset: xr.Dataset, position: int) -> xr.Dataset:
-    """A model of a result, without the axes of other models' parameters."""
+    """One model of a result, without the axes of other models' parameters."""
     first = dict.fromkeys(foreign_dims(dataset, str(dataset["model"].values[position])), 0)
     return dataset.isel({"model": position, **first})
 
 
 def _reduce_dims(of_model: xr.Dataset) -> tuple[xr.Dataset, int]:
-    """What is judged of a model, over the axes along which it or e varies, and how often each point counts."""
+    """The ranked variables of a model, over the axes along which they or e vary, and the weight of each point."""
     along_one = of_model.variables["e"].ndim == 1
     return over_varying_dims(
         of_model, RANKED_VARIABLES, *(of_model.variables["e"].dims if along_one else varying_dims(of_model, "e"))
@@ -250,7 +248,7 @@ def _reduce_dims(of_model: xr.Dataset) -> tuple[xr.Dataset, int]:
 
 @dataclass(frozen=True)
 class _JudgedSlab:
-    """Points of a slab: e and its error, and which are judged, failed, known, and within the tolerance."""
+    """Points of a slab: target e, its error, and which points count, failed, have an error and are within tol."""
 
     asked: NDArray[Any]
     error: NDArray[Any]
@@ -273,7 +271,7 @@ def _judge_slab(evaluated: xr.Dataset, where: Slab, sizes: Mapping[Hashable, int
 
 
 def _best_parameters(of_model: xr.Dataset, parameter_dims: Sequence[Hashable], tol: float) -> dict[Hashable, int]:
-    """The place on each axis of a model's own parameters at which it does best over all other axes."""
+    """The index on each axis of a model's own parameters at which it ranks best over all other axes."""
     evaluated, _ = over_varying_dims(of_model, RANKED_VARIABLES, *parameter_dims, *varying_dims(of_model, "e"))
     shape = tuple(evaluated.sizes[dim] for dim in parameter_dims)
     if math.prod(shape) > MAX_PARAMETER_COMBINATIONS:
@@ -299,7 +297,7 @@ def _best_parameters(of_model: xr.Dataset, parameter_dims: Sequence[Hashable], t
 
 
 def _rank_model(of_model: xr.Dataset, tol: float) -> Ranked:
-    """How well a model does, from its e_error and status, of the shape of the axes, and the e asked for."""
+    """The rank of a model, from its e_error and status and from the target e."""
     key = str(of_model["model"].item())
     parameter_dims = [dim for dim in own_dims(of_model, key) if dim in of_model.variables["e_error"].dims]
     best = _best_parameters(of_model, parameter_dims, tol) if parameter_dims else {}
@@ -309,7 +307,7 @@ def _rank_model(of_model: xr.Dataset, tol: float) -> Ranked:
     evaluated, weight = _reduce_dims(of_model)
     sizes = {dim: evaluated.sizes[dim] for dim in evaluated.variables["e_error"].dims}
     e, along_one = evaluated.variables["e"], of_model.variables["e"].ndim == 1
-    # along e, where it varies along one axis: whether there is a point to judge, and one that is not within tol
+    # if e varies along one axis, for each e: whether any point counts, and whether any is not within tol
     asked_at, missed_at = np.zeros(e.shape, bool), np.zeros(e.shape, bool)
     points = evaluable_points = within_points = failed_points = 0
     total, max_error, e_out = Fraction(), math.nan, math.nan
@@ -336,7 +334,7 @@ def _rank_model(of_model: xr.Dataset, tol: float) -> Ranked:
     at: dict[str, float | str] = {}
     mean_error = math.nan
     if worst is not None:
-        # an error without bound comes from a file that was not written by a sweep
+        # an infinite error comes from a file that was not written by a sweep
         mean_error = max_error if math.isinf(max_error) else float(total / evaluable_points)
         asked_there = e.isel({dim: worst[dim] for dim in e.dims}).values.item()
         at = {**_inputs_at(of_model, {dim: worst.get(dim, 0) for dim in axes}), **chosen, "e": float(asked_there)}
@@ -355,7 +353,7 @@ def _read_slab(variable: xr.Variable, where: Slab, sizes: Mapping[Hashable, int]
 
 
 def _exact_sum(values: NDArray[np.float64]) -> Fraction:
-    """The sum of finite numbers that are not negative, without rounding; at most 2**26 of them.
+    """The exact sum of at most 2**26 finite, non-negative numbers.
 
     >>> _exact_sum(np.array([1e16, 1.0, 1e-16])) == Fraction(1e16) + 1 + Fraction(1e-16)
     True
@@ -363,7 +361,7 @@ def _exact_sum(values: NDArray[np.float64]) -> Fraction:
     if not values.size:
         return Fraction()
     mantissas, exponents = np.frexp(values)
-    # whole numbers in two parts, whose sums are exact in double
+    # integers in two parts, whose sums are exact in double precision
     scaled = np.ldexp(mantissas, UPPER_BITS)
     upper = np.floor(scaled)
     lower = np.ldexp(scaled - upper, MANTISSA_BITS - UPPER_BITS)
@@ -377,7 +375,7 @@ def _exact_sum(values: NDArray[np.float64]) -> Fraction:
 
 
 def _inputs_at(of_model: xr.Dataset, positions: Mapping[Hashable, int]) -> dict[str, float | str]:
-    """What is swept, at a place along each axis, without the parameters of other models."""
+    """The swept inputs at a position along each axis, without the parameters of other models."""
     variables, key = of_model.variables, str(of_model["model"].item())
     return {
         name: variables[name].values[position].item()
@@ -388,8 +386,8 @@ def _inputs_at(of_model: xr.Dataset, positions: Mapping[Hashable, int]) -> dict[
 
 
 def _served_ranges(e: NDArray[Any], asked: Mask, missed: Mask) -> tuple[tuple[float, float], ...]:
-    """The ranges of neighbouring values of e at which every judged point is within the tolerance."""
-    # in order, each value once: that of alpha and of speeds that vary with it may come again
+    """The ranges of neighbouring values of e at which every point that counts is within the tolerance."""
+    # sorted, each value once: several combinations of alpha and speeds may give the same e
     values, value_index = np.unique(e[asked], return_inverse=True)
     served = np.bincount(value_index, missed[asked], values.size) == 0
     edges = np.diff(np.concatenate(([0], served, [0])))

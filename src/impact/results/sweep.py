@@ -40,9 +40,9 @@ from .schema import SchemaVariable, dataset_template, stored_variables
 from .summary import Summary, SweepOutcome, summarize
 from .validation import is_name
 
-# bytes that a result takes besides its values, about
+# approximate bytes of a result besides its values
 OVERHEAD_BYTES = 2**16
-# points up to which a sweep of one range keeps nothing: it is repeated faster than it is read
+# smaller sweeps of one range have no checkpoint: they are repeated faster than read
 NO_CHECKPOINT_POINTS = 2**20
 
 SlabValues = dict[str, NDArray[Any]]
@@ -50,15 +50,15 @@ SlabValues = dict[str, NDArray[Any]]
 
 @dataclass(frozen=True)
 class Extension:
-    """What of a sweep is known from a smaller one, see `impact.results.extend`.
+    """What a sweep takes over from an old result, see `impact.results.extend`.
 
     Parameters
     ----------
-    seal : of the result that is extended
-    note : what the new one says of it
+    seal : of the old result
+    note : JSON text for the attribute `extended` of the new result
     find_reused : returns the trajectories of a range that are not integrated again
-    fill : puts known values into those of a slab, given the model, the place and the values; None where all are
-        computed from the trajectories
+    fill : copies old values into a slab: `fill(model, region, values)`; None if all values are computed from
+        trajectories
     """
 
     seal: str
@@ -87,18 +87,18 @@ def sweep_into(
     plan : what to run
     resume : continue with the work folder that an interrupted sweep left
     overwrite : replace the file if it exists, and a work folder if it is not to be resumed
-    in_place : replace the file, and no work folder
-    backend : who integrates
-    on_progress : receives the progress, now and then
-    should_stop : whether to stop; what was begun is finished and kept
-    extension : what is known already
+    in_place : replace the file, but not a work folder
+    backend : processes, threads or workers that integrate
+    on_progress : called with the progress from time to time
+    should_stop : the sweep stops if it returns True; ranges that are running are finished and kept
+    extension : values and trajectories of an old result
 
     Raises
     ------
-    UsageError : the output, or the work folder, is not to be touched
+    UsageError : the output or the work folder exists and must not be replaced
     InUseError : another process writes the output
-    StoreError : the disk is full or failed, or processes were killed; what is finished is kept
-    UnfinishedError : it was stopped; likewise
+    StoreError : the disk is full or failed, or processes were killed; finished ranges are kept
+    UnfinishedError : the sweep was stopped; finished ranges are kept
     """
     check_output(output, overwrite=overwrite or in_place)
     check_storable(plan)
@@ -124,9 +124,9 @@ def sweep_into(
     with open_work_folder(
         folder, plan, resume=resume, overwrite=overwrite, extends=extension.seal if extension else ""
     ) as work_folder:
-        # another may have stored it since
+        # another process may have stored it in the meantime
         check_output(output, overwrite=overwrite or in_place)
-        # without the other word a result that is to be replaced would be in the way
+        # without --overwrite, an existing result would be refused
         again = "--resume --overwrite" if os.path.lexists(output) and not extension else "--resume"
         with report_kept_blocks(
             folder, counter, again, lambda error: _missing_space(error, output, plan, counter)
@@ -159,12 +159,12 @@ def complete_ranges(
     should_stop: Callable[[], bool],
     find_reused: FindReused = lambda part: None,
 ) -> None:
-    """Have all of some ranges in a work folder.
+    """Integrate the ranges that a work folder does not have yet.
 
     Raises
     ------
     StoreError, UsageError : see `sweep_into`
-    UnfinishedError : it was stopped
+    UnfinishedError : the sweep was stopped
     """
     todo: list[TrajectoryRange] = []
     for part in ranges:
@@ -187,13 +187,13 @@ def complete_ranges(
 def sweep_in_memory(
     plan: Plan, *, backend: Backend = SERIAL, on_progress: ProgressCallback, should_stop: Callable[[], bool]
 ) -> xr.Dataset:
-    """Run a plan; its result is in memory if it is small, else it is computed when it is indexed.
+    """Run a plan; a small result is in memory, a large one is computed when it is indexed.
 
     For the parameters see `sweep_into`.
 
     Raises
     ------
-    UnfinishedError : it was stopped; nothing is kept
+    UnfinishedError : the sweep was stopped; nothing is kept
     """
     check_labels(plan)
     maps = trajectory_maps(plan)
@@ -216,7 +216,7 @@ def sweep_in_memory(
 def range_reader(
     maps: Sequence[TrajectoryMap], load: Callable[[int], CollisionResult]
 ) -> Callable[[int, int, int], CollisionResult]:
-    """The finished ranges of a plan as what a `TrajectoryTable` reads; `load` gives the one of a number."""
+    """The `read` function of `TrajectoryRows` for finished ranges; `load` returns a range by its number."""
     first_range = np.cumsum([0, *(-(-trajectory_map.count // RANGE_TRAJECTORIES) for trajectory_map in maps)])
 
     def read(model: int, start: int, stop: int) -> CollisionResult:
@@ -226,7 +226,7 @@ def range_reader(
 
 
 def reload_range(work_folder: WorkFolder, part: TrajectoryRange) -> CollisionResult:
-    """A range that was finished.
+    """Load a finished range.
 
     Raises
     ------
@@ -239,7 +239,7 @@ def reload_range(work_folder: WorkFolder, part: TrajectoryRange) -> CollisionRes
 
 
 def check_storable(plan: Plan) -> None:
-    """Refuse a plan whose result could not be stored, before anything is integrated.
+    """Refuse a plan whose result could not be stored, before integration.
 
     Raises
     ------
@@ -251,11 +251,11 @@ def check_storable(plan: Plan) -> None:
 
 
 def check_labels(plan: Plan) -> None:
-    """Refuse a plan whose labels would not be read again, before anything is integrated.
+    """Refuse a plan whose labels could not be read again, before integration.
 
     Raises
     ------
-    UsageError : they are too long, or a material that has an axis could not be part of a name in the file
+    UsageError : they are too long, or a material with an axis has a name that a file cannot hold
     """
     columns = [name for axis in plan.config.axes for name in axis.columns]
     odd = [name for name in columns if material_property(name) and not is_name(name)]
@@ -272,8 +272,8 @@ def check_labels(plan: Plan) -> None:
 
 
 def find_finished(path: Path, plan: Plan) -> SweepOutcome | None:
-    """What a file holds, if it is the whole result of a plan."""
-    # a model without a hash cannot be known to be the same; of a name that is too long, pathlib would raise
+    """The result in a file, if it is the whole result of a plan; else None."""
+    # a model without a hash cannot be compared; pathlib would raise an error for a name that is too long
     if None in plan.plugins.hashes.values() or os.path.islink(path) or not os.path.isfile(path):
         return None
     try:
@@ -292,7 +292,7 @@ def find_finished(path: Path, plan: Plan) -> SweepOutcome | None:
 
 
 def _missing_space(error: Exception, output: Path, plan: Plan, counter: ProgressCounter) -> list[str]:
-    """On a full disk, how much more room it takes."""
+    """A sentence with the missing disk space, if the disk is full."""
     cause = error.__cause__
     if not isinstance(cause, OSError) or cause.errno not in (errno.ENOSPC, errno.EDQUOT):
         return []
@@ -313,7 +313,7 @@ def store_result(
     should_stop: Callable[[], bool],
     extension: Extension | None = None,
 ) -> SweepOutcome:
-    """Write the result of a trajectory table in the layout of its plan, and give it its name."""
+    """Write the result of a trajectory table in the layout of its plan."""
     at, variables, summary = counter.at, stored_variables(plan), Summary()
     whole = dataset_template(plan)
     if extension:
@@ -357,7 +357,7 @@ def store_result(
 
 
 def _summarize_points(table: TrajectoryTable, variables: Sequence[SchemaVariable]) -> Summary:
-    """What came out, point by point: unlike `summarize` it knows the radii."""
+    """Summarize a trajectory table point by point; unlike `summarize` this has the radii."""
     summary = Summary()
     for model, where, impacts, values in expanded_slabs(table, variables):
         axes = table.inputs.axes_of_model(table.laws[model].key)
@@ -373,7 +373,7 @@ def _add_slab(
     impacts: Impacts,
     values: SlabValues,
 ) -> None:
-    """Count the points of a slab, those that differ by parameters of other models once."""
+    """Add the points of a slab; points that differ only by parameters of other models count once."""
     if any(part.start > 0 for axis, part in enumerate(where) if axis not in axes):
         return
     first = tuple(slice(None) if axis in axes else slice(1) for axis in range(len(where)))
