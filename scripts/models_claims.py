@@ -1,4 +1,4 @@
-"""Of docs/models.md: where laws do not do what is said of them, in numbers that are computed here."""
+"""Section "Known deviations" of docs/models.md, with numbers that are computed here."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from models_measured import (
 
 
 def claims() -> str:
-    """What laws are taken for, and the numbers against it."""
+    """All sections of the known deviations."""
     known = [law for law in laws() if "e" in law.quantities and delivers(law, GRID) is not None]
     ends = (floors(known), claimed(), at_one(known), slopes(known), without_tension(known))
     parts = (*ends, of_codes(known), hysteretic())
@@ -43,16 +43,16 @@ def law_table(head: Sequence[str], rows: Iterable[tuple[ForceModel, str]]) -> st
 
 
 def floors(known: Sequence[ForceModel]) -> str:
-    """Laws that cannot deliver little."""
+    """Laws with a lower limit of the restitution."""
     rows = [(law, number(at(law, 0.0))) for law in known if at(law, 0.0) > ROUNDING]
     return f"""\
-**A floor.** The damping of these stays finite at e = 0. However little is asked for, they deliver no less than
+**Lower limit of e_out.** The damping of these laws is finite at e = 0, so that e_out is never below
 
 {law_table(["e_out at e = 0"], rows)}"""
 
 
 def claimed() -> str:
-    """Laws that are off in the domain in which they are said to hold."""
+    """Laws with errors in their stated domain."""
     rows = []
     for law in laws():
         low, high = law.domain.get("e", (np.inf, np.inf))
@@ -60,16 +60,16 @@ def claimed() -> str:
         if measured()[law.key].over == "e" and error(law)[inside].max(initial=0.0) > BOUNDS[0] - ROUNDING:
             rows.append((law, f"{law.domain_text}|{largest(error(law)[inside], GRID[inside])}"))
     return f"""\
-**Off where they are said to hold.** By {BOUNDS[0]:g} or more there:
+**Errors in the stated domain.** The error of these laws in their stated domain is {BOUNDS[0]:g} or more:
 
-{law_table(["said to hold for", "largest error there"], rows)}"""
+{law_table(["stated domain", "largest error there"], rows)}"""
 
 
 def at_one(known: Sequence[ForceModel]) -> str:
-    """Laws with a loss where none is asked for."""
+    """Laws with an energy loss at e = 1."""
     rows = [(law, number(at(law, 1.0))) for law in known if at(law, 1.0) < 1 - ROUNDING]
     return f"""\
-**A loss at e = 1.** Asked for an elastic impact, these deliver
+**Energy loss at e = 1.** For a requested elastic impact these laws deliver
 
 {law_table(["e_out at e = 1"], rows)}"""
 
@@ -89,8 +89,8 @@ def slopes(known: Sequence[ForceModel]) -> str:
     off = [law for law in known if abs(whole.get(law.key, 1.0) - 1) > BOUNDS[0]]
     rows = [(law, f"{number(whole[law.key], 3)}|{number(at(law, 0.9))}") for law in off]
     return f"""\
-**Another slope at e = 1.** To be right for small losses a law needs de_out/de = 1 there. Where it is less, less is
-lost than is asked for, with 0.5 half of it; where it is more, more.
+**Wrong slope at e = 1.** For small losses to be correct, de_out/de must be 1 at e = 1. If it is smaller, the loss
+is smaller than requested (half of it for 0.5); if it is larger, the loss is larger.
 
 {law_table(["de_out/de at e = 1", "e_out at e = 0.9"], rows)}"""
 
@@ -101,8 +101,9 @@ def without_tension(known: Sequence[ForceModel]) -> str:
     asked = (0.1, 0.5, 0.9)
     rows = [(law, "|".join(number(at(law, e)) for e in asked)) for law in known if law.key in with_tension]
     return f"""\
-**The damping of another end.** ζ = −ln e/√(π² + ln² e) delivers e where the contact lasts to zero indentation.
-Codes that use it and cut the tension off deliver more; `exact-dashpot-no-tension` has the ζ of that end.
+**Damping for a different end of contact.** ζ = −ln e/√(π² + ln² e) delivers e if the contact ends at zero
+indentation. Codes that use it without tension deliver more; `exact-dashpot-no-tension` has the correct ζ for
+that end.
 
 {law_table([f"e_out at e = {e:g}" for e in asked], rows)}"""
 
@@ -113,7 +114,7 @@ def of_codes(known: Sequence[ForceModel]) -> str:
     codes = [law for law in known if law.family == "codes" and np.abs(error(law)).max() > BOUNDS[0]]
     rows = [(law, "|".join([law.title, *(number(at(law, e)) for e in asked)])) for law in codes]
     return f"""\
-**Codes that deliver another e.** Asked for e, at small time steps, by {BOUNDS[0]:g} or more off somewhere:
+**Codes that deliver a different e.** At small time steps e_out differs from e by {BOUNDS[0]:g} or more somewhere:
 
 {law_table(["code", *(f"e_out at e = {e:g}" for e in asked)], rows)}"""
 
@@ -123,5 +124,5 @@ def hysteretic() -> str:
     law = catalogue()["kelvin-voigt-hysteretic"]
     assert np.abs(measured()[law.key].e_out - np.sqrt(GRID)).max() < ROUNDING
     return f"""\
-**A root.** `{law.key}` unloads with e K δ. That gives back the part e of the work, and so delivers √e,
-{number(at(law, 0.5))} at e = 0.5; with e² in the place of e it would deliver e."""
+**Square root.** `{law.key}` unloads with e K δ. This recovers the fraction e of the work, and so delivers √e,
+{number(at(law, 0.5))} at e = 0.5; with e² in place of e it would deliver e."""

@@ -9,19 +9,23 @@ from __future__ import annotations
 
 import atexit
 import ctypes
+import fcntl
 import gc
 import io
 import json
 import os
+import pty
 import signal
+import struct
 import subprocess
 import sys
 import tempfile
+import termios
 import threading
 import time
 import traceback
 from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import IO, NoReturn
@@ -48,11 +52,15 @@ class Forked:
 
     server: subprocess.Popen[str]
 
-    def __call__(self, *words: str | Path, cwd: Path = ROOT, limit: float = 30.0, **environment: str) -> Done:
+    def __call__(
+        self, *words: str | Path, cwd: Path = ROOT, limit: float = 30.0, code: str = "", stdout: str = "",
+        stderr: str = "", **environment: str,
+    ) -> Done:  # fmt: skip
+        """Run a command line, after some Python code, with streams that may go to a file or a terminal."""
         assert self.server.stdin is not None
         assert self.server.stdout is not None
         request = {"argv": [str(word) for word in words], "cwd": str(cwd), "limit": limit,
-                   "environment": environment}  # fmt: skip
+                   "environment": environment, "code": code, "stdout": stdout, "stderr": stderr}  # fmt: skip
         print(json.dumps(request), file=self.server.stdin, flush=True)
         return Done(**json.loads(self.server.stdout.readline()))
 
@@ -73,6 +81,43 @@ def forking() -> Iterator[Forked]:
             server.stdin.close()
 
 
+@contextmanager
+def abandoned_pipe(folder: Path) -> Iterator[str]:
+    """The path of a pipe whose reader leaves as soon as there is a writer."""
+    path = folder / "pipe"
+    os.mkfifo(path)
+    reader = threading.Thread(target=lambda: os.close(os.open(path, os.O_RDONLY)))
+    reader.start()
+    yield str(path)
+    reader.join()
+    path.unlink()
+
+
+def printed_on_terminal(
+    forked: Forked, *words: str | Path, width: int = 80, **environment: str
+) -> tuple[Done, str]:
+    """Run a command line whose stdout is a terminal; how it ended and what the terminal shows."""
+    driver, terminal = pty.openpty()
+    fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 50, width, 0, 0))
+    # the width of the terminal counts only where no variable has another
+    code = "import os\nfor name in {'COLUMNS', 'LINES', 'TERM'} - {*%r}:\n    os.environ.pop(name, None)"
+    printed = b""
+
+    def read() -> None:
+        nonlocal printed
+        with suppress(OSError):
+            while True:
+                printed += os.read(driver, 10_000)
+
+    reader = threading.Thread(target=read)
+    reader.start()
+    done = forked(*words, stdout=os.ttyname(terminal), code=code % [*environment], **environment)
+    os.close(terminal)
+    reader.join()
+    os.close(driver)
+    return done, printed.decode()
+
+
 def serve() -> None:
     """Answer requests until there are no more."""
     _warm_up()
@@ -82,7 +127,11 @@ def serve() -> None:
             child = os.fork()
             if child == 0:
                 os.environ |= request["environment"]
-                _command(request["argv"], request["cwd"], out, err)
+                streams = [
+                    os.open(request[name], os.O_WRONLY) if request[name] else file.fileno()
+                    for name, file in (("stdout", out), ("stderr", err))
+                ]
+                _command(request["argv"], request["cwd"], request["code"], *streams)
             done = _wait(child, request["limit"], out, err)
         print(json.dumps(asdict(done)), flush=True)
 
@@ -118,25 +167,30 @@ def _warm_up() -> None:
     gc.freeze()
 
 
-def _command(argv: list[str], cwd: str, out: IO[bytes], err: IO[bytes]) -> NoReturn:
+def _command(argv: list[str], cwd: str, program: str, stdout: int, stderr: int) -> NoReturn:
     """In the child: become the command, and leave as a program does."""
     from impact.cli.main import main
 
     code: object = 99
     try:
         os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
-        os.dup2(out.fileno(), 1)
-        os.dup2(err.fileno(), 2)
+        os.dup2(stdout, 1)
+        os.dup2(stderr, 2)
         os.chdir(cwd)
         sys.argv = ["impact", *argv]
+        exec(program, {})
         main()
     except SystemExit as leaving:
         code = leaving.code or 0
     except BaseException:
         traceback.print_exc()
     finally:
-        sys.stdout.flush()
-        sys.stderr.flush()
+        for stream in (sys.stdout, sys.stderr):
+            try:
+                stream.flush()
+            except OSError:
+                # as the interpreter leaves where it cannot flush
+                code = 120
         # libraries close their files at the exit, and can crash there: os._exit would hide it
         atexit._run_exitfuncs()
         ctypes.CDLL(None).exit(code if isinstance(code, int) else 99)

@@ -74,23 +74,23 @@ def test_a_changed_model_has_another_fingerprint() -> None:
         ({"force": lambda elastik: elastik}, 'its force asks for "elastik"; did you mean "elastic"?'),
         ({"residual": lambda x: x}, 'its residual asks for "x"'),
         ({"coefficients": {"a": lambda b: b, "b": lambda e: e}}, 'its coefficient a asks for "b"'),
-        ({"key": "Mine"}, 'model key "Mine": wants kebab-case'),
-        ({"release": "tension"}, 'release: got \'tension\', wants "gap" or "force"'),
-        ({"coordinate_power": 3}, "coordinate_power: got 3, wants 2, 4, 6 or 8"),
+        ({"key": "Mine"}, 'model key "Mine": expected kebab-case'),
+        ({"release": "tension"}, 'release: got \'tension\', expected "gap" or "force"'),
+        ({"coordinate_power": 3}, "coordinate_power: got 3, expected 2, 4, 6 or 8"),
         ({"exponent": -1.0}, "exponent: got -1.0"),
         ({"domain": {"foo": (0, 1)}}, 'domain of "foo"'),
-        ({"domain": {"e": (1, 0)}}, "domain of e: got (1, 0), wants (least, most)"),
-        ({"parameters": ("c",)}, "wants a tuple of Parameter"),
+        ({"domain": {"e": (1, 0)}}, "domain of e: got (1, 0), expected (least, most)"),
+        ({"parameters": ("c",)}, "expected a tuple of Parameter"),
         ({"coefficients": {"K": lambda e: e}}, '"K" is the name of a quantity'),
         (
             {"velocity_coordinate": "log"},
-            'velocity_coordinate "log" wants a coefficient chi, a force of elastic and chi',
+            'velocity_coordinate "log": expected a coefficient chi, a force of elastic and chi',
         ),
         (
             {"velocity_coordinate": "force"},
-            'velocity_coordinate "force" wants a coefficient c and one q, a force of elastic and c',
+            'velocity_coordinate "force": expected a coefficient c and a coefficient q, a force of elastic and c',
         ),
-        ({"velocity_coordinate": "w"}, 'velocity_coordinate: got \'w\', wants "v", "log" or "force"'),
+        ({"velocity_coordinate": "w"}, 'velocity_coordinate: got \'w\', expected "v", "log" or "force"'),
     ],
 )
 def test_a_wrong_model_is_refused_when_it_is_made(change: dict[str, object], words: str) -> None:
@@ -152,7 +152,7 @@ def test_a_model_that_closes_over_values_is_never_taken_for_another(tmp_path: Pa
 def test_a_force_of_the_wrong_shape_is_an_error_of_the_model() -> None:
     texts = {"key": "short", "title": "", "year": 1, "equation": "", "reference": ""}
     short = impact.ForceModel(**texts, force=lambda elastic, e: (elastic * e)[:1])  # type: ignore[arg-type]
-    with pytest.warns(UserWarning, match=r"^model short: the force has the shape \(1,\), wants \(2,\)$"):
+    with pytest.warns(UserWarning, match=r"^model short: the force has shape \(1,\), expected \(2,\)$"):
         status = impact.sweep({"models": "short", "sweep": SWEEP}, plugins=[short])["status"].values
     assert status.tolist() == [[Status.MODEL_ERROR, Status.MODEL_ERROR]]
 

@@ -261,7 +261,7 @@ def test_a_state_without_a_source_is_refused(state):
 
 
 def test_evidence_in_words_of_old_is_refused_with_the_right_form():
-    with pytest.raises(ModelError, match=r"evidence: got 'from a book', wants an impact\.Evidence"):
+    with pytest.raises(ModelError, match=r"evidence: got 'from a book', expected an impact\.Evidence"):
         impact.ForceModel("mine", "Mine", 2026, "F = 0", "", lambda elastic: elastic, evidence="from a book")
 
 

@@ -98,7 +98,7 @@ def test_the_scheduler_gone(two: Dask, tmp_path: Path, right: bytes, moment: int
     assert re.search(rf"{two.address}: the scheduler is gone; [\d,]+ of 400,000 trajectories are kept in", said), (
         said
     )
-    assert "--resume goes on" in said
+    assert "--resume continues" in said
     assert "Traceback" not in said
     kept = {path: path.stat().st_mtime_ns for path in one.folder.glob("*.work/*.npz")}
     assert moment <= len(kept) < BLOCKS
@@ -139,7 +139,7 @@ def test_a_worker_of_another_version_that_joins_later_is_refused(two: Dask, tmp_
     assert re.search(
         rf"has impact 0\.0\.1, this is {re.escape(impact.__version__)}; expected the same; \d", said
     ), said
-    assert "--resume goes on" in said
+    assert "--resume continues" in said
     two.kill("old")
     two.worker("c")
     assert resumed(tmp_path / "sweep", "--scheduler", two.address) == right
@@ -150,7 +150,7 @@ def test_a_worker_without_the_package_is_refused(two: Dask, tmp_path: Path) -> N
     (tmp_path / "other" / "impact.py").write_text("raise ImportError('none here')")
     two.worker("bare", PYTHONPATH=str(tmp_path / "other"))
     said = sweep(tmp_path / "sweep", "--scheduler", two.address).ends(2)
-    assert re.search("^tcp://127.0.0.1:.*: has no impact: none here; wants impact", said, re.MULTILINE), said
+    assert re.search("^tcp://127.0.0.1:.*: has no impact: none here; expected impact", said, re.MULTILINE), said
 
 
 def test_a_scheduler_without_the_package_is_refused(tmp_path: Path) -> None:
@@ -158,7 +158,7 @@ def test_a_scheduler_without_the_package_is_refused(tmp_path: Path) -> None:
     (tmp_path / "other" / "impact.py").write_text("raise ImportError('none here')")
     with dask(tmp_path / "cluster", PYTHONPATH=str(tmp_path / "other")) as found:
         said = sweep(tmp_path / "sweep", "--scheduler", found.address).ends(2)
-    assert said == f"the scheduler: has no impact: none here; wants impact {impact.__version__}\n"
+    assert said == f"the scheduler: has no impact: none here; expected impact {impact.__version__}\n"
 
 
 def test_a_plug_in_whose_file_the_workers_have_not(two: Dask, tmp_path: Path) -> None:
@@ -222,7 +222,7 @@ def test_interrupted_it_is_resumed(two: Dask, tmp_path: Path, right: bytes) -> N
     one.until_kept(2)
     one.process.send_signal(signal.SIGINT)
     said = one.ends(130)
-    assert "--resume goes on" in said
+    assert "--resume continues" in said
     assert resumed(tmp_path / "sweep", "--scheduler", two.address) == right
 
 
@@ -231,7 +231,7 @@ def test_interrupted_when_nobody_is_left_it_ends(two: Dask, tmp_path: Path, righ
     one.until_kept(2)
     two.kill("a", "b")
     one.process.send_signal(signal.SIGINT)
-    assert "--resume goes on" in one.ends(130)
+    assert "--resume continues" in one.ends(130)
     assert resumed(tmp_path / "sweep") == right
 
 
@@ -245,7 +245,7 @@ def test_a_block_that_kills_every_worker_is_given_up(tmp_path: Path) -> None:
     assert said.splitlines()[-1].startswith(
         "processes were killed 4 times at the same trajectories: memory is short"
     )
-    assert "--resume goes on" in said
+    assert "--resume continues" in said
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
@@ -258,7 +258,7 @@ def test_a_cluster_of_its_own_ends_with_the_sweep(tmp_path: Path, right: bytes, 
         os.killpg(group, number)
         said = one.ends(130)
         assert said.splitlines()[-1].endswith(
-            "of 400,000 trajectories are kept in results.h5.work; --resume goes on"
+            "of 400,000 trajectories are kept in results.h5.work; --resume continues"
         )
         assert "Traceback" not in said
     else:
@@ -271,10 +271,10 @@ def test_a_cluster_of_its_own_ends_with_the_sweep(tmp_path: Path, right: bytes, 
 def test_nobody_answers(tmp_path: Path) -> None:
     said = sweep(tmp_path / "sweep", "--scheduler", "tcp://127.0.0.1:1").ends(2)
     assert "tcp://127.0.0.1:1: " in said
-    assert "wants the address of a scheduler of dask, such as tcp://host:8786" in said
+    assert "expected the address of a scheduler of dask, such as tcp://host:8786" in said
     assert "Traceback" not in said
     assert not (tmp_path / "sweep" / "results.h5.work").exists()
     said = sweep(tmp_path / "sweep", "--scheduler", "localhorst").ends(2)
-    assert said == "localhorst: wants the address of a scheduler of dask, such as tcp://host:8786; or local\n"
+    assert said == "localhorst: expected the address of a scheduler of dask, such as tcp://host:8786; or local\n"
     said = sweep(tmp_path / "sweep", "--scheduler", "local", "--jobs", "2").ends(2)
     assert "--jobs 2: given beside --scheduler local, expected one of the two" in said

@@ -78,13 +78,13 @@ def same_bits(one: xr.Dataset, other: xr.Dataset) -> None:
         assert one[variable.name].values.tobytes() == other[variable.name].values.tobytes(), variable.name
 
 
-@settings(max_examples=60)
+@settings(max_examples=15)
 @given(sweeps())
 def test_both_give_the_same_bits(config: dict[str, object]) -> None:
     same_bits(swept(config), swept(config, "solver.collapse=false"))
 
 
-@settings(max_examples=20)
+@settings(max_examples=10)
 @given(sweeps())
 def test_within_blocks_too_where_there_are_too_many_cells(config: dict[str, object]) -> None:
     once = swept(config)
@@ -93,7 +93,7 @@ def test_within_blocks_too_where_there_are_too_many_cells(config: dict[str, obje
         same_bits(once, swept(config))
 
 
-@settings(max_examples=30)
+@settings(max_examples=15)
 @given(sweeps())
 def test_a_grid_by_its_axes_is_its_points_one_by_one(config: dict[str, object]) -> None:
     plan = prepare(config, plugins=[DASHPOT, SPEED])

@@ -18,7 +18,7 @@ from xarray.core import indexing
 import impact
 from impact.comparison.verdict import Verdict
 from impact.errors import UsageError
-from impact.plots.differences import differences
+from impact.plots.differences import difference_data
 from impact.results.schema import SCHEMA_VERSION
 from impact.results.slabs import SLAB_POINTS, VARIES_ALONG, is_lazy
 
@@ -188,7 +188,7 @@ def test_two_results_with_differences_in_several_slabs() -> None:
     assert (judged.at["model"], judged.at["e"], judged.at["m2"]) == ("a", 1.0, 5.0)
     along = verdict.worst_along["m1"]["e_out"].values
     assert np.flatnonzero(along).tolist() == [0, 7, 19]
-    assert differences(verdict).panels[0].ratios["e_out"] == pytest.approx((1000.0, 0.0, 1000.0))
+    assert difference_data(verdict).panels[0].ratios["e_out"] == pytest.approx((1000.0, 0.0, 1000.0))
 
 
 def test_no_more_than_a_slab_is_read_at_once() -> None:
@@ -270,7 +270,7 @@ def test_points_of_the_same_trajectory_are_judged_once_and_all_counted() -> None
     assert judged["status"].different == 0
     assert reads.total < 10**5
     # the picture: a peak along e, and a line along what was not walked along
-    panels = differences(verdict).panels
+    panels = difference_data(verdict).panels
     assert [panel.label.split()[0].lower() for panel in panels] == ["model", *EVERY]
     assert np.flatnonzero(panels[1].ratios["e_out"]).tolist() == [500]
     assert set(panels[4].ratios["v1_post"]) == {judged["v1_post"].times}

@@ -275,7 +275,7 @@ BAD = [
     ("rho = 7850", "rho = 7850\n[model.hetrz]",
      ['x.toml:13: model.hetrz: unknown key; did you mean "hertz"?']),
     ("rho = 7850", "rho = 7850\n[model.hertz]\nS = 1",
-     ["x.toml:14: model.hertz.S: unknown key; none is known here"]),
+     ["x.toml:14: model.hertz.S: unknown key; none are defined"]),
     ("rho = 7850", 'rho = 7850\n[model.test-driven]\nS = "1 N/m"\nc = [1, 10]\nd = 1',
      ['x.toml:14: model.test-driven.S: got "1 N/m", expected a unit of N/m^n with n = 1.5',
       "x.toml:15: model.test-driven.c[1]: got 10, expected a number from 1 to 9",

@@ -22,9 +22,9 @@ CLAUSES = (
     "agrees with its closed form",
     "a change of units changes nothing",
     "swapped balls swap velocities",
-    "at e = 1 it is ordinary",
+    "at e = 1 the status is OK",
     "a tighter tolerance moves nothing",
-    "a lane alone equals the lane in a crowd",
+    "an impact alone has the bits that it has in a batch",
 )
 
 
@@ -94,20 +94,20 @@ WRONG = {
     ),
     "an infinite damping at e = 1": (
         hysteresis("wrong", title="", year=2026, equation="", reference="", chi=lambda e: np.divide(e, 1.0 - e)),
-        "at e = 1 it is ordinary",
+        "at e = 1 the status is OK",
     ),
     "a force that ages": (ageing(), "a tighter tolerance moves nothing"),
     "a force that ages, seen in other units": (ageing(), "a change of units changes nothing"),
     "a force that sees its neighbours": (
         wrong(lambda elastic, x, v, e: elastic * (1.0 + (1.0 - e) * v + 1e-12 * x.max())),
-        "a lane alone equals the lane in a crowd",
+        "an impact alone has the bits that it has in a batch",
     ),
     "a coefficient that sees its neighbours": (
         wrong(
             lambda elastic, v, chi: elastic * (1.0 + chi * v),
             coefficients={"chi": lambda e: 1.0 - e + 1e-12 * np.mean(e)},
         ),
-        "a lane alone equals the lane in a crowd",
+        "an impact alone has the bits that it has in a batch",
     ),
 }
 

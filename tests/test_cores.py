@@ -147,7 +147,7 @@ def test_files_of_threads_and_processes_are_the_same(cli: Run, tmp_path: Path) -
 
 
 def test_processes_and_threads_are_one_or_the_other() -> None:
-    with pytest.raises(UsageError, match="got jobs = 2 and threads = 2, wants one of them"):
+    with pytest.raises(UsageError, match="got jobs = 2 and threads = 2, expected one of them"):
         impact.sweep(SWEEP, overrides=['solver.core="numpy"'], jobs=2, threads=2)
 
 

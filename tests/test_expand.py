@@ -14,12 +14,14 @@ from hypothesis import strategies as st
 import impact
 from impact.api import prepare
 from impact.contact.outputs import check_inputs
+from impact.contact.status import Status
 from impact.engine.build_impacts import build_impacts
 from impact.results import sweep as sweeps_of
 from impact.results.expand import CHECKS, checks_that_may_fail
 from impact.results.schema import SCHEMA
 from impact.results.sweep import sweep_into
 
+from .problems import impacts
 from .test_collapse import DASHPOT, MATERIALS, NEEDS, OWN, SPEED
 
 # a rule of K of its own, which asks for the exponent, a speed and the masses
@@ -131,6 +133,15 @@ def test_what_is_not_checked_never_fails(config: dict[str, object]) -> None:
             found = check_inputs(law, lanes, checks_that_may_fail(plan.inputs, law))
         shape = plan.shape or (1,)
         assert np.array_equal(np.broadcast_to(found, shape), np.broadcast_to(expected, shape)), law.key
+
+
+@pytest.mark.parametrize(
+    ("checks", "status"),
+    [({"v0"}, Status.NO_IMPACT), ({"length"}, Status.NO_IMPACT), ({"e"}, Status.OK), (set(), Status.OK)],
+)
+def test_balls_that_part_are_found_by_their_speed_or_their_sizes(checks: set[str], status: Status) -> None:
+    checked = check_inputs(impact.models()["hertz"], impacts(v1=-1.0), frozenset(checks))
+    assert np.broadcast_to(checked, 1).tolist() == [status]
 
 
 def test_a_plain_sweep_needs_no_checks_and_one_that_may_fail_has_them() -> None:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import shlex
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -15,6 +17,7 @@ from impact.engine.plugins import installed, read_plugins
 from impact.errors import ModelError
 
 from .conftest import ROOT, Run
+from .forked import Done, Forked
 
 PAGE = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
 BROKEN = """
@@ -120,27 +123,43 @@ def install(folder: Path, text: str, value: str = "our_package.laws") -> Path:
     return site
 
 
-def test_the_laws_of_an_installed_package_are_in_the_catalogue(cli: Run, tmp_path: Path) -> None:
+@pytest.fixture
+def with_package(forked: Forked) -> Callable[..., Done]:
+    """Run a command line where a folder is one of installed packages, for its processes, too."""
+
+    def run(*words: str, site: Path, cwd: Path = ROOT) -> Done:
+        code = f"import sys; sys.path.insert(0, {str(site)!r})\n"
+        code += "from impact.engine.plugins import installed; installed.cache_clear()"
+        return forked(*words, cwd=cwd, code=code, limit=120.0, PYTHONPATH=os.pathsep.join([str(site), *sys.path]))
+
+    return run
+
+
+def test_the_laws_of_an_installed_package_are_in_the_catalogue(
+    cli: Run, with_package: Callable[..., Done], tmp_path: Path
+) -> None:
     site = install(tmp_path, LAWS)
     (tmp_path / "config.toml").write_text(SWEEP, encoding="utf-8")
-    listed = json.loads(cli("models", "--json", PYTHONPATH=str(site)).stdout)
+    listed = json.loads(with_package("models", "--json", site=site).stdout)
     # one that it imports is not its own
     assert [one["key"] for one in listed if one["key"] not in impact.models()] == ["ours-2026", "stiff-2026"]
 
-    done = cli("sweep", "config.toml", "--jobs", "2", cwd=tmp_path, PYTHONPATH=str(site))
+    done = with_package("sweep", "config.toml", "--jobs", "2", cwd=tmp_path, site=site)
     assert done.returncode == 0, done.stderr
     record = json.loads(impact.load(tmp_path / "results.h5").attrs["plugins"])
     assert {key: (one["file"], one["package"]) for key, one in record.items()} == {
         "ours-2026": (None, "our-package 1.2")
     }
-    again = cli("rerun", "results.h5", cwd=tmp_path, PYTHONPATH=str(site))
+    again = with_package("rerun", "results.h5", cwd=tmp_path, site=site)
     assert (again.returncode, again.stdout[:6]) == (0, "equal:")
     without = cli("rerun", "results.h5", cwd=tmp_path)
     assert without.returncode == 2
     assert "made with ours-2026 of our-package 1.2; give it again with the package installed" in without.stderr
 
 
-def test_all_is_what_is_built_in_whatever_is_installed(cli: Run, tmp_path: Path) -> None:
+def test_all_is_what_is_built_in_whatever_is_installed(
+    cli: Run, with_package: Callable[..., Done], tmp_path: Path
+) -> None:
     site = install(tmp_path, LAWS)
     text = SWEEP.replace(
         '["ours-2026", "hertz"]',
@@ -149,21 +168,20 @@ def test_all_is_what_is_built_in_whatever_is_installed(cli: Run, tmp_path: Path)
     )
     steel = '[materials.steel]\nE = "210 GPa"\nnu = 0.3\nrho = 7850\n'
     (tmp_path / "all.toml").write_text(text.replace("K = 6e9", 'material = "steel"') + steel, encoding="utf-8")
-    keys = []
-    for more in ({}, {"PYTHONPATH": str(site)}):
-        done = cli("sweep", "all.toml", "--dry-run", "--json", cwd=tmp_path, **more)
-        keys.append([one["model"] for one in json.loads(done.stdout)["models"]])
+    words = ("sweep", "all.toml", "--dry-run", "--json")
+    runs = (cli(*words, cwd=tmp_path), with_package(*words, cwd=tmp_path, site=site))
+    keys = [[model["model"] for model in json.loads(done.stdout)["models"]] for done in runs]
     assert len(keys[0]) > 25
     assert keys[0] == keys[1]
 
 
-def test_no_data_file_brings_a_package_in(cli: Run, tmp_path: Path) -> None:
+def test_no_data_file_brings_a_package_in(with_package: Callable[..., Done], tmp_path: Path) -> None:
     # what is not installed as a package is imported for no entry in a TOML
     site = install(tmp_path, LAWS)
     for path in (site / "our_package-1.2.dist-info").iterdir():
         path.unlink()
     (tmp_path / "config.toml").write_text(SWEEP.replace('"hertz"', '"our_package.laws"'), encoding="utf-8")
-    done = cli("sweep", "config.toml", cwd=tmp_path, PYTHONPATH=str(site))
+    done = with_package("sweep", "config.toml", cwd=tmp_path, site=site)
     assert (done.returncode, (tmp_path / "imported").exists()) == (2, False)
 
 

@@ -22,8 +22,8 @@ from matplotlib.text import Text
 import impact
 from impact import api
 from impact.errors import UsageError
-from impact.plots.curves import Lines, Panel
-from impact.plots.kinds import FOLLOWED, KINDS, WIDTHS, Choice
+from impact.plots.curves import CurveData, Panel
+from impact.plots.kinds import KINDS, MOTION_KINDS, WIDTHS, Choice
 from impact.plots.style import save_figure
 
 from .conftest import ROOT, Run
@@ -31,20 +31,20 @@ from .conftest import ROOT, Run
 CURVES = [kind for kind in KINDS if kind not in ("map", "validity")]
 
 
-def pictured(dataset: xr.Dataset, kind: str = "final-velocities", **choice: object) -> Lines:
+def pictured(dataset: xr.Dataset, kind: str = "final-velocities", **choice: object) -> CurveData:
     """The numbers of a picture of curves."""
-    numbers = api.pictured(dataset, kind, Choice(**choice))  # type: ignore[arg-type]
-    assert isinstance(numbers, Lines)
+    numbers = api.get_plot_data(dataset, kind, Choice(**choice))  # type: ignore[arg-type]
+    assert isinstance(numbers, CurveData)
     return numbers
 
 
-def only(numbers: Lines) -> Panel:
+def only(numbers: CurveData) -> Panel:
     """The panel of a picture that has one."""
     (panel,) = numbers.panels
     return panel
 
 
-def shown(numbers: Lines) -> str:
+def shown(numbers: CurveData) -> str:
     """The conditions, with plain spaces."""
     return numbers.conditions.replace("\N{NO-BREAK SPACE}", " ")
 
@@ -119,7 +119,7 @@ def test_figure_6_is_the_stored_numbers(figure6: xr.Dataset) -> None:
 
 def test_numbers_of_equations_are_of_the_paper_only(figure6: xr.Dataset) -> None:
     for kind in CURVES:
-        numbers = pictured(figure6, kind, sel={"e": 0.5} if kind in FOLLOWED else {})
+        numbers = pictured(figure6, kind, sel={"e": 0.5} if kind in MOTION_KINDS else {})
         labels = [curve.label for panel in numbers.panels for curve in panel.curves]
         assert labels
         assert not [label for label in labels if "(2" in label.replace("(20", "") or "(6)" in label]
@@ -158,7 +158,7 @@ def test_an_error_needs_a_restitution_asked_for() -> None:
     assert [curve.model for curve in only(pictured(result, "restitution")).curves] == ["hertz"]
 
 
-@pytest.mark.parametrize("kind", FOLLOWED)
+@pytest.mark.parametrize("kind", MOTION_KINDS)
 def test_a_point_is_followed_through_time_again(figure6: xr.Dataset, kind: str) -> None:
     keys = ["gharib-hurmuzlu-2012", "lankarani-nikravesh-1990"]
     numbers = pictured(figure6, kind, sel={"e": 0.5}, models=keys)
@@ -235,7 +235,7 @@ def test_one_prefix_of_the_unit_stands_in_the_label(figure6: xr.Dataset) -> None
 @pytest.mark.parametrize("width", ["84mm", "single", 7.1], ids=str)
 @pytest.mark.parametrize("kind", CURVES)
 def test_nothing_covers_a_text(figure6: xr.Dataset, kind: str, width: float | str) -> None:
-    figure = impact.plot(figure6, kind=kind, sel={"e": 0.5} if kind in FOLLOWED else None, width=width)
+    figure = impact.plot(figure6, kind=kind, sel={"e": 0.5} if kind in MOTION_KINDS else None, width=width)
     expected = {"84mm": 84 / 25.4, "single": 3.5, 7.1: 7.1}[width]
     assert figure.get_figwidth() == pytest.approx(expected)
     check_layout(figure)
@@ -384,6 +384,7 @@ def test_pictures_are_files_of_their_format(figure6: xr.Dataset, tmp_path: Path,
     impact.plot(figure6).savefig(tmp_path / f"two.{kind}")
 
 
+@pytest.mark.slow
 def test_the_same_bytes_in_every_process(stored: Path, tmp_path: Path) -> None:
     sweep = {"e": [0.1, 0.5, 1.0], "v1": {"geomspace": [0.1, 10.0, 5]}, "m1": 1.0, "m2": 1.0, "K": 6e9}
     plane = impact.sweep({"models": ["hertz", "flores-2011", "lankarani-nikravesh-1990"], "sweep": sweep})

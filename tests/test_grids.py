@@ -17,8 +17,9 @@ from matplotlib.patches import PathPatch
 import impact
 from impact.errors import UsageError
 from impact.formatting import percentage
-from impact.plots.kinds import draw
-from impact.plots.maps import CONTOURS, NO_VALUE, Grids, edges_of, field_map, validity
+from impact.plots import maps
+from impact.plots.kinds import Choice, draw
+from impact.plots.maps import CONTOURS, NO_VALUE, MapData, edges_of
 from impact.plots.style import save_figure
 
 from .test_figures import check_layout, texts_of
@@ -50,28 +51,38 @@ def many() -> xr.Dataset:
     return impact.sweep({"title": "Thirteen", "models": MORE, "sweep": sweep})
 
 
-def expected(dataset: xr.Dataset, numbers: Grids, model: str, **fixed: object) -> np.ndarray:
+def expected(dataset: xr.Dataset, numbers: MapData, model: str, **fixed: object) -> np.ndarray:
     """A field by y and x, looked up one point after another."""
     one = dataset[numbers.variable].sel(model=model, **fixed)
     return np.array([[one.sel({numbers.x: x, numbers.y: y}).item() for x in numbers.x_values]
                      for y in numbers.y_values])  # fmt: skip
 
 
-def conditions_of(numbers: Grids) -> str:
+def field_map(dataset: xr.Dataset, **choice: object) -> MapData:
+    """The data of a map."""
+    return maps.field_map(dataset, Choice(**choice))  # type: ignore[arg-type]
+
+
+def validity(dataset: xr.Dataset, **choice: object) -> MapData:
+    """The data of a map of the closest model."""
+    return maps.validity_map(dataset, Choice(**choice))  # type: ignore[arg-type]
+
+
+def conditions_of(numbers: MapData) -> str:
     """The conditions, whose parts do not break."""
     return numbers.conditions.replace("\xa0", " ")
 
 
-def panels_of(figure: Figure, numbers: Grids) -> list[Axes]:
+def panels_of(figure: Figure, numbers: MapData) -> list[Axes]:
     """The panels; what comes after them is the colour bar."""
     return figure.axes[: 2 if numbers.closest else len(numbers.panels)]
 
 
-def centres(numbers: Grids) -> np.ndarray:
+def centres(numbers: MapData) -> np.ndarray:
     return np.array([(x, y) for y in numbers.y_values for x in numbers.x_values])
 
 
-def covered(patch: PathPatch, numbers: Grids) -> np.ndarray:
+def covered(patch: PathPatch, numbers: MapData) -> np.ndarray:
     """By y and x, the cells whose middle lies in a patch."""
     inside = [patch.get_path().contains_point(point) for point in centres(numbers)]
     return np.array(inside).reshape(len(numbers.y_values), -1)

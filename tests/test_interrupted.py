@@ -316,7 +316,7 @@ def check_interrupted(done: Done, folder: Path, number: int, at: object) -> None
     """One line that says how to go on, or that there is no need to."""
     assert done.returncode == 128 + number, (at, done)
     assert (done.stderr.count("\n"), done.stdout) == (1, ""), (at, done)
-    told = f"{RESULT} was stored whole" if (folder / RESULT).exists() else f"{WORK}; --resume goes on"
+    told = f"{RESULT} was stored whole" if (folder / RESULT).exists() else f"{WORK}; --resume continues"
     assert done.stderr.endswith(f"{told}\n"), (at, done)
     assert done.stderr.startswith("interrupted" if number == INT else "terminated"), (at, done)
 
@@ -479,7 +479,7 @@ def test_workers_that_are_killed_again_and_again(sweeps: Sweeps) -> None:
     done = sweeps("--jobs", 2, "--plugin", "mine.py", cwd=folder)
     assert (done.returncode, done.stderr.count("\n")) == (4, 1), done
     assert "processes were killed 4 times" in done.stderr
-    assert done.stderr.endswith("; --resume goes on\n")
+    assert done.stderr.endswith("; --resume continues\n")
     assert done.kept
     assert done.kept == kept_in(folder)
     again = sweeps("--resume", "--plugin", "mine.py", cwd=folder)

@@ -278,12 +278,12 @@ def test_a_picture_reads_what_it_draws(small: xr.Dataset, big: tuple[xr.Dataset,
     sel = {"v2": 0.0, **({"e": 0.5} if kind in ("loop", "history", "impulse") else {})}
     plane = kind in ("map", "validity")
     choice = Choice(sel=sel, models=MODELS[:3], x="e", y="K" if plane else None)
-    numbers = impact.api.pictured(dataset, kind, choice, [BROKEN])
+    numbers = impact.api.get_plot_data(dataset, kind, choice, [BROKEN])
     expected = 0 if "e" in sel else 3 * 10 * (1_000 if plane else 1)
     assert max(reads.total.values(), default=0) == expected
     assert list(islice(numbers.rows(), 3))
     if not plane:
-        assert list(numbers.rows()) == list(impact.api.pictured(small, kind, choice, [BROKEN]).rows())
+        assert list(numbers.rows()) == list(impact.api.get_plot_data(small, kind, choice, [BROKEN]).rows())
         return
     error = small["e_error"].sel(model="lankarani-nikravesh-1990", v2=0.0).values
     assert numbers.panels[1].values[7] == tuple(error.tolist())
@@ -292,7 +292,7 @@ def test_a_picture_reads_what_it_draws(small: xr.Dataset, big: tuple[xr.Dataset,
 def test_a_map_reads_no_model_that_it_leaves_out(small: xr.Dataset) -> None:
     many = small.isel(model=[0] * 42).assign_coords(model=[f"model-{number}" for number in range(42)])
     dataset, reads = stretched(many, BIG)
-    numbers = impact.api.pictured(dataset, "map", Choice(x="e", y="v2"))
+    numbers = impact.api.get_plot_data(dataset, "map", Choice(x="e", y="v2"))
     assert (len(numbers.panels), len(numbers.left_out)) == (12, 30)
     assert reads.total == {"e_error": 12 * 10 * 3}
 

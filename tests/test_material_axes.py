@@ -84,19 +84,23 @@ def test_a_sweep_over_properties_is_the_sweeps_at_each_of_their_values(
     mixed = _prepared(config(sweep, {"steel": STEEL, "brass": BRASS}))
     axes = {f"materials.steel.{first}": PROPERTIES[first], f"materials.brass.{second}": PROPERTIES[second][:2]}
     plan = with_axes(mixed, *(Axis({name: tuple(values)}) for name, values in axes.items()))
+    tables = [
+        {"steel": {**STEEL, first: value}, "brass": {**BRASS, second: other}}
+        for value in PROPERTIES[first]
+        for other in PROPERTIES[second][:2]
+    ]
+    singles = [execute(_prepared(config(sweep, table))) for table in tables]
     for layout in LAYOUTS:
         stored = replace(plan, config=replace(plan.config, output=replace(plan.config.output, layout=layout)))
         outcome = sweep_into(tmp_path / layout, stored, overwrite=True)
         assert outcome.summary.points == plan.points
         result = impact.load(tmp_path / layout)
         assert result["materials.steel." + first].attrs["units"]
-        for i, value in enumerate(PROPERTIES[first]):
-            for j, other in enumerate(PROPERTIES[second][:2]):
-                table = {"steel": {**STEEL, first: value}, "brass": {**BRASS, second: other}}
-                single = execute(_prepared(config(sweep, table)))
-                part = result.isel({f"materials.steel.{first}": i, f"materials.brass.{second}": j})
-                for name in EVERYTHING:
-                    same_bits(part[name], single[name])
+        for number, single in enumerate(singles):
+            i, j = divmod(number, 2)
+            part = result.isel({f"materials.steel.{first}": i, f"materials.brass.{second}": j})
+            for name in EVERYTHING:
+                same_bits(part[name], single[name])
 
 
 def _prepared(config: Any) -> Plan:

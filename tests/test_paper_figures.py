@@ -11,7 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import impact
 from impact import api
-from impact.plots.curves import Lines, Panel
+from impact.plots.curves import CurveData, Panel
 from impact.plots.kinds import Choice, draw
 from impact.plots.labels import symbol
 
@@ -34,15 +34,15 @@ MARKS = {
 }
 
 
-def numbers(figure: str) -> Lines:
+def numbers(figure: str) -> CurveData:
     """The numbers of a figure of the paper."""
     result = impact.sweep(ROOT / "configs" / f"figure{figure}.toml")
-    found = api.pictured(result, "impulse" if figure == "2" else "loop", Choice())
-    assert isinstance(found, Lines)
+    found = api.get_plot_data(result, "impulse" if figure == "2" else "loop", Choice())
+    assert isinstance(found, CurveData)
     return found
 
 
-def only(lines: Lines) -> Panel:
+def only(lines: CurveData) -> Panel:
     (panel,) = lines.panels
     return panel
 
@@ -76,13 +76,13 @@ def test_names_of_marks_are_legible(figure: str, width: float) -> None:
 
 def test_several_laws_have_no_marks_but_the_impulse_they_share(figure6: object) -> None:
     for kind, labels in (("loop", []), ("impulse", ["tau_c"])):
-        lines = api.pictured(figure6, kind, Choice(sel={"e": 0.5}))  # type: ignore[arg-type]
+        lines = api.get_plot_data(figure6, kind, Choice(sel={"e": 0.5}))  # type: ignore[arg-type]
         assert [mark.label for mark in only(lines).marks] == labels  # type: ignore[arg-type]
 
 
 def test_a_damped_law_marks_no_largest_force_at_its_largest_indentation() -> None:
     shot = impact.run(model="gharib-hurmuzlu-2012", at={"e": 0.2})
-    lines = api.pictured(shot.history, "loop", Choice())  # type: ignore[arg-type]
+    lines = api.get_plot_data(shot.history, "loop", Choice())  # type: ignore[arg-type]
     assert [mark.label for mark in only(lines).marks] == ["delta_m"]  # type: ignore[arg-type]
 
 
@@ -94,7 +94,7 @@ def test_the_exponent_shown_is_the_laws_own(figure6: object) -> None:
     both = impact.sweep({"models": ["hertz", "bilinear"], **config})
     for kind in ("final-velocities", "loop"):
         for models, n in (([], "1.5 (1 for bilinear)"), (["hertz"], "1.5"), (["bilinear"], "1")):
-            shown = api.pictured(both, kind, Choice(models=models or None)).conditions
+            shown = api.get_plot_data(both, kind, Choice(models=models or None)).conditions
             assert f"n = {n}," in f"{shown},".replace("\N{NO-BREAK SPACE}", " "), (kind, models)
 
 

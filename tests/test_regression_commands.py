@@ -12,8 +12,6 @@ import signal
 import stat
 import subprocess
 import sys
-import time
-from functools import partial
 from hashlib import sha256
 from pathlib import Path
 from unicodedata import category
@@ -30,7 +28,7 @@ from impact.errors import ResultError, StoreError, UsageError
 from impact.results.backend import write_sealed
 
 from .conftest import ROOT
-from .forked import Done, Forked
+from .forked import Done, Forked, abandoned_pipe, printed_on_terminal
 
 FORMATS = ("table", "json", "junit", "markdown", "github")
 KEY = "lankarani-nikravesh-1990"
@@ -605,7 +603,7 @@ def test_a_rerun_repeats_the_points_that_the_file_holds(
         assert verdict.variables[0].points == part["v1_post"].size
 
 
-def test_a_rerun_allocates_no_more_than_the_file_holds(tmp_path: Path) -> None:
+def test_a_rerun_allocates_no_more_than_the_file_holds(forked: Forked, tmp_path: Path) -> None:
     small = impact.sweep(SMALL)
     axes = {
         "e": {"linspace": [0.25, 0.75, 1_001]},
@@ -617,9 +615,8 @@ def test_a_rerun_allocates_no_more_than_the_file_holds(tmp_path: Path) -> None:
         ("no_labels", {"config_set": json.dumps([f"sweep.v{i}.linspace=[0,1,15000]" for i in (1, 2)])}),
     ):
         impact.save(small.assign_attrs(attrs), tmp_path / f"{name}.h5")
-        command = f"ulimit -v 4000000; exec {shlex.quote(sys.executable)} -m impact rerun {name}.h5"
-        run = partial(subprocess.run, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
-        done = run(["bash", "-c", command])
+        limit = "import resource\nresource.setrlimit(resource.RLIMIT_AS, (4_000_000_000,) * 2)"
+        done = forked("rerun", f"{name}.h5", cwd=tmp_path, code=limit, limit=60.0)
         assert done.returncode == (0 if name == "config" else 1), done
         assert "note: repeated " in done.stdout
 
@@ -694,51 +691,52 @@ def test_a_rerun_of_a_result_whose_config_cannot_be_read(forked: Forked, tmp_pat
         impact.rerun(tmp_path / "bad.h5")
 
 
-# a law that takes its time where there is a file "slow", and says that it has begun
+# a law that interrupts the program where there is a file "slow"
 SLOW = """\
-import time
+import os, signal
 from pathlib import Path
 from impact import ForceModel
 
 def force(elastic):
-    if Path("slow").exists():
+    if Path("slow").exists() and not Path("begun").exists():
         Path("begun").touch()
-        time.sleep(0.002)
+        os.kill(os.getpid(), signal.SIGINT)
     return elastic
 
 LAW = ForceModel("slow", "Slow", 2026, "F = K δⁿ", "", force=force)
 """
 
 
-def test_a_signal_ends_a_rerun(tmp_path: Path) -> None:
+def test_a_signal_ends_a_rerun(forked: Forked, tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(SLOW)
     impact.save(impact.sweep(SMALL | {"models": ["slow"]}, plugins=[tmp_path / "mine.py"]), tmp_path / "long.h5")
     (tmp_path / "slow").touch()
-    command = [sys.executable, "-m", "impact", "rerun", "long.h5", "--plugin", "mine.py"]
-    child = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    while not (tmp_path / "begun").exists():
-        assert child.poll() is None
-        time.sleep(0.02)
-    child.send_signal(signal.SIGINT)
-    stdout, stderr = child.communicate(timeout=60)
-    assert (child.returncode, stdout) == (130, "")
-    assert stderr.splitlines()[-1] == "interrupted; nothing was written"
+    done = forked("rerun", "long.h5", "--plugin", "mine.py", cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (130, "")
+    assert done.stderr.splitlines()[-1] == "interrupted; nothing was written"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["begun", "long.h5", "mine.py", "slow"]
 
 
-@pytest.mark.parametrize(
-    ("format", "new", "code"),
-    [
-        ("table", "different", 1),
-        pytest.param("table", "equal", 0, marks=pytest.mark.slow),
-        ("json", "different", 1),
-        *(
-            pytest.param(format, "different", 1, marks=pytest.mark.slow)
-            for format in ("junit", "markdown", "github")
-        ),
-    ],
-)
+READ_IN_PART = [
+    ("table", "different", 1),
+    ("table", "equal", 0),
+    *((format, "different", 1) for format in ("json", "junit", "markdown", "github")),
+]
+
+
+@pytest.mark.parametrize(("format", "new", "code"), READ_IN_PART)
 def test_a_reader_who_leaves_early_does_not_change_the_exit_code(
+    forked: Forked, folder: Path, tmp_path: Path, format: str, new: str, code: int
+) -> None:
+    words = ("compare", f"{new}.h5", "base.h5", "--format", format)
+    with abandoned_pipe(tmp_path) as pipe:
+        done = forked(*words, cwd=folder, stdout=pipe)
+    assert (done.returncode, "Traceback" in done.stderr) == (code, False)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("format", "new", "code"), READ_IN_PART)
+def test_a_reader_who_leaves_an_interpreter_early_does_not_change_the_exit_code(
     folder: Path, tmp_path: Path, format: str, new: str, code: int
 ) -> None:
     program = f"{shlex.quote(sys.executable)} -m impact compare"
@@ -751,36 +749,30 @@ def test_a_reader_who_leaves_early_does_not_change_the_exit_code(
     assert (tmp_path / f"{new}.png").exists()
 
 
-def test_bless_replaces_nothing_where_nobody_reads_the_verdict(folder: Path, tmp_path: Path) -> None:
+def test_bless_replaces_nothing_where_nobody_reads_the_verdict(
+    forked: Forked, folder: Path, tmp_path: Path
+) -> None:
     baseline = tmp_path / "base.h5"
     shutil.copy(folder / "base.h5", baseline)
-    line = f"{shlex.quote(sys.executable)} -m impact bless {folder}/different.h5 {baseline} --reason why"
-    for command, code in (
-        (f"({line}; echo $? > {tmp_path}/code) | true", 2),
-        (f"{line} > /dev/full; echo $? > {tmp_path}/code", 4),
-    ):
-        subprocess.run(["bash", "-c", command], cwd=ROOT, capture_output=True, check=False)
-        assert (tmp_path / "code").read_text().strip() == str(code)
-        assert baseline.read_bytes() == (folder / "base.h5").read_bytes()
+    with abandoned_pipe(tmp_path) as pipe:
+        for stdout, code in ((pipe, 2), ("/dev/full", 4)):
+            done = forked("bless", folder / "different.h5", baseline, "--reason", "why", stdout=stdout)
+            assert done.returncode == code
+            assert baseline.read_bytes() == (folder / "base.h5").read_bytes()
 
 
-def test_bless_refuses_a_reason_that_is_not_text(folder: Path, tmp_path: Path) -> None:
+def test_bless_refuses_a_reason_that_is_not_text(forked: Forked, folder: Path, tmp_path: Path) -> None:
     for reason in (b"caf\xe9", "a lone \ud800 surrogate"):
         with pytest.raises(UsageError, match="--reason: got"):
             impact.bless(folder / "equal.h5", tmp_path / "new.h5", reason=os.fsdecode(reason))
-    command = [sys.executable, "-m", "impact", "bless", f"{folder}/equal.h5", "new.h5", "--reason", b"caf\xe9"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    done = forked("bless", folder / "equal.h5", "new.h5", "--reason", os.fsdecode(b"caf\xe9"), cwd=tmp_path)
     assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
     assert not (tmp_path / "new.h5").exists()
 
 
-def test_a_narrow_terminal_shows_sentences_and_no_table(folder: Path) -> None:
-    command = [sys.executable, "-m", "impact", "compare", str(folder / "different.h5"), str(folder / "base.h5")]
-    in_terminal = [sys.executable, "-c", f"import pty; pty.spawn({command!r})"]
+def test_a_narrow_terminal_shows_sentences_and_no_table(forked: Forked, folder: Path) -> None:
+    words = ("compare", folder / "different.h5", folder / "base.h5")
     for columns, has_table in (("40", False), ("120", True)):
-        done = subprocess.run(
-            in_terminal, cwd=ROOT, env={**os.environ, "COLUMNS": columns}, stdin=subprocess.DEVNULL,
-            capture_output=True, text=True, check=False,
-        )  # fmt: skip
-        assert done.stdout.startswith("not equal: ")
-        assert ("scaled by v0" in done.stdout) == has_table
+        _, printed = printed_on_terminal(forked, *words, COLUMNS=columns)
+        assert printed.startswith("not equal: ")
+        assert ("scaled by v0" in printed) == has_table

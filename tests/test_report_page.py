@@ -85,7 +85,7 @@ class Seen(HTMLParser):
 
 
 def build(dataset: xr.Dataset, plugins: Sequence[impact.ForceModel | Path] = ()) -> str:
-    return page(dataset, lambda kind, choice: api.pictured(dataset, kind, choice, plugins))
+    return page(dataset, lambda kind, choice: api.get_plot_data(dataset, kind, choice, plugins))
 
 
 def table(text: str, label: str) -> list[list[str]]:

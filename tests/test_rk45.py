@@ -103,8 +103,8 @@ def test_recording_changes_no_bit(known):
 lanes = st.tuples(st.floats(-6.0, 4.0).map(lambda x: 10.0**x), st.floats(0.0, 0.5), st.floats(-1.0, 0.5))
 
 
-@settings(max_examples=30, deadline=None)
-@given(rows=st.lists(lanes, min_size=1, max_size=24), seed=st.integers(0, 999))
+@settings(max_examples=10, deadline=None)
+@given(rows=st.lists(lanes, min_size=1, max_size=8), seed=st.integers(0, 999))
 def test_lane_has_the_same_bits_alone_and_in_any_crowd(rows, seed):
     crowd = springs(rows)
     order = np.random.default_rng(seed).permutation(len(rows))
@@ -226,6 +226,32 @@ def test_a_step_across_the_event_is_tried_again_up_to_it():
     assert crossed.tolist() == [False, True, True, False]
     # by half where the event is not within the step
     assert h_next.tolist() == [7.0, 1.5, 1.0, 7.0]
+
+
+def test_an_event_is_located_at_the_bound_of_the_remaining_offset_and_not_above():
+    h, g = 2.0, np.ones(3)
+    bound = events.EVENT_RTOL * h + events.EVENT_ATOL
+    remaining = np.array([bound, -bound, np.nextafter(bound, 1.0)])
+    located, crossed, _ = events.at_event(np.full(3, True), remaining, g, remaining, h, 7.0)
+    assert located.tolist() == [True, True, False]
+    assert not crossed.any()
+
+
+@pytest.mark.parametrize(("ended", "is_compacted"), [(2, False), (3, True)])
+def test_trajectories_that_have_ended_are_removed_above_a_fraction(monkeypatch, ended, is_compacted):
+    # two of sixteen are the fraction
+    assert rk45.COMPACT_ABOVE == 2 / 16
+    sizes = []
+    advance = rk45._advance
+
+    def recorded(problem, state, *arguments):
+        sizes.append(state.y.shape[1])
+        return advance(problem, state, *arguments)
+
+    monkeypatch.setattr(rk45, "_advance", recorded)
+    solution = springs([(1.0, 0.1, 0.0)] * ended + [(1e-6, 0.0, 0.0)] * (16 - ended))
+    assert np.all(solution.termination == Termination.EVENT_REACHED)
+    assert set(sizes) == ({16, 16 - ended} if is_compacted else {16})
 
 
 def test_the_step_follows_the_error_within_bounds():

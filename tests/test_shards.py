@@ -19,6 +19,7 @@ from impact.results.sweep import sweep_into
 
 from .clusters import content, sweep
 from .conftest import Run
+from .forked import Forked
 
 # a block of each law
 CONFIG = """title = "In parts"
@@ -120,13 +121,11 @@ def test_an_unfinished_shard_is_told_from_a_missing_one(cli: Run, folder: Path) 
 
 LIMITED = """import resource
 resource.setrlimit(resource.RLIMIT_NOFILE, (40, 40))
-from impact.cli.main import main
-main()
 """
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a limit of open files")
-def test_more_shards_than_open_files_are_merged(cli: Run, folder: Path) -> None:
+def test_more_shards_than_open_files_are_merged(cli: Run, forked: Forked, folder: Path) -> None:
     # of the 60 only five have a range, and each is a folder with a lock
     found = shards(cli, folder, "1/60", "2/60", "3/60", "4/60", "5/60")
     for number in range(6, 61):
@@ -135,8 +134,7 @@ def test_more_shards_than_open_files_are_merged(cli: Run, folder: Path) -> None:
         told = json.loads((found[-1] / "shard.json").read_text()) | {"shard": [number, 60]}
         (found[-1] / "shard.json").write_text(json.dumps(told))
         (found[-1] / "00000000.npz").unlink()
-    words = [sys.executable, "-c", LIMITED, "merge", *map(str, reversed(found))]
-    done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
+    done = forked("merge", *reversed(found), cwd=folder, code=LIMITED)
     assert done.returncode == 0, done.stderr
     assert content(folder) == right(folder)
 
@@ -183,6 +181,18 @@ def test_what_a_folder_says_may_be_anything(cli: Run, folder: Path, text: str) -
     done = cli("merge", found, cwd=folder)
     assert done.returncode == 2
     assert "is not a shard; expected a work folder of impact sweep --shard K/N" in done.stderr
+
+
+def test_blocks_in_two_shards_have_to_be_equal(cli: Run, folder: Path) -> None:
+    whole, part = shards(cli, folder, "1/1", "1/5")
+    assert "in more than one folder, with the same bits" in merged(cli, folder, whole, part)
+    (path,) = part.glob("0*.npz")
+    with np.load(path) as stored:
+        arrays = {name: stored[name] for name in stored.files}
+    np.savez(path, **{**arrays, "contact_time": np.nextafter(arrays["contact_time"], 1.0)})
+    done = cli("merge", whole, part, "--overwrite", cwd=folder)
+    assert done.returncode == 2
+    assert f"{path}: differs from {whole / path.name}; expected both" in done.stderr
 
 
 @pytest.mark.slow

@@ -73,7 +73,7 @@ def test_a_scheduler_that_stops_answering_is_given_up(tmp_path: Path, monkeypatc
         rf"{cluster.address}: the scheduler has not answered for 4 s; [\d,]+ of 100,000 trajectories are kept in"
     )
     assert re.match(line, said.splitlines()[-1]), said
-    assert said.endswith("--resume goes on\n")
+    assert said.endswith("--resume continues\n")
     assert "Traceback" not in said
 
 
@@ -86,7 +86,7 @@ def test_the_first_signal_ends_a_sweep_whose_scheduler_stopped(tmp_path: Path) -
         one.process.terminate()
         said = one.ends(143)
     assert time.monotonic() - begun < 15.0
-    assert re.search(r"[\d,]+ of 400,000 trajectories are kept in results.h5.work; --resume goes on\n$", said), (
+    assert re.search(r"[\d,]+ of 400,000 trajectories are kept in results.h5.work; --resume continues\n$", said), (
         said
     )
     assert "Traceback" not in said

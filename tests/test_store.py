@@ -9,8 +9,6 @@ import re
 import shutil
 import stat
 import subprocess
-import sys
-import time
 import tomllib
 import tracemalloc
 from pathlib import Path
@@ -25,11 +23,13 @@ import impact
 from impact.api import prepare
 from impact.engine.executors import choose_backend
 from impact.errors import ResultError, StoreError, UnfinishedError, UsageError
+from impact.results import sweep as sweeps_of
 from impact.results.backend import open_result, write_file
 from impact.results.seal import write_seal
 from impact.results.sweep import sweep_into
 
 from .conftest import ROOT, Run
+from .forked import Forked
 
 
 def test_what_was_saved_is_loaded(stored: Path, figure6: xr.Dataset) -> None:
@@ -151,7 +151,9 @@ def test_h5ls_reads_it(stored: Path, factored: Path) -> None:
 
 
 @pytest.mark.parametrize("layout", ["full", "factored"])
-@pytest.mark.parametrize("option", OPTIONS)
+@pytest.mark.parametrize(
+    "option", ["all", *(pytest.param(name, marks=pytest.mark.slow) for name in OPTIONS if name != "all")]
+)
 def test_two_processes_write_equal_bytes(cli: Run, tmp_path: Path, layout: str, option: str) -> None:
     if layout == "factored" and "chunks" in OPTIONS[option]:
         pytest.skip("a factored file has chunks of its own")
@@ -161,8 +163,8 @@ def test_two_processes_write_equal_bytes(cli: Run, tmp_path: Path, layout: str, 
         text += f"{name} = {json.dumps(value).replace(':', ' =')}\n"
     (tmp_path / "c.toml").write_text(text, encoding="utf-8")
     contents = set()
-    # the hash of a text is another in each process begun anew
-    for name, environment in (("a", {"PYTHONHASHSEED": "1"}), ("b", {"PYTHONHASHSEED": "2"}), ("c", {})):
+    # the hash of a text differs in a new process
+    for name, environment in (("a", {"PYTHONHASHSEED": "1"}), ("b", {})):
         done = cli("sweep", "c.toml", "-o", f"{name}.h5", cwd=tmp_path, **environment)
         assert done.returncode == 0, done.stderr
         contents.add((tmp_path / f"{name}.h5").read_bytes())
@@ -194,6 +196,18 @@ def test_threads_processes_and_an_interruption_change_no_byte(tmp_path: Path, la
 def test_equal_inputs_give_equal_bytes(figure6: xr.Dataset, stored: Path, tmp_path: Path) -> None:
     impact.save(figure6, tmp_path / "again.h5")
     assert (tmp_path / "again.h5").read_bytes() == stored.read_bytes()
+
+
+def test_a_sweep_whose_file_cannot_be_read_is_not_published(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*arguments: object) -> None:
+        raise StoreError("cannot be read")
+
+    monkeypatch.setattr(sweeps_of, "check_readable", refuse)
+    with pytest.raises(StoreError, match="cannot be read"):
+        sweep_into(tmp_path / "out.h5", prepare(ROOT / "configs" / "figure6.toml", ["sweep.e=0.5"]))
+    assert not (tmp_path / "out.h5").exists()
 
 
 def test_an_output_that_exists_is_kept(figure6: xr.Dataset, tmp_path: Path) -> None:
@@ -253,23 +267,21 @@ def test_a_folder_that_cannot_be_synced_is_a_note(
 
 
 UNREADABLE = """
-import ctypes, sys
+import ctypes
 # without its capabilities root may open no more than others; 0x20080522 is the version of the call
 ctypes.CDLL(None).capset((ctypes.c_uint32 * 2)(0x20080522, 0), (ctypes.c_uint32 * 6)())
-from impact.cli.main import main
-sys.argv = ["impact", "sweep", "c.toml", "--quiet"]
-main()
 """
 
 
-def test_a_folder_that_may_be_written_to_and_not_read_holds_the_result(tmp_path: Path) -> None:
+def test_a_folder_that_may_be_written_to_and_not_read_holds_the_result(forked: Forked, tmp_path: Path) -> None:
     folder = tmp_path / "folder"
     folder.mkdir()
     text = (ROOT / "configs" / "figure6.toml").read_text(encoding="utf-8")
     # so many points are integrated beside a work folder
     (folder / "c.toml").write_text(text.replace("101", "40000"), encoding="utf-8")
     folder.chmod(0o300)
-    done = subprocess.run([sys.executable, "-c", UNREADABLE], cwd=folder, capture_output=True, text=True)
+    words = ("--set", "models=['hunt-crossley-1975']", "--set", "solver.rtol=1e-4", "--quiet")
+    done = forked("sweep", "c.toml", *words, cwd=folder, code=UNREADABLE)
     folder.chmod(0o700)
     assert done.returncode == 0, done.stderr
     assert done.stderr == (
@@ -417,67 +429,64 @@ def test_what_no_memory_holds_is_refused_before_it_is_computed(tmp_path: Path) -
     with open_result(tmp_path / "large.h5") as opened:
         assert opened["e_out"].size == 10**12
         tracemalloc.start()
-        begun = time.monotonic()
         for compute in (lambda: opened["e_out"].mean(), lambda: opened.load(), lambda: opened["status"].values):
             with pytest.raises(MemoryError, match=r"1,000,000,000,000 values take .* select a part first"):
                 compute()
-        assert time.monotonic() - begun < 1.0
         assert tracemalloc.get_traced_memory()[1] < 20_000_000
         tracemalloc.stop()
         assert float(opened["e_out"].isel(v1=0, m1=slice(0, 50)).mean()) == pytest.approx(1.0, abs=1e-9)
 
 
-# what could be neither stored nor read is refused before anything is integrated: so many trajectories take minutes
-SLOW = """
-models = ["hertz"]
+# what could be neither stored nor read is refused before anything is integrated, which leaves a file
+SWEEP = """
+models = ["mine-2026"]
 [sweep]
-e = 1.0
-v1 = {linspace = [1.0, 2.0, 1000]}
+v1 = [1.0, 2.0]
 m1 = 1.0
 m2 = 1.0
 """
-SLOW_LAW = """
-models = ["lankarani-nikravesh-1990"]
-[sweep]
-e = {linspace = [0.0, 1.0, 3000000]}
-v1 = 1.0
-m1 = 1.0
-m2 = 1.0
-K = 6e9
+# a law of forty parameters
+LAW = """
+from pathlib import Path
+import impact
+
+def force(elastic):
+    Path("integrated").touch()
+    return elastic
+
+MINE = impact.ForceModel(
+    "mine-2026", "Mine", 2026, equation="", reference="", exponent=1.0, force=force,
+    parameters=tuple(impact.Parameter(f"p{number}", "1", "a number", default=1.0) for number in range(40)),
+)
 """
 
 
-def _refused(cli: Run, folder: Path, config: str, output: str, *words: str) -> str:
+def test_a_sweep_that_is_not_refused_leaves_a_file(cli: Run, tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(LAW, encoding="utf-8")
+    (tmp_path / "c.toml").write_text(f"{SWEEP}K = 6e9\nn = 1.0\n", encoding="utf-8")
+    assert cli("sweep", "c.toml", "--plugin", "mine.py", cwd=tmp_path).returncode == 0
+    assert (tmp_path / "integrated").exists()
+
+
+def _refused(cli: Run, folder: Path, config: str, output: str) -> str:
+    (folder / "mine.py").write_text(LAW, encoding="utf-8")
     (folder / "c.toml").write_text(config, encoding="utf-8")
     before = sorted(path.name for path in folder.iterdir())
-    begun = time.monotonic()
-    done = cli("sweep", "c.toml", "-o", output, *words, cwd=folder)
-    assert time.monotonic() - begun < 30.0
+    done = cli("sweep", "c.toml", "-o", output, "--plugin", "mine.py", cwd=folder)
     assert (done.returncode, done.stdout) == (2, ""), done
     (line,) = done.stderr.splitlines()
     assert sorted(path.name for path in folder.iterdir()) == before
     return line
 
 
-# a law of forty parameters
-FORTY = """
-import impact
-MINE = impact.ForceModel(
-    "mine-2026", "Mine", 2026, equation="", reference="", exponent=1.0, force=lambda elastic: elastic,
-    parameters=tuple(impact.Parameter(f"p{number}", "1", "a number", default=1.0) for number in range(40)),
-)
-"""
-
-
 @pytest.mark.parametrize("layout", ["full", "factored"])
 def test_more_axes_than_a_file_can_have_are_refused(cli: Run, tmp_path: Path, layout: str) -> None:
-    (tmp_path / "mine.py").write_text(FORTY, encoding="utf-8")
     axes = "".join(f"p{number} = {[1.0, 2.0] if number < 2 else [1.0]}\n" for number in range(40))
     config = (
         f'models = ["mine-2026"]\n[sweep]\nv1 = 1.0\nm1 = 1.0\nm2 = 1.0\nK = 6e9\nn = 1.0\n'
         f'[output]\nlayout = "{layout}"\n[model.mine-2026]\n{axes}'
     )
-    line = _refused(cli, tmp_path, config, "out.h5", "--plugin", "mine.py")
+    line = _refused(cli, tmp_path, config, "out.h5")
     assert "got 40 axes, expected at most 31" in line
 
 
@@ -485,13 +494,13 @@ def test_longer_labels_than_a_file_can_have_are_refused(cli: Run, tmp_path: Path
     # each takes as many letters as the longest
     names = ["x" * 400_000, *(f"y{number}" for number in range(19))]
     materials = "".join(f"[materials.{name}]\nE = 2e11\nnu = 0.3\nrho = 7800\n" for name in names)
-    line = _refused(cli, tmp_path, f"{SLOW}material = {json.dumps(names)}\n{materials}", "out.h5")
+    line = _refused(cli, tmp_path, f"{SWEEP}n = 1.0\nmaterial = {json.dumps(names)}\n{materials}", "out.h5")
     assert "labels take 8," in line
     assert "expected at most 4,000,000: give materials shorter names" in line
 
 
 @pytest.mark.parametrize("length", [242, 255, 300])
 def test_longer_names_than_a_folder_can_have_are_refused(cli: Run, tmp_path: Path, length: int) -> None:
-    line = _refused(cli, tmp_path, SLOW_LAW, "r" * (length - 3) + ".h5")
+    line = _refused(cli, tmp_path, f"{SWEEP}K = 6e9\nn = 1.0\n", "r" * (length - 3) + ".h5")
     assert f"got a name of {length} bytes, expected at most " in line
     assert len(line) < 200

@@ -276,7 +276,7 @@ def test_any_executor_integrates(blocks: Path) -> None:
             assert impact.sweep(blocks, executor=executor).identical(one)
         # it is not shut down
         assert threads.submit(len, "abc").result() == 3
-    with pytest.raises(UsageError, match="got jobs = 2 and an executor, wants one of them"):
+    with pytest.raises(UsageError, match="got jobs = 2 and an executor, expected one of them"):
         impact.sweep(blocks, jobs=2, executor=threads)
 
 
@@ -429,7 +429,7 @@ def test_chunks_that_are_too_many_or_too_large(blocks: Path) -> None:
     with pytest.raises(ConfigError, match=r"got 1,600,000 chunks of 2 points, expected at most 100,000 of"):
         prepare(blocks, ["output.chunks.e=1"])
     with pytest.raises(ConfigError, match=r"got 80 chunks of 10,000,000 points"):
-        prepare(blocks, ["output.chunks.m1=1", "sweep.e.linspace=[0,1,10000000]"])
+        prepare(blocks, ["output.chunks.m1=1", "sweep.v1={linspace=[1,2,250]}"])
 
 
 def test_what_packs_very_well_is_read_again(tmp_path: Path) -> None:

@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from .plots.kinds import Choice, Numbers
+    from .plots.kinds import Choice, PlotData
 
 
 def prepare(
@@ -334,18 +334,18 @@ def plot(
     from .plots.kinds import Choice, draw
 
     choice = Choice(x, y, variable, sel, models, log, equations)
-    numbers = pictured(dataset, kind, choice, plugins)
-    return draw(numbers, width, height, style=style, title=title, labels=labels, points=points, ax=ax)
+    plot_data = get_plot_data(dataset, kind, choice, plugins)
+    return draw(plot_data, width, height, style=style, title=title, labels=labels, points=points, ax=ax)
 
 
-def pictured(
+def get_plot_data(
     dataset: xr.Dataset, kind: str, choice: Choice, plugins: Sequence[ForceModel | str | Path] = ()
-) -> Numbers:
-    """The numbers of a picture; see `plot`."""
-    from .plots.kinds import numbers_of
+) -> PlotData:
+    """The data of a picture; see `plot`."""
+    from .plots.kinds import plot_data_of
 
     own = read_plugins(plugins)
-    return numbers_of(kind, dataset, choice, lambda: histories(dataset, choice.models, choice.sel or {}, own))
+    return plot_data_of(kind, dataset, choice, lambda: histories(dataset, choice.models, choice.sel or {}, own))
 
 
 def materials() -> dict[str, dict[str, float | str]]:
@@ -411,4 +411,4 @@ def report(dataset: xr.Dataset, *, plugins: Sequence[ForceModel | str | Path] = 
     """
     from .reporting.page import page
 
-    return page(dataset, lambda kind, choice: pictured(dataset, kind, choice, plugins))
+    return page(dataset, lambda kind, choice: get_plot_data(dataset, kind, choice, plugins))

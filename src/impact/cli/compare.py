@@ -149,7 +149,7 @@ def _tell(verdict: Verdict, format: Format, plot: Path | None) -> None:
     elif plot is not None:
         from ..plots import differences, style
 
-        style.save_figure(differences.draw_differences(differences.differences(verdict)), plot)
+        style.save_figure(differences.draw_differences(differences.difference_data(verdict)), plot)
         exits.say(f"{safe_text(str(plot))}: {'drawn' if verdict.equal else 'where the differences lie'}")
     if not verdict.equal:
         raise typer.Exit(exits.NOT_EQUAL)

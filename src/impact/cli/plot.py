@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..errors import UsageError, did_you_mean
-from ..plots.kinds import KINDS, LOGS, WIDTHS
+from ..plots.kinds import KINDS, LOG_AXES, WIDTHS
 from ..text import safe_text
 from . import exits
 from .console import dump
 from .options import Json, Models, Overwrite, Plugins, Sel
 
 if TYPE_CHECKING:
-    from ..plots.kinds import Numbers
+    from ..plots.kinds import PlotData
 
 
 def plot(
@@ -113,8 +113,8 @@ def plot(
     from ..plots.style import check_picture, length, save_figure
     from ..results import backend
 
-    if log not in (None, *LOGS):
-        raise UsageError(f"--log: got {safe_text(str(log))}, expected {', '.join(LOGS)}")
+    if log not in (None, *LOG_AXES):
+        raise UsageError(f"--log: got {safe_text(str(log))}, expected {', '.join(LOG_AXES)}")
     kinds = list(dict.fromkeys(kind or ["final-velocities"]))
     for name in kinds:
         if name not in KINDS:
@@ -125,7 +125,8 @@ def plot(
     if data is not None:
         check_table(data, data_form)
     files = {
-        name: [_named(path, name, len(kinds)) for path in (output, data) if path is not None] for name in kinds
+        name: [_path_of_kind(path, name, len(kinds)) for path in (output, data) if path is not None]
+        for name in kinds
     }
     for path in (path for paths in files.values() for path in paths):
         for source in (result, *([points] if points else [])):
@@ -133,21 +134,23 @@ def plot(
     measured = None if points is None else read_points(points)
     dataset = api.load(result)
     choice = Choice(x, y, variable, dict(sel or ()), model, log or "", equations)
-    drawn: dict[str, Numbers] = {}
+    drawn: dict[str, PlotData] = {}
     faults: dict[str, str] = {}
     for name, (picture, *table) in files.items():
         try:
-            numbers = api.pictured(dataset, name, choice, plugin or ())
-            figure = draw(numbers, *size, style=style, title=not no_title, labels=_labels(label), points=measured)
-            tables = [(path, as_table(numbers, path.suffix.lower(), data_form)) for path in table]
+            plot_data = api.get_plot_data(dataset, name, choice, plugin or ())
+            figure = draw(
+                plot_data, *size, style=style, title=not no_title, labels=_parse_labels(label), points=measured
+            )
+            tables = [(path, as_table(plot_data, path.suffix.lower(), data_form)) for path in table]
         except UsageError as error:
             faults[name] = str(error)
             continue
         save_figure(figure, picture, overwrite=overwrite, style=style)
         for path, content in tables:
             backend.write_file(path, content, overwrite=overwrite)
-        drawn[name] = numbers
-        exits.say(_summary(picture, numbers))
+        drawn[name] = plot_data
+        exits.say(_summary_line(picture, plot_data))
     if not drawn:
         raise UsageError("\n".join(dict.fromkeys(faults.values())))
     for name, fault in faults.items():
@@ -155,10 +158,10 @@ def plot(
     if as_json:
         from dataclasses import asdict
 
-        print(dump({name: asdict(numbers) for name, numbers in drawn.items()}))
+        print(dump({name: asdict(plot_data) for name, plot_data in drawn.items()}))
 
 
-def _labels(words: list[str] | None) -> dict[str, str]:
+def _parse_labels(words: list[str] | None) -> dict[str, str]:
     """KEY=TEXT options."""
     labels: dict[str, str] = {}
     for word in words or ():
@@ -169,12 +172,12 @@ def _labels(words: list[str] | None) -> dict[str, str]:
     return labels
 
 
-def _named(path: Path, kind: str, kinds: int) -> Path:
+def _path_of_kind(path: Path, kind: str, kinds: int) -> Path:
     """A file of its own for each of several kinds."""
     return path if kinds == 1 else path.with_name(f"{path.stem}-{kind}{path.suffix}")
 
 
-def _summary(picture: Path, numbers: Numbers) -> str:
-    conditions = numbers.conditions.replace("\N{NO-BREAK SPACE}", " ")
-    without = f"; without {', '.join(numbers.not_drawn)}" if numbers.not_drawn else ""
-    return safe_text(f"{picture}: {numbers.title}" + (f", {conditions}" if conditions else "") + without, 1000)
+def _summary_line(picture: Path, plot_data: PlotData) -> str:
+    conditions = plot_data.conditions.replace("\N{NO-BREAK SPACE}", " ")
+    without = f"; without {', '.join(plot_data.not_drawn)}" if plot_data.not_drawn else ""
+    return safe_text(f"{picture}: {plot_data.title}" + (f", {conditions}" if conditions else "") + without, 1000)

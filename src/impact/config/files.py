@@ -1,4 +1,4 @@
-"""What a config is read from, made into plain data: files, texts, mappings, overrides; none is trusted."""
+"""Plain data from the sources of a config: files, texts, mappings and overrides, none of which is trusted."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ import numpy as np
 
 from ..errors import ConfigError
 from ..text import safe_text
-from .lines import BARE
-from .quantities import RANGES, Fault, KeyPath, show
+from .lines import BARE_KEY
+from .quantities import RANGE_FORMS, ConfigProblem, KeyPath, show
 
-MAX_BYTES = 1_000_000  # of a config file
-MAX_OVERRIDE = 4_000_000  # characters of a value that is set
-MAX_DEPTH = 8  # of nested tables and lists; the deepest key needs 5
-MAX_TEXT = 64_000_000  # of a mapping as JSON, whose axes may have been written out
-MAX_PARTS = 64  # dots of a key: TOML parsers take quadratic time over longer ones
-_PART = rf"""(?:{BARE}|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""
-LONG_KEY = re.compile(rf"(?<![\w.-])(?:{_PART}[ \t]*+\.[ \t]*+){{{MAX_PARTS + 1}}}")
+MAX_CONFIG_BYTES = 1_000_000  # size of a TOML file
+MAX_OVERRIDE_LENGTH = 4_000_000  # characters of the value of an override
+MAX_DEPTH = 8  # levels of nested tables and lists; the deepest key needs 5
+MAX_JSON_LENGTH = 64_000_000  # characters of a mapping as JSON, which may hold all values of its axes
+MAX_KEY_PARTS = 64  # dots of a key: TOML parsers take quadratic time for longer ones
+_PART = rf"""(?:{BARE_KEY}|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""
+LONG_KEY = re.compile(rf"(?<![\w.-])(?:{_PART}[ \t]*+\.[ \t]*+){{{MAX_KEY_PARTS + 1}}}")
 
 
-def read_text(path: Path, kind: str = "TOML", most: int = MAX_BYTES) -> str:
+def read_text(path: Path, kind: str = "TOML", most: int = MAX_CONFIG_BYTES) -> str:
     """The text of a file.
 
     Raises
@@ -50,16 +50,16 @@ def read_text(path: Path, kind: str = "TOML", most: int = MAX_BYTES) -> str:
         raise ConfigError([f"{name}:{line}: not UTF-8: byte 0x{content[error.start]:02x}"]) from None
 
 
-def load(text: str, name: str) -> Any:
-    """What a TOML text, or a JSON text, which starts with a brace, says.
+def parse_document(text: str, name: str) -> Any:
+    """The data of a TOML text, or of a JSON text, which starts with a brace.
 
     Raises
     ------
-    ConfigError : the text is not of the language, or costs the parser too much
+    ConfigError : the text has a syntax error, is too large, or is nested too deeply
     """
     name = safe_text(name)
     is_json = text.lstrip().startswith("{")
-    if len(text) > (MAX_TEXT if is_json else MAX_BYTES):
+    if len(text) > (MAX_JSON_LENGTH if is_json else MAX_CONFIG_BYTES):
         raise ConfigError([f"{name}: larger than any config"])
     return _parse(text, json.loads if is_json else tomllib.loads, "JSON" if is_json else "TOML", name)
 
@@ -68,75 +68,81 @@ def _parse(text: str, loads: Callable[[str], object], language: str, name: str) 
     long = LONG_KEY.search(text) if language == "TOML" else None
     if long is not None:
         line = text.count("\n", 0, long.start()) + 1
-        raise ConfigError([f"{name}:{line}: a key of more than {MAX_PARTS} dots: {safe_text(long[0], 40)}"])
+        raise ConfigError([f"{name}:{line}: a key of more than {MAX_KEY_PARTS} dots: {safe_text(long[0], 40)}"])
     try:
         return loads(text)
     except RecursionError:
-        line = max(range(1, text.count("\n") + 2), key=_nesting(text).__getitem__)
+        line = max(range(1, text.count("\n") + 2), key=_bracket_counts(text).__getitem__)
         raise ConfigError([f"{name}:{line}: nested too deeply, expected at most {MAX_DEPTH} levels"]) from None
     except ValueError as error:
-        raise ConfigError([f"{name}:{_explained(text, language, str(error))}"]) from None
+        raise ConfigError([f"{name}:{_syntax_error_line(text, language, str(error))}"]) from None
 
 
-def _nesting(text: str) -> list[int]:
-    """Opening brackets of each line, from line 1; a guess that is enough to find the absurd one."""
+def _bracket_counts(text: str) -> list[int]:
+    """Opening brackets of each line, from line 1: the line with the most is taken as the one nested too deeply."""
     return [0, *(line.count("[") + line.count("{") for line in text.split("\n"))]
 
 
-def _explained(text: str, language: str, message: str) -> str:
+def _syntax_error_line(text: str, language: str, message: str) -> str:
+    """The line number, the message of the parser and the line itself."""
     lines = text.split("\n")
     digits = re.search(r"[0-9_]{4000}", text)
     if "integer string conversion" in message and digits is not None:
         return f"{text.count(chr(10), 0, digits.start()) + 1}: not {language}: a number of thousands of digits"
-    found = re.search(r"\(?at line (\d+), column \d+\)|: line (\d+) column.*$|\(at end of document\)", message)
-    line = int(found[1] or found[2] or len(lines)) if found is not None else 1
-    reason = message[: found.start()].strip() if found is not None else message
+    position = re.search(r"\(?at line (\d+), column \d+\)|: line (\d+) column.*$|\(at end of document\)", message)
+    line = int(position[1] or position[2] or len(lines)) if position is not None else 1
+    reason = message[: position.start()].strip() if position is not None else message
     shown = safe_text(lines[line - 1].strip(), 60)
     return f"{line}: not {language}: {safe_text(reason)}" + (f": {shown}" if shown else "")
 
 
-def plain(value: object, path: KeyPath = ()) -> tuple[Any, list[Fault]]:
-    """The value in dicts, lists and plain Python numbers, and what keeps it from being that.
+def to_plain_data(value: object, path: KeyPath = ()) -> tuple[Any, list[ConfigProblem]]:
+    """The value as dicts, lists and plain Python numbers, and its problems: invalid text, or too many levels.
 
-    >>> plain({"e": np.linspace(0, 1, 3), "m2": (1, np.float64(2))})
+    >>> to_plain_data({"e": np.linspace(0, 1, 3), "m2": (1, np.float64(2))})
     ({'e': [0.0, 0.5, 1.0], 'm2': [1, 2.0]}, [])
     """
     if type(value) in (float, int, bool):
         return value, []
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
-    if isinstance(value, str) and not _storable(value):
+    if isinstance(value, str) and not _is_storable(value):
         return value, [(path, f"got {show(value)}, expected text without NUL and lone surrogates")]
     if not isinstance(value, Mapping | list | tuple):
         return value, []
     if len(path) >= MAX_DEPTH:
         return None, [(path, f"nested too deeply, expected at most {MAX_DEPTH} levels")]
-    found: list[Fault] = []
+    problems: list[ConfigProblem] = []
     if isinstance(value, list | tuple):
-        if all(type(item) is float for item in value):
+        if all(type(element) is float for element in value):
             return list(value), []
-        items: list[object] = []
-        for place, item in enumerate(value):
-            made, wrong = plain(item, (*path, place))
-            items.append(made)
-            found += wrong
-        return items, found
+        elements: list[object] = []
+        for index, element in enumerate(value):
+            plain_element, element_problems = to_plain_data(element, (*path, index))
+            elements.append(plain_element)
+            problems += element_problems
+        return elements, problems
     table: dict[str, object] = {}
-    for key, item in value.items():
-        if not isinstance(key, str) or not _storable(key):
-            found.append((path, f"got the key {show(key)}, expected text without NUL and lone surrogates"))
+    for key, element in value.items():
+        if not isinstance(key, str) or not _is_storable(key):
+            problems.append((path, f"got the key {show(key)}, expected text without NUL and lone surrogates"))
         else:
-            table[key], wrong = plain(item, (*path, key))
-            found += wrong
-    return table, found
+            table[key], element_problems = to_plain_data(element, (*path, key))
+            problems += element_problems
+    return table, problems
 
 
-def _storable(text: str) -> bool:
+def _is_storable(text: str) -> bool:
     return "\0" not in text and not re.search("[\ud800-\udfff]", text)
 
 
+def as_table(value: object) -> dict[str, Any]:
+    """The value if it is a table, otherwise an empty table."""
+    return value if isinstance(value, dict) else {}
+
+
 def toml_text(value: object) -> str:
-    """A value of plain data as TOML on one line.
+    """Plain data as TOML on one line.
 
     >>> toml_text({"v1": [1.0, float("inf")], "my steel": "a"})
     '{v1 = [1.0, inf], "my steel" = "a"}'
@@ -149,80 +155,87 @@ def toml_text(value: object) -> str:
         case list():
             return f"[{', '.join(map(toml_text, value))}]"
         case dict():
-            return f"{{{', '.join(f'{toml_key(key)} = {toml_text(item)}' for key, item in value.items())}}}"
+            return f"{{{', '.join(f'{toml_key(key)} = {toml_text(element)}' for key, element in value.items())}}}"
     return repr(value)
 
 
 def toml_key(name: str) -> str:
     """A part of a TOML key."""
-    return name if re.fullmatch(BARE, name) else toml_text(name)
+    return name if re.fullmatch(BARE_KEY, name) else toml_text(name)
 
 
 def apply_overrides(
     data: dict[str, Any], overrides: Sequence[str]
 ) -> tuple[dict[str, Any], dict[KeyPath, tuple[int, KeyPath]], list[str]]:
-    """The data after overrides such as `sweep.e.linspace=[0,1,11]`, which gave which path, and problems."""
+    """Apply overrides such as `sweep.e.linspace=[0,1,11]`.
+
+    Returns
+    -------
+    The new data; for each path that was set, the index of the override and the path that it names; and problems.
+    """
     problems: list[str] = []
     overridden: dict[KeyPath, tuple[int, KeyPath]] = {}
-    for which, text in enumerate(overrides):
-        path, written = read_override(text)
+    for index, text in enumerate(overrides):
+        path, value_text = read_override(text)
         if not path:
             problems.append(f"--set {safe_text(text)}: expected PATH=VALUE, such as sweep.e=0.5")
             continue
-        new_range = path[0] in ("sweep", "model", "materials") and len(path) > 2 and path[-1] in RANGES
-        data, start = _replaced(data, path, _value(written), new_range)
-        overridden = {old: by for old, by in overridden.items() if old[: len(start)] != start}
-        overridden[start] = (which, path)
+        new_range = path[0] in ("sweep", "model", "materials") and len(path) > 2 and path[-1] in RANGE_FORMS
+        data, start = set_value(data, path, _override_value(value_text), new_range=new_range)
+        overridden = {old: override for old, override in overridden.items() if old[: len(start)] != start}
+        overridden[start] = (index, path)
         other = "alpha" if path[:2] == ("sweep", "e") else "e" if path[:2] == ("sweep", "alpha") else None
         if other:
-            # each says what the other would: what is set last takes the place of what was there before
-            overridden = {old: by for old, by in overridden.items() if old[:2] != ("sweep", other)}
-            data = {**data, "sweep": {key: item for key, item in data["sweep"].items() if key != other}}
+            # e and alpha exclude each other: an override of one removes the other
+            overridden = {old: override for old, override in overridden.items() if old[:2] != ("sweep", other)}
+            data = {**data, "sweep": {key: value for key, value in data["sweep"].items() if key != other}}
     return data, overridden, problems
 
 
 def read_override(text: str) -> tuple[KeyPath, str]:
-    """The path and the value's text of an override PATH=VALUE; an empty path if it is not one.
+    """The path and the text of the value of an override PATH=VALUE; an empty path for any other text.
 
     >>> read_override("sweep.e.linspace=[0,1,11]")
     (('sweep', 'e', 'linspace'), '[0,1,11]')
     """
-    # a quoted part of a key may hold "="
-    for match in list(re.finditer("=", text[:MAX_BYTES]))[:8]:
+    # a quoted part of a key may contain "="
+    for match in list(re.finditer("=", text[:MAX_CONFIG_BYTES]))[:8]:
         try:
-            table = load(f"{text[: match.start()]}=0", "--set")
+            table = parse_document(f"{text[: match.start()]}=0", "--set")
         except ConfigError:
             continue
         path: list[str] = []
         while isinstance(table, dict) and len(table) == 1:
             ((name, table),) = table.items()
             path.append(name)
-        return (tuple(path), text[match.end() :].strip()) if table == 0 and len(path) <= MAX_PARTS else ((), "")
+        if table == 0 and len(path) <= MAX_KEY_PARTS:
+            return tuple(path), text[match.end() :].strip()
+        break
     return (), ""
 
 
-def _replaced(
-    data: Mapping[str, object], path: KeyPath, value: object, new_range: bool
+def set_value(
+    data: Mapping[str, object], path: KeyPath, value: object, *, new_range: bool = False
 ) -> tuple[dict[str, Any], KeyPath]:
     """The data with the value at the path, and the part of the path that is new or replaced.
 
-    `new_range` drops what else the innermost table holds: a range replaces another.
+    With `new_range`, the other keys of the innermost table are removed: one range replaces another.
 
-    >>> _replaced({"sweep": {"e": 0.5}}, ("sweep", "e", "linspace"), [0, 1, 3], True)
+    >>> set_value({"sweep": {"e": 0.5}}, ("sweep", "e", "linspace"), [0, 1, 3], new_range=True)
     ({'sweep': {'e': {'linspace': [0, 1, 3]}}}, ('sweep', 'e'))
     """
     name, *rest = (str(part) for part in path)
     if not rest:
         return {**data, name: value}, (name,)
     inner = data.get(name)
-    kept = inner if isinstance(inner, dict) and not (new_range and len(rest) == 1) else {}
-    changed, start = _replaced(kept, tuple(rest), value, new_range)
-    return {**data, name: changed}, (name,) if kept is not inner else (name, *start)
+    base = inner if isinstance(inner, dict) and not (new_range and len(rest) == 1) else {}
+    changed, start = set_value(base, tuple(rest), value, new_range=new_range)
+    return {**data, name: changed}, (name,) if base is not inner else (name, *start)
 
 
-def _value(text: str) -> object:
-    """A TOML value, or the text itself: `sweep.material=steel` needs no quotes."""
-    if len(text) > MAX_OVERRIDE:
+def _override_value(text: str) -> object:
+    """The TOML value of a text, or the text itself: `sweep.material=steel` needs no quotes."""
+    if len(text) > MAX_OVERRIDE_LENGTH:
         return text
     try:
         table = _parse(f"value = {text}", tomllib.loads, "TOML", "--set")

@@ -9,21 +9,21 @@ from dataclasses import dataclass
 from pydantic import ValidationError
 
 from ..contact.outputs import BY_DEFAULT
-from .quantities import MAX_FAULTS, Fault, KeyPath, Names, Numbers, Quantity, Range, nearest, show
+from .quantities import MAX_PROBLEMS, ConfigProblem, KeyPath, Names, Numbers, Quantity, Range, show, suggest
 
-# of all models together, where nothing else is said
+# default limit of the points of all models together
 MAX_POINTS = 10**9
-# that can be counted, where they are not stored one by one
+# limit of the points of a factored result, which are not stored one by one: they must fit in 64-bit indices
 MAX_COUNTED_POINTS = 2**62
-# HDF5 has arrays of 32 dimensions, one of which is that of the models
+# HDF5 arrays have at most 32 dimensions, and the models take one
 MAX_AXES = 31
-FULL = ' in layout "full" (--max-points); layout = "factored" stores any number'
-# chunks of a result, and points of a chunk: a reader opens each, and holds it as a whole
+FULL_LAYOUT_HINT = ' in layout "full" (--max-points); layout = "factored" stores any number'
+# chunks of a result and points of a chunk: a reader opens every chunk, and holds a whole one in memory
 MAX_STORED_CHUNKS, MAX_CHUNK_POINTS = 100_000, 2**22
-# bytes that the outputs of a point take at most, by default
-WIDTH = 8 * len(BY_DEFAULT)
+# upper bound of the bytes that the default outputs of a point take
+BYTES_PER_POINT = 8 * len(BY_DEFAULT)
 
-Values = tuple[float, ...] | tuple[str, ...]
+AxisValues = tuple[float, ...] | tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -33,9 +33,9 @@ class Axis:
     Parameters
     ----------
     columns : values by config name, all of one length
-    numbered : name of a dimension whose points are numbered from 0, since no column names them: that of a table
-        of cases, or of a group with repeated values; empty where the first column names the points
-    numbers : those of its points, where it is a part of such a dimension; empty for the whole
+    numbered : name of a dimension whose points are numbered from 0, because no column labels them: that of a table
+        of cases, or of a group with repeated values; empty where the first column labels the points
+    numbers : the numbers of its points, where it is a part of such a dimension; empty for a whole dimension
 
     >>> Axis({"m1": (1.0, 2.0), "m2": (2.0, 4.0)}).name
     'm1'
@@ -43,13 +43,13 @@ class Axis:
     (0, 1)
     """
 
-    columns: Mapping[str, Values]
+    columns: Mapping[str, AxisValues]
     numbered: str = ""
     numbers: tuple[int, ...] = ()
 
     @property
     def name(self) -> str:
-        """Of the dimension."""
+        """Name of the dimension."""
         return self.numbered or next(iter(self.columns))
 
     @property
@@ -58,92 +58,93 @@ class Axis:
 
     @property
     def labels(self) -> tuple[float, ...] | tuple[str, ...]:
-        """What names its points: the values of the first column, or their numbers."""
+        """The labels of its points: the values of the first column, or numbers."""
         return (self.numbers or tuple(range(self.size))) if self.numbered else self.columns[self.name]
 
 
 @dataclass(frozen=True)
 class Grid:
-    """Scalars by name, axes in config order, and what is wrong with them."""
+    """Scalars by name, axes in config order, and their problems."""
 
     scalars: Mapping[str, float | str]
     axes: tuple[Axis, ...]
-    faults: tuple[Fault, ...]
+    problems: tuple[ConfigProblem, ...]
 
 
-def lay_out(
-    entries: Mapping[str, Numbers | Names],
+def build_grid(
+    values: Mapping[str, Numbers | Names],
     quantities: Mapping[str, Quantity],
     groups: Sequence[Sequence[str]],
     cases: Sequence[str],
-    given: Sequence[str],
-    models: int,
+    config_names: Sequence[str],
+    n_models: int,
     max_points: int = MAX_POINTS,
     *,
     in_full: bool = True,
 ) -> Grid:
-    """The grid of some entries.
+    """The grid that the values of a config span.
 
     Parameters
     ----------
-    entries : what could be read, by config name, in config order
-    quantities : what each number has to be
+    values : the valid values by config name, in config order
+    quantities : the quantity of each numeric value, by config name
     groups : config names that vary together
-    cases : the names of the columns of a table of cases
-    given : the names that were given, whether they could be read or not
-    models : how many there are
-    max_points : how many points are allowed
-    in_full : whether all of them are to be stored; else what is integrated is bounded, see `impact.api.prepare`
+    cases : config names of the columns of a table of cases
+    config_names : all names in the config, also those with invalid values
+    n_models : number of models
+    max_points : limit of the number of points
+    in_full : whether every point is stored; otherwise `impact.api.prepare` limits the number of trajectories
     """
-    sizes = {name: _size(entry) for name, entry in entries.items()}
-    scalars = {name: entry for name, entry in entries.items() if isinstance(entry, float | str)}
-    member_of, faults = _zipped(groups, sizes, cases, given)
-    together = [name for name in entries if name in cases]
-    member_of |= dict.fromkeys(together, together)
-    swept = [name for name in entries if name not in scalars]
-    # a group stands where its first member does
-    leaders = [name for name in swept if member_of.get(name, (name,))[0] == name]
-    points = math.prod(sizes[name] or 1 for name in leaders) * models
+    axis_sizes = {name: _axis_size(value) for name, value in values.items()}
+    scalars = {name: value for name, value in values.items() if isinstance(value, float | str)}
+    member_of, problems = _zip_groups(groups, axis_sizes, cases, config_names)
+    case_columns = [name for name in values if name in cases]
+    member_of |= dict.fromkeys(case_columns, case_columns)
+    axis_names = [name for name in values if name not in scalars]
+    # a group takes the position of its first member
+    leaders = [name for name in axis_names if member_of.get(name, (name,))[0] == name]
+    points = math.prod(axis_sizes[name] or 1 for name in leaders) * n_models
     if len(leaders) > MAX_AXES:
-        faults.append((("sweep",), f"got {len(leaders)} axes, expected at most {MAX_AXES}"))
-    most = max_points if in_full else MAX_COUNTED_POINTS
-    if points > most:
-        size = f"{points:,} points (axes times models), up to {WIDTH * points / 1e9:,.0f} GB"
-        faults.append((("sweep",), f"got {size}, expected at most {most:,} points" + FULL * in_full))
-    columns: dict[str, Values] = {}
-    for name in swept:
-        entry = entries[name]
-        if isinstance(entry, tuple):
-            columns[name] = entry
+        problems.append((("sweep",), f"got {len(leaders)} axes, expected at most {MAX_AXES}"))
+    limit = max_points if in_full else MAX_COUNTED_POINTS
+    if points > limit:
+        size = f"{points:,} points (axes times models), up to {BYTES_PER_POINT * points / 1e9:,.0f} GB"
+        hint = FULL_LAYOUT_HINT if in_full else ""
+        problems.append((("sweep",), f"got {size}, expected at most {limit:,} points{hint}"))
+    columns: dict[str, AxisValues] = {}
+    for name in axis_names:
+        value = values[name]
+        if isinstance(value, tuple):
+            columns[name] = value
             if name not in member_of:
-                faults += _repeated(name, entry)
-        elif isinstance(entry, Range) and points <= most:
+                problems += _repetition_problems(name, value)
+        elif isinstance(value, Range) and points <= limit:
             try:
-                columns[name] = entry.values(quantities[name])
+                columns[name] = value.values(quantities[name])
             except ValidationError as error:
-                faults += [((*path_of(name), *item["loc"]), item["msg"]) for item in error.errors()]
-    # a member whose entry could not be read has no column; its fault is reported where it was read
+                problems += [((*path_of(name), *detail["loc"]), detail["msg"]) for detail in error.errors()]
+    # a group member with an invalid value has no column; that problem is reported by the validation
     groups = [member_of.get(name, (name,)) for name in leaders]
-    is_complete = not faults and all(name in columns for group in groups for name in group)
-    return Grid(scalars, _axes(groups, columns, cases) if is_complete else (), tuple(faults))
+    is_complete = not problems and all(name in columns for group in groups for name in group)
+    return Grid(scalars, _build_axes(groups, columns, cases) if is_complete else (), tuple(problems))
 
 
-def _size(entry: Numbers | Names) -> int | None:
+def _axis_size(value: Numbers | Names) -> int | None:
     """The number of values of an axis; None for a scalar."""
-    match entry:
+    match value:
         case tuple():
-            return len(entry)
+            return len(value)
         case Range():
-            return entry.size
+            return value.size
     return None
 
 
-def _axes(
-    groups: Sequence[Sequence[str]], columns: Mapping[str, Values], cases: Sequence[str]
+def _build_axes(
+    groups: Sequence[Sequence[str]], columns: Mapping[str, AxisValues], cases: Sequence[str]
 ) -> tuple[Axis, ...]:
-    """The dimensions of some groups: a group is named by its first member without repeated values.
+    """The axes of groups of columns; the first column without repeated values names the axis.
 
-    The points of cases, and of a group without such a member, are numbered: "case", then "case_2" and so on.
+    The points of cases, and of a group without such a column, are numbered: "case", then "case_2" and so on.
     """
     axes: list[Axis] = []
     numbered = 1 if cases else 0
@@ -160,22 +161,24 @@ def _axes(
     return tuple(axes)
 
 
-def chunk_faults(chunks: Mapping[str, int], axes: Sequence[Axis], models: int, variables: int) -> list[Fault]:
-    """What is wrong with the chunks that a result is to be stored in: no such axis, too small or too large.
+def chunk_problems(
+    chunks: Mapping[str, int], axes: Sequence[Axis], n_models: int, n_variables: int
+) -> list[ConfigProblem]:
+    """Problems of the chunks in which a result is to be stored: unknown axes, too many or too large chunks.
 
     Parameters
     ----------
-    chunks : their lengths, by axis; along the others they are whole
-    axes, models : of the grid
-    variables : number of those that are stored
+    chunks : lengths of a chunk along axes, by name; along other axes a chunk covers all points
+    axes : of the grid
+    n_models, n_variables : numbers of models and of stored variables
     """
     sizes, path = {axis.name: axis.size for axis in axes}, ("output", "chunks")
     unknown = [name for name in chunks if name not in sizes]
     if unknown or not chunks:
-        return [((*path, name), f"no axis of this sweep; {nearest(name, list(sizes))}") for name in unknown]
-    size = math.prod(min(chunks.get(name, whole), whole) for name, whole in sizes.items())
-    count = math.prod(-(-whole // chunks.get(name, whole)) for name, whole in sizes.items())
-    count *= models * variables
+        return [((*path, name), f"no axis of this sweep; {suggest(name, list(sizes))}") for name in unknown]
+    size = math.prod(min(chunks.get(name, length), length) for name, length in sizes.items())
+    count = math.prod(-(-length // chunks.get(name, length)) for name, length in sizes.items())
+    count *= n_models * n_variables
     if size > MAX_CHUNK_POINTS or count > MAX_STORED_CHUNKS:
         expected = f"expected at most {MAX_STORED_CHUNKS:,} of at most {MAX_CHUNK_POINTS:,}"
         return [(path, f"got {count:,} chunks of {size:,} points, {expected}")]
@@ -203,49 +206,54 @@ def name_of(path: KeyPath) -> str:
     return ".".join(map(str, path[0 if path[0] == "materials" else 1 :]))
 
 
-def _zipped(
-    groups: Sequence[Sequence[str]], sizes: Mapping[str, int | None], cases: Sequence[str], given: Sequence[str]
-) -> tuple[dict[str, Sequence[str]], list[Fault]]:
-    """The group of each zipped name, and what is wrong: no axis, named twice, of another length.
+def _zip_groups(
+    groups: Sequence[Sequence[str]],
+    sizes: Mapping[str, int | None],
+    cases: Sequence[str],
+    config_names: Sequence[str],
+) -> tuple[dict[str, Sequence[str]], list[ConfigProblem]]:
+    """The group of each zipped name, and problems: names that are no axis, are repeated, or differ in length.
 
     Parameters
     ----------
-    groups : names that vary together
-    sizes : of what could be read; None for a scalar
-    cases : names that vary together already
-    given : the names that were given, whether they could be read or not
+    groups : config names that vary together
+    sizes : number of values of each valid key, by config name; None for a scalar
+    cases : config names of the columns of a table of cases, which vary together already
+    config_names : all names in the config, also those with invalid values
     """
     member_of: dict[str, Sequence[str]] = {}
-    faults: list[Fault] = []
-    for place, group in enumerate(groups[:MAX_FAULTS]):
+    problems: list[ConfigProblem] = []
+    for group_index, group in enumerate(groups[:MAX_PROBLEMS]):
         lengths: dict[str, int] = {}
-        names = [name_of(path_of(name)) for name in group[:MAX_FAULTS]]
-        for member, name in enumerate(names):
-            path = ("sweep", "zip", place, member)
+        names = [name_of(path_of(name)) for name in group[:MAX_PROBLEMS]]
+        for member_index, name in enumerate(names):
+            path = ("sweep", "zip", group_index, member_index)
             size = sizes.get(name)
-            if name not in given:
-                axes = [key for key in given if sizes.get(key) is not None]
-                faults.append((path, f"got {show(name)}, expected an axis; {nearest(name, axes or list(given))}"))
+            if name not in config_names:
+                axes = [key for key in config_names if sizes.get(key) is not None]
+                suggestion = suggest(name, axes or list(config_names))
+                problems.append((path, f"got {show(name)}, expected an axis; {suggestion}"))
             elif name in member_of:
-                faults.append((path, f"got {show(name)} twice, expected each name once"))
+                problems.append((path, f"got {show(name)} twice, expected each name once"))
             elif name in cases:
-                faults.append((path, f"got {show(name)}, a column of cases, which vary together already"))
+                problems.append((path, f"got {show(name)}, a column of cases, which vary together already"))
             elif name in sizes and size is None:
-                faults.append((path, f"got {show(name)}, which is a scalar, expected an axis: a list or a range"))
+                message = f"got {show(name)}, which is a scalar, expected an axis: a list or a range"
+                problems.append((path, message))
             elif size is not None:
                 lengths[name] = size
             member_of.setdefault(name, names)
         if len(set(lengths.values())) > 1:
             of_each = ", ".join(f"{name} of {size}" for name, size in lengths.items())
-            faults.append((("sweep", "zip", place), f"got {of_each} values, expected axes of one length"))
-    return member_of, faults
+            problems.append((("sweep", "zip", group_index), f"got {of_each} values, expected axes of one length"))
+    return member_of, problems
 
 
-def _repeated(name: str, values: Values) -> list[Fault]:
-    """The first value of a list that comes a second time."""
+def _repetition_problems(name: str, values: AxisValues) -> list[ConfigProblem]:
+    """A problem for the first value of a list that occurs twice."""
     seen: set[object] = set()
-    for place, value in enumerate(values):
+    for index, value in enumerate(values):
         if value in seen:
-            return [((*path_of(name), place), f"got {show(value)} twice, expected each value once")]
+            return [((*path_of(name), index), f"got {show(value)} twice, expected each value once")]
         seen.add(value)
     return []

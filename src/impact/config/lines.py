@@ -1,4 +1,4 @@
-"""Where in a config a key stands, and its problems as lines: file:line: key: got X, expected Y."""
+"""Line numbers of keys, and problems of a config as lines: file:line: key: got X, expected Y."""
 
 from __future__ import annotations
 
@@ -12,25 +12,34 @@ from pydantic import ValidationError
 from ..contact.model import ForceModel
 from ..text import safe_text
 from . import quantities
-from .quantities import RANGES, Column, Fault, KeyPath, nearest, show
-from .tables import MATERIAL_QUANTITIES, MODELS, Document, MaterialTable, Output, Solver, Sweep, model_quantities
+from .quantities import RANGE_FORMS, Column, ConfigProblem, KeyPath, show, suggest
+from .tables import (
+    MATERIAL_QUANTITIES,
+    MODELS_EXPECTED,
+    Document,
+    MaterialTable,
+    Output,
+    Solver,
+    Sweep,
+    model_quantities,
+)
 
-MAX_LINES = 100
-EXPECTED = {
+MAX_PROBLEM_LINES = 100
+EXPECTED_BY_KEY = {
     "sweep": "a table [sweep] of what to sweep: e or alpha, v1, m1, m2, material, ...",
-    "models": MODELS,
+    "models": MODELS_EXPECTED,
     **{name: f"{quantity.expected}: {quantity.meaning}" for name, quantity in MATERIAL_QUANTITIES.items()},
     **{name: str(info.description) for name, info in Column.model_fields.items()},
 }
-# what else a key might be called
-WORDS = {
+# other words that users may write for a key
+KEY_SYNONYMS = {
     "restitution": "e", "cor": "e", "mass1": "m1", "mass2": "m2", "speed1": "v1", "speed2": "v2",
     "velocity1": "v1", "velocity2": "v2", "radius1": "R1", "radius2": "R2", "stiffness": "K", "exponent": "n",
     "youngs_modulus": "E", "poisson": "nu", "poissons_ratio": "nu", "density": "rho",
 }  # fmt: skip
 
-BARE = r"[A-Za-z0-9_-]++"
-TOKEN = re.compile(
+BARE_KEY = r"[A-Za-z0-9_-]++"
+TOML_TOKEN = re.compile(
     r"""(?P<newline>\n)
       | (?P<skip>[ \t\r]+ | \#[^\n]*)
       | (?P<long>\"{3} (?: \\. | [^\\] )*? \"{3,5} | '{3} .*? '{3,5})
@@ -41,7 +50,7 @@ TOKEN = re.compile(
 
 
 def path_text(path: KeyPath) -> str:
-    """A path as it is written in a message.
+    """A path as text for a message.
 
     >>> path_text(("materials", "my steel", "E")), path_text(("sweep", "e", 3))
     ('materials."my steel".E', 'sweep.e[3]')
@@ -51,75 +60,76 @@ def path_text(path: KeyPath) -> str:
         if isinstance(part, int):
             shown += f"[{part}]"
         else:
-            bare = re.fullmatch(BARE, part)
+            bare = re.fullmatch(BARE_KEY, part)
             shown += ("." if shown else "") + (safe_text(part, 60) if bare else f'"{safe_text(part, 60)}"')
     return shown
 
 
 def key_lines(text: str) -> dict[KeyPath, int]:
-    """The line of every key of a valid TOML text, and of list items that do not stand on their list's line.
+    """The line of every key of a valid TOML text, and of list elements on another line than their list.
 
     >>> key_lines("a = 1\\n[b]\\nc.d = [\\n  1,\\n  2]")[("b", "c", "d", 1)]
     5
     """
-    scanner = _Scanner()
-    for match in TOKEN.finditer(text):
+    scanner = _KeyScanner()
+    for match in TOML_TOKEN.finditer(text):
         scanner.read(match[0], str(match.lastgroup))
     return scanner.lines
 
 
-class _Scanner:
-    """Reads the tokens of a TOML text, and notes the line of each key."""
+class _KeyScanner:
+    """Reads the tokens of a TOML text and records the line of each key."""
 
     def __init__(self) -> None:
         self.lines: dict[KeyPath, int] = {}
         self.line = 1
         self.table: KeyPath = ()
-        self.path: KeyPath = ()  # of the key or item being read
-        self.parts: list[str] = []  # of the key being read, from line `started` on
+        self.path: KeyPath = ()  # of the key or list element being read
+        self.parts: list[str] = []  # of the key being read, which begins on line `started`
         self.started = 1
         self.is_key = True
-        self.opened: list[tuple[KeyPath, int | None]] = []  # inline tables, and lists with the place of their item
+        # open inline tables, with None, and open lists, with the index of the element being read
+        self.opened: list[tuple[KeyPath, int | None]] = []
 
     def read(self, token: str, kind: str) -> None:
         if kind == "newline" and not self.opened:
             self.is_key, self.parts = True, []
         elif kind not in ("newline", "skip"):
             if self.is_key:
-                self._key(token, kind)
+                self._read_key(token, kind)
             else:
-                self._value(token)
+                self._read_value(token)
         self.line += token.count("\n")
 
-    def _key(self, token: str, kind: str) -> None:
+    def _read_key(self, token: str, kind: str) -> None:
         if kind == "name":
             self.started = self.started if self.parts else self.line
-            self.parts.append(_name(token))
+            self.parts.append(_unquoted(token))
         elif token == "=":
-            self._named(self.opened[-1][0] if self.opened else self.table)
+            self._end_key(self.opened[-1][0] if self.opened else self.table)
             self.is_key = False
         elif token == "]" and self.parts:
-            self._named(())
+            self._end_key(())
             self.table = self.path
         elif token == "}":
             self.path, self.is_key = self.opened.pop()[0], False
 
-    def _named(self, base: KeyPath) -> None:
-        """A key or a header is whole; a dotted one makes its parents too."""
+    def _end_key(self, base: KeyPath) -> None:
+        """Record the line of a complete key or header, and of the tables that a dotted one implies."""
         self.path = (*base, *self.parts)
         self.parts = []
         for end in range(len(base) + 1, len(self.path) + 1):
             self.lines.setdefault(self.path[:end], self.started)
 
-    def _value(self, token: str) -> None:
+    def _read_value(self, token: str) -> None:
         if token in ("]", "}"):
             self.path = self.opened.pop()[0]
         elif token == ",":
-            base, place = self.opened[-1]
-            self.is_key = place is None
-            if place is not None:
-                self.opened[-1] = (base, place + 1)
-                self.path = (*base, place + 1)
+            base, index = self.opened[-1]
+            self.is_key = index is None
+            if index is not None:
+                self.opened[-1] = (base, index + 1)
+                self.path = (*base, index + 1)
         else:
             if self.opened and self.opened[-1][1] is not None and self.lines.get(self.opened[-1][0]) != self.line:
                 self.lines.setdefault(self.path, self.line)
@@ -128,29 +138,29 @@ class _Scanner:
                 self.path, self.is_key = (*self.path, 0) if token == "[" else self.path, token == "{"
 
 
-def _name(token: str) -> str:
-    """The name that a part of a key stands for."""
+def _unquoted(token: str) -> str:
+    """A part of a key without its quotes and escapes."""
     if token.startswith("'"):
         return token[1:-1]
     if not token.startswith('"'):
         return token
     try:
-        # TOML's escapes are JSON's and \UXXXXXXXX, the same for a name without one of those
+        # the escapes of TOML are those of JSON and \UXXXXXXXX
         return str(json.loads(token))
     except ValueError:
         return token[1:-1]
 
 
 @dataclass(frozen=True)
-class Places:
-    """Where the value at a path was given, as a message says it.
+class SourceLocations:
+    """Where the values of a config were written: lines of its source, and overrides.
 
     Parameters
     ----------
     name : the file, or another name of the source
     lines : the line of each path; empty for a source without lines
     overrides : the overrides in order
-    overridden : for each path that overrides changed, which of them, and the path that it names
+    overridden : for each path that an override changed, the index of the override and the path that it sets
     """
 
     name: str
@@ -159,54 +169,62 @@ class Places:
     overridden: Mapping[KeyPath, tuple[int, KeyPath]] = field(default_factory=dict)
 
     def find(self, path: KeyPath) -> tuple[tuple[int, int], str]:
-        """A rank, in the order of the file and then of the overrides, and the place in words."""
+        """The location of the value at a path: a sort key, by line and then by override, and its text."""
         for end in range(len(path), 0, -1):
             if path[:end] in self.overridden:
-                which, named = self.overridden[path[:end]]
-                shared = min(len(path), len(named))
-                # a table made for one key is no place for another that is missing in it
-                if path[:shared] == named[:shared]:
-                    return (1, which), f"--set {safe_text(self.overrides[which])}"
+                override, override_path = self.overridden[path[:end]]
+                shared = min(len(path), len(override_path))
+                # an override that creates a table for one key is not the location of another, missing key
+                if path[:shared] == override_path[:shared]:
+                    return (1, override), f"--set {safe_text(self.overrides[override])}"
                 break
-            if path[:end] in self.lines and not self._replaced(path[:end]):
+            if path[:end] in self.lines and not self._is_overridden(path[:end]):
                 line = self.lines[path[:end]]
                 return (0, line), f"{safe_text(self.name)}:{line}"
-        # what a model asks for, and has no table yet, is asked for where models are chosen
+        # a parameter of a model without a table is required by the key `models`
         return self.find(("models",)) if path[:1] == ("model",) else ((0, 0), safe_text(self.name))
 
-    def _replaced(self, path: KeyPath) -> bool:
-        """Whether what the source says at a path was overridden."""
+    def _is_overridden(self, path: KeyPath) -> bool:
+        """Whether an override replaced the value at a path of the source."""
         return any(path[:end] in self.overridden for end in range(len(path) + 1))
 
 
-def faults_of(error: ValidationError, known: Mapping[str, ForceModel]) -> Iterable[Fault]:
-    """What is wrong, with the path of each value, from what pydantic says."""
-    for count, item in enumerate(error.errors(include_url=False)):
-        # the tags of unions are no keys
-        path: KeyPath = tuple(part for part in item["loc"] if not (isinstance(part, str) and "\0" in part))
-        match item["type"]:
-            case "fault":
-                yield path, item["msg"]
+def validation_problems(error: ValidationError, models: Mapping[str, ForceModel]) -> Iterable[ConfigProblem]:
+    """The problems that pydantic reports, with the path of each value.
+
+    Parameters
+    ----------
+    error : raised by pydantic
+    models : all models by key
+    """
+    for n_problems, detail in enumerate(error.errors(include_url=False)):
+        # the tags of unions are not keys
+        path: KeyPath = tuple(part for part in detail["loc"] if not (isinstance(part, str) and "\0" in part))
+        match detail["type"]:
+            case quantities.PROBLEM_TYPE:
+                yield path, detail["msg"]
             case "missing":
-                yield path, f"missing, expected {EXPECTED[str(path[-1])]}"
+                yield path, f"missing, expected {EXPECTED_BY_KEY[str(path[-1])]}"
             case "extra_forbidden" | "unexpected_keyword_argument":
-                yield path, f"unknown key; {_hint(item['loc'], known) if count < MAX_LINES else ''}"
+                # hints take time, and later lines are not printed
+                hint = _unknown_key_hint(detail["loc"], models) if n_problems < MAX_PROBLEM_LINES else ""
+                yield path, f"unknown key; {hint}"
             case "literal_error":
-                choices = ", ".join(re.findall("'([^']*)'", item["ctx"]["expected"]))
-                yield path, f"got {show(item['input'])}, expected one of {choices}"
+                choices = ", ".join(re.findall("'([^']*)'", detail["ctx"]["expected"]))
+                yield path, f"got {show(detail['input'])}, expected one of {choices}"
             case _:
-                yield path, f"got {show(item['input'])}, expected a table"
+                yield path, f"got {show(detail['input'])}, expected a table"
 
 
-def _hint(location: KeyPath, known: Mapping[str, ForceModel]) -> str:
-    """What an unknown key might have been; `location` is its path, with tags."""
+def _unknown_key_hint(location: KeyPath, models: Mapping[str, ForceModel]) -> str:
+    """A suggestion for an unknown key; `location` is its path, with tags."""
     name = str(location[-1])
     if len(location) == 1 and name in Sweep.model_fields:
         return "it belongs under [sweep]"
     keys: Iterable[str]
     match location[:-1]:
         case (*_, quantities.RANGE):
-            keys = RANGES
+            keys = RANGE_FORMS
         case (*_, quantities.COLUMN):
             keys = Column.model_fields
         case ():
@@ -216,21 +234,21 @@ def _hint(location: KeyPath, known: Mapping[str, ForceModel]) -> str:
         case ("materials", _):
             keys = MaterialTable.model_fields
         case ("model",):
-            keys = known
+            keys = models
         case ("model", key):
-            keys = model_quantities(known[str(key)])
+            keys = model_quantities(models[str(key)])
         case (table, *_):
             keys = vars(Solver() if table == "solver" else Output())
-    return nearest(name, list(keys), WORDS)
+    return suggest(name, list(keys), KEY_SYNONYMS)
 
 
-def lines_of(found: Iterable[Fault], places: Places) -> list[str]:
-    """One line for each fault, in the order of the file, then of the overrides."""
-    located = sorted(((*places.find(path), path, message) for path, message in found), key=lambda item: item[0])
-    lines = [
-        ": ".join(part for part in (place, path_text(path), message) if part)
-        for _, place, path, message in located
-    ]
-    if len(lines) > MAX_LINES:
-        lines[MAX_LINES:] = [f"and {len(lines) - MAX_LINES} more"]
+def problem_lines(problems: Iterable[ConfigProblem], locations: SourceLocations) -> list[str]:
+    """One line for each problem, in the order of the file, then of the overrides."""
+    ranked: list[tuple[tuple[int, int], str]] = []
+    for path, message in problems:
+        rank, location = locations.find(path)
+        ranked.append((rank, ": ".join(part for part in (location, path_text(path), message) if part)))
+    lines = [line for _, line in sorted(ranked, key=lambda ranked_line: ranked_line[0])]
+    if len(lines) > MAX_PROBLEM_LINES:
+        lines[MAX_PROBLEM_LINES:] = [f"and {len(lines) - MAX_PROBLEM_LINES} more"]
     return lines

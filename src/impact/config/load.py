@@ -1,4 +1,4 @@
-"""A config read and checked: from a TOML file or a mapping to a frozen `Config`, or all of its problems."""
+"""Read and check a config: from a TOML file or a mapping to a frozen `Config`, or a list of all problems."""
 
 from __future__ import annotations
 
@@ -19,17 +19,25 @@ from ..contact.numba.dispatch import is_installed
 from ..contact.outputs import BY_DEFAULT
 from ..errors import ConfigError
 from .cases import expand_cases, inline_files
-from .files import apply_overrides, load, plain, read_override, read_text, toml_key, toml_text
-from .grid import MAX_POINTS, Axis, chunk_faults, lay_out, name_of, path_of
+from .files import (
+    apply_overrides,
+    as_table,
+    parse_document,
+    read_override,
+    read_text,
+    to_plain_data,
+    toml_key,
+    toml_text,
+)
+from .grid import MAX_POINTS, Axis, build_grid, chunk_problems, name_of, path_of
 from .library import library
-from .lines import Places, faults_of, key_lines, lines_of
-from .quantities import Column, Context, Fault, KeyPath, Names, Numbers, Table
-from .rules import Given, cross_faults
+from .lines import SourceLocations, key_lines, problem_lines, validation_problems
+from .quantities import Column, ConfigProblem, KeyPath, Names, Numbers, Table, ValidationContext
+from .rules import RawConfig, listed_names, rule_problems
 from .tables import (
     DEFAULT_RTOL,
-    DEFAULTS,
     MATERIAL_KEYS,
-    MATERIAL_QUANTITIES,
+    SWEEP_DEFAULTS,
     SWEEP_QUANTITIES,
     Document,
     MaterialTable,
@@ -38,7 +46,7 @@ from .tables import (
     document_type,
     expand_models,
     json_schema,
-    model_quantities,
+    quantity_at,
 )
 
 __all__ = ["DEFAULT_RTOL", "Axis", "Config", "Output", "Solver", "json_schema", "parse_config", "read_config"]
@@ -46,24 +54,24 @@ __all__ = ["DEFAULT_RTOL", "Axis", "Config", "Output", "Solver", "json_schema", 
 
 @dataclass(frozen=True)
 class Config:
-    """A sweep as it was asked for, checked, in SI units.
+    """A valid config of a sweep, in SI units.
 
     Parameters
     ----------
     title : of the sweep
-    models : the contact force models, in the order asked for
-    scalars : what does not vary, by config name ("v1", "material1", "KEY.name" for a model's parameter),
-        with defaults filled in; a mass or radius that is not given is derived from the other and the density
+    models : the contact force models, in config order
+    scalars : values that do not vary, by config name ("v1", "material1", "KEY.name" for a parameter of a model),
+        including defaults; a mass or radius that is not in the config is derived from the other and the density
     axes : the dimensions of the grid in config order: those of [sweep], of materials ("materials.steel.E"), of
         models
-    materials : by name, those of the library that are used among them; what is an axis is NaN for E and nu, and
-        None for rho and yield_strength
-    solver : tolerances
+    materials : by name, including the library materials that the config uses; a property that is an axis is NaN
+        for E and nu, and None for rho and yield_strength
+    solver : tolerances and core
     output : which variables are stored, and how
-    text : the TOML text verbatim, or a mapping as JSON
-    overrides : PATH=VALUE strings in order; `text` is without them. Those that were asked for stand after those
-        that hold the materials of the library that the config uses, and before those that hold the values of the
-        CSV files that it names: text and overrides say it all, wherever they are read again
+    text : the TOML text verbatim, or a mapping as JSON, without overrides
+    overrides : PATH=VALUE strings in order: first the library materials that the config uses, then those of the
+        caller, then the values of the CSV files that the config names. So text and overrides define the config
+        without the library or any file
     """
 
     title: str
@@ -83,19 +91,19 @@ def read_config(
     plugins: Sequence[ForceModel] = (),
     max_points: int = MAX_POINTS,
 ) -> Config:
-    """The config of a TOML file or a mapping.
+    """Read the config of a TOML file or a mapping.
 
     Parameters
     ----------
-    source : path of a TOML file, or what such a file says as a mapping; files that it names are relative to the
-        folder of the former, or for a mapping to the working directory
+    source : path of a TOML file, or a mapping with the same keys; the names of CSV files are relative to the
+        folder of the TOML file, or for a mapping to the working directory
     overrides : strings such as "sweep.e.linspace=[0,1,11]"
     plugins : models that are not built in
-    max_points : how many it may have, of all models together; more are refused before there is an array
+    max_points : limit of the points of all models together, checked before any array is allocated
 
     Raises
     ------
-    ConfigError : with every problem, one a line
+    ConfigError : with all problems, one per line
 
     >>> steel = {"E": "210 GPa", "nu": 0.3, "rho": 7850}
     >>> sweep = {"e": [0.5, 1], "v1": 1, "m1": 1, "m2": 1, "material": "steel"}
@@ -107,7 +115,7 @@ def read_config(
         return reader.read(source, None, "config")
     path = Path(source)
     text = read_text(path)
-    return replace(reader, folder=path.parent).read(load(text, str(path)), text, str(path))
+    return replace(reader, folder=path.parent).read(parse_document(text, str(path)), text, str(path))
 
 
 def parse_config(
@@ -117,11 +125,12 @@ def parse_config(
     name: str = "<text>",
     max_points: int = MAX_POINTS,
 ) -> Config:
-    """The config of a TOML text, or of a JSON text, which starts with a brace; otherwise as `read_config`.
+    """Read the config of a TOML text, or of a JSON text, which starts with a brace; see `read_config`.
 
-    It reads no files: a text may be that of a result from anywhere.
+    No file is read, because the text may come from a result of unknown origin.
     """
-    return _Reader(catalogue(plugins), tuple(overrides), max_points, None).read(load(text, name), text, name)
+    reader = _Reader(catalogue(plugins), tuple(overrides), max_points, None)
+    return reader.read(parse_document(text, name), text, name)
 
 
 @dataclass(frozen=True)
@@ -130,91 +139,85 @@ class _Reader:
 
     Parameters
     ----------
-    known : all models by key
+    models : all models by key
     overrides, max_points : see `read_config`
-    folder : where files are that the config names; None where none may be read
+    folder : of the files that the config names; None if no file may be read
     """
 
-    known: Mapping[str, ForceModel]
+    models: Mapping[str, ForceModel]
     overrides: tuple[str, ...]
     max_points: int
     folder: Path | None
 
     def read(self, source: object, text: str | None, name: str) -> Config:
-        """The config, or every problem of its overrides, files and values; `text` is None for a mapping."""
-        given, faults = plain(source)
-        places, config = Places(name), None
-        problems: list[str] = []
-        if not faults:
-            overrides = (*_of_library(given, self.overrides), *self.overrides)
-            data, overridden, problems = apply_overrides(given, overrides)
-            places = Places(name, overrides=overrides, overridden=overridden)
-            data, faults = plain(data)
-        if not faults:
+        """Read a config, or report every problem of its overrides, files and values.
+
+        Parameters
+        ----------
+        source : data of the config
+        text : of the file; None for a mapping
+        name : of the source, for messages
+        """
+        source_data, problems = to_plain_data(source)
+        locations, config = SourceLocations(name), None
+        override_problems: list[str] = []
+        file_problems: list[str] = []
+        if not problems:
+            overrides = (*_library_overrides(source_data, self.overrides), *self.overrides)
+            data, overridden, override_problems = apply_overrides(source_data, overrides)
+            locations = SourceLocations(name, overrides=overrides, overridden=overridden)
+            data, problems = to_plain_data(data)
+        if not problems:
             if text is None:
-                text = json.dumps(given, separators=(",", ":"), default=str)
-            n = read_exponent(_dict(data.get("sweep")))
-            data, inlined, unread = inline_files(data, self.folder, self.known, n)
-            config, faults = self._config(data, text, (*overrides, *inlined))
-            problems = [*unread, *problems]
-        if config is None or problems:
+                text = json.dumps(source_data, separators=(",", ":"), default=str)
+            n = read_exponent(as_table(data.get("sweep")))
+            data, file_overrides, file_problems = inline_files(data, self.folder, self.models, n)
+            config, problems = self._build_config(data, text, (*overrides, *file_overrides))
+        if config is None or override_problems or file_problems:
             if text is not None and not text.lstrip().startswith("{"):
-                places = replace(places, lines=key_lines(text))
-            raise ConfigError([*lines_of(faults, places), *problems])
+                locations = replace(locations, lines=key_lines(text))
+            raise ConfigError([*problem_lines(problems, locations), *file_problems, *override_problems])
         return config
 
-    def _config(
+    def _build_config(
         self, data: Mapping[str, Any], text: str, overrides: Sequence[str]
-    ) -> tuple[Config | None, list[Fault]]:
-        """The config that plain data gives, or what is wrong with it."""
-        data, used = _with_library(data)
-        data, cases, faults = expand_cases(data, self.known)
-        sweep, parameters = _dict(data.get("sweep")), _dict(data.get("model"))
+    ) -> tuple[Config | None, list[ConfigProblem]]:
+        """The config of plain data, or None and the problems of the data."""
+        data, library_overrides = _add_library_materials(data)
+        data, cases, problems = expand_cases(data, self.models)
+        sweep, parameters = as_table(data.get("sweep")), as_table(data.get("model"))
         n = read_exponent(sweep)
-        models, _ = expand_models(data.get("models"), self.known)
-        given = Given(sweep, _dict(data.get("materials")), parameters, models, data.get("models"), n)
-        context = Context(n, tuple({**given.materials, **library()}), self.known)
-        document, wrong = self._validated(data, context)
-        faults += wrong
+        models, _ = expand_models(data.get("models"), self.models)
+        raw = RawConfig(sweep, as_table(data.get("materials")), parameters, models, data.get("models"), n)
+        context = ValidationContext(n, tuple({**raw.materials, **library()}), self.models)
+        document, invalid_values = self._validate(data, context)
+        problems += invalid_values
         if isinstance(data.get("sweep"), dict):
-            faults += cross_faults(given)
+            problems += rule_problems(raw)
         if "cases" in sweep:
-            # what cases that cannot be read would give is not missing
-            faults = [(path, message) for path, message in faults if not message.startswith("missing")]
+            # cases that cannot be read may contain the inputs that seem to be missing
+            problems = [(path, message) for path, message in problems if not message.startswith("missing")]
         if document is None:
-            return None, _of_cases(faults, cases)
-        chosen = {f"{model.key}.{name}": q for model in models for name, q in model_quantities(model).items()}
-        entries = _entries(document, given, chosen)
-        names = [name for name in sweep if name not in ("zip", "cases")]
-        names += [f"materials.{key}.{name}" for key, table in given.materials.items() for name in _dict(table)]
-        names += [f"{key}.{name}" for key, table in parameters.items() for name in _dict(table)]
-        quantities = (
-            SWEEP_QUANTITIES
-            | chosen
-            | {
-                name: MATERIAL_QUANTITIES[name.rpartition(".")[2]]
-                for name in entries
-                if name.startswith("materials.")
-            }
-        )
+            return None, _locate_in_cases(problems, cases)
+        values = _valid_values(document, raw)
+        quantities = {name: quantity_at(path_of(name), self.models) for name in values}
         output = document.output
-        in_full = output.layout == "full" or (output.layout == "auto" and bool(output.chunks))
-        grid = lay_out(
-            entries,
-            quantities,
+        grid = build_grid(
+            values,
+            {name: quantity for name, quantity in quantities.items() if quantity is not None},
             document.sweep.zip,
             tuple(cases),
-            names,
+            raw.names,
             len(models),
             self.max_points,
-            in_full=in_full,
+            in_full=output.layout == "full" or (output.layout == "auto" and bool(output.chunks)),
         )
-        faults += grid.faults
-        if not faults:
-            faults += _settings_faults(document, grid.axes, len(models))
-        if faults:
-            return None, _of_cases(faults, cases)
-        defaults = DEFAULTS | {
+        problems += grid.problems
+        if not problems:
+            problems += _settings_problems(document, grid.axes, len(models))
+        if problems:
+            return None, _locate_in_cases(problems, cases)
+        defaults = SWEEP_DEFAULTS | {
             f"{model.key}.{parameter.name}": parameter.default
             for model in models
             for parameter in model.parameters
@@ -223,32 +226,36 @@ class _Reader:
         return Config(
             title=document.title,
             models=tuple(models),
-            scalars={**grid.scalars, **{name: value for name, value in defaults.items() if name not in entries}},
+            scalars={**grid.scalars, **{name: value for name, value in defaults.items() if name not in values}},
             axes=grid.axes,
-            materials={name: _material(table) for name, table in document.materials.items()},
+            materials={name: _build_material(table) for name, table in document.materials.items()},
             solver=document.solver,
             output=output,
             text=text,
-            overrides=(*used, *overrides),
+            overrides=(*library_overrides, *overrides),
         ), []
 
-    def _validated(self, data: Mapping[str, Any], context: Context) -> tuple[Document | None, list[Fault]]:
-        """What pydantic makes of the data, or of that part of it in which nothing is wrong; and what is wrong."""
-        kind = document_type(self.known, [key for key in _dict(data.get("model")) if key in self.known])
+    def _validate(
+        self, data: Mapping[str, Any], context: ValidationContext
+    ) -> tuple[Document | None, list[ConfigProblem]]:
+        """The validated document, and problems; with problems it is the document of the valid part, or None."""
+        with_tables = [key for key in as_table(data.get("model")) if key in self.models]
+        document = document_type(self.models, with_tables)
         try:
-            return kind.model_validate(data, context=context), []
+            return document.model_validate(data, context=context), []
         except ValidationError as error:
-            faults = list(faults_of(error, self.known))
+            problems = list(validation_problems(error, self.models))
+        valid_part = _remove_invalid(data, [path for path, _ in problems])
         try:
-            return kind.model_validate(_without(data, [path for path, _ in faults]), context=context), faults
+            return document.model_validate(valid_part, context=context), problems
         except ValidationError:
-            return None, faults
+            return None, problems
 
 
 def read_exponent(sweep: Mapping[str, Any]) -> float | None:
-    """The sweep's n, which the unit of K contains: None for an axis, NaN where it cannot be read."""
-    n = sweep.get("n", DEFAULTS["n"])
-    if isinstance(n, list | dict) or "n" in _dict(sweep.get("cases")):
+    """The exponent n of [sweep], which the unit of K contains: None for an axis, NaN where it cannot be read."""
+    n = sweep.get("n", SWEEP_DEFAULTS["n"])
+    if isinstance(n, list | dict) or "n" in as_table(sweep.get("cases")):
         return None
     try:
         return SWEEP_QUANTITIES["n"].read(n)
@@ -256,115 +263,124 @@ def read_exponent(sweep: Mapping[str, Any]) -> float | None:
         return math.nan
 
 
-def _of_library(given: Mapping[str, Any], overrides: Sequence[str]) -> list[str]:
-    """Overrides that give the materials of the library a table of which other overrides change a key."""
+def _library_overrides(data: Mapping[str, Any], overrides: Sequence[str]) -> list[str]:
+    """Overrides that define the library materials of which other overrides change a property."""
     paths = [path for path, _ in map(read_override, overrides) if path[:1] == ("materials",)]
     names = dict.fromkeys(str(path[1]) for path in paths if len(path) > 2)
-    return [_as_override(name, library()[name]) for name in names if _is_in_library(name, given, paths)]
+    return [
+        _material_override(name, library()[name])
+        for name in names
+        if _is_from_library(name, data) and ("materials", name) not in paths
+    ]
 
 
-def _is_in_library(name: str, data: Mapping[str, Any], paths: Sequence[KeyPath] = ()) -> bool:
-    """Whether a material is that of the library: there is one, and no table takes its place."""
-    return name in library() and name not in _dict(data.get("materials")) and ("materials", name) not in paths
+def _is_from_library(name: str, data: Mapping[str, Any]) -> bool:
+    """Whether a material is in the library, and no table of the config replaces it."""
+    return name in library() and name not in as_table(data.get("materials"))
 
 
-def _as_override(name: str, table: Mapping[str, object]) -> str:
-    return f"materials.{toml_key(name)}={toml_text(dict(table))}"
+def _material_override(name: str, properties: Mapping[str, object]) -> str:
+    """The override that defines a material."""
+    return f"materials.{toml_key(name)}={toml_text(dict(properties))}"
 
 
-def _with_library(data: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
-    """The data with tables for the materials of the library that a ball has, and the overrides that make them."""
-    sweep = _dict(data.get("sweep"))
-    cases = _dict(sweep.get("cases"))
-    named = dict.fromkeys(
-        name for key in MATERIAL_KEYS for table in (sweep, cases) for name in _listed(table.get(key))
+def _add_library_materials(data: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
+    """The data with tables for the library materials that a ball may have, and overrides that add those tables."""
+    sweep = as_table(data.get("sweep"))
+    cases = as_table(sweep.get("cases"))
+    names = dict.fromkeys(
+        name for key in MATERIAL_KEYS for table in (sweep, cases) for name in listed_names(table.get(key))
     )
-    named |= {str(path[1]): None for path in map(path_of, cases) if path[0] == "materials"}
-    tables = {
-        # a column of cases takes the place of a number
+    names |= {str(path[1]): None for path in map(path_of, cases) if path[0] == "materials"}
+    materials = {
+        # a column of cases replaces a property
         name: {key: value for key, value in library()[name].items() if f"materials.{name}.{key}" not in cases}
-        for name in named
-        if _is_in_library(name, data) and isinstance(data.get("materials", {}), dict)
+        for name in names
+        if _is_from_library(name, data) and isinstance(data.get("materials", {}), dict)
     }
-    new = {**data, "materials": {**data.get("materials", {}), **tables}} if tables else dict(data)
-    return new, [_as_override(name, table) for name, table in tables.items()]
+    extended = {**data, "materials": {**data.get("materials", {}), **materials}} if materials else dict(data)
+    return extended, [_material_override(name, properties) for name, properties in materials.items()]
 
 
-def _listed(value: object) -> list[str]:
-    """The names in a name or a list of names."""
-    return [name for name in (value if isinstance(value, list) else [value]) if isinstance(name, str)]
+def _remove_invalid(data: Mapping[str, Any], paths: Sequence[KeyPath]) -> dict[str, Any]:
+    """The data without the keys that have problems, and without materials that lack a property.
+
+    [solver] and [output] are removed whole, of other tables the key, and of [model.KEY] the parameter.
+    """
+    lengths = {"solver": 1, "output": 1, "model": 3}
+    invalid = {path[: lengths.get(str(path[0]), 2)] for path in paths if path}
+
+    def valid_part(value: Any, path: KeyPath) -> Any:
+        if not isinstance(value, dict) or len(path) > 2:
+            return value
+        return {
+            key: valid_part(inner, (*path, key)) for key, inner in value.items() if (*path, key) not in invalid
+        }
+
+    valid_data: dict[str, Any] = valid_part(data, ())
+    return valid_data
 
 
-def _without(data: Mapping[str, Any], paths: Sequence[KeyPath]) -> dict[str, Any]:
-    """The data without the keys in which something is wrong, and without materials that miss one."""
-    depth = {"model": 3}
-    out = {path[: 1 if path[0] in ("solver", "output") else depth.get(str(path[0]), 2)] for path in paths if path}
-
-    def kept(table: Any, path: KeyPath) -> Any:
-        if not isinstance(table, dict) or len(path) > 2:
-            return table
-        return {key: kept(item, (*path, key)) for key, item in table.items() if (*path, key) not in out}
-
-    rest: dict[str, Any] = kept(data, ())
-    return rest
-
-
-def _entries(document: Document, given: Given, chosen: Mapping[str, object]) -> dict[str, Numbers | Names]:
-    """What could be read, by config name: the keys of [sweep], axes of the materials used, and parameters."""
-    sweep = _values(document.sweep)
-    entries = {name: sweep[name] for name in given.sweep if name in sweep and name not in ("zip", "cases")}
-    balls = {name for ball in "12" for name in given.material_of(ball)}
-    for key, table in document.materials.items():
-        for name, value in _values(table).items() if key in balls else ():
+def _valid_values(document: Document, raw: RawConfig) -> dict[str, Numbers | Names]:
+    """The valid values by config name: keys of [sweep], axes of the materials of the balls, and parameters."""
+    sweep = _values_by_key(document.sweep)
+    values = {name: sweep[name] for name in raw.sweep if name in sweep and name not in ("zip", "cases")}
+    used_materials = {name for ball in "12" for name in raw.materials_of(ball)}
+    for material, table in document.materials.items():
+        for name, value in _values_by_key(table).items() if material in used_materials else ():
             if not isinstance(value, float):
-                entries[f"materials.{key}.{name}"] = value
-    tables = _values(document.model)
-    for key in given.parameters:
-        # what a model that is not chosen asks for was checked, and is not part of the grid
-        own = {f"{key}.{name}": value for name, value in _values(tables.get(key)).items()}
-        entries |= {name: value for name, value in own.items() if name in chosen}
-    # the file of a column could not be read
-    return {name: value for name, value in entries.items() if not isinstance(value, Column)}
+                values[f"materials.{material}.{name}"] = value
+    tables = _values_by_key(document.model)
+    selected = {model.key for model in raw.models}
+    for key in raw.parameters:
+        # parameters of models that are not selected are checked, but are not part of the grid
+        parameters = _values_by_key(tables.get(key)) if key in selected else {}
+        values |= {f"{key}.{name}": value for name, value in parameters.items()}
+    # a Column that is left names a file that cannot be read
+    return {name: value for name, value in values.items() if not isinstance(value, Column)}
 
 
-def _values(table: Table | None) -> dict[str, Any]:
-    """What was given in a table, by key in its order of definition."""
+def _values_by_key(table: Table | None) -> dict[str, Any]:
+    """The values that are set in a table, by key, in the order of definition."""
     if table is None:
         return {}
     fields = type(table).model_fields
     return {fields[name].alias or name: getattr(table, name) for name in fields if name in table.model_fields_set}
 
 
-def _material(table: MaterialTable) -> Material:
-    """A material, of which an axis is left out."""
-    numbers = {name: value for name, value in _values(table).items() if isinstance(value, float)}
+def _build_material(table: MaterialTable) -> Material:
+    """The material of a table, without the properties that are axes."""
+    numbers = {name: value for name, value in _values_by_key(table).items() if isinstance(value, float)}
     return Material(**({"E": math.nan, "nu": math.nan} | numbers))
 
 
-def _settings_faults(document: Document, axes: Sequence[Axis], models: int) -> list[Fault]:
-    """What of [solver] and [output] does not go with the rest, or with what is installed."""
+def _settings_problems(document: Document, axes: Sequence[Axis], n_models: int) -> list[ConfigProblem]:
+    """Problems of [solver] and [output] with the rest of the config, or with the installed packages."""
     output = document.output
-    faults: list[Fault] = []
+    problems: list[ConfigProblem] = []
     if document.solver.core == "numba" and not is_installed():
         expected = 'numba, which is not installed (pip install "impact-sweep[fast]"), or "auto"'
-        faults.append((("solver", "core"), f'got "numba", expected {expected}'))
-    count = len({"status", *(output.variables or BY_DEFAULT)})
-    faults += chunk_faults(output.chunks, axes, models, count)
+        problems.append((("solver", "core"), f'got "numba", expected {expected}'))
+    n_variables = len({"status", *(output.variables or BY_DEFAULT)})
+    problems += chunk_problems(output.chunks, axes, n_models, n_variables)
     if output.chunks and output.layout == "factored":
-        faults.append((("output", "chunks"), 'got chunks beside layout = "factored", expected layout = "full"'))
-    return faults
+        message = 'got chunks beside layout = "factored", expected layout = "full"'
+        problems.append((("output", "chunks"), message))
+    return problems
 
 
-def _of_cases(faults: Sequence[Fault], cases: Mapping[str, str]) -> list[Fault]:
-    """The faults, those of a column of cases with its path."""
+def _locate_in_cases(problems: Sequence[ConfigProblem], cases: Mapping[str, str]) -> list[ConfigProblem]:
+    """The problems, with paths inside `sweep.cases` for inputs that are columns there.
+
+    Parameters
+    ----------
+    problems : with the paths that the columns have after `expand_cases`
+    cases : names of the columns by config name
+    """
 
     def located(path: KeyPath) -> KeyPath:
-        end = 2 if path[:1] == ("sweep",) else 3
-        column = cases.get(name_of(path[:end])) if len(path) >= end else None
-        return path if column is None else ("sweep", "cases", column, *path[end:])
+        length = 2 if path[:1] == ("sweep",) else 3
+        column = cases.get(name_of(path[:length])) if len(path) >= length else None
+        return path if column is None else ("sweep", "cases", column, *path[length:])
 
-    return [(located(path), message) for path, message in faults]
-
-
-def _dict(value: object) -> dict[str, Any]:
-    return value if isinstance(value, dict) else {}
+    return [(located(path), message) for path, message in problems]

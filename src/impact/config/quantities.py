@@ -35,28 +35,32 @@ from ..contact.units import dimension, names_in
 from ..errors import did_you_mean
 from ..text import safe_text
 
+# keys and indices from the top of a config to a value
 KeyPath: TypeAlias = tuple[str | int, ...]
-Fault: TypeAlias = tuple[KeyPath, str]
+# where something is wrong, and the message
+ConfigProblem: TypeAlias = tuple[KeyPath, str]
+# error type of pydantic errors that this package raises, whose messages are complete
+PROBLEM_TYPE = "config_problem"
 
-MAX_UNIT = 64  # characters of a string with a unit
+MAX_UNIT_LENGTH = 64  # characters of a string with a unit
 MAX_AXIS_VALUES = 10**7  # values on one axis, which are held in memory
-MAX_COUNTED = 10**18  # what a message writes out
-MAX_FAULTS = 100  # of one list or table
-MAX_REFUSED = 1000  # values of a config; the rest of a hostile list is not worth its time
+MAX_PRINTED_COUNT = 10**18  # larger counts are not written out in messages
+MAX_PROBLEMS = 100  # reported for one list or table
+MAX_REPORTED_VALUES = 1000  # invalid values reported for a config; bounds the time that a hostile list takes
 
 _DIGITS = r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
-NUMBER = re.compile(rf"\s*([-+]?(?:{_DIGITS}|inf\b|nan\b))\s*(.*?)\s*")
-# names with small exponents, one level of brackets: no expression whose value could take long to work out
+NUMBER_SYNTAX = re.compile(rf"\s*([-+]?(?:{_DIGITS}|inf\b|nan\b))\s*(.*?)\s*")
+# names with small exponents and one level of brackets: no expression that takes long to evaluate
 _SIGNED = r"-?[0-9]{1,2}(?:\.[0-9]{1,6})?"
 _POWER = rf"(?:\s*(?:\^|\*\*)\s*(?:{_SIGNED}|\(-?[0-9]{{1,2}}(?:[./][0-9]{{1,6}})?\))|-?[0-9]{{1,2}}|⁻?[⁰¹²³⁴-⁹])?"
 _LETTERS = "A-Za-zµμΩ°Å%_"
 _FACTOR = rf"(?:1|[{_LETTERS}]+{_POWER})"
 _PRODUCT = rf"{_FACTOR}(?:\s*[*/·]\s*{_FACTOR}|\s+{_FACTOR})*+"
-UNIT = re.compile(rf"/?\s*{_PRODUCT}(?:\s*[*/]\s*\(\s*{_PRODUCT}\s*\))?")
+UNIT_SYNTAX = re.compile(rf"/?\s*{_PRODUCT}(?:\s*[*/]\s*\(\s*{_PRODUCT}\s*\))?")
 
-# tags of the forms that a value may have; no key of a config holds NUL, so that paths can be freed of them
+# tags of the forms that a value may have; no key of a config contains NUL, so tags can be removed from paths
 SCALAR, LIST, RANGE, COLUMN = "\0scalar", "\0list", "\0range", "\0column"
-RANGES = {
+RANGE_FORMS = {
     "linspace": "[first, last, count]",
     "geomspace": "[first, last, count]",
     "arange": "[first, stop, step]",
@@ -64,25 +68,25 @@ RANGES = {
 
 
 @dataclass
-class Context:
-    """What values depend on besides themselves.
+class ValidationContext:
+    """What the validation of a value depends on besides the value.
 
     Parameters
     ----------
-    n : the sweep's exponent: None where it is an axis, NaN where it cannot be read
-    materials : names of those that are known
+    n : the exponent of the sweep: None where it is an axis, NaN where it cannot be read
+    materials : names of the materials that a ball may have
     models : all models by key
-    refused : how many values were refused so far
+    n_errors : number of invalid values so far
     """
 
     n: float | None
     materials: tuple[str, ...]
     models: Mapping[str, ForceModel]
-    refused: int = 0
+    n_errors: int = 0
 
 
 def show(value: object) -> str:
-    """A value in a message, short and safe.
+    """The value as text for a message: short, and without control characters.
 
     >>> show(True), show(0.5), show("steel"), show([1, 2]), show(16**6000)
     ('true', '0.5', '"steel"', 'a list', 'an integer of 24001 bits')
@@ -102,102 +106,113 @@ def show(value: object) -> str:
             return "a table" if value else "an empty table"
         case None:
             return "nothing"
-    moment = getattr(value, "isoformat", None)
-    return safe_text(str(moment()) if callable(moment) else f"a {type(value).__name__}", 60)
+    # dates and times of TOML
+    isoformat = getattr(value, "isoformat", None)
+    return safe_text(str(isoformat()) if callable(isoformat) else f"a {type(value).__name__}", 60)
 
 
-def refuse(value: object, expected: str) -> PydanticCustomError:
-    """The error of a value that is not what it should be."""
-    return fault(f"got {show(value)}, expected {expected}")
+def mismatch_error(value: object, expected: str) -> PydanticCustomError:
+    """The error of a value that differs from what is expected."""
+    return value_error(f"got {show(value)}, expected {expected}")
 
 
-def fault(message: str) -> PydanticCustomError:
-    """An error with a message of its own."""
-    return PydanticCustomError("fault", "{message}", {"message": message})
+def value_error(message: str) -> PydanticCustomError:
+    """An error with this message, which `validation_problems` passes on unchanged."""
+    return PydanticCustomError(PROBLEM_TYPE, "{message}", {"message": message})
 
 
-def faults(found: Iterable[Fault]) -> ValidationError:
-    """Several errors, each with its path inside the value."""
-    errors = [InitErrorDetails(type=fault(message), loc=path, input=None) for path, message in found]
+def located_errors(problems: Iterable[ConfigProblem]) -> ValidationError:
+    """An exception with several errors, each with its path inside the value."""
+    errors = [InitErrorDetails(type=value_error(message), loc=path, input=None) for path, message in problems]
     return ValidationError.from_exception_data("config", errors)
 
 
-def _refused(info: ValidationInfo, error: PydanticCustomError, value: Any) -> Any:
-    """Raise the error; after a thousand in a config return the value, as the config is refused anyway."""
-    context: Context | None = info.context
+def _raise_or_skip(info: ValidationInfo, error: PydanticCustomError, value: Any) -> Any:
+    """Raise the error; after MAX_REPORTED_VALUES of them return `value`, as the config is refused anyway."""
+    context: ValidationContext | None = info.context
     if context is not None:
-        context.refused += 1
-        if context.refused > MAX_REFUSED:
+        context.n_errors += 1
+        if context.n_errors > MAX_REPORTED_VALUES:
             return value
     raise error
 
 
-def nearest(word: str, known: Sequence[str], words: Mapping[str, str] | None = None) -> str:
-    """`did_you_mean` for a key, which also knows other cases and other words.
+def suggest(word: str, choices: Sequence[str], synonyms: Mapping[str, str] | None = None) -> str:
+    """`did_you_mean` for a key, which also finds it in another case and by a synonym.
 
-    >>> nearest("masss1", ["m1", "v1"], {"mass1": "m1"})
+    Parameters
+    ----------
+    word : what was written
+    choices : the valid keys
+    synonyms : other words for some of them
+
+    >>> suggest("masss1", ["m1", "v1"], {"mass1": "m1"})
     'did you mean "m1"?'
     """
-    other = {name.lower(): name for name in known[:1000]} | {w: k for w, k in (words or {}).items() if k in known}
-    near = get_close_matches(word[:64].lower(), list(other), n=1, cutoff=0.6)
-    if not known:
-        return "none is known here"
-    return safe_text(did_you_mean(other[near[0]] if near else word[:64], known[:1000]), 800)
+    spellings = {name.lower(): name for name in choices[:1000]}
+    spellings |= {synonym: name for synonym, name in (synonyms or {}).items() if name in choices}
+    matches = get_close_matches(word[:64].lower(), list(spellings), n=1, cutoff=0.6)
+    if not choices:
+        return "none are defined"
+    return safe_text(did_you_mean(spellings[matches[0]] if matches else word[:64], choices[:1000]), 800)
 
 
 def expected(text: str) -> WrapValidator:
-    """Words for what pydantic refuses about a value as a whole; errors inside it keep theirs.
+    """Replace the message of pydantic's own errors about a value; errors inside the value are not changed.
 
     >>> from pydantic import TypeAdapter
     >>> TypeAdapter(Annotated[str, expected("text")]).validate_python(3)
     Traceback (most recent call last):
     pydantic_core._pydantic_core.ValidationError: 1 validation error for function-wrap[wrap()]
-      got 3, expected text [type=fault, input_value=3, input_type=int]
+      got 3, expected text [type=config_problem, input_value=3, input_type=int]
     """
 
     def wrap(value: object, handler: Callable[[object], object], info: ValidationInfo) -> object:
         try:
             return handler(value)
         except ValidationError as error:
-            if any(not item["loc"] and item["type"] != "fault" for item in error.errors(include_url=False)):
-                return _refused(info, refuse(value, text), value)
+            details = error.errors(include_url=False)
+            if any(not detail["loc"] and detail["type"] != PROBLEM_TYPE for detail in details):
+                return _raise_or_skip(info, mismatch_error(value, text), value)
             raise
 
     return WrapValidator(wrap)
 
 
-def named(what: str, known: Callable[[ValidationInfo], Sequence[str]]) -> BeforeValidator:
-    """A check that a text is one of some names; the message has the nearest."""
+def known_name(description: str, choices_of: Callable[[ValidationInfo], Sequence[str]]) -> BeforeValidator:
+    """A check that a text is one of some names; the message suggests the nearest."""
 
     def check(value: object, info: ValidationInfo) -> str:
-        names = known(info)
-        if isinstance(value, str) and value in names:
+        choices = choices_of(info)
+        if isinstance(value, str) and value in choices:
             return value
-        words = f"{what}; {nearest(value, names)}" if isinstance(value, str) else f"the name of {what}"
-        return str(_refused(info, refuse(value, words), ""))
+        expectation = f"the name of {description}"
+        if isinstance(value, str):
+            expectation = f"{description}; {suggest(value, choices)}"
+        return str(_raise_or_skip(info, mismatch_error(value, expectation), ""))
 
     return BeforeValidator(check)
 
 
-def tidy(schema: dict[str, Any]) -> None:
-    """The schema of a table without null, which TOML does not have, and with the summary of its docstring."""
+def simplify_schema(schema: dict[str, Any]) -> None:
+    """Remove null defaults, which TOML does not have, and all but the summary of the docstring."""
     schema["description"] = schema.get("description", "").split("\n")[0]
-    for entry in schema.get("properties", {}).values():
-        if entry.get("default", 0) is None:
-            del entry["default"]
+    for key_schema in schema.get("properties", {}).values():
+        if key_schema.get("default", 0) is None:
+            del key_schema["default"]
 
 
 class Table(BaseModel):
     """A table of a config: these keys and no others."""
 
     model_config = ConfigDict(
-        extra="forbid", strict=True, frozen=True, protected_namespaces=(), json_schema_extra=tidy
+        extra="forbid", strict=True, frozen=True, protected_namespaces=(), json_schema_extra=simplify_schema
     )
 
 
 @dataclass(frozen=True)
 class ReadAs:
-    """The annotation of a type that is made when the program runs, so that mypy sees the type of its value."""
+    """Annotation that has pydantic validate by a type built at run time; mypy sees the type of the value."""
 
     type: Any
 
@@ -205,17 +220,18 @@ class ReadAs:
         return handler.generate_schema(self.type)
 
 
-def _whole(value: object) -> object:
-    """A whole number that was written as a float, such as 1e6, as JSON has it."""
+def _float_to_int(value: object) -> object:
+    """An int for a float without a fraction, such as 1e6; other values unchanged."""
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
-def whole(least: int, most: int | None = None) -> ReadAs:
-    """Whole numbers of an interval."""
-    words = (
+def bounded_int(least: int, most: int | None = None) -> ReadAs:
+    """The type of whole numbers in an interval."""
+    description = (
         f"a whole number of at least {least:,}" if most is None else f"a whole number from {least:,} to {most:,}"
     )
-    return ReadAs(Annotated[int, Field(ge=least, le=most, strict=True), BeforeValidator(_whole), expected(words)])
+    interval = Field(ge=least, le=most, strict=True)
+    return ReadAs(Annotated[int, interval, BeforeValidator(_float_to_int), expected(description)])
 
 
 class Column(Table):
@@ -225,45 +241,46 @@ class Column(Table):
     column: Annotated[str, expected("the name of a column")] = Field(description="a name in its first line")
 
 
-def _one_range(schema: dict[str, Any]) -> None:
-    tidy(schema)
+def _range_schema(schema: dict[str, Any]) -> None:
+    simplify_schema(schema)
     schema.update(minProperties=1, maxProperties=1)
 
 
 class Range(Table):
     """A range, which is counted before it is written out: exactly one of its fields is given."""
 
-    model_config = ConfigDict(json_schema_extra=_one_range)
+    model_config = ConfigDict(json_schema_extra=_range_schema)
 
     linspace: tuple[float, float, int] | None = None
     geomspace: tuple[float, float, int] | None = None
     arange: tuple[float, float, float] | None = None
 
     @model_validator(mode="after")
-    def _countable(self) -> Range:
+    def _check_numbers(self) -> Range:
         if len(self.model_fields_set) != 1:
-            got = " and ".join(name for name in RANGES if name in self.model_fields_set) or "an empty table"
-            choices = ", ".join(f"{name} = {form}" for name, form in RANGES.items())
-            raise fault(f"got {got}, expected one of {choices}")
-        first, last, third = self.numbers
+            got = " and ".join(name for name in RANGE_FORMS if name in self.model_fields_set) or "an empty table"
+            choices = ", ".join(f"{name} = {form}" for name, form in RANGE_FORMS.items())
+            raise value_error(f"got {got}, expected one of {choices}")
+        first, last, step_or_count = self.numbers
         if self.kind == "geomspace" and min(first, last) <= 0 <= max(first, last):
-            raise self._fault(f"got {first:g} to {last:g}, expected two ends of one sign, neither of them 0")
-        if self.kind == "arange" and third == 0:
-            raise faults([(("arange", 2), "got 0, expected a step other than 0")])
+            raise self._range_error(f"got {first:g} to {last:g}, expected two ends of one sign, neither of them 0")
+        if self.kind == "arange" and step_or_count == 0:
+            raise located_errors([(("arange", 2), "got 0, expected a step other than 0")])
         if self.size < 1:
-            raise self._fault(f"got no value from {first:g} to {last:g} by {third:g}, expected at least one")
+            got = f"no value from {first:g} to {last:g} by {step_or_count:g}"
+            raise self._range_error(f"got {got}, expected at least one")
         if self.size > MAX_AXIS_VALUES:
-            size = f"{self.size:,}" if self.size <= MAX_COUNTED else f"more than {MAX_COUNTED:,}"
-            raise self._fault(f"got {size} values, expected at most {MAX_AXIS_VALUES:,} on an axis")
+            size = f"{self.size:,}" if self.size <= MAX_PRINTED_COUNT else f"more than {MAX_PRINTED_COUNT:,}"
+            raise self._range_error(f"got {size} values, expected at most {MAX_AXIS_VALUES:,} on an axis")
         return self
 
-    def _fault(self, message: str) -> ValidationError:
-        return faults([((self.kind,), message)])
+    def _range_error(self, message: str) -> ValidationError:
+        return located_errors([((self.kind,), message)])
 
     @property
     def kind(self) -> str:
-        """Name of its field."""
-        return next(name for name in RANGES if getattr(self, name) is not None)
+        """Name of the field that is set."""
+        return next(name for name in RANGE_FORMS if getattr(self, name) is not None)
 
     @property
     def numbers(self) -> tuple[float, float, float]:
@@ -273,52 +290,55 @@ class Range(Table):
     @property
     def size(self) -> int:
         """Number of values."""
-        first, last, third = self.numbers
+        first, last, step_or_count = self.numbers
         if self.kind != "arange":
-            return int(third)
-        size = (last - first) / third
-        return max(math.ceil(size), 0) if math.isfinite(size) else 2 * MAX_COUNTED
+            return int(step_or_count)
+        size = (last - first) / step_or_count
+        return max(math.ceil(size), 0) if math.isfinite(size) else 2 * MAX_PRINTED_COUNT
 
     def values(self, quantity: Quantity) -> tuple[float, ...]:
-        """Its values, those between the ends rounded to 15 significant digits, so that 0.3 is 0.3.
+        """The values of the range.
+
+        Those between the ends are rounded to 15 significant digits, so that 0.3 is 0.3.
 
         Raises
         ------
-        ValidationError : the range leaves the interval, overflows, or is finer than numbers are
+        ValidationError : a value is outside the interval of the quantity, the range overflows, or two neighbours
+            round to the same number
 
         >>> Range(linspace=(0.0, 1.0, 11)).values(Quantity("1", "restitution", 0, 1))[3]
         0.3
         """
-        first, last, third = self.numbers
+        first, last, step_or_count = self.numbers
         with np.errstate(all="ignore"):
             match self.kind:
                 case "linspace":
-                    array = np.linspace(first, last, int(third))
+                    values = np.linspace(first, last, int(step_or_count))
                 case "geomspace":
-                    array = np.geomspace(first, last, int(third))
+                    values = np.geomspace(first, last, int(step_or_count))
                 case _:
-                    array = np.arange(first, last, third)
-        if not np.isfinite(array).all():
-            raise self._fault(f"got {first:g} to {last:g}, expected a range that does not overflow")
-        # the ends were typed; the others get 15 significant digits
+                    values = np.arange(first, last, step_or_count)
+        if not np.isfinite(values).all():
+            raise self._range_error(f"got {first:g} to {last:g}, expected a range that does not overflow")
+        # the ends are kept as they were written
         inner = slice(1, None if self.kind == "arange" else -1)
-        array[inner] = [float(f"{value:.15g}") for value in array[inner].tolist()]
-        for extreme in (float(array.min()), float(array.max())):
+        values[inner] = [float(f"{value:.15g}") for value in values[inner].tolist()]
+        for extreme in (float(values.min()), float(values.max())):
             if not quantity.allows(extreme):
-                raise self._fault(f"got a value {extreme!r}, expected {quantity.expected}")
-        same = np.flatnonzero(np.diff(array) == 0)
-        if same.size:
-            raise self._fault(f"got {float(array[same[0]])!r} twice, expected each value once")
-        return tuple((array + 0.0).tolist())
+                raise self._range_error(f"got a value {extreme!r}, expected {quantity.expected}")
+        repeated = np.flatnonzero(np.diff(values) == 0)
+        if repeated.size:
+            raise self._range_error(f"got {float(values[repeated[0]])!r} twice, expected each value once")
+        return tuple((values + 0.0).tolist())
 
 
-# what a key that may be an axis is read as
+# the values of keys that may be axes
 Numbers: TypeAlias = float | tuple[float, ...] | Range | Column
 Names: TypeAlias = str | tuple[str, ...] | Column
 
 
-def form_of(value: object) -> str:
-    """The tag of the form that a value has: a number or text, a list, a range, or a column of a file."""
+def value_form(value: object) -> str:
+    """The tag of the form of a value: a number or text, a list, a range, or a column of a file."""
     match value:
         case list():
             return LIST
@@ -329,38 +349,38 @@ def form_of(value: object) -> str:
     return SCALAR
 
 
-def _form_of_names(value: object) -> str:
-    form = form_of(value)
+def _name_form(value: object) -> str:
+    form = value_form(value)
     return SCALAR if form == RANGE else form
 
 
-def _list_of(item: Any, what: str) -> Any:
-    """A list of at least one item, as a tuple."""
+def _list_of(element: Any, description: str) -> Any:
+    """The type of a list of at least one element, which becomes a tuple."""
 
-    def filled(value: list[object]) -> list[object]:
+    def check_not_empty(value: list[object]) -> list[object]:
         if not value:
-            raise refuse(value, f"a list of at least one: {what}")
+            raise mismatch_error(value, f"a list of at least one: {description}")
         return value
 
-    return Annotated[list[item], Field(min_length=1), BeforeValidator(filled), AfterValidator(tuple)]
+    return Annotated[list[element], Field(min_length=1), BeforeValidator(check_not_empty), AfterValidator(tuple)]
 
 
-def names(what: str, known: Callable[[ValidationInfo], Sequence[str]]) -> ReadAs:
-    """A name or a list of names, all of them known."""
-    name = Annotated[str, named(what, known)]
+def name_or_names(description: str, choices_of: Callable[[ValidationInfo], Sequence[str]]) -> ReadAs:
+    """The type of a name, or a list of names, that are among some choices."""
+    choice = Annotated[str, known_name(description, choices_of)]
     return ReadAs(
         Annotated[
-            Annotated[name, Tag(SCALAR)]
-            | Annotated[_list_of(name, what), Tag(LIST)]
+            Annotated[choice, Tag(SCALAR)]
+            | Annotated[_list_of(choice, description), Tag(LIST)]
             | Annotated[Column, Tag(COLUMN)],
-            Discriminator(_form_of_names),
+            Discriminator(_name_form),
         ]
     )
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """A number that the config may give, which also is the annotation of its type.
+    """A number of the config: its unit, meaning and interval; used as the annotation of its type.
 
     `Annotated[float, Quantity("1", "tolerance", 0, 1)]` is a number, bare or with its unit;
     `Annotated[Numbers, Quantity("kg", "mass", 0)]` may also be a list, a range or a column of a file.
@@ -368,10 +388,10 @@ class Quantity:
     Parameters
     ----------
     unit : SI unit, whose exponents may contain n
-    meaning : what it is, in words
-    least, most : the interval of its values, closed at finite ends
-    above : `least` itself is left out
-    infinite : inf is a value
+    meaning : what the number is, in words
+    least, most : ends of the interval of its values, which includes finite ends
+    above : whether the interval excludes `least`
+    infinite : whether inf is allowed
     """
 
     unit: str
@@ -383,7 +403,7 @@ class Quantity:
 
     @property
     def expected(self) -> str:
-        """The values it may have, in words.
+        """The allowed values, in words.
 
         >>> Quantity("kg", "mass", least=0, above=True, infinite=True).expected
         'a number > 0 kg, or inf'
@@ -402,44 +422,45 @@ class Quantity:
 
     @property
     def about(self) -> str:
-        """What it is, with its unit."""
+        """The meaning with the unit in brackets."""
         return f"{self.meaning} [{'-' if self.unit == '1' else self.unit}]"
 
     def allows(self, value: float) -> bool:
-        """Whether a number is in the interval."""
+        """Whether a number is allowed."""
         if math.isinf(value) and not self.infinite:
             return False
         return (self.least < value if self.above else self.least <= value) and value <= self.most
 
     @property
     def exponents(self) -> frozenset[str]:
-        """The names that its unit depends on."""
+        """The names that occur in the exponents of the unit."""
         return names_in(self.unit)
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> Any:
-        # types of one unit and interval are one type, whatever they mean
-        make = number_type if source is float else numbers_type
-        return handler.generate_schema(Annotated[make(replace(self, meaning="")), Field(description=self.about)])
+        # quantities with the same unit and interval share a type, whatever their meaning
+        build_type = number_type if source is float else numbers_type
+        validated = build_type(replace(self, meaning=""))
+        return handler.generate_schema(Annotated[validated, Field(description=self.about)])
 
     def validate(self, value: object, info: ValidationInfo) -> float:
-        """`read` for pydantic."""
-        context: Context | None = info.context
+        """Call `read` with the exponent of the validation context."""
+        context: ValidationContext | None = info.context
         try:
             return self.read(value, math.nan if context is None else context.n)
         except PydanticCustomError as error:
-            return float(_refused(info, error, math.nan))
+            return float(_raise_or_skip(info, error, math.nan))
 
     def read(self, value: object, n: float | None = math.nan) -> float:
         """The SI value of a number or a string with a unit.
 
         Parameters
         ----------
-        value : what the config gives
-        n : the exponent that the unit may contain; None where it is an axis, NaN where it is not known
+        value : from the config
+        n : the exponent that the unit may contain; None where it is an axis, NaN where it is unknown
 
         Raises
         ------
-        PydanticCustomError : it is something else, is not in the interval, or its unit is of another dimension
+        PydanticCustomError : the value is neither, is not allowed, or its unit has another dimension
 
         >>> Quantity("Pa", "Young's modulus", least=0, above=True).read("56 GPa")
         56000000000.0
@@ -449,53 +470,53 @@ class Quantity:
         if isinstance(value, str):
             number = self._with_unit(value, n)
         elif isinstance(value, bool) or not isinstance(value, int | float):
-            raise refuse(value, self.expected)
+            raise mismatch_error(value, self.expected)
         else:
-            number = _float(lambda: float(value))
+            number = _float_or_inf(lambda: float(value))
         if not self.allows(number):
-            raise refuse(value, self.expected)
-        # -0.0 and 0.0 are one value, and have one label
+            raise mismatch_error(value, self.expected)
+        # -0.0 becomes 0.0: they are one value with one label
         return number + 0.0
 
     def _with_unit(self, text: str, n: float | None) -> float:
-        if len(text) > MAX_UNIT:
-            raise refuse(text, f"at most {MAX_UNIT} characters")
-        parts = NUMBER.fullmatch(text)
+        if len(text) > MAX_UNIT_LENGTH:
+            raise mismatch_error(text, f"at most {MAX_UNIT_LENGTH} characters")
+        parts = NUMBER_SYNTAX.fullmatch(text)
         example = "" if self.exponents else f', such as "1 {self.unit}"'
         if parts is None or not parts[2]:
             with_unit = "" if self.unit == "1" else f", bare or with a unit{example}"
-            raise refuse(text, f"{self.expected}{with_unit}")
+            raise mismatch_error(text, f"{self.expected}{with_unit}")
         factor = self._factor(text, parts[2], n, example)
         number = float(parts[1])
         if number == 0.0 or not math.isfinite(number):
             return number
-        # exact until the last step, so that "35 mm" is 0.035 to the bit
-        return _float(lambda: float(Fraction(parts[1]) * factor))
+        # exact until it is converted to a float, so that "35 mm" equals 0.035 exactly
+        return _float_or_inf(lambda: float(Fraction(parts[1]) * factor))
 
     def _factor(self, text: str, unit: str, n: float | None, example: str) -> Fraction | float:
-        """What a unit is in SI, if it is of this dimension."""
+        """The factor that converts a unit to SI, if it has the dimension of the quantity."""
         others = sorted(self.exponents - {"n"})
         if others:
-            raise refuse(text, f"a bare number: its unit {self.unit} depends on {' and '.join(others)}")
+            raise mismatch_error(text, f"a bare number: its unit {self.unit} depends on {' and '.join(others)}")
         if n is None and self.exponents:
-            raise refuse(text, f"a bare number: its unit {self.unit} depends on n, which is an axis")
+            raise mismatch_error(text, f"a bare number: its unit {self.unit} depends on n, which is an axis")
         of_n = f" with n = {n:g}" if self.exponents and n is not None else ""
         wanted = "a bare number" if self.unit == "1" else f"a unit of {self.unit}{of_n}{example}"
-        scale = _scale(unit)
+        scale = _si_scale(unit)
         if scale is None:
-            raise refuse(text, f'{wanted}; "{safe_text(unit)}" is not a known unit')
+            raise mismatch_error(text, f'{wanted}; "{safe_text(unit)}" is not a known unit')
         factor, powers = scale
         if self.exponents and n is not None and math.isnan(n):
             return factor
-        own = map(float, dimension(self.unit, {"n": 0.0 if n is None or math.isnan(n) else n}))
-        if powers is None or any(abs(a - b) > 1e-9 for a, b in zip(powers, own, strict=True)):
-            raise refuse(text, wanted)
+        expected_powers = map(float, dimension(self.unit, {"n": 0.0 if n is None or math.isnan(n) else n}))
+        if powers is None or any(abs(a - b) > 1e-9 for a, b in zip(powers, expected_powers, strict=True)):
+            raise mismatch_error(text, wanted)
         return factor
 
 
 @cache
 def number_type(quantity: Quantity) -> Any:
-    """The type of a number, bare or with its unit."""
+    """The type of a number, bare or with a unit."""
     bounds: dict[str, Any] = {}
     if math.isfinite(quantity.least):
         bounds["gt" if quantity.above else "ge"] = quantity.least
@@ -504,51 +525,52 @@ def number_type(quantity: Quantity) -> Any:
     bare: Any = Annotated[float, Field(**bounds)]
     if quantity.exponents <= {"n"}:
         number = rf"\s*[-+]?({_DIGITS}{'|inf' if quantity.infinite else ''})\s*"
-        # a number without a unit is no text
+        # a number without a unit must not be a string
         pattern = rf"^(?!{number}$){number}[{_LETTERS}/1]"
         example = f"1 {'%' if quantity.unit == '1' else quantity.unit}"
-        bare |= Annotated[str, Field(pattern=pattern, max_length=MAX_UNIT, examples=[example])]
+        bare |= Annotated[str, Field(pattern=pattern, max_length=MAX_UNIT_LENGTH, examples=[example])]
     return Annotated[float, PlainValidator(quantity.validate, json_schema_input_type=bare)]
 
 
 @cache
 def numbers_type(quantity: Quantity) -> Any:
-    """The type of what may be an axis; its form decides how it is read."""
+    """The type of a number, list, range or column of a file; the form decides which type validates it."""
     number, end = number_type(quantity), number_type(replace(quantity, infinite=False))
-    free, count, three = number_type(Quantity(quantity.unit, "")), whole(1).type, cast(Any, tuple)
+    any_number, count = number_type(Quantity(quantity.unit, "")), bounded_int(1).type
+    triple = cast(Any, tuple)
     types = {
-        "linspace": three[end, end, count],
-        "geomspace": three[end, end, count],
-        # what arange stops before, and its step, need not be values themselves
-        "arange": three[end, free, free],
+        "linspace": triple[end, end, count],
+        "geomspace": triple[end, end, count],
+        # the stop and the step of arange need not be allowed values
+        "arange": triple[end, any_number, any_number],
     }
-    fields: dict[str, Any] = {
-        name: (Annotated[kind, Field(description=RANGES[name], strict=False), BeforeValidator(_three(name))], None)
-        for name, kind in types.items()
-    }
-    interval = create_model(f"Range of {quantity.expected.removeprefix('a ')}", __base__=Range, **fields)
+    fields: dict[str, Any] = {}
+    for kind, numbers in types.items():
+        form = Field(description=RANGE_FORMS[kind], strict=False)
+        fields[kind] = Annotated[numbers, form, BeforeValidator(_range_numbers(kind))], None
+    range_type = create_model(f"Range of {quantity.expected.removeprefix('a ')}", __base__=Range, **fields)
     return Annotated[
         Annotated[number, Tag(SCALAR)]
         | Annotated[_list_of(number, quantity.expected), Tag(LIST)]
-        | Annotated[interval, Tag(RANGE)]
+        | Annotated[range_type, Tag(RANGE)]
         | Annotated[Column, Tag(COLUMN)],
-        Discriminator(form_of),
+        Discriminator(value_form),
     ]
 
 
-def _three(kind: str) -> Callable[[object], object]:
-    """A check that a range has its three numbers."""
+def _range_numbers(kind: str) -> Callable[[object], object]:
+    """A check that the list of a range has three numbers."""
 
     def check(value: object) -> object:
         if isinstance(value, list | tuple) and len(value) == 3:
             return value
         got = f"a list of {len(value)}" if isinstance(value, list | tuple) else show(value)
-        raise fault(f"got {got}, expected {RANGES[kind]}")
+        raise value_error(f"got {got}, expected {RANGE_FORMS[kind]}")
 
     return check
 
 
-def _float(convert: Callable[[], float]) -> float:
+def _float_or_inf(convert: Callable[[], float]) -> float:
     try:
         return convert()
     except OverflowError:
@@ -556,32 +578,35 @@ def _float(convert: Callable[[], float]) -> float:
 
 
 @cache
-def _registry() -> Any:
+def _unit_registry() -> Any:
     import pint
 
     return pint.UnitRegistry(non_int_type=Fraction)
 
 
 @lru_cache(maxsize=256)
-def _scale(unit: str) -> tuple[Fraction | float, tuple[float, float, float] | None] | None:
-    """The factor to SI and the exponents of mass, length and time; these are None for any other dimension."""
-    if UNIT.fullmatch(unit) is None:
+def _si_scale(unit: str) -> tuple[Fraction | float, tuple[float, float, float] | None] | None:
+    """The factor to SI, and the powers of mass, length and time, or None if the unit has another dimension.
+
+    None for an unknown unit.
+    """
+    if UNIT_SYNTAX.fullmatch(unit) is None:
         return None
-    # kg/m3 and kg m-3 are common spellings, which pint does not know
+    # kg/m3 and kg m-3 are common spellings that pint does not accept
     unit = re.sub(rf"(?<=[{_LETTERS}])(-?[0-9])", r"^\1", unit)
-    registry = _registry()
-    # pint leaves its parser by many kinds of exception (AttributeError, AssertionError, ZeroDivisionError)
+    registry = _unit_registry()
+    # pint's parser raises many kinds of exception (AttributeError, AssertionError, ZeroDivisionError)
     try:
         parsed = registry.parse_units(("1" if unit.startswith("/") else "") + unit)
-        # a unit with an offset, or a logarithmic one, is no factor
+        # units with an offset and logarithmic units have no factor
         if registry.Quantity(Fraction(0), parsed).to_base_units().magnitude != 0:
             return None
         factor, _ = registry.get_base_units(parsed)
-        exponents = {str(name): float(power) for name, power in parsed.dimensionality.items()}
+        powers = {str(dimension_name): float(power) for dimension_name, power in parsed.dimensionality.items()}
     except Exception:
         return None
-    known = ("[mass]", "[length]", "[time]")
-    if not exponents.keys() <= set(known):
+    base_dimensions = ("[mass]", "[length]", "[time]")
+    if not powers.keys() <= set(base_dimensions):
         return factor, None
-    mass, length, time = (exponents.get(name, 0.0) for name in known)
+    mass, length, time = (powers.get(dimension_name, 0.0) for dimension_name in base_dimensions)
     return factor, (mass, length, time)

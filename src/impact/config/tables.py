@@ -1,4 +1,4 @@
-"""The tables of a config as pydantic models, and the JSON Schema that they make."""
+"""The tables of a config as pydantic models, and their JSON Schema."""
 
 from __future__ import annotations
 
@@ -25,46 +25,49 @@ from ..contact.models import built_in, catalogue
 from ..contact.outputs import OUTPUTS
 from .quantities import (
     MAX_AXIS_VALUES,
-    MAX_FAULTS,
-    MAX_UNIT,
+    MAX_PROBLEMS,
+    MAX_UNIT_LENGTH,
     RANGE,
     SCALAR,
-    Context,
-    Fault,
+    ConfigProblem,
+    KeyPath,
     Names,
     Numbers,
     Quantity,
     ReadAs,
     Table,
+    ValidationContext,
+    bounded_int,
     expected,
-    fault,
-    faults,
-    named,
-    names,
-    nearest,
-    refuse,
-    tidy,
-    whole,
+    known_name,
+    located_errors,
+    mismatch_error,
+    name_or_names,
+    simplify_schema,
+    suggest,
+    value_error,
 )
 
 DEFAULT_TITLE = "Impact sweep"
 DEFAULT_RTOL = 1e-10
-MAX_STEPS = 10**9
+MAX_SOLVER_STEPS = 10**9
 CORES = ("auto", "numpy", "numba")
-MODELS = 'a model, or a list of models; "all" are all'
+MODELS_EXPECTED = 'a model, or a list of models; "all" are all'
 
 
-MATERIAL_NAME = names("a material of [materials]", lambda info: cast(Context, info.context).materials)
-Group = Annotated[
+MATERIAL_NAME = name_or_names(
+    "a material of [materials]", lambda info: cast(ValidationContext, info.context).materials
+)
+ZipGroup = Annotated[
     list[Annotated[str, expected("a name")]], Field(min_length=2), expected("a group of at least two names")
 ]
-CASES = "the name of a CSV file, or a table of lists by config name, such as { v1 = [1.0, 2.0] }"
-Cases = Annotated[
-    Annotated[str, expected(CASES), Tag(SCALAR)]
+CASES_EXPECTED = "the name of a CSV file, or a table of lists by config name, such as { v1 = [1.0, 2.0] }"
+CasesTable = Annotated[
+    Annotated[str, expected(CASES_EXPECTED), Tag(SCALAR)]
     | Annotated[
         dict[str, Annotated[list[float | str], Field(min_length=1), expected("a list of values")]],
         Field(min_length=1),
-        expected(CASES),
+        expected(CASES_EXPECTED),
         Tag(RANGE),
     ],
     Discriminator(lambda value: RANGE if isinstance(value, dict) else SCALAR),
@@ -72,10 +75,10 @@ Cases = Annotated[
 
 
 def _sweep_schema(schema: dict[str, Any]) -> None:
-    """What is asked for may be given in more than one way."""
-    tidy(schema)
-    ways = (("v1", "cases"), ("m1", "R1", "cases"), ("m2", "R2", "cases"))
-    schema["allOf"] = [{"anyOf": [{"required": [key]} for key in keys]} for keys in ways]
+    """Require each of these inputs by one of its alternative keys."""
+    simplify_schema(schema)
+    alternatives = (("v1", "cases"), ("m1", "R1", "cases"), ("m2", "R2", "cases"))
+    schema["allOf"] = [{"anyOf": [{"required": [key]} for key in keys]} for keys in alternatives]
 
 
 class Sweep(Table):
@@ -96,10 +99,10 @@ class Sweep(Table):
     material: Annotated[Names | None, MATERIAL_NAME] = Field(None, description="material of both balls")
     material1: Annotated[Names | None, MATERIAL_NAME] = Field(None, description="material of ball 1")
     material2: Annotated[Names | None, MATERIAL_NAME] = Field(None, description="material of ball 2")
-    zip: Annotated[list[Group], expected('a list of groups of names, such as [["m1", "m2"]]')] = Field(
+    zip: Annotated[list[ZipGroup], expected('a list of groups of names, such as [["m1", "m2"]]')] = Field(
         default=[], description="groups of axes that vary together"
     )
-    cases: Annotated[Any, ReadAs(Cases)] = Field(
+    cases: Annotated[Any, ReadAs(CasesTable)] = Field(
         None, description="a CSV file of points, whose columns are config names with units, or a table of lists"
     )
 
@@ -116,10 +119,10 @@ class MaterialTable(Table):
 def quantities_of(table: type[Table]) -> dict[str, Quantity]:
     """The quantities of a table by key."""
     return {
-        name: item
-        for name, key in table.model_fields.items()
-        for item in key.metadata
-        if isinstance(item, Quantity)
+        name: annotation
+        for name, field in table.model_fields.items()
+        for annotation in field.metadata
+        if isinstance(annotation, Quantity)
     }
 
 
@@ -127,12 +130,12 @@ SWEEP_QUANTITIES, MATERIAL_QUANTITIES = quantities_of(Sweep), quantities_of(Mate
 MATERIAL_KEYS = {
     name: str(Sweep.model_fields[name].description) for name in ("material", "material1", "material2")
 }
-DEFAULTS = {name: float(Sweep.model_fields[name].default) for name in ("v2", "n")}
-# of a law that has an exponent of its own
-OWN_K = Quantity("N/m^n", "stiffness of this law, in place of the sweep's", 0, above=True)
+SWEEP_DEFAULTS = {name: float(Sweep.model_fields[name].default) for name in ("v2", "n")}
+# K of a model with a fixed exponent
+LAW_STIFFNESS = Quantity("N/m^n", "stiffness of this law, in place of the sweep's", 0, above=True)
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid", json_schema_extra=tidy))
+@dataclass(frozen=True, config=ConfigDict(extra="forbid", json_schema_extra=simplify_schema))
 class Solver:
     """How impacts are integrated.
 
@@ -145,7 +148,9 @@ class Solver:
     """
 
     rtol: Annotated[float, Quantity("1", "relative tolerance of the integration", 1e-13, 1e-4)] = DEFAULT_RTOL
-    max_steps: Annotated[int, whole(1, MAX_STEPS), Field(description="steps that one impact may take")] = 10_000
+    max_steps: Annotated[
+        int, bounded_int(1, MAX_SOLVER_STEPS), Field(description="steps that one impact may take")
+    ] = 10_000
     collapse: Annotated[
         bool, Field(strict=True, description="integrate impacts that are the same once"), expected("true or false")
     ] = True
@@ -154,17 +159,17 @@ class Solver:
     )
 
 
-Variable = Annotated[Literal[*OUTPUTS], named("a variable of the result", lambda info: OUTPUTS)]  # type: ignore[valid-type]
+OutputVariable = Annotated[Literal[*OUTPUTS], known_name("a variable of the result", lambda info: OUTPUTS)]  # type: ignore[valid-type]
 
 
-def _listed(value: object) -> object:
-    """A list, or nothing, which stands for all; other collections are not converted."""
+def _list_or_none(value: object) -> object:
+    """The value if it is a list, or None, which means all; other collections are not converted to lists."""
     if isinstance(value, list | tuple | None) and value != []:
         return value
-    raise refuse(value, "a list of names")
+    raise mismatch_error(value, "a list of names")
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid", json_schema_extra=tidy))
+@dataclass(frozen=True, config=ConfigDict(extra="forbid", json_schema_extra=simplify_schema))
 class Output:
     """What of a result is stored, and how.
 
@@ -179,8 +184,10 @@ class Output:
     """
 
     variables: Annotated[
-        tuple[Variable, ...] | None,
-        BeforeValidator(_listed, json_schema_input_type=Annotated[list[Variable], Field(min_length=1)]),
+        tuple[OutputVariable, ...] | None,
+        BeforeValidator(
+            _list_or_none, json_schema_input_type=Annotated[list[OutputVariable], Field(min_length=1)]
+        ),
         Field(description="else all but those stored on request; the status is always among them"),
     ] = None
     dtype: Annotated[
@@ -188,7 +195,7 @@ class Output:
     ] = "float64"
     compression: Annotated[Literal["none", "gzip"], Field(description="of the variables")] = "none"
     chunks: Annotated[
-        Mapping[str, Annotated[int, whole(1, MAX_AXIS_VALUES)]],
+        Mapping[str, Annotated[int, bounded_int(1, MAX_AXIS_VALUES)]],
         Field(description="lengths along axes, by name, of the chunks in which variables are stored"),
         expected("a table of lengths by axis, such as { e = 50 }"),
     ] = field(default_factory=dict)
@@ -199,41 +206,58 @@ class Output:
 
 
 def model_quantities(model: ForceModel) -> dict[str, Quantity]:
-    """What [model.KEY] may hold: the parameters, and K of a law that has an exponent of its own."""
-    stiffness = {} if model.exponent is None else {"K": OWN_K}
+    """The quantities of [model.KEY]: the parameters, and K of a model with a fixed exponent."""
+    stiffness = {} if model.exponent is None else {"K": LAW_STIFFNESS}
     return stiffness | {
         parameter.name: Quantity(parameter.unit, parameter.meaning, parameter.least, parameter.most)
         for parameter in model.parameters
     }
 
 
+def quantity_at(path: KeyPath, models: Mapping[str, ForceModel]) -> Quantity | None:
+    """The quantity of the input at a path; None for the name of a material.
+
+    Raises
+    ------
+    KeyError : no input has this path
+    """
+    match path:
+        case ("sweep", str(name)):
+            return None if name in MATERIAL_KEYS else SWEEP_QUANTITIES[name]
+        case ("materials", _, str(name)):
+            return MATERIAL_QUANTITIES[name]
+        case ("model", str(key), str(name)):
+            return model_quantities(models[key])[name]
+    raise KeyError(path)
+
+
 def parameter_table(model: ForceModel) -> type[Table]:
-    """The table [model.KEY]. Its keys are aliases: not every name of a parameter could name a field."""
+    """The type of the table [model.KEY]; its keys are aliases, since not every parameter name can name a field."""
     defaults = {parameter.name: parameter.default for parameter in model.parameters}
     fields: dict[str, Any] = {
-        f"field_{place}": (Annotated[Numbers | None, quantity, Field(alias=name)], defaults.get(name))
-        for place, (name, quantity) in enumerate(model_quantities(model).items())
+        f"field_{index}": (Annotated[Numbers | None, quantity, Field(alias=name)], defaults.get(name))
+        for index, (name, quantity) in enumerate(model_quantities(model).items())
     }
     return create_model(model.key, __base__=Table, **fields)
 
 
-def _selected(value: object, info: ValidationInfo) -> tuple[ForceModel, ...]:
-    models, found = expand_models(value, cast(Context, info.context).models)
-    if found:
-        raise faults(found)
-    return tuple(models)
+def _select_models(value: object, info: ValidationInfo) -> tuple[ForceModel, ...]:
+    selection, problems = expand_models(value, cast(ValidationContext, info.context).models)
+    if problems:
+        raise located_errors(problems)
+    return tuple(selection)
 
 
 class Document(Table):
-    """A whole config, without what depends on the catalogue; see `document_type`."""
+    """A whole config, except for the parts that depend on the catalogue; see `document_type`."""
 
-    # a dataclass is made of a table
+    # not strict: the dataclasses Solver and Output are built from tables
     model_config = ConfigDict(strict=False)
 
     title: Annotated[str, Field(strict=True), expected("text")] = Field(
         DEFAULT_TITLE, description="title of the sweep"
     )
-    models: Annotated[tuple[ForceModel, ...], PlainValidator(_selected)] = ()
+    models: Annotated[tuple[ForceModel, ...], PlainValidator(_select_models)] = ()
     sweep: Sweep
     materials: Annotated[dict[str, MaterialTable], expected("a table")] = Field(
         default_factory=dict, description="materials by name"
@@ -243,89 +267,104 @@ class Document(Table):
     model: Any = None
 
 
-def document_type(known: Mapping[str, ForceModel], with_tables: Sequence[str]) -> type[Document]:
-    """The type of a whole config: all models by name, and tables for the parameters of some of them."""
+def document_type(models_by_key: Mapping[str, ForceModel], with_tables: Sequence[str]) -> type[Document]:
+    """The type of a whole config.
+
+    Parameters
+    ----------
+    models_by_key : the models that the config may name
+    with_tables : keys of the models that have a table for their parameters
+    """
     fields: dict[str, Any] = {
-        f"field_{place}": (Annotated[parameter_table(known[key]), Field(alias=key)], None)
-        for place, key in enumerate(with_tables)
+        f"field_{index}": (Annotated[parameter_table(models_by_key[key]), Field(alias=key)], None)
+        for index, key in enumerate(with_tables)
     }
     parameters = create_model("model", __base__=Table, __doc__="Parameters of models, by key.", **fields)
-    models = PlainValidator(_selected, json_schema_input_type=_model_names(known))
-    about = Field(description='models by name, "all", "family:NAME" or a pattern; after "!" those left out')
+    selection = PlainValidator(_select_models, json_schema_input_type=_model_names(models_by_key))
+    description = Field(description='models by name, "all", "family:NAME" or a pattern; after "!" those left out')
     return create_model(
         "config",
         __base__=Document,
-        models=(Annotated[Any, models, about], ...),
+        models=(Annotated[Any, selection, description], ...),
         model=(parameters, Field(default_factory=parameters)),
     )
 
 
 def json_schema() -> dict[str, object]:
-    """JSON Schema (draft 2020-12) of a config, from which editors complete and check.
+    """JSON Schema (draft 2020-12) of a config, for completion and checks in editors.
 
-    It cannot say what depends on more than one key, but for `required`: the rules of `impact.config.rules`, names
-    of materials and columns, numbers of points; nor the dimension and the value of a string with a unit, and the
-    size and the overflow of a range.
+    Except for required keys, it does not cover conditions between keys: the rules of `impact.config.rules`, names
+    of materials and columns, numbers of points. Nor does it cover the dimension and value of a string with a unit,
+    and the size and overflow of a range.
 
     >>> json_schema()["required"]
     ['models', 'sweep']
     """
-    known = catalogue()
-    schema = document_type(known, list(known)).model_json_schema()
+    models = catalogue()
+    schema = document_type(models, list(models)).model_json_schema()
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
 
-def _model_names(known: Mapping[str, ForceModel]) -> Any:
-    """The type of the key `models`, with all names, for its JSON Schema."""
-    families = {f"family:{model.family}" for model in known.values() if not model.same_as}
-    words = (*known, "all", *sorted(families))
-    # a pattern holds *, ? or [; no key begins with "!", and "family:" takes no pattern
+def _model_names(models: Mapping[str, ForceModel]) -> Any:
+    """The type of the key `models` for its JSON Schema, with all names."""
+    families = {f"family:{model.family}" for model in models.values() if not model.same_as}
+    words = (*models, "all", *sorted(families))
+    # a pattern contains *, ? or [; no key begins with "!", and "family:" takes no pattern
     pattern = r"(?!!|family:).*[*?\[]"
     name: Any = Literal[words] | Annotated[str, Field(pattern=f"^{pattern}")]
     excluded: Any = Literal[tuple(f"!{word}" for word in words)] | Annotated[str, Field(pattern=f"^!{pattern}")]
-    # the first entry of a list has no models before it to leave out
+    # the first element of a list cannot exclude models, since none precede it
     first: Any = {"allOf": [{"prefixItems": [{"not": {"type": "string", "pattern": "^!"}}]}]}
     return name | Annotated[list[name | excluded], Field(min_length=1, json_schema_extra=first)]
 
 
-def expand_models(selection: object, known: Mapping[str, ForceModel]) -> tuple[list[ForceModel], list[Fault]]:
-    """The models of a key, "all", "family:NAME", a glob or a list of those, less those after "!"; and faults."""
+def expand_models(
+    selection: object, models: Mapping[str, ForceModel]
+) -> tuple[list[ForceModel], list[ConfigProblem]]:
+    """The models that a selection names, and its problems.
+
+    Parameters
+    ----------
+    selection : a key, "all", "family:NAME", a pattern, or a list of those; those after "!" are excluded
+    models : all models by key
+    """
     if not isinstance(selection, str | list) or not selection:
-        return [], [((), refuse(selection, MODELS).message())]
+        return [], [((), mismatch_error(selection, MODELS_EXPECTED).message())]
     selected: dict[str, ForceModel] = {}
-    found: list[Fault] = []
-    for place, word in enumerate([selection] if isinstance(selection, str) else selection):
+    problems: list[ConfigProblem] = []
+    for index, word in enumerate([selection] if isinstance(selection, str) else selection):
         try:
             if isinstance(word, str) and word.startswith("!"):
-                _leave_out(selected, word, known)
+                _leave_out(selected, word, models)
             else:
-                selected |= _models(word, known)
+                selected |= _models_matching(word, models)
         except PydanticCustomError as error:
-            found.append((() if isinstance(selection, str) else (place,), error.message()))
-            if len(found) >= MAX_FAULTS:
+            problems.append((() if isinstance(selection, str) else (index,), error.message()))
+            if len(problems) >= MAX_PROBLEMS:
                 break
-    if not selected and not found:
-        found.append(((), refuse(selection, "models that are not all left out again").message()))
-    return list(selected.values()), found
+    if not selected and not problems:
+        problems.append(((), mismatch_error(selection, "models that are not all left out again").message()))
+    return list(selected.values()), problems
 
 
-def _leave_out(selected: dict[str, ForceModel], word: str, known: Mapping[str, ForceModel]) -> None:
-    """Take the models of "!..." out of those selected before it."""
+def _leave_out(selected: dict[str, ForceModel], word: str, models: Mapping[str, ForceModel]) -> None:
+    """Remove the models of "!..." from those selected before it."""
     try:
-        out = _models(word[1:], known)
+        excluded = _models_matching(word[1:], models)
     except PydanticCustomError as error:
-        raise fault(f"after !: {error.message()}") from None
-    if selected.keys().isdisjoint(out):
-        raise refuse(word, "models to leave out of those before it")
-    for key in out:
+        raise value_error(f"after !: {error.message()}") from None
+    if selected.keys().isdisjoint(excluded):
+        raise mismatch_error(word, "models to leave out of those before it")
+    for key in excluded:
         selected.pop(key, None)
 
 
-def _models(word: object, known: Mapping[str, ForceModel]) -> dict[str, ForceModel]:
+def _models_matching(word: object, models: Mapping[str, ForceModel]) -> dict[str, ForceModel]:
+    """The models of a key, "all", "family:NAME" or a pattern, by key."""
     if not isinstance(word, str):
-        raise refuse(word, "the name of a model")
-    # a law is not run twice because it has two names
-    laws = {key: model for key, model in known.items() if not model.same_as}
+        raise mismatch_error(word, "the name of a model")
+    # a law with two names is not run twice
+    laws = {key: model for key, model in models.items() if not model.same_as}
     if word == "all":
         return {key: model for key, model in laws.items() if key in built_in()}
     if word.startswith("family:"):
@@ -333,13 +372,13 @@ def _models(word: object, known: Mapping[str, ForceModel]) -> dict[str, ForceMod
         members = {key: model for key, model in laws.items() if model.family == family}
         if not members:
             families = sorted({model.family for model in laws.values()})
-            raise refuse(word, f"a family of models; {nearest(family, families)}")
+            raise mismatch_error(word, f"a family of models; {suggest(family, families)}")
         return members
     if any(letter in word for letter in "*?["):
-        matching = {key: model for key, model in known.items() if fnmatchcase(key, word[:MAX_UNIT])}
+        matching = {key: model for key, model in models.items() if fnmatchcase(key, word[:MAX_UNIT_LENGTH])}
         if not matching:
-            raise refuse(word, "a pattern that some model matches")
+            raise mismatch_error(word, "a pattern that some model matches")
         return matching
-    if word not in known:
-        raise refuse(word, f"a model; {nearest(word, list(known))}")
-    return {word: known[word]}
+    if word not in models:
+        raise mismatch_error(word, f"a model; {suggest(word, list(models))}")
+    return {word: models[word]}

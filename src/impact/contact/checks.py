@@ -1,4 +1,4 @@
-"""The contract: what physics and the house ask of every contact force model, built in or a user's own."""
+"""The contract: conditions of physics and of this package for every contact force model, also for plug-ins."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from .status import FIRST_FAILURE, Status
 from .units import dimension
 
 CONTRACT_RTOL, CONTRACT_MAX_STEPS = 1e-10, 10_000
-# what rounding leaves of an identity, relative to its largest term
+# largest error of an identity by rounding, relative to its largest term
 ROUNDING_ERROR = 1e-12
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One clause: what it says, how far off the model is at its worst, and how far it may be."""
+    """One clause of the contract: its text, the largest deviation of the model, and the bound on it."""
 
     clause: str
     worst: float
@@ -51,29 +51,28 @@ def sample(model: ForceModel) -> Impacts:
     impacts = Impacts(
         e=e, v1=v1, v2=v2, m1=m1, m2=m2, R1=R1, R2=R2, n=n, E1=E1, nu1=nu1, yield_strength1=strength,
         E2=E2, nu2=nu2, yield_strength2=strength, K=stiffness(n, hertz, effective_mass(m1, m2), v1 - v2),
-        parameters={one.name: np.ones(count) for one in model.parameters},
+        parameters={parameter.name: np.ones(count) for parameter in model.parameters},
     )  # fmt: skip
-    return replace(
-        impacts, parameters={one.name: _parameter_values(model, one, impacts) for one in model.parameters}
-    )
+    values = {parameter.name: _parameter_values(model, parameter, impacts) for parameter in model.parameters}
+    return replace(impacts, parameters=values)
 
 
 def _parameter_values(model: ForceModel, parameter: Parameter, impacts: Impacts) -> Array:
-    """Values of a parameter: its default, or from its least upwards, by a typical value or each contact's size."""
+    """Values of a parameter for the impacts: its default, or values from its least one upwards, shape (n,)."""
     if parameter.default is not None:
         return np.full(len(impacts), parameter.default)
-    # what one of its units is in the contact's own
+    # the size of the parameter that is 1 in the contact's own units
     size = 1.0 / impacts.dimensionless(model, parameter.name) if parameter.typical is None else parameter.typical
     least = parameter.least if math.isfinite(parameter.least) else min(0.0, parameter.most)
     return np.clip(least + np.linspace(0.0, 4.0, len(impacts)) * size, parameter.least, parameter.most)
 
 
 def contract(model: ForceModel) -> Iterator[Finding]:
-    """Every clause, one after the other.
+    """Check every clause of the contract; yields the findings.
 
     Parameters
     ----------
-    model : the law; its numbers are those of forty impacts at rtol 1e-10
+    model : the law; it is checked with the forty impacts of `sample` at rtol 1e-10
 
     >>> from impact.contact.models import find
     >>> all(finding.holds for finding in contract(find("bilinear")))
@@ -87,15 +86,15 @@ def contract(model: ForceModel) -> Iterator[Finding]:
     def worst(values: Array) -> float:
         return float(np.max(np.abs(values[ended]), initial=0.0))
 
-    # a wall takes up momentum without moving; equation (5) covers it
+    # a wall takes momentum without moving, and is covered by equation (5)
     ball = np.isfinite(impacts.m2)
     m1, m2 = impacts.m1[ball], impacts.m2[ball]
-    before, after = (
-        (m1 * first[ball], m2 * second[ball])
-        for first, second in ((impacts.v1, impacts.v2), (base["v1_post"], base["v2_post"]))
+    momenta_before, momenta_after = (
+        (m1 * ball_1[ball], m2 * ball_2[ball])
+        for ball_1, ball_2 in ((impacts.v1, impacts.v2), (base["v1_post"], base["v2_post"]))
     )
-    size = np.abs(before[0]) + np.abs(before[1])
-    lost = np.abs(before[0] + before[1] - after[0] - after[1]) / size
+    size = np.abs(momenta_before[0]) + np.abs(momenta_before[1])
+    lost = np.abs(momenta_before[0] + momenta_before[1] - momenta_after[0] - momenta_after[1]) / size
     yield Finding("momentum is conserved (4)", float(np.max(lost)), ROUNDING_ERROR)
     rebound = (base["v2_post"] - base["v1_post"]) / impacts.v0 - base["e_out"]
     scale = 1.0 + (np.abs(impacts.v1) + np.abs(impacts.v2)) / impacts.v0
@@ -119,12 +118,14 @@ def contract(model: ForceModel) -> Iterator[Finding]:
         "swapped balls swap velocities", worst((other["v1_post"] + base["v2_post"]) / impacts.v0), ROUNDING_ERROR
     )
     elastic = _collide(model, replace(impacts, e=np.ones(len(impacts))))
-    # parameters of its own may damp a law to its limit, whatever e is
+    # the parameters of a law may damp it to its limit at any e
     odd = elastic["status"] != Status.OK if "e" in model.quantities else elastic["status"] >= FIRST_FAILURE
-    yield Finding("at e = 1 it is ordinary", float(np.count_nonzero(odd)), 0)
+    yield Finding("at e = 1 the status is OK", float(np.count_nonzero(odd)), 0)
     tight = _collide(model, impacts, CONTRACT_RTOL / 100)
     yield Finding("a tighter tolerance moves nothing", worst(tight["e_out"] - base["e_out"]), 10 * CONTRACT_RTOL)
-    yield Finding("a lane alone equals the lane in a crowd", float(_alone_differs(model, impacts, base)), 0)
+    yield Finding(
+        "an impact alone has the bits that it has in a batch", float(_alone_differs(model, impacts, base)), 0
+    )
 
 
 def _collide(model: ForceModel, impacts: Impacts, rtol: float = CONTRACT_RTOL) -> Outputs:
@@ -133,26 +134,26 @@ def _collide(model: ForceModel, impacts: Impacts, rtol: float = CONTRACT_RTOL) -
 
 def in_other_units(model: ForceModel, impacts: Impacts) -> Impacts:
     """The same impacts with grams, feet and minutes as units."""
-    units = {one.name: one.unit for one in model.parameters} | QUANTITIES
+    units = {parameter.name: parameter.unit for parameter in model.parameters} | QUANTITIES
     units |= {"v1": "m/s", "v2": "m/s", "m1": "kg", "m2": "kg"}
-    given = {"n": impacts.n, **impacts.parameters}
+    exponents = {"n": impacts.n, **impacts.parameters}
 
     def changed(name: str, value: Array) -> Array:
-        mass, length, time = dimension(units[name], given)
+        mass, length, time = dimension(units[name], exponents)
         return np.asarray(value * 1e3**mass * (1 / 0.3048) ** length * (1 / 60.0) ** time)
 
-    plain = {f.name: changed(f.name, getattr(impacts, f.name)) for f in fields(impacts) if f.name != "parameters"}
-    return Impacts(**plain, parameters={name: changed(name, value) for name, value in impacts.parameters.items()})
+    arrays = {f.name: changed(f.name, getattr(impacts, f.name)) for f in fields(impacts) if f.name != "parameters"}
+    return Impacts(**arrays, parameters={name: changed(name, value) for name, value in impacts.parameters.items()})
 
 
 def _alone_differs(model: ForceModel, impacts: Impacts, base: Outputs) -> int:
     """How many impacts have other bits when they are integrated alone."""
     differ = 0
-    for place in range(0, len(impacts), 7):
-        alone = _collide(model, impacts[np.array([place])])
+    for index in range(0, len(impacts), 7):
+        alone = _collide(model, impacts[np.array([index])])
         # an output that is the same for all impacts has length one
         differ += any(
-            np.broadcast_to(base[name], impacts.shape)[[place]].tobytes() != alone[name].tobytes()
+            np.broadcast_to(base[name], impacts.shape)[[index]].tobytes() != alone[name].tobytes()
             for name in OUTPUTS
         )
     return differ

@@ -1,4 +1,4 @@
-"""What is known of where a law comes from, as data: read at a source, derived, disputed, or not verified."""
+"""Evidence for a law, as data: seen at a source, derived, disputed, or not verified."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ EVIDENCE_STATES: tuple[EvidenceState, ...] = get_args(EvidenceState)
 
 @dataclass(frozen=True)
 class Evidence:
-    """How far the formula of a law, and its DOI, are known.
+    """How well the formula of a law, and its DOI, are verified.
 
     Parameters
     ----------
     state : "seen", "derived", "disputed" or "not verified"
     source : where the formula was read (repository, path and commit or date; a page; a paper and its equation),
-        where it is derived, or both sides of a dispute; may be missing only where nothing was verified
-    doi : where the DOI of the law was read; empty where the law gives none
-    note : what else a user has to know, such as what the source does not contain
+        where it is derived, or both sides of a dispute; may be empty only in the state "not verified"
+    doi : where the DOI of the law was read; empty for a law without DOI
+    note : anything else that a user has to know, such as what the source does not contain
 
     Raises
     ------
-    ModelError : the state is none of the four, or a source is missing
+    ModelError : unknown state, or missing source
 
     >>> print(Evidence("seen", "Gharib and Hurmuzlu (2012), equation (19)", note="for e > 0.95"))
     seen in Gharib and Hurmuzlu (2012), equation (19); for e > 0.95
@@ -41,7 +41,7 @@ class Evidence:
         if self.state not in EVIDENCE_STATES:
             raise ModelError(f"evidence: got state {self.state!r}, expected one of {', '.join(EVIDENCE_STATES)}")
         if self.state != "not verified" and not self.source:
-            raise ModelError(f'evidence: "{self.state}" without a source, expected where')
+            raise ModelError(f'evidence: state "{self.state}" without a source, expected a source')
 
     def __str__(self) -> str:
         source = f" in {self.source}" if self.state == "seen" else f": {self.source}" if self.source else ""
@@ -50,10 +50,10 @@ class Evidence:
 
 
 def count_states(evidence: Iterable[Evidence]) -> str:
-    """How many are in each state.
+    """The number of laws in each state, as text.
 
     >>> count_states([Evidence("derived", "here"), Evidence("seen", "there"), Evidence("seen", "there")])
     '2 seen, 1 derived'
     """
-    states = [one.state for one in evidence]
+    states = [law_evidence.state for law_evidence in evidence]
     return ", ".join(f"{states.count(state)} {state}" for state in EVIDENCE_STATES if state in states)

@@ -1,4 +1,4 @@
-"""Forms of a force that many laws share: the formulas, each once, whatever integrates them."""
+"""Expressions of forces that many laws share, and both back ends."""
 
 from __future__ import annotations
 
@@ -30,5 +30,5 @@ def returning(stretch: Array, recovered: Array, n: float, force_at_peak: Array) 
     return force_at_peak * power(stretch / recovered, n)
 
 
-# unloading branches that are a constant times the n-th power of the stretch
+# unloading branches that are a constant times the n-th power of the stretch, the recovered indentation
 POWER_LAWS = (spring, stiffer, returning)

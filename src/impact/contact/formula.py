@@ -1,4 +1,4 @@
-"""Formulas that ask by the names of their arguments for what they need."""
+"""Formulas that are called by the names of their arguments."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..errors import NOT_OF_A_PLUGIN, ModelError
 from ..text import safe_text
 from .powers import Array
 
-# whose own lines say nothing about where a formula is wrong
+# frames of a traceback in these folders do not show where a formula is wrong
 LIBRARIES = (Path(__file__).parents[1], Path(np.__file__).parent)
 
 Formula = Callable[..., object]
@@ -22,7 +22,7 @@ Formula = Callable[..., object]
 
 @cache
 def argument_names(formula: Formula | None) -> tuple[str, ...]:
-    """The names that a formula asks for; an argument with a default is its own.
+    """The names of a formula's arguments, without those that have a default.
 
     >>> argument_names(lambda elastic, v, chi: elastic * (1 + chi * v))
     ('elastic', 'v', 'chi')
@@ -30,46 +30,48 @@ def argument_names(formula: Formula | None) -> tuple[str, ...]:
     if formula is None:
         return ()
     arguments = inspect.signature(formula).parameters.values()
-    return tuple(one.name for one in arguments if one.default is inspect.Parameter.empty)
+    return tuple(argument.name for argument in arguments if argument.default is inspect.Parameter.empty)
 
 
-def call_by_name(formula: Formula, known: Mapping[str, Array | float]) -> Array:
-    """The value of a formula, given what it asks for by name, in arrays that it cannot write to.
+def call_by_name(formula: Formula, values: Mapping[str, Array | float]) -> Array:
+    """The value of a formula, called with values by name; arrays are passed as read-only views.
 
     Raises
     ------
-    ModelError : the formula raised an error, whatever it was, or returned something other than real numbers
+    ModelError : the formula raised any error, or returned something other than real numbers
     """
-    given = [_read_only(known[wish]) for wish in argument_names(formula)]
+    arguments = [_read_only(values[name]) for name in argument_names(formula)]
     try:
-        return _real(formula(*given))
+        return _real(formula(*arguments))
     except NOT_OF_A_PLUGIN:
         raise
     except BaseException as error:
-        # a formula that ends the program would take the other impacts with it
+        # also SystemExit: a formula must not end the computation of the other impacts
         raise ModelError(f"a formula raised {type(error).__name__}: {error}") from error
 
 
 def explained(key: str, error: ModelError) -> tuple[str, str]:
-    """A key that identifies an error of a law, and one line about it: place, type, text, and a hint.
+    """A key that identifies an error of a law, and a line that describes it: location, type, text and a hint.
 
     Parameters
     ----------
-    key : of the model
-    error : that `call_by_name` raised, or whoever found its answer to be of a wrong shape
+    key : key of the model
+    error : raised by `call_by_name`, or because a formula returned a wrong shape
     """
     cause = error.__cause__
     if cause is None:
         return key, safe_text(f"model {key}: {str(error).removeprefix(f'{key}: ')}", 1000)
-    own = [
+    locations = [
         f"{Path(frame.f_code.co_filename).name}:{line}: "
         for frame, line in traceback.walk_tb(cause.__traceback__)
         if not any(Path(frame.f_code.co_filename).is_relative_to(folder) for folder in LIBRARIES)
     ]
-    place, kind = own[-1] if own else "", type(cause).__name__
+    location, kind = locations[-1] if locations else "", type(cause).__name__
     is_branch = isinstance(cause, ValueError) and "truth value of an array" in str(cause)
     hint = "; formulas work on arrays: use np.where instead of if" if is_branch else ""
-    return f"{place}{key}: {kind}", safe_text(f"{place}model {key}: {kind}: {str(cause).rstrip('.')}{hint}", 1000)
+    return f"{location}{key}: {kind}", safe_text(
+        f"{location}model {key}: {kind}: {str(cause).rstrip('.')}{hint}", 1000
+    )
 
 
 def _read_only(value: Array | float) -> Array | float:
@@ -82,12 +84,12 @@ def _read_only(value: Array | float) -> Array | float:
 
 
 def _real(value: object) -> Array:
-    """The value as an array of float64; no text, date or complex number is taken for a real one."""
+    """The value as an array of float64; text, dates and complex numbers are refused."""
     array = np.asarray(value)
     if array.dtype == float:
         return array
     if array.dtype.kind == "O":
-        # NumPy takes None for NaN
+        # float() refuses None, which NumPy would convert to NaN
         return np.array([float(element) for element in array.flat]).reshape(array.shape)
     if array.dtype.kind not in "fiub":
         raise TypeError(f"it returned {array.dtype}, expected real numbers")

@@ -1,4 +1,4 @@
-"""One impact in time: its history, and the three restitutions computed from it independently."""
+"""The time history of an impact, and three restitutions computed from it independently."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from .simulate import integrate_phases
 from .status import Status
 from .velocity_coordinates import is_strong
 
-# points at which a step is shown, and at which it is integrated again
+# points at which a step is sampled, and Gauss points by which it is integrated
 SAMPLES_PER_STEP, GAUSS_POINTS = 4, 5
-# halvings of a step after which a moment in it is known to the last bit
+# halvings of a step that locate a time in it to the last bit
 BISECTIONS = 54
 
 
 @dataclass(frozen=True)
 class History:
-    """The time history of one impact, in SI; arrays of shape (k,).
+    """The time history of an impact, in SI; arrays of shape (k,).
 
     `x1`, `x2` are the displacements of the balls since first contact, so that delta = x1 - x2. `tau_c` and `tau_r`
     [N s] are the impulses of approach and restitution, `W_c` and `W_r` [J] the works done against the force in
@@ -52,18 +52,18 @@ class History:
 def follow(
     model: ForceModel, impacts: Impacts, *, rtol: float, max_steps: int, times: int | None = None
 ) -> History | None:
-    """Follow a single impact through time.
+    """The time history of a single impact.
 
     Parameters
     ----------
     model : the law
-    impacts : one impact
+    impacts : the impact, a batch of length one
     rtol, max_steps : see `impact.contact.outputs.collide`
-    times : how many points in time, uniform from first contact to release; by default some in each step
+    times : number of points in time, uniform from first contact to release; by default SAMPLES_PER_STEP per step
 
     Returns
     -------
-    History or None : None where there is no motion to follow, because the balls miss or a limit was taken
+    History or None : None without a motion to follow, because the balls miss or the result is a limit
     """
     n = float(impacts.n[0])
     with np.errstate(all="ignore"):
@@ -73,14 +73,25 @@ def follow(
         collision = integrate_phases(law, params, 1, rtol, max_steps, record=True)
     if collision.restitution is None or collision.result.status[0] != Status.OK:
         return None
-    turn, end = float(collision.approach.state[2, 0]), float(collision.restitution.state[2, 0])
-    grid = None if times is None else np.linspace(0.0, turn + end, times)
-    before = None if grid is None else grid[grid <= turn]
-    after = None if grid is None else np.minimum(grid[grid > turn] - turn, end)
-    approach = _phase(law, motion.approach_problem(law), collision.approach.recorded, params, before)
-    back = motion.restitution_law(law)
+    peak_time, restitution_duration = (
+        float(collision.approach.state[2, 0]),
+        float(collision.restitution.state[2, 0]),
+    )
+    times_in_unit = None if times is None else np.linspace(0.0, peak_time + restitution_duration, times)
+    approach_times = None if times_in_unit is None else times_in_unit[times_in_unit <= peak_time]
+    restitution_times = (
+        None
+        if times_in_unit is None
+        else np.minimum(times_in_unit[times_in_unit > peak_time] - peak_time, restitution_duration)
+    )
+    approach = _phase(law, motion.approach_problem(law), collision.approach.recorded, params, approach_times)
+    back_law = motion.restitution_law(law)
     restitution = _phase(
-        back, motion.restitution_problem(back), collision.restitution.recorded, collision.params, after
+        back_law,
+        motion.restitution_problem(back_law),
+        collision.restitution.recorded,
+        collision.params,
+        restitution_times,
     )
 
     residual = (
@@ -93,20 +104,20 @@ def follow(
     delta = np.concatenate([approach.x, residual + restitution.x]) * impacts.length
     v = np.concatenate([approach.v, restitution.v]) * impacts.v0
     force = np.concatenate([approach.F, restitution.F]) * (impacts.m * impacts.v0 / unit_t)
-    # the phases meet at the peak, and a landing can be shorter than rounding: each moment is told once
-    later = np.append(np.minimum.accumulate(t[::-1])[::-1][1:], np.inf)
-    t, delta, v, force = (row[t < later] for row in (t, delta, v, force))
+    # the phases meet at the peak, and the last step can be shorter than rounding: each time appears once
+    next_times = np.append(np.minimum.accumulate(t[::-1])[::-1][1:], np.inf)
+    t, delta, v, force = (row[t < next_times] for row in (t, delta, v, force))
     momentum, energy = (impacts.m * impacts.v0).item(), impacts.energy.item()
-    share1, share2 = impacts.m / impacts.m1, impacts.m / impacts.m2
+    mass_share1, mass_share2 = impacts.m / impacts.m1, impacts.m / impacts.m2
     return History(
         t=t,
         delta=delta,
         v=v,
         F=force,
-        x1=impacts.v1 * t - share1 * (impacts.v0 * t - delta),
-        x2=impacts.v2 * t + share2 * (impacts.v0 * t - delta),
-        v1=impacts.v1 - share1 * (impacts.v0 - v),
-        v2=impacts.v2 + share2 * (impacts.v0 - v),
+        x1=impacts.v1 * t - mass_share1 * (impacts.v0 * t - delta),
+        x2=impacts.v2 * t + mass_share2 * (impacts.v0 * t - delta),
+        v1=impacts.v1 - mass_share1 * (impacts.v0 - v),
+        v2=impacts.v2 + mass_share2 * (impacts.v0 - v),
         tau_c=approach.impulse * momentum,
         tau_r=restitution.impulse * momentum,
         W_c=approach.work * energy,
@@ -118,7 +129,7 @@ def follow(
 
 @dataclass(frozen=True)
 class _Phase:
-    """A phase in the contact's own units; x above the residual indentation."""
+    """The samples of a phase in the contact's own units, shape (k,), and its integrals; x above the residual."""
 
     t: Array
     x: Array
@@ -151,27 +162,27 @@ def _phase(
 
 
 def _fractions(steps: tuple[Step, ...]) -> list[Array]:
-    """Some fractions of each step, with the end of the last."""
+    """Uniform fractions of each step, and the end of the last step."""
     inner = np.arange(SAMPLES_PER_STEP) / SAMPLES_PER_STEP
     return [step.end * (inner if step is not steps[-1] else np.append(inner, 1.0)) for step in steps]
 
 
 def _fractions_at(steps: tuple[Step, ...], times: Array) -> list[Array]:
-    """The fractions of each step at which the interpolated time is one of some times, which increase."""
+    """The fractions of each step at which the interpolated time equals one of the increasing times."""
     ends = np.array([step.at(step.end)[2, 0] for step in steps])
-    place = np.minimum(np.searchsorted(ends, times), len(steps) - 1)
-    found = []
-    for at, step in enumerate(steps):
-        wanted = times[place == at]
-        many = wanted.size
-        low, high = np.zeros(many), np.full(many, step.end[0])
-        beside = Step(
-            np.repeat(step.start, many, 1), np.repeat(step.length, many), np.repeat(step.stages, many, 2), high
+    step_of_time = np.minimum(np.searchsorted(ends, times), len(steps) - 1)
+    fractions = []
+    for index, step in enumerate(steps):
+        step_times = times[step_of_time == index]
+        count = step_times.size
+        low, high = np.zeros(count), np.full(count, step.end[0])
+        repeated_step = Step(
+            np.repeat(step.start, count, 1), np.repeat(step.length, count), np.repeat(step.stages, count, 2), high
         )
         # the time grows with the fraction: bisect to the last bit
-        for _ in range(BISECTIONS if many else 0):
+        for _ in range(BISECTIONS if count else 0):
             middle = 0.5 * (low + high)
-            is_early = beside.at(middle)[2] < wanted
+            is_early = repeated_step.at(middle)[2] < step_times
             low, high = np.where(is_early, middle, low), np.where(is_early, high, middle)
-        found.append(high)
-    return found
+        fractions.append(high)
+    return fractions

@@ -1,4 +1,4 @@
-"""The impacts of a block: what goes into a law, in SI, and the contact's own units."""
+"""The impacts of a block: the inputs of a law in SI, and the contact's own units."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from .powers import Array, all_within, powers
 from .status import Status
 from .units import dimension
 
-# what of an impact is checked before it is integrated, see `check_inputs`
+# checks of an impact before it is integrated, see `check_inputs`
 CHECKS = frozenset({"e", "v0", "length"})
 
 
 @dataclass(frozen=True)
 class Impacts:
-    """Impacts side by side; every field is an array of shape (n,).
+    """A batch of impacts; every field is an array of shape (n,).
 
-    Impacts on a grid may be arrays of several axes that broadcast against each other: what does not vary along
-    an axis has length one there, and nothing is computed twice.
+    The fields of impacts on a grid may have several axes and broadcast against each other: a field that does not
+    vary along an axis has length one there, so that nothing is computed twice.
 
     Parameters
     ----------
-    e : restitution asked for [-]; NaN where none is
+    e : required restitution [-]; NaN for none
     v1, v2 : velocities before the impact [m/s]
     m1, m2 : masses [kg]; infinity is a wall
     R1, R2 : radii [m]; infinity is a plane; NaN where unknown
@@ -65,9 +65,9 @@ class Impacts:
 
     @cached_property
     def shape(self) -> tuple[int, ...]:
-        """Of all impacts together."""
-        own = {getattr(self, f.name).shape for f in fields(self) if f.name != "parameters"}
-        return np.broadcast_shapes(*own.union(array.shape for array in self.parameters.values()))
+        """The shape to which all fields broadcast."""
+        shapes = {getattr(self, f.name).shape for f in fields(self) if f.name != "parameters"}
+        return np.broadcast_shapes(*shapes.union(array.shape for array in self.parameters.values()))
 
     @cached_property
     def v0(self) -> Array:
@@ -111,7 +111,7 @@ class Impacts:
 
     @cached_property
     def energy(self) -> Array:
-        """The contact's unit of energy [J], m v0^2, twice what the balls bring with them."""
+        """The contact's unit of energy [J], m v0^2, twice the energy of the relative motion."""
         return self.m * self.v0 * self.v0
 
     def quantity(self, name: str) -> Array:
@@ -130,27 +130,27 @@ class Impacts:
 
 
 def dimensionless_exponents(
-    model: ForceModel, name: str, given: Mapping[str, Array | float]
+    model: ForceModel, name: str, exponent_values: Mapping[str, Array | float]
 ) -> dict[str, Array | float]:
-    """The exponents of m, length and v0 by which a quantity or parameter is made dimensionless.
+    """The exponents of m, length and v0 in the contact's own unit of a quantity or parameter.
 
     Parameters
     ----------
-    model, name : the law, and which quantity or parameter
-    given : what the exponents of its unit are made of: n, and parameters of the law
+    model, name : the law, and the name of the quantity or parameter
+    exponent_values : values of the names in the exponents of its unit: n, and parameters of the law
 
     >>> from impact.contact.models import find
     >>> dimensionless_exponents(find("hertz"), "E1", {"n": 1.5})
     {'m': 1.0, 'length': -3.0, 'v0': 2.0}
     """
-    mass, length, time = dimension(model.unit_of(name), given)
+    mass, length, time = dimension(model.unit_of(name), exponent_values)
     return {"m": mass + 0.0, "length": length + time + 0.0, "v0": 0.0 - time}
 
 
 def stiffness(n: Array, hertz: Array, m: Array, v0: Array) -> Array:
-    """Stiffness K [N/m^n] where none is given: Hertz's for n = 3/2, else K = F_m/delta_m^n of the Hertz peak.
+    """The default stiffness K [N/m^n]: Hertz's for n = 3/2, else K = F_m/delta_m^n at the peak by Hertz.
 
-    For n = 1 that is the secant stiffness. It depends on the speed, so that it is NaN where there is none.
+    For n = 1 that is the secant stiffness. It depends on the closing speed and is NaN where that is not positive.
 
     Parameters
     ----------
@@ -165,14 +165,14 @@ def stiffness(n: Array, hertz: Array, m: Array, v0: Array) -> Array:
 
 
 def check_inputs(model: Law, impacts: Impacts, checks: frozenset[str] = CHECKS) -> NDArray[np.int8]:
-    """What can be said of impacts before they are integrated; of a shape that broadcasts to theirs.
+    """The status of impacts before they are integrated; of a shape that broadcasts to theirs.
 
     Parameters
     ----------
     model : the law
     impacts : the impacts
-    checks : what is looked at: the restitution "e", the closing speed "v0", and the sizes of the contact,
-        "length", the unit of which comes from all of them
+    checks : which of these to check: the restitution "e", the closing speed "v0", and the derived quantities
+        m, K, length, energy and time, "length"
     """
     status = np.asarray(Status.OK, np.int8)
     if "length" in checks:
@@ -190,7 +190,7 @@ def check_inputs(model: Law, impacts: Impacts, checks: frozenset[str] = CHECKS) 
 def _unless(
     values: Array, least: float, most: float, status: NDArray[np.int8], otherwise: Status
 ) -> NDArray[np.int8]:
-    """The status, but another one where a value is not within bounds."""
+    """The status, replaced by another one where a value is not within bounds."""
     if all_within(values, least, most):
         return status
     return np.where((values >= least) & (values <= most), status, otherwise)

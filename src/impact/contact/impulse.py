@@ -1,4 +1,4 @@
-"""The impulse-momentum solution, which every law is compared with: equations (4) to (9)."""
+"""The impulse-momentum solution, the reference for every law: equations (4) to (9)."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ def velocities_at(impacts: Impacts, impulse: Array) -> tuple[Array, Array]:
 def velocities_after(impacts: Impacts, e: Array) -> tuple[Array, Array]:
     """Velocities v1+, v2+ [m/s] after an impact of restitution e: equations (6) and (7), shape (n,).
 
-    They are those at the impulse tau_c (1 + e), where tau_c = m v0 is that of the approach. Balls that do not
-    approach keep their velocities; an impulse that is too large for a number gives NaN.
+    The impulse is tau_c (1 + e), where tau_c = m v0 is that of the approach. Balls that do not approach keep their
+    velocities; an impulse that overflows gives NaN.
     """
     impulse = (1.0 + e) * impacts.m * impacts.v0
     if not impacts.all_approach:

@@ -1,4 +1,4 @@
-"""A contact force model as data: what a paper says of it, and its formulas as pure functions."""
+"""A contact force model as data: its source, and its formulas as pure functions."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .evidence import Evidence
 from .formula import Formula, argument_names
 from .units import dimension
 
-# what a law may ask for by name, besides its own parameters and coefficients, and the unit of each
+# arguments of formulas besides the law's own parameters and coefficients, and their units
 QUANTITIES = {
     "e": "1", "n": "1", "K": "N/m^n", "m": "kg", "v0": "m/s", "R1": "m", "R2": "m", "E1": "Pa", "E2": "Pa",
     "nu1": "1", "nu2": "1", "yield_strength1": "Pa", "yield_strength2": "Pa",
@@ -25,7 +25,7 @@ BASE_QUANTITIES = {
     "Y_min": ("yield_strength1", "yield_strength2"),
 }
 NOT_VERIFIED = Evidence("not verified")
-# what else a domain may bound
+# further inputs that a domain may bound
 DOMAIN_INPUTS = ("v1", "v2", "m1", "m2", "length")
 FORCE_ARGUMENTS = {"x": "indentation", "v": "indentation rate", "elastic": "K δⁿ"}
 UNLOADING_ARGUMENTS = {
@@ -35,12 +35,12 @@ UNLOADING_ARGUMENTS = {
     "recovered": "peak indentation above the permanent one",
 }
 STRETCH_ARGUMENTS = {"stretch": "indentation above the permanent one"}
-# coefficients that a coordinate of the velocity asks for; the first is the strength of the damping
+# coefficients that a velocity coordinate needs; the first measures the strength of the damping
 COORDINATE_COEFFICIENTS = {"v": (), "log": ("chi",), "force": ("c", "q")}
 
 
 def with_base_quantities(names: Iterable[str]) -> frozenset[str]:
-    """Some names, and those of the quantities that they are computed from.
+    """The names, extended by those of the quantities that they are computed from.
 
     >>> sorted(with_base_quantities(["R_eff", "e"]))
     ['R1', 'R2', 'R_eff', 'e']
@@ -51,10 +51,10 @@ def with_base_quantities(names: Iterable[str]) -> frozenset[str]:
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter of a model that the restitution does not set.
+    """A parameter that the user sets for a model, besides the restitution.
 
     `unit` is an SI unit, whose exponents may contain n ("N/m^n") and dimensionless parameters; `least` and `most`
-    are the closed interval of its values; `default` is None where the user has to give it; `typical` is a value
+    are the closed interval of its values; `default` is None where the user has to set it; `typical` is a value
     in that unit for checks, where the contact's own units are no measure of it.
 
     >>> Parameter("c", "N s/m", "damping constant", default=100.0, least=0.0).unit
@@ -71,9 +71,9 @@ class Parameter:
 
 
 class Law(Protocol):
-    """What the outputs of a collision depend on besides its trajectory: all of a law but its formulas.
+    """The properties of a law that the outputs of a collision depend on, besides its trajectory.
 
-    A `ForceModel` is one; a result keeps one of each model, so that it can be read without the formulas.
+    A `ForceModel` has them; a result stores them for each model, so that it can be read without the formulas.
     """
 
     @property
@@ -93,7 +93,7 @@ class Law(Protocol):
 
 
 class About(TypedDict):
-    """What is said of a law besides its formulas; see `ForceModel`."""
+    """The fields of a `ForceModel` that describe a law, besides its formulas."""
 
     title: str
     year: int
@@ -109,52 +109,54 @@ class About(TypedDict):
 
 @dataclass(frozen=True, repr=False)
 class ForceModel:
-    """A contact force model, written as its paper writes it.
+    """A contact force model, with formulas in the notation of its source.
 
-    Every formula asks by the names of its arguments for what it needs: `x` (indentation), `v` (its rate),
+    The names of a formula's arguments decide what it is called with: `x` (indentation), `v` (its rate),
     `elastic` (K δⁿ), the quantities of the contact (`K, n, m, v0, e, R1, R2, E1, E2, nu1, nu2,
     yield_strength1, yield_strength2`, and of both balls together `R_eff` = 1/(1/R1 + 1/R2), `E_eff` =
     1/((1 − nu1²)/E1 + (1 − nu2²)/E2), `Y_min` = min(yield_strength1, yield_strength2)), the
     model's own parameters and coefficients; `unloading` also for
-    `peak`, `force_at_peak`, `residual`, `recovered` and `stretch`, x above the residual. All arrive in the
+    `peak`, `force_at_peak`, `residual`, `recovered` and `stretch`, x above the residual. All are in the
     contact's own units, in which K = m = v0 = 1, as arrays of one shape, (n,), or as numbers where they are the
-    same for all; parameters are converted by their unit, so that the formula does not change. A formula works on
-    arrays: `np.where`, not `if`.
+    same for all impacts; parameters are converted by their unit, so that the formula does not change. A formula
+    works on arrays: use `np.where`, not `if`.
 
     Parameters
     ----------
     key : kebab-case name, unique in the catalogue
-    title, year, reference, doi : where the law comes from
+    title, year, reference, doi : name, year and source of the law
     equation : the law in one line of Unicode
-    evidence : where the formula and the DOI were read, derived, or that they were not verified
-    domain : closed intervals by the name of an input or derived quantity, where the law is said to hold
-    domain_source : who says so
+    evidence : where the formula and the DOI were read or derived, or that they were not verified
+    domain : closed intervals in which the law is reported to hold, by the name of an input or derived quantity
+    domain_source : the source of the domain
     force : contact force of the whole contact, or of the approach phase where `unloading` is given
     unloading : contact force of the restitution phase
     residual : permanent indentation, from `peak`, `force_at_peak` and the quantities of the contact
-    recovered : what of the peak indentation is recovered, in place of `residual` where it may be a small part
-    breakpoints, unloading_breakpoints : indentations at which `force`, or `unloading`, has another formula, NaN
-        for none; no step goes across. They ask for what is known beforehand, the latter for `peak`,
-        `force_at_peak` and `residual` too. One that asks for `x`, `v` or `elastic` changes its sign there
-    coefficients : formulas evaluated once per impact, by name; a later one may ask for an earlier one.
+    recovered : recovered part of the peak indentation, instead of `residual` where it may be a small part
+    breakpoints, unloading_breakpoints : indentations at which the formula of `force`, or of `unloading`, changes;
+        NaN for none. No step crosses them. Their arguments are quantities, parameters and coefficients, those of
+        the latter also `peak`, `force_at_peak` and `residual`. A formula with the argument `x`, `v` or `elastic`
+        returns no indentation, but a function of the motion that changes its sign at the breakpoint
+    coefficients : formulas evaluated once per impact, by name; each may use those before it.
         `chi` is the dimensionless damping χ = λ v₀/K
-    parameters : what the user gives in `[model.KEY]`
+    parameters : parameters that the user sets in `[model.KEY]`
     oracle : exact delivered restitution, where a closed form exists
-    stiffness : K in SI from the quantities of the contact and the parameters, where it is not given and not (12)
-    release : the contact ends at zero indentation ("gap"), or already at zero force ("force")
+    stiffness : K in SI from the quantities of the contact and the parameters, used where the user sets no K;
+        None is equation (12)
+    release : where the contact ends: at zero indentation ("gap"), or already at zero force ("force")
     coordinate_power : p of the smooth coordinate δ = δᵣ + sᵖ: 2 for half-integer powers, 4 for quarters
     velocity_coordinate : "log" where `force` is K δⁿ (1 + χ δ̇/v₀) exactly, so that large χ can be integrated
         without stiffness; "force" where it is K δⁿ + c δ^q δ̇ exactly, with coefficients c, and q of n alone,
         which keeps the digits of the force at its zero
-    exponent : n, where the law fixes it; None takes the sweep's
-    family : the group it is listed under
-    same_as : the key of the law that this is another name of, if it is
+    exponent : n, where the law fixes it; None is the n of the sweep
+    family : group of the catalogue
+    same_as : key of the law that this one is another name for, or ""
 
     Raises
     ------
-    ModelError : a formula asks for something that is not there, a unit cannot be read, a field is malformed
+    ModelError : a formula has an unknown argument, a unit cannot be parsed, or a field is malformed
 
-    A linear spring and dashpot, whose damping constant the user gives, and which ends when the force does:
+    A linear spring and dashpot with a damping constant that the user sets, whose contact ends at zero force:
 
     >>> import impact
     >>> dashpot = ForceModel(
@@ -199,82 +201,93 @@ class ForceModel:
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", self.key):
-            raise ModelError(f'model key "{self.key}": wants kebab-case, such as "hunt-crossley-1975"')
+            raise ModelError(f'model key "{self.key}": expected kebab-case, such as "hunt-crossley-1975"')
         if self.residual is not None and self.recovered is not None:
-            raise ModelError(f"model {self.key}: recovered: given beside residual, wants one of the two")
+            raise ModelError(f"model {self.key}: recovered: set together with residual, expected one of the two")
         if self.unloading_breakpoints and self.unloading is None:
-            raise ModelError(f"model {self.key}: unloading_breakpoints: wants an unloading")
+            raise ModelError(f"model {self.key}: unloading_breakpoints: expected an unloading")
         self._check_fields()
         self._check_velocity_coordinate()
-        once = {*QUANTITIES, *(parameter.name for parameter in self.parameters)}
+        names = {*QUANTITIES, *(parameter.name for parameter in self.parameters)}
         for name, formula in self.coefficients.items():
-            self._check_arguments(f"coefficient {name}", formula, once)
-            once.add(name)
-        self._check_arguments("force", self.force, {*once, *FORCE_ARGUMENTS})
+            self._check_arguments(f"coefficient {name}", formula, names)
+            names.add(name)
+        self._check_arguments("force", self.force, {*names, *FORCE_ARGUMENTS})
         self._check_arguments(
-            "unloading", self.unloading, {*once, *FORCE_ARGUMENTS, *UNLOADING_ARGUMENTS, *STRETCH_ARGUMENTS}
+            "unloading", self.unloading, {*names, *FORCE_ARGUMENTS, *UNLOADING_ARGUMENTS, *STRETCH_ARGUMENTS}
         )
         for role in ("residual", "recovered"):
-            self._check_arguments(role, getattr(self, role), {*once, "peak", "force_at_peak"})
+            self._check_arguments(role, getattr(self, role), {*names, "peak", "force_at_peak"})
         for formula in self.breakpoints:
-            self._check_arguments("breakpoint", formula, {*once, *FORCE_ARGUMENTS})
+            self._check_arguments("breakpoint", formula, {*names, *FORCE_ARGUMENTS})
         for formula in self.unloading_breakpoints:
-            self._check_arguments("unloading breakpoint", formula, {*once, *FORCE_ARGUMENTS, *UNLOADING_ARGUMENTS})
-        self._check_arguments("oracle", self.oracle, once)
+            self._check_arguments(
+                "unloading breakpoint", formula, {*names, *FORCE_ARGUMENTS, *UNLOADING_ARGUMENTS}
+            )
+        self._check_arguments("oracle", self.oracle, names)
         self._check_arguments(
-            "stiffness", self.stiffness, {*QUANTITIES, *(one.name for one in self.parameters)} - {"K", "e"}
+            "stiffness",
+            self.stiffness,
+            {*QUANTITIES, *(parameter.name for parameter in self.parameters)} - {"K", "e"},
         )
 
     def _check_velocity_coordinate(self) -> None:
-        wanted = COORDINATE_COEFFICIENTS[self.velocity_coordinate]
-        is_of_form = {"elastic", *wanted[:1]} <= set(argument_names(self.force)) and not self.breakpoints
-        if wanted and not (is_of_form and self.coefficients.keys() >= set(wanted)):
+        required = COORDINATE_COEFFICIENTS[self.velocity_coordinate]
+        has_arguments = {"elastic", *required[:1]} <= set(argument_names(self.force)) and not self.breakpoints
+        if required and not (has_arguments and self.coefficients.keys() >= set(required)):
             raise ModelError(
-                f'model {self.key}: velocity_coordinate "{self.velocity_coordinate}" wants a coefficient '
-                f"{' and one '.join(wanted)}, a force of elastic and {wanted[0]}, and no breakpoints"
+                f'model {self.key}: velocity_coordinate "{self.velocity_coordinate}": expected a coefficient '
+                f"{' and a coefficient '.join(required)}, a force of elastic and {required[0]}, and no breakpoints"
             )
 
     def _check_fields(self) -> None:
-        own = isinstance(self.parameters, tuple) and all(isinstance(one, Parameter) for one in self.parameters)
-        known = isinstance(self.evidence, Evidence)
+        are_parameters = isinstance(self.parameters, tuple) and all(
+            isinstance(parameter, Parameter) for parameter in self.parameters
+        )
+        is_evidence = isinstance(self.evidence, Evidence)
         allowed = {
-            "evidence": (known, 'an impact.Evidence, such as Evidence("derived", "our report, equation (3)")'),
+            "evidence": (
+                is_evidence,
+                'an impact.Evidence, such as Evidence("derived", "our report, equation (3)")',
+            ),
             "release": (self.release in ("gap", "force"), '"gap" or "force"'),
             "velocity_coordinate": (self.velocity_coordinate in COORDINATE_COEFFICIENTS, '"v", "log" or "force"'),
             "coordinate_power": (self.coordinate_power in (2, 4, 6, 8), "2, 4, 6 or 8"),
             "exponent": (self.exponent is None or 1.0 <= self.exponent <= 10.0, "None, or a number from 1 to 10"),
-            "parameters": (own, "a tuple of Parameter"),
+            "parameters": (are_parameters, "a tuple of Parameter"),
         }
-        for name, (right, wants) in allowed.items():
-            if not right:
-                raise ModelError(f"model {self.key}: {name}: got {getattr(self, name)!r}, wants {wants}")
-        taken = {*QUANTITIES, *DOMAIN_INPUTS, *FORCE_ARGUMENTS, *UNLOADING_ARGUMENTS, *STRETCH_ARGUMENTS}
+        for name, (is_valid, expected) in allowed.items():
+            if not is_valid:
+                raise ModelError(f"model {self.key}: {name}: got {getattr(self, name)!r}, expected {expected}")
+        reserved_names = {*QUANTITIES, *DOMAIN_INPUTS, *FORCE_ARGUMENTS, *UNLOADING_ARGUMENTS, *STRETCH_ARGUMENTS}
         for name in (*(parameter.name for parameter in self.parameters), *self.coefficients):
-            if name in taken:
-                raise ModelError(f'model {self.key}: "{name}" is the name of a quantity, wants another')
-        pure = [parameter.name for parameter in self.parameters if parameter.unit == "1"]
+            if name in reserved_names:
+                raise ModelError(f'model {self.key}: "{name}" is the name of a quantity, expected another name')
+        dimensionless = [parameter.name for parameter in self.parameters if parameter.unit == "1"]
         for parameter in self.parameters:
-            dimension(parameter.unit, {"n": 1.5, **dict.fromkeys(pure, 1.0)})
-        bounded = {
+            dimension(parameter.unit, {"n": 1.5, **dict.fromkeys(dimensionless, 1.0)})
+        domain_names = {
             *QUANTITIES,
             *DOMAIN_INPUTS,
             *({"chi"} & self.coefficients.keys()),
-            *(one.name for one in self.parameters),
+            *(parameter.name for parameter in self.parameters),
         }
         for name, ends in self.domain.items():
-            if name not in bounded:
-                raise ModelError(f'model {self.key}: domain of "{name}"; {did_you_mean(name, sorted(bounded))}')
+            if name not in domain_names:
+                raise ModelError(
+                    f'model {self.key}: domain of "{name}"; {did_you_mean(name, sorted(domain_names))}'
+                )
             if len(ends) != 2 or not ends[0] <= ends[1]:
-                raise ModelError(f"model {self.key}: domain of {name}: got {ends!r}, wants (least, most)")
+                raise ModelError(f"model {self.key}: domain of {name}: got {ends!r}, expected (least, most)")
 
     def __repr__(self) -> str:
         return f"<ForceModel {self.key}>"
 
-    def _check_arguments(self, role: str, formula: Formula | None, known: set[str]) -> None:
-        for wish in argument_names(formula):
-            if wish not in known:
+    def _check_arguments(self, role: str, formula: Formula | None, names: set[str]) -> None:
+        for name in argument_names(formula):
+            if name not in names:
                 raise ModelError(
-                    f'model {self.key}: its {role} asks for "{wish}"; {did_you_mean(wish, sorted(known))}'
+                    f'model {self.key}: its {role} asks for "{name}"; {did_you_mean(name, sorted(names))}'
                 )
 
     @property
@@ -286,13 +299,16 @@ class ForceModel:
     @property
     def quantities(self) -> frozenset[str]:
         """The names of the quantities and parameters that the law's motion depends on."""
-        own = {parameter.name for parameter in self.parameters}
+        names = QUANTITIES.keys() | {parameter.name for parameter in self.parameters}
         formulas = (*self.motion_formulas, *self.coefficients.values())
-        return frozenset(w for formula in formulas for w in argument_names(formula) if w in QUANTITIES or w in own)
+        return frozenset(name for formula in formulas for name in argument_names(formula) if name in names)
 
     def unit_of(self, name: str) -> str:
         """The unit of a quantity or parameter."""
-        return next((one.unit for one in self.parameters if one.name == name), None) or QUANTITIES[name]
+        return (
+            next((parameter.unit for parameter in self.parameters if parameter.name == name), None)
+            or QUANTITIES[name]
+        )
 
     @property
     def is_permanent(self) -> bool:
@@ -301,7 +317,7 @@ class ForceModel:
 
     @property
     def domain_text(self) -> str:
-        """The domain in words, and who says so.
+        """The domain in words, with its source.
 
         >>> from impact.contact.models import catalogue
         >>> catalogue()["lankarani-nikravesh-1990"].domain_text

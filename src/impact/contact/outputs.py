@@ -1,4 +1,4 @@
-"""The outputs of collisions, in SI: what a result file has of each impact."""
+"""The outputs of collisions, in SI: the variables of a result file."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..ode.problem import Mask
 from .formula import argument_names
 from .impacts import Impacts, check_inputs
 from .impulse import velocities_after
@@ -17,11 +18,10 @@ from .scaling import dimensionless_values
 from .simulate import CollisionResult, simulate
 from .status import FIRST_FAILURE, LIMIT, NO_IMPACT, OK
 
-Mask = NDArray[np.bool_]
 Outputs = dict[str, NDArray[Any]]
 InSI = Callable[[Array, Array], Array]
 
-# the outputs of an impact that a result has by default, in its order, and those that it has on request
+# the outputs that a result has by default, in its order; OUTPUTS also has those on request
 BY_DEFAULT = (
     "v1_post", "v2_post", "v1_reference", "v2_reference", "v1_error", "v2_error", "e_out", "e_error",
     "peak_indentation", "permanent_indentation", "peak_force", "contact_time", "energy_loss", "stiffness",
@@ -37,29 +37,29 @@ def outputs(
     names: Iterable[str],
     checked: NDArray[np.int8] | None = None,
 ) -> Outputs:
-    """Some outputs of collisions; no more is computed than they need.
+    """Outputs of collisions by name; only what they need is computed.
 
     Parameters
     ----------
-    law : of the model
+    law : the law
     impacts : the inputs
-    result : what the law does with them, in the contact's own units, of shapes that broadcast to theirs
-    names : of `OUTPUTS`, see docs/schema.md
-    checked : what `check_inputs` says of the impacts, where it is known
+    result : the collisions, in the contact's own units, of shapes that broadcast to those of the impacts
+    names : names of `OUTPUTS`, see docs/schema.md
+    checked : the status by `check_inputs`, if it is already computed
 
     Returns
     -------
     dict : by name, arrays of the shape of the impacts, or that broadcast to it; an impact that failed has NaN
     """
-    known: dict[str, Any] = {"law": law, "impacts": impacts, "result": result}
+    computed: dict[str, Any] = {"law": law, "impacts": impacts, "result": result}
     if checked is not None:
-        known["checked"] = checked
+        computed["checked"] = checked
 
     def value(name: str) -> Any:
-        if name not in known:
+        if name not in computed:
             formula = FORMULAS[name]
-            known[name] = formula(*map(value, argument_names(formula)))
-        return known[name]
+            computed[name] = formula(*map(value, argument_names(formula)))
+        return computed[name]
 
     with np.errstate(all="ignore"):
         return {name: value(name) for name in names}
@@ -76,7 +76,7 @@ def collide(
     errors: dict[str, str] | None = None,
     names: Iterable[str] = OUTPUTS,
 ) -> Outputs:
-    """Let every pair of balls collide by the law of a model.
+    """Simulate the impacts with a model.
 
     Parameters
     ----------
@@ -84,10 +84,10 @@ def collide(
     impacts : the inputs, n of them
     rtol : local error of a step of the integrator, relative
     max_steps : attempted steps per phase after which an impact fails
-    collapse : integrate impacts that are the same in the contact's own units once; changes no bit
-    core : "numpy", or "numba" for what that compiles; they agree within the tolerance
+    collapse : integrate impacts that are equal in the contact's own units once; changes no bit of the results
+    core : "numpy", or "numba" for the laws that it compiles; the results agree within the tolerance
     errors : receives a line for each distinct error that the law raised, see `impact.contact.formula.explained`
-    names : of the outputs
+    names : names of the outputs
 
     Returns
     -------
@@ -103,18 +103,18 @@ def collide(
 
 
 def _mask_if_any(mask: Mask) -> Mask | None:
-    """A mask, if anything is in it: None is cheaper than an empty one."""
+    """The mask, or None if it is False everywhere, which saves work."""
     return mask if mask.any() else None
 
 
 def _replace_where(
     value: NDArray[Any], where: Mask | None, otherwise: float | np.int32 | NDArray[Any]
 ) -> NDArray[Any]:
-    """The value, but another one where a mask is true."""
+    """The value, replaced by another one where the mask is True."""
     return value if where is None else np.where(where, otherwise, value)
 
 
-# ---- what outputs have in common; each function is one value, its arguments are others, by name
+# ---- intermediate values; the arguments of each function are names of FORMULAS
 
 
 def _status_of_impacts(
@@ -124,18 +124,18 @@ def _status_of_impacts(
 
 
 def _undefined(failed: Mask | None, missed: Mask | None, status: NDArray[np.int8]) -> Mask | None:
-    """Where there is no collision of which anything is known."""
+    """Impacts without a result: they failed or the balls miss."""
     return failed if missed is None else _mask_if_any(missed | (status >= FIRST_FAILURE))
 
 
 def _asked_e(impacts: Impacts) -> Array:
-    """The restitution asked for, NaN where it is none."""
+    """The required restitution, NaN where it is not within [0, 1]."""
     e = impacts.e
     return e if all_within(e, 0.0, 1.0) else np.where((e >= 0.0) & (e <= 1.0), e, np.nan)
 
 
 def _in_si(failed: Mask | None, missed: Mask | None) -> InSI:
-    """Values in a unit of the contact's own, in SI; nothing moves where the balls miss each other."""
+    """Converts (values, unit) to SI: NaN where the impact failed, 0 where the balls miss each other."""
     return lambda value, unit: _replace_where(_replace_where(value * unit, failed, np.nan), missed, 0.0)
 
 
@@ -147,22 +147,22 @@ def _damping_ratio(result: CollisionResult, not_integrated: Mask | None) -> Arra
     return _replace_where(_replace_where(chi, not_integrated, np.nan), _mask_if_any(np.isinf(chi)), np.nan)
 
 
-def _energy_residual(result: CollisionResult, unknown: Mask | None) -> Array:
+def _energy_residual(result: CollisionResult, undefined: Mask | None) -> Array:
     work = result.approach_work + result.restitution_work
-    return _replace_where(work - (1.0 - result.e_out * result.e_out), unknown, np.nan)
+    return _replace_where(work - (1.0 - result.e_out * result.e_out), undefined, np.nan)
 
 
-def _energetic(result: CollisionResult, unknown: Mask | None) -> Array:
-    """sqrt(-W_r/W_c), equation (3), from the works that were integrated; 0 where the balls stay together."""
+def _energetic(result: CollisionResult, undefined: Mask | None) -> Array:
+    """sqrt(-W_r/W_c), equation (3), from the integrated works; 0 where the balls stay together."""
     e = np.sqrt(np.maximum(-result.restitution_work, 0.0) / result.approach_work)
-    return _replace_where(_replace_where(e, _mask_if_any(result.status == LIMIT), 0.0), unknown, np.nan)
+    return _replace_where(_replace_where(e, _mask_if_any(result.status == LIMIT), 0.0), undefined, np.nan)
 
 
 def _in_domain(law: Law, impacts: Impacts, damping_ratio: Array) -> NDArray[np.int8]:
     inside = np.ones((1,) * max(1, len(impacts.shape)), bool)
     for name, (low, high) in law.domain.items():
         value = damping_ratio if name == "chi" else impacts.quantity(name)
-        # what is not known, such as an e that was not asked for, is not claimed
+        # NaN, such as an e that is not required, is outside
         inside = inside & (value >= low) & (value <= high)
     return inside.astype(np.int8)
 
@@ -174,21 +174,21 @@ def _separation_time(
     contact_time: Array,
     in_si: Callable[[Array, Array], Array],
 ) -> Array:
-    """Time until the surfaces part: after the force has ended they move at e_out v0. NaN if they never do."""
+    """Time until the surfaces separate: after the contact they move at e_out v0. NaN if they never separate."""
     if law.is_permanent:
-        # a permanent indentation stays in the surfaces, which part at the release
+        # a permanent indentation stays in the surfaces, which separate at the release
         return contact_time
-    rest = np.where(result.permanent > 0.0, result.permanent / result.e_out, 0.0)
-    return in_si(result.contact_time + np.where(np.isinf(rest), np.nan, rest), impacts.time)
+    remaining_time = np.where(result.permanent > 0.0, result.permanent / result.e_out, 0.0)
+    return in_si(result.contact_time + np.where(np.isinf(remaining_time), np.nan, remaining_time), impacts.time)
 
 
-# by name: a formula of values by name
+# formulas by the names of their values; their arguments are names of this dict, or law, impacts and result
 FORMULAS: dict[str, Callable[..., Any]] = {
     "checked": lambda law, impacts: check_inputs(law, impacts),
     "not_integrated": lambda checked: _mask_if_any(checked != OK),
     "missed": lambda checked: _mask_if_any(checked == NO_IMPACT),
     "failed": lambda status: _mask_if_any(status >= FIRST_FAILURE),
-    "unknown": _undefined,
+    "undefined": _undefined,
     "asked_e": _asked_e,
     "in_si": _in_si,
     "velocities": lambda impacts, e_out: velocities_after(impacts, e_out),
@@ -199,7 +199,7 @@ FORMULAS: dict[str, Callable[..., Any]] = {
     "v2_reference": lambda references: references[1],
     "v1_error": lambda v1_post, v1_reference: v1_post - v1_reference,
     "v2_error": lambda v2_post, v2_reference: v2_post - v2_reference,
-    "e_out": lambda result, unknown: _replace_where(result.e_out, unknown, np.nan),
+    "e_out": lambda result, undefined: _replace_where(result.e_out, undefined, np.nan),
     "e_error": lambda e_out, asked_e: e_out - asked_e,
     "peak_indentation": lambda result, impacts, in_si: in_si(result.peak, impacts.length),
     "permanent_indentation": lambda result, impacts, in_si: in_si(result.permanent, impacts.length),
@@ -213,7 +213,7 @@ FORMULAS: dict[str, Callable[..., Any]] = {
     "status": _status_of_impacts,
     "in_domain": _in_domain,
     "steps": lambda result, not_integrated: _replace_where(result.steps, not_integrated, np.int32(0)),
-    # tau_r/tau_c, equation (2): the phases change the momentum by m v0 and e_out m v0
+    # tau_r/tau_c, equation (2): the phases change the momentum by m v0 and by e_out m v0
     "e_kinetic": lambda e_out: e_out,
     "e_energetic": _energetic,
     # lambda = chi K/v0 [N s/m^(n+1)]

@@ -1,4 +1,4 @@
-"""A phase of a contact, integrated in parts between the breakpoints of its force, which no step goes across."""
+"""A phase of a contact, integrated in parts between the breakpoints of its force, which no step crosses."""
 
 from __future__ import annotations
 
@@ -10,32 +10,36 @@ from numpy.typing import NDArray
 
 from ..ode.problem import N_COMPONENTS, N_INTEGRATED, Array, Event, Params, Problem, Solution, Step, Termination
 
-# the force has one formula where this is positive, and another where it is negative; NaN is no breakpoint
+# the formula of the force changes where this changes its sign; NaN for no breakpoint
 Breakpoint = Callable[[Array, Params], Array]
 IntegratePart = Callable[[Problem, Array, Params], Solution]
 
-# a part has ended at a breakpoint that is nearer than this, in smooth time
+# a part that ends within this distance of a breakpoint, in smooth time, ends at the breakpoint
 BREAKPOINT_TOLERANCE = 1e-9
 # step of the difference quotient for the rate of a breakpoint, relative to s
 BREAKPOINT_RATE_STEP = 1e-7
-# the next part begins so much later, in smooth time: where the other formula holds for sure
+# the next part begins this much later, in smooth time, where the other formula certainly holds
 STEP_BEYOND = 1e-12
-# parts per breakpoint after which a trajectory that crosses them back and forth fails
+# parts per breakpoint after which a trajectory fails that crosses breakpoints back and forth
 MAX_PARTS_PER_BREAKPOINT = 8
 
 
 def in_parts(
     run: IntegratePart, problem: Problem, breakpoints: Sequence[Breakpoint], start: Array, params: Params
 ) -> Solution:
-    """Integrate a phase.
+    """Integrate a phase in parts.
 
     Parameters
     ----------
     run : integrates trajectories of a problem from their start, of shape (4, n), to their event
-    problem : of the phase, without its breakpoints
-    breakpoints : where the force goes over to another formula
+    problem : problem of the phase, without its breakpoints
+    breakpoints : functions that change their sign where the formula of the force changes
     start : components at the start, shape (2, n)
-    params : of the law, each of shape (n,)
+    params : params of the law, each of shape (n,)
+
+    Returns
+    -------
+    Solution : as of an integration without parts
     """
     if not breakpoints:
         return run(problem, start, params)
@@ -49,33 +53,36 @@ def in_parts(
     recorded: list[Step] = []
     where = np.arange(n)
     for _ in range(MAX_PARTS_PER_BREAKPOINT * len(breakpoints)):
-        own_params = (*(column[where] for column in params), *sides[:, where])
-        part = run(between, state[:, where], own_params)
+        part_params = (*(column[where] for column in params), *sides[:, where])
+        part = run(between, state[:, where], part_params)
         recorded += part.recorded
         total.maximum[where] = np.fmax(total.maximum[where], part.maximum)
         total.steps[where] += part.steps
         state[:, where] = part.state
-        k = problem.rates(part.state[:N_COMPONENTS], own_params)
-        met = _reached(problem, breakpoints, part.state[:N_COMPONENTS], k, own_params)
-        further = (part.termination == Termination.EVENT_REACHED) & met.any(axis=0)
+        k = problem.rates(part.state[:N_COMPONENTS], part_params)
+        met = _reached(problem, breakpoints, part.state[:N_COMPONENTS], k, part_params)
+        at_breakpoint = (part.termination == Termination.EVENT_REACHED) & met.any(axis=0)
         sides[:, where] = np.where(met, -sides[:, where], sides[:, where])
         state[:, where] += STEP_BEYOND * np.minimum(part.state[0], 1.0) * k[:N_INTEGRATED]
-        done = where[~further]
-        total.termination[done], total.state[:, done] = part.termination[~further], part.state[:, ~further]
-        where = where[further]
+        done = where[~at_breakpoint]
+        total.termination[done], total.state[:, done] = (
+            part.termination[~at_breakpoint],
+            part.state[:, ~at_breakpoint],
+        )
+        where = where[at_breakpoint]
         if not where.size:
             break
     return replace(total, recorded=tuple(recorded))
 
 
 def _distances(breakpoints: Sequence[Breakpoint], y: Array, k: Array, params: Params) -> list[tuple[Array, Array]]:
-    """Each breakpoint on the side where the trajectory is, which falls through zero, and its rate."""
+    """Each breakpoint, with the sign that makes it positive on the current side, and its rate; shapes (n,)."""
     small = BREAKPOINT_RATE_STEP * np.where(y[0] > 0.0, np.minimum(y[0], 1.0), 1.0)
     ahead = y + small * k[:N_COMPONENTS]
     distances = []
     for breakpoint, side in zip(breakpoints, params[-len(breakpoints) :], strict=True):
-        left = side * breakpoint(y, params)
-        distances.append((left, (side * breakpoint(ahead, params) - left) / small))
+        distance = side * breakpoint(y, params)
+        distances.append((distance, (side * breakpoint(ahead, params) - distance) / small))
     return distances
 
 
@@ -84,11 +91,11 @@ def _first_event(problem: Problem, breakpoints: Sequence[Breakpoint]) -> Event:
 
     def event(y: Array, k: Array, params: Params) -> tuple[Array, Array]:
         g, dg = problem.event(y, k, params)
-        for left, rate in _distances(breakpoints, y, k, params):
-            # of two that a step went across the first one, and likewise of two that are to come
-            alike = (left < 0.0) == (g < 0.0)
-            by_breakpoint = np.where(alike, left * dg > g * rate, left < 0.0)
-            g, dg = np.where(by_breakpoint, left, g), np.where(by_breakpoint, rate, dg)
+        for distance, rate in _distances(breakpoints, y, k, params):
+            # if a step crossed both, or neither, the earlier one; otherwise the one that it crossed
+            same_sign = (distance < 0.0) == (g < 0.0)
+            by_breakpoint = np.where(same_sign, distance * dg > g * rate, distance < 0.0)
+            g, dg = np.where(by_breakpoint, distance, g), np.where(by_breakpoint, rate, dg)
         return g, dg
 
     return event
@@ -97,8 +104,8 @@ def _first_event(problem: Problem, breakpoints: Sequence[Breakpoint]) -> Event:
 def _reached(
     problem: Problem, breakpoints: Sequence[Breakpoint], y: Array, k: Array, params: Params
 ) -> NDArray[np.bool_]:
-    """At which breakpoints trajectories have ended, not at the event of the phase; shape (breakpoints, n)."""
+    """Mask of the breakpoints at which trajectories have ended, shape (breakpoints, n)."""
     g, dg = problem.event(y, k, params)
-    away = np.array([np.abs(left / rate) for left, rate in _distances(breakpoints, y, k, params)])
-    near = np.fmax(np.fmin.reduce(away), BREAKPOINT_TOLERANCE)
-    return np.asarray((away <= near) & (np.abs(g / dg) > near))
+    times = np.array([np.abs(distance / rate) for distance, rate in _distances(breakpoints, y, k, params)])
+    near = np.fmax(np.fmin.reduce(times), BREAKPOINT_TOLERANCE)
+    return np.asarray((times <= near) & (np.abs(g / dg) > near))

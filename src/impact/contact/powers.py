@@ -41,43 +41,43 @@ def power(base: Array, exponent: float) -> Array:
 
 
 def is_reproducible(exponent: Array | float) -> NDArray[np.bool_]:
-    """Whether a power is built from products and roots."""
+    """Whether `power` computes an exponent from products and square roots; elementwise."""
     quarters = np.multiply(exponent, 4.0)
     return np.asarray((quarters == np.rint(quarters)) & (np.abs(quarters) <= 64.0))
 
 
 def powers(base: Array, exponent: Array) -> Array:
-    """`base` to an exponent of each element's own; the arrays broadcast against each other.
+    """`base` to an array of exponents; the arrays broadcast against each other.
 
-    The bits of an element are those of `power` at its exponent, whatever the others are.
+    The bits of an element are those of `power` at its exponent, independent of the other elements.
 
     >>> powers(np.array([4.0, 4.0]), np.array([0.5, 2.0]))
     array([ 2., 16.])
     """
-    kinds = distinct_values(exponent)
-    if kinds.size == 1:
-        return power(base, float(kinds[0]))
+    exponents = distinct_values(exponent)
+    if exponents.size == 1:
+        return power(base, float(exponents[0]))
     base, exponent = np.broadcast_arrays(base, exponent)
     result = np.power(base, exponent)
-    for one in kinds[is_reproducible(kinds)]:
-        where = exponent == one
-        result[where] = power(base[where], float(one))
+    for scalar in exponents[is_reproducible(exponents)]:
+        where = exponent == scalar
+        result[where] = power(base[where], float(scalar))
     return result
 
 
 def distinct_values(values: Array) -> Array:
-    """The different ones of some values, in order.
+    """The distinct values of an array, sorted.
 
     >>> distinct_values(np.array([1.5, 1.0, 1.5]))
     array([1. , 1.5])
     """
     values = values.reshape(-1)
-    # mostly there is one, and nothing to sort
+    # in most cases all are equal
     return values[:1] if (values == values[:1]).all() else np.unique(values)
 
 
 def all_within(values: Array, least: float, most: float) -> bool:
-    """Whether all values are within bounds, which two numbers tell; NaN is not.
+    """Whether all values are within bounds; False if any is NaN. Only the least and the largest are compared.
 
     >>> all_within(np.array([0.0, 0.5]), 0.0, 1.0), all_within(np.array([0.5, np.nan]), 0.0, 1.0)
     (True, False)

@@ -31,24 +31,24 @@ STATUS_OF_TERMINATION[Termination.MAX_STEPS] = Status.MAX_STEPS
 STATUS_OF_TERMINATION[Termination.STEP_UNDERFLOW] = Status.STEP_UNDERFLOW
 STATUS_OF_TERMINATION[Termination.NOT_FINITE] = Status.NOT_FINITE
 
-# positions of impacts; a slice where it is all of them, so that nothing is copied
+# positions of impacts; a slice for all of them, so that nothing is copied
 Positions = NDArray[np.intp] | slice
-# what a law asks for, by name, in the contact's own units
-Named = Mapping[str, Array]
+# arrays that a law needs, by name, in the contact's own units
+ValueArrays = Mapping[str, Array]
 
 
-def positions(chosen: NDArray[np.bool_]) -> Positions:
-    """The positions of those that are chosen."""
-    return slice(None) if chosen.all() else np.flatnonzero(chosen)
+def positions(mask: NDArray[np.bool_]) -> Positions:
+    """The positions at which the mask is True."""
+    return slice(None) if mask.all() else np.flatnonzero(mask)
 
 
 @dataclass(frozen=True)
 class CollisionResult:
-    """What a law does with impacts, in the contact's own units; arrays of shape (n,).
+    """The collisions of impacts by a law, in the contact's own units; arrays of shape (n,).
 
     `approach_work` and `restitution_work` are twice the works done against the force in the two phases, 1 and
     -e_out^2 up to the solver's error; `chi` is the law's damping ratio and `exact` its restitution in closed form,
-    where it has them.
+    NaN for a law without them.
     """
 
     e_out: Array
@@ -65,7 +65,7 @@ class CollisionResult:
 
     @classmethod
     def blank(cls, n: int) -> CollisionResult:
-        """n impacts of which nothing is known."""
+        """n impacts without values, with status OK and no steps."""
         return cls(
             e_out=np.full(n, np.nan),
             peak=np.full(n, np.nan),
@@ -81,7 +81,7 @@ class CollisionResult:
         )
 
     def put(self, where: Positions | NDArray[np.bool_], part: CollisionResult) -> None:
-        """Write a part's arrays at their positions."""
+        """Write the arrays of a part to its positions."""
         for field in fields(self):
             getattr(self, field.name)[where] = getattr(part, field.name)
 
@@ -89,7 +89,7 @@ class CollisionResult:
     def joined(
         cls, n: int, status: NDArray[np.int8], parts: Sequence[tuple[Positions, CollisionResult]]
     ) -> CollisionResult:
-        """n impacts, parts of them at their positions; of those in none only the status is known."""
+        """n impacts, composed of parts at their positions; impacts in no part have only a status."""
         if parts and isinstance(parts[0][0], slice):
             return parts[0][1]
         result = cls.blank(n)
@@ -103,7 +103,7 @@ class CollisionResult:
         return CollisionResult(**{field.name: getattr(self, field.name)[where] for field in fields(self)})
 
 
-# the columns of a table of trajectories
+# columns of the trajectory table
 TABLE_COLUMNS = tuple(field.name for field in fields(CollisionResult))
 
 
@@ -123,7 +123,7 @@ class RecordedCollision:
 def simulate(
     model: ForceModel,
     n: Array,
-    values: Named,
+    values: ValueArrays,
     status: NDArray[np.int8],
     *,
     rtol: float,
@@ -138,8 +138,8 @@ def simulate(
     ----------
     model : the law
     n : compliance exponents, shape (k,)
-    values : what the law asks for, by name, in the contact's own units, each of shape (k,)
-    status : what is known of the impacts before; those that are not OK are not integrated
+    values : `dimensionless_values` of the impacts, by name, each of shape (k,)
+    status : status by `check_inputs`, shape (k,); impacts that are not OK are not integrated
     rtol, max_steps, collapse, core, errors : see `impact.contact.outputs.collide`
 
     Returns
@@ -154,29 +154,31 @@ def simulate(
             chosen = (status == OK) & (n == exponent)
             count, where = int(np.count_nonzero(chosen)), positions(chosen)
             if count:
-                some = _values_at(values, where)
-                part = _isolate_failures(model, float(exponent), some, count, integrate_both, collapse, errors)
+                chosen_values = _values_at(values, where)
+                part = _isolate_failures(
+                    model, float(exponent), chosen_values, count, integrate_both, collapse, errors
+                )
                 parts.append((where, part))
     return CollisionResult.joined(n.size, status, parts)
 
 
-def _values_at(values: Named, where: Positions) -> Named:
+def _values_at(values: ValueArrays, where: Positions) -> ValueArrays:
     return {name: array[where] for name, array in values.items()}
 
 
 def _isolate_failures(
     model: ForceModel,
     n: float,
-    values: Named,
+    values: ValueArrays,
     count: int,
     integrate_both: Callable[..., RecordedCollision],
     collapse: bool,
     errors: dict[str, str],
 ) -> CollisionResult:
-    """Simulate impacts that share n; those at which the law raises have a status.
+    """Simulate impacts with the same n; those for which the law raises an error have the status MODEL_ERROR.
 
-    A law that raises is tried again on both halves, so that only the impacts that make it raise fail. A single
-    impact is tried together with a copy: a result of the wrong shape, or an `if`, does not show at one.
+    After an error both halves are tried again, so that only the impacts that cause it fail. A single impact is
+    tried together with a copy: a result of the wrong shape, or an `if`, raises no error for an array of length 1.
     """
     try:
         if count == 1:
@@ -200,16 +202,16 @@ def _isolate_failures(
 def _simulate_distinct(
     model: ForceModel,
     n: float,
-    values: Named,
+    values: ValueArrays,
     count: int,
     integrate_both: Callable[..., RecordedCollision],
     collapse: bool,
 ) -> CollisionResult:
-    """Integrate the distinct ones of some impacts, with weak and with strong damping."""
-    known = with_coefficients(model, with_units(values, n), count)
-    status = _check_coefficients(model, known, values, count)
-    exact, chi = exact_restitution(model, known, count), chi_of(known, count)
-    strong = is_strong(model, known, count)
+    """Integrate each distinct dimensionless problem once, those with strong damping in their own coordinate."""
+    law_values = with_coefficients(model, with_units(values, n), count)
+    status = _check_coefficients(model, law_values, values, count)
+    exact, chi = exact_restitution(model, law_values, count), chi_of(law_values, count)
+    strong = is_strong(model, law_values, count)
     parts: list[tuple[Positions, CollisionResult]] = []
     for is_strongly_damped in (False, True):
         chosen = (status == OK) & (strong == is_strongly_damped)
@@ -218,34 +220,36 @@ def _simulate_distinct(
             continue
         where = positions(chosen)
         law = motion.MotionLaw.of(model, n, is_strongly_damped)
-        params = tuple(np.asarray(known[name])[where] for name in law.names)
-        first, back = deduplicate(params, (size,)) if collapse else (slice(None), slice(None))
+        params = tuple(np.asarray(law_values[name])[where] for name in law.names)
+        first, row_of_impact = deduplicate(params, (size,)) if collapse else (slice(None), slice(None))
         never_separates = exact[where][first] == 0.0
         distinct_params = tuple(column[first] for column in params)
         collision = integrate_both(law, distinct_params, never_separates.size, never_separates=never_separates)
-        parts.append((where, collision.result.take(back)))
+        parts.append((where, collision.result.take(row_of_impact)))
     result = replace(CollisionResult.joined(count, status, parts), chi=chi, exact=exact)
-    held = status == LIMIT
-    if held.any():
+    stopped = status == LIMIT
+    if stopped.any():
         for array in (result.e_out, result.peak, result.permanent):
-            array[held] = 0.0
+            array[stopped] = 0.0
     return result
 
 
-def _check_coefficients(model: ForceModel, known: LawValues, values: Named, count: int) -> NDArray[np.int8]:
-    """The status of impacts once their coefficients are known, before they are integrated."""
+def _check_coefficients(
+    model: ForceModel, law_values: LawValues, values: ValueArrays, count: int
+) -> NDArray[np.int8]:
+    """The status of impacts by the coefficients of their law, before they are integrated; shape (count,)."""
     status = np.full(count, Status.OK, np.int8)
-    coefficients = {name: np.asarray(known[name]) for name in model.coefficients}
+    coefficients = {name: np.asarray(law_values[name]) for name in model.coefficients}
     if all(np.isfinite(coefficient).all() for coefficient in coefficients.values()):
         return status
-    plastic = values.get("e", np.full(count, np.nan)) == 0.0
+    is_e_zero = values.get("e", np.full(count, np.nan)) == 0.0
     for coefficient in coefficients.values():
-        status[np.isinf(coefficient) & ~plastic] = Status.OUT_OF_RANGE
+        status[np.isinf(coefficient) & ~is_e_zero] = Status.OUT_OF_RANGE
     for coefficient in coefficients.values():
         status[np.isnan(coefficient)] = Status.INVALID_PARAMETER
-    # with an infinite damping the balls neither approach nor part: force and time have no finite limit
+    # with infinite damping the balls neither approach nor separate: force and time have no finite limit
     for name in coefficients.keys() & argument_names(model.force):
-        status[np.isinf(coefficients[name]) & plastic] = Status.LIMIT
+        status[np.isinf(coefficients[name]) & is_e_zero] = Status.LIMIT
     return status
 
 
@@ -300,7 +304,7 @@ def integrate_phases(
         steps=approach.steps.copy(), status=_status_of_solution(approach), chi=unknown, exact=unknown,
     )  # fmt: skip
 
-    # nothing is recovered where the balls stay at their peak
+    # without a recovered indentation the balls stay at their peak
     stays = (result.status == OK) & (recovered <= 0.0)
     if stays.any():
         result.status[stays], result.e_out[stays] = LIMIT, 0.0
@@ -314,7 +318,7 @@ def integrate_phases(
     _mark_never_separating(back, restitution, params, recovered)
     e_out, work = -back.velocity(restitution.state, params), 2.0 * restitution.state[3]
     status = _status_of_solution(restitution)
-    # held, or parting with no speed after an infinite time: all the energy of such balls is lost
+    # the balls are held, or separate at zero speed after infinite time: all their energy is lost
     held = restitution.termination == Termination.EVENT_UNREACHABLE
     if held.any():
         held &= motion.may_be_overdamped(back.model) | np.broadcast_to(never_separates, n)[where]
@@ -330,15 +334,15 @@ def integrate_phases(
 
 
 def _mark_never_separating(law: motion.MotionLaw, solution: Solution, params: Params, recovered: Array) -> None:
-    """Mark trajectories that never separate, unlike those that only take too many steps."""
+    """Set the termination of trajectories that never separate, unlike those that only take too many steps."""
     unfinished = np.isin(solution.termination, (Termination.MAX_STEPS, Termination.STEP_UNDERFLOW))
-    left = np.flatnonzero(unfinished)
-    if not left.size or law.model.release != "gap":
+    unfinished_at = np.flatnonzero(unfinished)
+    if not unfinished_at.size or law.model.release != "gap":
         return
     rates = motion.restitution_problem(replace(law, coordinate=VelocityCoordinate())).rates
-    some = tuple(column[left] for column in params)
-    never = motion.never_separates(rates, some, recovered[left], law.model.coordinate_power)
-    solution.termination[left[never]] = Termination.EVENT_UNREACHABLE
+    unfinished_params = tuple(column[unfinished_at] for column in params)
+    never = motion.never_separates(rates, unfinished_params, recovered[unfinished_at], law.model.coordinate_power)
+    solution.termination[unfinished_at[never]] = Termination.EVENT_UNREACHABLE
 
 
 def _status_of_solution(solution: Solution) -> NDArray[np.int8]:

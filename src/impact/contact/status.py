@@ -1,4 +1,4 @@
-"""The status of a point: 1 to 9 are answers, 10 and up have NaN for their answer."""
+"""The status of a point: below 10 it has a result, from 10 on its result is NaN."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from enum import IntEnum
 
 
 class Status(IntEnum):
-    """How a point ended; `meaning` says it in a sentence."""
+    """The status of a point; `meaning` describes it."""
 
     OK = 1
     NO_IMPACT = 2

@@ -1,4 +1,4 @@
-"""The dimension of a unit as a law declares it, so that its parameters can enter the contact's own units."""
+"""Dimensions of the units that laws declare, by which parameters are converted to the contact's own units."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .powers import Array
 
 
 class Dimension(NamedTuple):
-    """Exponents of mass, length and time; arrays where what they are made of is."""
+    """Exponents of mass, length and time; arrays where the values in the exponents of the unit are arrays."""
 
     mass: Array | float
     length: Array | float
@@ -35,13 +35,13 @@ EXPONENT_PATTERN = r"\^(-?[\d.]+|[A-Za-z]\w*|\([^()]*(?:\([^()]*\)[^()]*)*\))"
 FACTOR_PATTERN = re.compile(rf"\s*([*/]?)\s*(1|[A-Za-z]+)(?:{EXPONENT_PATTERN})?")
 
 
-def dimension(unit: str, given: Mapping[str, Array | float]) -> Dimension:
+def dimension(unit: str, values: Mapping[str, Array | float]) -> Dimension:
     """The dimension of an SI unit.
 
     Parameters
     ----------
-    unit : its exponents may contain names
-    given : their values: the compliance exponent n, and dimensionless parameters of a law
+    unit : SI unit such as "N/m^n", whose exponents may contain names
+    values : the values of these names: the compliance exponent n, and dimensionless parameters of a law
 
     >>> dimension("N/m^n", {"n": 1.5})
     Dimension(mass=1.0, length=-0.5, time=-2.0)
@@ -50,31 +50,31 @@ def dimension(unit: str, given: Mapping[str, Array | float]) -> Dimension:
 
     Raises
     ------
-    ModelError : the unit is not a product of powers of kg, m, s, N, Pa, J, Hz, 1, or an exponent is not given
+    ModelError : the unit is not a product of powers of kg, m, s, N, Pa, J, Hz, 1, or an exponent has no value
     """
     total: list[Array | float] = [0.0, 0.0, 0.0]
-    place = 0
-    while place < len(unit):
-        factor = FACTOR_PATTERN.match(unit, place)
+    position = 0
+    while position < len(unit):
+        factor = FACTOR_PATTERN.match(unit, position)
         if factor is None or factor[2] not in UNIT_DIMENSIONS:
-            raise ModelError(f'unit "{unit}": wants powers of {", ".join(UNIT_DIMENSIONS)}, such as "N/m^n"')
-        exponent = _exponent_value(factor[3] or "1", given, unit) * (-1 if factor[1] == "/" else 1)
-        for axis, one in enumerate(UNIT_DIMENSIONS[factor[2]]):
-            # a power of what it is not made of is none, whatever its exponent
-            total[axis] += one * exponent if one else 0.0
-        place = factor.end()
+            raise ModelError(f'unit "{unit}": expected powers of {", ".join(UNIT_DIMENSIONS)}, such as "N/m^n"')
+        exponent = _exponent_value(factor[3] or "1", values, unit) * (-1 if factor[1] == "/" else 1)
+        for axis, base_exponent in enumerate(UNIT_DIMENSIONS[factor[2]]):
+            # an exponent that is not finite must not change the dimensions that the factor does not have
+            total[axis] += base_exponent * exponent if base_exponent else 0.0
+        position = factor.end()
     return Dimension(*total)
 
 
-def with_numbers(unit: str, given: Mapping[str, float]) -> str:
+def with_numbers(unit: str, values: Mapping[str, float]) -> str:
     """The unit with numbers for the names in its exponents.
 
     >>> with_numbers("N s^p/m^(n+p)", {"n": 1.5, "p": 2.0})
     'N s^2/m^3.5'
     """
 
-    def power(found: re.Match[str]) -> str:
-        exponent = _exponent_value(found[1], given, unit)
+    def power(exponent_match: re.Match[str]) -> str:
+        exponent = _exponent_value(exponent_match[1], values, unit)
         return "" if exponent == 1.0 else f"^{exponent:g}"
 
     return re.sub(EXPONENT_PATTERN, power, unit)
@@ -88,18 +88,18 @@ def names_in(unit: str) -> frozenset[str]:
     ['n', 'p']
     """
     exponents = (factor[3] for factor in FACTOR_PATTERN.finditer(unit))
-    return frozenset(name for one in exponents for name in re.findall(r"[A-Za-z]\w*", one or ""))
+    return frozenset(name for exponent in exponents for name in re.findall(r"[A-Za-z]\w*", exponent or ""))
 
 
-def _exponent_value(text: str, given: Mapping[str, Array | float], unit: str) -> Array | float:
+def _exponent_value(text: str, values: Mapping[str, Array | float], unit: str) -> Array | float:
     """The value of an exponent such as `2`, `n` or `(n+1)/2`."""
 
     def walk(node: ast.expr) -> Array | float:
         match node:
             case ast.Constant(value=int() | float() as number):
                 return float(number)
-            case ast.Name(id=name) if name in given:
-                return given[name]
+            case ast.Name(id=name) if name in values:
+                return values[name]
             case ast.UnaryOp(op=ast.USub(), operand=inner):
                 return -walk(inner)
             case ast.BinOp(left=left, op=ast.Add(), right=right):
@@ -110,10 +110,10 @@ def _exponent_value(text: str, given: Mapping[str, Array | float], unit: str) ->
                 return walk(left) * walk(right)
             case ast.BinOp(left=left, op=ast.Div(), right=right):
                 return walk(left) / walk(right)
-        known = ", ".join(given)
-        raise ModelError(f'unit "{unit}": the exponent "{text}" wants numbers, {known} and + - * /')
+        names = ", ".join(values)
+        raise ModelError(f'unit "{unit}": the exponent "{text}" expected numbers, {names} and + - * /')
 
     try:
         return walk(ast.parse(text, mode="eval").body)
     except SyntaxError:
-        raise ModelError(f'unit "{unit}": the exponent "{text}" cannot be read') from None
+        raise ModelError(f'unit "{unit}": the exponent "{text}" cannot be parsed') from None

@@ -1,4 +1,4 @@
-"""Velocity coordinates: the second component of the motion, v or its substitute where the damping is strong.
+"""Velocity coordinates: the second component of the motion, v or its substitute for strong damping.
 
 In the coordinate "log" a force F = xⁿ (1 + χ v) gives, with dt = p sᵖ⁻¹ dσ and x = sᵖ,
 
@@ -8,7 +8,7 @@ which is not stiff for any χ. In "force" a force F = xⁿ + c x^q v gives
 
     w = v + x^(n−q)/c,  F = c x^q w,  dw/dσ = −p sᵖ⁻¹ F + (p(n − q)/c) s^(p(n−q)−1) v,
 
-where the force keeps its digits down to its zero, though spring and dashpot cancel nearly all the way to it.
+in which the force keeps its digits down to its zero, although spring and dashpot nearly cancel on the way there.
 """
 
 from __future__ import annotations
@@ -24,38 +24,38 @@ from .formula import call_by_name
 from .model import COORDINATE_COEFFICIENTS, ForceModel
 from .powers import integer_power, power
 
-# an impact whose damping is above this takes its law's coordinate; below it v costs less, though it takes up to a
-# third more steps
+# damping above which an impact is integrated in the coordinate of its law; below it v is faster, although it takes
+# up to a third more steps
 STRONG_DAMPING = {"log": 5.0, "force": 2.0}
 
 
 class VelocityCoordinate:
-    """v itself, and the interface of a coordinate; arrays are of shape (n,).
+    """The coordinate v, and the interface of the others; arrays are of shape (n,), y is (2, n) and k is (5, n).
 
-    `strength` is the coefficient, by name or its values, that measures the damping.
+    `strength` is the coefficient that measures the damping: its name in the class, its values in the methods.
     """
 
     strength = ""
 
     def of(self, s: Array, v: float, strength: Array) -> Array | float:
-        """The coordinate of a velocity that all have."""
+        """The coordinate at s for a velocity that all trajectories have."""
         return v
 
     def velocity(self, y: Array, strength: Array) -> Array:
-        """The velocity of the components."""
+        """v from the components."""
         return np.asarray(y[1])
 
     def stop(self, y: Array, k: Array) -> tuple[Array, Array]:
-        """What falls to zero with the velocity, and its rate, from components and rates."""
+        """The function that falls to zero with the velocity, and its rate, from components y and rates k."""
         return y[1], k[1]
 
     def rates(self, out: Array, y: Array, weight: Array, elastic: Array, strength: Array) -> None:
-        """Finish rates that have v, and p sᵖ⁻¹ F for the second component; a fifth row is F."""
+        """Complete the rates in `out`: its second row contains p sᵖ⁻¹ F, its fifth row, if any, F."""
         np.negative(out[1], out[1])
 
 
 class LogCoordinate(VelocityCoordinate):
-    """u."""
+    """The coordinate u = ln(1 + χ v)."""
 
     strength = COORDINATE_COEFFICIENTS["log"][0]
 
@@ -80,13 +80,13 @@ def velocity_of_force(w: Array, power_of_s: Array, c: Array) -> Array:
 
 
 def rate_of_force(v: Array, power_of_s: Array, factor: Array, weight: Array, force: Array) -> Array:
-    """dw/dσ, where the factor is p(n − q)/c and the power that of s^(p(n−q)−1); for arrays and for numbers."""
+    """dw/dσ, with factor = p(n − q)/c and power_of_s = s^(p(n−q)−1); for arrays and for numbers."""
     return factor * power_of_s * v - weight * force
 
 
 @dataclass(frozen=True)
 class ForceCoordinate(VelocityCoordinate):
-    """w; the exponents of s are those of the drag, x^q = s^drag, and of x^(n−q) = s^spring."""
+    """The coordinate w; `drag` and `spring` are exponents of s: x^q = s^drag and x^(n−q) = s^spring."""
 
     drag: float
     spring: float
@@ -102,7 +102,7 @@ class ForceCoordinate(VelocityCoordinate):
         return k[0], -k[2] * k[4]
 
     def rates(self, out: Array, y: Array, weight: Array, elastic: Array, strength: Array) -> None:
-        # the force that did the work is the same, but for digits that it loses before its zero
+        # the same as the force from v, without the loss of digits near its zero
         force = strength * signed_power(y[0], self.drag) * y[1]
         out[1] = rate_of_force(
             out[0], signed_power(y[0], self.spring - 1.0), self.spring / strength, weight, force
@@ -111,7 +111,7 @@ class ForceCoordinate(VelocityCoordinate):
 
 
 def is_strong(model: ForceModel, values: Mapping[str, Array | float], count: int) -> NDArray[np.bool_]:
-    """Which impacts are integrated in their law's own coordinate: by their own damping, never by the batch."""
+    """Which impacts are integrated in the coordinate of their law, by their own damping alone; shape (count,)."""
     if model.velocity_coordinate not in STRONG_DAMPING:
         return np.zeros(count, bool)
     return np.broadcast_to(
@@ -122,7 +122,7 @@ def is_strong(model: ForceModel, values: Mapping[str, Array | float], count: int
 
 
 def coordinate(model: ForceModel, n: float) -> VelocityCoordinate:
-    """The coordinate for strong damping that a law declares."""
+    """The coordinate that a law declares for strong damping."""
     if model.velocity_coordinate == "log":
         return LogCoordinate()
     if model.velocity_coordinate == "force":
@@ -131,11 +131,11 @@ def coordinate(model: ForceModel, n: float) -> VelocityCoordinate:
 
 
 def force_form(model: ForceModel, n: float) -> ForceCoordinate:
-    """The coordinate of a law that declares the form K δⁿ + c δ^q δ̇."""
+    """The coordinate w of a law that declares the form K δⁿ + c δ^q δ̇."""
     q = float(call_by_name(model.coefficients["q"], {"n": n}))
     return ForceCoordinate(model.coordinate_power * q, model.coordinate_power * (n - q))
 
 
 def signed_power(s: Array, exponent: float) -> Array:
-    """s to a power. A whole power is continued through zero, so that a step across the release is smooth."""
+    """s to a power; a whole power is continued to negative s, so that a step across the release is smooth."""
     return integer_power(s, int(exponent)) if float(exponent).is_integer() else power(np.abs(s), exponent)

@@ -1,4 +1,4 @@
-"""The impacts of a plan: what goes into a law at some cells of the grid."""
+"""The impacts of a plan: the inputs of a law at cells of the grid."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from ..contact.powers import Array
 from ..errors import ModelError
 from .plan import Index, Inputs, dimensions
 
-# K of a law at some cells of the grid [N/m^n]
+# K of a law at cells of the grid [N/m^n]
 Stiffness = Callable[[Index], Array]
 
 
 def build_impacts(inputs: Inputs, model: Law, index: Index, stiffness: Stiffness | None = None) -> Impacts:
-    """The impacts of a model at some cells of the grid; what does not vary along an axis has length one there.
+    """The impacts of a model at cells of the grid; arrays have length 1 along axes on which they do not vary.
 
     Parameters
     ----------
     inputs : of the sweep
-    model : the law, or what is known of it
+    model : the law, or what a file stores of it
     index : the cells
-    stiffness : K at some cells [N/m^n], where the law has a rule for it; by default its formula
+    stiffness : returns K at cells [N/m^n], if the law has a formula for it; by default that formula
     """
-    given = set(inputs.names())
+    names = set(inputs.names())
     missing = np.full((1,) * dimensions(index), np.nan)
 
     def value(name: str) -> Array:
@@ -44,70 +44,70 @@ def build_impacts(inputs: Inputs, model: Law, index: Index, stiffness: Stiffness
     m1, m2 = (mass_at(inputs, ball, index) for ball in "12")
     E1, E2, nu1, nu2 = (of_material(ball, key) for key in ("E", "nu") for ball in "12")
     R1, R2 = (
-        value(f"R{ball}") if f"R{ball}" in given else sphere_radius(mass, of_material(ball, "rho"))
+        value(f"R{ball}") if f"R{ball}" in names else sphere_radius(mass, of_material(ball, "rho"))
         for ball, mass in (("1", m1), ("2", m2))
     )
     n = value("n") if model.exponent is None else np.full_like(missing, model.exponent)
     with np.errstate(all="ignore"):
-        own_K = f"{model.key}.K"
-        if own_K in given or "K" in given:
-            K = value(own_K if own_K in given else "K")
+        stiffness_name = f"{model.key}.K"
+        if stiffness_name in names or "K" in names:
+            K = value(stiffness_name if stiffness_name in names else "K")
         elif stiffness is not None:
             K = stiffness(index)
         else:
             K = hertz_or_secant(n, hertz_stiffness(E1, nu1, E2, nu2, R1, R2), effective_mass(m1, m2), v1 - v2)
         e = restitution_at(inputs, index)
-    own = {parameter.name: value(f"{model.key}.{parameter.name}") for parameter in model.parameters}
+    parameters = {parameter.name: value(f"{model.key}.{parameter.name}") for parameter in model.parameters}
     impacts = Impacts(
         e=e, v1=v1, v2=v2, m1=m1, m2=m2, K=K, n=n, R1=R1, R2=R2, E1=E1, nu1=nu1, E2=E2, nu2=nu2,
         yield_strength1=of_material("1", "yield_strength"), yield_strength2=of_material("2", "yield_strength"),
-        parameters=own,
+        parameters=parameters,
     )  # fmt: skip
     if not has_stiffness_rule(inputs, model) or stiffness is not None:
         return impacts
     assert model.stiffness is not None
     with np.errstate(all="ignore"):
-        known = {name: impacts.quantity(name) for name in argument_names(model.stiffness)}
-        shape = np.broadcast_shapes(missing.shape, *(values.shape for values in known.values()))
-        # a formula is promised arrays of one shape (n,)
-        flat = {name: np.broadcast_to(values, shape).reshape(-1) for name, values in known.items()}
-        K = call_by_name(model.stiffness, flat)
+        arguments = {name: impacts.quantity(name) for name in argument_names(model.stiffness)}
+        shape = np.broadcast_shapes(missing.shape, *(values.shape for values in arguments.values()))
+        # formulas receive arrays of one shape (n,)
+        flat_arguments = {name: np.broadcast_to(values, shape).reshape(-1) for name, values in arguments.items()}
+        K = call_by_name(model.stiffness, flat_arguments)
     if K.shape not in ((), (math.prod(shape),)):
         raise ModelError(f"{model.key}: stiffness returned the shape {K.shape}, expected ({math.prod(shape)},)")
     return replace(impacts, K=np.broadcast_to(K, math.prod(shape)).reshape(shape))
 
 
 def values_at(inputs: Inputs, name: str, index: Index) -> Array:
-    """The numbers of a config name at some cells; NaN of one that has no value."""
+    """The numbers of a config name at cells; NaN for a name without a value."""
     if name not in inputs.names():
         return np.full((1,) * dimensions(index), np.nan)
     return np.asarray(inputs.column(name, index), float)
 
 
 def property_at(inputs: Inputs, ball: str, key: str, index: Index) -> Array:
-    """A property of the material of a ball, "1" or "2", at some cells, such as E [Pa]; NaN where it is unknown."""
+    """A property of the material of a ball, "1" or "2", at cells, such as E [Pa]; NaN where it is unknown."""
     names = inputs.names()
     name = "material" if "material" in names else f"material{ball}"
     if name not in names:
         return np.full((1,) * dimensions(index), np.nan)
-    of_cell = inputs.column(name, index)
-    chosen, where = np.unique(of_cell, return_inverse=True)
-    table = np.array([getattr(inputs.materials[str(material)], key) for material in chosen], dtype=float)
-    values = table[where].reshape(of_cell.shape)
+    material_of_cell = inputs.column(name, index)
+    materials, material_index = np.unique(material_of_cell, return_inverse=True)
+    table = np.array([getattr(inputs.materials[str(material)], key) for material in materials], dtype=float)
+    values = table[material_index].reshape(material_of_cell.shape)
     for material in sorted(inputs.materials_of(ball)):
         column = f"materials.{material}.{key}"
-        # whether or not these cells have the material: the shape tells along which axes the ball's property varies
+        # also where no cell has the material: the shape shows along which axes the property of the ball varies
         if column in names:
-            values = np.where(of_cell == material, values_at(inputs, column, index), values)
+            values = np.where(material_of_cell == material, values_at(inputs, column, index), values)
     return values
 
 
 def mass_at(inputs: Inputs, ball: str, index: Index) -> Array:
-    """The mass of a ball, "1" or "2", at some cells [kg]; where none is given, that of a sphere of its radius.
+    """The mass of a ball, "1" or "2", at cells [kg]; if the config has none, that of a sphere of its radius.
 
     Raises
     ------
-    ModelError : there is no mass, and no radius and density to derive it from
+    ModelError : the config has neither the mass nor a radius and density to derive it from
     """
     if f"m{ball}" in inputs.names():
         return values_at(inputs, f"m{ball}", index)
@@ -118,7 +118,7 @@ def mass_at(inputs: Inputs, ball: str, index: Index) -> Array:
 
 
 def restitution_at(inputs: Inputs, index: Index) -> Array:
-    """The restitution asked for at some cells: e, or e = 1 - alpha (v1 - v2), equation (24)."""
+    """The requested restitution at cells: e, or e = 1 - alpha (v1 - v2), equation (24)."""
     if "e" in inputs.names():
         return values_at(inputs, "e", index)
     speed = values_at(inputs, "v1", index) - values_at(inputs, "v2", index)
@@ -126,12 +126,12 @@ def restitution_at(inputs: Inputs, index: Index) -> Array:
 
 
 def has_stiffness_rule(inputs: Inputs, model: Law) -> bool:
-    """Whether K comes from a formula of the law's own: it has one, and no K is given."""
+    """Whether K is computed by a formula of the law: it has one, and the config has no K."""
     return model.stiffness is not None and {"K", f"{model.key}.K"}.isdisjoint(inputs.names())
 
 
 def exponents(inputs: Inputs, model: Law) -> tuple[float, ...]:
-    """The compliance exponents that a model is asked at."""
+    """The compliance exponents of a model in the sweep."""
     if model.exponent is not None:
         return (model.exponent,)
     return tuple(np.unique(np.asarray(inputs.values("n"), float)).tolist())

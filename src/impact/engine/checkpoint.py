@@ -1,7 +1,8 @@
-"""The work folder: what a sweep has finished, kept block by block, so that nothing completed is ever lost.
+"""The work folder of a sweep: one file for each finished block, so that no completed work is ever lost.
 
-Beside the output `results.h5` stands `results.h5.work/` while a sweep runs: the plan, a lock, and a file for each
-finished block, written to another name, synced, renamed. It goes when the result is whole.
+While a sweep runs, the folder `results.h5.work/` beside the output `results.h5` contains the plan, a lock, and a
+file for each finished block, which is written to a temporary name, synced and renamed. The folder is removed when
+the result is complete.
 """
 
 from __future__ import annotations
@@ -26,9 +27,9 @@ from .execute import with_core
 from .plan import Plan
 from .trajectories import RANGE_TRAJECTORIES, TrajectoryRange, trajectory_maps
 
-PLAN, LOCK = "plan.json", "lock"
-ELSE = "give the sweep that it is of, another output, or --overwrite to start again"
-TOLD = 3  # differences
+PLAN_FILE, LOCK_FILE = "plan.json", "lock"
+OTHER_SWEEP_HINT = "give the sweep that it is of, another output, or --overwrite to start again"
+MAX_DIFFERENCES = 3  # between two sweeps, in a message
 
 
 def work_folder_of(output: Path) -> Path:
@@ -37,13 +38,13 @@ def work_folder_of(output: Path) -> Path:
 
 
 def partial_file_of(output: Path) -> Path:
-    """The name of an output while it is assembled."""
+    """The temporary name of an output while it is written."""
     return output.with_name(f"{output.name}.part")
 
 
 @dataclass(frozen=True)
 class WorkFolder:
-    """A work folder that this process has locked; `key` tells what its blocks are of."""
+    """A work folder that this process has locked; `key` identifies the sweep of its blocks."""
 
     folder: Path
     key: str
@@ -51,113 +52,115 @@ class WorkFolder:
     def path(self, number: int) -> Path:
         return self.folder / f"{number:08d}.npz"
 
-    def _of(self, part: TrajectoryRange) -> str:
-        """What a block says of itself."""
+    def _block_header(self, part: TrajectoryRange) -> str:
+        """The text in a block that identifies its sweep and its range of trajectories."""
         return f"{part.number} {part.model} {part.start} {part.stop} {self.key}"
 
-    def store(self, part: TrajectoryRange, rebound: CollisionResult) -> None:
-        """Keep a finished block.
+    def store(self, part: TrajectoryRange, collisions: CollisionResult) -> None:
+        """Store a finished block.
 
         Raises
         ------
         StoreError : the disk is full or failed
         """
         with atomic_write(self.path(part.number), overwrite=True, part=self.folder / "block.part") as sink:
-            write_block(sink, self._of(part), rebound)
+            write_block(sink, self._block_header(part), collisions)
 
     def load(self, part: TrajectoryRange) -> CollisionResult | None:
-        """A finished block; None if it is not there, or not whole."""
-        # what is no regular file might never end
+        """A finished block; None if it is missing or damaged."""
+        # reading something other than a regular file might never end
         if not self.path(part.number).is_file():
             return None
-        return read_block(self.path(part.number), self._of(part), part.size)
+        return read_block(self.path(part.number), self._block_header(part), part.size)
 
 
 @contextlib.contextmanager
 def open_work_folder(
     folder: Path, plan: Plan, *, resume: bool, overwrite: bool, extends: str = ""
 ) -> Iterator[WorkFolder]:
-    """A work folder, locked.
+    """Create or reopen a work folder, and lock it.
 
     Parameters
     ----------
-    folder : where
-    plan : what it runs
-    resume : go on with what a leftover folder holds
-    overwrite : throw away what a leftover folder holds, unless it is resumed
-    extends : the seal of the result that is extended, if one is: the folder then lacks what that holds
+    folder : its path
+    plan : the plan whose blocks it contains
+    resume : keep the blocks of an interrupted sweep
+    overwrite : remove the blocks of an interrupted sweep, unless they are resumed
+    extends : seal of the result that is extended, if any, whose trajectories the folder does not contain
 
     Raises
     ------
-    InUseError : another process works there
-    UsageError : a leftover folder is neither to be resumed nor overwritten, or is of another sweep
+    InUseError : another process has locked the folder
+    UsageError : the folder exists, and neither `resume` nor `overwrite` is set, or it is of another sweep
     StoreError : the disk is full or failed
     """
-    _check(folder)
-    record = _record(plan, extends)
-    lock = FileLock(folder / LOCK, timeout=0)
+    _check_is_work_folder(folder)
+    record = _sweep_record(plan, extends)
+    lock = FileLock(folder / LOCK_FILE, timeout=0)
     try:
-        _lock(lock, folder)
-        _prepare(folder, record, resume=resume, overwrite=overwrite)
-        yield WorkFolder(folder, _key(record))
+        _acquire_lock(lock, folder)
+        _prepare_folder(folder, record, resume=resume, overwrite=overwrite)
+        yield WorkFolder(folder, _record_digest(record))
     finally:
         lock.release()
 
 
 @contextlib.contextmanager
 def lock_work_folder(folder: Path, plan: Plan) -> Iterator[WorkFolder]:
-    """A work folder of a plan as it is, locked.
+    """Lock an existing work folder of a plan without changing it.
 
     Raises
     ------
     InUseError, StoreError : see `open_work_folder`
-    UsageError : it is of another sweep
+    UsageError : the folder is of another sweep
     """
-    record = _record(plan)
-    told = _told_apart(folder, record)
-    if told:
-        raise UsageError(f"{safe_text(str(folder))}: {told}; wants the folders of one sweep")
-    lock = FileLock(folder / LOCK, timeout=0)
+    record = _sweep_record(plan)
+    difference = _difference_from(folder, record)
+    if difference:
+        raise UsageError(f"{safe_text(str(folder))}: {difference}; expected the folders of one sweep")
+    lock = FileLock(folder / LOCK_FILE, timeout=0)
     try:
-        _lock(lock, folder)
-        yield WorkFolder(folder, _key(record))
+        _acquire_lock(lock, folder)
+        yield WorkFolder(folder, _record_digest(record))
     finally:
         lock.release()
 
 
 def remove_stale_work_folder(output: Path, plan: Plan) -> None:
-    """Remove what a sweep has left that was killed when its result was whole, if nobody works there."""
+    """Remove the work folder of a sweep that was killed after its result was complete, if it is not locked."""
     folder = work_folder_of(output)
     with contextlib.suppress(ImpactError, Timeout, OSError):
         if folder.is_dir():
-            _check(folder)
+            _check_is_work_folder(folder)
             plan = with_core(plan, trajectory_maps(plan))
-            with FileLock(folder / LOCK, timeout=0):
-                if not os.path.lexists(folder / PLAN) or _is_of(folder, _record(plan), resume=True):
+            with FileLock(folder / LOCK_FILE, timeout=0):
+                has_plan = os.path.lexists(folder / PLAN_FILE)
+                if not has_plan or _can_resume(folder, _sweep_record(plan), resume=True):
                     partial_file_of(output).unlink(missing_ok=True)
                     remove_work_folder(folder)
 
 
-def _check(folder: Path) -> None:
-    """Refuse what has the name of a work folder, and is none."""
+def _check_is_work_folder(folder: Path) -> None:
+    """Refuse a file, link or folder that has the name of a work folder but is none."""
     shown = safe_text(str(folder))
     if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
         raise UsageError(f"{shown}: is not a folder, and is not modified")
-    if folder.is_dir() and not os.path.lexists(folder / PLAN):
-        strange = [one.name for one in folder.iterdir() if one.name != LOCK and not one.name.endswith(".part")]
-        if strange:
-            raise UsageError(f"{shown}: holds {safe_text(strange[0])}, and no {PLAN}; it is not modified")
+    if folder.is_dir() and not os.path.lexists(folder / PLAN_FILE):
+        names = [path.name for path in folder.iterdir()]
+        foreign = [name for name in names if name != LOCK_FILE and not name.endswith(".part")]
+        if foreign:
+            raise UsageError(f"{shown}: holds {safe_text(foreign[0])}, and no {PLAN_FILE}; it is not modified")
 
 
 def remove_work_folder(folder: Path) -> None:
-    """Remove a folder whose result is whole; what cannot be, and what others have put there, does no harm."""
+    """Remove the folder of a complete result; files that cannot be removed, and files of others, are left."""
     with contextlib.suppress(OSError):
-        _clear(folder, plan=True)
-        (folder / LOCK).unlink()
+        _remove_files(folder, plan=True)
+        (folder / LOCK_FILE).unlink()
         folder.rmdir()
 
 
-def _lock(lock: FileLock, folder: Path) -> None:
+def _acquire_lock(lock: FileLock, folder: Path) -> None:
     try:
         folder.mkdir(exist_ok=True)
         sync_folder(folder.parent)
@@ -170,120 +173,120 @@ def _lock(lock: FileLock, folder: Path) -> None:
         raise StoreError(f"{safe_text(str(folder))}: {error.strerror}") from error
 
 
-def _prepare(folder: Path, record: Mapping[str, Any], *, resume: bool, overwrite: bool) -> None:
-    """Have a folder with the plan, and with the blocks of it that are to be gone on with."""
+def _prepare_folder(folder: Path, record: Mapping[str, Any], *, resume: bool, overwrite: bool) -> None:
+    """Write the plan to a folder, and remove blocks that are not resumed."""
     shown = safe_text(str(folder))
     try:
-        left = any(one.name != LOCK for one in folder.iterdir())
-        if left and not resume and not overwrite:
+        has_leftovers = any(path.name != LOCK_FILE for path in folder.iterdir())
+        if has_leftovers and not resume and not overwrite:
             raise UsageError(
                 f"{shown}: is left of an interrupted sweep; use --resume to continue or --overwrite to start again"
             )
-        if left and _is_of(folder, record, resume=resume):
+        if has_leftovers and _can_resume(folder, record, resume=resume):
             return
-        _clear(folder)
-        # what is removed must not come back beside another plan
+        _remove_files(folder)
+        # after a power cut, removed blocks must not reappear beside the new plan
         sync_folder(folder)
-        with atomic_write(folder / PLAN, overwrite=True) as sink:
+        with atomic_write(folder / PLAN_FILE, overwrite=True) as sink:
             sink.write(json.dumps(record).encode())
     except OSError as error:
         raise StoreError(f"{shown}: {error.strerror}") from error
 
 
-def _record(plan: Plan, extends: str = "") -> dict[str, Any]:
-    """What a folder is of: all that the finished blocks depend on."""
+def _sweep_record(plan: Plan, extends: str = "") -> dict[str, Any]:
+    """The identity of a sweep: everything that its finished blocks depend on."""
     solver = plan.config.solver
     return {"schema": TABLE_COLUMNS, "block": RANGE_TRAJECTORIES, "collapse": solver.collapse, "core": solver.core,
             "physics": plan.physics, **({"extends": extends} if extends else {})}  # fmt: skip
 
 
-def _key(record: Mapping[str, Any]) -> str:
+def _record_digest(record: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(record).encode()).hexdigest()
 
 
-def _clear(folder: Path, plan: bool = False) -> None:
-    """Remove the finished blocks, and what was left half written."""
-    for one in (*folder.glob("*.npz"), *folder.glob("*.part"), *([folder / PLAN] if plan else [])):
-        one.unlink(missing_ok=True)
+def _remove_files(folder: Path, plan: bool = False) -> None:
+    """Remove the finished and partial blocks, and with `plan` the plan."""
+    for path in (*folder.glob("*.npz"), *folder.glob("*.part"), *([folder / PLAN_FILE] if plan else [])):
+        path.unlink(missing_ok=True)
 
 
-def _is_of(folder: Path, record: Mapping[str, Any], *, resume: bool) -> bool:
-    """Whether a folder has finished blocks of a sweep to go on with.
+def _can_resume(folder: Path, record: Mapping[str, Any], *, resume: bool) -> bool:
+    """Whether the blocks of a folder can be resumed.
 
     Raises
     ------
-    UsageError : it is to be resumed, and is of another sweep, which is told
+    UsageError : `resume` is set, and the folder is of another sweep
     """
-    if not resume or not os.path.lexists(folder / PLAN):
-        # without a plan it was interrupted before anything was done
+    if not resume or not os.path.lexists(folder / PLAN_FILE):
+        # without a plan, the sweep was interrupted before its first block
         return False
-    told = _told_apart(folder, record)
-    if told:
-        raise UsageError(f"{safe_text(str(folder))}: {told}; {ELSE}")
+    difference = _difference_from(folder, record)
+    if difference:
+        raise UsageError(f"{safe_text(str(folder))}: {difference}; {OTHER_SWEEP_HINT}")
     return True
 
 
-def _told_apart(folder: Path, record: Mapping[str, Any]) -> str | None:
-    """In what a folder is of another sweep; None if it is of this one."""
+def _difference_from(folder: Path, record: Mapping[str, Any]) -> str | None:
+    """How the sweep of a folder differs from the one of a record; None if they are the same."""
     unknown = [key for key, digest in record["physics"]["plugins"].items() if digest is None]
     if unknown:
         return f"the model {safe_text(unknown[0])} is in no file, so that it cannot be known to be the same"
     try:
-        if not (folder / PLAN).is_file():
+        if not (folder / PLAN_FILE).is_file():
             raise ValueError
-        stored = json.loads((folder / PLAN).read_text(encoding="utf-8"))
+        stored = json.loads((folder / PLAN_FILE).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
-        return f"its {PLAN} cannot be read"
-    told = list(record_differences(stored, json.loads(json.dumps(record))))
-    more = f" and {len(told) - TOLD} more" if len(told) > TOLD else ""
-    return f"is of another sweep: {'; '.join(told[:TOLD])}{more}" if told else None
+        return f"its {PLAN_FILE} cannot be read"
+    differences = list(record_differences(stored, json.loads(json.dumps(record))))
+    more = f" and {len(differences) - MAX_DIFFERENCES} more" if len(differences) > MAX_DIFFERENCES else ""
+    return f"is of another sweep: {'; '.join(differences[:MAX_DIFFERENCES])}{more}" if differences else None
 
 
-def write_block(file: Any, of: str, rebound: CollisionResult) -> None:
+def write_block(file: Any, header: str, collisions: CollisionResult) -> None:
     """Write a block.
 
     Parameters
     ----------
-    file : a binary one, to be written to
-    of : what it says of itself
-    rebound : what is in it
+    file : a binary file
+    header : text that identifies the block
+    collisions : results of its trajectories
     """
-    np.savez(file, of=of, **{name: getattr(rebound, name) for name in TABLE_COLUMNS})
+    np.savez(file, of=header, **{name: getattr(collisions, name) for name in TABLE_COLUMNS})
 
 
-def read_block(path: Path, of: str, size: int) -> CollisionResult | None:
-    """A block of so many trajectories; None if it is of something else, or not whole."""
+def read_block(path: Path, header: str, size: int) -> CollisionResult | None:
+    """A block of `size` trajectories; None if it has another header or is damaged."""
     try:
         with np.load(path, allow_pickle=False) as stored:
-            if stored["of"].item() != of:
+            if stored["of"].item() != header:
                 return None
             arrays = {name: stored[name] for name in TABLE_COLUMNS}
     except MemoryError:
         raise
-    # numpy and zipfile raise almost anything on a damaged file
+    # numpy and zipfile raise almost any exception on a damaged file
     except Exception:
         return None
     blank = CollisionResult.blank(size)
-    right = all(
-        (one.shape, one.dtype) == (getattr(blank, name).shape, getattr(blank, name).dtype)
-        for name, one in arrays.items()
+    is_whole = all(
+        (array.shape, array.dtype) == (getattr(blank, name).shape, getattr(blank, name).dtype)
+        for name, array in arrays.items()
     )
-    return CollisionResult(**arrays) if right else None
+    return CollisionResult(**arrays) if is_whole else None
 
 
-def record_differences(there: object, here: object, path: str = "") -> Iterator[str]:
-    """In what two records differ, each with its place."""
-    if isinstance(there, dict) and isinstance(here, dict):
-        for key in dict.fromkeys((*there, *here)):
+def record_differences(stored: object, current: object, path: str = "") -> Iterator[str]:
+    """The differences between two records, each with its path."""
+    if isinstance(stored, dict) and isinstance(current, dict):
+        for key in dict.fromkeys((*stored, *current)):
             name = key if path in ("", "physics") else f"{path}.{key}"
-            yield from record_differences(there.get(key), here.get(key), str(name))
-    elif isinstance(there, list) and isinstance(here, list) and len(there) == len(here):
-        for place, (one, other) in enumerate(zip(there, here, strict=True)):
-            yield from record_differences(one, other, f"{path}[{place}]")
-    elif there != here and not (there != there and here != here):
-        yield f"{safe_text(path)}: {_shown(there)} there, {_shown(here)} here"
+            yield from record_differences(stored.get(key), current.get(key), str(name))
+    elif isinstance(stored, list) and isinstance(current, list) and len(stored) == len(current):
+        for index, (stored_element, current_element) in enumerate(zip(stored, current, strict=True)):
+            yield from record_differences(stored_element, current_element, f"{path}[{index}]")
+    elif stored != current and not (stored != stored and current != current):
+        yield f"{safe_text(path)}: {_short_json(stored)} there, {_short_json(current)} here"
 
 
-def _shown(value: object) -> str:
+def _short_json(value: object) -> str:
     text = f"{len(value)} values" if isinstance(value, list) else json.dumps(value)
     return safe_text(text, 60)

@@ -1,4 +1,4 @@
-"""A cluster: the workers of a scheduler of dask.distributed as a team, wherever they are."""
+"""A backend that integrates on the workers of a scheduler of dask.distributed."""
 
 from __future__ import annotations
 
@@ -23,32 +23,36 @@ if TYPE_CHECKING:
     from distributed import Client, LocalCluster
 
 LOCAL = "local"
-ADDRESS = "the address of a scheduler of dask, such as tcp://host:8786"
-# blocks given to all workers together, at most: the driver's memory is the same for any number of them
-MOST = 256
-# seconds between two questions to the scheduler, and after which nobody is waited for any more
-MOMENT, PATIENCE = 1.0, 10.0
-# seconds without an answer after which no block is given out and a signal ends the sweep at once, and that the end
-# of a connection may take
-SILENCE_S, CLOSE_TIMEOUT_S = 3.0, 2.0
-# the setting of dask's configuration for how long a connection, and any later answer, may take
-TIMEOUT = "distributed.comm.timeouts.connect"
-# seconds without a worker of our own, which are begun again when they die, after which there will be none
-AWAY = 60.0
-# asks in words that a worker of any version understands
-VERSION = "__import__('impact').__version__"
-# of a scheduler of our own: a block whose worker died comes back to us, to be given out again; and a worker that
-# is dead when it is looked at is begun again all the same
-OWN = {"distributed.scheduler.allowed-failures": 0, "distributed.deploy.lost-worker-timeout": "1000 days"}
-# what workers of our own do first: a terminal sends SIGINT to all, and it is the driver's; so is what is told
-DEAF = "import logging, signal; logging.disable(); signal.signal(signal.SIGINT, signal.SIG_IGN)"
+ADDRESS_EXPECTED = "the address of a scheduler of dask, such as tcp://host:8786"
+# unfinished blocks of all workers together, which bounds the memory of the driver for any number of workers
+MAX_BLOCKS_IN_FLIGHT = 256
+# seconds between two requests to the scheduler, and to wait for a connection or a scheduler file
+SCHEDULER_POLL_S, CONNECT_TIMEOUT_S = 1.0, 10.0
+# seconds without an answer of the scheduler after which no block is submitted and a signal ends the sweep at once
+SILENCE_LIMIT_S = 3.0
+# seconds that closing a connection may take
+CLOSE_TIMEOUT_S = 2.0
+# the setting in dask's configuration for how long a connection, and any later answer, may take
+TIMEOUT_SETTING = "distributed.comm.timeouts.connect"
+# seconds after which a local cluster without workers, which it restarts when they die, is given up
+NO_WORKERS_LIMIT_S = 60.0
+# an expression that a worker with any version of this package can evaluate
+VERSION_EXPRESSION = "__import__('impact').__version__"
+# of a local scheduler: a block whose worker died is returned to the driver, which submits it again; and a worker
+# that died is restarted whenever that is noticed
+LOCAL_SCHEDULER_SETTINGS = {
+    "distributed.scheduler.allowed-failures": 0,
+    "distributed.deploy.lost-worker-timeout": "1000 days",
+}
+# run first by local workers: only the driver logs, and handles SIGINT, which a terminal sends to all
+WORKER_PRELOAD = "import logging, signal; logging.disable(); signal.signal(signal.SIGINT, signal.SIG_IGN)"
 
 
-Result = TypeVar("Result")
+ResultT = TypeVar("ResultT")
 
 
 class Cluster(NamedTuple):
-    """A team, the address of the scheduler's dashboard if it has one, and how many workers there are at first."""
+    """A backend, the address of the scheduler's dashboard if it has one, and the initial number of workers."""
 
     backend: Backend
     dashboard: str | None
@@ -56,62 +60,69 @@ class Cluster(NamedTuple):
 
 
 @contextlib.contextmanager
-def cluster(place: str | Path, should_stop: Callable[[], bool] = never_stop) -> Iterator[Cluster]:
-    """The workers of a scheduler.
+def cluster(scheduler: str | Path, should_stop: Callable[[], bool] = never_stop) -> Iterator[Cluster]:
+    """Connect to the workers of a scheduler.
 
     Parameters
     ----------
-    place : its address, such as "tcp://host:8786"; the path of its scheduler file; or "local", for one of our own
-        with a worker for each processor of this machine, which ends with us
-    should_stop : whether to give up while it is connected to
+    scheduler : its address, such as "tcp://host:8786"; the path of its scheduler file; or "local", for a temporary
+        scheduler with a worker for each processor of this machine
+    should_stop : when it returns True, connecting is given up
 
     Raises
     ------
     UsageError : it cannot be reached or does not answer, dask.distributed is missing, or a worker has another
         version of this package
-    UnfinishedError : `should_stop` became true
+    UnfinishedError : `should_stop` returned True
     """
-    shown = safe_text(str(place))
+    scheduler_name = safe_text(str(scheduler))
     if find_spec("distributed") is None:
         extra = 'pip install "impact-sweep[distributed]"'
-        raise UsageError(f"--scheduler {shown}: wants dask.distributed, which is not installed: {extra}")
-    if isinstance(place, str) and place != LOCAL and "://" not in place:
-        raise UsageError(f"{shown}: wants {ADDRESS}; or {LOCAL}")
+        raise UsageError(
+            f"--scheduler {scheduler_name}: expected dask.distributed, which is not installed: {extra}"
+        )
+    if isinstance(scheduler, str) and scheduler != LOCAL and "://" not in scheduler:
+        raise UsageError(f"{scheduler_name}: expected {ADDRESS_EXPECTED}; or {LOCAL}")
     with contextlib.ExitStack() as stack:
-        # what becomes of the scheduler and its workers is told by the sweep
+        # the sweep reports what happens to the scheduler and its workers
         stack.callback(logging.disable, logging.root.manager.disable)
         logging.disable()
-        limit = _timeout()
-        own = _local_cluster(stack) if place == LOCAL else None
+        limit = _answer_timeout()
+        local_cluster = _start_local_cluster(stack) if scheduler == LOCAL else None
         try:
-            client, info, workers = _within(limit, partial(_connected, own or place, shown, limit), should_stop)
+            client, info, workers = _run_with_timeout(
+                limit, partial(_connect, local_cluster or scheduler, scheduler_name, limit), should_stop
+            )
         except TimeoutError:
             raise UsageError(
-                f"{shown}: no answer within {limit:g} s; expected {ADDRESS} (dask: {TIMEOUT})"
+                f"{scheduler_name}: no answer within {limit:g} s; "
+                f"expected {ADDRESS_EXPECTED} (dask: {TIMEOUT_SETTING})"
             ) from None
         stack.callback(_close, client)
-        backend = Backend(lambda: _executor(client, shown), _room(client, shown))
+        backend = Backend(lambda: _open_executor(client, scheduler_name), _capacity(client, scheduler_name))
         yield Cluster(backend, client.dashboard_link if "dashboard" in info["services"] else None, workers)
 
 
-def _timeout() -> float:
-    """Seconds that an answer may take, by dask's configuration, to which distributed adds its own on import."""
+def _answer_timeout() -> float:
+    """Seconds that an answer may take, from dask's configuration."""
     import dask.config
-    import distributed  # noqa: F401
+    import distributed  # noqa: F401 (adds its settings to the configuration)
     from dask.utils import parse_timedelta
 
-    return float(parse_timedelta(dask.config.get(TIMEOUT)))
+    return float(parse_timedelta(dask.config.get(TIMEOUT_SETTING)))
 
 
-def _within(limit: float, action: Callable[[], Result], should_stop: Callable[[], bool] = never_stop) -> Result:
-    """The result of an action that may wait forever: it runs in a thread, which is left behind if it does.
+def _run_with_timeout(
+    limit: float, action: Callable[[], ResultT], should_stop: Callable[[], bool] = never_stop
+) -> ResultT:
+    """The result of an action that may wait forever; it runs in a daemon thread, which is abandoned then.
 
     Raises
     ------
-    TimeoutError : it takes longer than `limit` seconds
-    UnfinishedError : `should_stop` became true
+    TimeoutError : the action takes longer than `limit` seconds
+    UnfinishedError : `should_stop` returned True
     """
-    future: Future[Result] = Future()
+    future: Future[ResultT] = Future()
 
     def run() -> None:
         try:
@@ -129,30 +140,34 @@ def _within(limit: float, action: Callable[[], Result], should_stop: Callable[[]
     return future.result()
 
 
-def _local_cluster(stack: contextlib.ExitStack) -> LocalCluster:
-    """A scheduler of our own, which other machines cannot reach; it ends with the stack."""
+def _start_local_cluster(stack: contextlib.ExitStack) -> LocalCluster:
+    """A temporary scheduler that other machines cannot reach; the stack closes it."""
     import dask.config
     from distributed import LocalCluster
 
-    dask.config.set(OWN)
+    dask.config.set(LOCAL_SCHEDULER_SETTINGS)
     loopback = {"host": "127.0.0.1", "dashboard_address": "127.0.0.1:0"}
-    return stack.enter_context(LocalCluster(threads_per_worker=1, memory_limit=0, preload=[DEAF], **loopback))
+    return stack.enter_context(
+        LocalCluster(threads_per_worker=1, memory_limit=0, preload=[WORKER_PRELOAD], **loopback)
+    )
 
 
-def _connected(place: str | Path | LocalCluster, shown: str, limit: float) -> tuple[Client, dict[str, Any], int]:
-    """A client of a scheduler and workers of this version, what the scheduler is, and how many workers it has."""
+def _connect(
+    scheduler: str | Path | LocalCluster, scheduler_name: str, limit: float
+) -> tuple[Client, dict[str, Any], int]:
+    """A client of a scheduler with workers of this version, the scheduler's info, and the number of workers."""
     from distributed import Client
 
-    patience = min(PATIENCE, limit)
+    timeout = min(CONNECT_TIMEOUT_S, limit)
     try:
-        if isinstance(place, Path):
-            _wait_for(place, shown)
-            client = Client(scheduler_file=str(place), set_as_default=False, timeout=patience)
+        if isinstance(scheduler, Path):
+            _wait_for_file(scheduler, scheduler_name)
+            client = Client(scheduler_file=str(scheduler), set_as_default=False, timeout=timeout)
         else:
-            client = Client(place, set_as_default=False, timeout=patience)
+            client = Client(scheduler, set_as_default=False, timeout=timeout)
     except (OSError, ValueError, TypeError, ImportError) as error:
-        told = safe_text(str(error), 300)
-        raise UsageError(f"{shown}: {told}; wants {ADDRESS}") from None
+        reason = safe_text(str(error), 300)
+        raise UsageError(f"{scheduler_name}: {reason}; expected {ADDRESS_EXPECTED}") from None
     try:
         _check_versions(client)
         return client, client.scheduler_info(), len(client.nthreads())
@@ -171,107 +186,111 @@ def _close(client: Client) -> None:
             client.close(timeout=CLOSE_TIMEOUT_S)
 
 
-def _wait_for(file: Path, shown: str) -> None:
-    """A scheduler that was started just now may still be about to write its file."""
-    begun = time.monotonic()
+def _wait_for_file(file: Path, scheduler_name: str) -> None:
+    """Wait for the file of a scheduler, which may have been started just now."""
+    start = time.monotonic()
     while not file.is_file():
-        if time.monotonic() - begun > PATIENCE:
-            wants = "the file that dask scheduler --scheduler-file makes"
-            raise UsageError(f"{shown}: is not there after {PATIENCE:.0f} s, wants {wants}")
+        if time.monotonic() - start > CONNECT_TIMEOUT_S:
+            expected = "the file that dask scheduler --scheduler-file makes"
+            raise UsageError(
+                f"{scheduler_name}: is not there after {CONNECT_TIMEOUT_S:.0f} s, expected {expected}"
+            )
         time.sleep(0.1)
 
 
 def _check_versions(client: Client) -> None:
-    """Refuse a scheduler and workers that have another version of this package, or none: all read what is sent."""
+    """Refuse a scheduler and workers with another version of this package, or none: all deserialize the blocks."""
     try:
-        places = {"the scheduler": client.run_on_scheduler(eval, VERSION)}
+        versions = {"the scheduler": client.run_on_scheduler(eval, VERSION_EXPRESSION)}
     except ImportError as error:
-        places = {"the scheduler": error}
-    for place, found in (places | client.run(eval, VERSION, on_error="return")).items():
-        if isinstance(found, BaseException):
-            raise UsageError(f"{place}: has no impact: {safe_text(str(found))}; wants impact {__version__}")
-        if found != __version__:
-            raise UsageError(other_version(place, str(found), __version__))
+        versions = {"the scheduler": error}
+    for location, version in (versions | client.run(eval, VERSION_EXPRESSION, on_error="return")).items():
+        if isinstance(version, BaseException):
+            raise UsageError(
+                f"{location}: has no impact: {safe_text(str(version))}; expected impact {__version__}"
+            )
+        if version != __version__:
+            raise UsageError(other_version(location, str(version), __version__))
 
 
-def _room(client: Client, shown: str) -> Callable[[], int]:
-    """How many blocks may be given at the moment: workers come and go; those of our own are to stay.
+def _capacity(client: Client, scheduler_name: str) -> Callable[[], int]:
+    """A function that returns how many unfinished blocks the workers may have: workers join and leave.
 
-    A thread asks the scheduler, who may never answer.
+    A thread polls the scheduler, which may never answer. All workers of a local cluster must not be gone for long.
     """
-    limit = _timeout()
-    answers = seen = workers = 0
-    silent = alone = 0.0
-    last = time.monotonic()
+    limit = _answer_timeout()
+    n_answers = n_seen = n_workers = 0
+    silence_s = without_workers_s = 0.0
+    last_call = time.monotonic()
 
-    def ask() -> None:
-        nonlocal answers, workers
+    def poll_scheduler() -> None:
+        nonlocal n_answers, n_workers
         while client.status not in ("closing", "closed"):
             with contextlib.suppress(OSError, ValueError, CancelledError):
-                workers = sum(client.nthreads().values())
-                answers += 1
-            time.sleep(MOMENT)
+                n_workers = sum(client.nthreads().values())
+                n_answers += 1
+            time.sleep(SCHEDULER_POLL_S)
 
-    threading.Thread(target=ask, daemon=True).start()
+    threading.Thread(target=poll_scheduler, daemon=True).start()
 
-    def of_now() -> int:
-        nonlocal seen, silent, alone, last
-        # a time in which this process was suspended does not count
-        passed = min(time.monotonic() - last, MOMENT)
-        last = time.monotonic()
-        silent = 0.0 if answers > seen else silent + passed
-        alone = 0.0 if workers or not answers else alone + passed
-        seen = answers
-        if silent > limit:
-            raise StoreError(f"{shown}: the scheduler has not answered for {limit:g} s")
-        if shown == LOCAL and alone > AWAY:
-            raise StoreError(f"{shown}: all workers are gone")
-        return 0 if silent > SILENCE_S else min(BLOCKS_IN_FLIGHT * workers, MOST)
+    def current_capacity() -> int:
+        nonlocal n_seen, silence_s, without_workers_s, last_call
+        # time during which this process was suspended does not count
+        elapsed = min(time.monotonic() - last_call, SCHEDULER_POLL_S)
+        last_call = time.monotonic()
+        silence_s = 0.0 if n_answers > n_seen else silence_s + elapsed
+        without_workers_s = 0.0 if n_workers or not n_answers else without_workers_s + elapsed
+        n_seen = n_answers
+        if silence_s > limit:
+            raise StoreError(f"{scheduler_name}: the scheduler has not answered for {limit:g} s")
+        if scheduler_name == LOCAL and without_workers_s > NO_WORKERS_LIMIT_S:
+            raise StoreError(f"{scheduler_name}: all workers are gone")
+        return 0 if silence_s > SILENCE_LIMIT_S else min(BLOCKS_IN_FLIGHT * n_workers, MAX_BLOCKS_IN_FLIGHT)
 
-    return of_now
+    return current_capacity
 
 
-class _Tasks(Executor):
-    """An executor of dask whose futures can be cancelled without an answer of the scheduler."""
+class _CancellableExecutor(Executor):
+    """Wraps an executor of dask so that futures can be cancelled without an answer of the scheduler."""
 
-    def __init__(self, tasks: Executor) -> None:
-        self._tasks = tasks
+    def __init__(self, dask_executor: Executor) -> None:
+        self._dask_executor = dask_executor
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         future: Future[Any] = Future()
 
-        def hand_on(done: Future[Any]) -> None:
+        def copy_outcome(dask_future: Future[Any]) -> None:
             with contextlib.suppress(InvalidStateError):
-                if done.cancelled():
+                if dask_future.cancelled():
                     future.cancel()
                     future.set_running_or_notify_cancel()
-                elif error := done.exception():
+                elif error := dask_future.exception():
                     future.set_exception(error)
                 else:
-                    future.set_result(done.result())
+                    future.set_result(dask_future.result())
 
-        self._tasks.submit(fn, *args, **kwargs).add_done_callback(hand_on)
+        self._dask_executor.submit(fn, *args, **kwargs).add_done_callback(copy_outcome)
         return future
 
 
 @contextlib.contextmanager
-def _executor(client: Client, shown: str) -> Iterator[Executor]:
+def _open_executor(client: Client, scheduler_name: str) -> Iterator[Executor]:
     from distributed import KilledWorker
     from distributed.client import ClosedClientError
 
-    tasks = client.get_executor(pure=False)
+    dask_executor = client.get_executor(pure=False)
     try:
-        yield _Tasks(tasks)
+        yield _CancellableExecutor(dask_executor)
     except KilledWorker as error:
-        # all that was given out is given out again
+        # all unfinished blocks are submitted again
         with contextlib.suppress(TimeoutError):
-            _within(CLOSE_TIMEOUT_S, partial(tasks.shutdown, wait=False))
+            _run_with_timeout(CLOSE_TIMEOUT_S, partial(dask_executor.shutdown, wait=False))
         raise BrokenExecutor from error
     except (CancelledError, ClosedClientError, OSError) as error:
-        raise StoreError(f"{shown}: the scheduler is gone") from error
+        raise StoreError(f"{scheduler_name}: the scheduler is gone") from error
     except ImpactError:
         raise
     except Exception:
-        # one that joined with another version may not even understand what it is sent
-        _within(_timeout(), partial(_check_versions, client))
+        # a worker that joined with another version may fail to deserialize a block
+        _run_with_timeout(_answer_timeout(), partial(_check_versions, client))
         raise

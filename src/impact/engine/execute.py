@@ -1,7 +1,7 @@
-"""Run a plan: a generator of finished ranges of trajectories, from which progress and storage follow.
+"""Run a plan: a generator of finished ranges of trajectories, which callers store and count.
 
-A range is integrated here or anywhere else, from numbers, names and source alone, and no more is loaded there than
-it needs.
+A range is integrated in this process or in a worker. A worker receives only numbers, names and the source of
+plug-ins, and imports no more than it needs.
 """
 
 from __future__ import annotations
@@ -32,31 +32,31 @@ from .executors import SERIAL, Backend
 from .plan import Plan
 from .trajectories import Columns, TrajectoryMap, TrajectoryRange, columns_of
 
-# trajectories of compiled forms from which on numba is faster, though it has to be loaded
+# trajectories of compiled force laws above which numba is faster, including the time to load it
 NUMBA_MIN_TRAJECTORIES = 200_000
-# how often a range is submitted again whose process was killed
+# how often a range whose process was killed is submitted again
 MAX_RETRIES = 3
-# seconds after which it is looked again whether to stop, and whether there is room
+# seconds between two checks of `should_stop` and of the capacity of the backend
 POLL_INTERVAL_S = 0.2
 
-# what a range comes to, and a line for each distinct error that the law raised
+# the results of a range, and a line for each distinct error that the law raised
 Integrated = tuple[CollisionResult, dict[str, str]]
-# which trajectories of a range are known already, and what they come to; None where none is
+# a mask of the trajectories of a range that are reused from another result, and their results; None for no reuse
 ReusedPart = tuple[NDArray[np.bool_], CollisionResult] | None
 FindReused = Callable[[TrajectoryRange], ReusedPart]
-# what is being integrated
+# the ranges that are being integrated
 Running = dict[Future[Integrated], tuple[TrajectoryRange, ReusedPart]]
 
 
 @dataclass(frozen=True)
 class WorkerContext:
-    """What a range is integrated with where nothing of its sweep is known: numbers, names and source.
+    """What a worker needs to integrate ranges of a sweep.
 
     Parameters
     ----------
     version : of this package
-    solver : how
-    sources : name and content of the Python files that plug-in models are in
+    solver : settings of the solver
+    sources : name and content of the Python files of plug-in models
     hashes : key and SHA-256 of the models that are not built in
     """
 
@@ -67,56 +67,56 @@ class WorkerContext:
 
 
 def integrate_columns(model: ForceModel, columns: Columns, solver: Solver) -> Integrated:
-    """Integrate some trajectories of a model; see `impact.engine.trajectories.columns_of`."""
+    """Integrate trajectories of a model; see `impact.engine.trajectories.columns_of`."""
     errors: dict[str, str] = {}
     values = {name: column for name, column in columns.items() if name not in ("n", "status")}
-    rebound = simulate(
+    collisions = simulate(
         model, columns["n"], values, columns["status"],
         rtol=solver.rtol, max_steps=solver.max_steps, collapse=solver.collapse, core=solver.core, errors=errors,
     )  # fmt: skip
-    return rebound, errors
+    return collisions, errors
 
 
 def integrate_remotely(key: str, columns: Columns, context: WorkerContext) -> Integrated:
-    """Integrate some trajectories of the model of a key; a pure function, which may run anywhere, and twice.
+    """Integrate trajectories of the model of a key: a pure function, which may run in any process, and repeatedly.
 
     Raises
     ------
-    UsageError : this place has another version, no numba where that is wanted, or not the same models
+    UsageError : this process has another version or other models, or lacks numba where `context` requires it
     """
-    return integrate_columns(_models(context)[key], columns, context.solver)
+    return integrate_columns(_models_of_context(context)[key], columns, context.solver)
 
 
-# the models of the sweeps of which this place was sent something last
 @lru_cache(maxsize=4)
-def _models(context: WorkerContext) -> Mapping[str, ForceModel]:
-    here = socket.gethostname()
+def _models_of_context(context: WorkerContext) -> Mapping[str, ForceModel]:
+    """All models of a sweep by key, cached for the most recent sweeps."""
+    host = socket.gethostname()
     if context.version != __version__:
-        raise UsageError(other_version(here, __version__, context.version))
+        raise UsageError(other_version(host, __version__, context.version))
     if context.solver.core == "numba" and not is_installed():
         raise UsageError(
-            f'{here}: has no numba, which this sweep needs; install it there, or set solver.core = "numpy"'
+            f'{host}: has no numba, which this sweep needs; install it there, or set solver.core = "numpy"'
         )
     if not context.hashes:
         return catalogue()
-    from .plugins import Source, read_plugins
+    from .plugins import PythonFile, read_plugins
 
-    plugins = read_plugins([Source(*source) for source in context.sources])
-    lacking = [key for key, sha256 in context.hashes if plugins.hashes.get(key) != sha256]
-    if lacking:
+    plugins = read_plugins([PythonFile(*source) for source in context.sources])
+    missing_models = [key for key, sha256 in context.hashes if plugins.hashes.get(key) != sha256]
+    if missing_models:
         raise UsageError(
-            f"{here}: {safe_text(', '.join(lacking))}: expected the package that has it, in this version"
+            f"{host}: {safe_text(', '.join(missing_models))}: expected the package that has it, in this version"
         )
     return catalogue(plugins.models)
 
 
-def other_version(place: str, there: str, here: str) -> str:
-    """The message about a place that has another version."""
-    return f"{place}: has impact {safe_text(there)}, this is {here}; expected the same"
+def other_version(location: str, location_version: str, this_version: str) -> str:
+    """The message about a worker or scheduler that has another version."""
+    return f"{location}: has impact {safe_text(location_version)}, this is {this_version}; expected the same"
 
 
 def with_core(plan: Plan, maps: Sequence[TrajectoryMap]) -> Plan:
-    """The plan with `core = "auto"` replaced, by what there is to integrate.
+    """The plan with `core = "auto"` replaced by "numba" or "numpy", depending on the number of trajectories.
 
     >>> from impact.api import prepare
     >>> from impact.engine.trajectories import trajectory_maps
@@ -127,19 +127,19 @@ def with_core(plan: Plan, maps: Sequence[TrajectoryMap]) -> Plan:
     solver = plan.config.solver
     if solver.core != "auto":
         return plan
-    count = sum(own.count for own in maps if _is_compiled(plan, own))
+    count = sum(trajectory_map.count for trajectory_map in maps if _is_compiled(plan, trajectory_map))
     core = "numba" if is_installed() and count >= NUMBA_MIN_TRAJECTORIES else "numpy"
     return replace(plan, config=replace(plan.config, solver=replace(solver, core=core)))
 
 
-def _is_compiled(plan: Plan, own: TrajectoryMap) -> bool:
-    """Whether a compiled core integrates some phase of a model, at all of its exponents."""
-    model = plan.models[own.model]
+def _is_compiled(plan: Plan, trajectory_map: TrajectoryMap) -> bool:
+    """Whether the compiled core integrates a phase of a model, for all of its exponents."""
+    model = plan.models[trajectory_map.model]
     return all(any(serves(model, n)) for n in exponents(plan.inputs, model))
 
 
 def never_stop() -> bool:
-    """Do not stop."""
+    """The default of `should_stop`."""
     return False
 
 
@@ -150,141 +150,147 @@ def integrate_ranges(
     *,
     backend: Backend = SERIAL,
     should_stop: Callable[[], bool] = never_stop,
-    known: FindReused = lambda part: None,
+    find_reused: FindReused = lambda trajectory_range: None,
 ) -> Iterator[tuple[TrajectoryRange, CollisionResult]]:
-    """Integrate range after range; alone in order, with others as they finish.
+    """Integrate ranges of trajectories, and yield each when it is finished: in order in this process alone.
 
     Parameters
     ----------
-    plan : what to run
+    plan : the plan
     maps : its trajectories
-    todo : the ranges of them to be integrated
-    backend : who integrates
-    should_stop : whether no more are to be begun; those that were are finished
-    known : what is known already, and is not integrated again
+    todo : the ranges to integrate
+    backend : what integrates them
+    should_stop : when it returns True, no further range is started; ranges already started are finished
+    find_reused : returns the trajectories of a range that are not integrated, with their results
 
     Raises
     ------
-    UsageError : a model was given as a Python value, which cannot be sent; or those who integrate lack something
-    StoreError : they were killed again and again, cannot be reached any more, or return something else
+    UsageError : a model is a Python value, which cannot be sent to a worker; or a worker cannot run the sweep
+    StoreError : workers were killed repeatedly, cannot be reached any more, or return invalid results
 
     Warns
     -----
     UserWarning : a law raised an error; once for each law and distinct error
     """
-    submit = _submitter(plan, backend)
-    left, trials = deque(todo), Counter[int]()
+    submit = _build_submit(plan, backend)
+    remaining, attempts = deque(todo), Counter[int]()
     reported: set[str] = set()
     while True:
         running: Running = {}
         try:
             with backend.executor() as executor:
 
-                def start(part: TrajectoryRange, before: ReusedPart) -> Future[Integrated]:
-                    # no more is held of a range than what it is made of
-                    columns = columns_of(plan, maps, part)
-                    if before is not None:
-                        columns = {name: values[~before[0]] for name, values in columns.items()}
-                    return submit(executor, plan.models[part.model].key, columns)
+                def start(trajectory_range: TrajectoryRange, reused: ReusedPart) -> Future[Integrated]:
+                    # the arguments are built here, so that waiting ranges take no memory
+                    columns = columns_of(plan, maps, trajectory_range)
+                    if reused is not None:
+                        columns = {name: values[~reused[0]] for name, values in columns.items()}
+                    return submit(executor, plan.models[trajectory_range.model].key, columns)
 
-                for part, (rebound, errors) in _finished(
-                    start, left, running, known, backend.capacity, should_stop
+                for trajectory_range, (collisions, errors) in _submit_and_collect(
+                    start, remaining, running, find_reused, backend.capacity, should_stop
                 ):
                     for error in errors.keys() - reported:
                         warnings.warn(errors[error], stacklevel=2)
                     reported |= errors.keys()
-                    yield part, rebound
+                    yield trajectory_range, collisions
                 return
         except BrokenExecutor:
-            # which of the ranges it did not live through cannot be known
-            begun = [part for part, _ in running.values()]
-            left.extendleft(begun)
-            trials.update(part.number for part in begun or left)
-            if max(trials.values()) > MAX_RETRIES:
+            # it is unknown which of the running ranges killed the worker
+            interrupted = [trajectory_range for trajectory_range, _ in running.values()]
+            remaining.extendleft(interrupted)
+            attempts.update(trajectory_range.number for trajectory_range in interrupted or remaining)
+            if max(attempts.values()) > MAX_RETRIES:
                 raise StoreError(
                     f"processes were killed {MAX_RETRIES + 1} times at the same trajectories: memory is short; "
                     'or, of a program of your own, it lacks its if __name__ == "__main__":'
                 ) from None
 
 
-def _finished(
+def _submit_and_collect(
     start: Callable[[TrajectoryRange, ReusedPart], Future[Integrated]],
-    left: deque[TrajectoryRange],
+    remaining: deque[TrajectoryRange],
     running: Running,
-    known: FindReused,
+    find_reused: FindReused,
     capacity: Callable[[], int],
     should_stop: Callable[[], bool],
 ) -> Iterator[tuple[TrajectoryRange, Integrated]]:
-    """Submit what is left, as many ranges at a time as there is room for, and take them as they finish."""
+    """Submit the remaining ranges, as many at a time as the backend takes, and yield each when it is finished."""
     try:
-        while left or running:
-            # asked in every round, also where nothing is left to submit: it raises if nobody answers any more
-            most = capacity()
-            while left and len(running) < most and not should_stop():
-                part, before = left[0], known(left[0])
-                if before is not None and before[0].all():
-                    left.popleft()
-                    yield part, (before[1], {})
+        while remaining or running:
+            # called in every round, even if no range remains: it raises if the workers cannot be reached any more
+            limit = capacity()
+            while remaining and len(running) < limit and not should_stop():
+                trajectory_range, reused = remaining[0], find_reused(remaining[0])
+                if reused is not None and reused[0].all():
+                    remaining.popleft()
+                    yield trajectory_range, (reused[1], {})
                     continue
-                running[start(part, before)] = part, before
-                left.popleft()
-            # what was begun is finished, unless there is nobody left to do it
-            if should_stop() and not (running and most):
+                running[start(trajectory_range, reused)] = trajectory_range, reused
+                remaining.popleft()
+            # ranges already started are finished, unless no worker is left
+            if should_stop() and not (running and limit):
                 return
             if not running:
-                # nobody is there yet
-                time.sleep(POLL_INTERVAL_S if left else 0.0)
+                # no worker has joined yet
+                time.sleep(POLL_INTERVAL_S if remaining else 0.0)
             for future in wait(running, POLL_INTERVAL_S, FIRST_COMPLETED).done:
-                (part, before), done = running[future], future.result()
-                _check(part, done, part.size if before is None else int(np.count_nonzero(~before[0])))
+                (trajectory_range, reused), integrated = running[future], future.result()
+                size = trajectory_range.size if reused is None else int(np.count_nonzero(~reused[0]))
+                _check_integrated(trajectory_range, integrated, size)
                 del running[future]
-                yield part, done if before is None else (_merged(before, done[0]), done[1])
+                collisions, errors = integrated
+                if reused is not None:
+                    collisions = _merge_reused(reused, collisions)
+                yield trajectory_range, (collisions, errors)
     finally:
         for future in running:
             future.cancel()
 
 
-def _merged(known: tuple[NDArray[np.bool_], CollisionResult], integrated: CollisionResult) -> CollisionResult:
-    """A range of which some trajectories were known."""
-    is_known, before = known
-    whole = before.take(slice(None))
-    whole = CollisionResult(**{name: values.copy() for name, values in vars(whole).items()})
-    whole.put(~is_known, integrated)
-    return whole
+def _merge_reused(
+    reused: tuple[NDArray[np.bool_], CollisionResult], integrated: CollisionResult
+) -> CollisionResult:
+    """The results of a range of which some trajectories are reused."""
+    is_reused, reused_values = reused
+    collisions = reused_values.take(slice(None))
+    collisions = CollisionResult(**{name: values.copy() for name, values in vars(collisions).items()})
+    collisions.put(~is_reused, integrated)
+    return collisions
 
 
-def _check(part: TrajectoryRange, done: object, size: int) -> None:
-    """Refuse what cannot be what so many trajectories came to: an executor may return anything.
+def _check_integrated(trajectory_range: TrajectoryRange, integrated: object, size: int) -> None:
+    """Refuse a return value of an executor that cannot be the results of `size` trajectories.
 
     Raises
     ------
-    StoreError : it has another type, or its arrays another shape or dtype, or hold an unknown status
+    StoreError : it has another type, or its arrays have another shape or dtype, or contain an unknown status
     """
-    where = f"executor: range {part.number}"
-    rebound, errors = done if isinstance(done, tuple) and len(done) == 2 else (done, {})
-    if not isinstance(rebound, CollisionResult):
-        raise StoreError(f"{where}: got {safe_text(type(rebound).__name__)}, expected CollisionResult")
+    where = f"executor: range {trajectory_range.number}"
+    collisions, errors = integrated if isinstance(integrated, tuple) and len(integrated) == 2 else (integrated, {})
+    if not isinstance(collisions, CollisionResult):
+        raise StoreError(f"{where}: got {safe_text(type(collisions).__name__)}, expected CollisionResult")
     if not isinstance(errors, dict):
         raise StoreError(f"{where}: got {safe_text(type(errors).__name__)}, expected a dict of errors")
     blank = CollisionResult.blank(size)
     for name in TABLE_COLUMNS:
-        got, expected = (_form(getattr(result, name)) for result in (rebound, blank))
+        got, expected = (_dtype_and_shape(getattr(result, name)) for result in (collisions, blank))
         if got != expected:
             raise StoreError(f"{where}: {name}: got {got}, expected {expected}")
-    unknown = np.setdiff1d(rebound.status, STATUSES)
+    unknown = np.setdiff1d(collisions.status, STATUSES)
     if unknown.size:
         raise StoreError(f"{where}: status: got {unknown[0]}, expected one of {list(STATUSES)}")
 
 
-def _form(array: object) -> str:
+def _dtype_and_shape(array: object) -> str:
     """The dtype and shape of an array."""
     if not isinstance(array, np.ndarray):
         return safe_text(type(array).__name__)
     return f"{array.dtype} of shape {array.shape}"
 
 
-def _submitter(plan: Plan, backend: Backend) -> Callable[..., Future[Integrated]]:
-    """What submits the trajectories of a plan to an executor of a team."""
+def _build_submit(plan: Plan, backend: Backend) -> Callable[..., Future[Integrated]]:
+    """A function that submits trajectories of a plan to an executor of a backend."""
     if backend.shares_memory:
         models = {model.key: model for model in plan.models}
 
@@ -303,7 +309,7 @@ def _submitter(plan: Plan, backend: Backend) -> Callable[..., Future[Integrated]
 
 
 def context_of(plan: Plan) -> WorkerContext:
-    """What the trajectories of a plan are integrated with elsewhere."""
+    """What workers need to integrate trajectories of a plan."""
     plugins = plan.plugins
     return WorkerContext(
         __version__,

@@ -1,4 +1,4 @@
-"""Teams: who integrates the blocks of a sweep. All of them take it as an executor of concurrent.futures does."""
+"""Backends that integrate the blocks of a sweep: each provides an executor of concurrent.futures."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from typing import Any
 
 from ..errors import UsageError
 
-# blocks that a worker has before it: the one it works at, and those it goes on with while the driver is busy
+# blocks submitted for each worker: the one being integrated, and those that follow while the driver is busy
 BLOCKS_IN_FLIGHT = 3
-# blocks that are given to an executor of which nothing else is known
-SOME = 64
+# blocks submitted at a time to an executor with an unknown number of workers
+EXECUTOR_BLOCKS = 64
 
 
 @dataclass(frozen=True)
 class Backend:
-    """Who integrates.
+    """What integrates the blocks of a sweep.
 
     Parameters
     ----------
-    executor : makes the executor, and again where it was broken (`concurrent.futures.BrokenExecutor`)
-    capacity : how many blocks may be given to it before one is finished, at the moment; none if nobody is there
-    shares_memory : whether it shares our memory; to others numbers, names and source are sent
+    executor : creates the executor; called again after `concurrent.futures.BrokenExecutor`
+    capacity : returns how many unfinished blocks the executor may have at the moment; 0 without workers
+    shares_memory : whether it runs in this process; otherwise blocks are sent as numbers, names and source
     """
 
     executor: Callable[[], AbstractContextManager[Executor]]
@@ -38,8 +38,8 @@ class Backend:
     shares_memory: bool = False
 
 
-class _AtOnce(Executor):
-    """An executor that does what it is given before it returns."""
+class _SerialExecutor(Executor):
+    """An executor that runs a function during `submit`."""
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         future: Future[Any] = Future()
@@ -50,43 +50,44 @@ class _AtOnce(Executor):
         return future
 
 
-SERIAL = Backend(_AtOnce, lambda: 1, shares_memory=True)
+SERIAL = Backend(_SerialExecutor, lambda: 1, shares_memory=True)
 
 
 def choose_backend(jobs: int = 1, threads: int = 1, executor: Executor | None = None) -> Backend:
-    """The team of some processes, of some threads, or of an executor of any kind.
+    """The backend for a number of processes, a number of threads, or an executor of any kind.
 
     Raises
     ------
-    UsageError : it is asked for more than one of the three
+    UsageError : more than one of the three is set
     """
-    asked = {f"jobs = {jobs}": jobs > 1, f"threads = {threads}": threads > 1, "an executor": executor is not None}
-    several = [name for name, wanted in asked.items() if wanted]
-    if len(several) > 1:
-        raise UsageError(f"got {' and '.join(several)}, wants one of them")
+    is_set = {f"jobs = {jobs}": jobs > 1, f"threads = {threads}": threads > 1, "an executor": executor is not None}
+    arguments = [argument for argument, is_requested in is_set.items() if is_requested]
+    if len(arguments) > 1:
+        raise UsageError(f"got {' and '.join(arguments)}, expected one of them")
     if executor is not None:
-        return Backend(lambda: nullcontext(executor), lambda: SOME, isinstance(executor, ThreadPoolExecutor))
+        shares_memory = isinstance(executor, ThreadPoolExecutor)
+        return Backend(lambda: nullcontext(executor), lambda: EXECUTOR_BLOCKS, shares_memory)
     if threads > 1:
         return Backend(lambda: ThreadPoolExecutor(threads), lambda: BLOCKS_IN_FLIGHT * threads, shares_memory=True)
-    return Backend(lambda: _processes(jobs), lambda: BLOCKS_IN_FLIGHT * jobs) if jobs > 1 else SERIAL
+    return Backend(lambda: _process_pool(jobs), lambda: BLOCKS_IN_FLIGHT * jobs) if jobs > 1 else SERIAL
 
 
-class _Processes(ProcessPoolExecutor):
-    """Processes that get no SIGINT, which a terminal sends to all: it is the driver's, later."""
+class _ProcessPool(ProcessPoolExecutor):
+    """Processes that receive no SIGINT, which a terminal sends to all: only the driver handles it."""
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        # it may begin a process
-        with _interrupts_held():
+        # submit may start a process
+        with _interrupts_blocked():
             return super().submit(fn, *args, **kwargs)
 
 
 @contextlib.contextmanager
-def _processes(jobs: int) -> Iterator[Executor]:
-    pool = _Processes(jobs, multiprocessing.get_context("spawn"), _begin)
+def _process_pool(jobs: int) -> Iterator[Executor]:
+    pool = _ProcessPool(jobs, multiprocessing.get_context("spawn"), _initialize_worker)
     try:
         yield pool
     except BaseException as error:
-        # a force that never returns would be waited for
+        # shutdown would wait for a force law that never returns
         if not isinstance(error, Exception | GeneratorExit):
             for process in list(getattr(pool, "_processes", None) or {}):
                 os.kill(process, signal.SIGKILL)
@@ -96,26 +97,26 @@ def _processes(jobs: int) -> Iterator[Executor]:
 
 
 @contextlib.contextmanager
-def _interrupts_held() -> Iterator[None]:
-    """Hold back SIGINT: what begins here never gets it, we do later."""
+def _interrupts_blocked() -> Iterator[None]:
+    """Block SIGINT: processes started meanwhile inherit the block; this process receives the signal afterwards."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    previous_mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, previous_mask)
 
 
-def _begin() -> None:
-    """What a process does first: leave signals to the driver, and end when that does."""
+def _initialize_worker() -> None:
+    """Initialize a worker process: it ignores SIGINT, and ends when the driver ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     driver = multiprocessing.parent_process()
     if driver is not None:
 
-        def follow() -> None:
+        def exit_with_driver() -> None:
             multiprocessing.connection.wait([driver.sentinel])
             os._exit(1)
 
-        threading.Thread(target=follow, daemon=True).start()
+        threading.Thread(target=exit_with_driver, daemon=True).start()

@@ -1,4 +1,4 @@
-"""A plan: which impacts a config asks for, by index arithmetic on the axes of its grid."""
+"""A plan: the impacts of a config, by index arithmetic on the axes of its grid."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from ..contact.materials import Material
 from ..contact.model import ForceModel
 from .plugins import Plugins
 
-# values of a variable up to which a result is stored in full where nothing else is said; and where some of them
-# only repeat others, along the axes of other laws
+# values of a variable up to which layout "auto" stores a result in full; the smaller limit holds where values
+# repeat along the axes of other laws
 MAX_FULL_POINTS, MAX_FULL_REPEATED = 10**7, 10**6
 
-# the places along each axis of some cells of the grid, in arrays that broadcast against each other
+# the indices of cells along each axis of the grid, in arrays that broadcast against each other
 Index = tuple[NDArray[np.intp], ...]
 
 
 def dimensions(index: Index) -> int:
-    """How many axes the arrays of an index have; those of a plan without axes have one."""
+    """Number of dimensions of the arrays of an index; one for a plan without axes."""
     return index[0].ndim if index else 1
 
 
 def owner_of(name: str) -> str:
-    """The key of the model that a config name is a parameter of; empty for one that all models share.
+    """The key of the model whose parameter a config name is; empty for an input that all models share.
 
     >>> owner_of("bilinear.K"), owner_of("v1"), owner_of("materials.steel.E")
     ('bilinear', '', '')
@@ -42,7 +42,7 @@ def owner_of(name: str) -> str:
 
 
 def material_property(name: str) -> tuple[str, str] | None:
-    """The material and the property that a config name is of, if it is.
+    """The material and the property of a config name, or None if it is not a property of a material.
 
     >>> material_property("materials.steel.E"), material_property("bilinear.K")
     (('steel', 'E'), None)
@@ -54,7 +54,7 @@ def material_property(name: str) -> tuple[str, str] | None:
 
 
 def is_foreign(names: Iterable[str], model: str) -> bool:
-    """Whether columns that vary together are parameters of other models only, so that nothing of this one varies.
+    """Whether columns that vary together are parameters of other models only, and do not affect this model.
 
     >>> is_foreign(["bilinear.K"], "hertz"), is_foreign(["bilinear.K", "m1"], "hertz")
     (True, False)
@@ -64,7 +64,7 @@ def is_foreign(names: Iterable[str], model: str) -> bool:
 
 
 def is_own(names: Iterable[str], model: str) -> bool:
-    """Whether columns that vary together are parameters of this model, and none that all share.
+    """Whether columns that vary together are parameters of this model, and none is an input of all models.
 
     >>> is_own(["bilinear.K"], "bilinear"), is_own(["bilinear.K", "m1"], "bilinear")
     (True, False)
@@ -75,7 +75,7 @@ def is_own(names: Iterable[str], model: str) -> bool:
 
 @dataclass(frozen=True)
 class Inputs:
-    """What a sweep gives a value to: scalars, and the axes of its grid.
+    """The inputs of a sweep: scalars, and the axes of its grid.
 
     Parameters
     ----------
@@ -95,55 +95,55 @@ class Inputs:
 
     @property
     def cells(self) -> int:
-        """Cells of the grid; those of a model that differ by parameters of other models only are one point."""
+        """Number of cells of the grid; cells that differ only in parameters of other models are one point."""
         return math.prod(self.shape)
 
     def axes_of_model(self, key: str) -> tuple[int, ...]:
         """The axes along which the points of a model lie: all but those of other models' parameters."""
-        return tuple(place for place, axis in enumerate(self.axes) if not is_foreign(axis.columns, key))
+        return tuple(number for number, axis in enumerate(self.axes) if not is_foreign(axis.columns, key))
 
     def points_of(self, key: str) -> int:
-        """How many points a model has."""
+        """Number of points of a model."""
         return math.prod(self.shape[axis] for axis in self.axes_of_model(key))
 
     def names(self) -> tuple[str, ...]:
-        """All names that have a value, those of axes first."""
+        """All config names that have a value, those of axes first."""
         return (*(name for axis in self.axes for name in axis.columns), *self.scalars)
 
     def axes_of(self, name: str) -> tuple[int, ...]:
         """The axes along which a name varies: none for a scalar."""
-        return tuple(place for place, axis in enumerate(self.axes) if name in axis.columns)
+        return tuple(number for number, axis in enumerate(self.axes) if name in axis.columns)
 
     def column(self, name: str, index: Index) -> NDArray[np.generic]:
-        """The values of a name at some cells; of length one along the axes on which it does not vary."""
+        """The values of a name at cells; the array has length 1 along the axes on which the name does not vary."""
         if name in self.scalars:
             return np.full((1,) * dimensions(index), self.scalars[name])
-        (place,) = self.axes_of(name)
-        return self._columns[name][index[place]]
+        (number,) = self.axes_of(name)
+        return self._arrays[name][index[number]]
 
     def values(self, name: str) -> NDArray[np.generic]:
-        """All values of a name: along its axis, or one; None of a name without a value."""
-        if name in self._columns:
-            return self._columns[name]
+        """All values of a name: those of its axis, or a single value, which is None for a name without a value."""
+        if name in self._arrays:
+            return self._arrays[name]
         material, key = material_property(name) or ("", "")
-        fixed = getattr(self.materials[material], key) if material in self.materials else None
-        return np.asarray(self.scalars.get(name, fixed))
+        constant = getattr(self.materials[material], key) if material in self.materials else None
+        return np.asarray(self.scalars.get(name, constant))
 
     def materials_of(self, ball: str) -> frozenset[str]:
-        """The materials that a ball, "1" or "2", has somewhere."""
-        return self._materials[ball]
+        """The materials that a ball, "1" or "2", has in any cell."""
+        return self._ball_materials[ball]
 
-    def index(self, where: Sequence[slice] | None = None) -> Index:
+    def index(self, slices: Sequence[slice] | None = None) -> Index:
         """The places of a part of the grid, one array along each axis; by default of the whole grid."""
-        parts = [slice(None)] * len(self.axes) if where is None else where
-        return np.ix_(*(np.arange(size)[part] for size, part in zip(self.shape, parts, strict=True)))
+        slices = [slice(None)] * len(self.axes) if slices is None else slices
+        return np.ix_(*(np.arange(size)[cells] for size, cells in zip(self.shape, slices, strict=True)))
 
     @cached_property
-    def _columns(self) -> dict[str, NDArray[np.generic]]:
+    def _arrays(self) -> dict[str, NDArray[np.generic]]:
         return {name: np.asarray(values) for axis in self.axes for name, values in axis.columns.items()}
 
     @cached_property
-    def _materials(self) -> dict[str, frozenset[str]]:
+    def _ball_materials(self) -> dict[str, frozenset[str]]:
         names = {ball: ({"material", f"material{ball}"} & {*self.names()}) for ball in "12"}
         return {
             ball: frozenset(str(value) for name in of_ball for value in np.unique(self.values(name)))
@@ -153,7 +153,7 @@ class Inputs:
 
 @dataclass(frozen=True)
 class Plan:
-    """What is to be run: the inputs of a config, for every model.
+    """A config with the plug-ins that it uses.
 
     Parameters
     ----------
@@ -179,17 +179,17 @@ class Plan:
 
     @property
     def points(self) -> int:
-        """Of all models; one that does not have the parameters of an axis has no more points along it."""
+        """Points of all models; the axes of parameters of other models do not count."""
         return sum(self.inputs.points_of(model.key) for model in self.models)
 
     @property
     def stored_points(self) -> int:
-        """Values of a variable in the dataset, cells times models: along the axes of other laws they repeat."""
+        """Values of a variable in the dataset, cells times models; they repeat along the axes of other models."""
         return self.inputs.cells * len(self.models)
 
     @property
     def layout(self) -> Literal["full", "factored"]:
-        """How the result is stored: by default in full if that is not too much, or where chunks are asked for."""
+        """The layout of the result; "auto" is full up to a limit, or if the config sets chunks."""
         output = self.config.output
         if output.layout == "auto":
             most = MAX_FULL_POINTS if self.stored_points == self.points else MAX_FULL_REPEATED
@@ -198,13 +198,13 @@ class Plan:
 
     @cached_property
     def fingerprint(self) -> str:
-        """SHA-256 over what determines the result: equal fingerprints, equal contents."""
+        """SHA-256 over everything that determines the result: equal fingerprints mean equal contents."""
         output = asdict(self.config.output)
         return hashlib.sha256(json.dumps([self.physics, self.config.title, output]).encode()).hexdigest()
 
     @cached_property
     def physics(self) -> dict[str, object]:
-        """What determines the trajectories, as plain data."""
+        """Everything that determines the trajectories, as plain data."""
         config = self.config
         return {
             "version": __version__,
@@ -216,14 +216,14 @@ class Plan:
                 for axis in config.axes
             ],
             "materials": self.material_record,
-            # not whether impacts are collapsed, which changes nothing
+            # without `collapse`, which changes no value
             "solver": {"rtol": config.solver.rtol, "max_steps": config.solver.max_steps},
             "plugins": self.plugins.hashes,
         }
 
     @property
     def materials_used(self) -> dict[str, Material]:
-        """The materials that some ball has, by name; E and nu are NaN where they are axes, the others None."""
+        """The materials of the balls by name; properties that are axes are NaN for E and nu, otherwise None."""
         fixed: dict[str, dict[str, float]] = {}
         for name, value in self.config.scalars.items():
             material, key = material_property(name) or ("", "")
@@ -233,7 +233,7 @@ class Plan:
 
     @property
     def material_record(self) -> dict[str, dict[str, float | None]]:
-        """The properties of the materials that some ball has, as plain data: None of one that is an axis."""
+        """The properties of the materials of the balls, as plain data: None for one that is an axis."""
         return {
             name: {key: None if value != value else value for key, value in asdict(material).items()}
             for name, material in self.materials_used.items()

@@ -1,12 +1,12 @@
 """Models that are not built in: values from Python, Python files that a caller names, and installed packages.
 
-A package offers models by an entry point of the group `impact.models`, a model or a module of some:
+A package provides models by an entry point of the group `impact.models`, a model or a module that defines some:
 
     [project.entry-points."impact.models"]
     my-laws = "my_package.laws"
 
-Its models are in the catalogue wherever it is installed. Packages are imported whenever models that are not
-built in may be asked for, whatever a data file says: none is imported because one names it.
+Its models are in the catalogue wherever the package is installed. All such packages are imported when models that
+are not built in may be needed; no package is imported because a data file names it.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ from ..contact.models import catalogue
 from ..errors import NOT_OF_A_PLUGIN, ImpactError, ModelError, UsageError
 from ..text import safe_text
 
-GROUP = "impact.models"
-# characters of the message of a plug-in's error: one that lists what is known is long
-MAX_MESSAGE = 1000
-# attributes of a function that hold values which its file may not tell
+ENTRY_POINT_GROUP = "impact.models"
+# characters of the error message of a plug-in: a message that lists all known names is long
+MAX_ERROR_LENGTH = 1000
+# attributes of a function with values that its file does not determine
 HELD_BY_FUNCTIONS = ("__closure__", "__defaults__", "__kwdefaults__", "__self__")
 
 
-class Source(NamedTuple):
-    """A Python file that was read: its name, and the content that was executed, whatever it holds now."""
+class PythonFile(NamedTuple):
+    """A Python file: its name, and the content that was executed, even if the file has changed since."""
 
     name: str
     content: bytes
@@ -45,89 +45,92 @@ class Source(NamedTuple):
 
 @dataclass(frozen=True)
 class Plugin:
-    """A model that is not built in, where it is from, and what tells its versions.
+    """A model that is not built in, with its origin and a hash of its definition.
 
-    `source` is the Python file that was given, or `package` the name and version of an installed one; where both
-    are None, the model was given as a value. `sha256` is that of the file that defines the model, see `value_hash`
-    for a value; None where no file does.
+    Parameters
+    ----------
+    model : the model
+    sha256 : of the file that defines the model; see `value_hash` for a Python value; None if no file defines it
+    source : the Python file, if the model comes from one
+    package : name and version of the installed package, if the model comes from one
     """
 
     model: ForceModel
     sha256: str | None
-    source: Source | None = None
+    source: PythonFile | None = None
     package: str | None = None
 
     @property
     def is_value(self) -> bool:
-        """It can be sent to no other process, and no command can give it again."""
+        """Whether the model is a Python value, which cannot be sent to another process or named in a command."""
         return self.source is None and self.package is None
 
     @property
     def record(self) -> dict[str, str | None]:
-        """What a result says of it: the file's name without a folder, or the package."""
+        """The record in a result: the name of the file without its folder, or the package, and the hash."""
         file = None if self.source is None else Path(self.source.name).name
-        about = {"file": file, "sha256": self.sha256}
-        return about if self.package is None else {**about, "package": self.package}
+        record = {"file": file, "sha256": self.sha256}
+        return record if self.package is None else {**record, "package": self.package}
 
 
 @dataclass(frozen=True)
 class Plugins:
-    """The models that are not built in, in the order given."""
+    """The models that are not built in, in the order of the caller."""
 
     items: tuple[Plugin, ...] = ()
 
     @property
     def models(self) -> tuple[ForceModel, ...]:
-        return tuple(one.model for one in self.items)
+        return tuple(plugin.model for plugin in self.items)
 
     @property
-    def sources(self) -> tuple[Source, ...]:
-        """The files that were read for them."""
-        return tuple(dict.fromkeys(one.source for one in self.items if one.source is not None))
+    def sources(self) -> tuple[PythonFile, ...]:
+        """The Python files that define them."""
+        return tuple(dict.fromkeys(plugin.source for plugin in self.items if plugin.source is not None))
 
     @property
     def hashes(self) -> dict[str, str | None]:
-        """SHA-256 by key: what the fingerprint is over, which a file's name is not."""
-        return {one.model.key: one.sha256 for one in self.items}
+        """SHA-256 by key, which is part of the fingerprint; names of files are not."""
+        return {plugin.model.key: plugin.sha256 for plugin in self.items}
 
     @property
     def record(self) -> dict[str, dict[str, str | None]]:
-        """What a result says of them, by key."""
-        return {one.model.key: one.record for one in self.items}
+        """The records in a result, by key."""
+        return {plugin.model.key: plugin.record for plugin in self.items}
 
     def of(self, models: Sequence[ForceModel]) -> Plugins:
-        """Those among some models."""
+        """Those that are among `models`."""
         keys = {model.key for model in models}
-        return Plugins(tuple(one for one in self.items if one.model.key in keys))
+        return Plugins(tuple(plugin for plugin in self.items if plugin.model.key in keys))
 
 
-def read_plugins(sources: Sequence[ForceModel | str | Path | Source]) -> Plugins:
-    """The models of installed packages, and those given as values or in Python files.
+def read_plugins(sources: Sequence[ForceModel | str | Path | PythonFile]) -> Plugins:
+    """The models of installed packages, and those of `sources`.
 
-    The packages are imported and the files executed: give none that a data file names.
+    The packages are imported and the files executed: never pass files that a data file names.
 
     Parameters
     ----------
-    sources : models, and Python files by their paths or as they were read elsewhere; of a file, every `ForceModel`
-        at its top level is taken
+    sources : models, paths of Python files, or files that were read elsewhere; from a file, every `ForceModel` at
+        the top level is taken
 
     Raises
     ------
-    UsageError : a file is not there, cannot be read or is no Python file
-    ModelError : it, or a package, is not Python, fails, or holds no model, or one whose key is taken
+    UsageError : a file is missing, cannot be read or is not a Python file
+    ModelError : a file or package has a syntax error, raises an error, contains no model, or one with a key in use
 
     >>> law = ForceModel("mine", "Mine", 2026, "F = K δⁿ", "", force=lambda elastic: elastic)
     >>> read_plugins([law]).record["mine"]["file"] is None
     True
     """
     if isinstance(sources, str | Path | ForceModel):
-        raise UsageError(f"plugins: got {safe_text(repr(sources))}, expected a list of such")
+        raise UsageError(f"plugins: got {safe_text(repr(sources))}, expected a list of models and paths")
     origins = dict.fromkeys(catalogue(), "built in")
     plugins: list[Plugin] = []
-    named = [(str(plugin.package), plugin) for plugin in installed()]
-    for place, source in enumerate(sources):
-        named += _of_source(source, f"plugins[{place}]")
-    for origin, plugin in named:
+    named_plugins = [(str(plugin.package), plugin) for plugin in installed()]
+    for index, source in enumerate(sources):
+        named_plugins += _plugins_of_source(source, f"plugins[{index}]")
+    for origin, plugin in named_plugins:
         name, key = safe_text(origin), plugin.model.key
         _check_storable(plugin.model, name)
         if key in origins:
@@ -140,16 +143,17 @@ def read_plugins(sources: Sequence[ForceModel | str | Path | Source]) -> Plugins
     return Plugins(tuple(plugins))
 
 
-def _of_source(source: object, place: str) -> list[tuple[str, Plugin]]:
-    """The models of a source, each with the name that messages call it by."""
+def _plugins_of_source(source: object, argument: str) -> list[tuple[str, Plugin]]:
+    """The plug-ins of a source, each with the name of the source in messages."""
     match source:
         case ForceModel():
-            return [(place, Plugin(source, value_hash(source)))]
-        case Source():
-            return [(source.name, plugin) for plugin in _of_file(source)]
+            return [(argument, Plugin(source, value_hash(source)))]
+        case PythonFile():
+            return [(source.name, plugin) for plugin in _plugins_of_file(source)]
         case str() | Path():
-            return [(str(source), plugin) for plugin in _of_file(_read(Path(source)))]
-    raise UsageError(f"{place}: got {safe_text(repr(source))}, expected a ForceModel or the path of a Python file")
+            return [(str(source), plugin) for plugin in _plugins_of_file(_read_source(Path(source)))]
+    got = safe_text(repr(source))
+    raise UsageError(f"{argument}: got {got}, expected a ForceModel or the path of a Python file")
 
 
 @cache
@@ -158,42 +162,42 @@ def installed() -> tuple[Plugin, ...]:
 
     Raises
     ------
-    ModelError : a package cannot be imported, or what it names is no model; it has to be fixed or uninstalled
+    ModelError : a package cannot be imported, or its entry point is no model; it has to be fixed or uninstalled
     """
     plugins: dict[int, Plugin] = {}
-    for point in sorted(entry_points(group=GROUP), key=lambda point: (point.value, point.name)):
-        for plugin in _of_entry_point(point):
+    for point in sorted(entry_points(group=ENTRY_POINT_GROUP), key=lambda point: (point.value, point.name)):
+        for plugin in _plugins_of_entry_point(point):
             plugins.setdefault(id(plugin.model), plugin)
     return tuple(plugins.values())
 
 
-def _of_entry_point(point: EntryPoint) -> list[Plugin]:
+def _plugins_of_entry_point(point: EntryPoint) -> list[Plugin]:
     package = f"{point.dist.name} {point.dist.version}" if point.dist else "a package without a name"
-    where = safe_text(f"{package}: entry point {point.name} = {point.value}")
+    location = safe_text(f"{package}: entry point {point.name} = {point.value}")
     try:
         loaded = point.load()
     except NOT_OF_A_PLUGIN:
         raise
     except BaseException as error:
         message = safe_text(f"{type(error).__name__}: {error}", 300)
-        raise ModelError(f"{where}: {message}; expected a package that works, or none") from None
+        raise ModelError(f"{location}: {message}; expected a package that works, or none") from None
     models = _models_among(vars(loaded).values() if isinstance(loaded, ModuleType) else [loaded])
     if not models:
-        raise ModelError(f"{where}: no model in it, expected a ForceModel, or a module that holds some")
+        raise ModelError(f"{location}: no model in it, expected a ForceModel, or a module that holds some")
     file = getattr(sys.modules.get(point.module), "__file__", None)
     sha256 = hashlib.sha256(Path(file).read_bytes()).hexdigest() if file else None
     return [Plugin(model, sha256, package=package) for model in models]
 
 
 def _models_among(values: Iterable[object]) -> list[ForceModel]:
-    """The models among some values, each once; one that was imported, to make others from, is left out."""
+    """The models among some values, each once, without built-in models, which a file may import to modify."""
     built_in = {id(model) for model in catalogue().values()}
     models = {id(value): value for value in values if isinstance(value, ForceModel)}
     return [model for identity, model in models.items() if identity not in built_in]
 
 
 def _check_storable(model: ForceModel, name: str) -> None:
-    """Refuse what a result cannot hold now, not when all the work is done."""
+    """Refuse texts and years that a result cannot store, before the sweep is integrated."""
     texts = {field: getattr(model, field) for field in ("title", "equation", "reference", "doi")}
     texts |= {f"meaning of {parameter.name}": parameter.meaning for parameter in model.parameters}
     for field, text in texts.items():
@@ -206,41 +210,41 @@ def _check_storable(model: ForceModel, name: str) -> None:
         raise ModelError(f"{name}: model {model.key}: year: got {show(model.year)}, expected a year, such as 2026")
 
 
-def _of_file(source: Source) -> list[Plugin]:
-    """The models at the top level of a Python file, in their order."""
+def _plugins_of_file(source: PythonFile) -> list[Plugin]:
+    """The models at the top level of a Python file, in order of definition."""
     name = safe_text(source.name)
     sha256 = hashlib.sha256(source.content).hexdigest()
-    models = _models_among(vars(_executed(source, name, sha256)).values())
+    models = _models_among(vars(_execute_module(source, name, sha256)).values())
     if not models:
         raise ModelError(f"{name}: no model in it, expected a ForceModel at its top level")
     return [Plugin(model, sha256, source) for model in models]
 
 
-def _read(path: Path) -> Source:
-    """A file that may be Python."""
+def _read_source(path: Path) -> PythonFile:
+    """Read a Python file."""
     name = safe_text(str(path))
     if path.suffix != ".py":
         raise UsageError(f"{name}: its name does not end in .py, expected a Python file")
     try:
-        # what is not a regular file might never end
+        # reading something other than a regular file might never end
         if path.exists() and not path.is_file():
             raise UsageError(f"{name}: not a regular file, expected a Python file")
-        return Source(str(path), path.read_bytes())
+        return PythonFile(str(path), path.read_bytes())
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise UsageError(f"{name}: cannot be read: {safe_text(reason)}") from None
 
 
-def _executed(source: Source, name: str, sha256: str) -> ModuleType:
-    """The module that a source is, executed; exactly the bytes that were hashed, and no bytecode is kept of them.
+def _execute_module(source: PythonFile, name: str, sha256: str) -> ModuleType:
+    """Execute exactly the bytes that were hashed as a module, without storing bytecode.
 
-    Its folder is not searched for modules: a plug-in is one file, so that its hash is over all of it.
+    Its folder is not searched for modules: a plug-in is a single file, so that the hash covers all of it.
     """
     file = str(Path(source.name).absolute())
     try:
         code = compile(source.content, file, "exec", dont_inherit=True)
     except Exception as error:
-        # a SyntaxError, and what the compiler raises for NUL bytes and absurd nesting
+        # a SyntaxError, or other errors of the compiler for NUL bytes and very deep nesting
         line = getattr(error, "lineno", None) or 1
         text = safe_text((getattr(error, "text", None) or "").strip(), 60)
         message = error.msg if isinstance(error, SyntaxError) else f"{type(error).__name__}: {error}"
@@ -257,13 +261,13 @@ def _executed(source: Source, name: str, sha256: str) -> ModuleType:
         sys.modules.pop(module.__name__, None)
         frames = traceback.walk_tb(error.__traceback__)
         line = [number for frame, number in frames if frame.f_code.co_filename == file][-1]
-        raise ModelError(f"{name}:{line}: {_message(error)}") from None
+        raise ModelError(f"{name}:{line}: {_error_message(error)}") from None
     return module
 
 
-def _message(error: BaseException) -> str:
-    """What an error of a plug-in says."""
-    text = safe_text(str(error), MAX_MESSAGE)
+def _error_message(error: BaseException) -> str:
+    """The message of an error that a plug-in raised."""
+    text = safe_text(str(error), MAX_ERROR_LENGTH)
     if isinstance(error, ImpactError):
         return text
     kind = type(error).__name__ + (f": {text}" if text else "")
@@ -271,10 +275,10 @@ def _message(error: BaseException) -> str:
 
 
 def value_hash(model: ForceModel) -> str | None:
-    """SHA-256 over the file that defines a model's formulas, where in it they stand, and the model's other fields.
+    """SHA-256 over the files that define a model's formulas, their positions there, and the other fields.
 
-    None where that does not tell the model from another: a formula was typed into a session, takes values from
-    where it was made (a closure, defaults, a callable object), or its file cannot be read.
+    None where these do not identify the model: a formula was typed into a session, uses values from its
+    surroundings (a closure, defaults, a callable object), or its file cannot be read.
 
     >>> session = {}
     >>> exec("formula = lambda elastic: elastic", session)
@@ -289,12 +293,12 @@ def value_hash(model: ForceModel) -> str | None:
             digest.update(f"{name} = {value!r}\n".encode())
         for formula in formulas:
             code = getattr(formula, "__code__", None)
-            if code is None or any(getattr(formula, held, None) for held in HELD_BY_FUNCTIONS):
+            if code is None or any(getattr(formula, attribute, None) for attribute in HELD_BY_FUNCTIONS):
                 return None
             module = str(formula.__module__)
             digest.update(f"{name}: {module}.{code.co_qualname}\n".encode())
             if module.startswith("impact."):
-                # the version of this program is recorded beside it
+                # the version of this package is recorded beside the hash
                 continue
             digest.update(repr([*code.co_positions()]).encode())
             try:

@@ -1,4 +1,4 @@
-"""How far a sweep is, and what is said of it where it ends before it is whole."""
+"""Progress of a sweep, and the message about its finished blocks if it ends early."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .trajectories import TrajectoryRange
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a sweep is: trajectories integrated, and points stored, of all; and how many of either failed."""
+    """Progress of a sweep: integrated trajectories and stored points, their totals, and the number that failed."""
 
     trajectories: int
     of_trajectories: int
@@ -32,47 +32,51 @@ ProgressCallback = Callable[[Progress], None]
 
 @dataclass
 class ProgressCounter:
-    """Counts what is finished, and tells it."""
+    """Counts finished trajectories, and passes the progress to a callback."""
 
-    at: Progress
+    progress: Progress
     on_progress: ProgressCallback
 
     @classmethod
-    def begin(cls, trajectories: int, points: int, on_progress: ProgressCallback) -> ProgressCounter:
+    def start(cls, trajectories: int, points: int, on_progress: ProgressCallback) -> ProgressCounter:
         return cls(Progress(0, trajectories, 0, points, 0), on_progress)
 
     @property
     def is_full(self) -> bool:
         """Whether all trajectories are integrated."""
-        return self.at.trajectories == self.at.of_trajectories
+        return self.progress.trajectories == self.progress.of_trajectories
 
-    def count(self, part: TrajectoryRange, rebound: CollisionResult) -> None:
-        """One more block is finished."""
-        failed = int(np.count_nonzero(rebound.status >= FIRST_FAILURE))
-        self.at = replace(self.at, trajectories=self.at.trajectories + part.size, failed=self.at.failed + failed)
+    def count(self, part: TrajectoryRange, collisions: CollisionResult) -> None:
+        """Add a finished block."""
+        failed = int(np.count_nonzero(collisions.status >= FIRST_FAILURE))
+        self.progress = replace(
+            self.progress,
+            trajectories=self.progress.trajectories + part.size,
+            failed=self.progress.failed + failed,
+        )
 
     def report(self) -> None:
-        self.on_progress(self.at)
+        self.on_progress(self.progress)
 
 
 @contextmanager
 def report_kept_blocks(
-    folder: Path, counter: ProgressCounter, again: str, more: Callable[[Exception], list[str]]
+    folder: Path, counter: ProgressCounter, command: str, details: Callable[[Exception], list[str]]
 ) -> Iterator[None]:
-    """Have an error say what is kept nevertheless.
+    """Add to the message of an error how many finished trajectories the work folder contains.
 
     Parameters
     ----------
-    folder : where
-    counter : how much
-    again : what goes on with it
-    more : what else there is to say of an error
+    folder : the work folder
+    counter : counts the finished trajectories
+    command : option or command that continues the sweep
+    details : returns further sentences about an error
     """
     try:
         yield
     except (StoreError, UnfinishedError, UsageError, MemoryError) as error:
-        of = f"{counter.at.trajectories:,} of {counter.at.of_trajectories:,} trajectories"
-        left = f"{of} are kept in {safe_text(str(folder))}; {again} goes on"
+        share = f"{counter.progress.trajectories:,} of {counter.progress.of_trajectories:,} trajectories"
+        kept_blocks = f"{share} are kept in {safe_text(str(folder))}; {command} continues"
         is_memory = isinstance(error, MemoryError)
-        lines = ["out of memory" if is_memory else "", str(error), *more(error), left]
+        lines = ["out of memory" if is_memory else "", str(error), *details(error), kept_blocks]
         raise (StoreError if is_memory else type(error))("; ".join(filter(None, lines))) from error

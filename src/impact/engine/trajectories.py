@@ -1,7 +1,7 @@
-"""The trajectories of a plan: which points are the same physics, and what is to be integrated once for them.
+"""The distinct trajectories of a plan: points with the same dimensionless problem share one trajectory.
 
-A law's values come from some of the axes only. Over the product of those, the cells, they are evaluated; where
-the cells are not too many, equal values are found over the whole plan.
+The values of a law depend only on some of the axes. They are evaluated on the cells, the product of those axes; up
+to MAX_CELLS cells, equal values are found in the whole plan.
 """
 
 from __future__ import annotations
@@ -23,27 +23,27 @@ from ..text import safe_text
 from .build_impacts import build_impacts
 from .plan import Index, Inputs, Plan, dimensions
 
-# cells up to which equal values are found over the whole plan; beyond, within a range of trajectories
+# cells up to which equal values are found in the whole plan; with more, only within a range of trajectories
 MAX_CELLS = 2**22
-# trajectories that are integrated at a time: enough to pay for the interpreter, few enough to stay in cache
+# trajectories integrated at a time: many, to amortise the interpreter's overhead, and few enough to stay in cache
 RANGE_TRAJECTORIES = 32768
 
-# the dimensionless problems of some trajectories: the exponent `n`, the `status` that is known beforehand, and by
-# name what the law asks for
+# the dimensionless problems of trajectories: the exponent `n`, the `status` after the checks of inputs, and the
+# arguments of the law by name
 Columns = dict[str, NDArray[Any]]
 
 
 @dataclass(frozen=True)
 class TrajectoryMap:
-    """The trajectories of a model, and which of them each point of the grid takes.
+    """The trajectories of a model, and the trajectory of each point of the grid.
 
     Parameters
     ----------
-    model : its place in the plan
-    axes : the axes of the grid that the law's values come from
-    shape : their sizes; a cell is a place on these axes
-    first : the cell from which each trajectory is taken, shape (count,); None where every cell is one of its own
-    of_cell : the trajectory of each cell, shape (cells,); None likewise
+    model : index of the model in the plan
+    axes : the axes of the grid on which the values of the law depend
+    shape : their sizes; a cell is an index into these axes
+    first : the first cell of each trajectory, shape (count,); None if each cell has its own trajectory
+    of_cell : the trajectory of each cell, shape (cells,); None if each cell has its own trajectory
     """
 
     model: int
@@ -66,7 +66,7 @@ class TrajectoryMap:
         return self.of_cell is not None
 
     def rows(self, index: Index) -> NDArray[np.intp]:
-        """The trajectories at some places of the grid; of length one along the axes on which they do not vary."""
+        """The trajectories of cells of the grid; the array has length 1 along axes on which they do not depend."""
         cell = np.zeros((1,) * dimensions(index), np.intp)
         for axis, size in zip(self.axes, self.shape, strict=True):
             cell = cell * size + index[axis]
@@ -75,7 +75,7 @@ class TrajectoryMap:
 
 @dataclass(frozen=True)
 class TrajectoryRange:
-    """The trajectories of a model from one to another; `number` counts the ranges of a plan."""
+    """Trajectories `start` to `stop` of a model; `number` counts the ranges of a plan."""
 
     number: int
     model: int
@@ -88,16 +88,22 @@ class TrajectoryRange:
 
 
 def trajectory_maps(plan: Plan) -> tuple[TrajectoryMap, ...]:
-    """The trajectories of every model of a plan, in its order."""
-    return tuple(_map_of(plan, place, model) for place, model in enumerate(plan.models))
+    """The trajectories of every model of a plan, in the order of the models."""
+    return tuple(_build_map(plan, index, model) for index, model in enumerate(plan.models))
 
 
 def check_count(plan: Plan, most: int, name: str) -> None:
-    """Refuse a plan of more trajectories than some, before there is an array of them.
+    """Refuse a plan with too many trajectories, before any array is allocated.
+
+    Parameters
+    ----------
+    plan : the plan
+    most : limit of the number of trajectories
+    name : of the config, for the message
 
     Raises
     ------
-    UsageError : so it is; `name` is that of the config, for the message
+    UsageError : there are more
     """
     if plan.points <= most:
         return
@@ -105,7 +111,7 @@ def check_count(plan: Plan, most: int, name: str) -> None:
     for model in plan.models:
         collapse = plan.config.solver.collapse
         axes = axes_of_law(plan.inputs, model) if collapse else plan.inputs.axes_of_model(model.key)
-        # what is the same is found where the cells are not too many
+        # with fewer cells, equal ones are found, and the number of trajectories is not known yet
         cells = math.prod(plan.shape[axis] for axis in axes)
         total += cells if cells > MAX_CELLS else 0
     if total > most:
@@ -115,31 +121,31 @@ def check_count(plan: Plan, most: int, name: str) -> None:
         )
 
 
-def _map_of(plan: Plan, place: int, model: ForceModel) -> TrajectoryMap:
+def _build_map(plan: Plan, model_index: int, model: ForceModel) -> TrajectoryMap:
     collapse = plan.config.solver.collapse
     axes = axes_of_law(plan.inputs, model) if collapse else plan.inputs.axes_of_model(model.key)
-    found = TrajectoryMap(place, axes, tuple(plan.shape[axis] for axis in axes))
-    if not collapse or found.cells > MAX_CELLS:
-        return found
+    trajectory_map = TrajectoryMap(model_index, axes, tuple(plan.shape[axis] for axis in axes))
+    if not collapse or trajectory_map.cells > MAX_CELLS:
+        return trajectory_map
     # the other axes are at their first value
     shape = tuple(size if axis in axes else 1 for axis, size in enumerate(plan.shape))
     columns = columns_at(plan, model, axes, np.ix_(*map(np.arange, shape)))
     first, of_cell = deduplicate(list(columns.values()), shape or (1,))
-    return replace(found, first=first, of_cell=of_cell.astype(np.int32))
+    return replace(trajectory_map, first=first, of_cell=of_cell.astype(np.int32))
 
 
 def trajectory_ranges(maps: Sequence[TrajectoryMap], size: int = RANGE_TRAJECTORIES) -> Iterator[TrajectoryRange]:
     """All trajectories in order, in ranges of at most `size`."""
     number = 0
-    for own in maps:
-        step = even_size(own.count, size)
-        for start in range(0, own.count, step):
-            yield TrajectoryRange(number, own.model, start, min(start + step, own.count))
+    for trajectory_map in maps:
+        step = even_size(trajectory_map.count, size)
+        for start in range(0, trajectory_map.count, step):
+            yield TrajectoryRange(number, trajectory_map.model, start, min(start + step, trajectory_map.count))
             number += 1
 
 
 def even_size(count: int, most: int) -> int:
-    """The size of ranges of at most so many that share a number evenly: a small last one would cost too much.
+    """The size of ranges of at most `most` that divide `count` evenly, since a small last range would be slow.
 
     >>> even_size(20_000, 16_384), even_size(100, 16_384)
     (10000, 100)
@@ -147,27 +153,28 @@ def even_size(count: int, most: int) -> int:
     return -(-count // -(-count // most))
 
 
-def columns_of(plan: Plan, maps: Sequence[TrajectoryMap], part: TrajectoryRange) -> Columns:
-    """What is integrated of a range of trajectories, arrays of shape (part.size,)."""
-    own, model = maps[part.model], plan.models[part.model]
-    cells = np.arange(part.start, part.stop)
-    if own.first is not None:
-        cells = own.first[cells]
-    along = dict(zip(own.axes, np.unravel_index(cells, own.shape) if own.shape else (), strict=True))
+def columns_of(plan: Plan, maps: Sequence[TrajectoryMap], trajectory_range: TrajectoryRange) -> Columns:
+    """The dimensionless problems of a range of trajectories, arrays of shape (trajectory_range.size,)."""
+    trajectory_map, model = maps[trajectory_range.model], plan.models[trajectory_range.model]
+    cells = np.arange(trajectory_range.start, trajectory_range.stop)
+    if trajectory_map.first is not None:
+        cells = trajectory_map.first[cells]
+    cell_index = np.unravel_index(cells, trajectory_map.shape) if trajectory_map.shape else ()
+    index_along = dict(zip(trajectory_map.axes, cell_index, strict=True))
     # the other axes are at their first value
-    index = tuple(along.get(axis, np.zeros(1, np.intp)) for axis in range(len(plan.shape)))
-    columns = columns_at(plan, model, own.axes, index)
+    index = tuple(index_along.get(axis, np.zeros(1, np.intp)) for axis in range(len(plan.shape)))
+    columns = columns_at(plan, model, trajectory_map.axes, index)
     return {name: np.broadcast_to(values, cells.shape).copy() for name, values in columns.items()}
 
 
 def columns_at(plan: Plan, model: ForceModel, axes: Sequence[int], index: Index) -> Columns:
-    """The dimensionless problems of a model at some places of the grid, arrays that broadcast against each other.
+    """The dimensionless problems of a model at cells of the grid, arrays that broadcast against each other.
 
     Parameters
     ----------
-    plan, model : whose problems
-    axes : the axes that the law's values come from; what varies along others is not checked here
-    index : the places
+    plan, model : the plan and one of its models
+    axes : the axes on which the values of the law depend; inputs that vary along others are not checked
+    index : the cells
     """
     impacts = build_impacts(plan.inputs, model, index)
     with np.errstate(all="ignore"):
@@ -181,40 +188,42 @@ def columns_at(plan: Plan, model: ForceModel, axes: Sequence[int], index: Index)
         }
 
 
-def probe_index(inputs: Inputs, whole: Iterable[str] = ()) -> Index:
-    """Two places of every axis, but all of an axis on which some names vary.
+def probe_index(inputs: Inputs, swept_names: Iterable[str] = ()) -> Index:
+    """Cells at two values of every axis, and at all values of the axes on which some names vary.
 
-    What is computed there has length one along an axis on which it does not depend: the shape tells.
+    Values computed there have length 1 along the axes on which they do not depend: the shape shows which.
     """
-    kept = {axis for name in whole for axis in inputs.axes_of(name)}
-    return np.ix_(*(np.arange(size if axis in kept else min(size, 2)) for axis, size in enumerate(inputs.shape)))
+    full_axes = {axis for name in swept_names for axis in inputs.axes_of(name)}
+    sizes = (size if axis in full_axes else min(size, 2) for axis, size in enumerate(inputs.shape))
+    return np.ix_(*map(np.arange, sizes))
 
 
 def axes_of_arrays(arrays: Iterable[NDArray[Any]]) -> frozenset[int]:
-    """The axes along which any of some arrays of as many axes as the grid varies."""
+    """The axes along which any of the arrays varies; the arrays have as many axes as the grid."""
     return frozenset(axis for array in arrays for axis, size in enumerate(array.shape) if size > 1)
 
 
 def axes_of_law(inputs: Inputs, model: ForceModel) -> tuple[int, ...]:
-    """The axes that the values of a law come from."""
-    impacts = _probed(inputs, model)
+    """The axes on which the values of a law depend."""
+    impacts = _probe_impacts(inputs, model)
     with np.errstate(all="ignore"):
         return tuple(sorted(axes_of_arrays([impacts.n, *dimensionless_values(model, impacts).values()])))
 
 
 def axes_of_checks(inputs: Inputs, model: ForceModel) -> Mapping[str, frozenset[int]]:
-    """The axes that each check of `check_inputs` comes from."""
-    impacts = _probed(inputs, model)
+    """The axes on which each check of `check_inputs` depends."""
+    impacts = _probe_impacts(inputs, model)
     with np.errstate(all="ignore"):
-        looked_at = {
+        checked_arrays = {
             "e": [impacts.e],
             "v0": [impacts.v0],
             "length": [impacts.length, impacts.energy, impacts.time],
         }
-    return {check: axes_of_arrays(looked_at[check]) for check in CHECKS}
+    return {check: axes_of_arrays(checked_arrays[check]) for check in CHECKS}
 
 
-def _probed(inputs: Inputs, model: ForceModel) -> Impacts:
-    # an exponent may be zero by its value, and then leaves a unit out: all values of those are looked at
+def _probe_impacts(inputs: Inputs, model: ForceModel) -> Impacts:
+    # an exponent of a unit may be zero at some values, where the unit drops out: all values of exponents are used
     names = exponent_names(model)
-    return build_impacts(inputs, model, probe_index(inputs, {"n", *names, *(f"{model.key}.{n}" for n in names)}))
+    exponents = {"n", *names, *(f"{model.key}.{name}" for name in names)}
+    return build_impacts(inputs, model, probe_index(inputs, exponents))

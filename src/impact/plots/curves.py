@@ -1,4 +1,4 @@
-"""Pictures of curves: velocities, restitution and its error over one axis of a result; how curves are drawn."""
+"""Curves over one axis of a result: velocities, restitution and its error; their data and their drawing."""
 
 from __future__ import annotations
 
@@ -16,32 +16,38 @@ from ..formatting import heading
 from ..results.schema import plain_unit
 from ..text import safe_text
 from .labels import REFERENCE, label_axis, law_text, pretty_conditions, symbol, words_of
-from .slices import Selection, conditions_of, is_ordered, own_conditions, read, scalars_of, take_line
-from .style import is_geometric, looks_of
+from .slices import conditions_of, is_ordered, parameter_text, read, scalars_of, take_line
+from .style import is_geometric, model_styles
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from .data import Points
+    from .kinds import Choice
 
 FIGURE_6 = "Final velocities comparison"
-Array = NDArray[np.float64]
 # distances from zero that are shaded, the widest first, and their colours
 BANDS = (0.05, 0.01)
 BAND_COLOURS = ("#ebf3f8", "#cde2ef")
-# an error below this is the solver's, and has no place on a logarithmic axis
-SMALLEST = 1e-9
-# of a picture with one panel, and with several: height of a panel over the width
-HEIGHT, HEIGHT_OF_SEVERAL = 0.56, 0.36
-# from so many laws on a legend has keys in place of titles
+# the smallest |e_error| on a logarithmic axis: smaller ones are errors of the solver
+MIN_DRAWN_ERROR = 1e-9
+# height of a panel over the width of the picture: of a single panel, and of several below each other
+PANEL_ASPECT, STACKED_PANEL_ASPECT = 0.56, 0.36
+# from this number of laws on the legend shows keys instead of titles
 MANY_LAWS = 16
 
 
 @dataclass(frozen=True)
 class Curve:
-    """One curve: its name, the model's key (None for a reference), its points, and a name beside the last one.
+    """One curve.
 
-    `variable` is what its y is, under the name of the result file or of a time history.
+    Parameters
+    ----------
+    label : its name in the legend
+    model : key of the model; None for a reference
+    x, y : its points, in SI
+    end : text beside the last point
+    variable : name of its y in a result or a time history
     """
 
     label: str
@@ -54,7 +60,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class Mark:
-    """A point of a curve with a name, such as tau_c, which stands at the foot of its line to the axis `along`."""
+    """A named point of a curve, such as tau_c; a dashed line joins it to the axis `along`."""
 
     label: str
     x: float
@@ -64,10 +70,18 @@ class Mark:
 
 @dataclass(frozen=True)
 class Panel:
-    """Curves over one pair of axes, of which each has a label in words, a name, and a unit in SI.
+    """Curves over one pair of axes.
 
-    `bands` are distances from zero that are shaded, the widest first; `marks` are points with names; `joined` says
-    whether lines join the points.
+    Parameters
+    ----------
+    x_label, y_label : meaning of each axis in words
+    curves : the curves
+    x_unit, y_unit : unit of each axis, in SI
+    x_log, y_log : whether the axis is logarithmic
+    bands : distances from zero that are shaded, the widest first
+    marks : named points
+    x_name, y_name : name of each axis in a result or a time history
+    joined : whether lines join the points
     """
 
     x_label: str
@@ -85,8 +99,8 @@ class Panel:
 
 
 @dataclass(frozen=True)
-class Lines:
-    """The numbers of a picture: panels one below the other, what they are of, and what is not drawn."""
+class CurveData:
+    """The data of a picture of curves: title, conditions, panels one below the other, and what is not drawn."""
 
     title: str
     conditions: str
@@ -96,7 +110,7 @@ class Lines:
     columns = ("x_axis", "y_axis", "curve", "model", "x", "y")
 
     def rows(self) -> Iterator[tuple[str | float, ...]]:
-        """The numbers behind the picture, one point a row."""
+        """The points of all curves, one per row; for the names of the columns see `columns`."""
         for panel in self.panels:
             axes = (
                 heading(f"{panel.x_label},", panel.x_name, panel.x_unit),
@@ -108,9 +122,9 @@ class Lines:
                     yield (*axes, name, curve.model or "", x, y)
 
     def table(self) -> dict[str, tuple[float, ...]]:
-        """The numbers behind the picture, a column for each curve, after the x of those that share it.
+        """The points of all curves, one column per curve; curves with the same x share its column.
 
-        The names are ASCII: variable, model, and the unit in brackets.
+        The names of the columns are ASCII: variable, model, and the unit in brackets.
         """
         columns: dict[str, tuple[float, ...]] = {}
         all_curves = [(panel, curve) for panel in self.panels for curve in panel.curves]
@@ -123,187 +137,170 @@ class Lines:
 
     @property
     def names(self) -> set[str]:
-        """What a label can be given to."""
+        """The axes and models whose text a user can replace."""
         axes = {name for panel in self.panels for name in (panel.x_name, panel.y_name)}
         return axes | {curve.model for panel in self.panels for curve in panel.curves if curve.model}
 
 
-def final_velocities(
-    dataset: xr.Dataset,
-    x: str | None = None,
-    sel: Selection = None,
-    models: Sequence[str] | None = None,
-    log: str = "",
-    *,
-    equations: bool = False,
-) -> Lines:
+def velocity_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     """Figure 6 of the paper: post-impact velocities of every model and of the impulse-momentum solution.
 
     Parameters
     ----------
     dataset : a result
-    x, sel, models : see `impact.plots.slices.take_line`
-    log : axes that are logarithmic, of "x" and "y"; an x that is spaced so is in any case
-    equations : name the laws with the numbers of their equations in the paper
+    choice : which part of it; an x whose values are spaced evenly in their logarithm has a logarithmic axis
 
     Raises
     ------
-    UsageError : the result has not got what is asked for
+    UsageError : the result does not contain what `choice` selects
     """
-    data, x, not_drawn = _along(dataset, x, sel, models, "v1_post", "v2_post", "v1_reference", "v2_reference")
-    reference = f"{REFERENCE} (6), (7)" if equations else REFERENCE
+    line = _take_line(dataset, choice, "v1_post", "v2_post", "v1_reference", "v2_reference")
+    reference = f"{REFERENCE} (6), (7)" if choice.equations else REFERENCE
     references = [
-        _curve(reference, None, data, x, data[f"v{ball}_reference"], f"v{ball}_post", end)
+        _curve(reference, None, line, line.data[f"v{ball}_reference"], f"v{ball}_post", end)
         for ball, end in ((1, "v₁⁺"), (2, "v₂⁺"))
     ]
     curves = [
-        _curve(label, key, data, x, of_model[f"v{ball}_post"], f"v{ball}_post", end)
-        for label, key, of_model in _laws(data, equations)
+        _curve(label, key, line, of_model[f"v{ball}_post"], f"v{ball}_post", end)
+        for label, key, of_model in _split_by_model(line, choice)
         for ball, end in ((1, "v₁⁺"), (2, "v₂⁺"))
     ]
-    panel = Panel("", "Velocity after the impact", (*_known(references), *curves), y_unit="m/s", y_name="v_post")
-    return _lines(dataset, data, x, FIGURE_6, [panel], not_drawn, log)
+    all_curves = (*_without_empty(references), *curves)
+    panel = Panel("", "Velocity after the impact", all_curves, y_unit="m/s", y_name="v_post")
+    return _curve_data(dataset, line, FIGURE_6, [panel], choice)
 
 
-def restitution(
-    dataset: xr.Dataset,
-    x: str | None = None,
-    sel: Selection = None,
-    models: Sequence[str] | None = None,
-    log: str = "",
-    *,
-    equations: bool = False,
-) -> Lines:
-    """The delivered restitution of every model, beside what was asked for; see `final_velocities`."""
-    data, x, not_drawn = _along(dataset, x, sel, models, "e_out")
-    asked = [_curve("As asked for", None, data, x, data["e"], "e")] if "e" in data.coords else []
+def restitution_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
+    """The delivered restitution of every model beside the requested one; see `velocity_curves`."""
+    line = _take_line(dataset, choice, "e_out")
+    requested = [_curve("As asked for", None, line, line.data["e"], "e")] if "e" in line.data.coords else []
     curves = [
-        _curve(label, key, data, x, of_model["e_out"], "e_out") for label, key, of_model in _laws(data, equations)
+        _curve(label, key, line, of_model["e_out"], "e_out")
+        for label, key, of_model in _split_by_model(line, choice)
     ]
-    panel = Panel("", "Delivered restitution", (*_known(asked), *curves), y_name="e_out")
-    return _lines(dataset, data, x, "Delivered restitution", [panel], not_drawn, log)
+    panel = Panel("", "Delivered restitution", (*_without_empty(requested), *curves), y_name="e_out")
+    return _curve_data(dataset, line, "Delivered restitution", [panel], choice)
 
 
-def error(
-    dataset: xr.Dataset,
-    x: str | None = None,
-    sel: Selection = None,
-    models: Sequence[str] | None = None,
-    log: str = "",
-    *,
-    equations: bool = False,
-) -> Lines:
-    """What every model's restitution is off by, signed and absolute; see `final_velocities`."""
-    data, x, not_drawn = _along(dataset, x, sel, models, "e_error")
-    laws = [(label, key, of_model["e_error"].values) for label, key, of_model in _laws(data, equations)]
-    if not any(np.isfinite(values).any() for _, _, values in laws):
+def error_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
+    """The error of every model's restitution, signed and absolute; see `velocity_curves`."""
+    line = _take_line(dataset, choice, "e_error")
+    errors = [(label, key, of_model["e_error"].values) for label, key, of_model in _split_by_model(line, choice)]
+    if not any(np.isfinite(values).any() for _, _, values in errors):
         raise UsageError(
             "this result has no error of the restitution, which needs an e that is asked for; sweep e"
         )
-    signed = [_curve(label, key, data, x, values, "e_error") for label, key, values in laws]
+    signed = [_curve(label, key, line, values, "e_error") for label, key, values in errors]
     absolute = [
-        _curve(label, key, data, x, np.maximum(np.abs(values), SMALLEST), "abs_e_error")
-        for label, key, values in laws
+        _curve(label, key, line, np.maximum(np.abs(values), MIN_DRAWN_ERROR), "abs_e_error")
+        for label, key, values in errors
     ]
     panels = [
         Panel("", "Error", tuple(signed), bands=BANDS, y_name="e_error"),
         Panel("", "Absolute error", tuple(absolute), y_log=True, bands=BANDS, y_name="abs_e_error"),
     ]
-    return _lines(dataset, data, x, "Error of the restitution", panels, not_drawn, log)
+    return _curve_data(dataset, line, "Error of the restitution", panels, choice)
 
 
-def _along(
-    dataset: xr.Dataset, x: str | None, sel: Selection, models: Sequence[str] | None, *names: str
-) -> tuple[xr.Dataset, str, tuple[str, ...]]:
-    """The line of a result that is drawn, with its variables in memory; over what; what is not drawn."""
-    line, x, not_drawn = take_line(dataset, x, sel, models)
+@dataclass(frozen=True)
+class _Line:
+    """A line through a result: its variables in memory, the coordinate `x`, and values that are not drawn."""
+
+    data: xr.Dataset
+    x: str
+    not_drawn: tuple[str, ...]
+
+
+def _take_line(dataset: xr.Dataset, choice: Choice, *names: str) -> _Line:
+    """The line of a result that is drawn, with some variables in memory."""
+    line, x, not_drawn = take_line(dataset, choice.x, choice.sel, choice.models)
     missing = [name for name in names if name not in dataset]
     if missing:
         raise UsageError(f"this result has no {', '.join(missing)}; sweep without [output] variables, or add them")
-    return read(line, names), x, not_drawn
+    return _Line(read(line, names), x, not_drawn)
 
 
-def _laws(data: xr.Dataset, equations: bool) -> Iterator[tuple[str, str, xr.Dataset]]:
-    """The name of each model of a slice, its key, and its part."""
-    for place in range(data.sizes["model"]):
-        of_model = data.isel(model=place)
-        key = str(of_model["model"].item())
-        yield label_of(of_model, numbered=equations), key, of_model
+def _split_by_model(line: _Line, choice: Choice) -> Iterator[tuple[str, str, xr.Dataset]]:
+    """Label, key and part of each model of a line."""
+    for index in range(line.data.sizes["model"]):
+        of_model = line.data.isel(model=index)
+        yield model_label(of_model, numbered=choice.equations), str(of_model["model"].item()), of_model
 
 
-def label_of(of_model: xr.Dataset, *, numbered: bool = False) -> str:
-    """The name of a model of a result, with its own parameters."""
+def model_label(of_model: xr.Dataset, *, numbered: bool = False) -> str:
+    """The title of a model of a result, with the values of its parameters."""
     title, year, equation = (of_model[name].item() for name in ("title", "year", "equation"))
-    own = own_conditions(str(of_model["model"].item()), scalars_of(of_model))
-    return law_text(str(title), int(year), str(equation), own, numbered=numbered)
+    parameters = parameter_text(str(of_model["model"].item()), scalars_of(of_model))
+    return law_text(str(title), int(year), str(equation), parameters, numbered=numbered)
 
 
 def _curve(
     label: str,
     model: str | None,
-    data: xr.Dataset,
-    x: str,
-    values: xr.DataArray | Array,
+    line: _Line,
+    values: xr.DataArray | NDArray[np.float64],
     variable: str,
     end: str = "",
 ) -> Curve:
-    along = np.asarray(data[x].values, float)
-    drawn = np.broadcast_to(np.asarray(values, float), along.shape)
-    return Curve(label, model, tuple(along.tolist()), tuple(drawn.tolist()), end, variable)
+    x = np.asarray(line.data[line.x].values, float)
+    y = np.broadcast_to(np.asarray(values, float), x.shape)
+    return Curve(label, model, tuple(x.tolist()), tuple(y.tolist()), end, variable)
 
 
-def _known(references: list[Curve]) -> list[Curve]:
-    """Without a restitution asked for there is no reference."""
-    return [curve for curve in references if np.isfinite(curve.y).any()]
+def _without_empty(curves: list[Curve]) -> list[Curve]:
+    """The curves that have a finite value: without a requested restitution a reference has none."""
+    return [curve for curve in curves if np.isfinite(curve.y).any()]
 
 
-def _lines(
-    dataset: xr.Dataset, data: xr.Dataset, x: str, title: str, panels: Sequence[Panel], not_drawn: tuple[str, ...],
-    log: str,
-) -> Lines:  # fmt: skip
-    own, conditions = safe_text(str(dataset.attrs.get("title", "")), 140), conditions_of(data, x)
-    if own and title != FIGURE_6:
-        own, conditions = title, ": ".join(filter(None, (own, conditions)))
+def _curve_data(
+    dataset: xr.Dataset, line: _Line, title: str, panels: Sequence[Panel], choice: Choice
+) -> CurveData:
+    """The data of a picture: panels with the x axis of their line, the title and the conditions."""
+    data, x = line.data, line.x
+    heading = safe_text(str(dataset.attrs.get("title", "")), 140)
+    conditions = conditions_of(data, x)
+    if heading and title != FIGURE_6:
+        heading, conditions = title, ": ".join(filter(None, (heading, conditions)))
     values = data[x].values
-    along: dict[str, Any] = {
+    x_axis: dict[str, Any] = {
         "x_name": x, "x_label": words_of(data[x].attrs, x),
         "x_unit": safe_text(plain_unit(str(data[x].attrs.get("units", "1")))),
-        "x_log": is_geometric(values) or ("x" in log and bool(np.all(values > 0.0))),
+        "x_log": is_geometric(values) or ("x" in choice.log and bool(np.all(values > 0.0))),
         "joined": is_ordered(dataset, x),
     }  # fmt: skip
-    panels = [replace(panel, y_log=panel.y_log or "y" in log, **along) for panel in panels]
+    panels = [replace(panel, y_log=panel.y_log or "y" in choice.log, **x_axis) for panel in panels]
     empty = {c.model: None for panel in panels for c in panel.curves if c.model and not np.isfinite(c.y).any()}
-    without = tuple(f"{key}, which has no point here" for key in empty)
-    return Lines(own or title, conditions, tuple(panels), (*not_drawn, *without))
+    without_value = tuple(f"{key}, which has no point here" for key in empty)
+    return CurveData(heading or title, conditions, tuple(panels), (*line.not_drawn, *without_value))
 
 
-def draw_lines(
-    numbers: Lines, all_axes: Sequence[Axes], labels: Mapping[str, str], points: Points | None
+def draw_curves(
+    plot_data: CurveData, all_axes: Sequence[Axes], labels: Mapping[str, str], points: Points | None
 ) -> list[tuple[Artist, str]]:
     """Draw curves, and measured points over them.
 
     Parameters
     ----------
-    numbers : what is drawn
-    all_axes : for each panel
-    labels : texts in place of those of axes and laws, by name
-    points : what was measured
+    plot_data : the curves
+    all_axes : axes of each panel
+    labels : texts that replace those of axes and laws, by name
+    points : measured points
 
     Returns
     -------
-    handles and names of a legend
+    handles and names of the legend
     """
-    models = dict.fromkeys(curve.model for panel in numbers.panels for curve in panel.curves if curve.model)
-    looks = looks_of([model for model in models if model])
+    models = dict.fromkeys(curve.model for panel in plot_data.panels for curve in panel.curves if curve.model)
+    styles = model_styles([model for model in models if model])
     entries: dict[str, Artist] = {}
-    for axes, panel in zip(all_axes, numbers.panels, strict=True):
+    for axes, panel in zip(all_axes, plot_data.panels, strict=True):
         _draw_bands(axes, panel)
         axes.set(xscale="log" if panel.x_log else "linear", yscale="log" if panel.y_log else "linear")
         for curve in panel.curves:
-            own = labels.get(curve.model or "reference")
-            short = curve.model if curve.model and len(looks) >= MANY_LAWS else curve.label
-            name = own or pretty_conditions(short)
-            (line,) = axes.plot(curve.x, curve.y, label=f"_{name}", **_look(curve, panel, looks))
+            chosen_name = labels.get(curve.model or "reference")
+            default_name = curve.model if curve.model and len(styles) >= MANY_LAWS else curve.label
+            name = chosen_name or pretty_conditions(default_name)
+            (line,) = axes.plot(curve.x, curve.y, label=f"_{name}", **_line_style(curve, panel, styles))
             entries.setdefault(name, line)
         entries |= points.draw(axes, panel) if points else {}
         # the names of marks need room at the ends of the axes
@@ -311,24 +308,24 @@ def draw_lines(
         axes.autoscale_view()
         _label_axes(axes, panel, labels, last=axes is all_axes[-1] or len(all_axes) == 1)
         for mark in panel.marks:
-            _mark(axes, mark)
-        _name_ends(axes, panel.curves)
+            _draw_mark(axes, mark)
+        _label_curve_ends(axes, panel.curves)
     return [(artist, name) for name, artist in entries.items()]
 
 
-def _look(curve: Curve, panel: Panel, looks: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """How a curve is drawn: a reference as a plain line, points without order without one."""
+def _line_style(curve: Curve, panel: Panel, styles: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """The line style of a curve: a reference is a plain line, points without an order have no line."""
     points = len(curve.x)
     scattered: dict[str, Any] = {} if panel.joined else {"linestyle": "none"}
     if curve.model is None:
-        # without a line it is a disc that shows around the models' markers
+        # without a line it is a disc, larger than the markers of the models
         disc = {"marker": "o", "markersize": 9.0, "alpha": None} if points == 1 or scattered else {}
         return {"color": "black" if not disc else "#c0c0c0", "linewidth": 2.0, "zorder": 1.5, **disc, **scattered}
-    look = {key: value for key, value in looks[curve.model].items() if key != "hatch"}
-    # the markers of different models stand at different points, so that equal curves show both
+    style = {key: value for key, value in styles[curve.model].items() if key != "hatch"}
+    # the markers of different models are at different points, so that equal curves show both
     every = 1 if scattered else max(1, points // 12)
-    start = list(looks).index(curve.model) * every // max(1, len(looks)) % every
-    return {**look, "markevery": (start, every), "markerfacecolor": "white", **scattered}
+    start = list(styles).index(curve.model) * every // max(1, len(styles)) % every
+    return {**style, "markevery": (start, every), "markerfacecolor": "white", **scattered}
 
 
 def _draw_bands(axes: Axes, panel: Panel) -> None:
@@ -344,7 +341,7 @@ def _draw_bands(axes: Axes, panel: Panel) -> None:
 
 
 def _label_axes(axes: Axes, panel: Panel, labels: Mapping[str, str], *, last: bool) -> None:
-    """The labels of both axes, each with one prefix of its unit."""
+    """Write the labels of both axes, each with one prefix of its unit."""
     for axis, words, name, unit, limits, log in (
         (axes.xaxis, panel.x_label, panel.x_name, panel.x_unit, axes.get_xlim(), panel.x_log),
         (axes.yaxis, panel.y_label, panel.y_name, panel.y_unit, axes.get_ylim(), panel.y_log),
@@ -354,8 +351,8 @@ def _label_axes(axes: Axes, panel: Panel, labels: Mapping[str, str], *, last: bo
         axes.set_xlabel("")
 
 
-def _mark(axes: Axes, mark: Mark) -> None:
-    """A point, a dashed line from it to its axis, and its name at the foot of the line."""
+def _draw_mark(axes: Axes, mark: Mark) -> None:
+    """Draw a point, a dashed line from it to its axis, and its name at the foot of the line."""
     low = axes.get_xlim()[0] if mark.along == "y" else axes.get_ylim()[0]
     foot = (mark.x, low) if mark.along == "x" else (low, mark.y)
     dashes: dict[str, Any] = {"color": "#777777", "linewidth": 0.8, "linestyle": (0, (4, 2)), "zorder": 1.2}
@@ -368,8 +365,8 @@ def _mark(axes: Axes, mark: Mark) -> None:
     )
 
 
-def _name_ends(axes: Axes, curves: Sequence[Curve]) -> None:
-    """Names beside the last points: where several end together, one stands below and the other above."""
+def _label_curve_ends(axes: Axes, curves: Sequence[Curve]) -> None:
+    """Write names beside the last points: where several end together, one is below and the others above."""
     ends: dict[str, tuple[float, float]] = {}
     for curve in curves:
         drawn = np.flatnonzero(np.isfinite(curve.y))
@@ -377,9 +374,9 @@ def _name_ends(axes: Axes, curves: Sequence[Curve]) -> None:
             ends.setdefault(curve.variable, (curve.x[drawn[-1]], curve.y[drawn[-1]]))
     low, high = axes.get_ylim()
     ordered = sorted((point[1], name) for name, point in ends.items())
-    for place, (y, name) in enumerate(ordered):
+    for rank, (y, name) in enumerate(ordered):
         near = [other for other, _ in ordered if abs(other - y) < 0.06 * (high - low)]
-        aside = (-8 if place == 0 else 8) if len(near) > 1 else 0
+        aside = (-8 if rank == 0 else 8) if len(near) > 1 else 0
         axes.annotate(
             symbol(name), ends[name], (6, aside), textcoords="offset points", va="center", fontsize="large",
             annotation_clip=False,

@@ -1,4 +1,4 @@
-"""The numbers behind a picture as a file, and measured points as one."""
+"""The data of a picture as a table, and measured points from a table."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..config.cases import HEADER, CsvTable, column_values, read_csv
+from ..config.cases import COLUMN_HEADER, CsvTable, column_values, read_csv
 from ..config.quantities import Quantity, show
 from ..config.tables import SWEEP_QUANTITIES
 from ..errors import ConfigError, UsageError, did_you_mean
@@ -25,39 +25,39 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from .curves import Panel
-    from .kinds import Numbers
+    from .kinds import PlotData
 
-# the endings of a table, and its forms
-TABLES = (".csv", ".tex", ".parquet")
-FORMS = ("wide", "long")
+# suffixes of a table, and its forms
+TABLE_SUFFIXES = (".csv", ".tex", ".parquet")
+TABLE_FORMS = ("wide", "long")
 SIGMA = "sigma"
 MEASURED = "Measured"
 
 
 def check_table(path: Path, form: str) -> None:
-    """Refuse a table whose ending or form is not known.
+    """Check the suffix and the form of a table.
 
     Raises
     ------
-    UsageError : see above
+    UsageError : one of them is unknown
     """
-    if path.suffix.lower() not in TABLES:
-        *most, last = TABLES
+    if path.suffix.lower() not in TABLE_SUFFIXES:
+        *most, last = TABLE_SUFFIXES
         raise UsageError(
             f"--data {safe_text(str(path))}: expected a name that ends in {', '.join(most)} or {last}"
         )
-    if form not in FORMS:
-        raise UsageError(f"--data-form: got {safe_text(form)}, expected {' or '.join(FORMS)}")
+    if form not in TABLE_FORMS:
+        raise UsageError(f"--data-form: got {safe_text(form)}, expected {' or '.join(TABLE_FORMS)}")
 
 
-def as_table(numbers: Numbers, suffix: str, form: str = "wide") -> bytes:
-    """The numbers behind a picture as the bytes of a file; every digit is kept, but for print.
+def as_table(plot_data: PlotData, suffix: str, form: str = "wide") -> bytes:
+    """The data of a picture as the bytes of a table; all digits are written, except to .tex.
 
     Parameters
     ----------
-    numbers : of the picture
-    suffix : one of TABLES
-    form : "wide" has a column for each curve, whose names are ASCII and have the unit; "long" a row for each point
+    plot_data : the data
+    suffix : one of TABLE_SUFFIXES
+    form : "wide", one column per curve, whose names are ASCII and have the unit; or "long", one row per point
 
     Raises
     ------
@@ -66,9 +66,9 @@ def as_table(numbers: Numbers, suffix: str, form: str = "wide") -> bytes:
     import pandas as pd
 
     if form == "long":
-        frame = pd.DataFrame(numbers.rows(), columns=list(numbers.columns))
+        frame = pd.DataFrame(plot_data.rows(), columns=list(plot_data.columns))
     else:
-        frame = pd.DataFrame({name: pd.Series(values) for name, values in numbers.table().items()})
+        frame = pd.DataFrame({name: pd.Series(values) for name, values in plot_data.table().items()})
     if suffix == ".tex":
         text: str = frame.to_latex(index=False, escape=True, na_rep="", float_format=number)
         return text.encode()
@@ -85,7 +85,7 @@ def as_table(numbers: Numbers, suffix: str, form: str = "wide") -> bytes:
 
 @dataclass(frozen=True)
 class Points:
-    """What was measured: columns in SI by the names of inputs and variables, sigma among them, and where from."""
+    """Measured points: columns in SI, by the names of inputs, variables and sigma, and where they come from."""
 
     source: str
     columns: Mapping[str, np.ndarray]
@@ -95,7 +95,7 @@ class Points:
 
         Raises
         ------
-        UsageError : the points have not got what the panel shows
+        UsageError : the points lack what the panel shows
         """
         variables = list(dict.fromkeys(curve.variable for curve in panel.curves if curve.model))
         shown = [name for name in variables if name in self.columns]
@@ -106,11 +106,11 @@ class Points:
         if SIGMA in self.columns and len(shown) > 1:
             raise UsageError(f"{self.source}: {SIGMA} of which, {' or '.join(shown)}? expected one of them")
         artists: dict[str, Artist] = {}
-        for place, name in enumerate(shown):
+        for index, name in enumerate(shown):
             bars = axes.errorbar(
                 self.columns[panel.x_name], self.columns[name], self.columns.get(SIGMA), color="black", zorder=3,
                 marker="o", markersize=4.0, linestyle="none", elinewidth=0.9, capsize=2.0,
-                markerfacecolor="black" if place == 0 else "white",
+                markerfacecolor="black" if index == 0 else "white",
             )  # fmt: skip
             artists[MEASURED if len(shown) == 1 else f"{MEASURED} {name}"] = bars[0]
         return artists
@@ -120,52 +120,61 @@ def read_points(points: str | Path | pd.DataFrame | xr.Dataset) -> Points:
     """Measured points, of a CSV file or of a table of pandas or xarray.
 
     The names of the columns are those of inputs and variables, with their units in brackets: "v1 [mm/s]". Without
-    a unit a column is in SI. `sigma` is the standard deviation of the variable before it, by default in its unit.
+    a unit a column is in SI. `sigma` is the standard deviation of the variable in the
+    column before it, by default in its unit.
 
     Raises
     ------
-    ConfigError : the file cannot be read, or a name, a unit or a number is not right
+    ConfigError : the file cannot be read, or a name, a unit or a number is invalid
     """
-    table = read_csv(Path(points)) if isinstance(points, str | Path) else _table_of(points)
-    known = _known()
+    table = read_csv(Path(points)) if isinstance(points, str | Path) else _csv_table(points)
+    quantities = _column_quantities()
     for column in table.units:
-        if column not in known:
-            place = f"{table.name}:1: " if isinstance(points, str | Path) else f"{table.name}: "
-            raise ConfigError([f"{place}got {show(column)}; {did_you_mean(column, sorted(known))}"])
-    units, before = dict(table.units), ""
+        if column not in quantities:
+            location = f"{table.name}:1: " if isinstance(points, str | Path) else f"{table.name}: "
+            raise ConfigError([f"{location}got {show(column)}; {did_you_mean(column, sorted(quantities))}"])
+    units, previous = dict(table.units), ""
     for column in table.units:
-        if column == SIGMA and before:
-            known[SIGMA] = Quantity(known[before].unit, "standard deviation", least=0.0)
-            units[SIGMA] = units[SIGMA] or units[before]
-        before = column
+        if column == SIGMA and previous:
+            quantities[SIGMA] = Quantity(quantities[previous].unit, "standard deviation", least=0.0)
+            units[SIGMA] = units[SIGMA] or units[previous]
+        previous = column
     table = replace(table, units=units)
     return Points(
-        table.name, {name: np.array(column_values(table, name, known[name], None), float) for name in table.units}
+        table.name,
+        {name: np.array(column_values(table, name, quantities[name], None), float) for name in table.units},
     )
 
 
-def _table_of(points: pd.DataFrame | xr.Dataset) -> CsvTable:
-    """A table of pandas or xarray as that of a file, whose lines are its rows."""
+def _csv_table(points: pd.DataFrame | xr.Dataset) -> CsvTable:
+    """A table of pandas or xarray as a CSV table, whose line numbers are those of its rows."""
     units: dict[str, str] = {}
     frame: Any = points
     if hasattr(points, "data_vars"):
         dataset: Any = points
-        units = {str(name): plain_unit(str(one.attrs.get("units", ""))) for name, one in dataset.variables.items()}
+        units = {
+            str(name): plain_unit(str(variable.attrs.get("units", "")))
+            for name, variable in dataset.variables.items()
+        }
         frame = dataset.to_dataframe().reset_index()
     cells: dict[str, list[tuple[int, str]]] = {}
     for name, values in frame.items():
-        parts = HEADER.fullmatch(str(name))
+        parts = COLUMN_HEADER.fullmatch(str(name))
         assert parts is not None
         units[parts[1]] = parts[2] or units.get(parts[1], "")
         cells[parts[1]] = [(row, repr(value)) for row, value in enumerate(values.tolist(), 1)]
     return CsvTable("points", {name: units[name] for name in cells}, cells)
 
 
-def _known() -> dict[str, Quantity]:
-    """What a column may be called, with its unit."""
-    outputs = {one.name: Quantity(plain_unit(one.unit), one.meaning) for one in SCHEMA if one.dtype == "f8"}
+def _column_quantities() -> dict[str, Quantity]:
+    """Names of columns, with their units."""
+    outputs = {
+        variable.name: Quantity(plain_unit(variable.unit), variable.meaning)
+        for variable in SCHEMA
+        if variable.dtype == "f8"
+    }
     history = {name: Quantity(plain_unit(unit), meaning) for name, unit, meaning in HISTORY_VARIABLES}
-    inputs = {name: Quantity(one.unit, one.meaning) for name, one in SWEEP_QUANTITIES.items()}
+    inputs = {name: Quantity(rule.unit, rule.meaning) for name, rule in SWEEP_QUANTITIES.items()}
     time, impulse = Quantity("s", "time"), Quantity("N s", "impulse")
     sigma = Quantity("1", "standard deviation", least=0.0)
     return {**outputs, **history, **inputs, "t": time, "tau": impulse, SIGMA: sigma}

@@ -1,6 +1,6 @@
-"""The kinds of picture: what each shows, its numbers, and its drawing.
+"""The kinds of picture: what each shows, its data, and its drawing.
 
-The command line reads the names of the kinds at every start, so nothing here imports matplotlib before it draws.
+The command line reads the names of the kinds at every start, so this module imports matplotlib only to draw.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from .curves import Lines
+    from .curves import CurveData
     from .data import Points
-    from .maps import Grids
+    from .maps import MapData
 
-    Numbers: TypeAlias = Lines | Grids
+    PlotData: TypeAlias = CurveData | MapData
 
 KINDS = {
     "final-velocities": "velocities after the impact beside the impulse-momentum solution, Figure 6 of the paper",
@@ -35,16 +35,16 @@ KINDS = {
     "history": "indentation, its rate and the force over time",
     "impulse": "velocities over the impulse that has passed",
 }
-# those that follow a point through time, which --sel chooses
-FOLLOWED = ("loop", "history", "impulse")
-# of one column of a journal, and of two [in]
+# those that show the motion at one point, which --sel chooses
+MOTION_KINDS = ("loop", "history", "impulse")
+# width of one and of two columns of a journal [in]
 WIDTHS = {"single": 3.5, "double": 7.1}
-LOGS = ("x", "y", "xy")
+LOG_AXES = ("x", "y", "xy")
 
 
 @dataclass(frozen=True)
 class Choice:
-    """What of a result is drawn; see `impact.plot`."""
+    """Which part of a result is drawn; see `impact.plot`."""
 
     x: str | None = None
     y: str | None = None
@@ -55,21 +55,21 @@ class Choice:
     equations: bool = False
 
 
-def numbers_of(
+def plot_data_of(
     kind: str, dataset: xr.Dataset, choice: Choice, histories: Callable[[], Sequence[xr.Dataset]]
-) -> Numbers:
-    """The numbers of a picture.
+) -> PlotData:
+    """The data of a picture.
 
     Parameters
     ----------
     kind : one of KINDS
     dataset : a result, or a time history
-    choice : what of it
-    histories : follows the chosen point through time by each model
+    choice : which part of it
+    histories : integrates the chosen point again with each model, and returns the time histories
 
     Raises
     ------
-    UsageError : there is no such kind, or the result has not got what it needs
+    UsageError : there is no such kind, or the result does not contain what it needs
     """
     if kind not in KINDS:
         raise UsageError(f'--kind: no kind "{safe_text(kind)}"; {did_you_mean(kind, list(KINDS))}')
@@ -78,20 +78,18 @@ def numbers_of(
 
     if kind in MOTIONS:
         return MOTIONS[kind](histories(), equations=choice.equations)
-    common: dict[str, Any] = {
-        "x": choice.x, "sel": choice.sel, "models": choice.models, "log": choice.log,
-        "equations": choice.equations,
-    }  # fmt: skip
-    if kind == "map":
-        return maps.field_map(dataset, variable=choice.variable, y=choice.y, **common)
-    if kind == "validity":
-        return maps.validity(dataset, y=choice.y, **common)
-    draws = {"restitution": curves.restitution, "error": curves.error}.get(kind, curves.final_velocities)
-    return draws(dataset, **common)
+    functions: dict[str, Callable[[xr.Dataset, Choice], PlotData]] = {
+        "final-velocities": curves.velocity_curves,
+        "restitution": curves.restitution_curves,
+        "error": curves.error_curves,
+        "map": maps.field_map,
+        "validity": maps.validity_map,
+    }
+    return functions[kind](dataset, choice)
 
 
 def draw(
-    numbers: Numbers,
+    plot_data: PlotData,
     width: float | str | None = None,
     height: float | str | None = None,
     *,
@@ -105,42 +103,42 @@ def draw(
 
     Parameters
     ----------
-    numbers : see `numbers_of`
+    plot_data : see `plot_data_of`
     width, height : of the figure, see `impact.plots.style.length`; by default the width is that of rcParams where
         the user changed it, else 7.1 in, and the height suits what is drawn
     style : see `impact.plots.style.styled`
     title : write the title and the conditions
     labels : see `impact.plots.labels.checked_labels`
     points : measured points, see `impact.plots.data.read_points`; only curves have them
-    ax : draw into these axes of the user's, one for each panel
+    ax : the user's axes to draw into, one for each panel
 
     Raises
     ------
-    UsageError : an option is not right, or does not fit the picture
+    UsageError : an option is invalid, or does not apply to the picture
     """
     from . import curves, maps
     from .data import Points as Measured
     from .data import read_points
-    from .labels import checked_labels, plain, pretty_conditions
+    from .labels import checked_labels, escape_mathtext, pretty_conditions
     from .layout import Picture
     from .style import default_size, length, styled
 
     width, height = length(width, "--width"), length(height, "--height")
-    chosen = checked_labels(labels or {}, numbers.names)
+    chosen = checked_labels(labels or {}, plot_data.names)
     measured = points if points is None or isinstance(points, Measured) else read_points(points)
-    if measured is not None and not isinstance(numbers, curves.Lines):
+    if measured is not None and not isinstance(plot_data, curves.CurveData):
         raise UsageError(f"{measured.source}: measured points are drawn over curves, not over a map")
 
-    def drawn(all_axes: Sequence[Axes]) -> Any:
-        if isinstance(numbers, curves.Lines):
-            return curves.draw_lines(numbers, all_axes, chosen, measured)
-        return maps.draw_grids(numbers, all_axes, chosen)
+    def draw_panels(all_axes: Sequence[Axes]) -> Any:
+        if isinstance(plot_data, curves.CurveData):
+            return curves.draw_curves(plot_data, all_axes, chosen, measured)
+        return maps.draw_maps(plot_data, all_axes, chosen)
 
-    heading = chosen.get("title", plain(numbers.title))
-    count = len(numbers.panels) if isinstance(numbers, curves.Lines) or not numbers.closest else 2
+    heading = chosen.get("title", escape_mathtext(plot_data.title))
+    count = len(plot_data.panels) if isinstance(plot_data, curves.CurveData) or not plot_data.closest else 2
     if ax is not None:
-        all_axes = _given_axes(ax, count)
-        entries = drawn(all_axes)
+        all_axes = _check_axes(ax, count)
+        entries = draw_panels(all_axes)
         if title:
             all_axes[0].set_title(heading)
         if entries:
@@ -151,21 +149,21 @@ def draw(
     with styled(style):
         default_width, default_height = default_size()
         width, height = width or default_width, height or default_height
-        picture = Picture(width, *((heading, pretty_conditions(numbers.conditions)) if title else ()))
-        if isinstance(numbers, curves.Lines):
+        picture = Picture(width, *((heading, pretty_conditions(plot_data.conditions)) if title else ()))
+        if isinstance(plot_data, curves.CurveData):
             all_axes = list(picture.subplots(count, sharex=count > 1, squeeze=False).ravel())
-            body = count * width * (curves.HEIGHT if count == 1 else curves.HEIGHT_OF_SEVERAL) + 0.3
+            body = count * width * (curves.PANEL_ASPECT if count == 1 else curves.STACKED_PANEL_ASPECT) + 0.3
         else:
-            all_axes, body = maps.place_panels(picture, numbers, width, count)
-        picture.settle(body, height, drawn(all_axes))
+            all_axes, body = maps.place_panels(picture, plot_data, width, count)
+        picture.add_legend(body, height, draw_panels(all_axes))
     return picture
 
 
-def _given_axes(ax: Axes | Sequence[Axes], count: int) -> list[Axes]:
-    """The user's axes, as many as there are panels."""
+def _check_axes(ax: Axes | Sequence[Axes], count: int) -> list[Axes]:
+    """The user's axes as a list, one for each panel."""
     import numpy as np
 
-    given = list(np.ravel(np.asarray(ax, object)))
-    if len(given) != count:
-        raise UsageError(f"ax: got {len(given)} axes, expected {count}, one for each panel")
-    return given
+    all_axes = list(np.ravel(np.asarray(ax, object)))
+    if len(all_axes) != count:
+        raise UsageError(f"ax: got {len(all_axes)} axes, expected {count}, one for each panel")
+    return all_axes

@@ -1,4 +1,4 @@
-"""Words of a picture: symbols of variables in italics, labels of axes, names of laws, conditions."""
+"""Texts of a picture: symbols of variables in italics, labels of axes, names of laws, conditions."""
 
 from __future__ import annotations
 
@@ -21,28 +21,28 @@ GREEK = (
     "alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "kappa", "lambda", "mu", "nu", "xi",
     "rho", "sigma", "tau", "phi", "chi", "psi", "omega",
 )  # fmt: skip
-# letters of the paper for names that are words; those of v_post and abs_e_error stand for several variables
-SYMBOLS = {
+# symbols of the paper for names that are words; v_post and abs_e_error are each a label of several variables
+MATH_SYMBOLS = {
     "e_out": r"e_\mathrm{out}", "e_error": r"e_\mathrm{out}-e", "abs_e_error": r"|e_\mathrm{out}-e|",
     "v1_post": "v_1^+", "v2_post": "v_2^+", "v1_reference": "v_1^+", "v2_reference": "v_2^+", "v_post": "v_i^+",
     "v_i": "v_i", "v": r"\dot{\delta}", "peak_indentation": r"\delta_m", "permanent_indentation": r"\delta_p",
     "peak_force": "f_m", "stiffness": "K", "damping_ratio": r"\chi", "E1": "E_1", "E2": "E_2",
     "e_kinetic": r"e_\mathrm{kinetic}", "e_energetic": r"e_\mathrm{energetic}",
 }  # fmt: skip
-# what the paper calls the solution by impulse and momentum
+# name of the impulse-momentum solution in the paper
 REFERENCE = "Impulse-momentum"
 
 
 @cache
 def symbol(name: str) -> str:
-    r"""A variable as mathtext; empty where its name is no letter.
+    r"""A variable as mathtext; empty where its name is not a letter.
 
     >>> symbol("v1"), symbol("e_out"), symbol("tau_c"), symbol("contact_time"), symbol("maw.gamma")
     ('$v_1$', '$e_\\mathrm{out}$', '$\\tau_c$', '', '$\\gamma$')
     """
     name = name.rpartition(".")[2]
-    if name in SYMBOLS:
-        return f"${SYMBOLS[name]}$"
+    if name in MATH_SYMBOLS:
+        return f"${MATH_SYMBOLS[name]}$"
     parts = re.fullmatch(r"([A-Za-z]|[a-z]+)_?([A-Za-z]?|[0-9]*)", name)
     if parts is None or not (len(parts[1]) == 1 or parts[1] in GREEK):
         return ""
@@ -50,8 +50,8 @@ def symbol(name: str) -> str:
     return f"${letter}_{parts[2]}$" if parts[2] else f"${letter}$"
 
 
-def plain(text: str) -> str:
-    """Text of a file or a user as mathtext that shows it as it is."""
+def escape_mathtext(text: str) -> str:
+    """Text of a file or a user, escaped so that matplotlib shows it unchanged."""
     return text.replace("$", r"\$")
 
 
@@ -62,17 +62,21 @@ def checked_labels(labels: Mapping[str, str], shown: set[str]) -> dict[str, str]
     ----------
     labels : texts, which may have mathtext, by the name of an axis or a variable, the key of a law, "reference" or
         "title"
-    shown : the names of the picture; others of the program are passed over
+    shown : the names in the picture; other names of the program are ignored
 
     Raises
     ------
     UsageError : there is no such name, or a text is not valid mathtext
     """
-    known = {*shown, "reference", "title"}
-    elsewhere = {*(one.name for one in SCHEMA), *(name for name, _, _ in HISTORY_VARIABLES), *catalogue()}
+    shown_names = {*shown, "reference", "title"}
+    elsewhere = {
+        *(variable.name for variable in SCHEMA),
+        *(name for name, _, _ in HISTORY_VARIABLES),
+        *catalogue(),
+    }
     for key, text in labels.items():
-        if key not in known and key not in elsewhere and not is_input(key):
-            names = did_you_mean(key, sorted(known))
+        if key not in shown_names and key not in elsewhere and not is_input(key):
+            names = did_you_mean(key, sorted(shown_names))
             raise UsageError(f'--label: nothing in the picture is called "{safe_text(key)}"; {names}')
         try:
             MathTextParser("path").parse(text)
@@ -87,23 +91,25 @@ def axis_text(words: str, name: str, unit: str, labels: Mapping[str, str]) -> st
     if name in labels:
         words, letter = labels[name], ""
     else:
-        words, letter = plain(words[:1].upper() + words[1:]), symbol(name)
+        words, letter = escape_mathtext(words[:1].upper() + words[1:]), symbol(name)
     shown = f"({pretty(unit)})" if unit not in ("", "1") else ""
     return " ".join(filter(None, (words, NO_BREAK.join(filter(None, (letter, shown))))))
 
 
 def words_of(attributes: Mapping[object, object], name: str) -> str:
-    """The meaning of a variable in words; what stands after a semicolon is no label."""
+    """The meaning of a variable in words, up to a semicolon."""
     return safe_text(str(attributes.get("long_name") or name).partition(";")[0])
 
 
 def pretty(text: str) -> str:
-    r"""Units and numbers as they are printed.
+    r"""Units and numbers in print notation.
 
     >>> pretty("6e+09 N/m^1.5")
     '6·10⁹ N/m$^{1.5}$'
     """
-    text = re.sub(r"(?<![\w.])-?\d+(?:\.\d+)?e[+-]\d+", lambda found: typographic(float(found[0])), plain(text))
+    text = re.sub(
+        r"(?<![\w.])-?\d+(?:\.\d+)?e[+-]\d+", lambda match: typographic(float(match[0])), escape_mathtext(text)
+    )
     return re.sub(r"\^(-?[\d.]+|\([^)]*\))", r"$^{\1}$", text)
 
 
@@ -117,11 +123,11 @@ def pretty_conditions(text: str) -> str:
     return re.sub(rf"([A-Za-z][\w.-]*)(?={NO_BREAK}={NO_BREAK})", shown, pretty(text))
 
 
-def law_text(title: str, year: int, equation: str, own: str, *, numbered: bool) -> str:
-    """The name of a law: title, year, its own parameters, and where `numbered` its equation in the paper."""
+def law_text(title: str, year: int, equation: str, parameters: str, *, numbered: bool) -> str:
+    """The name of a law: title, year, its parameters, and where `numbered` its equation in the paper."""
     number = re.search(r"\(\d+\)(?:-\(\d+\))?$", equation) if numbered else None
     name = safe_text(with_year(title, year), 80)
-    return ", ".join(filter(None, (name, number[0] if number else "", own)))
+    return ", ".join(filter(None, (name, number[0] if number else "", parameters)))
 
 
 def label_axis(

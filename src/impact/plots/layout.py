@@ -1,4 +1,4 @@
-"""The figure of a picture: a title, panels and a legend, laid out by matplotlib at any size."""
+"""The figure of a picture: title, panels and legend, laid out by matplotlib at any size."""
 
 from __future__ import annotations
 
@@ -19,44 +19,45 @@ from matplotlib.text import Text
 
 from .style import encoded
 
-# between the parts of a picture, and its edges [in]
-GAP = 0.05
-# the most that a picture grows for its legend [in]
-PAGE = 9.5
-# of the height of a single row of panels, what the label of a low one may take; a word is broken above this [in]
-OF_ROW, LONGEST_WORD = 0.7, 2.4
-# of a layout at most
-PASSES = 4
-# of the length of an axis, what its label may take: the axis may become a little shorter
-SPARE = 0.93
-# of a picture whose height is given, the largest part that its legend takes
+# space between the parts of a picture, and at its edges
+GAP_INCHES = 0.05
+# height up to which a picture grows for its legend
+MAX_HEIGHT_INCHES = 9.5
+# fraction of the height of a single row of panels that the label of its vertical axis may take
+LABEL_SHARE_OF_ROW = 0.7
+# a longer word is broken
+MAX_WORD_INCHES = 2.4
+MAX_LAYOUT_PASSES = 4
+# fraction of the length of an axis that its label may take: the layout may make the axis a little shorter
+LABEL_SHARE_OF_AXIS = 0.93
+# largest fraction of a picture of fixed height that its legend takes
 LEGEND_SHARE = 0.5
-# a legend of more entries has smaller letters
-MANY = 16
+# a legend with more entries has smaller letters
+MANY_ENTRIES = 16
 
 
 class Picture(Figure):
-    """A figure with a title, conditions below it and a legend at its foot, which fit it at any size.
+    """A figure with a title, conditions below it and a legend at the bottom, which fit it at any size.
 
-    Unlike a plain figure it shows itself in a notebook, also where no backend of matplotlib was chosen.
+    A notebook shows it even if no backend of matplotlib is selected.
     """
 
     def __init__(self, width: float, title: str = "", conditions: str = "") -> None:
         super().__init__((width, width), layout=Layout())
         FigureCanvasAgg(self)
-        looks: tuple[dict[str, Any], ...] = (
+        styles: tuple[dict[str, Any], ...] = (
             {"fontweight": "bold", "fontsize": "large"},
             {"fontsize": "small", "color": "#555555"},
         )
-        texts = zip((title, conditions), looks, strict=True)
-        self.header = [self.text(0.0, 1.0, text, va="top", **look) for text, look in texts if text]
+        texts = zip((title, conditions), styles, strict=True)
+        self.header = [self.text(0.0, 1.0, text, va="top", **style) for text, style in texts if text]
         self.entries: list[tuple[Artist, str]] = []
         self.shared: tuple[Text, ...] = ()
-        # a later change of the size makes the legend again, in the style of now
+        # a later change of the size makes the legend again, in the present style
         self.style = {
             key: value for key, value in matplotlib.rcParams.items() if key.startswith(("legend", "font"))
         }
-        # texts that were broken into lines, as they were and as they are
+        # texts that were broken into lines: original text and present text
         self.fitted: dict[Text, tuple[str, str]] = {}
 
     def _repr_png_(self) -> bytes:
@@ -65,33 +66,33 @@ class Picture(Figure):
     def set_size_inches(self, w: Any, h: Any = None, forward: bool = True) -> None:
         before = self.get_figwidth()
         super().set_size_inches(w, h, forward)
-        # a change of the resolution comes here too
+        # matplotlib also calls this method when the resolution changes
         if self.get_figwidth() != before and self.entries:
             self.place_legend(self.entries)
 
-    def settle(self, body: float, height: float | None, entries: Sequence[tuple[Artist, str]]) -> None:
+    def add_legend(self, body: float, height: float | None, entries: Sequence[tuple[Artist, str]]) -> None:
         """Add the legend and choose the height.
 
         Parameters
         ----------
-        body : height of the panels [in], where none is given; of a tall legend they are as high
-        height : of the figure [in], where the user chose one
+        body : height of the panels [in] where `height` is None; with a taller legend they get its height
+        height : of the figure [in], if the user chose one
         entries : handles and names of the legend
         """
         width, shown = self.get_figwidth(), list(entries)
         legend = self.place_legend(shown)
         if height is None:
-            most = min(legend, PAGE / 2.0)
-            height = GAP + self.place_header() + max(body, most) + most
+            most = min(legend, MAX_HEIGHT_INCHES / 2.0)
+            height = GAP_INCHES + self.place_header() + max(body, most) + most
         while legend > LEGEND_SHARE * height and len(shown) > 1:
-            # as many entries as there is room for, and the number of the others
+            # show the entries that fit, and the number of the others
             shown = shown[: max(1, int(0.9 * len(shown)))]
             more = (Line2D([], [], linestyle=""), f"and {len(entries) - len(shown)} more")
             legend = self.place_legend([*shown, more])
         self.set_size_inches(width, height)
 
     def place_legend(self, entries: Sequence[tuple[Artist, str]]) -> float:
-        """Put the legend at the foot in as many columns as fit; returns its height [in]."""
+        """Put the legend at the bottom in as many columns as fit; returns its height [in]."""
         for legend in list(self.legends):
             legend.remove()
         self.entries = list(entries)
@@ -101,9 +102,9 @@ class Picture(Figure):
         return self.legend_height()
 
     def _place_legend(self) -> None:
-        room = self.bbox.width - GAP * self.dpi
+        room = self.bbox.width - GAP_INCHES * self.dpi
         columns = max(1, int(room / self._legend(1).get_window_extent(self.renderer).width))
-        # columns of short names are narrower than that of all: perhaps there is room for another
+        # columns of short names are narrower than a single column: another one may fit
         for number in range(min(columns + 1, len(self.entries)), 0, -1):
             self.legends[0].remove()
             if self._legend(number).get_window_extent(self.renderer).width <= room:
@@ -111,21 +112,22 @@ class Picture(Figure):
 
     @property
     def renderer(self) -> RendererBase:
-        """What measures text at the present resolution; a text keeps the one that it was measured by before."""
+        """The renderer that measures text at the present resolution; a text would keep the one used before."""
         return self._get_renderer()  # type: ignore[attr-defined, no-any-return]
 
     def legend_height(self) -> float:
         """The height of the legend [in]."""
         return sum(
-            float(legend.get_window_extent(self.renderer).height / self.dpi) + GAP for legend in self.legends
+            float(legend.get_window_extent(self.renderer).height / self.dpi) + GAP_INCHES
+            for legend in self.legends
         )
 
     def _legend(self, columns: int) -> Legend:
-        """The legend in so many columns; names that are wider than the figure have several lines."""
-        look: dict[str, Any] = {"fontsize": "x-small"} if len(self.entries) > MANY else {}
+        """The legend in a number of columns; names wider than the figure are broken into lines."""
+        style: dict[str, Any] = {"fontsize": "x-small"} if len(self.entries) > MANY_ENTRIES else {}
         handles, names = zip(*self.entries, strict=True)
         legend = self.legend(
-            handles, names, loc="lower center", ncols=columns, borderaxespad=0.3, columnspacing=1.2, **look
+            handles, names, loc="lower center", ncols=columns, borderaxespad=0.3, columnspacing=1.2, **style
         )
         room = self.bbox.width - 4.5 * float(legend.get_texts()[0].get_fontsize()) * self.dpi / 72.0
         for text in legend.get_texts():
@@ -133,7 +135,7 @@ class Picture(Figure):
         return legend
 
     def share_labels(self, x_label: str, y_label: str) -> None:
-        """Write labels of the axes once for all panels."""
+        """Write labels shared by the axes of all panels."""
         size = matplotlib.rcParams["axes.labelsize"]
         below = self.text(0.5, 0.0, x_label, ha="center", va="bottom", fontsize=size)
         self.shared = (
@@ -143,7 +145,7 @@ class Picture(Figure):
 
     def place_header(self) -> float:
         """Put the title and the conditions at the top, in lines that fit; returns their height [in]."""
-        gap = GAP * self.dpi
+        gap = GAP_INCHES * self.dpi
         down = self.bbox.height - gap
         for text in self.header:
             self.fit(text, self.bbox.width - 2.0 * gap)
@@ -152,9 +154,9 @@ class Picture(Figure):
         return float((self.bbox.height - down) / self.dpi)
 
     def place_around(self) -> tuple[float, float, float]:
-        """Place what stands around the panels; returns the parts of the figure at the left, below and above."""
+        """Place the texts around the panels; returns the fractions that they take left, below, above."""
         width, height = self.bbox.width, self.bbox.height
-        gap, above = GAP * self.dpi, self.place_header() * self.dpi
+        gap, above = GAP_INCHES * self.dpi, self.place_header() * self.dpi
         left, below = 0.0, self.legend_height() * self.dpi
         if self.shared:
             x_label, y_label = self.shared
@@ -167,25 +169,30 @@ class Picture(Figure):
         return left / width, below / height, above / height
 
     def fit_labels(self, height: float) -> list[str]:
-        """Break the labels and titles of all axes to the lengths of these; returns their texts.
+        """Break the labels and titles of all axes to the length of their axis; returns their texts.
 
-        Where the axes stand in a single row of some height [px], a label may be longer than a low one.
+        In a single row of panels of a height [px] a vertical label may be longer than its axis.
         """
         labels = []
         rows = len({round(axes.get_position().y0, 1) for axes in self.axes})
-        least = OF_ROW * height if rows == 1 else 0.0
+        least = LABEL_SHARE_OF_ROW * height if rows == 1 else 0.0
         for axes in self.axes:
             box = axes.get_window_extent()
             titles = [text for text in axes.get_children() if isinstance(text, Text) and text not in axes.texts]
             for text in (*titles, axes.xaxis.label, axes.yaxis.label):
-                self.fit(text, max(SPARE * box.height, least) if text is axes.yaxis.label else SPARE * box.width)
+                self.fit(
+                    text,
+                    max(LABEL_SHARE_OF_AXIS * box.height, least)
+                    if text is axes.yaxis.label
+                    else LABEL_SHARE_OF_AXIS * box.width,
+                )
                 labels.append(text.get_text())
         return labels
 
     def fit(self, text: Text, room: float) -> None:
-        """Break a text at its spaces into lines no longer than a number of pixels.
+        """Break a text at its spaces into lines no longer than `room` [px].
 
-        Of what is one word only one that no language has is broken.
+        A single word is broken only if it is longer than MAX_WORD_INCHES.
         """
         whole, shown = self.fitted.get(text, ("", ""))
         if not shown or text.get_text() != shown:
@@ -205,7 +212,7 @@ class Picture(Figure):
                 lines[-1] = longer
                 continue
             letters = len(word)
-            if "$" not in word and length(word) > max(room, LONGEST_WORD * self.dpi):
+            if "$" not in word and length(word) > max(room, MAX_WORD_INCHES * self.dpi):
                 letters = max(1, int(len(word) * room / length(word)))
             lines += [word[start : start + letters] for start in range(0, len(word), letters)]
         text.set_text("\n".join(filter(None, lines)))
@@ -215,8 +222,8 @@ class Picture(Figure):
 class Layout(ConstrainedLayoutEngine):
     """Constrained layout below the title of a picture, with every label broken to the length of its axis.
 
-    The solver of the layout is not the same to the last digit each time: positions are rounded, so that a picture
-    has the same bytes in any process.
+    The last digits of the solver's positions differ between processes: positions are rounded, so that a picture
+    has the same bytes in every process.
     """
 
     def execute(self, fig: Figure) -> None:
@@ -224,18 +231,18 @@ class Layout(ConstrainedLayoutEngine):
         fig.fitted = {text: texts for text, texts in fig.fitted.items() if text.figure is not None}
         left, below, above = fig.place_around()
         self.set(rect=(left, below, 1.0 - left, 1.0 - above - below))
-        # the axes have their sizes of before, and become shorter where a label gets another line
+        # axes become shorter where a label gets another line, which may change the lines again
         before: list[str] = []
-        for _ in range(PASSES):
+        for _ in range(MAX_LAYOUT_PASSES):
             labels = fig.fit_labels((1.0 - above - below) * fig.bbox.height)
             if labels == before:
                 break
             with warnings.catch_warnings():
-                # of labels that leave no room it warns; the picture is drawn all the same
+                # it warns where labels leave no space for the axes; the picture is drawn anyway
                 warnings.filterwarnings("ignore", "constrained_layout not applied", UserWarning)
                 super().execute(fig)
             before = labels
         for axes in fig.axes:
             axes.set_position(np.round(axes.get_position(original=True).bounds, 3))
-            # to set a position takes the axes out of the layout
+            # setting a position takes the axes out of the layout
             axes.set_in_layout(True)

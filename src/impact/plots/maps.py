@@ -1,4 +1,4 @@
-"""Pictures over two axes: a variable of each model, and which model is closest to e; and their drawing."""
+"""Maps over two axes: a variable of each model, or the model closest to e; their data and their drawing."""
 
 from __future__ import annotations
 
@@ -22,47 +22,65 @@ from ..errors import UsageError, did_you_mean
 from ..formatting import heading, percentage
 from ..results.schema import plain_unit
 from ..text import safe_text
-from .curves import label_of
+from .curves import model_label
 from .labels import REFERENCE, label_axis, number_axis, pretty_conditions, symbol, words_of
 from .layout import Picture
-from .slices import NO_SWEEP, Selection, conditions_of, read, take_plane
-from .style import is_geometric, looks_of
+from .slices import NO_SWEEP, conditions_of, read, take_plane
+from .style import is_geometric, model_styles
 
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = NDArray[np.float64]
-Rows = tuple[tuple[float, ...], ...]
-# at most so many panels are drawn
-PANELS = 12
-# errors this close are equal; one below the second is the solver's, and has no place on a logarithmic scale
-TIE, SMALLEST = 1e-9, 1e-9
-# more cells than these are stored as an image
-LARGE = 2_000
+    from .kinds import Choice
+
+FloatArray = NDArray[np.float64]
+# a value at each y and x
+Plane = tuple[tuple[float, ...], ...]
+MAX_PANELS = 12
+# errors that differ by less are equal
+TIE_TOLERANCE = 1e-9
+# the smallest error on a logarithmic scale: smaller ones are errors of the solver
+MIN_DRAWN_DISTANCE = 1e-9
+# a map of more cells is stored as an image
+MAX_VECTOR_CELLS = 2_000
 # errors that have a contour line, and its dashes
 CONTOURS: dict[float, Any] = {0.01: ":", 0.05: "-"}
 FAILED: dict[str, Any] = {"facecolor": "#ebebeb", "edgecolor": "#b4b4b4", "hatch": "/////", "linewidth": 0}
 NO_VALUE = "failed or not defined"
-# inches: a panel of a map and one of the closest model are so wide at least; what stands beside the panels; the
-# height of a panel with its title
-NARROW, NARROW_CLOSEST, BESIDE, LOW, HIGH = 1.6, 3.0, 1.35, 1.7, 3.2
+# least width of a panel of a map, and of one of the closest model [in]
+MIN_PANEL_WIDTH, MIN_CLOSEST_PANEL_WIDTH = 1.6, 3.0
+# width of what is beside the panels: labels and colour bar [in]
+MARGIN_WIDTH = 1.35
+# height of a panel with its title [in]
+MIN_ROW_HEIGHT, MAX_ROW_HEIGHT = 1.7, 3.2
 
 
 @dataclass(frozen=True)
 class Field:
-    """One panel: its title, the model's key (None for the reference), and a value by y and x."""
+    """One panel: its title, the key of its model (None for the reference), and a value at each y and x."""
 
     label: str
     model: str | None
-    values: Rows
+    values: Plane
 
 
 @dataclass(frozen=True)
-class Grids:
-    """The numbers of a picture: panels over the same two axes, and what is not drawn.
+class MapData:
+    """The data of a picture: panels over the same two axes, and what is not drawn.
 
-    `labels` and `units` are those of x, y and the variable; `left_out` the models without a panel. `closest` has
-    by y and x the key of the model with the smallest |e_error|, `distance` that number; a map has neither.
+    Parameters
+    ----------
+    title, conditions : texts above the panels
+    variable, x, y : names in the result
+    labels, units : of x, y and the variable
+    x_values, y_values : values of the axes, in SI
+    x_log, y_log : whether the axis is logarithmic
+    signed : whether the variable has values of both signs
+    panels : values of the variable
+    not_drawn : values of the axes without a position
+    left_out : keys of the models without a panel
+    closest : at each y and x, the key of the model with the smallest |e_error|; empty for a map
+    distance : at each y and x, that |e_error|; empty for a map
     """
 
     title: str
@@ -81,27 +99,27 @@ class Grids:
     not_drawn: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
     closest: tuple[tuple[str | None, ...], ...] = ()
-    distance: Rows = ()
+    distance: Plane = ()
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """The names of what `rows` gives."""
+        """The names of the columns of `rows`."""
         return ("model", self.x, self.y, self.variable, *(("closest", "abs_e_error") if self.closest else ()))
 
     @property
     def shares(self) -> dict[str | None, float]:
-        """The part of all cells where each model is closest, in the result's order; None is where none is."""
+        """The fraction of cells where each model is closest, in the order of the result; None: where none is."""
         count = Counter(key for row in self.closest for key in row)
         keys = (*(panel.model for panel in self.panels), None)
         return {key: count[key] / count.total() for key in keys if count[key]}
 
     @property
     def names(self) -> set[str]:
-        """What a label can be given to."""
+        """The axes, variable and models whose text a user can replace."""
         return {self.x, self.y, self.variable, *(panel.model for panel in self.panels if panel.model)}
 
     def table(self) -> dict[str, Sequence[object]]:
-        """The numbers behind the picture by name, a column for each model; x runs slowest."""
+        """The values by name of a column, one column per model; x varies slowest."""
         x_unit, y_unit, unit = self.units
         columns: dict[str, Sequence[object]] = {
             heading(self.x, unit=x_unit): np.repeat(self.x_values, len(self.y_values)).tolist(),
@@ -115,7 +133,7 @@ class Grids:
         return columns
 
     def rows(self) -> Iterator[tuple[str | float, ...]]:
-        """The numbers behind the picture, one point a row."""
+        """The values, one point per row; for the names of the columns see `columns`."""
         for panel in self.panels:
             for i, x in enumerate(self.x_values):
                 for j, y in enumerate(self.y_values):
@@ -123,73 +141,62 @@ class Grids:
                     yield (panel.model or "", x, y, panel.values[j][i], *best)
 
 
-def field_map(
-    dataset: xr.Dataset, *, variable: str = "e_error", x: str | None = None, y: str | None = None,
-    sel: Selection = None, models: Sequence[str] | None = None, log: str = "", equations: bool = False,
-) -> Grids:  # fmt: skip
-    """A variable over two axes, for each model.
+def field_map(dataset: xr.Dataset, choice: Choice) -> MapData:
+    """The data of a map: a variable over two axes, for each model.
 
     Parameters
     ----------
     dataset : a result
-    variable : its name
-    x, y : the axes; by default e, else the first numeric axis, and the next one
-    sel : values of other axes, by name; an axis that is not named shows its first value
-    models : keys of the models to show; by default all, of which the first 12 are drawn
-    log : axes that are logarithmic, of "x" and "y"; one that is spaced so is in any case
-    equations : name the laws with the numbers of their equations in the paper
+    choice : its variable, axes and models, of which at most MAX_PANELS are drawn; an axis whose values are spaced
+        evenly in their logarithm is logarithmic
 
     Raises
     ------
-    UsageError : the result has not got what is asked for, or not two axes
+    UsageError : the result does not contain what `choice` selects, or does not have two axes
     """
-    numbers = _numbers("map", dataset, variable, x, y, sel, models, log, equations, PANELS)
-    if not numbers.left_out:
-        return numbers
-    count = f"the first {PANELS} of {PANELS + len(numbers.left_out)} models"
-    return replace(numbers, conditions="; ".join(filter(None, (numbers.conditions, count))))
+    plot_data = _map_data("map", dataset, choice.variable, choice, MAX_PANELS)
+    if not plot_data.left_out:
+        return plot_data
+    count = f"the first {MAX_PANELS} of {MAX_PANELS + len(plot_data.left_out)} models"
+    return replace(plot_data, conditions="; ".join(filter(None, (plot_data.conditions, count))))
 
 
-def validity(
-    dataset: xr.Dataset, *, x: str | None = None, y: str | None = None, sel: Selection = None,
-    models: Sequence[str] | None = None, log: str = "", equations: bool = False,
-) -> Grids:  # fmt: skip
-    """Over two axes, which model has the smallest |e_error|, and how small it is; see `field_map`.
+def validity_map(dataset: xr.Dataset, choice: Choice) -> MapData:
+    """The model with the smallest |e_error| over two axes, and that error; see `field_map`.
 
-    Of models that are equally close (to 1e-9) it is the first in the result.
+    Of models whose errors are equal within TIE_TOLERANCE it is the first in the result.
     """
-    numbers = _numbers("validity", dataset, "e_error", x, y, sel, models, log, equations)
-    error = np.abs([panel.values for panel in numbers.panels])
+    plot_data = _map_data("validity", dataset, "e_error", choice)
+    error = np.abs([panel.values for panel in plot_data.panels])
     error[np.isnan(error)] = np.inf
-    # the first place where it is so
-    place = np.argmax(error <= error.min(axis=0) + TIE, axis=0)
-    closest = np.array([panel.model for panel in numbers.panels], object)[place]
-    distance = np.take_along_axis(error, place[None], axis=0)[0]
-    unknown = np.isinf(distance)
-    closest[unknown], distance[unknown] = None, np.nan
-    return replace(numbers, closest=_rows(closest), distance=_rows(distance))
+    # argmax gives the first model of which this is true
+    best = np.argmax(error <= error.min(axis=0) + TIE_TOLERANCE, axis=0)
+    closest = np.array([panel.model for panel in plot_data.panels], object)[best]
+    distance = np.take_along_axis(error, best[None], axis=0)[0]
+    no_value = np.isinf(distance)
+    closest[no_value], distance[no_value] = None, np.nan
+    return replace(plot_data, closest=_nested_tuples(closest), distance=_nested_tuples(distance))
 
 
-def _rows(values: NDArray[Any]) -> tuple[Any, ...]:
+def _nested_tuples(values: NDArray[Any]) -> tuple[Any, ...]:
     return tuple(map(tuple, values.tolist()))
 
 
-def _numbers(
-    kind: str, dataset: xr.Dataset, variable: str, x: str | None, y: str | None,
-    sel: Selection, models: Sequence[str] | None, log: str, equations: bool, most: int | None = None,
-) -> Grids:  # fmt: skip
-    """The panels of the models, at most so many; of the others nothing is read."""
+def _map_data(
+    kind: str, dataset: xr.Dataset, variable: str, choice: Choice, max_panels: int | None = None
+) -> MapData:
+    """The panels of a kind of map; of more than `max_panels` models the rest is not read."""
     if "model" not in dataset.dims:
         raise UsageError(NO_SWEEP)
     if variable not in dataset.data_vars:
-        known = did_you_mean(variable, [str(name) for name in dataset.data_vars])
-        raise UsageError(f'no variable "{safe_text(variable)}" in this result; {known}')
-    data, x, y, not_drawn = take_plane(dataset, kind, x, y, sel, models)
+        hint = did_you_mean(variable, [str(name) for name in dataset.data_vars])
+        raise UsageError(f'no variable "{safe_text(variable)}" in this result; {hint}')
+    data, x, y, not_drawn = take_plane(dataset, kind, choice.x, choice.y, choice.sel, choice.models)
     field, plane = data[variable], (*data[y].dims, *data[x].dims)
     left_out: tuple[str, ...] = ()
     if "model" in field.dims:
-        left_out = tuple(map(str, field["model"].values[most:].tolist())) if most is not None else ()
-        field = field.isel(model=slice(most))
+        left_out = tuple(map(str, field["model"].values[max_panels:].tolist())) if max_panels is not None else ()
+        field = field.isel(model=slice(max_panels))
     what = safe_text(f"{variable} over {x} and {y}")
     if field.dtype.kind not in "iuf" or not set(plane) <= set(field.dims):
         raise UsageError(f"no picture of {what}: it is not a number at each point")
@@ -201,37 +208,37 @@ def _numbers(
     if not finite.size:
         raise UsageError(f"no picture of {what}: it has no value there")
     for letter, name in (("x", x), ("y", y)):
-        if letter in log and data[name].values[0] <= 0.0:
+        if letter in choice.log and data[name].values[0] <= 0.0:
             raise UsageError(f"--log {letter}: {safe_text(name)} has values that are not above 0")
-    names: list[tuple[str, str | None]] = [(f"{REFERENCE} (6), (7)" if equations else REFERENCE, None)]
+    names: list[tuple[str, str | None]] = [(f"{REFERENCE} (6), (7)" if choice.equations else REFERENCE, None)]
     if "model" in field.dims:
-        by_model = (data.isel(model=place) for place in range(field.sizes["model"]))
-        names = [(label_of(part, numbered=equations), str(part["model"].item())) for part in by_model]
+        by_model = (data.isel(model=index) for index in range(field.sizes["model"]))
+        names = [(model_label(part, numbered=choice.equations), str(part["model"].item())) for part in by_model]
 
-    own = safe_text(str(dataset.attrs.get("title", "")), 140)
+    heading_text = safe_text(str(dataset.attrs.get("title", "")), 140)
     x_label, y_label, label = (words_of(data[name].attrs, name) for name in (x, y, variable))
     x_unit, y_unit, unit = (
         safe_text(plain_unit(str(data[name].attrs.get("units", "1")))) for name in (x, y, variable)
     )
     label = "Error" if variable == "e_error" else label[:1].upper() + label[1:]
     title = safe_text(f"{label if kind == 'map' else 'Closest model'} over {x} and {y}")
-    return Grids(
-        f"{title}: {own}" if own else title, conditions_of(data, x, y), variable, x, y,
+    return MapData(
+        f"{title}: {heading_text}" if heading_text else title, conditions_of(data, x, y), variable, x, y,
         labels=(x_label, y_label, label),
         units=(x_unit, y_unit, unit),
         x_values=tuple(data[x].values.tolist()),
         y_values=tuple(data[y].values.tolist()),
-        x_log="x" in log or is_geometric(data[x].values),
-        y_log="y" in log or is_geometric(data[y].values),
+        x_log="x" in choice.log or is_geometric(data[x].values),
+        y_log="y" in choice.log or is_geometric(data[y].values),
         # errors, and what has values of both signs, not by rounding alone
         signed=variable.endswith(("_error", "energy_residual")) or bool(-finite.min() > 1e-3 * finite.max() > 0.0),
-        panels=tuple(Field(*name, _rows(part)) for name, part in zip(names, values, strict=True)),
+        panels=tuple(Field(*name, _nested_tuples(part)) for name, part in zip(names, values, strict=True)),
         not_drawn=not_drawn,
         left_out=left_out,
     )  # fmt: skip
 
 
-def edges_of(values: Sequence[float], log: bool) -> Array:
+def edges_of(values: Sequence[float], log: bool) -> FloatArray:
     """The edges of cells, half way between their values, of shape (values + 1,).
 
     >>> edges_of([0.0, 1.0, 3.0], log=False).tolist(), edges_of([1.0, 100.0], log=True).round(9).tolist()
@@ -243,117 +250,138 @@ def edges_of(values: Sequence[float], log: bool) -> Array:
     return np.asarray(np.exp(edges) if log else edges)
 
 
-def panels_per_row(numbers: Grids, width: float) -> int:
-    """How many panels stand beside each other in a figure of some width [in], with as many in each row."""
-    count = 2 if numbers.closest else len(numbers.panels)
-    fit = max(1, int(width / (NARROW_CLOSEST if numbers.closest else NARROW)))
+def panels_per_row(plot_data: MapData, width: float) -> int:
+    """The number of panels in each row of a figure of a width [in]; the rows have nearly equal numbers."""
+    count = 2 if plot_data.closest else len(plot_data.panels)
+    fit = max(1, int(width / (MIN_CLOSEST_PANEL_WIDTH if plot_data.closest else MIN_PANEL_WIDTH)))
     return -(-count // -(-count // fit))
 
 
-def height_of(numbers: Grids, width: float) -> float:
-    """The height of a row of panels in a figure of some width [in]."""
-    return float(min(max(0.9 * (width - BESIDE) / panels_per_row(numbers, width), LOW), HIGH))
+def row_height(plot_data: MapData, width: float) -> float:
+    """The height [in] of a row of panels in a figure of a width [in]."""
+    return float(
+        min(max(0.9 * (width - MARGIN_WIDTH) / panels_per_row(plot_data, width), MIN_ROW_HEIGHT), MAX_ROW_HEIGHT)
+    )
 
 
-def draw_grids(numbers: Grids, all_axes: Sequence[Axes], labels: Mapping[str, str]) -> list[tuple[Artist, str]]:
+def draw_maps(plot_data: MapData, all_axes: Sequence[Axes], labels: Mapping[str, str]) -> list[tuple[Artist, str]]:
     """Draw panels over two axes.
 
     Parameters
     ----------
-    numbers : what is drawn
-    all_axes : for each panel
-    labels : texts in place of those of axes and laws, by name
+    plot_data : the panels
+    all_axes : axes of each panel
+    labels : texts that replace those of axes and laws, by name
 
     Returns
     -------
-    handles and names of a legend
+    handles and names of the legend
     """
-    x, y = edges_of(numbers.x_values, numbers.x_log), edges_of(numbers.y_values, numbers.y_log)
-    draw = _draw_closest if numbers.closest else _draw_fields
-    mesh, entries = draw(numbers, all_axes, x, y, labels)
-    names = [labels.get(panel.model or "reference", pretty_conditions(panel.label)) for panel in numbers.panels]
-    titles = ["Closest model", "Its absolute error"] if numbers.closest else names
+    x, y = edges_of(plot_data.x_values, plot_data.x_log), edges_of(plot_data.y_values, plot_data.y_log)
+    draw = _draw_closest if plot_data.closest else _draw_fields
+    mesh, entries = draw(plot_data, all_axes, x, y, labels)
+    names = [labels.get(panel.model or "reference", pretty_conditions(panel.label)) for panel in plot_data.panels]
+    titles = ["Closest model", "Its absolute error"] if plot_data.closest else names
     for axes, title in zip(all_axes, titles, strict=True):
         axes.set_title(title)
         axes.grid(False)
-        axes.set(xscale="log" if numbers.x_log else "linear", yscale="log" if numbers.y_log else "linear")
+        axes.set(xscale="log" if plot_data.x_log else "linear", yscale="log" if plot_data.y_log else "linear")
         axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
-        for axis, place, name, values, log in (
-            (axes.xaxis, 0, numbers.x, numbers.x_values, numbers.x_log),
-            (axes.yaxis, 1, numbers.y, numbers.y_values, numbers.y_log),
+        for axis, index, name, values, log in (
+            (axes.xaxis, 0, plot_data.x, plot_data.x_values, plot_data.x_log),
+            (axes.yaxis, 1, plot_data.y, plot_data.y_values, plot_data.y_log),
         ):
             largest = max(map(abs, values))
-            label_axis(axis, numbers.labels[place], name, numbers.units[place], largest, labels, log=log)
+            label_axis(axis, plot_data.labels[index], name, plot_data.units[index], largest, labels, log=log)
     if len(all_axes) > 1 and isinstance(figure := all_axes[0].figure, Picture):
         figure.share_labels(all_axes[0].get_xlabel(), all_axes[0].get_ylabel())
         for axes in all_axes:
             axes.set(xlabel="", ylabel="")
-    bar_axes = all_axes[-1:] if numbers.closest else list(all_axes)
+    bar_axes = all_axes[-1:] if plot_data.closest else list(all_axes)
     grid = all_axes[0].get_gridspec()
-    rows = grid.nrows if grid is not None and not numbers.closest else 1
-    more = "min" if numbers.closest and np.nanmin(numbers.distance) < SMALLEST else "neither"
+    rows = grid.nrows if grid is not None and not plot_data.closest else 1
+    more = "min" if plot_data.closest and np.nanmin(plot_data.distance) < MIN_DRAWN_DISTANCE else "neither"
     bar = all_axes[0].figure.colorbar(mesh, ax=bar_axes, extend=more, pad=0.02, aspect=25 * rows)
-    if numbers.closest:
+    if plot_data.closest:
         number_axis(bar.ax.yaxis, log=True)
     else:
         largest = max(map(abs, mesh.get_clim()))
-        label_axis(bar.ax.yaxis, numbers.labels[2], numbers.variable, numbers.units[2], largest, labels, log=False)
+        label_axis(
+            bar.ax.yaxis, plot_data.labels[2], plot_data.variable, plot_data.units[2], largest, labels, log=False
+        )
     return entries
 
 
 def _draw_fields(
-    numbers: Grids, axes: Sequence[Axes], x: Array, y: Array, labels: Mapping[str, str]
+    plot_data: MapData, axes: Sequence[Axes], x: FloatArray, y: FloatArray, labels: Mapping[str, str]
 ) -> tuple[QuadMesh, list[tuple[Artist, str]]]:
-    """The panels of a map; returns what the colour bar is of, and what the legend holds."""
-    values = np.ma.masked_invalid([panel.values for panel in numbers.panels])
+    """Draw the panels of a map; returns what the colour bar shows, and handles and names of the legend."""
+    values = np.ma.masked_invalid([panel.values for panel in plot_data.panels])
     low, top = float(values.min()), float(values.max())
-    if numbers.signed:
+    if plot_data.signed:
         low, top = -max(abs(low), abs(top)), max(abs(low), abs(top))
     norm = Normalize(low, top) if low < top else Normalize(low - 0.5, low + 0.5)
-    return _draw_values(numbers, axes, x, y, values, norm, "RdBu_r" if numbers.signed else "viridis")
+    return _draw_values(plot_data, axes, x, y, values, norm, "RdBu_r" if plot_data.signed else "viridis")
 
 
 def _draw_closest(
-    numbers: Grids, axes: Sequence[Axes], x: Array, y: Array, labels: Mapping[str, str]
+    plot_data: MapData, axes: Sequence[Axes], x: FloatArray, y: FloatArray, labels: Mapping[str, str]
 ) -> tuple[QuadMesh, list[tuple[Artist, str]]]:
-    """The two panels of the closest model; returns the same."""
+    """Draw the two panels of the closest model; returns the same."""
     names = {
-        panel.model: labels.get(panel.model or "", pretty_conditions(panel.label)) for panel in numbers.panels
+        panel.model: labels.get(panel.model or "", pretty_conditions(panel.label)) for panel in plot_data.panels
     }
-    looks = looks_of([panel.model for panel in numbers.panels if panel.model in numbers.shares and panel.model])
-    closest = np.array(numbers.closest, object)
+    styles = model_styles(
+        [panel.model for panel in plot_data.panels if panel.model in plot_data.shares and panel.model]
+    )
+    closest = np.array(plot_data.closest, object)
     entries: list[tuple[Artist, str]] = []
-    for key, share in numbers.shares.items():
-        look = FAILED
+    for key, share in plot_data.shares.items():
+        style = FAILED
         if key:
-            own = looks[key]
-            look = {"facecolor": own["color"], "hatch": own["hatch"], "edgecolor": "white", "linewidth": 0}
-        axes[0].add_patch(_cells(x, y, closest == key, look))
-        entries.append((Patch(**look), f"{percentage(share)}  {names[key] if key else NO_VALUE}"))
-    shown = np.ma.maximum(np.ma.masked_invalid(numbers.distance), SMALLEST)
+            model_style = styles[key]
+            style = {
+                "facecolor": model_style["color"],
+                "hatch": model_style["hatch"],
+                "edgecolor": "white",
+                "linewidth": 0,
+            }
+        axes[0].add_patch(_merged_cells(x, y, closest == key, style))
+        entries.append((Patch(**style), f"{percentage(share)}  {names[key] if key else NO_VALUE}"))
+    shown = np.ma.maximum(np.ma.masked_invalid(plot_data.distance), MIN_DRAWN_DISTANCE)
     norm = LogNorm(shown.min(), max(shown.max(), 10.0 * shown.min()))
-    mesh, rest = _draw_values(numbers, axes[1:], x, y, shown[None], norm, "viridis")
+    mesh, rest = _draw_values(plot_data, axes[1:], x, y, shown[None], norm, "viridis")
     return mesh, entries + [(artist, name) for artist, name in rest if name != NO_VALUE]
 
 
 def _draw_values(
-    numbers: Grids, axes: Sequence[Axes], x: Array, y: Array, values: Any, norm: Normalize, colours: str
+    plot_data: MapData,
+    axes: Sequence[Axes],
+    x: FloatArray,
+    y: FloatArray,
+    values: Any,
+    norm: Normalize,
+    colours: str,
 ) -> tuple[QuadMesh, list[tuple[Artist, str]]]:
-    """Values, of shape (axes, y, x), as colours with contour lines; returns the same."""
-    name = symbol("abs_e_error" if numbers.closest else "e_error") + (" = " if numbers.closest else " = ±")
+    """Draw values, of shape (axes, y, x), as colours with contour lines; returns the same."""
+    name = symbol("abs_e_error" if plot_data.closest else "e_error") + (" = " if plot_data.closest else " = ±")
     entries: dict[float, tuple[Artist, str]] = {}
-    for one, field in zip(axes, values, strict=True):
-        mesh = one.pcolormesh(x, y, field, norm=norm, cmap=colours, rasterized=values.size > LARGE)
+    for panel_axes, field in zip(axes, values, strict=True):
+        mesh = panel_axes.pcolormesh(
+            x, y, field, norm=norm, cmap=colours, rasterized=values.size > MAX_VECTOR_CELLS
+        )
         if field.mask.any():
-            one.add_patch(_cells(x, y, np.ma.getmaskarray(field), FAILED))
+            panel_axes.add_patch(_merged_cells(x, y, np.ma.getmaskarray(field), FAILED))
             entries[0.0] = Patch(**FAILED), NO_VALUE
-        levels = [sign * level for level in CONTOURS for sign in (-1, 1)] if numbers.variable == "e_error" else []
+        levels = (
+            [sign * level for level in CONTOURS for sign in (-1, 1)] if plot_data.variable == "e_error" else []
+        )
         inside = sorted(level for level in levels if field.min() < level < field.max())
         if inside:
-            # as far as the cells go, and seen on dark and on light
+            # contours that reach the edges of the cells, with an outline visible on dark and on light colours
             wider = np.ma.masked_invalid(np.pad(field.filled(np.nan), 1, mode="edge"))
-            across, up = [x[0], *numbers.x_values, x[-1]], [y[0], *numbers.y_values, y[-1]]
-            drawn = one.contour(across, up, wider, inside, colors="black", linewidths=0.8,
+            across, up = [x[0], *plot_data.x_values, x[-1]], [y[0], *plot_data.y_values, y[-1]]
+            drawn = panel_axes.contour(across, up, wider, inside, colors="black", linewidths=0.8,
                                 linestyles=[CONTOURS[abs(level)] for level in inside])  # fmt: skip
             drawn.set_path_effects([withStroke(linewidth=1.8, foreground="white")])
         for level in map(abs, inside):
@@ -362,25 +390,25 @@ def _draw_values(
     return mesh, [entries[level] for level in sorted(entries)]
 
 
-def _cells(x: Array, y: Array, mask: NDArray[np.bool_], look: dict[str, Any]) -> PathPatch:
-    """The cells of a mask by y and x as one patch; neighbours in a row are one rectangle."""
-    found = []
+def _merged_cells(x: FloatArray, y: FloatArray, mask: NDArray[np.bool_], style: dict[str, Any]) -> PathPatch:
+    """The cells where a mask, of shape (y, x), is true, as one patch; neighbours in a row are one rectangle."""
+    rectangles = []
     for row, line in enumerate(mask):
         ends = x[np.flatnonzero(np.diff(np.concatenate(([False], line, [False]))))]
         for left, right in ends.reshape(-1, 2):
             corners = [(left, y[row]), (right, y[row]), (right, y[row + 1]), (left, y[row + 1]), (left, y[row])]
-            found.append(Path(corners, closed=True))
-    path = Path.make_compound_path(*found)
-    return PathPatch(path, antialiased=False, rasterized=mask.size > LARGE, **look)
+            rectangles.append(Path(corners, closed=True))
+    path = Path.make_compound_path(*rectangles)
+    return PathPatch(path, antialiased=False, rasterized=mask.size > MAX_VECTOR_CELLS, **style)
 
 
-def place_panels(picture: Picture, numbers: Grids, width: float, count: int) -> tuple[list[Axes], float]:
-    """Axes for all panels in rows, and the height of all rows [in]; ticks are named at the left and below only."""
-    columns = panels_per_row(numbers, width)
+def place_panels(picture: Picture, plot_data: MapData, width: float, count: int) -> tuple[list[Axes], float]:
+    """Axes for all panels, and the height of all rows [in]; only the left and lower axes have tick labels."""
+    columns = panels_per_row(plot_data, width)
     rows = -(-count // columns)
     grid = picture.subplots(rows, columns, squeeze=False)
-    for place, axes in enumerate(grid.ravel()):
-        axes.tick_params(labelleft=place % columns == 0, labelbottom=place + columns >= count)
-        if place >= count:
+    for index, axes in enumerate(grid.ravel()):
+        axes.tick_params(labelleft=index % columns == 0, labelbottom=index + columns >= count)
+        if index >= count:
             axes.remove()
-    return list(grid.ravel()[:count]), rows * (height_of(numbers, width) + 0.25) + 0.3
+    return list(grid.ravel()[:count]), rows * (row_height(plot_data, width) + 0.25) + 0.3

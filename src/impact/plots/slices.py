@@ -1,4 +1,4 @@
-"""Which part of a result a picture shows: lines and planes through it, and the values of everything else."""
+"""Lines and planes through a result that a picture shows, and the values of all other inputs."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-# numbers of a picture: enough for any that can be looked at, few enough to be held one by one
+# values in a picture, which are held as Python objects
 MAX_DRAWN = 2**24
 NO_BREAK = "\N{NO-BREAK SPACE}"
 NO_SWEEP = "this is a time history, not the result of a sweep; draw it with --kind loop, or history"
@@ -41,15 +41,15 @@ def take_line(
 
     Returns
     -------
-    the dataset along the line, sorted, of which nothing is read yet; what is drawn over; values without a place
+    the dataset along the line, sorted and not read yet; the coordinate to draw over; values without a position
 
     Raises
     ------
     UsageError : an axis, a value or a model is not in the result
     """
-    dataset = _chosen(dataset, sel, models)
+    dataset = _select(dataset, sel, models)
     x = x_axis(dataset, x)
-    line, not_drawn = _sorted_along(_first_of_others(dataset, [dataset[x].dims[0]]), x)
+    line, not_drawn = _sorted_along(_drop_other_axes(dataset, [dataset[x].dims[0]]), x)
     if not line[x].size:
         raise UsageError(f"{safe_text(x)} has no finite value to draw over")
     return line, x, not_drawn
@@ -63,14 +63,14 @@ def take_plane(
     sel: Selection = None,
     models: Sequence[str] | None = None,
 ) -> tuple[xr.Dataset, str, str, tuple[str, ...]]:
-    """Cut a plane through a result: the dataset over two sorted axes, their names, and values without a place.
+    """Cut a plane through a result: the dataset over two sorted axes, their names, and values without a position.
 
-    For the parameters and errors see `take_line`; `kind` is what needs the plane.
+    For the parameters and errors see `take_line`; `kind` is the kind of picture, for messages.
     """
-    dataset = _chosen(dataset, sel, models)
+    dataset = _select(dataset, sel, models)
     along = [x_axis(dataset, name) for name in (x, y) if name is not None]
     dims = [dataset[name].dims[0] for name in along]
-    # by default nothing is drawn over an axis of one value, nor over what varies along several
+    # the default is no axis of a single value, and no coordinate that varies along several axes
     plain = dataset.drop_vars([name for name, coordinate in dataset.coords.items() if coordinate.ndim > 1])
     while len(along) < 2:
         taken = [dim for dim, size in plain.sizes.items() if dim != "model" and (size == 1 or dim in dims)]
@@ -82,7 +82,7 @@ def take_plane(
         dims.append(dataset[along[-1]].dims[0])
     if dims[0] == dims[1]:
         raise UsageError(f"{kind} needs two axes; {safe_text(f'{along[0]} and {along[1]} vary together')}")
-    plane = _first_of_others(dataset, dims)
+    plane = _drop_other_axes(dataset, dims)
     not_drawn: tuple[str, ...] = ()
     for name in along:
         values = plane[name].values
@@ -97,8 +97,8 @@ def take_plane(
     return plane, first, second, not_drawn
 
 
-def _chosen(dataset: xr.Dataset, sel: Selection, models: Sequence[str] | None) -> xr.Dataset:
-    """The part of a result that was asked for."""
+def _select(dataset: xr.Dataset, sel: Selection, models: Sequence[str] | None) -> xr.Dataset:
+    """The selected part of a result."""
     if "model" not in dataset.dims:
         raise UsageError(NO_SWEEP)
     if models:
@@ -106,30 +106,30 @@ def _chosen(dataset: xr.Dataset, sel: Selection, models: Sequence[str] | None) -
     return select(dataset, sel or {})
 
 
-def _first_of_others(dataset: xr.Dataset, dims: Sequence[object]) -> xr.Dataset:
-    """The result at the first value of every axis that is not drawn over."""
+def _drop_other_axes(dataset: xr.Dataset, dims: Sequence[object]) -> xr.Dataset:
+    """The result at the first value of every axis that is not drawn."""
     return dataset.isel({dim: 0 for dim in dataset.sizes if dim != "model" and dim not in dims})
 
 
 def _sorted_along(dataset: xr.Dataset, name: str) -> tuple[xr.Dataset, tuple[str, ...]]:
     """The part of a result at the finite values of a coordinate along one axis, in order, and the other values.
 
-    A wall, or a plane, has no place on an axis.
+    The infinite mass of a wall, or the infinite radius of a plane, has no position on an axis.
     """
     values = dataset[name].values
     order = np.argsort(values, kind="stable")
     order = order[np.isfinite(values[order])]
     not_drawn = tuple(f"{name} = {value}" for value in values[~np.isfinite(values)].tolist())
-    # a file is read in one go where nothing is left out or moved
+    # without a selection a file is read in one piece
     in_order = np.array_equal(order, np.arange(values.size))
     return (dataset if in_order else dataset.isel({dataset[name].dims[0]: order})), not_drawn
 
 
 def is_ordered(dataset: xr.Dataset, name: str) -> bool:
-    """Whether the points along a coordinate follow each other, so that a line may join them.
+    """Whether the points along a coordinate have an order, so that a line may join them.
 
-    Values of an axis of its own do; those that vary together with others do only if they rise or fall all along.
-    Cases and samples, whose dimension only numbers them, do not.
+    The values of an axis have; values that vary together with others have if they are monotonic. Cases and
+    samples, whose dimension only numbers them, have not.
     """
     (dim,) = dataset[name].dims
     if dim not in dataset.coords or dataset[dim].dtype.kind in "iu":
@@ -148,7 +148,7 @@ def read(data: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
 
     Raises
     ------
-    UsageError : they are more than a picture shows
+    UsageError : they have more than MAX_DRAWN values
     """
     numbers = sum(data[name].size for name in names)
     if numbers > MAX_DRAWN:
@@ -159,7 +159,7 @@ def read(data: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
 
 
 def x_axis(dataset: xr.Dataset, x: str | None) -> str:
-    """The coordinate to draw over: the one asked for, else e, else the first axis of numbers."""
+    """The coordinate to draw over: `x`, else e, else the first axis of numbers."""
     lines = [
         str(name) for name, coord in dataset.coords.items()
         if coord.ndim == 1 and coord.dims != ("model",) and coord.dtype.kind in "fiu"
@@ -173,23 +173,23 @@ def x_axis(dataset: xr.Dataset, x: str | None) -> str:
                 )
             raise UsageError(f'cannot draw over "{safe_text(x)}"; {did_you_mean(x, lines)}')
         return x
-    # a number that only counts the points says least, then a parameter of one law
-    for name in ("e", *(dim for dim in dataset.sizes if dim in lines and _says(dataset, str(dim))), *lines):
-        if name in lines and _says(dataset, str(name)):
+    # prefer floats: an integer axis only numbers the points; axes come before parameters of single laws
+    for name in ("e", *(dim for dim in dataset.sizes if dim in lines and _is_float(dataset, str(dim))), *lines):
+        if name in lines and _is_float(dataset, str(name)):
             return str(name)
     if lines:
         return lines[0]
     raise UsageError("this result has no numeric axis left to draw over; sweep one, such as e")
 
 
-def _says(dataset: xr.Dataset, name: str) -> bool:
+def _is_float(dataset: xr.Dataset, name: str) -> bool:
     return dataset[name].dtype.kind == "f"
 
 
 def conditions_of(dataset: xr.Dataset, *drawn: str) -> str:
-    """The values of everything that is not drawn over, of which each stays on its line.
+    """The values of all inputs that are not drawn, as text; no line break separates a name from its value.
 
-    A parameter of a law is no condition of the others: it stands beside the law's name, see `own_conditions`.
+    The parameters of a law are part of its name, see `parameter_text`.
     """
     inputs = {name: value for name, value in scalars_of(dataset).items() if name not in drawn}
     units = {name: plain_unit(str(dataset[name].attrs.get("units", "1"))) for name in inputs}
@@ -203,7 +203,7 @@ def scalars_of(dataset: xr.Dataset) -> dict[str, object]:
 
 
 def described_inputs(inputs: Mapping[str, object], units: Mapping[str, str], exponent: str | None = None) -> str:
-    """Inputs with their units in words; `exponent` is n of the laws shown, which may have their own."""
+    """Inputs with their units as text; `exponent` is the text for n if the laws shown fix their exponent."""
     parts = []
     for name, value in inputs.items():
         if not owner_of(name):
@@ -214,11 +214,15 @@ def described_inputs(inputs: Mapping[str, object], units: Mapping[str, str], exp
     return ", ".join(parts)
 
 
-def own_conditions(key: str, inputs: Mapping[str, object]) -> str:
-    """The parameters of a law among some inputs, as they stand beside its name.
+def parameter_text(key: str, inputs: Mapping[str, object]) -> str:
+    """The parameters of a law among some inputs, as text beside its name.
 
-    >>> own_conditions("bilinear", {"bilinear.K": 1e9, "hertz.K": 2e9, "e": 0.5}).replace(NO_BREAK, " ")
+    >>> parameter_text("bilinear", {"bilinear.K": 1e9, "hertz.K": 2e9, "e": 0.5}).replace(NO_BREAK, " ")
     'K = 1e+09'
     """
-    own = ((name.removeprefix(f"{key}."), value) for name, value in inputs.items() if name.startswith(f"{key}."))
-    return ", ".join(safe_text(f"{name} = {quantity(value)}", 60).replace(" ", NO_BREAK) for name, value in own)
+    parameters = (
+        (name.removeprefix(f"{key}."), value) for name, value in inputs.items() if name.startswith(f"{key}.")
+    )
+    return ", ".join(
+        safe_text(f"{name} = {quantity(value)}", 60).replace(" ", NO_BREAK) for name, value in parameters
+    )

@@ -1,4 +1,4 @@
-"""What all pictures have in common: colours, markers, sizes, the style, and how they are stored."""
+"""Common to all pictures: colours, markers, sizes, style sheet, and writing files."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from ..results.backend import write_file
 from ..text import safe_text
 from .kinds import WIDTHS
 
-# Okabe and Ito's colours, without the yellow that vanishes on white; a number of markers that shares no factor
-# with theirs, so that neighbours in the catalogue differ in both
+# the colours of Okabe and Ito without yellow, which is invisible on white; the number of markers is coprime to
+# that of the colours, so that neighbours in the catalogue differ in both
 COLOURS = ("#7F4F24", "#009E73", "#56B4E9", "#CC79A7", "#D55E00", "#E69F00", "#0072B2")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*", "p")
 DASHES = ("-", (0, (6, 1.5)), (0, (3, 1.2)), (0, (6, 1.5, 1, 1.5)), (0, (1.2, 1.2)))
 HATCHES = ("", "////", "....", "\\\\\\\\", "xxxx", "----", "oo", "||||")
-STYLE = files(__package__) / "impact.mplstyle"
-# a picture has the same bytes each time: no dates in it
+STYLE_SHEET = files(__package__) / "impact.mplstyle"
+# without dates in the metadata a picture has the same bytes each time
 METADATA: dict[str, dict[str, None]] = {
     "png": {},
     "svg": dict.fromkeys(("Date", "Creator", "Format", "Type")),
@@ -38,25 +38,25 @@ METADATA: dict[str, dict[str, None]] = {
     "eps": {},
     "pgf": {},
 }
-# the sizes of a picture [in], and the units of a length
-SMALLEST, LARGEST = 1.0, 60.0
-LENGTH = re.compile(r"\s*([0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)?)\s*(mm|cm|in)\s*")
-INCHES = {"mm": 1.0 / 25.4, "cm": 1.0 / 2.54, "in": 1.0}
+# limits of the width and height of a picture
+MIN_SIZE_INCHES, MAX_SIZE_INCHES = 1.0, 60.0
+LENGTH_PATTERN = re.compile(r"\s*([0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)?)\s*(mm|cm|in)\s*")
+INCHES_PER_UNIT = {"mm": 1.0 / 25.4, "cm": 1.0 / 2.54, "in": 1.0}
 
 
 @contextlib.contextmanager
 def styled(style: str | Path | None = None) -> Iterator[None]:
-    """Draw in the style of this package, where the user's own settings leave matplotlib's defaults, and a file's.
+    """Draw with the style sheet of this package; settings that the user changed from matplotlib's defaults stay.
 
     Parameters
     ----------
-    style : a file of matplotlib's rcParams, or the name of a style of matplotlib, which comes before all others
+    style : a file of matplotlib's rcParams, or the name of a style of matplotlib; it overrides all others
 
     Raises
     ------
     UsageError : it cannot be read
     """
-    ours = rc_params_from_file(str(STYLE), use_default_template=False)
+    ours = rc_params_from_file(str(STYLE_SHEET), use_default_template=False)
     unchanged = {key: value for key, value in ours.items() if rcParams[key] == rcParamsDefault[key]}
     with matplotlib.rc_context({**unchanged, **_style_of(style)}):
         yield
@@ -78,7 +78,7 @@ def _style_of(style: str | Path | None) -> Mapping[Any, Any]:
         raise UsageError(f"--style {shown}: cannot be read: {safe_text(str(error))}") from None
 
 
-def length(given: str | float | None, option: str) -> float | None:
+def length(size: str | float | None, option: str) -> float | None:
     """A size of a picture in inches: a number of them, a length with its unit, or the name of a journal's width.
 
     Raises
@@ -88,52 +88,52 @@ def length(given: str | float | None, option: str) -> float | None:
     >>> round(length("84mm", "--width"), 4), length("single", "--width"), length(7.1, "--width")
     (3.3071, 3.5, 7.1)
     """
-    if given is None or given in WIDTHS:
-        return None if given is None else WIDTHS[str(given)]
-    parts = LENGTH.fullmatch(given) if isinstance(given, str) else None
-    inches = float(parts[1]) * INCHES[parts[2]] if parts else given
-    if isinstance(inches, str) or not SMALLEST <= inches <= LARGEST:
-        expected = f"a length from 26mm to {LARGEST:g}in, such as 84mm, 8.4cm or 3.3in"
+    if size is None or size in WIDTHS:
+        return None if size is None else WIDTHS[str(size)]
+    parts = LENGTH_PATTERN.fullmatch(size) if isinstance(size, str) else None
+    inches = float(parts[1]) * INCHES_PER_UNIT[parts[2]] if parts else size
+    if isinstance(inches, str) or not MIN_SIZE_INCHES <= inches <= MAX_SIZE_INCHES:
+        expected = f"a length from 26mm to {MAX_SIZE_INCHES:g}in, such as 84mm, 8.4cm or 3.3in"
         names = f", or {' or '.join(WIDTHS)}" if option.endswith("width") else ""
-        raise UsageError(f"{option}: got {safe_text(str(given))}, expected {expected}{names}")
+        raise UsageError(f"{option}: got {safe_text(str(size))}, expected {expected}{names}")
     return float(inches)
 
 
 def default_size() -> tuple[float, float | None]:
-    """Width and height [in] where none is given: the user's own, else two columns and what suits the picture."""
+    """Default width and height [in]: those of rcParams if the user changed them, else two columns and None."""
     width, height = rcParams["figure.figsize"]
     if [width, height] == list(rcParamsDefault["figure.figsize"]):
         return WIDTHS["double"], None
     return width, height
 
 
-def looks_of(models: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """Colour, marker, dashes and hatch of each model of a picture, no two alike.
+def model_styles(models: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """Colour, marker, dashes and hatch of each model of a picture; no two models are alike.
 
-    A model prefers what its place in the catalogue gives it, so that it looks the same in most pictures; where
-    that is taken it has the next that is free. One that is not built in comes after the catalogue.
+    The style of a model follows from its index in the catalogue, so that it is the same in most pictures; if
+    another model of the picture has that style already, the next free one is used. Plug-ins follow the catalogue.
     """
-    places = list(dict.fromkeys([*catalogue(), *models]))
-    looks: dict[str, dict[str, Any]] = {}
+    keys = list(dict.fromkeys([*catalogue(), *models]))
+    styles_by_model: dict[str, dict[str, Any]] = {}
     used: dict[str, Counter[Any]] = {"color": Counter(), "marker": Counter(), "hatch": Counter()}
     for model in dict.fromkeys(models):
-        place = places.index(model)
-        color = _next_free(COLOURS, place, used["color"])
-        alike = [look for look in looks.values() if look["color"] == color]
-        looks[model] = {
+        index = keys.index(model)
+        color = _next_free(COLOURS, index, used["color"])
+        alike = [style for style in styles_by_model.values() if style["color"] == color]
+        styles_by_model[model] = {
             "color": color,
-            "marker": _next_free(MARKERS, place, used["marker"], {look["marker"] for look in alike}),
-            "hatch": _next_free(HATCHES, len(looks), used["hatch"], {look["hatch"] for look in alike}),
-            "linestyle": DASHES[(place + len(alike)) % len(DASHES)],
+            "marker": _next_free(MARKERS, index, used["marker"], {style["marker"] for style in alike}),
+            "hatch": _next_free(HATCHES, len(styles_by_model), used["hatch"], {style["hatch"] for style in alike}),
+            "linestyle": DASHES[(index + len(alike)) % len(DASHES)],
         }
         for name, counter in used.items():
-            counter[looks[model][name]] += 1
-    return looks
+            counter[styles_by_model[model][name]] += 1
+    return styles_by_model
 
 
-def _next_free(choices: Sequence[Any], place: int, used: Counter[Any], refused: Set[Any] = frozenset()) -> Any:
-    """The first choice from a place on that is used least, and not refused where that can be."""
-    ordered = [choices[(place + step) % len(choices)] for step in range(len(choices))]
+def _next_free(choices: Sequence[Any], start: int, used: Counter[Any], refused: Set[Any] = frozenset()) -> Any:
+    """The least used choice, the first from index `start` on; a refused one only if there is no other."""
+    ordered = [choices[(start + step) % len(choices)] for step in range(len(choices))]
     return min(ordered, key=lambda choice: (choice in refused, used[choice]))
 
 
@@ -145,7 +145,7 @@ def is_geometric(values: np.ndarray) -> bool:
 
 
 def check_picture(path: Path) -> str:
-    """The format of a picture, by its ending.
+    """The format of a picture, from the ending of its name.
 
     Raises
     ------
@@ -164,7 +164,7 @@ def check_picture(path: Path) -> str:
 
 
 def encoded(figure: Figure, kind: str, style: str | Path | None = None) -> bytes:
-    """A figure as the bytes of a file of a format of METADATA; they are the same each time.
+    """A figure as the bytes of a file, in a format of METADATA; they are the same each time.
 
     Raises
     ------
@@ -175,7 +175,7 @@ def encoded(figure: Figure, kind: str, style: str | Path | None = None) -> bytes
         try:
             figure.savefig(buffer, format=kind, metadata=METADATA[kind] or None)
         except RuntimeError as error:
-            # of LaTeX, in the format .pgf and with the user's own text.usetex
+            # LaTeX runs for the format .pgf, and if the user sets text.usetex
             reason = safe_text(" ".join(str(error).split()), 300)
             raise UsageError(f"the picture cannot be drawn as .{kind}: {reason}") from None
     if kind == "eps":

@@ -1,4 +1,4 @@
-"""The figures of a page about a result: which there are, over what, and at which point."""
+"""The figures of a report: their kinds, axes, and the point they are drawn at."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from ..results.slabs import distinct_points, is_computed, slabs
 if TYPE_CHECKING:
     import xarray as xr
 
-    from ..plots.kinds import Numbers
+    from ..plots.kinds import PlotData
 
-# the figures, and what each shows
+# kinds of figure, and what each shows
 FIGURES = {
     "final-velocities": "Velocities after the impact, beside the impulse-momentum solution.",
     "restitution": "Restitution delivered, beside what was asked for.",
@@ -35,8 +35,8 @@ FIGURES = {
     "validity": "Which model is closest to what was asked for, and how close it is.",
     "loop": "Force over indentation at one point: the area of a loop is the energy that is lost.",
 }
-PLANES = ("map", "validity")
-# points of which a figure's conditions are the first with an answer
+MAP_KINDS = ("map", "validity")
+# points that are searched for the first one with an answer, at which the figures are drawn
 MAX_SEARCHED = 2**18
 
 
@@ -47,8 +47,8 @@ class Figure:
     Parameters
     ----------
     label : what it shows
-    caption : the same, with the point where it is drawn and what is left out of it
-    source : the picture, as the URL of an image that holds it
+    caption : the same, the point where it is drawn, and what is left out
+    source : the picture as a data URL
     """
 
     label: str
@@ -57,41 +57,43 @@ class Figure:
 
 
 def figures_of(
-    dataset: xr.Dataset, keys: Sequence[str], figures: Callable[[str, Choice], Numbers]
+    dataset: xr.Dataset, keys: Sequence[str], get_plot_data: Callable[[str, Choice], PlotData]
 ) -> tuple[list[Figure], list[str]]:
-    """The figures of a result, and a sentence for each one that cannot be drawn.
+    """The figures of a result, and a sentence for each figure that cannot be drawn.
 
     Parameters
     ----------
     dataset : a result
-    keys : of the models that are shown
-    figures : the numbers of a figure, of its kind and of what it shows
+    keys : keys of the models to show
+    get_plot_data : returns the data of a figure, given its kind and which part of the result it shows
     """
     drawn, reasons = [], []
-    for kind, choice, places in choices(dataset, keys):
+    for kind, choice, position in iterate_choices(dataset, keys):
         try:
-            numbers = figures(kind, choice)
-            # its title and conditions are the caption; narrow, so that its text is legible on a phone
-            figure = draw(replace(numbers, title="", conditions=""), WIDTHS["single"])
+            plot_data = get_plot_data(kind, choice)
+            # title and conditions are in the caption; the figure is narrow, so that its text is legible on a phone
+            figure = draw(replace(plot_data, title="", conditions=""), WIDTHS["single"])
         except ImpactError as error:
             reasons.append(f"The figure {kind} is left out: {'; '.join(str(error).splitlines())}")
             continue
-        # nothing is behind it but the page, which may be dark
+        # transparent, because the page may be dark
         for background in (figure.patch, *(axes.patch for axes in figure.axes)):
             background.set_visible(False)
         source = f"data:image/svg+xml;base64,{base64.b64encode(encoded(figure, 'svg')).decode()}"
-        sentences = [FIGURES[kind], *_conditions(dataset, places, keys)]
-        sentences += [f"Not drawn: {'; '.join(numbers.not_drawn)}."] if numbers.not_drawn else []
+        sentences = [FIGURES[kind], *_condition_sentences(dataset, position, keys)]
+        sentences += [f"Not drawn: {'; '.join(plot_data.not_drawn)}."] if plot_data.not_drawn else []
         drawn.append(Figure(FIGURES[kind], " ".join(sentences), source))
     return drawn, reasons
 
 
-def _conditions(dataset: xr.Dataset, places: Mapping[Hashable, int], keys: Sequence[str]) -> Iterator[str]:
-    """Where a figure is drawn: the values of what varies in the sweep and not in the figure.
+def _condition_sentences(
+    dataset: xr.Dataset, position: Mapping[Hashable, int], keys: Sequence[str]
+) -> Iterator[str]:
+    """Sentences with the values of the inputs that vary in the sweep and not in the figure.
 
-    A parameter of a model stands with that model, and not at all where it is not shown.
+    A sentence for all models comes first, then one for the parameters of each model.
     """
-    point, inputs = dataset.isel(places), varying(dataset)
+    point, inputs = dataset.isel(position), varying(dataset)
     for key in ("", *keys):
         values = at_text(point, [name for name in inputs if owner_of(name) == key])
         if values:
@@ -99,67 +101,73 @@ def _conditions(dataset: xr.Dataset, places: Mapping[Hashable, int], keys: Seque
 
 
 def at_text(point: xr.Dataset, names: Sequence[str]) -> str:
-    """Those of some inputs that have a single value at a point, each of them on one line."""
-    values = (f"{name} = {quantity(point[name])}" for name in names if point[name].ndim == 0)
+    """Names and values of the inputs that have a single value at a point; no line break separates the two."""
+    values = (f"{name} = {coordinate_text(point[name])}" for name in names if point[name].ndim == 0)
     return ", ".join(value.replace(" ", "\u00a0") for value in values)
 
 
-def choices(dataset: xr.Dataset, keys: Sequence[str]) -> Iterator[tuple[str, Choice, dict[Hashable, int]]]:
-    """The figures of a result: over e, else the first axis of several numbers; the loop is at the middle of it.
+def iterate_choices(dataset: xr.Dataset, keys: Sequence[str]) -> Iterator[tuple[str, Choice, dict[Hashable, int]]]:
+    """The figures of a result: over e, else the first axis of several numbers; the loop is at its middle.
 
     Returns
     -------
-    (kind, Choice, places) : of each figure, the last along the axes that are not drawn over
+    (kind, Choice, position) : of each figure; the position has an index for each axis that is not drawn
     """
     along = {name: dataset[name] for name in varying(dataset) if dataset[name].ndim == 1}
-    along = {name: one for name, one in along.items() if one.dtype.kind == "f" and _different(one.values) > 1}
+    along = {
+        name: coordinate
+        for name, coordinate in along.items()
+        if coordinate.dtype.kind == "f" and _count_different(coordinate.values) > 1
+    }
     x = "e" if "e" in along else next(iter(along), None)
-    # a parameter of one of several models is no axis of a map of them all
+    # a parameter of a single model is not an axis of a map of several models
     across = [name for name in along if len(keys) == 1 or not owner_of(name)]
     y = next((name for name in across if x and along[name].dims != along[x].dims), None)
     for kind in FIGURES:
-        if kind in PLANES and not y:
+        if kind in MAP_KINDS and not y:
             continue
-        drawn = [along[name].dims[0] for name in ((x, y) if kind in PLANES else (x,)) if name]
-        places = _answered(dataset, keys, drawn)
+        drawn = [along[name].dims[0] for name in ((x, y) if kind in MAP_KINDS else (x,)) if name]
+        position = _first_answered_index(dataset, keys, drawn)
         if kind != "loop":
-            sel = {str(dim): dataset[dim].values[place].item() for dim, place in places.items()}
-            yield kind, Choice(x, y if kind in PLANES else None, sel=sel, models=keys), places
+            sel = {str(dim): dataset[dim].values[index].item() for dim, index in position.items()}
+            yield kind, Choice(x, y if kind in MAP_KINDS else None, sel=sel, models=keys), position
             continue
         if x:
-            places[drawn[0]] = int(np.argsort(along[x].values, kind="stable")[along[x].size // 2])
-        yield kind, Choice(sel=_inputs(dataset, places), models=keys), places
+            position[drawn[0]] = int(np.argsort(along[x].values, kind="stable")[along[x].size // 2])
+        yield kind, Choice(sel=_inputs_at(dataset, position), models=keys), position
 
 
-def _inputs(dataset: xr.Dataset, places: Mapping[Hashable, int]) -> dict[str, float | str]:
-    """The inputs that name a point: the label of each axis, or all columns of one whose labels only number it."""
-    names = {dim: [str(dim)] if is_input(str(dim)) else columns_along(dataset, dim) for dim in places}
-    at = {name: dataset[name].values[places[dim]].item() for dim in names for name in names[dim]}
-    # a number that is missing is no input there
+def _inputs_at(dataset: xr.Dataset, position: Mapping[Hashable, int]) -> dict[str, float | str]:
+    """The inputs that select a point: the label of each axis, or all columns of an axis of cases or samples."""
+    names = {dim: [str(dim)] if is_input(str(dim)) else columns_along(dataset, dim) for dim in position}
+    at = {name: dataset[name].values[position[dim]].item() for dim in names for name in names[dim]}
+    # a missing number is not an input
     return {name: value for name, value in at.items() if value == value}
 
 
-def _different(values: NDArray[Any]) -> int:
+def _count_different(values: NDArray[Any]) -> int:
     return np.unique(values[np.isfinite(values)]).size
 
 
-def _answered(dataset: xr.Dataset, keys: Sequence[str], drawn: Sequence[Hashable]) -> dict[Hashable, int]:
-    """Places along the axes that are not drawn over: the first where the balls meet and a model has an answer."""
+def _first_answered_index(
+    dataset: xr.Dataset, keys: Sequence[str], drawn: Sequence[Hashable]
+) -> dict[Hashable, int]:
+    """Index along each axis that is not drawn: of the first impact that a model has an answer for."""
     dims = dataset["status"].dims if "status" in dataset else dataset.dims
     axes = [dim for dim in dims if dim not in ("model", *drawn)]
     first: tuple[int, ...] | None = None
-    for place in model_positions(keys, dataset) if "status" in dataset else ():
-        answered = _first_answered(dataset.isel(model=place), axes)
+    for index in model_positions(keys, dataset) if "status" in dataset else ():
+        answered = _first_answered_of_model(dataset.isel(model=index), axes)
         first = min(filter(None, (first, answered)), default=None)
         if first is not None and not any(first):
             break
     return dict(zip(axes, first or (0,) * len(axes), strict=True))
 
 
-def _first_answered(of_model: xr.Dataset, axes: Sequence[Hashable]) -> tuple[int, ...] | None:
-    """The first place along some axes at which a model has an answer for balls that meet; None where it has none.
+def _first_answered_of_model(of_model: xr.Dataset, axes: Sequence[Hashable]) -> tuple[int, ...] | None:
+    """Index along some axes of the first impact that a model has an answer for; None if there is none.
 
-    Where the status of more than MAX_SEARCHED points would have to be computed, those of a coarser grid are.
+    If the status of more than MAX_SEARCHED points would be computed, a coarser grid is searched.
     """
     status, _ = distinct_points(of_model, "status")
     ordered = [*axes, *(dim for dim in status.dims if dim not in axes)]
@@ -175,26 +183,29 @@ def _first_answered(of_model: xr.Dataset, axes: Sequence[Hashable]) -> tuple[int
         if answered.any():
             first = np.unravel_index(int(np.argmax(answered)), answered.shape)
             return tuple(
-                (where[dim].start + int(place)) * steps[dim] for dim, place in zip(axes, first, strict=False)
+                (where[dim].start + int(index)) * steps[dim] for dim, index in zip(axes, first, strict=False)
             )
     return None
 
 
 def varying(dataset: xr.Dataset) -> list[str]:
-    """The inputs that vary: the axes, each with what varies along it, then what varies along several."""
-    found = {str(name): one.dims for name, one in dataset.coords.items()
-             if one.ndim and "model" not in one.dims and is_input(str(name))}  # fmt: skip
-    along = [name for dim in dataset.dims for name in (str(dim), *found) if found.get(name) == (dim,)]
-    return list(dict.fromkeys([*along, *found]))
+    """The inputs that vary: each axis with the inputs along it, then the inputs that vary along several axes."""
+    dims_of = {
+        str(name): coordinate.dims
+        for name, coordinate in dataset.coords.items()
+        if coordinate.ndim and "model" not in coordinate.dims and is_input(str(name))
+    }
+    along = [name for dim in dataset.dims for name in (str(dim), *dims_of) if dims_of.get(name) == (dim,)]
+    return list(dict.fromkeys([*along, *dims_of]))
 
 
-def quantity(coordinate: xr.DataArray) -> str:
-    """The value of a coordinate that has one, with its unit."""
+def coordinate_text(coordinate: xr.DataArray) -> str:
+    """The value of a scalar coordinate with its unit."""
     unit = unit_of(coordinate)
     return label(coordinate.values.item()) + (f" {unit}" if unit else "")
 
 
 def unit_of(coordinate: xr.DataArray) -> str:
-    """The unit of a coordinate; empty of what has none."""
+    """The unit of a coordinate; empty if it has none."""
     unit = plain_unit(str(coordinate.attrs.get("units", "")))
     return "" if unit == "1" else unit

@@ -1,6 +1,6 @@
-"""A result as one page of HTML: it needs no network, runs nothing, and shows what a file says as text only.
+"""The report: a result as one page of HTML, without network access or scripts; texts of a file are escaped.
 
-`page.html.j2` is the page; this module gives it plain values.
+`page.html.j2` is the template; this module gives it plain values.
 """
 
 from __future__ import annotations
@@ -29,26 +29,26 @@ from ..results.schema import count_points, exponents_of, is_input
 from ..results.slabs import MAX_SUMMARY_POINTS, is_large
 from ..results.summary import Summary, extremes_of, summarize
 from ..text import safe_text, with_year
-from .figures import at_text, figures_of, quantity, unit_of, varying
+from .figures import at_text, coordinate_text, figures_of, unit_of, varying
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from ..plots.kinds import Numbers
+    from ..plots.kinds import PlotData
 
-# at most so many letters of a text are shown, of a line of the config, and so many values and failed points
-MAX_LETTERS, MAX_LINE, MAX_VALUES, MAX_FAILED = 2000, 100_000, 8, 20
-# of more than MANY models the figures show the BEST
-MANY, BEST = 12, 8
+# the most that is shown: letters of a text and of a line of the config, values of an axis, failed points
+MAX_TEXT_LETTERS, MAX_LINE_LETTERS, MAX_VALUES, MAX_FAILED = 2000, 100_000, 8, 20
+# with more than MAX_FIGURE_MODELS models the figures show the BEST_MODELS best
+MAX_FIGURE_MODELS, BEST_MODELS = 12, 8
 
 
-def page(dataset: xr.Dataset, figures: Callable[[str, Choice], Numbers]) -> str:
+def page(dataset: xr.Dataset, get_plot_data: Callable[[str, Choice], PlotData]) -> str:
     """A result as one page of HTML.
 
     Parameters
     ----------
     dataset : a result
-    figures : the numbers of a figure, of its kind and of what it shows
+    get_plot_data : returns the data of a figure, given its kind and which part of the result it shows
 
     Raises
     ------
@@ -57,44 +57,44 @@ def page(dataset: xr.Dataset, figures: Callable[[str, Choice], Numbers]) -> str:
     """
     if "model" not in dataset.dims:
         raise UsageError("this is a time history; a report is made of the result of a sweep")
-    tally = summarize(dataset, MAX_FAILED)
-    ranked, headline = _answer(dataset)
+    summary = summarize(dataset, MAX_FAILED)
+    ranked, headline = _rank_models(dataset)
     keys = [str(key) for key in dataset["model"].values]
     selection = ""
-    if len(keys) > MANY:
-        best = [one.model for one in ranked.models] if ranked else keys
-        selection = f"The figures show {BEST} of the {len(keys)} models: {', '.join(best[:BEST])}."
-        keys = best[:BEST]
-    drawn, left_out = figures_of(dataset, keys, figures)
-    models = [_model(dataset.isel(model=place)) for place in range(dataset.sizes["model"])]
+    if len(keys) > MAX_FIGURE_MODELS:
+        best = [row.model for row in ranked.models] if ranked else keys
+        selection = f"The figures show {BEST_MODELS} of the {len(keys)} models: {', '.join(best[:BEST_MODELS])}."
+        keys = best[:BEST_MODELS]
+    drawn, left_out = figures_of(dataset, keys, get_plot_data)
+    models = [_model_section(dataset.isel(model=index)) for index in range(dataset.sizes["model"])]
     moduli = {str(name): dataset[name].values.tolist() for name in dataset.coords if str(name).endswith(".E")}
     lines = str(dataset.attrs.get("config", "")).replace("\r\n", "\n").expandtabs(4).split("\n")
     return _template().render(
         title=str(dataset.attrs.get("title", "")) or "Impact of two balls",
-        summary=_summary(dataset),
-        notes=[*material_notes(read_attribute(dataset.attrs, "materials"), moduli), *result_notes(tally)],
-        outcomes=list(_outcomes(tally)),
-        axes=[(name, *_about(dataset[name]), *_range(dataset[name])) for name in varying(dataset)],
+        summary=_summary_sentence(dataset),
+        notes=[*material_notes(read_attribute(dataset.attrs, "materials"), moduli), *result_notes(summary)],
+        outcomes=list(_outcomes(summary)),
+        axes=[(name, *_meaning_and_unit(dataset[name]), *_range(dataset[name])) for name in varying(dataset)],
         single_values=list(_single_values(dataset)),
         ranking=ranked,
         headline=headline,
         selection=selection,
         figures=drawn,
         left_out=left_out,
-        failures=_failures(dataset, tally),
+        failures=_failures_section(dataset, summary),
         facts=_facts(dataset),
         models=models,
         evidence=[row for model in models for row in model["evidence"]],
-        config=Markup("\n").join(safe_text(line, MAX_LINE) for line in lines),
+        config=Markup("\n").join(safe_text(line, MAX_LINE_LETTERS) for line in lines),
         changes=read_attribute(dataset.attrs, "config_set"),
     )
 
 
 def _template() -> Template:
-    """The page, in which what is inserted is text."""
+    """The template of the page, which escapes all values."""
 
     def text(value: object) -> str:
-        return value if isinstance(value, Markup) else safe_text(str(value), MAX_LETTERS)
+        return value if isinstance(value, Markup) else safe_text(str(value), MAX_TEXT_LETTERS)
 
     environment = Environment(
         loader=FunctionLoader(lambda name: files(__package__).joinpath(name).read_text(encoding="utf-8")),
@@ -104,28 +104,28 @@ def _template() -> Template:
     return environment.get_template("page.html.j2")
 
 
-def _summary(dataset: xr.Dataset) -> str:
+def _summary_sentence(dataset: xr.Dataset) -> str:
     models, axes = dataset.sizes["model"], [str(dim) for dim in dataset.sizes if dim != "model"]
     points, over = count_points(dataset), f" over {', '.join(axes)}" if axes else ""
     return (
-        f"{models:,} model{_s(models)} of the impact of two balls{over}, judged by the "
-        f"impulse-momentum solution: {points:,} point{_s(points)}."
+        f"{models:,} model{_plural_s(models)} of the impact of two balls{over}, judged by the "
+        f"impulse-momentum solution: {points:,} point{_plural_s(points)}."
     )
 
 
-def _outcomes(tally: Summary) -> Iterator[str]:
-    """How the points ended."""
-    for status in sorted(tally.counts):
-        yield f"{tally.counts[status]:,} {status.name.lower()}: {status.meaning}"
-    if tally.not_counted:
-        yield f"{tally.not_counted:,} not evaluated: too many different points to count them for a report"
+def _outcomes(summary: Summary) -> Iterator[str]:
+    """Sentences with the number of points by status."""
+    for status in sorted(summary.counts):
+        yield f"{summary.counts[status]:,} {status.name.lower()}: {status.meaning}"
+    if summary.not_counted:
+        yield f"{summary.not_counted:,} not evaluated: too many different points to count them for a report"
 
 
 def _single_values(dataset: xr.Dataset) -> Iterator[tuple[str, str, str]]:
-    """Name, value and meaning of what has a single value."""
+    """Name, value and meaning of the inputs and materials that have a single value."""
     for name, coordinate in dataset.coords.items():
         if coordinate.ndim == 0 and is_input(str(name)):
-            value = (exponents_of(dataset) if name == "n" else None) or quantity(coordinate)
+            value = (exponents_of(dataset) if name == "n" else None) or coordinate_text(coordinate)
             yield str(name), value, str(coordinate.attrs.get("long_name", ""))
     units = {key: rule.unit.removesuffix("1") for key, rule in MATERIAL_QUANTITIES.items()}
     for name, material in read_attribute(dataset.attrs, "materials").items():
@@ -134,13 +134,13 @@ def _single_values(dataset: xr.Dataset) -> Iterator[tuple[str, str, str]]:
         yield name, ", ".join(values), "material"
 
 
-def _about(coordinate: xr.DataArray) -> tuple[str, str]:
+def _meaning_and_unit(coordinate: xr.DataArray) -> tuple[str, str]:
     """Meaning and unit of a coordinate."""
     return str(coordinate.attrs.get("long_name", "")), unit_of(coordinate) or "–"
 
 
 def _range(coordinate: xr.DataArray) -> tuple[str, str, str, str]:
-    """From, to, how many, and how the values are spaced."""
+    """Smallest and largest value of a coordinate, number of values, and how they are spaced."""
     ends, large = ("–", "–"), is_large(coordinate.variable)
     if large:
         extremes = extremes_of(coordinate.to_dataset(name="values"), "values")
@@ -155,7 +155,7 @@ def _range(coordinate: xr.DataArray) -> tuple[str, str, str, str]:
 
 
 def _spacing(values: NDArray[Any]) -> str:
-    """How values are spaced, or which they are.
+    """The spacing of values, or the values.
 
     >>> _spacing(np.array([0.0, 0.5, 1.0])), _spacing(np.array([1.0, 10.0, 100.0])), _spacing(np.array([2.0, 1.0]))
     ('even, by 0.5', 'geometric, by 10', '2, 1')
@@ -171,8 +171,8 @@ def _spacing(values: NDArray[Any]) -> str:
     return ", ".join(map(label, values[:MAX_VALUES].tolist())) + (", …" if values.size > MAX_VALUES else "")
 
 
-def _answer(dataset: xr.Dataset) -> tuple[Ranking | None, str]:
-    """The models, the best first, if they can be ranked, and the answer in a sentence."""
+def _rank_models(dataset: xr.Dataset) -> tuple[Ranking | None, str]:
+    """The ranking of the models, None if they cannot be ranked, and the answer in a sentence."""
     try:
         ranked = ranking(dataset, max_points=MAX_SUMMARY_POINTS)
     except UsageError as error:
@@ -180,26 +180,26 @@ def _answer(dataset: xr.Dataset) -> tuple[Ranking | None, str]:
     return ranked, re.sub("^no ", "No ", f"{ranked.headline}.")
 
 
-def _failures(dataset: xr.Dataset, tally: Summary) -> dict[str, Any]:
-    """What is to be said of failed points, the first of them, and how many more there are."""
+def _failures_section(dataset: xr.Dataset, summary: Summary) -> dict[str, Any]:
+    """Sentences about failed points, the first failed points, and the number of the others."""
     if "status" not in dataset:
         return {"sentences": ["The result does not tell which points failed."], "points": [], "more": ""}
-    sentences = [f"The status of {tally.not_counted:,} points was not evaluated."] if tally.not_counted else []
-    if not tally.failed:
-        sentences.append("No other point failed." if tally.not_counted else "No point failed.")
+    sentences = [f"The status of {summary.not_counted:,} points was not evaluated."] if summary.not_counted else []
+    if not summary.failed:
+        sentences.append("No other point failed." if summary.not_counted else "No point failed.")
     axes = [dim for dim in dataset["status"].dims if dim != "model"]
     points = []
-    for status, model, places in tally.failed_at:
+    for status, model, places in summary.failed_at:
         point = dataset.isel({"model": model, **dict(zip(axes, places, strict=True))})
         key = str(point["model"].item())
         inputs = [name for name in varying(dataset) if owner_of(name) in ("", key)]
         points.append((key, at_text(point, inputs) or "–", status.meaning))
-    more = tally.failed - len(points)
+    more = summary.failed - len(points)
     return {"sentences": sentences, "points": points, "more": f"{more:,}" if more > 0 else ""}
 
 
 def _facts(dataset: xr.Dataset) -> list[tuple[str, str]]:
-    """By which program and settings a result was made, and what tells it from others."""
+    """Program, packages and settings that a result was computed with, its fingerprint and its seal."""
     attributes, settings = dataset.attrs, ("rtol", "max_steps")
     packages = read_attribute(attributes, "packages")
     facts = {
@@ -216,26 +216,26 @@ def _facts(dataset: xr.Dataset) -> list[tuple[str, str]]:
     return [(name, str(fact)) for name, fact in facts.items() if fact]
 
 
-def _model(of_model: xr.Dataset) -> dict[str, Any]:
-    """Where a model comes from, and what the catalogue knows of it."""
+def _model_section(of_model: xr.Dataset) -> dict[str, Any]:
+    """Reference of a declaration, and its domain and evidence from the catalogue."""
     key, title, year, equation, reference, doi = (
         str(of_model[name].item()) for name in ("model", "title", "year", "equation", "reference", "doi")
     )
-    known = catalogue().get(key)
-    # a plug-in, or another version of the program, may mean another law by this name
-    known = known if known is not None and known.equation == equation else None
+    declaration = catalogue().get(key)
+    # a plug-in, or another version of the program, may use this key for another law
+    declaration = declaration if declaration is not None and declaration.equation == equation else None
     evidence = []
-    if known:
-        about = known.evidence
+    if declaration:
+        about = declaration.evidence
         source = [about.source, f"DOI seen in {about.doi}" if about.doi else "", about.note]
         evidence.append((key, about.state, "; ".join(filter(None, source)) or "–"))
     is_doi = re.fullmatch(r"10\.[0-9]{4,}/\S+", doi)
     return {
         "key": key, "title": with_year(title, year), "equation": equation, "reference": reference, "doi": doi,
         "link": f"https://doi.org/{quote(doi, safe='/', errors='replace')}" if is_doi else "",
-        "domain": known.domain_text if known else "", "evidence": evidence,
+        "domain": declaration.domain_text if declaration else "", "evidence": evidence,
     }  # fmt: skip
 
 
-def _s(number: int) -> str:
+def _plural_s(number: int) -> str:
     return "" if number == 1 else "s"

@@ -115,7 +115,7 @@ def sweep_shard(
     plan = with_core(plan, maps)
     blocks = list(trajectory_ranges(maps))
     shard_blocks = [block for block in blocks if shard.has(block)]
-    counter = ProgressCounter.begin(sum(block.size for block in shard_blocks), plan.points, on_progress)
+    counter = ProgressCounter.start(sum(block.size for block in shard_blocks), plan.points, on_progress)
     folder = shard.folder(output)
     with open_work_folder(folder, plan, resume=not overwrite, overwrite=overwrite) as work_folder:
         attributes = dataset_template(plan).attrs
@@ -129,7 +129,9 @@ def sweep_shard(
             sink.write(json.dumps(record).encode())
         with report_kept_blocks(folder, counter, "the same command", lambda error: []):
             complete_ranges(work_folder, plan, maps, shard_blocks, counter, backend, should_stop)
-    return ShardProgress(folder, len(shard_blocks), len(blocks), counter.at.trajectories, counter.at.failed)
+    return ShardProgress(
+        folder, len(shard_blocks), len(blocks), counter.progress.trajectories, counter.progress.failed
+    )
 
 
 @dataclass(frozen=True)
@@ -182,7 +184,7 @@ def merge(
     plan = Plan(config, plugins.of(config.models))
     maps = trajectory_maps(plan)
     blocks = list(trajectory_ranges(maps))
-    counter = ProgressCounter.begin(sum(trajectory_map.count for trajectory_map in maps), plan.points, on_progress)
+    counter = ProgressCounter.start(sum(trajectory_map.count for trajectory_map in maps), plan.points, on_progress)
     for folder, record in records.items():
         if record.attributes["fingerprint"] != first_record.attributes["fingerprint"]:
             # a difference in the trajectories is reported first, by its name

@@ -106,12 +106,12 @@ def sweep_into(
     plan = with_core(plan, maps)
     ranges = list(trajectory_ranges(maps))
     total = sum(trajectory_map.count for trajectory_map in maps)
-    counter = ProgressCounter.begin(total, plan.points, on_progress)
+    counter = ProgressCounter.start(total, plan.points, on_progress)
     find_reused = extension.find_reused if extension else lambda part: None
     few = plan.stored_points <= NO_CHECKPOINT_POINTS or plan.layout == "factored"
     if total <= RANGE_TRAJECTORIES and few and not os.path.lexists(work_folder_of(output)):
         finished = {}
-        for part, rebound in integrate_ranges(plan, maps, ranges, known=find_reused):
+        for part, rebound in integrate_ranges(plan, maps, ranges, find_reused=find_reused):
             finished[part.number] = rebound
             counter.count(part, rebound)
         table = table_of(plan, maps, range_reader(maps, finished.__getitem__))
@@ -175,7 +175,7 @@ def complete_ranges(
             counter.count(part, before)
     counter.report()
     for part, rebound in integrate_ranges(
-        plan, maps, todo, backend=backend, should_stop=should_stop, known=find_reused
+        plan, maps, todo, backend=backend, should_stop=should_stop, find_reused=find_reused
     ):
         work_folder.store(part, rebound)
         counter.count(part, rebound)
@@ -198,7 +198,7 @@ def sweep_in_memory(
     check_labels(plan)
     maps = trajectory_maps(plan)
     plan = with_core(plan, maps)
-    counter = ProgressCounter.begin(sum(trajectory_map.count for trajectory_map in maps), plan.points, on_progress)
+    counter = ProgressCounter.start(sum(trajectory_map.count for trajectory_map in maps), plan.points, on_progress)
     finished: dict[int, CollisionResult] = {}
     for part, rebound in integrate_ranges(
         plan, maps, trajectory_ranges(maps), backend=backend, should_stop=should_stop
@@ -297,8 +297,8 @@ def _missing_space(error: Exception, output: Path, plan: Plan, counter: Progress
     if not isinstance(cause, OSError) or cause.errno not in (errno.ENOSPC, errno.EDQUOT):
         return []
     row = sum(getattr(CollisionResult.blank(1), name).nbytes for name in TABLE_COLUMNS)
-    result = counter.at.of_trajectories * row if plan.layout == "factored" else dataset_template(plan).nbytes
-    needed = result + OVERHEAD_BYTES + (counter.at.of_trajectories - counter.at.trajectories) * row
+    result = counter.progress.of_trajectories * row if plan.layout == "factored" else dataset_template(plan).nbytes
+    needed = result + OVERHEAD_BYTES + (counter.progress.of_trajectories - counter.progress.trajectories) * row
     free = shutil.disk_usage(output.parent).free
     return [f"it takes {needed:,} bytes more, {free:,} are free"]
 
@@ -314,7 +314,7 @@ def store_result(
     extension: Extension | None = None,
 ) -> SweepOutcome:
     """Write the result of a trajectory table in the layout of its plan."""
-    at, variables, summary = counter.at, stored_variables(plan), Summary()
+    at, variables, summary = counter.progress, stored_variables(plan), Summary()
     whole = dataset_template(plan)
     if extension:
         whole = whole.assign_attrs(extended=extension.note)
@@ -329,8 +329,6 @@ def store_result(
         lengths = [chunks.get(axis.name, axis.size) for axis in plan.config.axes] if chunks else []
         for model, where, impacts, values in expanded_slabs(table, variables, lengths):
             if extension and extension.fill:
-                # expanded values may be read-only views
-                values = {name: array.copy() for name, array in values.items()}
                 extension.fill(model, where, values)
             for name, array in values.items():
                 yield name, (model, *where) if "model" in whole[name].dims else where, array

@@ -1,0 +1,21 @@
+"""The dimension of a unit is that of its factors, with exponents that may be formulas."""
+
+from __future__ import annotations
+
+import pytest
+
+from impact.contact.units import dimension
+
+UNITS = {
+    "m^(-n)": (0.0, -1.5, 0.0),
+    "kg^-2": (-2.0, 0.0, 0.0),
+    "s^(n-p)": (0.0, 0.0, -0.5),
+    "N/m^n": (1.0, -0.5, -2.0),
+    "Pa s^((n+p)/2)": (1.0, -1.0, -0.25),
+    "m^(2*p)": (0.0, 4.0, 0.0),
+}
+
+
+@pytest.mark.parametrize("unit", UNITS)
+def test_dimension(unit: str) -> None:
+    assert dimension(unit, {"n": 1.5, "p": 2.0}) == UNITS[unit]
