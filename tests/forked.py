@@ -94,9 +94,14 @@ def abandoned_pipe(folder: Path) -> Iterator[str]:
 
 
 def printed_on_terminal(
-    forked: Forked, *words: str | Path, width: int = 80, **environment: str
+    forked: Forked,
+    *words: str | Path,
+    stream: str = "stdout",
+    width: int = 80,
+    cwd: Path = ROOT,
+    **environment: str,
 ) -> tuple[Done, str]:
-    """Run a command line whose stdout is a terminal; how it ended and what the terminal shows."""
+    """Run a command line of which a stream is a terminal; how it ended and what the terminal shows."""
     driver, terminal = pty.openpty()
     fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 50, width, 0, 0))
     # the width of the terminal counts only where no variable has another
@@ -111,7 +116,8 @@ def printed_on_terminal(
 
     reader = threading.Thread(target=read)
     reader.start()
-    done = forked(*words, stdout=os.ttyname(terminal), code=code % [*environment], **environment)
+    streams = {stream: os.ttyname(terminal)}
+    done = forked(*words, cwd=cwd, code=code % [*environment], **streams, **environment)
     os.close(terminal)
     reader.join()
     os.close(driver)
@@ -176,6 +182,9 @@ def _command(argv: list[str], cwd: str, program: str, stdout: int, stderr: int) 
         os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
         os.dup2(stdout, 1)
         os.dup2(stderr, 2)
+        # the streams of the server may be of files, at places that a terminal does not have
+        sys.stdout = os.fdopen(1, "w", closefd=False)
+        sys.stderr = os.fdopen(2, "w", buffering=1, closefd=False)
         os.chdir(cwd)
         sys.argv = ["impact", *argv]
         exec(program, {})

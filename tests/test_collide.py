@@ -217,10 +217,10 @@ restitution = st.one_of(ordinary, st.floats(0.005, 1.0), st.sampled_from([-0.1, 
 speed = st.sampled_from([-0.5, -0.0, 0.0, 1.0, 1.25, 1e-3, 30.0])
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(
     key=st.sampled_from(sorted(LAWS)),
-    rows=st.lists(st.tuples(restitution, speed, speed, st.sampled_from([0.5, 1.0, 7.0])), min_size=1, max_size=30),
+    rows=st.lists(st.tuples(restitution, speed, speed, st.sampled_from([0.5, 1.0, 7.0])), min_size=1, max_size=12),
 )
 def test_collapse_changes_no_bit(key, rows):
     e, v1, v2, m1 = np.array(rows).T
@@ -230,15 +230,15 @@ def test_collapse_changes_no_bit(key, rows):
     assert differences(struck(find(key), lanes), struck(find(key), lanes, collapse=False)) == []
 
 
-@settings(max_examples=12, deadline=None)
-@given(key=st.sampled_from(sorted(LAWS)), seed=st.integers(0, 999), size=st.integers(6, 40))
-def test_lane_has_the_same_bits_in_any_order_and_block(key, seed, size):
+@settings(max_examples=10, deadline=None)
+@given(key=st.sampled_from(sorted(LAWS)), seed=st.integers(0, 999), size=st.integers(5, 20))
+def test_trajectory_has_the_same_bits_in_any_order_and_block(key, seed, size):
     chance = np.random.default_rng(seed)
-    e, n = chance.uniform(0.0, 1.0, 40), find(key).exponent or 1.5
-    lanes = with_parameters(find(key), impacts(n, e=e, v1=chance.uniform(0.1, 10.0, 40)), 1.0 - e)
+    e, n = chance.uniform(0.0, 1.0, 20), find(key).exponent or 1.5
+    lanes = with_parameters(find(key), impacts(n, e=e, v1=chance.uniform(0.1, 10.0, 20)), 1.0 - e)
     whole = struck(find(key), lanes)
-    order = chance.permutation(40)
-    for start in range(0, 40, size):
+    order = chance.permutation(20)
+    for start in range(0, 20, size):
         places = order[start : start + size]
         assert differences(whole, struck(find(key), lanes[places]), places) == []
 

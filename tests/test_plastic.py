@@ -39,6 +39,17 @@ def over_speed(key: str) -> tuple[Impacts, Outputs]:
     return lanes, contact
 
 
+@pytest.mark.parametrize("n", [1.0, 1.5, 2.0])
+def test_an_unloading_that_is_a_share_of_the_elastic_force_returns_that_share_of_the_work(n):
+    law = ForceModel(
+        "softer", "Softer", 2026, equation="", reference="", force=lambda elastic: elastic,
+        unloading=lambda elastic: 0.25 * elastic,
+    )  # fmt: skip
+    contact = struck(law, impacts(n))
+    assert contact["status"][0] == Status.OK
+    assert contact["e_out"][0] == pytest.approx(0.5, abs=1e-9)
+
+
 def integral(force, ends: list[float]) -> float:
     """The work of a force, by Gauss-Legendre between its bends."""
     ends = sorted(set(ends))

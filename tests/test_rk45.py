@@ -1,4 +1,4 @@
-"""The integrator has the order of its tableau, finds where lanes end, and computes a lane as if it were alone."""
+"""The integrator has the order of its tableau, and computes each trajectory to its end as if it were alone."""
 
 from dataclasses import replace
 from functools import partial
@@ -26,15 +26,15 @@ def solve(known: Known, rtol: float, record: bool = False) -> Solution:
 
 
 def springs(rows: np.ndarray, max_steps: int = 1000) -> Solution:
-    """Lanes of `SPRINGS` from (0, 1), one a row (k, c, q)."""
+    """Trajectories of `SPRINGS` from (0, 1), each a row (k, c, q)."""
     columns = tuple(np.ascontiguousarray(np.array(rows, float).reshape(-1, 3).T))
     start = np.array([np.zeros(columns[0].size), np.ones(columns[0].size)])
     return integrate(SPRINGS, start, columns, rtol=1e-9, max_steps=max_steps)
 
 
-def bits(solution: Solution, place: int) -> bytes:
+def bits(solution: Solution, index: int) -> bytes:
     arrays = (solution.state, solution.maximum, solution.steps, solution.termination)
-    return b"".join(array[..., place].tobytes() for array in arrays)
+    return b"".join(array[..., index].tobytes() for array in arrays)
 
 
 def fixed_step_error(known: Known, count: int, embedded: bool) -> float:
@@ -99,23 +99,23 @@ def test_recording_changes_no_bit(known):
     assert bits(solve(known, 1e-8, record=True), 0) == bits(solve(known, 1e-8), 0)
 
 
-# a lane that ends at once, a lane that ends after a thousand times as long, and everything between
-lanes = st.tuples(st.floats(-6.0, 4.0).map(lambda x: 10.0**x), st.floats(0.0, 0.5), st.floats(-1.0, 0.5))
+# a trajectory that ends at once, a trajectory that ends after a thousand times as long, and everything between
+trajectories = st.tuples(st.floats(-6.0, 4.0).map(lambda x: 10.0**x), st.floats(0.0, 0.5), st.floats(-1.0, 0.5))
 
 
 @settings(max_examples=10, deadline=None)
-@given(rows=st.lists(lanes, min_size=1, max_size=8), seed=st.integers(0, 999))
-def test_lane_has_the_same_bits_alone_and_in_any_crowd(rows, seed):
-    crowd = springs(rows)
+@given(rows=st.lists(trajectories, min_size=1, max_size=8), seed=st.integers(0, 999))
+def test_trajectory_has_the_same_bits_alone_and_in_any_batch(rows, seed):
+    batch = springs(rows)
     order = np.random.default_rng(seed).permutation(len(rows))
-    permuted = springs([rows[place] for place in order])
-    for place, row in enumerate(rows):
+    permuted = springs([rows[index] for index in order])
+    for index, row in enumerate(rows):
         alone = bits(springs([row]), 0)
-        assert bits(crowd, place) == alone
-        assert bits(permuted, int(np.flatnonzero(order == place)[0])) == alone
+        assert bits(batch, index) == alone
+        assert bits(permuted, int(np.flatnonzero(order == index)[0])) == alone
 
 
-def test_lane_has_the_same_bits_among_lanes_that_end_much_later():
+def test_trajectory_has_the_same_bits_among_others_that_end_much_later():
     solution = springs([(1.0, 0.1, 0.0), *[(1e-11, 0.0, -1e-3)] * 40])
     assert solution.steps[0] * 3 < solution.steps[1]
     assert bits(solution, 0) == bits(springs([(1.0, 0.1, 0.0)]), 0)
@@ -131,15 +131,15 @@ FAILURES = {
 
 
 @pytest.mark.parametrize(("row", "end"), FAILURES.values(), ids=FAILURES)
-def test_failure_is_told_and_leaves_the_other_lanes_alone(row, end):
-    others = [(0.5 + 0.1 * place, 0.1, 0.0) for place in range(9)]
-    whole, crowd = springs(others), springs([*others[:4], row, *others[4:]])
-    assert crowd.termination[4] == end
-    assert np.isnan(crowd.state[:, 4]).all()
-    assert np.isnan(crowd.maximum[4])
-    for place in range(9):
-        assert crowd.termination[place + (place >= 4)] == Termination.EVENT_REACHED
-        assert bits(crowd, place + (place >= 4)) == bits(whole, place)
+def test_failure_is_reported_and_changes_no_other_trajectory(row, end):
+    others = [(0.5 + 0.1 * index, 0.1, 0.0) for index in range(9)]
+    whole, batch = springs(others), springs([*others[:4], row, *others[4:]])
+    assert batch.termination[4] == end
+    assert np.isnan(batch.state[:, 4]).all()
+    assert np.isnan(batch.maximum[4])
+    for index in range(9):
+        assert batch.termination[index + (index >= 4)] == Termination.EVENT_REACHED
+        assert bits(batch, index + (index >= 4)) == bits(whole, index)
 
 
 @pytest.mark.parametrize("wall", [0.1, 0.3, 0.5, 0.777, 0.99])
@@ -154,7 +154,7 @@ def test_rate_that_becomes_nan_on_the_way_is_not_finite(wall):
 
 
 def test_given_up_after_max_steps_attempts():
-    # attempts are accepted steps and those tried again, so that the number of them that suffices is found
+    # attempts are accepted steps and those tried again, so that the number that suffices is searched for
     enough = next(
         count
         for count in range(1, 200)
@@ -175,7 +175,7 @@ def test_hardly_a_step_of_an_impact_is_tried_again(rtol):
         assert into(max_steps=int(into(max_steps=1000).steps[0]) + 1).termination[0] == Termination.EVENT_REACHED
 
 
-def test_no_lanes_give_no_outcome():
+def test_no_trajectories_give_no_solution():
     assert springs(np.empty((0, 3))).state.shape == (4, 0)
 
 

@@ -173,7 +173,7 @@ def test_two_processes_write_equal_bytes(cli: Run, tmp_path: Path, layout: str, 
 
 MANY = {
     "models": ["lankarani-nikravesh-1990", "gharib-hurmuzlu-2012"],
-    "sweep": {"e": {"linspace": [0.01, 1.0, 40_000]}, "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6e9},
+    "sweep": {"e": {"linspace": [0.01, 1.0, 33_000]}, "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6e9},
     "solver": {"rtol": 1e-4},
 }  # fmt: skip
 

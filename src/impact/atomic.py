@@ -1,4 +1,4 @@
-"""Files that appear whole: what is written goes to a part, which gets its name when it is complete."""
+"""Atomic writes: a file is written under a temporary name, and renamed when it is complete and on the disk."""
 
 from __future__ import annotations
 
@@ -17,15 +17,23 @@ from typing import Any
 from .errors import StoreError, UsageError
 from .text import safe_text
 
-# what opening or syncing a folder fails with although files in it can be written and synced
-NO_SYNC = {errno.EINVAL, errno.EACCES, errno.EPERM, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS, errno.EISDIR}
+# errors of opening or syncing a folder on file systems where files can still be written and synced
+UNSYNCABLE_ERRNOS = {
+    errno.EINVAL,
+    errno.EACCES,
+    errno.EPERM,
+    errno.ENOTSUP,
+    errno.EOPNOTSUPP,
+    errno.ENOSYS,
+    errno.EISDIR,
+}
 
 
 class Sink(io.RawIOBase):
-    """A file that takes what is written to it and never fails; what went wrong is told when it is asked for.
+    """A file that records the first I/O error instead of raising it; `check` and `sync` raise it.
 
-    HDF5 on a full disk may report success, or bring the process down when it ends: it is told that all is well,
-    and the first error is kept. After one, nothing more is written.
+    HDF5 on a full disk may report success, or crash the process at its end. So writes always report success here,
+    and after the first error nothing more is written.
     """
 
     def __init__(self, path: Path, mode: str) -> None:
@@ -51,11 +59,11 @@ class Sink(io.RawIOBase):
         return self._file.readinto(buffer) or 0
 
     def write(self, content: Any, /) -> int:
-        left = memoryview(content).cast("B")
-        # one system call may take less than all
-        while self.error is None and left:
+        remaining = memoryview(content).cast("B")
+        # a system call may write only a part
+        while self.error is None and remaining:
             try:
-                left = left[self._file.write(left) :]
+                remaining = remaining[self._file.write(remaining) :]
             except BaseException as error:
                 self.error = error
         return memoryview(content).nbytes
@@ -72,33 +80,33 @@ class Sink(io.RawIOBase):
         pass
 
     def inherit(self, path: Path) -> None:
-        """Take the permissions, and where it is allowed the owner and group, of a file that is to be replaced."""
+        """Copy the permissions, and where allowed the owner and group, of the file that is to be replaced."""
         try:
-            before = path.lstat()
+            replaced = path.lstat()
         except FileNotFoundError:
             return
-        if not stat.S_ISREG(before.st_mode):
+        if not stat.S_ISREG(replaced.st_mode):
             return
-        number = self._file.fileno()
-        # a file system that keeps neither is no reason to lose the output
-        for uid, gid in ((-1, before.st_gid), (before.st_uid, -1)):
+        descriptor = self._file.fileno()
+        # a file system without owners or permissions must not prevent the output
+        for uid, gid in ((-1, replaced.st_gid), (replaced.st_uid, -1)):
             with contextlib.suppress(OSError):
-                os.fchown(number, uid, gid)
+                os.fchown(descriptor, uid, gid)
         with contextlib.suppress(OSError):
-            os.fchmod(number, stat.S_IMODE(before.st_mode))
+            os.fchmod(descriptor, stat.S_IMODE(replaced.st_mode))
 
     def sync(self) -> None:
-        """Have everything on the disk.
+        """Flush everything to the disk.
 
         Raises
         ------
-        OSError : something could not be written, now or before
+        OSError : this write or an earlier one failed
         """
         self.check()
         os.fsync(self._file.fileno())
 
     def check(self) -> None:
-        """Raise what went wrong so far."""
+        """Raise the first error, if any."""
         if self.error is not None:
             raise self.error
 
@@ -109,25 +117,25 @@ class Sink(io.RawIOBase):
 
 @contextlib.contextmanager
 def atomic_write(path: Path, *, overwrite: bool, part: Path | None = None) -> Iterator[Sink]:
-    """A file to write to, which has its name when the block ends without an error, and then survives a power cut.
+    """Open a file that gets its name when the block ends without an error, and then survives a power cut.
 
     Parameters
     ----------
     path : the file
-    overwrite : whether it may take the place of another
-    part : its name until then; by default one that no other has
+    overwrite : whether it may replace another file
+    part : the temporary name; by default a unique one
 
     Raises
     ------
-    UsageError : the file appeared meanwhile, and is not to be overwritten
-    StoreError : the disk is full or failed; nothing is left under either name
+    UsageError : the file was created by another process meanwhile, and `overwrite` is not set
+    StoreError : the disk is full or failed; no file is left under either name
     """
     shown = safe_text(str(path))
     try:
         if part is None:
             part = path.with_name(f"{path.name}.{token_hex(4)}.part")
         else:
-            # what was left under this name may be a link, or another name of a whole result
+            # a file left under this name may be a link, or a hard link to a complete result
             part.unlink(missing_ok=True)
         sink = Sink(part, "x+")
         try:
@@ -148,34 +156,34 @@ def atomic_write(path: Path, *, overwrite: bool, part: Path | None = None) -> It
 
 
 def sync_folder(folder: Path) -> None:
-    """Have the names in a folder on the disk.
+    """Flush the names in a folder to the disk.
 
     Warns
     -----
-    UserWarning : the file system cannot sync a folder, or this user may not open it; the names are there anyway
+    UserWarning : the file system cannot sync folders, or the user may not open it; the names exist nevertheless
     """
     try:
-        number = os.open(folder, os.O_RDONLY)
+        descriptor = os.open(folder, os.O_RDONLY)
         try:
-            os.fsync(number)
+            os.fsync(descriptor)
         finally:
-            os.close(number)
+            os.close(descriptor)
     except OSError as error:
-        if error.errno not in NO_SYNC:
+        if error.errno not in UNSYNCABLE_ERRNOS:
             raise
-        _note_unsynced(error.strerror)
+        _warn_unsynced(error.strerror)
 
 
 @cache
-def _note_unsynced(reason: str) -> None:
-    """Warn once in a process, however many blocks it stores."""
+def _warn_unsynced(reason: str) -> None:
+    """Warn once per process."""
     warnings.warn(
         f"folders cannot be synced here ({reason}): a power cut may undo what was just written", stacklevel=3
     )
 
 
 def _publish(part: Path, path: Path, *, overwrite: bool) -> None:
-    """Give a complete file its name; without `overwrite` never in the place of a file that appeared meanwhile."""
+    """Rename a complete file; without `overwrite`, never over a file that was created meanwhile."""
     if overwrite:
         part.replace(path)
         return
@@ -184,7 +192,7 @@ def _publish(part: Path, path: Path, *, overwrite: bool) -> None:
     except FileExistsError:
         raise
     except OSError:
-        # a file system without hard links: what is left is to look before the rename
+        # a file system without hard links: check for the file, then rename
         if path.exists():
             raise FileExistsError from None
         part.rename(path)

@@ -1,16 +1,16 @@
 """The exceptions of the program, all under one root.
 
     ImpactError
-    ├── ConfigError    the sweep asked for cannot be run: every problem, one a line
-    ├── ModelError     a contact force model is declared wrongly
-    ├── UsageError     a request that the data or the file system cannot meet as it was put
+    ├── ConfigError    the config of a sweep is invalid: all problems, one per line
+    ├── ModelError     the definition of a contact force model is invalid
+    ├── UsageError     an argument does not fit the data or the file system
     ├── ResultError    a file is not a readable result
-    ├── StoreError     the result could not be stored, or not computed; what was finished is kept
+    ├── StoreError     the result could not be computed or stored; finished blocks are kept
     ├── InUseError     another process writes the output
-    └── UnfinishedError  a signal ended a sweep; what was finished is kept
+    └── UnfinishedError  a signal stopped a sweep; finished blocks are kept
 
-They say what is wrong, where, what was got and what is wanted. They become exit codes in one place,
-`impact.cli.exits`.
+A message says what is wrong and where, the invalid value and what was expected. `impact.cli.exits` maps exceptions
+to exit codes.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from .text import safe_text
 
 
 class ImpactError(Exception):
-    """The root: an error that the program expected, with a message for its user.
+    """Base class of all expected errors, with a message for the user.
 
     >>> import impact
     >>> try:
@@ -34,7 +34,7 @@ class ImpactError(Exception):
 
 
 class ConfigError(ImpactError):
-    """The config of a sweep has problems; `problems` holds one line for each."""
+    """The config of a sweep is invalid; `problems` holds one line for each problem."""
 
     def __init__(self, problems: Sequence[str]) -> None:
         self.problems = tuple(problems)
@@ -42,11 +42,11 @@ class ConfigError(ImpactError):
 
 
 class ModelError(ImpactError):
-    """A contact force model is declared wrongly, or is not in the catalogue."""
+    """The definition of a contact force model is invalid, or a model is not in the catalogue."""
 
 
 class UsageError(ImpactError):
-    """A request that cannot be met as it was put: an unknown coordinate, an output that exists."""
+    """An argument does not fit the data or the file system: an unknown coordinate, an output that exists."""
 
 
 class ResultError(ImpactError):
@@ -62,24 +62,24 @@ class InUseError(ImpactError):
 
 
 class UnfinishedError(ImpactError):
-    """A sweep was told to stop; what it has finished is kept, as the message says."""
+    """A sweep was stopped; the message says which finished work is kept."""
 
 
 class Interruption(BaseException):
-    """A signal ends the program at once; the message says what is kept."""
+    """A signal ends the program at once; the message says which finished work is kept."""
 
 
-# exceptions that are never the fault of a plug-in, whatever it was doing when they were raised
+# exceptions that a plug-in does not cause, even if they are raised while it runs
 NOT_OF_A_PLUGIN = (KeyboardInterrupt, GeneratorExit, MemoryError, Interruption)
 
 
-def did_you_mean(word: str, known: Sequence[str]) -> str:
-    """The end of a message about an unknown name: the nearest known one, else all of them.
+def did_you_mean(word: str, choices: Sequence[str]) -> str:
+    """The end of a message about an unknown name: the most similar choice, otherwise all choices.
 
     >>> did_you_mean("hetrz", ["hertz", "bilinear"])
     'did you mean "hertz"?'
     >>> did_you_mean("x", ["hertz", "bilinear"])
     'known: bilinear, hertz'
     """
-    near = get_close_matches(word, known, n=1, cutoff=0.6)
-    return safe_text(f'did you mean "{near[0]}"?' if near else f"known: {', '.join(sorted(known))}", 800)
+    matches = get_close_matches(word, choices, n=1, cutoff=0.6)
+    return safe_text(f'did you mean "{matches[0]}"?' if matches else f"known: {', '.join(sorted(choices))}", 800)

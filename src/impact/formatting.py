@@ -1,4 +1,4 @@
-"""Numbers, units and quantities as text: every table, message, page and picture writes them by these functions."""
+"""Numbers, units and quantities as text: all tables, messages, pages and pictures use these functions."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ PREFIXED = re.compile(r"(m|s|N|J|Pa|W|Hz)(?![\^A-Za-z])")
 
 
 def number(value: object, digits: int = 6) -> str:
-    """A value with so many digits; a missing number is a dash, and what is no float is as it is.
+    """A float with `digits` significant digits; NaN is a dash, and other types use `str`.
 
     >>> number(1 / 3), number(0.5), number(6e9), number(float("nan")), number(12)
     ('0.333333', '0.5', '6e+09', '–', '12')
@@ -23,7 +23,7 @@ def number(value: object, digits: int = 6) -> str:
 
 
 def decimals(value: float, places: int = 4) -> str:
-    """A number with so many decimals, for columns whose numbers are compared; a missing one is a dash.
+    """A number with `places` decimals, for columns whose numbers are compared; NaN is a dash.
 
     >>> decimals(0.5), decimals(float("nan"))
     ('0.5000', '–')
@@ -32,7 +32,7 @@ def decimals(value: float, places: int = 4) -> str:
 
 
 def percentage(share: float) -> str:
-    """A share from 0 to 1 in percent; it is 0 or 100 only where none or all are meant.
+    """A share from 0 to 1 in percent; "0%" and "100%" mean exactly none and all.
 
     >>> [percentage(n / 3000) for n in (0, 1, 2000, 2999, 3000)]
     ['0%', '<0.1%', '66.7%', '>99.9%', '100%']
@@ -45,7 +45,7 @@ def percentage(share: float) -> str:
 
 
 def label(value: object) -> str:
-    """A value of an axis: all its digits but those that rounding left, without many zeros.
+    """The label of an axis value: enough digits to identify it, without rounding errors or trailing zeros.
 
     >>> label(0.1 + 0.2), label(6e9), label(1234567.0), label("steel")
     ('0.3', '6e+09', '1234567', 'steel')
@@ -55,7 +55,7 @@ def label(value: object) -> str:
 
 
 def quantity(value: object, unit: str = "1", digits: int = 6) -> str:
-    """A value with its unit, where it has one.
+    """A value with its unit, if it has one.
 
     >>> quantity(0.5, "m/s"), quantity(1.5), quantity(float("nan"), "N")
     ('0.5 m/s', '1.5', '–')
@@ -65,7 +65,7 @@ def quantity(value: object, unit: str = "1", digits: int = 6) -> str:
 
 
 def heading(name: str, of: str = "", unit: str = "1") -> str:
-    """The head of a column: a name, what it is of, and its unit in brackets.
+    """The heading of a column: a name, the model or ball it belongs to, and its unit in brackets.
 
     >>> heading("v1_post", "hertz", "m/s"), heading("e")
     ('v1_post hertz [m/s]', 'e')
@@ -74,7 +74,7 @@ def heading(name: str, of: str = "", unit: str = "1") -> str:
 
 
 def typographic(value: float, *, powers: bool = False) -> str:
-    """A number as it is printed: with a true minus, and powers of ten, also for 1e-4 where `powers` asks for them.
+    """A number with a minus sign and powers of ten as in print; with `powers`, also 1e-4 is a power of ten.
 
     >>> [typographic(value) for value in (0.25, -3.0, -1e-9, 2.5e10, 1e-4)], typographic(1e-4, powers=True)
     (['0.25', '−3', '−10⁻⁹', '2.5·10¹⁰', '0.0001'], '10⁻⁴')
@@ -89,12 +89,12 @@ def typographic(value: float, *, powers: bool = False) -> str:
 
 
 def scaled_unit(unit: str, largest: float) -> tuple[float, str]:
-    """The size of the unit with the prefix that suits a number, and that unit.
+    """The unit with the prefix that suits a number: its size in the given unit, and its name.
 
     Parameters
     ----------
     unit : in SI, such as "m/s"
-    largest : magnitude of the largest number that is shown, in it
+    largest : magnitude of the largest number to show, in that unit
 
     >>> scaled_unit("m", 1.2e-4), scaled_unit("m/s", 0.5), scaled_unit("N", 6200.0), scaled_unit("kg", 2e-3)
     ((1e-06, 'µm'), (1.0, 'm/s'), (1000.0, 'kN'), (0.001, 'g'))
@@ -109,7 +109,7 @@ def scaled_unit(unit: str, largest: float) -> tuple[float, str]:
 
 
 def _prefixed(largest: float) -> tuple[int, str]:
-    """The power of ten of a prefix, and the prefix; none for numbers that are short without one."""
+    """The power of ten of a prefix, and the prefix; 0 and "" for numbers that need none."""
     if not 0.0 < largest < float("inf") or 0.1 <= largest < 1000.0:
         return 0, ""
     exponent = int(f"{largest:.6e}".partition("e")[2])

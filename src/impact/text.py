@@ -1,4 +1,4 @@
-"""Text from files made safe to show."""
+"""Escape text from files so that it is safe to print."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ UNSAFE = frozenset({"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"})
 
 
 def with_year(title: str, year: int | str) -> str:
-    """The title of a model with its year; the versions at the end of a title stand for it.
+    """The title of a model with its year, unless the title ends with versions in brackets.
 
     >>> with_year("Hertz", 1882), with_year("Modia3D (v0.4.0 to v0.5.2, 2019 to 2021)", 2019)
     ('Hertz (1882)', 'Modia3D (v0.4.0 to v0.5.2, 2019 to 2021)')
@@ -18,14 +18,14 @@ def with_year(title: str, year: int | str) -> str:
 
 
 def safe_text(text: str, limit: int = 200) -> str:
-    r"""The text with characters that steer a terminal, or are not seen, escaped; at most `limit` characters.
+    r"""The text with control and invisible characters escaped, cut to at most `limit` characters.
 
     >>> safe_text("steel\x1b[31m")
     'steel\\x1b[31m'
     >>> safe_text("a\u202eb"), safe_text("abcdef", limit=4)
     ('a\\u202eb', 'abc…')
     """
-    # an escape is never shorter than its character: what is past the limit need not be looked at
+    # an escape is never shorter than its character: characters beyond the limit are not needed
     shown = "".join(_escaped(letter) if category(letter) in UNSAFE else letter for letter in text[: limit + 1])
     return shown if len(shown) <= limit else shown[: limit - 1] + "…"
 

@@ -1,4 +1,4 @@
-"""Common materials, which need no table in a config, with the source of each number."""
+"""The library of common materials, which need no table in a config, with the source of each number."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def records() -> Mapping[str, Mapping[str, float | str]]:
 
 @cache
 def library() -> Mapping[str, Mapping[str, float | str]]:
-    """The same as tables of a config."""
+    """The materials as tables of a config, without sources."""
     return {
         name: {key: value for key, value in record.items() if key in MATERIAL_QUANTITIES}
         for name, record in records().items()

@@ -1,6 +1,6 @@
 """Event location: the final steps of a trajectory, at whose end the event function vanishes.
 
-The formulas are of plain arithmetic and `choose`, so that they hold for arrays and, compiled, for numbers.
+The formulas use only arithmetic, `choose` and `smaller`, so that they hold for arrays and, compiled, for numbers.
 """
 
 from __future__ import annotations
@@ -15,40 +15,40 @@ from .problem import N_COMPONENTS, N_INTEGRATED, Array, Mask, Problem, Terminati
 if TYPE_CHECKING:
     from .rk45 import State, TrialStep
 
-# an offset of up to NEAR_EVENT of a step is covered by a step of order two, forwards or backwards; the event is
-# located when the offset that then remains is below EVENT_RTOL of the step, or EVENT_ATOL: a linear step is then
-# exact to rounding
+# an offset up to NEAR_EVENT of a step is bridged by a step of order two, forwards or backwards; the event is
+# located when the remaining offset is below EVENT_RTOL of the step, or EVENT_ATOL: a linear step is then exact to
+# rounding
 NEAR_EVENT, EVENT_RTOL, EVENT_ATOL = 1e-3, 1e-6, 1e-12
 
 
 def choose(condition: Mask, this: Array | float, other: Array | float) -> Array:
-    """One of two values; the compiled back end has its own version for numbers."""
+    """`this` where the condition holds, else `other`; the compiled back end has its own version for numbers."""
     return np.where(condition, this, other)
 
 
-def smaller(one: Array, other: Array) -> Array:
+def smaller(this: Array, other: Array) -> Array:
     """The smaller of two values; the compiled back end has its own version."""
-    return np.minimum(one, other)
+    return np.minimum(this, other)
 
 
 def trapezoid(h: Array, k: Array, k_end: Array) -> Array:
-    """The increment of order two over h, from the rates at both ends."""
+    """The increment over h by the trapezoidal rule, from the rates at both ends."""
     return 0.5 * h * (k + k_end)
 
 
 def linear_offset(g: Array, dg: Array) -> Array:
-    """Offset of the root of an event function that is linear; 0 where it does not fall."""
+    """Offset of the root of a linear event function with value g and rate dg; 0 where it does not fall."""
     return choose(dg < 0.0, -g / dg, 0.0)
 
 
 def event_offset(g: Array, dg: Array, g_before: Array, dg_before: Array, h: Array) -> tuple[Array, Mask]:
-    """Offset of the event from the end of a step of length h, and whether it is sure to come.
+    """Offset of the event from the end of a step of length h, and whether the event is certain to occur.
 
     Parameters
     ----------
-    g, dg : event function and its rate at the end of the step
-    g_before, dg_before : at its start
-    h : length of the step
+    g, dg : event function and its rate at the end of the step, shape (n,)
+    g_before, dg_before : the same at its start
+    h : length of the step, shape (n,)
     """
     # the event function as the cubic through both ends, in units of h: the root of its parabola at the end, then
     # one Newton step
@@ -57,32 +57,32 @@ def event_offset(g: Array, dg: Array, g_before: Array, dg_before: Array, h: Arra
     root = 2.0 * g / (np.sqrt(slope * slope - 2.0 * curvature * g) - slope)
     correction = cubic * root * root * root / (slope + root * (curvature + 3.0 * root * cubic))
     root = choose(2.0 * np.abs(correction) < np.abs(root), root - correction, root)
-    # a function that only fades away has no root by its mean curvature; it may be too stiff for the cubic
-    sure = dg * slope >= 2.0 * g * (dg - dg_before)
-    return choose(dg < 0.0, root * h, np.inf), sure
+    # a function that decays without a root has none by its mean curvature; it may be too stiff for the cubic
+    certain = dg * slope >= 2.0 * g * (dg - dg_before)
+    return choose(dg < 0.0, root * h, np.inf), certain
 
 
 def is_event_ahead(g: Array, dg: Array, h_next: Array) -> Mask:
-    """Whether the event lies before the end of the next step, by its linear continuation."""
+    """Whether the event lies before the end of the next step, by linear extrapolation."""
     return smaller(h_next * dg + g, g) < 0.0
 
 
-def before_event(offset: Array, sure: Mask, h: Array, h_next: Array) -> tuple[Mask, Array]:
-    """Whether the event is near the end of a step, and the next step, which ends at the event at the latest."""
+def before_event(offset: Array, certain: Mask, h: Array, h_next: Array) -> tuple[Mask, Array]:
+    """Whether the event is near the end of a step, and the length of the next step, at most up to the event."""
     near = np.abs(offset) <= NEAR_EVENT * h + EVENT_ATOL
-    return near, choose(sure & (offset < h_next), offset, h_next)
+    return near, choose(certain & (offset < h_next), offset, h_next)
 
 
 def at_event(
     near: Mask, remaining: Array, g: Array, offset: Array, h: Array, h_next: Array
 ) -> tuple[Mask, Mask, Array]:
-    """Whether the event is located, whether the step went across it instead, and the next step.
+    """Whether the event is located, whether the step crossed it instead, and the length of the next step.
 
     Parameters
     ----------
     near, offset : see `before_event`
     remaining : offset that remains after a step of order two
-    g : event function at the end of the step of length h; negative where it went across
+    g : event function at the end of the step of length h; negative where the step crossed the event
     """
     located = near & (np.abs(remaining) <= EVENT_RTOL * h + EVENT_ATOL)
     crossed = (g < 0.0) & np.logical_not(located)
@@ -94,11 +94,11 @@ def at_event(
 def locate_event(
     problem: Problem, state: State, trial: TrialStep, accepted: Mask
 ) -> tuple[NDArray[np.intp], Array]:
-    """End trajectories at their event, and shorten the next step of those just before or beyond it.
+    """End trajectories at their event, and shorten the next step of those shortly before or beyond it.
 
-    A step across the event is rejected and tried again with the length to the event, so that the way to it
-    consists of true steps of order five. Returns the positions of the trajectories that ended, and the offsets of
-    their events from the end of the step, as fractions of it.
+    A step across the event is rejected and tried again with the length to the event, so that all steps up to the
+    event are of order five. Returns the positions of the trajectories that ended, and the offsets of their events
+    from the end of the step, as fractions of it.
     """
     g, dg = problem.event(trial.y[:N_COMPONENTS], trial.k, state.params)
     at = (is_event_ahead(g, dg, trial.h_next) & accepted).nonzero()[0]
@@ -106,8 +106,8 @@ def locate_event(
         return at, g[at]
     g, dg, h = g[at], dg[at], state.h[at]
     g_before, dg_before = problem.event(state.y[:N_COMPONENTS], state.k, state.params)
-    offset, sure = event_offset(g, dg, g_before[at], dg_before[at], h)
-    near, h_next = before_event(offset, sure, h, trial.h_next[at])
+    offset, certain = event_offset(g, dg, g_before[at], dg_before[at], h)
+    near, h_next = before_event(offset, certain, h, trial.h_next[at])
     y, remaining = _step_to_event(problem, state, trial, at, np.where(near, offset, 0.0))
     located, crossed, trial.h_next[at] = at_event(near, remaining, g, offset, h, h_next)
     trial.is_accurate[at[crossed]] = False
@@ -121,7 +121,7 @@ def locate_event(
 def _step_to_event(
     problem: Problem, state: State, trial: TrialStep, at: NDArray[np.intp], offset: Array
 ) -> tuple[Array, Array]:
-    """The rows an offset from the end of the step and then linearly at the event, and the offset of this part."""
+    """The rows at the event, by a step of order two and a linear one, and the offset of the linear step."""
     y, k, params = trial.y[:, at], trial.k[:, at], tuple(column[at] for column in state.params)
     k_end = problem.rates(y[:N_COMPONENTS] + offset * k[:N_COMPONENTS], params)
     y = y + trapezoid(offset, k, k_end)[:N_INTEGRATED]

@@ -1,4 +1,4 @@
-"""The maximum of the watched quantity, at or beside the largest value at the end of a step."""
+"""The maximum of the watched quantity, near its largest value at the end of a step."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from .problem import N_COMPONENTS, N_INTEGRATED, WATCHED_ROW, Array, Mask, Param
 if TYPE_CHECKING:
     from .rk45 import State, TrialStep
 
-# step of the difference quotient for the slope of the watched quantity, relative to the step beside it
+# step of the difference quotient for the slope of the watched quantity, relative to the adjacent step
 SLOPE_STEP = 1e-5
-# a slope that over that step is less than this of the value counts as zero
+# a slope that changes the value by less than this fraction over the adjacent step counts as zero
 FLAT_SLOPE = 1e-10
-# a maximum is flat, so that a crude location of it is enough
+# near a maximum the quantity is flat, so that an approximate location is sufficient
 SECANT_STEPS = 2
 
 # (positions, rows, rates, lengths of the step) -> rows and rates at its end
@@ -28,7 +28,7 @@ TakeStep = Callable[[NDArray[np.intp], Array, Array, Array], tuple[Array, Array]
 
 @dataclass(frozen=True)
 class PeakCandidate:
-    """Where the watched quantity was largest at a step's end, shape (2, n), and the steps behind and ahead."""
+    """Components where the watched quantity was largest at a step's end, shape (2, n), and the adjacent steps."""
 
     y: Array
     behind: Array
@@ -36,47 +36,47 @@ class PeakCandidate:
 
     @classmethod
     def of(cls, start: Array) -> PeakCandidate:
-        """The starts, beside which there is no step yet."""
+        """The starts of all trajectories, without adjacent steps."""
         return cls(start.copy(), np.zeros(start.shape[1]), np.zeros(start.shape[1]))
 
     def put(self, where: NDArray[np.intp], y: Array, behind: Array, ahead: Array | float) -> None:
-        """Replace the candidates at some positions."""
-        for row, new in zip(self.y, y, strict=True):
-            row[where] = new
+        """Replace the candidates at the given positions."""
+        for row, values in zip(self.y, y, strict=True):
+            row[where] = values
         self.behind[where], self.ahead[where] = behind, ahead
 
 
-def begins_to_fall(before: Array, after: Array, best: Array) -> Mask:
-    """Whether the watched quantity falls over a step, from a value above the best one so far."""
-    return (after < before) & (before > best)
+def begins_to_fall(value: Array, value_end: Array, best: Array) -> Mask:
+    """Whether the watched quantity falls over a step, from a value above the largest one so far."""
+    return (value_end < value) & (value > best)
 
 
 def secant_update(left: Array, d_left: Array, right: Array, d_right: Array) -> Array:
-    """The root of the secant through two slopes, as a fraction of the step; the right end where it is outside."""
+    """The root of the secant through two slopes, as a fraction of the step; `right` where it is outside."""
     root = right - d_right * (right - left) / (d_right - d_left)
     return choose((root >= 0.0) & (root <= 1.0), root, right)
 
 
-def note_peaks(state: State, trial: TrialStep, accepted: Mask, ended: NDArray[np.intp]) -> None:
-    """Note where the watched quantity begins to fall, or a trajectory ends, above all that was noted before."""
-    before, after = state.k[WATCHED_ROW], trial.k[WATCHED_ROW]
-    at = (begins_to_fall(before, after, state.best) & accepted).nonzero()[0]
+def update_peaks(state: State, trial: TrialStep, accepted: Mask, ended: NDArray[np.intp]) -> None:
+    """Update the candidates where the watched quantity begins to fall, or a trajectory ends, above `best`."""
+    value, value_end = state.k[WATCHED_ROW], trial.k[WATCHED_ROW]
+    at = (begins_to_fall(value, value_end, state.best) & accepted).nonzero()[0]
     if at.size:
-        state.best[at] = before[at]
+        state.best[at] = value[at]
         state.peak.put(state.index[at], state.y[:N_COMPONENTS, at], state.h_last[at], state.h[at])
-    ended = ended[after[ended] > state.best[ended]]
+    ended = ended[value_end[ended] > state.best[ended]]
     if ended.size:
-        state.best[ended] = after[ended]
+        state.best[ended] = value_end[ended]
         state.peak.put(state.index[ended], trial.y[:N_COMPONENTS, ended], state.h[ended], 0.0)
 
 
 def refine_maximum(
     problem: Problem, params: Params, peak: PeakCandidate, best: Array, take_step: TakeStep
 ) -> None:
-    """Raise the values at the candidates, shape (n,), to the maxima beside them.
+    """Raise the values at the candidates, `best` of shape (n,), to the maxima near them.
 
-    The secant rule finds where the slope along the trajectory vanishes, by true steps from the candidate into the
-    step ahead of it or, where the slope is negative there already, back into the one behind.
+    The secant rule finds where the slope along the trajectory vanishes, by steps of order five from the candidate
+    into the next step or, where the slope at the candidate is negative, back into the previous one.
     """
     small = SLOPE_STEP * np.maximum(peak.behind, peak.ahead)
 
@@ -95,13 +95,13 @@ def refine_maximum(
     y = np.zeros((N_INTEGRATED, at.size))
     y[:N_COMPONENTS] = peak.y[:, at]
 
-    def slope_after(fraction: Array) -> Array:
+    def slope_at(fraction: Array) -> Array:
         y_end, k_end = take_step(at, y, k, fraction * h)
         best[at] = np.fmax(best[at], k_end[WATCHED_ROW])
         return slope(y_end, k_end)
 
     left, right = np.zeros(at.size), np.ones(at.size)
-    d_left, d_right = d_peak, slope_after(right)
+    d_left, d_right = d_peak, slope_at(right)
     for _ in range(SECANT_STEPS):
         root = secant_update(left, d_left, right, d_right)
-        left, d_left, right, d_right = right, d_right, root, slope_after(root)
+        left, d_left, right, d_right = right, d_right, root, slope_at(root)

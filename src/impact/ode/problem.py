@@ -1,4 +1,4 @@
-"""What the integrator takes and returns: a problem of many trajectories, its steps and its solution."""
+"""Inputs and outputs of the integrator: a problem of many trajectories, its steps and its solution."""
 
 from __future__ import annotations
 
@@ -40,18 +40,18 @@ class Rates(Protocol):
 
 @dataclass(frozen=True)
 class Problem:
-    """What is integrated.
+    """An initial value problem with an event, for many trajectories.
 
     Parameters
     ----------
     rates : (y, params, out=None) -> rates of the two components and the two quadratures, and the watched
-        quantity, of shape (5, n), at components y of shape (2, n); they may be written into `out`, and the last
-        rows left out that it has no room for
+        quantity, of shape (5, n), at components y of shape (2, n); they may be written into `out`, which may lack
+        the last rows
     event : (y, k, params) -> (g, dg): a function that is positive until the trajectory ends, and its rate along
         the trajectory, at components y where the rates are k
     unreachable : (y, k, params) -> mask of the trajectories that can no longer reach the event
     floor : the local error of each component is judged against rtol max(|y|, floor)
-    watch : locate the maximum of the watched quantity
+    watch : whether to locate the maximum of the watched quantity
     step_at_unit_error : length of a step whose error is of the order of 1, from which the first step is chosen
     """
 
@@ -65,7 +65,7 @@ class Problem:
 
 @dataclass(frozen=True)
 class Step:
-    """One accepted step, for the interpolant: start (4, n), length (n,), stages (7, 4, n), end as a fraction."""
+    """An accepted step, for the interpolant: start (4, n), length (n,), stages (7, 4, n), end as a fraction."""
 
     start: Array
     length: Array
@@ -74,10 +74,10 @@ class Step:
 
     @classmethod
     def of(cls, start: Array, length: Array, stages: list[Array], end: Array) -> Step:
-        """A copy of a step; rows that a stage does not have are zero, and have no part in it."""
+        """A copy of a step; missing rows of a stage are zero, since they have no weight."""
         rows = np.zeros((len(stages), *start.shape))
-        for room, stage in zip(rows, stages, strict=True):
-            room[: len(stage)] = stage[:N_INTEGRATED]
+        for target, stage in zip(rows, stages, strict=True):
+            target[: len(stage)] = stage[:N_INTEGRATED]
         return cls(start.copy(), length, rows, end)
 
     def at(self, theta: float | Array) -> Array:
@@ -106,6 +106,6 @@ class Solution:
 
     @classmethod
     def blank(cls, n: int) -> Solution:
-        """n trajectories of which nothing is known."""
+        """n trajectories without values: NaN, no steps, RUNNING."""
         unknown = np.full((N_INTEGRATED, n), np.nan)
         return cls(unknown, np.full(n, np.nan), np.zeros(n, np.int32), np.zeros(n, np.int8))

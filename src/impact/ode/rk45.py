@@ -1,8 +1,8 @@
-"""Adaptive Dormand-Prince 5(4) for many trajectories: each has its own step, all are advanced as arrays.
+"""Adaptive Dormand-Prince 5(4) for many trajectories, each with its own step size, advanced as arrays.
 
-A trajectory is one initial value problem of two components that ends where an event function falls through zero.
-Beside the two, rates that depend on them alone are integrated as quadratures with the same weights, and one
-quantity is watched for its maximum. All arithmetic is elementwise and in a fixed order, so that a trajectory has
+A trajectory is an initial value problem of two components that ends where an event function falls through zero.
+Two quadratures, whose rates depend on the components alone, are integrated with the same weights, and the maximum
+of one watched quantity is located. All arithmetic is elementwise and in a fixed order, so that a trajectory has
 the same bits alone, in any batch and in any order.
 """
 
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .events import choose, locate_event
-from .maximum import PeakCandidate, note_peaks, refine_maximum
+from .maximum import PeakCandidate, refine_maximum, update_peaks
 from .problem import (
     N_COMPONENTS,
     N_INTEGRATED,
@@ -30,14 +30,15 @@ from .problem import (
 )
 from .tableau import A, E
 
-# the controller: a step is multiplied by SAFETY/error^GAIN, within bounds; exponents are in parts of 256. The
-# order of the method suggests a FIFTH, but with a smaller exponent steps vary less, and hardly any is rejected
+# the controller: a step is multiplied by SAFETY/error^CONTROLLER_EXPONENT, within
+# bounds; exponents are in parts of 256. The order of the method suggests 1/5 (51/256), but with a smaller exponent
+# steps vary less, and hardly any is rejected
 SAFETY, MIN_FACTOR, MAX_FACTOR, CONTROLLER_EXPONENT, FIRST_STEP_EXPONENT = 0.87, 0.2, 3.0, 36, 51
 MIN_STEP = 1e-16
-# after so many halvings a rate is taken to stay not finite; they are counted over the whole trajectory, since
-# towards a point beyond which there is no rate every halved step is accepted
+# halvings of steps with a rate that is not finite, after which a trajectory fails; they are counted over the whole
+# trajectory, since near a point beyond which no rate is finite every halved step is accepted
 MAX_HALVINGS = 20
-# trajectories that have ended are removed when they are more than this fraction
+# ended trajectories are removed when they are more than this fraction of all
 COMPACT_ABOVE = 0.125
 RUNNING, EVENT_REACHED = int(Termination.RUNNING), int(Termination.EVENT_REACHED)
 
@@ -54,7 +55,7 @@ def _nested_weights(row: tuple[Fraction, ...]) -> NestedWeights:
 
 
 STAGE_WEIGHTS, ERROR_WEIGHTS = tuple(map(_nested_weights, A[1:])), _nested_weights(E)
-# rows of the rates that each stage needs: the second has no part in the solution
+# rows of the rates that each stage needs; the second stage has no weight in the solution
 STAGE_ROWS = (
     WATCHED_ROW + 1,
     N_COMPONENTS,
@@ -69,7 +70,7 @@ STAGE_ROWS = (
 def _keep_freed_memory() -> None:
     """Allocate and free 16 MiB once, after which glibc keeps freed arrays of that size for the next ones.
 
-    It would else return them to the system every few steps; the first use of new pages is slow.
+    Otherwise it would return them to the system every few steps, and the first use of new pages is slow.
     """
     np.empty(1 << 21)
 
@@ -79,7 +80,7 @@ _keep_freed_memory()
 
 @dataclass
 class Workspace:
-    """Memory for the rows and rates of a batch, and for a step: later stages, rows at its end, a sum of stages."""
+    """Memory for the rows and rates of a batch, and of a step: stages after the first, rows at its end, a sum."""
 
     y: Array
     k: Array
@@ -109,10 +110,10 @@ def _narrow(rows: Array, n: int) -> Array:
 
 @dataclass
 class State:
-    """The trajectories that still run, in arrays that are compacted together; the last axis is the trajectory.
+    """The running trajectories, in arrays that are compacted together; the last axis is the trajectory.
 
-    `h` is the length of the next step, `h_last` that of the one before. `best` is the largest watched value at the
-    end of a step from which it fell or at which the trajectory ended; `peak`, of all trajectories, is where.
+    `h` is the length of the next step, `h_last` that of the previous one. `best` is the largest watched value at
+    the end of a step from which it fell or at which the trajectory ended; `peak`, for all trajectories, is where.
     """
 
     index: NDArray[np.intp]
@@ -130,7 +131,7 @@ class State:
 
     @classmethod
     def begin(cls, problem: Problem, start: Array, params: Params, workspace: Workspace, h: float) -> State:
-        """All trajectories at their start; rows that the start does not have are zero."""
+        """All trajectories at their start; missing rows of the start are zero."""
         n = start.shape[1]
         y, k = workspace.y, workspace.k
         y[: len(start)], y[len(start) :] = start, 0.0
@@ -162,23 +163,23 @@ class State:
         solution.steps[where], solution.termination[where] = self.steps[at], termination
 
     def compacted(self) -> State:
-        """Those that still run, in the same memory: what is kept moves into the spare array of each pair."""
-        kept = np.flatnonzero(self.termination == RUNNING)
-        workspace = self.workspace.narrow(kept.size)
-        y = self.y.take(kept, 1, workspace.y_end, "clip")
-        k = self.k.take(kept, 1, workspace.stages[-1], "clip")
-        workspace.y_end, workspace.stages[-1] = _narrow(self.y, kept.size), _narrow(self.k, kept.size)
+        """The running trajectories, in the same memory: they are moved into the spare array of each pair."""
+        running = np.flatnonzero(self.termination == RUNNING)
+        workspace = self.workspace.narrow(running.size)
+        y = self.y.take(running, 1, workspace.y_end, "clip")
+        k = self.k.take(running, 1, workspace.stages[-1], "clip")
+        workspace.y_end, workspace.stages[-1] = _narrow(self.y, running.size), _narrow(self.k, running.size)
         return State(
-            index=self.index[kept],
-            params=tuple(column[kept] for column in self.params),
+            index=self.index[running],
+            params=tuple(column[running] for column in self.params),
             y=y,
             k=k,
-            h=self.h[kept],
-            h_last=self.h_last[kept],
-            halvings=self.halvings[kept],
-            steps=self.steps[kept],
-            termination=self.termination[kept],
-            best=self.best[kept],
+            h=self.h[running],
+            h_last=self.h_last[running],
+            halvings=self.halvings[running],
+            steps=self.steps[running],
+            termination=self.termination[running],
+            best=self.best[running],
             peak=self.peak,
             workspace=workspace,
         )
@@ -186,7 +187,7 @@ class State:
 
 @dataclass(frozen=True)
 class TrialStep:
-    """A step tried in all trajectories: rows and rates at its end, whether it is accurate, the next step."""
+    """A trial step of all trajectories: rows and rates at its end, whether it is accurate, the next length."""
 
     y: Array
     k: Array
@@ -210,15 +211,15 @@ def integrate(
     ----------
     problem : rates, event and error scale
     start : components at the start, shape (2, n); or all rows, shape (4, n), where it continues
-    params : what the rates need per trajectory, each of shape (n,)
+    params : arguments of the rates per trajectory, each of shape (n,)
     rtol : local error per step, relative to max(|y|, floor)
     max_steps : attempted steps after which a trajectory fails
-    record : keep every accepted step for the interpolant; for a single trajectory
+    record : whether to keep every accepted step for the interpolant; for a single trajectory
     workspace : memory of an earlier call for as many trajectories or more
 
     Returns
     -------
-    Solution : a failed trajectory has NaN for its state, and its reason in `termination`
+    Solution : the state of a failed trajectory is NaN, its `termination` is the reason
     """
     n = start.shape[1]
     solution = Solution.blank(n)
@@ -241,8 +242,8 @@ def integrate(
         if problem.watch:
 
             def take_step(at: NDArray[np.intp], y: Array, k: Array, h: Array) -> tuple[Array, Array]:
-                some = tuple(column[at] for column in params)
-                y_end, stages = rk_step(problem, y, k, h, some, workspace.narrow(at.size))
+                step_params = tuple(column[at] for column in params)
+                y_end, stages = rk_step(problem, y, k, h, step_params, workspace.narrow(at.size))
                 return y_end, stages[-1]
 
             refine_maximum(problem, params, state.peak, solution.maximum, take_step)
@@ -250,7 +251,7 @@ def integrate(
 
 
 def _advance(problem: Problem, state: State, rtol: float, record: bool) -> Step | None:
-    """Try one step in every running trajectory; accept, end or shorten it. Returns a step to be recorded."""
+    """Try a step of every running trajectory; accept, end or shorten it. Returns the step if it is recorded."""
     y, h, workspace, running = state.y, state.h, state.workspace, state.termination == RUNNING
     y_end, stages = rk_step(problem, y, state.k, h, state.params, workspace)
     error = local_error(problem, stages, y, y_end, h, workspace)
@@ -262,7 +263,7 @@ def _advance(problem: Problem, state: State, rtol: float, record: bool) -> Step 
     accepted &= trial.is_accurate
 
     if problem.watch:
-        note_peaks(state, trial, accepted, ended)
+        update_peaks(state, trial, accepted, ended)
     unreachable = problem.unreachable(y_end, trial.k, state.params)
     if np.count_nonzero(unreachable):
         unreachable &= accepted & (state.termination == RUNNING)
@@ -280,7 +281,7 @@ def _advance(problem: Problem, state: State, rtol: float, record: bool) -> Step 
 def rk_step(
     problem: Problem, y: Array, k: Array, h: Array, params: Params, workspace: Workspace
 ) -> tuple[Array, list[Array]]:
-    """One step of length h from rows y whose rates are k: rows at its end, the seven stages; in the workspace."""
+    """A step of length h from rows y with rates k: rows at its end and the seven stages, in the workspace."""
     stages, slopes = [k], [k[:N_COMPONENTS]]
     part, y_end, start = workspace.part, workspace.y_end, y[:N_COMPONENTS]
     for weights, rows in zip(STAGE_WEIGHTS[:-1], workspace.stages[:-1], strict=True):
@@ -297,7 +298,7 @@ def rk_step(
 
 
 def _weighted_sum(weights: NestedWeights, stages: list[Array], total: Array) -> None:
-    """The weighted sum of the stages, in order, by Horner's scheme: it needs no memory for terms."""
+    """Write the weighted sum of the stages to `total`, in order, by Horner's scheme: it needs no other memory."""
     (first, weight), *rest = weights
     np.multiply(stages[first], weight, total)
     for stage, weight in rest:
@@ -315,18 +316,18 @@ def local_error(
     return error_norm(error[0], error[1], y[0], y[1], y_end[0], y_end[1], problem.floor)
 
 
-# The formulas from here to `next_step` hold for arrays and, compiled, for numbers; the compiled back end has own
-# versions of `larger`, `larger_quotient`, `bits` and `from_bits`.
+# The formulas from here to `next_step` hold for arrays and, compiled, for numbers; the compiled back end has its
+# own versions of `larger`, `larger_quotient`, `bits` and `from_bits`.
 
 
-def larger(one: Array, other: Array | float) -> Array:
+def larger(this: Array, other: Array | float) -> Array:
     """The larger of two values."""
-    return np.maximum(one, other)
+    return np.maximum(this, other)
 
 
-def larger_quotient(one: Array, divisor: Array, other: Array, other_divisor: Array) -> Array:
-    """The larger of two quotients; NaN where one is NaN."""
-    return np.maximum(one / divisor, other / other_divisor)
+def larger_quotient(this: Array, divisor: Array, other: Array, other_divisor: Array) -> Array:
+    """The larger of two quotients; NaN if any is NaN."""
+    return np.maximum(this / divisor, other / other_divisor)
 
 
 def error_norm(
@@ -373,7 +374,7 @@ def first_step(problem: Problem, rtol: float) -> float:
 
 
 def _halve_non_finite_steps(state: State, trial: TrialStep, error: Array) -> None:
-    """Halve a step with a rate that is not finite."""
+    """Halve the steps that have a rate which is not finite; end trajectories after too many halvings."""
     at = np.flatnonzero(~trial.is_accurate)
     at = at[~np.isfinite(error[at]) & (state.termination[at] == RUNNING)]
     trial.h_next[at] = 0.5 * state.h[at]
@@ -382,7 +383,7 @@ def _halve_non_finite_steps(state: State, trial: TrialStep, error: Array) -> Non
 
 
 def _move_to_ends(state: State, trial: TrialStep) -> None:
-    """Go to the ends of the accepted steps; a trajectory that has ended stands still until it is removed."""
+    """Move to the ends of the accepted steps; an ended trajectory has steps of length 0 until it is removed."""
     stay = (~trial.is_accurate).nonzero()[0]
     if stay.size:
         for row, before in (*zip(trial.y, state.y, strict=True), *zip(trial.k, state.k, strict=True)):

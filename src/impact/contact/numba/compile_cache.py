@@ -1,4 +1,4 @@
-"""Compiled code on disk: numba's cache of functions, with checksums, and without where nothing can be stored."""
+"""Compiled code on disk: numba's cache of functions, with checksums, and without failures."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class DamagedError(Exception):
 
 
 class CheckedFile(IndexDataCacheFile):
-    """The files of a function, each with the SHA-256 of its content: damaged machine code can end the process."""
+    """The cache files of a function, each with its SHA-256: damaged machine code could crash the process."""
 
     def _dump(self, obj):
         content = super()._dump(obj)
@@ -50,11 +50,11 @@ def _unpickle_checked(content):
 
 
 class CheckedCache(FunctionCache):
-    """A cache of a function that never fails: what is damaged is compiled again, what cannot be stored is not."""
+    """The cache of a function; damaged code is compiled again, and a failure to store it is only a warning."""
 
     def __init__(self, function):
         super().__init__(function)
-        # other names than those of files without a checksum
+        # these names differ from those of files without a checksum
         self._cache_file = CheckedFile(
             cache_path=self._cache_path,
             filename_base=f"{self._impl.filename_base}-sha256",
@@ -82,11 +82,11 @@ class CheckedCache(FunctionCache):
 
 
 def compiled(**options):
-    """As `numba.njit`, and the machine code is kept on disk where that can be done."""
+    """As `numba.njit`, with the machine code in a cache on disk where possible."""
 
     def decorate(function):
         dispatcher = njit(**options)(function)
-        # with NUMBA_DISABLE_JIT=1 it is the function itself
+        # with NUMBA_DISABLE_JIT=1 njit returns the function itself
         if dispatcher is function:
             return function
         try:

@@ -1,4 +1,4 @@
-"""Which phases of which laws a compiled core integrates, and how they are handed to it."""
+"""Which phases of which laws the compiled core integrates, and the call of its kernel."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from ..velocity_coordinates import ForceCoordinate, LogCoordinate, force_form
 
 # the equations of motion: of A xⁿ, of xⁿ (1 + χ v) in v and in "log", of xⁿ + c x^q v in v and in "force"
 EQ_SPRING, EQ_DAMPED, EQ_LOG, EQ_DRAGGED, EQ_FORCE = range(5)
-# what ends a phase: the largest indentation, the gap, no force
+# the end of a phase: the largest indentation, zero indentation, zero force
 END_AT_PEAK, END_AT_GAP, END_AT_NO_FORCE = range(3)
-# largest power of s
+# largest power of s in a form
 MAX_WHOLE_POWER = 15
 
 
 @cache
 def is_installed() -> bool:
-    """Whether numba is there, of which no more is loaded for that."""
+    """Whether numba is installed; it is not imported."""
     return find_spec("numba") is not None
 
 
 class Form(NamedTuple):
     """A phase of a law in whole powers of s: x = sᵖ, xⁿ = s^spring, x^q = s^drag.
 
-    `extra` is the power of s that the coordinate "force" has beside v, `bound_power` the one that bounds the speed
-    of balls that are overdamped.
+    `extra` is the power of s that the coordinate "force" adds to v, `bound_power` the one in the bound on the
+    speed of overdamped balls.
     """
 
     equation: int
@@ -46,12 +46,12 @@ class Form(NamedTuple):
 
 
 def approach_form(law: motion.MotionLaw) -> Form | None:
-    """The form of the approach, None where it has none."""
+    """The form of the approach, None if the compiled core cannot integrate it."""
     return None if law.model.breakpoints else _form_of_force(law, END_AT_PEAK)
 
 
 def restitution_form(law: motion.MotionLaw) -> Form | None:
-    """The form of the restitution phase, None where it has none."""
+    """The form of the restitution phase, None if the compiled core cannot integrate it."""
     model = law.model
     ending = END_AT_NO_FORCE if model.release == "force" else END_AT_GAP
     if model.unloading is None:
@@ -64,8 +64,8 @@ def restitution_form(law: motion.MotionLaw) -> Form | None:
 def serves(model: ForceModel, n: float) -> tuple[bool, bool]:
     """Whether the compiled core integrates the approach, and the restitution phase, of a law."""
     laws = [motion.MotionLaw.of(model, n, strong) for strong in (False, True)]
-    back = [motion.restitution_law(law) for law in laws]
-    return all(map(approach_form, laws)), all(map(restitution_form, back))
+    restitution_laws = [motion.restitution_law(law) for law in laws]
+    return all(map(approach_form, laws)), all(map(restitution_form, restitution_laws))
 
 
 def _form_of_force(law: motion.MotionLaw, ending: int) -> Form | None:
@@ -87,7 +87,7 @@ def _form_of_force(law: motion.MotionLaw, ending: int) -> Form | None:
 
 
 def _form_of_whole_powers(equation: int, ending: int, *exponents: float) -> Form | None:
-    if not all(float(one).is_integer() and 0.0 <= one <= MAX_WHOLE_POWER for one in exponents):
+    if not all(float(exponent).is_integer() and 0.0 <= exponent <= MAX_WHOLE_POWER for exponent in exponents):
         return None
     return Form(equation, ending, *map(int, exponents))
 
@@ -106,20 +106,20 @@ def integrate_compiled(
 
     Parameters
     ----------
-    form : of the phase
-    law, problem, params : of the phase; params each of shape (n,)
+    form : form of the phase
+    law, problem, params : law, problem and params of the phase; params each of shape (n,)
     start : components at the start, shape (2, n)
-    rtol, max_steps : see there
+    rtol, max_steps : see `impact.ode.rk45.integrate`
     """
     from .kernel import kernel
 
     n = start.shape[1]
-    known = dict(zip(law.names, params, strict=False))
+    law_values = dict(zip(law.names, params, strict=False))
     bound = np.zeros(n)
     if form.equation != EQ_SPRING:
-        strength = known["chi" if form.equation in (EQ_DAMPED, EQ_LOG) else "c"]
+        strength = law_values["chi" if form.equation in (EQ_DAMPED, EQ_LOG) else "c"]
     elif law.model.unloading is not None and form.ending != END_AT_PEAK:
-        # what a power law is times is the same at every stretch
+        # the factor of a power law is the same at every stretch
         stretch = power(integer_power(start[0], form.coordinate_power), law.n)
         strength = problem.rates(start, params)[4] / stretch
     else:

@@ -1,7 +1,7 @@
-"""The equations of the forms and one step of them, for one trajectory: what the compiled kernel calls.
+"""The equations of motion of the forms, and a Runge-Kutta step of them, for a single trajectory.
 
-Every function is compiled into its caller, for the numbers of a form, and has no branch that depends on a value.
-Formulas that the NumPy back end has too are `shared` with it.
+Every function is compiled into its caller, for the constants of a form, and has no branch that depends on a value.
+Formulas of the NumPy back end are `shared` with it.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def solution(k1, k3, k4, k5, k6):
 
 @inlined
 def difference(k1, k3, k4, k5, k6, k7):
-    """What it differs by from that of order four."""
+    """The difference of the weighted sum of order five from that of order four."""
     return E[0] * k1 + E[2] * k3 + E[3] * k4 + E[4] * k5 + E[5] * k6 + E[6] * k7
 
 
@@ -48,7 +48,7 @@ def difference(k1, k3, k4, k5, k6, k7):
 def rates(form, s, y, strength):
     """Rates of the two components and the two quadratures."""
     weight = form.coordinate_power * whole_power(s, form.coordinate_power - 1)
-    # of the force, K δⁿ and the drag with the weight in them: fewer products that a step has to wait for
+    # the weight times K δⁿ: a shorter chain of products than weight times force
     weighted = form.coordinate_power * whole_power(s, form.spring + form.coordinate_power - 1)
     if form.equation == EQ_FORCE:
         v = velocity_of_force(y, whole_power(s, form.extra), strength)
@@ -56,7 +56,7 @@ def rates(form, s, y, strength):
         rate_y = rate_of_force(v, whole_power(s, form.extra - 1), form.extra / strength, weight, force)
         return v, rate_y, weight, weight * force * v
     if form.equation == EQ_LOG:
-        # one division for all stages
+        # the quotient is the same in all stages, so that it is divided once
         v = (exponential(y) - 1.0) * (1.0 / strength)
         return v, rate_of_log(weighted, 1.0, strength), weight, damped(weighted, v, 1.0, strength) * v
     v = y
@@ -86,11 +86,11 @@ def force(form, s, y, v, strength):
 
 @inlined
 def rk_step(form, s, y, s1, y1, watched, h, strength):
-    """One step: components at its end and what is added to the others, rates there, the local error."""
+    """A step: components at its end, increments of the quadratures, rates and force there, the local error."""
     t1 = form.coordinate_power * whole_power(s, form.coordinate_power - 1)
     work1 = t1 * watched * s1
     s2, y2, _, _ = rates(form, s + (h * A[1][0]) * s1, y + (h * A[1][0]) * y1, strength)
-    # a stage comes last, and by itself, into the next one, which waits for it
+    # the latest stage is added last and alone, since the next one depends on it
     s3, y3, t3, work3 = rates(
         form, s + h * (A[2][0] * s1) + (h * A[2][1]) * s2, y + h * (A[2][0] * y1) + (h * A[2][1]) * y2, strength
     )
@@ -117,30 +117,30 @@ def rk_step(form, s, y, s1, y1, watched, h, strength):
 
 
 @inlined
-def slope_of_force(form, s, y, rate_s, rate_y, now, small, strength):
+def slope_of_force(form, s, y, rate_s, rate_y, current_force, small, strength):
     """The slope of the force along the trajectory, by a small step."""
     ahead_s, ahead_y = s + small * rate_s, y + small * rate_y
     v, _, _, _ = rates(form, ahead_s, ahead_y, strength)
-    return (force(form, ahead_s, ahead_y, v, strength) - now) / small
+    return (force(form, ahead_s, ahead_y, v, strength) - current_force) / small
 
 
 @inlined
-def event(form, s, y, rate_s, rate_y, now, strength):
-    """What falls to zero at the end of the phase, and its rate."""
+def event(form, s, y, rate_s, rate_y, watched, strength):
+    """The event function, which falls to zero at the end of the phase, and its rate."""
     if form.ending == END_AT_GAP:
         return s, rate_s
     if form.ending == END_AT_NO_FORCE:
         small = RELEASE_STEP * min(max(abs(s), MIN_RELEASE_S), 1.0)
-        slope = slope_of_force(form, s, y, rate_s, rate_y, now, small, strength)
-        return release_event(s, rate_s, now, slope)
+        slope = slope_of_force(form, s, y, rate_s, rate_y, watched, small, strength)
+        return release_event(s, rate_s, watched, slope)
     if form.equation == EQ_FORCE:
-        return rate_s, -form.coordinate_power * whole_power(s, form.coordinate_power - 1) * now
+        return rate_s, -form.coordinate_power * whole_power(s, form.coordinate_power - 1) * watched
     return y, rate_y
 
 
 @inlined
 def is_unreachable(form, s, rate_s, bound):
-    """Whether the event cannot be reached any more."""
+    """Whether the event can no longer be reached."""
     if form.ending == END_AT_PEAK:
         return s > MAX_S
     return -rate_s <= (bound * whole_power(s, form.bound_power) if form.equation >= EQ_DRAGGED else 0.0)

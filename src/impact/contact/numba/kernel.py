@@ -1,10 +1,10 @@
 """The kernel that numba compiles: the loops of `impact.ode.rk45` over trajectories, for the forms of `dispatch`.
 
-Impacts advance in units that begin together and make room together, each lane by its own step. Several units are
-side by side, since a processor that waits for one can go on with the next. All loops over the lanes of a unit have
-a fixed length and no branch, so that they become vector instructions, and a lane has the same bits in whatever
-company; what is seldom, such as a landing, has a loop of its own. A row of the workspace is one number of every
-lane. Numba finds the types.
+Trajectories advance in groups of LANES, each lane with its own step; a group is refilled when all of its lanes
+have ended. Several groups are advanced in turn, so that the processor can work on one while it waits for another.
+All loops over the lanes of a group have a fixed length and no branch, so that they become vector instructions, and
+a lane has the same bits in any group. Rare operations, such as the location of an event, have their own loop. A
+row of the workspace holds one number of every lane. Numba infers the types.
 """
 
 from __future__ import annotations
@@ -37,17 +37,17 @@ from .expressions import (
 )  # fmt: skip
 from .simd_math import inlined, kept_on_disk
 
-# lanes of a unit, and units side by side
+# lanes of a group, and groups advanced in turn
 LANES, GROUPS = 32, 2
-# rows of the workspace: the state, its rates and the watched quantity, the step and the one before
+# rows of the workspace: the state, its rates and the watched quantity, the next step and the last one
 (
     S, Y, TIME, WORK, RATE_S, RATE_Y, WATCHED, H, H_LAST,
-    # the same before the step
+    # the same before the last trial step
     S_0, Y_0, TIME_0, WORK_0, RATE_S_0, RATE_Y_0, WATCHED_0, H_0, H_LAST_0,
-    # the coefficient of the form, the bound of those that are overdamped; the error, and whether `finish_steps`
-    # has something to do
+    # the coefficient of the form, the bound of overdamped balls; the local error, and whether `finish_steps` has
+    # to process the lane
     STRENGTH, BOUND, LOCAL_ERROR, MARKED,
-    # the largest watched value at a step's end, where that was, and the steps beside it
+    # the largest watched value at a step's end, its components, and the adjacent steps
     LARGEST_WATCHED, PEAK_S, PEAK_Y, STEP_BEHIND, STEP_AHEAD,
     STEPS, HALVINGS, ENDED,
 ) = range(30)  # fmt: skip
@@ -59,7 +59,7 @@ RUNNING, EVENT_REACHED = float(Termination.RUNNING), float(Termination.EVENT_REA
 EVENT_UNREACHABLE, TOO_MANY_STEPS = float(Termination.EVENT_UNREACHABLE), float(Termination.MAX_STEPS)
 STEP_UNDERFLOW, NOT_FINITE = float(Termination.STEP_UNDERFLOW), float(Termination.NOT_FINITE)
 
-# numba's cache looks at this file alone; this number in the kernel stands for what else it was compiled from
+# numba's cache checks this file alone; this number, a constant of the kernel, represents the other source files
 _NUMBA_FOLDER = Path(__file__).parent
 _PACKAGE_FOLDER = _NUMBA_FOLDER.parents[1]
 _SOURCES = sorted(
@@ -74,14 +74,14 @@ SOURCE_CRC = zlib.crc32(b"".join(path.read_bytes() for path in _SOURCES))
 
 @inlined
 def state_at(w, row, j):
-    """s, y, their rates and the watched quantity of a lane: now from row S on, before the step from S_0 on."""
+    """s, y, their rates and the watched quantity of lane j: with row S the current ones, with S_0 those before."""
     row = row * LANES + j
     return w[row], w[row + Y * LANES], w[row + RATE_S * LANES], w[row + RATE_Y * LANES], w[row + WATCHED * LANES]
 
 
 @inlined
 def advance(form, w, rtol):
-    """Try one step in every lane of a unit. Returns in how many lanes `finish_steps` has something to do."""
+    """Try a step in every lane of a group. Returns the number of lanes that `finish_steps` has to process."""
     marks = 0
     for j in range(LANES):
         s, y, rate_s, rate_y, watched = state_at(w, S, j)
@@ -119,9 +119,9 @@ def advance(form, w, rtol):
 
 @inlined
 def step_to_event(form, s, y, rate_s, rate_y, offset, strength):
-    """The state an offset from the end of a step and then linearly at the event.
+    """The state at the event, by a step of order two over an offset and a linear one.
 
-    Returns s, y, what is added to the time and to the work, and the offset of the linear part.
+    Returns s, y, the increments of time and work, and the offset of the linear step.
     """
     _, _, rate_t, rate_work = rates(form, s, y, strength)
     rate_s_1, rate_y_1, rate_t_1, rate_work_1 = rates(form, s + offset * rate_s, y + offset * rate_y, strength)
@@ -137,10 +137,10 @@ def step_to_event(form, s, y, rate_s, rate_y, offset, strength):
 
 @inlined
 def locate_event(form, start, end, h, h_next, strength, accepted):
-    """As `impact.ode.events.locate_event`, for a step of one lane between two states, see `state_at`.
+    """As `impact.ode.events.locate_event`, for the step of a lane between two states, see `state_at`.
 
-    Returns whether the event is located and whether the step went across it, s, y and what is added to time and
-    work at the event, and the next step.
+    Returns whether the event is located, whether the step crossed it, s and y at the event, the increments of time
+    and work up to it, and the length of the next step.
     """
     gap_before, rate_before = event(form, start[0], start[1], start[2], start[3], start[4], strength)
     gap, rate_of_gap = event(form, end[0], end[1], end[2], end[3], end[4], strength)
@@ -156,8 +156,8 @@ def locate_event(form, start, end, h, h_next, strength, accepted):
 
 
 @inlined
-def note_peak(w, j, falls, highest, start, end, s, y):
-    """Note that the watched quantity begins to fall at the start of a step, or is highest where the lane ends."""
+def update_peak(w, j, falls, highest, start, end, s, y):
+    """Update the peak where the watched quantity begins to fall, or is highest where the lane ends."""
     h, h_last = w[H_0 * LANES + j], w[H_LAST_0 * LANES + j]
     best, peak_s, peak_y = w[LARGEST_WATCHED * LANES + j], w[PEAK_S * LANES + j], w[PEAK_Y * LANES + j]
     behind, ahead = w[STEP_BEHIND * LANES + j], w[STEP_AHEAD * LANES + j]
@@ -170,10 +170,10 @@ def note_peak(w, j, falls, highest, start, end, s, y):
 
 @inlined
 def finish_steps(form, w, rtol, is_last):
-    """Do what is rare: end trajectories, shorten the steps before an event, note peaks. Returns how many go on."""
-    going = 0
+    """End trajectories, shorten steps before an event, update peaks. Returns the number of running lanes."""
+    still_running = 0
     for j in range(LANES):
-        # all is read first, whatever is chosen below, so that the loop has no branch
+        # everything is read first, also what is not used below, so that the loop has no branch
         start, end = state_at(w, S_0, j), state_at(w, S, j)
         t_0, work_0, h_last_0 = w[TIME_0 * LANES + j], w[WORK_0 * LANES + j], w[H_LAST_0 * LANES + j]
         t, work, h, h_last = w[TIME * LANES + j], w[WORK * LANES + j], w[H_0 * LANES + j], w[H_LAST * LANES + j]
@@ -191,13 +191,13 @@ def finish_steps(form, w, rtol, is_last):
         if form.ending == END_AT_PEAK:
             falls = accepted and begins_to_fall(start[4], end[4], best)
             highest = located and end[4] > (start[4] if falls else best)
-            note_peak(w, j, falls, highest, start, end, s, y)
+            update_peak(w, j, falls, highest, start, end, s, y)
 
         unreachable = accepted and is_unreachable(form, s, end[2], bound)
         ended = EVENT_UNREACHABLE if unreachable and ended == RUNNING else ended
         ended = STEP_UNDERFLOW if ended == RUNNING and h_next < MIN_STEP else ended
         ended = TOO_MANY_STEPS if ended == RUNNING and is_last else ended
-        going += 1 if ended == RUNNING else 0
+        still_running += 1 if ended == RUNNING else 0
         w[ENDED * LANES + j], w[HALVINGS * LANES + j], w[H * LANES + j] = ended, halvings, h_next
         w[S * LANES + j], w[Y * LANES + j] = start[0] if crossed else s, start[1] if crossed else y
         w[TIME * LANES + j] = t_0 if crossed else t + (more_t if located else 0.0)
@@ -207,14 +207,14 @@ def finish_steps(form, w, rtol, is_last):
         w[WATCHED * LANES + j] = start[4] if crossed else end[4]
         w[H_LAST * LANES + j] = h_last_0 if crossed else h_last
         w[STEPS * LANES + j] -= 1.0 if crossed else 0.0
-    return going
+    return still_running
 
 
 @inlined
-def begin(form, w, first, lanes, start, strength, bound, first_step):
-    """Put the impacts from the first into a unit; where there are too few, the last one again."""
+def begin(form, w, first, count, start, strength, bound, first_step):
+    """Fill a group with the trajectories from `first` on; the last one is repeated where too few are left."""
     for j in range(LANES):
-        i = min(first + j, lanes - 1)
+        i = min(first + j, count - 1)
         s, y = start[0, i], start[1, i]
         rate_s, rate_y, _, _ = rates(form, s, y, strength[i])
         watched = force(form, s, y, rate_s, strength[i])
@@ -229,10 +229,10 @@ def begin(form, w, first, lanes, start, strength, bound, first_step):
 
 @inlined
 def refine_maximum(form, w):
-    """Raise the largest watched values to the maxima beside them; see `impact.ode.maximum.refine_maximum`."""
-    # rows of the same numbers by other names: the span of the search, the step of the difference, both ends
+    """Raise the largest watched values to the maxima near them; see `impact.ode.maximum.refine_maximum`."""
+    # rows that are reused: the length of the search, the step of the difference quotient, a point, its slope
     span, small, right, slope_right = TIME, H_LAST, WORK, H_0
-    some = 0
+    unrefined = 0
     for j in range(LANES):
         s, y, strength = w[PEAK_S * LANES + j], w[PEAK_Y * LANES + j], w[STRENGTH * LANES + j]
         rate_s, rate_y, _, _ = rates(form, s, y, strength)
@@ -242,10 +242,10 @@ def refine_maximum(form, w):
         slope = slope_of_force(form, s, y, rate_s, rate_y, watched, step, strength)
         reach = w[STEP_AHEAD * LANES + j] if slope > 0.0 else -w[STEP_BEHIND * LANES + j]
         reach = reach if abs(slope * reach) > FLAT_SLOPE * abs(w[LARGEST_WATCHED * LANES + j]) else 0.0
-        some += 1 if reach != 0.0 else 0
+        unrefined += 1 if reach != 0.0 else 0
         w[small * LANES + j], w[slope_right * LANES + j] = step, slope
         w[span * LANES + j], w[H * LANES + j], w[right * LANES + j] = reach, reach, 0.0
-    for count in range(SECANT_STEPS + 1 if some else 0):
+    for count in range(SECANT_STEPS + 1 if unrefined else 0):
         for j in range(LANES):
             s, y, _, _, rate_s, rate_y, watched, _ = rk_step(
                 form, w[PEAK_S * LANES + j], w[PEAK_Y * LANES + j], w[RATE_S * LANES + j], w[RATE_Y * LANES + j],
@@ -254,66 +254,66 @@ def refine_maximum(form, w):
             slope = slope_of_force(
                 form, s, y, rate_s, rate_y, watched, w[small * LANES + j], w[STRENGTH * LANES + j]
             )
-            reach, found = w[span * LANES + j], w[LARGEST_WATCHED * LANES + j]
-            w[LARGEST_WATCHED * LANES + j] = watched if reach != 0.0 and watched > found else found
-            here = 1.0 if count == 0 else w[H * LANES + j] / reach
-            before, slope_before = w[right * LANES + j], w[slope_right * LANES + j]
-            w[right * LANES + j], w[slope_right * LANES + j] = here, slope
-            w[H * LANES + j] = secant_update(before, slope_before, here, slope) * reach
+            reach, best = w[span * LANES + j], w[LARGEST_WATCHED * LANES + j]
+            w[LARGEST_WATCHED * LANES + j] = watched if reach != 0.0 and watched > best else best
+            fraction = 1.0 if count == 0 else w[H * LANES + j] / reach
+            fraction_before, slope_before = w[right * LANES + j], w[slope_right * LANES + j]
+            w[right * LANES + j], w[slope_right * LANES + j] = fraction, slope
+            w[H * LANES + j] = secant_update(fraction_before, slope_before, fraction, slope) * reach
 
 
 @inlined
-def end_all(form, w, first, lanes, state, best, steps, end):
-    """Write down how the impacts of a unit have ended."""
-    for j in range(min(LANES, lanes - first)):
+def end_all(form, w, first, count, state, best, steps, end):
+    """Write the results of the trajectories of a group."""
+    for j in range(min(LANES, count - first)):
         i, reached = first + j, w[ENDED * LANES + j] == EVENT_REACHED
         for row in range(4):
             state[row, i] = w[(S + row) * LANES + j] if reached else np.nan
         steps[i], end[i] = int(w[STEPS * LANES + j]), int(w[ENDED * LANES + j])
     if form.ending == END_AT_PEAK:
         refine_maximum(form, w)
-    for j in range(min(LANES, lanes - first)):
+    for j in range(min(LANES, count - first)):
         best[first + j] = w[LARGEST_WATCHED * LANES + j] if w[ENDED * LANES + j] == EVENT_REACHED else np.nan
 
 
 def _kernel(form: Form, version: int):
-    """The integrator of a form, whose numbers are constants in it, and the number by which it is kept."""
+    """The integrator of a form; the form and the number of the source files are constants in it."""
 
     @kept_on_disk
     def integrate(start, strength, bound, first_step, rtol, max_steps, state, best, steps, end):
-        lanes = start.shape[1] if version >= 0 else 0
+        count = start.shape[1] if version >= 0 else 0
         w = np.zeros((GROUPS, WORKSPACE_ROWS * LANES))
-        # the first impact of each unit, and how often a step of it was tried
+        # the first trajectory of each group, and the number of trial steps
         first, trials = np.arange(0, GROUPS * LANES, LANES), np.zeros(GROUPS, np.int64)
-        for unit in range(GROUPS):
-            begin(form, w[unit], first[unit], lanes, start, strength, bound, first_step)
-        waiting, living = GROUPS * LANES, min(GROUPS, -(-lanes // LANES))
-        while living:
-            for unit in range(GROUPS):
-                if first[unit] >= lanes:
+        for group in range(GROUPS):
+            begin(form, w[group], first[group], count, start, strength, bound, first_step)
+        next_trajectory, active = GROUPS * LANES, min(GROUPS, -(-count // LANES))
+        while active:
+            for group in range(GROUPS):
+                if first[group] >= count:
                     continue
-                rows = w[unit]
-                trials[unit] += 1
-                is_last = trials[unit] >= max_steps
+                rows = w[group]
+                trials[group] += 1
+                is_last = trials[group] >= max_steps
                 if (advance(form, rows, rtol) or is_last) and not finish_steps(form, rows, rtol, is_last):
-                    end_all(form, rows, first[unit], lanes, state, best, steps, end)
-                    first[unit], trials[unit] = waiting, 0
-                    waiting += LANES
-                    if first[unit] < lanes:
-                        begin(form, rows, first[unit], lanes, start, strength, bound, first_step)
+                    end_all(form, rows, first[group], count, state, best, steps, end)
+                    first[group], trials[group] = next_trajectory, 0
+                    next_trajectory += LANES
+                    if first[group] < count:
+                        begin(form, rows, first[group], count, start, strength, bound, first_step)
                     else:
-                        living -= 1
+                        active -= 1
 
     return integrate
 
 
-# each is compiled when it is first called
+# by form; each is compiled at its first call
 KERNELS: dict[Form, Callable[..., None]] = {}
 
 
 def kernel(form: Form) -> Callable[..., None]:
     """The integrator of a form."""
     if form not in KERNELS:
-        # threads that come at once all take the first one's
+        # threads that arrive at the same time all use the first one
         KERNELS.setdefault(form, _kernel(form, SOURCE_CRC))
     return KERNELS[form]
