@@ -46,7 +46,7 @@ RESULTS: dict[str, tuple[Change, str]] = {
     "tolerance of text": (lambda r: r.assign_attrs(rtol="x"), "no rtol, or not as a number"),
     "config_set": (lambda r: r.assign_attrs(config_set="{}"), "config_set: not JSON of the expected type"),
     "plugins": (lambda r: r.assign_attrs(plugins="{}x"), "plugins: not JSON of the expected type"),
-    "no hash": (lambda r: r.assign_attrs(plugins='{"mine": {"file": "my.py"}}'), "plugins: not JSON of the expected"),
+    "no hash": (lambda r: r.assign_attrs(plugins='{"mine": {"file": "my.py"}}'), "plugins: not JSON of the"),
     "deep plugins": (lambda r: r.assign_attrs(plugins=DEEP), "plugins: not JSON of the expected type"),
     "materials": (lambda r: r.assign_attrs(materials=1.0), "materials: not JSON of the expected type"),
 }  # fmt: skip
