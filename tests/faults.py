@@ -224,7 +224,7 @@ def _become(argv: list[str], cwd: str, told: str, fault: list[Any]) -> NoReturn:
     if fault:
         {one.__name__: one for one in (signalled, failing, recorded, limited)}[fault[0]](note, *fault[1:])
     with open(f"{told}.out", "wb") as out, open(f"{told}.err", "wb") as err:
-        _command(argv, cwd, out, err)
+        _command(argv, cwd, "", out.fileno(), err.fileno())
 
 
 def _wait(pid: int, limit: float) -> int | None:

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 import impact
 from impact.api import execute, prepare
-from impact.cli.summary import summary
+from impact.cli.summary import summary_json
 from impact.config.load import Axis
 from impact.engine.plan import MAX_FULL_REPEATED, Plan
 from impact.engine.trajectories import trajectory_maps
@@ -237,7 +237,7 @@ def test_points_are_counted_alike_in_every_place(tmp_path: Path, cli: Any) -> No
     assert plan.layout == "full"
     for layout in LAYOUTS:
         outcome = sweep_into(tmp_path / f"{layout}.h5", in_layout(plan, layout))
-        counts = summary(outcome, tmp_path / f"{layout}.h5")
+        counts = summary_json(outcome, tmp_path / f"{layout}.h5")
         assert counts["points"] == sum(counts["status"].values()) == plan.points == 24
         stored = impact.load(tmp_path / f"{layout}.h5")
         assert summarize(stored).counts == outcome.summary.counts
@@ -248,7 +248,7 @@ def test_a_failed_point_is_named_without_parameters_of_other_laws(tmp_path: Path
     plan = own_axes(["kelvin-voigt", "johnson-1985"])
     solver = replace(plan.config.solver, max_steps=3)
     plan = replace(plan, config=replace(plan.config, solver=solver))
-    counts = summary(sweep_into(tmp_path / "r.h5", plan), tmp_path / "r.h5")
+    counts = summary_json(sweep_into(tmp_path / "r.h5", plan), tmp_path / "r.h5")
     assert counts["first_failed"]
     for failure in counts["first_failed"]:
         key = failure["at"]["model"]

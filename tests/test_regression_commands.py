@@ -236,7 +236,7 @@ def test_usage_is_exit_2_and_a_line(forked: Forked, folder: Path) -> None:
         (["--tol", "e_oot=1"], '--tol e_oot: not a variable of a result; did you mean "e_out"?'),
         (["--tol", "much"], wrong + 'got "much", expected VALUE or NAME=VALUE, such as 1e-8, 5% or v1_post'),
         (["--tol", "nan"], wrong + 'got "nan", expected'), (["--tol", "e_out=x"], wrong + 'got "e_out=x"'),
-        (["--tol", "-1"], "--tol -1.0: wants"), (["--tol", "status=1"], "--tol status: has none"),
+        (["--tol", "-1"], "--tol -1.0: wants"), (["--tol", "status=1"], "--tol status: has no tolerance"),
         (["--tol", "1", "--tol", "2"], wrong + "got all twice, expected each name once"),
     ):  # fmt: skip
         done = forked("compare", "different.h5", "base.h5", *words, cwd=folder)
@@ -488,7 +488,7 @@ def test_bless_refuses_and_leaves_the_baseline_as_it_was(forked: Forked, folder:
         ([good, tmp_path / "link.h5", "--reason", "r"], "not a regular file"),
         ([good, tmp_path, "--reason", "r"], "not a regular file"),
         ([good, tmp_path / "no" / "b.h5", "--reason", "r"], "does not exist"),
-        ([good, baseline, "--reason", "r", "--tol", "status=1"], "--tol status: has none"),
+        ([good, baseline, "--reason", "r", "--tol", "status=1"], "--tol status: has no tolerance"),
         ([good, tmp_path / "fresh.h5", "--reason", "r", "--tol", "-1"], "--tol -1.0: expected a number"),
         *(([tmp_path / f"{name}.h5", baseline, "--reason", "r"], f"{name}.h5: ") for name in UNREADABLE),
         *(([tmp_path / f"{name}.h5", tmp_path / "n.h5", "--reason", "r"], f"{name}.h5: ") for name in UNREADABLE),

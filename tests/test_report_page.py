@@ -453,7 +453,7 @@ def test_the_command_replaces_nothing_that_is_no_page(cli: Run, stored: Path, tm
     shutil.copy(stored, result)
     for words, told in (
         (("report", "results.html"), "is the file to be read"),
-        (("report", stored, "-o", "results.h5"), "wants a name that ends in .html"),
+        (("report", stored, "-o", "results.h5"), "expected a name that ends in .html"),
         (("report", stored, "-o", "no/page.html"), "the folder no does not exist"),
         (("report", "none.h5"), "does not exist"),
     ):

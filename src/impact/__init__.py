@@ -10,9 +10,14 @@ if TYPE_CHECKING:
     from .api import (
         bless,
         compare,
+        estimate,
+        expand,
         extend,
+        extend_to_file,
+        init,
         load,
         materials,
+        merge,
         models,
         plot,
         recommend,
@@ -20,7 +25,10 @@ if TYPE_CHECKING:
         rerun,
         run,
         save,
+        schema,
         sweep,
+        sweep_shard,
+        sweep_to_file,
     )
     from .comparison.verdict import Verdict
     from .contact.evidence import Evidence
@@ -37,10 +45,15 @@ __all__ = [
     "Verdict",
     "bless",
     "compare",
+    "estimate",
+    "expand",
     "extend",
+    "extend_to_file",
     "hysteresis",
+    "init",
     "load",
     "materials",
+    "merge",
     "models",
     "plot",
     "power",
@@ -49,12 +62,15 @@ __all__ = [
     "rerun",
     "run",
     "save",
+    "schema",
     "sweep",
+    "sweep_shard",
+    "sweep_to_file",
 ]
 
 
 def __getattr__(name: str) -> Any:
-    # the floors below load numpy and more, which `import impact` and `impact --help` do without
+    # loads the submodules on first use: `import impact` and `impact --help` need neither numpy nor more
     if name in __all__:
         from . import api
 

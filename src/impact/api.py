@@ -1,13 +1,15 @@
-"""The program from Python: the one place that joins the floors. The commands are thin faces on it."""
+"""The Python interface; each command of the command line calls a function of this module."""
 
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from .comparison.bless import bless as bless
 from .comparison.compare import compare as compare
@@ -15,32 +17,41 @@ from .comparison.tolerances import Tolerances
 from .comparison.verdict import Verdict as Verdict
 from .config.grid import MAX_POINTS
 from .config.library import records
-from .config.load import read_config
+from .config.load import json_schema, read_config
 
-# a name imported "as itself" is public: `impact.__all__` hands it on
+# a name imported "as itself" is public, see `impact.__all__`
 from .contact.evidence import Evidence as Evidence
 from .contact.model import ForceModel as ForceModel
 from .contact.model import Parameter as Parameter
 from .contact.models import catalogue
 from .contact.models.hysteresis import hysteresis as hysteresis
 from .contact.powers import power as power
+from .engine.checkpoint import remove_stale_work_folder
 from .engine.execute import never_stop
 from .engine.executors import SERIAL, Backend, choose_backend
 from .engine.plan import Plan
 from .engine.plugins import read_plugins
-from .engine.progress import ProgressCallback
+from .engine.progress import Progress, ProgressCallback
 from .engine.trajectories import check_count
 from .errors import ImpactError as ImpactError
-from .errors import UsageError
+from .errors import UnfinishedError, UsageError
+from .results.backend import check_output, open_result, write_file
 from .results.backend import load as load
 from .results.backend import save as save
 from .results.extend import extend as extend_result
+from .results.plausibility import material_notes
 from .results.provenance import config_of_part, stored_config
 from .results.ranking import Ranking, ranking
 from .results.replay_command import command_start
+from .results.selection import model_positions, select
+from .results.shards import Shard, ShardProgress
+from .results.shards import merge as merge_shards
+from .results.shards import sweep_shard as write_shard
+from .results.single_impact import STARTER_CONFIG, histories, run_single_impact, single_point
 from .results.single_impact import Impact as Impact
-from .results.single_impact import histories, run_single_impact, single_point
-from .results.sweep import sweep_in_memory
+from .results.summary import SweepOutcome
+from .results.sweep import find_finished, sweep_in_memory, sweep_into
+from .text import safe_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -49,6 +60,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from .plots.kinds import Choice, PlotData
+    from .results.estimate import Estimate
+
+
+def ignore_progress(progress: Progress) -> None:
+    """Default of `on_progress`."""
+
+
+def ignore_note(note: str) -> None:
+    """Default of `on_note`."""
 
 
 def prepare(
@@ -65,9 +85,9 @@ def prepare(
     UsageError : more than `max_points` trajectories would be integrated
     """
     source = Path(source) if isinstance(source, str) else source
-    own = read_plugins(plugins)
-    config = read_config(source, overrides, own.models, max_points)
-    plan = Plan(config, own.of(config.models))
+    plugin_set = read_plugins(plugins)
+    config = read_config(source, overrides, plugin_set.models, max_points)
+    plan = Plan(config, plugin_set.of(config.models))
     check_count(plan, max_points, str(source) if isinstance(source, Path) else "config")
     return plan
 
@@ -87,37 +107,44 @@ def execute(
 def sweep(
     source: str | Path | Mapping[str, object],
     *,
+    output: str | Path | None = None,
     overrides: Sequence[str] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
     jobs: int = 1,
     threads: int = 1,
     executor: Executor | None = None,
     max_points: int = MAX_POINTS,
+    resume: bool = False,
+    overwrite: bool = False,
 ) -> xr.Dataset:
-    """Run a sweep, with its result in memory; `impact sweep` on the command line writes one of any size to a file.
+    """Run a sweep; the result is in memory, or in a file and of any size.
 
     Parameters
     ----------
     source : path of a TOML file, or a mapping of the same shape
-    overrides : changes to it, such as `"sweep.e=0.5"`
-    plugins : models of one's own, which the config may then name, and paths of Python files that hold such;
-        the files are executed
-    jobs : how many processes integrate; with more than one, a program of one's own wants the usual
+    output : file to write; by default the result stays in memory
+    overrides : changes to the config, such as `"sweep.e=0.5"`
+    plugins : plug-in models, which the config may name, and paths of Python files with such models, which are
+        executed
+    jobs : number of processes that integrate; with more than one a script needs the usual
         `if __name__ == "__main__":`
-    threads : how many threads integrate, in place of processes; they run side by side where a core is compiled
-    executor : of the interface of `concurrent.futures`, that integrates in their place: dask's
-        `client.get_executor(pure=False)`, or the one of mpi4py; it is not shut down
-    max_points : how many points it may have, of all models together
+    threads : number of threads that integrate, instead of processes; they run in parallel if the core is compiled
+    executor : an executor of the interface of `concurrent.futures` that integrates instead, such as dask's
+        `client.get_executor(pure=False)` or that of mpi4py; it is not shut down
+    max_points : the largest number of points, of all models together
+    resume : continue an interrupted sweep into `output`
+    overwrite : replace `output` if it exists
 
     Returns
     -------
-    xarray.Dataset : see docs/schema.md
+    xarray.Dataset : see docs/schema.md; of a large file the values are read when they are indexed
 
     Raises
     ------
     ConfigError : with all problems of the config
-    UsageError, ModelError : a plug-in cannot be read, or is not right; more than one of jobs, threads and executor
-    StoreError : processes were killed again and again
+    UsageError, ModelError : a plug-in cannot be read or is invalid; more than one of jobs, threads and executor;
+        `output` exists
+    StoreError : the disk is full or failed; or processes were killed repeatedly
 
     >>> import impact
     >>> result = impact.sweep({
@@ -127,7 +154,230 @@ def sweep(
     >>> result["e_out"].values.round(6).tolist()
     [[0.665265, 0.913177]]
     """
-    return execute(prepare(source, overrides, plugins, max_points), choose_backend(jobs, threads, executor))
+    if output is None:
+        if resume or overwrite:
+            raise UsageError("resume and overwrite: expected an output beside them")
+        return execute(prepare(source, overrides, plugins, max_points), choose_backend(jobs, threads, executor))
+    sweep_to_file(
+        source, output, overrides=overrides, plugins=plugins,
+        backend=nullcontext(choose_backend(jobs, threads, executor)), max_points=max_points, resume=resume,
+        overwrite=overwrite,
+    )  # fmt: skip
+    return load(output)
+
+
+def sweep_to_file(
+    source: str | Path | Mapping[str, object],
+    output: str | Path,
+    *,
+    overrides: Sequence[str] = (),
+    plugins: Sequence[ForceModel | str | Path] = (),
+    backend: AbstractContextManager[Backend] | None = None,
+    max_points: int = MAX_POINTS,
+    resume: bool = False,
+    overwrite: bool = False,
+    on_progress: ProgressCallback = ignore_progress,
+    on_note: Callable[[str], None] = ignore_note,
+    should_stop: Callable[[], bool] = never_stop,
+) -> SweepOutcome:
+    """Run a sweep into a file and summarize it, without reading the file again.
+
+    A file that already holds this sweep is left as it is.
+
+    Parameters
+    ----------
+    source, overrides, plugins, max_points : see `sweep`
+    output : the file
+    backend : context manager of what integrates, entered when it is needed; by default this process
+    resume : continue with the work folder of an interrupted sweep
+    overwrite : replace the file if it exists
+    on_progress : called from time to time with the progress
+    on_note : called with a sentence about each implausible value
+    should_stop : returns whether to stop; finished blocks stay in the work folder
+
+    Returns
+    -------
+    SweepOutcome : counts of points by status, largest errors, first failed points
+
+    Raises
+    ------
+    ConfigError : with all problems of the config
+    UsageError, ModelError : see `sweep`
+    InUseError : another process writes the file
+    StoreError : the disk is full or failed, or processes were killed; finished blocks stay in the work folder
+    UnfinishedError : `should_stop` stopped it
+
+    >>> import impact, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     outcome = impact.sweep_to_file("configs/figure6.toml", f"{folder}/results.h5")
+    >>> outcome.summary.points, outcome.trajectories, outcome.is_new
+    (303, 303, True)
+    """
+    plan = _prepare_with_notes(source, overrides, plugins, max_points, on_note)
+    output = Path(output)
+    shown = safe_text(str(output))
+    outcome = None if overwrite else find_finished(output, plan)
+    if outcome is not None:
+        remove_stale_work_folder(output, plan)
+        if should_stop():
+            raise UnfinishedError(f"{shown} already holds this sweep")
+        return replace(outcome, is_new=False)
+    for path in (source, *plugins):
+        if isinstance(path, str | Path):
+            check_output(output, overwrite=overwrite, source=Path(path))
+    with backend or nullcontext(SERIAL) as integrator:
+        outcome = sweep_into(
+            output, plan, resume=resume, overwrite=overwrite, backend=integrator, on_progress=on_progress,
+            should_stop=should_stop,
+        )  # fmt: skip
+    if should_stop():
+        raise UnfinishedError(f"{shown} was stored whole")
+    return outcome
+
+
+def sweep_shard(
+    source: str | Path | Mapping[str, object],
+    shard: str,
+    output: str | Path,
+    *,
+    overrides: Sequence[str] = (),
+    plugins: Sequence[ForceModel | str | Path] = (),
+    backend: AbstractContextManager[Backend] | None = None,
+    max_points: int = MAX_POINTS,
+    overwrite: bool = False,
+    on_progress: ProgressCallback = ignore_progress,
+    on_note: Callable[[str], None] = ignore_note,
+    should_stop: Callable[[], bool] = never_stop,
+) -> ShardProgress:
+    """Integrate one shard of a sweep into its work folder; `merge` joins the folders of all shards.
+
+    Parameters
+    ----------
+    shard : "K/N", the part K of N, such as "3/16"
+    output : file of the whole result, beside which the work folder is
+    overwrite : start the shard again
+    source, overrides, plugins, max_points, backend, on_progress, on_note, should_stop : see `sweep_to_file`
+
+    Returns
+    -------
+    ShardProgress : the work folder, and what is finished in it
+
+    Raises
+    ------
+    ConfigError, UsageError, ModelError, InUseError, StoreError, UnfinishedError : see `sweep_to_file`
+
+    >>> import impact, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     impact.sweep_shard("configs/figure6.toml", "1/1", f"{folder}/results.h5").trajectories
+    303
+    """
+    plan = _prepare_with_notes(source, overrides, plugins, max_points, on_note)
+    part = Shard.parse(shard)
+    # the command of the whole sweep: `merge` names by it the command of a shard that is missing
+    config = str(source) if isinstance(source, str | Path) else "CONFIG.toml"
+    command = ["impact", "sweep", config, "-o", str(output)]
+    command += [word for change in overrides for word in ("--set", change)]
+    command += [word for path in plugins if isinstance(path, str | Path) for word in ("--plugin", str(path))]
+    with backend or nullcontext(SERIAL) as integrator:
+        done = write_shard(
+            Path(output), plan, part, command, overwrite=overwrite, backend=integrator, on_progress=on_progress,
+            should_stop=should_stop,
+        )  # fmt: skip
+    if should_stop():
+        raise UnfinishedError(f"{safe_text(str(done.folder))} has the whole shard")
+    return done
+
+
+def merge(
+    folders: Sequence[str | Path],
+    output: str | Path,
+    *,
+    plugins: Sequence[ForceModel | str | Path] = (),
+    overwrite: bool = False,
+    on_progress: ProgressCallback = ignore_progress,
+    should_stop: Callable[[], bool] = never_stop,
+) -> SweepOutcome:
+    """Join the shards of a sweep into a file, and summarize it; the work folders stay.
+
+    Parameters
+    ----------
+    folders : the work folders of all shards, in any order
+    output : the file
+    plugins : the plug-in models that the shards were integrated with
+    overwrite : replace the file if it exists
+    on_progress, should_stop : see `sweep_to_file`
+
+    Returns
+    -------
+    SweepOutcome : counts of points by status, largest errors, first failed points
+
+    Raises
+    ------
+    UsageError : a folder is not a shard, or of another sweep; or shards are missing or unfinished
+    ResultError : a block is in two folders, and they differ
+    InUseError, StoreError, UnfinishedError : see `sweep_to_file`
+
+    >>> import impact, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     output = f"{folder}/results.h5"
+    ...     shards = [impact.sweep_shard("configs/figure6.toml", f"{k}/2", output) for k in (1, 2)]
+    ...     impact.merge([shard.folder for shard in shards], output).summary.points
+    303
+    """
+    outcome, repeated = merge_shards(
+        [Path(folder) for folder in folders], Path(output), read_plugins(plugins), overwrite=overwrite,
+        on_progress=on_progress, should_stop=should_stop,
+    )  # fmt: skip
+    if should_stop():
+        raise UnfinishedError(f"{safe_text(str(output))} was stored whole")
+    return replace(outcome, repeated_blocks=repeated)
+
+
+def estimate(
+    source: str | Path | Mapping[str, object],
+    *,
+    overrides: Sequence[str] = (),
+    plugins: Sequence[ForceModel | str | Path] = (),
+    jobs: int = 1,
+    max_points: int = MAX_POINTS,
+    on_note: Callable[[str], None] = ignore_note,
+) -> Estimate:
+    """Count the points and trajectories of a sweep, and estimate its size and time; nothing is written.
+
+    Parameters
+    ----------
+    source, overrides, plugins, max_points : see `sweep`
+    jobs : number of processes or threads that integrate
+    on_note : called with a sentence about each implausible value
+
+    Raises
+    ------
+    ConfigError, UsageError, ModelError : see `sweep`
+
+    >>> import impact
+    >>> impact.estimate("configs/figure6.toml").points
+    303
+    """
+    plan = _prepare_with_notes(source, overrides, plugins, max_points, on_note)
+    # it integrates a range, which a program that only imports impact does without
+    from .results.estimate import estimate as estimate_plan
+
+    return estimate_plan(plan, jobs)
+
+
+def _prepare_with_notes(
+    source: str | Path | Mapping[str, object],
+    overrides: Sequence[str],
+    plugins: Sequence[ForceModel | str | Path],
+    max_points: int,
+    on_note: Callable[[str], None],
+) -> Plan:
+    """The plan of a config; calls `on_note` for each material whose modulus is implausible."""
+    plan = prepare(source, overrides, plugins, max_points)
+    columns = {name: values for axis in plan.config.axes for name, values in axis.columns.items()}
+    for note in material_notes(plan.material_record, columns):
+        on_note(note)
+    return plan
 
 
 def run(
@@ -139,22 +389,22 @@ def run(
     plugins: Sequence[ForceModel | str | Path] = (),
     times: int | None = None,
 ) -> Impact:
-    """Run one impact and follow it through time.
+    """Run one impact and record its time history.
 
     Parameters
     ----------
     source : a TOML file, a mapping, or a result; by default the two balls of Table 1 of the paper, at e = 0.5
-    model : key of the model; by default the first of the source
-    at : values by config name, such as `{"e": 0.05}`; an axis that is not named takes its first value
+    model : key of the model; by default the first one of the source
+    at : values by config name, such as `{"e": 0.05}`; the default of an axis is its first value
     overrides : changes to the config, such as `"sweep.m2=2"`
-    plugins : models of one's own, and paths of Python files; a result made with such needs them again, and
-        a changed one gives a warning with both hashes
-    times : how many points in time the history has, uniform from first contact to release; by default those of the
+    plugins : plug-in models, and paths of Python files with such models; a result that was computed with them
+        needs them again, and a changed one gives a warning with both hashes
+    times : number of points of the history, uniform from first contact to release; by default the steps of the
         integrator
 
     Raises
     ------
-    ConfigError, UsageError, ModelError, ResultError : the source, a plug-in, a name or a value is not right
+    ConfigError, UsageError, ModelError, ResultError : the source, a plug-in, a name or a value is invalid
 
     >>> import impact
     >>> shot = impact.run(model="gharib-hurmuzlu-2012", at={"e": 0.5})
@@ -163,9 +413,9 @@ def run(
     """
     if times is not None and times < 2:
         raise UsageError(f"times: got {times}, expected a whole number >= 2")
-    own = read_plugins(plugins)
-    config, first = single_point(source, overrides, own, model, at)
-    return run_single_impact(Plan(config, own.of(config.models)), first, times)
+    plugin_set = read_plugins(plugins)
+    config, first = single_point(source, overrides, plugin_set, model, at)
+    return run_single_impact(Plan(config, plugin_set.of(config.models)), first, times)
 
 
 def extend(
@@ -182,20 +432,20 @@ def extend(
     Parameters
     ----------
     result : the file
-    overrides : changes to its config, such as `"sweep.m2=[1.0, 2.0]"`; values that it has are kept in any case
-    output : the file of the larger result; by default it takes the place of the smaller one
+    overrides : changes to its config, such as `"sweep.m2=[1.0, 2.0]"`; existing values stay
+    output : file of the larger result; by default it replaces the smaller one
     overwrite : replace the output if it exists
-    plugins : models of one's own, those that it was made with among them
-    max_points : how many points it may have, of all models together
+    plugins : plug-in models, among them those that the result was computed with
+    max_points : the largest number of points, of all models together
 
     Returns
     -------
-    xarray.Dataset : the larger result, in all variables and coordinates that of the sweep done at once
+    xarray.Dataset : the larger result, equal to that of a single sweep in all variables and coordinates
 
     Raises
     ------
-    ResultError : the file is not a readable result, or of another version of this program
-    UsageError : what is changed is more than values of axes and models
+    ResultError : the file is not a readable result, or was written by another version of this program
+    UsageError : the overrides change more than values of axes and models
     StoreError : the disk is full or failed
 
     >>> import impact, tempfile
@@ -204,10 +454,112 @@ def extend(
     ...     impact.extend(f"{folder}/r.h5", ["sweep.m2=[1.0, 2.0]"]).sizes["m2"]
     2
     """
-    path = Path(result)
-    target = path if output is None else Path(output)
-    extend_result(path, target, overrides, read_plugins(plugins), overwrite=overwrite, max_points=max_points)
+    target = result if output is None else output
+    extend_to_file(result, overrides, output=target, overwrite=overwrite, plugins=plugins, max_points=max_points)
     return load(target)
+
+
+def extend_to_file(
+    result: str | Path,
+    overrides: Sequence[str],
+    *,
+    output: str | Path | None = None,
+    overwrite: bool = False,
+    resume: bool = False,
+    plugins: Sequence[ForceModel | str | Path] = (),
+    backend: AbstractContextManager[Backend] | None = None,
+    max_points: int = MAX_POINTS,
+    on_progress: ProgressCallback = ignore_progress,
+    should_stop: Callable[[], bool] = never_stop,
+) -> SweepOutcome:
+    """Extend a stored result as `extend` does, and summarize it, without reading the file again.
+
+    Parameters
+    ----------
+    result, overrides, output, overwrite, plugins, max_points : see `extend`
+    resume : continue with the work folder of an interrupted extension
+    backend, on_progress, should_stop : see `sweep_to_file`
+
+    Returns
+    -------
+    SweepOutcome : counts of points by status, largest errors, first failed points; `integrated` counts the new
+        trajectories
+
+    Raises
+    ------
+    ResultError, UsageError, StoreError : see `extend`
+    InUseError, UnfinishedError : see `sweep_to_file`
+
+    >>> import impact, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     outcome = impact.sweep_to_file("configs/figure6.toml", f"{folder}/r.h5")
+    ...     impact.extend_to_file(f"{folder}/r.h5", ["sweep.e=[0.123]"]).integrated
+    3
+    """
+    target = Path(result if output is None else output)
+    with backend or nullcontext(SERIAL) as integrator:
+        outcome, integrated = extend_result(
+            Path(result), target, overrides, read_plugins(plugins), resume=resume, overwrite=overwrite,
+            max_points=max_points, backend=integrator, on_progress=on_progress, should_stop=should_stop,
+        )  # fmt: skip
+    if should_stop():
+        raise UnfinishedError(f"{safe_text(str(target))} was stored whole")
+    return replace(outcome, integrated=integrated)
+
+
+def expand(
+    result: str | Path,
+    output: str | Path,
+    *,
+    sel: Mapping[str, float | str] | None = None,
+    models: Sequence[str] | None = None,
+    overwrite: bool = False,
+    max_points: int = MAX_POINTS,
+    should_stop: Callable[[], bool] = never_stop,
+) -> int:
+    """Write all values of a stored result, or of a part of it, as netCDF for programs that do not use impact.
+
+    Parameters
+    ----------
+    result : file of the result
+    output : the file to write
+    sel : values of axes, such as `{"m2": 1.0}`; of an axis that is not named all values are written
+    models : keys of the models to write; by default all
+    overwrite : replace the output if it exists
+    max_points : the largest number of points to write
+    should_stop : returns whether to stop
+
+    Returns
+    -------
+    int : number of points written
+
+    Raises
+    ------
+    ResultError : the file is not a readable result
+    UsageError : it is a time history, it has more than `max_points` points, or the output exists
+    StoreError : the disk is full or failed
+
+    >>> import impact, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     outcome = impact.sweep_to_file("configs/figure6.toml", f"{folder}/r.h5")
+    ...     impact.expand(f"{folder}/r.h5", f"{folder}/full.h5", sel={"e": 0.5})
+    3
+    """
+    output, shown = Path(output), safe_text(str(result))
+    check_output(output, overwrite=overwrite, source=Path(result))
+    dataset = select(open_result(result), sel or {})
+    if "model" not in dataset.dims:
+        raise UsageError(f"{shown}: is a time history, expected a result of a sweep")
+    if models:
+        dataset = dataset.isel(model=model_positions(models, dataset))
+    points = math.prod(dataset.sizes.values())
+    if points > max_points:
+        raise UsageError(
+            f"{shown}: got {points:,} points, expected at most {max_points:,} (--max-points); select a part, such "
+            "as --sel e=0.5"
+        )
+    save(dataset, output, overwrite=overwrite, should_stop=should_stop)
+    return points
 
 
 def rerun(
@@ -219,23 +571,23 @@ def rerun(
     max_points: int = MAX_POINTS,
     execute: Callable[[Plan], xr.Dataset] = execute,
 ) -> Verdict:
-    """Repeat the sweep of a result from its file alone, and judge what comes out by what is in it.
+    """Repeat the sweep of a result from its file alone, and compare the new values with the stored ones.
 
-    Only the points that the file holds are repeated, also where its config has more.
+    Only the points in the file are repeated, even if its config has more.
 
     Parameters
     ----------
     result : the file
-    plugins : the models of one's own that it was made with; a note of the verdict names one that has changed
+    plugins : the plug-in models that it was computed with; a note of the verdict names a changed one
     tol, subset : see `compare`
-    max_points : refuse a config of more points
-    execute : runs a plan
+    max_points : the largest number of points
+    execute : function that runs a plan; by default it is run in this process
 
     Raises
     ------
     ResultError : the file is not a readable result
-    UsageError : it is no result of a sweep, or a plug-in is missing or another
-    ConfigError : this version has no such model, or does not read such a config
+    UsageError : it is not the result of a sweep, or a plug-in is missing or a different one
+    ConfigError : this version does not have a model of the result, or cannot read its config
 
     >>> import impact, tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -244,21 +596,21 @@ def rerun(
     equal: 19 variables, 5,353 values, none differs
     """
     stored = load(result)
-    own = read_plugins(plugins)
-    # the models by their keys, because "all" is more models now than it was; the tolerances that took effect
+    plugin_set = read_plugins(plugins)
+    # models by key, because "all" may include new models; the tolerances that were used
     keys = stored["model"].values.tolist() if "model" in stored.dims else []
     solver = (f"solver.{name}={stored.attrs.get(name)}" for name in ("rtol", "max_steps"))
-    # whichever core is here: they agree
+    # any core gives the same result
     changes = [f"models={json.dumps(keys)}", *solver, 'solver.core="auto"']
-    config = stored_config(stored.attrs, changes, own, str(result), max_points, allow_changed_plugins=True)
-    whole = Plan(config, own.of(config.models))
+    config = stored_config(stored.attrs, changes, plugin_set, str(result), max_points, allow_changed_plugins=True)
+    whole = Plan(config, plugin_set.of(config.models))
     plan = replace(whole, config=config_of_part(config, stored))
     check_count(plan, max_points, str(result))
     verdict = compare(execute(plan), stored, tol=tol, subset=subset)
     if plan.points < whole.points:
         part = f"repeated {plan.points:,} of {whole.points:,} points of the config: the file holds no others"
         verdict = replace(verdict, notes=(part, *verdict.notes))
-    files = [word for one in plugins if isinstance(one, str | Path) for word in ("--plugin", str(one))]
+    files = [word for path in plugins if isinstance(path, str | Path) for word in ("--plugin", str(path))]
     again = ("impact", "run", str(result), *files) if command_start(str(result), stored) else ()
     return replace(verdict, new="the rerun", baseline=str(result), repeats=again)
 
@@ -299,24 +651,24 @@ def plot(
     ----------
     dataset : a result, or a time history
     kind : one of `impact.plots.kinds.KINDS`
-    x : what to draw over; by default e, else the first numeric axis
+    x : the coordinate to draw over; by default e, else the first numeric axis
     y : second axis of a map, or of the kind validity; by default the next one
-    variable : that a map shows
-    sel : values of the other axes, such as `{"m2": 1.0}`; one that is not named shows its first value. A loop,
-        a history or an impulse may be at a point that is not on the grid
+    variable : name of the variable that a map shows
+    sel : values of the other axes, such as `{"m2": 1.0}`; the default is the first value. A loop, a history
+        or an impulse may be at a point that is not on the grid
     models : keys of the models to show; by default all
-    log : which axes are logarithmic, such as "x" or "xy"; axes that are spaced so are in any case
+    log : which axes are logarithmic, such as "x" or "xy"; axes with logarithmic spacing are in any case
     points : measured points over the curves: a CSV file, or a table of pandas or xarray, whose columns have names
         such as "v1 [m/s]", "e_out" and "sigma"
-    width : of the figure [in], or a length such as "84mm", "single" or "double"; by default that of rcParams where
-        it was changed, else "double"
-    height : of the figure [in], or a length; by default what suits the kind
-    style : a style sheet of matplotlib, or the name of one; the user's own rcParams are respected in any case
+    width : width of the figure [in], or a length such as "84mm", "single" or "double"; by default that of rcParams
+        if it was changed, else "double"
+    height : height of the figure [in], or a length; by default it depends on the kind
+    style : a style sheet of matplotlib, or the name of one; rcParams changed by the user are respected in any case
     title : write the title and the conditions
     labels : texts by the name of an axis, the key of a law, "reference" or "title"
     equations : name the laws with the numbers of their equations in the paper
-    ax : draw into these axes of a figure of one's own, one for each panel, in that figure's style
-    plugins : models of one's own, which the kinds that follow a motion need again
+    ax : axes of an existing figure to draw into, one for each panel, in the style of that figure
+    plugins : plug-in models that the result was computed with, needed to draw a loop, a history or an impulse
 
     Returns
     -------
@@ -324,7 +676,7 @@ def plot(
 
     Raises
     ------
-    UsageError : the result has not got what is asked for
+    UsageError : the result does not contain what the arguments select
 
     >>> import impact
     >>> figure = impact.plot(impact.sweep("configs/figure6.toml"))
@@ -344,16 +696,18 @@ def get_plot_data(
     """The data of a picture; see `plot`."""
     from .plots.kinds import plot_data_of
 
-    own = read_plugins(plugins)
-    return plot_data_of(kind, dataset, choice, lambda: histories(dataset, choice.models, choice.sel or {}, own))
+    plugin_set = read_plugins(plugins)
+    return plot_data_of(
+        kind, dataset, choice, lambda: histories(dataset, choice.models, choice.sel or {}, plugin_set)
+    )
 
 
 def materials() -> dict[str, dict[str, float | str]]:
-    """Common materials in SI units, which a config may name without a table [materials.NAME].
+    """Common materials in SI units, which a config can name without a table [materials.NAME].
 
     Returns
     -------
-    By name: E [Pa], nu, rho [kg/m3], yield_strength [Pa] where it is known, about, source
+    By name: E [Pa], nu, rho [kg/m3], yield_strength [Pa] if known, about, source
 
     >>> materials()["glass"]["E"]
     72000000000.0
@@ -368,13 +722,13 @@ def recommend(
     sel: Mapping[str, float | str] | None = None,
     models: Sequence[str] | None = None,
 ) -> Ranking:
-    """Rank the models of a result by how well they give the restitution asked for, over all that is swept.
+    """Rank the models of a result by the error of their restitution, over all points of the sweep.
 
     Parameters
     ----------
     dataset : a result
-    tol : what |e_out - e| may be
-    sel : values of axes, such as `{"m2": 1.0}`; all values of the others are judged
+    tol : largest accepted |e_out - e|
+    sel : values of axes, such as `{"m2": 1.0}`; by default all values of an axis are ranked
     models : keys of the models to rank; by default all
 
     Returns
@@ -383,7 +737,8 @@ def recommend(
 
     Raises
     ------
-    UsageError : the result asks for no e, or has not got what is asked for; tol is not a positive finite number
+    UsageError : the result has no requested e, or lacks what the arguments select; tol is not a positive finite
+        number
 
     >>> import impact
     >>> result = impact.sweep("configs/figure6.toml")
@@ -393,17 +748,26 @@ def recommend(
     return ranking(dataset, tol, sel, models)
 
 
-def report(dataset: xr.Dataset, *, plugins: Sequence[ForceModel | str | Path] = ()) -> str:
-    """A result as one page of HTML, which needs no network and runs nothing.
+def report(
+    dataset: xr.Dataset | str | Path,
+    *,
+    output: str | Path | None = None,
+    overwrite: bool = False,
+    plugins: Sequence[ForceModel | str | Path] = (),
+) -> str:
+    """A result as one page of HTML, which needs no network and runs no scripts.
 
     Parameters
     ----------
-    dataset : a result
-    plugins : models of one's own that it was made with; without them the figures that follow a motion are left out
+    dataset : a result, or the file of one
+    output : file to write the page to as well, whose name ends in .html
+    overwrite : replace the output if it exists
+    plugins : plug-in models that the result was computed with; without them the figures of a motion are left out
 
     Raises
     ------
-    UsageError, ResultError : it is a time history, or its attributes are not those of a result
+    UsageError, ResultError : it is a time history, or its attributes are not those of a result; the output exists,
+        or has another ending
 
     >>> import impact
     >>> "<h1>Final velocities comparison</h1>" in impact.report(impact.sweep("configs/figure6.toml"))
@@ -411,4 +775,56 @@ def report(dataset: xr.Dataset, *, plugins: Sequence[ForceModel | str | Path] = 
     """
     from .reporting.page import page
 
-    return page(dataset, lambda kind, choice: get_plot_data(dataset, kind, choice, plugins))
+    if output is not None:
+        output = Path(output)
+        if output.suffix.lower() not in (".html", ".htm"):
+            raise UsageError(f"{safe_text(str(output))}: expected a name that ends in .html")
+        for path in (dataset, *plugins):
+            if isinstance(path, str | Path):
+                check_output(output, overwrite=overwrite, source=Path(path))
+    result = load(dataset) if isinstance(dataset, str | Path) else dataset
+    text = page(result, lambda kind, choice: get_plot_data(result, kind, choice, plugins))
+    if output is not None:
+        write_file(output, text.encode(), overwrite=overwrite)
+    return text
+
+
+def init(path: str | Path = "config.toml", *, overwrite: bool = False) -> None:
+    """Write a commented starter config, ready to sweep.
+
+    Raises
+    ------
+    UsageError : the file exists, or cannot be written there
+    StoreError : the disk is full or failed
+
+    >>> import impact, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     impact.init(f"{folder}/config.toml")
+    ...     impact.estimate(f"{folder}/config.toml").points > 0
+    True
+    """
+    write_file(Path(path), STARTER_CONFIG.read_bytes(), overwrite=overwrite)
+
+
+def schema(output: str | Path | None = None, *, overwrite: bool = False) -> dict[str, Any]:
+    """The JSON Schema of a config, from which editors complete and check it.
+
+    Parameters
+    ----------
+    output : file to write it to as well
+    overwrite : replace the output if it exists
+
+    Raises
+    ------
+    UsageError : the output exists, or cannot be written there
+    StoreError : the disk is full or failed
+
+    >>> import impact
+    >>> "sweep" in impact.schema()["properties"]
+    True
+    """
+    content = json_schema()
+    if output is not None:
+        text = json.dumps(content, indent=2, ensure_ascii=False) + "\n"
+        write_file(Path(output), text.encode(), overwrite=overwrite)
+    return content

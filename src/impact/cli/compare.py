@@ -1,4 +1,4 @@
-"""The commands that guard stored datasets: compare, bless, rerun."""
+"""The commands that compare stored results: compare, bless, rerun."""
 
 from __future__ import annotations
 
@@ -15,19 +15,22 @@ from ..formatting import number
 from ..text import safe_text
 from . import exits
 from .console import dump
-from .options import MaxPoints, Plugins, Quiet, Result, Tolerances
+from .options import MaxPointsOption, PluginOption, QuietOption, ResultArgument, ToleranceOption
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from ..comparison.formats import Report
     from ..comparison.verdict import Verdict
+    from ..engine.plan import Plan
 
 
-# a narrower terminal shows the sentences only
-NARROWEST = 76
+# a narrower terminal shows no table
+MIN_TABLE_WIDTH = 76
 
 
 class Format(StrEnum):
-    """The forms of a verdict on stdout."""
+    """The formats of a verdict on stdout."""
 
     table = "table"
     json = "json"
@@ -36,27 +39,27 @@ class Format(StrEnum):
     github = "github"
 
 
-New = Annotated[Path, typer.Argument(help="The result to judge.")]
-Baseline = Annotated[Path, typer.Argument(help="The result that it is judged by.")]
-Subset = Annotated[
-    bool, typer.Option("--subset", help="Judge what both have, and do not mind what only one of them has.")
+NewArgument = Annotated[Path, typer.Argument(help="The new result.")]
+BaselineArgument = Annotated[Path, typer.Argument(help="The result to compare with.")]
+SubsetOption = Annotated[
+    bool, typer.Option("--subset", help="Compare only the variables and points that both results have.")
 ]
-Formats = Annotated[Format, typer.Option("--format", help="Form of the verdict on stdout.")]
-Plot = Annotated[
+FormatOption = Annotated[Format, typer.Option("--format", help="Format of the verdict on stdout.")]
+PlotOption = Annotated[
     Path | None,
-    typer.Option("--plot", metavar="FILE", help="Draw where the differences lie: .png, .svg or .pdf."),
+    typer.Option("--plot", metavar="FILE", help="Draw where the results differ: .png, .svg or .pdf."),
 ]
 
 
 def compare(
-    new: New,
-    baseline: Baseline,
-    tol: Tolerances = None,
-    subset: Subset = False,
-    format: Formats = Format.table,
-    plot: Plot = None,
+    new: NewArgument,
+    baseline: BaselineArgument,
+    tol: ToleranceOption = None,
+    subset: SubsetOption = False,
+    format: FormatOption = Format.table,
+    plot: PlotOption = None,
 ) -> None:
-    """Judge a result by a stored one: exit 0 if equal, 1 if not (the first line says in what), 2 if unreadable."""
+    """Compare a result with a baseline: exit 0 if equal, 1 if not (the first line says why), 2 on an error."""
     from .. import api
     from ..comparison import formats
 
@@ -64,21 +67,21 @@ def compare(
     try:
         verdict = api.compare(new, baseline, tol=dict(tol or ()) or None, subset=subset)
     except ImpactError as error:
-        _print(formats.report_of_error(str(new), str(baseline), str(error)), format)
+        _print_report(formats.report_of_error(str(new), str(baseline), str(error)), format)
         raise
-    _tell(verdict, format, plot)
+    _report_verdict(verdict, format, plot)
 
 
 def bless(
-    new: New,
-    baseline: Annotated[Path, typer.Argument(help="The baseline to replace, or to make.")],
-    reason: Annotated[str, typer.Option("--reason", help="Why the numbers changed; kept in the baseline.")],
-    tol: Tolerances = None,
+    new: NewArgument,
+    baseline: Annotated[Path, typer.Argument(help="The baseline to replace or create.")],
+    reason: Annotated[str, typer.Option("--reason", help="Why the numbers changed; stored in the baseline.")],
+    tol: ToleranceOption = None,
     allow_failed: Annotated[
         bool, typer.Option("--allow-failed", help="Accept a result with failed points.")
     ] = False,
 ) -> None:
-    """Show how a result differs from its baseline, then let it take the baseline's place."""
+    """Show how a result differs from its baseline, then replace the baseline by it."""
     from .. import api
 
     def show(verdict: Verdict) -> None:
@@ -92,39 +95,43 @@ def bless(
     except (BrokenPipeError, SystemExit):
         raise UsageError(f"{safe_text(str(baseline))}: not replaced, nobody read the verdict to its end") from None
     word = "made" if verdict is None else "replaced"
-    exits.say(f"{safe_text(str(baseline))}: {word}, with the reason")
+    exits.print_line(f"{safe_text(str(baseline))}: {word}, with the reason")
 
 
 def rerun(
-    result: Result,
-    plugins: Plugins = None,
-    tol: Tolerances = None,
-    subset: Subset = False,
-    max_points: MaxPoints = 10**9,
-    format: Formats = Format.table,
-    plot: Plot = None,
-    quiet: Quiet = False,
+    result: ResultArgument,
+    plugins: PluginOption = None,
+    tol: ToleranceOption = None,
+    subset: SubsetOption = False,
+    max_points: MaxPointsOption = 10**9,
+    format: FormatOption = Format.table,
+    plot: PlotOption = None,
+    quiet: QuietOption = False,
 ) -> None:
-    """Repeat the sweep of a result from the file alone, and judge what comes out by what is in it."""
-    with exits.signals() as should_stop:
+    """Repeat the sweep of a result from the file alone, and compare the new values with the stored ones."""
+    with exits.catch_signals() as should_stop:
         from .. import api
         from ..comparison import formats
-        from . import summary
+        from .progress import progress
+
+        def run_plan(plan: Plan) -> xr.Dataset:
+            with progress(quiet=quiet) as on_progress:
+                return api.execute(plan, on_progress=on_progress, should_stop=should_stop)
 
         _check_plot(plot, result)
         try:
             verdict = api.rerun(
                 result, plugins=plugins or (), tol=dict(tol or ()) or None, subset=subset, max_points=max_points,
-                execute=lambda plan: summary.execute(plan, should_stop, quiet=quiet),
+                execute=run_plan,
             )  # fmt: skip
         except ImpactError as error:
-            _print(formats.report_of_error("the rerun", str(result), str(error)), format)
+            _print_report(formats.report_of_error("the rerun", str(result), str(error)), format)
             raise
-    _tell(verdict, format, plot)
+    _report_verdict(verdict, format, plot)
 
 
 def _check_plot(plot: Path | None, *sources: Path) -> None:
-    """Refuse a picture that cannot be stored before any work is done."""
+    """Refuse a picture that cannot be stored before any work is dvariable."""
     if plot is not None:
         from ..plots.style import check_picture
         from ..results.backend import check_output
@@ -134,29 +141,29 @@ def _check_plot(plot: Path | None, *sources: Path) -> None:
             check_output(plot, overwrite=True, source=source)
 
 
-def _tell(verdict: Verdict, format: Format, plot: Path | None) -> None:
-    """Print a verdict, draw it, and leave by its exit code."""
+def _report_verdict(verdict: Verdict, format: Format, plot: Path | None) -> None:
+    """Print a verdict, draw it, and exit with its code."""
     from ..comparison import formats
 
-    with exits.readers_may_leave():
+    with exits.ignore_broken_pipe():
         if format is Format.table:
             print_verdict(verdict)
         else:
-            _print(formats.report_of(verdict), format)
+            _print_report(formats.report_of(verdict), format)
     if plot is not None and not verdict.worst_along:
-        # the verdict stands without a picture
-        exits.say("no picture: there is no point to draw at")
+        # a missing picture does not change the verdict
+        exits.print_line("no picture: there is no point to draw at")
     elif plot is not None:
         from ..plots import differences, style
 
         style.save_figure(differences.draw_differences(differences.difference_data(verdict)), plot)
-        exits.say(f"{safe_text(str(plot))}: {'drawn' if verdict.equal else 'where the differences lie'}")
+        exits.print_line(f"{safe_text(str(plot))}: {'drawn' if verdict.equal else 'where the differences lie'}")
     if not verdict.equal:
-        raise typer.Exit(exits.NOT_EQUAL)
+        raise typer.Exit(exits.EXIT_NOT_EQUAL)
 
 
-def _print(printed: Report, format: Format) -> None:
-    """A report on stdout; as a table there is none without a verdict, the error says it all."""
+def _print_report(printed: Report, format: Format) -> None:
+    """Print a report on stdout; for an error there is no table, its message is on stderr."""
     from ..comparison import formats
 
     match format:
@@ -171,21 +178,23 @@ def _print(printed: Report, format: Format) -> None:
 
 
 def print_verdict(verdict: Verdict) -> None:
-    """The first line, what differs with the command that repeats it, and each variable that is not bit for bit."""
+    """Print the headline, the differences with the commands that repeat them, and a table of changed variables."""
     from .console import cell, console, table
 
     out = console(sys.stdout)
     for line in (verdict.headline, *verdict.lines, *(f"note: {note}" for note in verdict.notes)):
-        # as one line, however long: a command is to be copied
+        # no wrapping, so that commands can be copied
         out.print(line, soft_wrap=True)
-    moved = [one for one in verdict.ranked if one.times]
-    if moved and out.width >= NARROWEST:
+    moved = [variable for variable in verdict.ranked if variable.times]
+    if moved and out.width >= MIN_TABLE_WIDTH:
         rows = table("variable", "judged", "tolerance", "differ", "worst", "x tolerance")
         rows.columns[1].justify = "left"
-        for one in moved:
-            tolerance = number(one.tolerance, 3)
-            times = number(one.times if one.tolerance == one.tolerance else math.nan, 3)
-            many = f"{one.different} of {one.points}"
-            rows.add_row(cell(one.name), cell(one.judged), tolerance, many, number(one.worst, 3), times)
+        for variable in moved:
+            tolerance = number(variable.tolerance, 3)
+            times = number(variable.times if variable.tolerance == variable.tolerance else math.nan, 3)
+            many = f"{variable.different} of {variable.points}"
+            rows.add_row(
+                cell(variable.name), cell(variable.judged), tolerance, many, number(variable.worst, 3), times
+            )
         out.print()
         out.print(rows)

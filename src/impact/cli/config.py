@@ -10,32 +10,29 @@ import typer
 
 from ..text import safe_text
 from . import exits
-from .options import Overwrite
+from .options import OverwriteOption
 
 
 def init(
     path: Annotated[Path, typer.Argument(help="The file to write.")] = Path("config.toml"),
-    overwrite: Overwrite = False,
+    overwrite: OverwriteOption = False,
 ) -> None:
     """Write a commented starter config, ready to sweep."""
-    from ..results import backend
-    from ..results.single_impact import STARTER_CONFIG
+    from .. import api
 
-    backend.write_file(path, STARTER_CONFIG.read_bytes(), overwrite=overwrite)
-    exits.say(f"{safe_text(str(path))}: written; next: impact sweep {safe_text(str(path))}")
+    api.init(path, overwrite=overwrite)
+    exits.print_line(f"{safe_text(str(path))}: written; next: impact sweep {safe_text(str(path))}")
 
 
 def schema(
     output: Annotated[Path | None, typer.Option("-o", "--output", help="The file. \\[default: stdout]")] = None,
-    overwrite: Overwrite = False,
+    overwrite: OverwriteOption = False,
 ) -> None:
     """The JSON Schema of the config, from which editors complete and check it."""
-    from ..config.load import json_schema
-    from ..results import backend
+    from .. import api
 
-    text = json.dumps(json_schema(), indent=2, ensure_ascii=False) + "\n"
+    json_schema = api.schema(output, overwrite=overwrite)
     if output is None:
-        print(text, end="")
+        print(json.dumps(json_schema, indent=2, ensure_ascii=False))
     else:
-        backend.write_file(output, text.encode(), overwrite=overwrite)
-        exits.say(f"{safe_text(str(output))}: written")
+        exits.print_line(f"{safe_text(str(output))}: written")

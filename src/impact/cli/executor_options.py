@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import UsageError
 from ..text import safe_text
-from .exits import say
+from .exits import print_line
 
 if TYPE_CHECKING:
     from ..engine.executors import Backend
@@ -51,5 +51,5 @@ class ExecutorOptions:
             if not quiet:
                 waits = "" if workers else ", waits for some"
                 count = f"{workers} worker{'' if workers == 1 else 's'}{waits}"
-                say(f"{count}; dashboard: {dashboard}" if dashboard else count)
+                print_line(f"{count}; dashboard: {dashboard}" if dashboard else count)
             yield backend

@@ -1,4 +1,4 @@
-"""Exit codes: what errors and signals of a command become, as a line on stderr and an exit code."""
+"""Exit codes: turns the errors and signals of a command into a line on stderr and an exit code."""
 
 from __future__ import annotations
 
@@ -21,31 +21,31 @@ from typer import TyperException
 from ..errors import ImpactError, Interruption, InUseError, StoreError, UnfinishedError
 from ..text import safe_text
 
-# the exit codes; a shell sees 130 and 143 for the signals of the same meaning
-OK, NOT_EQUAL, USAGE, LANES_FAILED, STORAGE, IN_USE = 0, 1, 2, 3, 4, 5
-INTERNAL, INTERRUPTED, TERMINATED = 70, 130, 143
-CODES = {StoreError: STORAGE, InUseError: IN_USE}
-# bytes that a process can always get which is not short of memory
-ROOM = 2**26
-# what a write fails with on a disk that is full or broken, and over a quota or a limit
-NOT_WRITTEN = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
+# a shell reports 130 and 143 for a process that SIGINT or SIGTERM ended
+EXIT_OK, EXIT_NOT_EQUAL, EXIT_USAGE, EXIT_POINTS_FAILED, EXIT_STORAGE, EXIT_IN_USE = 0, 1, 2, 3, 4, 5
+EXIT_INTERNAL, EXIT_INTERRUPTED, EXIT_TERMINATED = 70, 130, 143
+ERROR_EXIT_CODES = {StoreError: EXIT_STORAGE, InUseError: EXIT_IN_USE}
+# bytes that a process can always allocate unless memory is short
+PROBE_BYTES = 2**26
+# errors of a write: the disk is full or broken, or a quota or a limit is exceeded
+WRITE_ERRNOS = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
 
 
 class Interrupted(Interruption):
-    """A signal came; the message says what it found done."""
+    """A signal came; the message says what was finished."""
 
     def __init__(self, number: int, done: str) -> None:
         by_user = number == signal.SIGINT
-        self.code = INTERRUPTED if by_user else TERMINATED
+        self.code = EXIT_INTERRUPTED if by_user else EXIT_TERMINATED
         super().__init__(f"{'interrupted' if by_user else 'terminated'}; {done}")
 
 
 @contextlib.contextmanager
-def signals() -> Iterator[Callable[[], bool]]:
-    """Take SIGINT and SIGTERM as flags, and give a function that returns whether one has come.
+def catch_signals() -> Iterator[Callable[[], bool]]:
+    """Handle SIGINT and SIGTERM by a flag; yields a function that returns whether a signal came.
 
-    What then ends unfinished is `Interrupted`. An exception raised by a handler can land in a callback of HDF5,
-    where it is lost; a flag cannot. The third signal raises all the same, for a force that never returns.
+    An `UnfinishedError` inside becomes `Interrupted`. A handler does not raise, because an exception inside a
+    callback of HDF5 is lost. Only the third signal raises, for a force function that never returns.
     """
     came: list[int] = []
 
@@ -64,88 +64,88 @@ def signals() -> Iterator[Callable[[], bool]]:
             signal.signal(number, handler)
 
 
-def say(line: str, *, error: bool = False) -> None:
-    """A line on stderr; an error is red where the terminal shows colours."""
+def print_line(line: str, *, error: bool = False) -> None:
+    """Print a line on stderr; an error is red if the terminal shows colours."""
     red = error and sys.stderr.isatty() and not os.environ.get("NO_COLOR")
     try:
         print(f"\x1b[31m{line}\x1b[0m" if red else line, file=sys.stderr, flush=True)
     except OSError:
-        # nobody listens, or the disk is full: no reason to stop, or to end otherwise
-        _let_go(sys.stderr)
+        # the reader is gone or the disk is full: neither ends the command or changes its exit code
+        _discard_output(sys.stderr)
 
 
-def enter(command: Callable[[], object], *, debug: bool) -> int:
-    """Run the command line and return its exit code; an error that was expected is printed without a traceback."""
-    # a stream that was closed before we began takes what is written, and forgets it
+def run_command_line(command: Callable[[], object], *, debug: bool) -> int:
+    """Run the command line and return its exit code; expected errors are printed without a traceback."""
+    # output to a stream that was closed before the start is discarded
     sys.stdout = sys.stdout or open(os.devnull, "w")  # noqa: SIM115
     sys.stderr = sys.stderr or open(os.devnull, "w")  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(AttributeError):
-            # a locale that cannot show a formula shows its escapes, not a traceback
+            # a locale that cannot encode a formula shows escapes instead of a traceback
             stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
-    warnings.showwarning = _note
-    code = _code_of(command, debug=debug)
+    warnings.showwarning = _print_warning
+    code = _exit_code(command, debug=debug)
     try:
-        # what is left in the buffer would fail at the exit of the interpreter, which has a code of its own
+        # a failing flush at the exit of the interpreter would change the exit code
         sys.stdout.flush()
     except OSError as error:
-        _let_go(sys.stdout)
-        if error.errno in NOT_WRITTEN:
-            say(f"cannot write: {error.strerror}", error=True)
-            return STORAGE
+        _discard_output(sys.stdout)
+        if error.errno in WRITE_ERRNOS:
+            print_line(f"cannot write: {error.strerror}", error=True)
+            return EXIT_STORAGE
     return code
 
 
-def _code_of(command: Callable[[], object], *, debug: bool) -> int:
-    """The exit code of the command line, whose errors are printed."""
+def _exit_code(command: Callable[[], object], *, debug: bool) -> int:
+    """Run the command line, print its errors, and return its exit code."""
     try:
-        code = _run(command)
+        code = _call_command(command)
         sys.stdout.flush()
         return code
     except Interrupted as signalled:
-        say(str(signalled), error=True)
+        print_line(str(signalled), error=True)
         return signalled.code
     except TyperException as error:
-        # without a message it has shown the help
+        # without a message the help was shown
         if error.format_message():
-            say(_usage(error), error=True)
-        return USAGE
+            print_line(_usage_message(error), error=True)
+        return EXIT_USAGE
     except ImpactError as error:
         for line in str(error).splitlines():
-            say(line, error=True)
-        return next((code for kind, code in CODES.items() if isinstance(error, kind)), USAGE)
+            print_line(line, error=True)
+        return next((code for kind, code in ERROR_EXIT_CODES.items() if isinstance(error, kind)), EXIT_USAGE)
     except BrokenPipeError:
-        _let_go(sys.stdout)
-        return OK
+        _discard_output(sys.stdout)
+        return EXIT_OK
     except Exception as error:
         if _is_out_of_memory(error):
-            say(_out_of_memory(error), error=True)
-            return STORAGE
-        if isinstance(error, OSError) and error.errno in NOT_WRITTEN:
-            say(f"cannot write: {error.strerror}", error=True)
-            return STORAGE
+            print_line(_out_of_memory(error), error=True)
+            return EXIT_STORAGE
+        if isinstance(error, OSError) and error.errno in WRITE_ERRNOS:
+            print_line(f"cannot write: {error.strerror}", error=True)
+            return EXIT_STORAGE
         if debug:
             for line in traceback.format_exc().splitlines():
-                say(line)
+                print_line(line)
         else:
             what = safe_text(f"{type(error).__name__}: {error}")
-            say(f"internal error: {what}; report: {_report()}; --debug shows it", error=True)
-        return INTERNAL
+            print_line(f"internal error: {what}; report: {_write_traceback()}; --debug shows it", error=True)
+        return EXIT_INTERNAL
 
 
 def _is_out_of_memory(error: BaseException) -> bool:
-    """Whether an exception, or one that it came from, is of a lack of memory."""
+    """Whether an exception, or one of its causes, is a lack of memory."""
     chain: BaseException | None = error
     while chain is not None:
         if isinstance(chain, MemoryError) or (isinstance(chain, OSError) and chain.errno == errno.ENOMEM):
             return True
-        # a library that the loader has no room for
+        # the loader has no memory for a library
         if isinstance(chain, ImportError) and re.search("failed to map|[Cc]annot (allocate|apply)", str(chain)):
             return True
         chain = chain.__cause__ or chain.__context__
-    # libraries fail in many ways where there is no room
+    # libraries fail in many ways without memory
     try:
-        mmap.mmap(-1, ROOM).close()
+        mmap.mmap(-1, PROBE_BYTES).close()
     except (OSError, MemoryError):
         return True
     return False
@@ -157,59 +157,59 @@ def _out_of_memory(error: Exception) -> str:
     return "out of memory" + (f": {what}" if what else "")
 
 
-def _note(message: Warning | str, *_: object, **__: object) -> None:
-    """A warning, of ours or of a library, is a line on stderr too."""
-    say(f"note: {safe_text(str(message), 1000)}")
+def _print_warning(message: Warning | str, *_: object, **__: object) -> None:
+    """Print a warning, of this program or of a library, as a line on stderr."""
+    print_line(f"note: {safe_text(str(message), 1000)}")
 
 
-def _usage(error: TyperException) -> str:
-    """What is wrong with the words of a command."""
+def _usage_message(error: TyperException) -> str:
+    """One line about a wrong option or argument."""
     context = getattr(error, "ctx", None)
     at = context.command_path if context else "impact"
     message = " ".join(safe_text(error.format_message(), 1000).split())
     return f"{at}: {message.rstrip('. ')}; see {at} -h"
 
 
-def _run(command: Callable[[], object]) -> int:
-    """The exit code of a command, which returns it, or leaves by SystemExit, if it has one."""
+def _call_command(command: Callable[[], object]) -> int:
+    """Run a command; returns its exit code, which it returns or raises as SystemExit."""
     try:
         code = command()
     except SystemExit as leaving:
         if isinstance(leaving.__context__, OSError):
-            # typer leaves by this when the reader of our output has gone
+            # typer exits this way when the reader of the output is gone
             raise leaving.__context__ from None
         code = leaving.code
-    if code == INTERRUPTED:
-        say("interrupted", error=True)
-    return code if isinstance(code, int) else OK
+    if code == EXIT_INTERRUPTED:
+        print_line("interrupted", error=True)
+    return code if isinstance(code, int) else EXIT_OK
 
 
 @contextlib.contextmanager
-def readers_may_leave(stream: TextIO | None = None) -> Iterator[None]:
-    """Print to a reader who may have seen enough, `| head -1`: the exit code is still that of what was found."""
+def ignore_broken_pipe(stream: TextIO | None = None) -> Iterator[None]:
+    """Print to a reader that may close the pipe, such as `head -1`, without changing the exit code."""
     stream = stream or sys.stdout
     try:
         yield
         stream.flush()
     except OSError as error:
-        # of stderr nothing is missed that the exit code does not say
+        # output to stderr is optional: the exit code says the same
         if stream is not sys.stderr and not isinstance(error, BrokenPipeError):
             raise
-        _let_go(stream)
+        _discard_output(stream)
     except SystemExit as leaving:
-        # rich leaves by this when the reader has gone
+        # rich exits this way when the reader is gone
         if not isinstance(leaving.__context__, BrokenPipeError):
             raise
-        _let_go(stream)
+        _discard_output(stream)
 
 
-def _let_go(stream: TextIO) -> None:
-    """Nothing more can be written there: not at exit either."""
+def _discard_output(stream: TextIO) -> None:
+    """Redirect a stream to the null device, so that later writes do not fail."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
-def _report() -> str:
-    """The traceback in a file of its own; its name, or why there is none."""
+def _write_traceback() -> str:
+    """Write the traceback to a temporary file; returns its name, or why it was not written."""
     try:
         with tempfile.NamedTemporaryFile("w", prefix="impact-error-", suffix=".txt", delete=False) as file:
             traceback.print_exc(file=file)

@@ -1,4 +1,4 @@
-"""The commands that store more of a result: expand and extend."""
+"""The commands that change what a file stores of a sweep: expand and extend."""
 
 from __future__ import annotations
 
@@ -7,60 +7,46 @@ from typing import Annotated
 
 import typer
 
-from ..errors import UnfinishedError, UsageError
 from ..text import safe_text
 from . import exits
 from .executor_options import ExecutorOptions
 from .options import (
-    AllowFailed,
-    Jobs,
-    Json,
-    MaxPoints,
-    Models,
-    Overwrite,
-    Plugins,
-    Quiet,
-    Result,
-    Resume,
-    Sel,
-    Threads,
+    AllowFailedOption,
+    JobsOption,
+    JsonOption,
+    MaxPointsOption,
+    ModelOption,
+    OverwriteOption,
+    PluginOption,
+    QuietOption,
+    ResultArgument,
+    ResumeOption,
+    SelectOption,
+    ThreadsOption,
 )  # fmt: skip
 
 
 def expand(
-    result: Result,
+    result: ResultArgument,
     output: Annotated[Path, typer.Option("-o", "--output", help="The file to write.")],
-    sel: Sel = None,
-    model: Models = None,
-    overwrite: Overwrite = False,
-    max_points: MaxPoints = 10**9,
+    sel: SelectOption = None,
+    model: ModelOption = None,
+    overwrite: OverwriteOption = False,
+    max_points: MaxPointsOption = 10**9,
 ) -> None:
-    """Write a result, or a part of it, with all of its values: for programs that read netCDF and not impact."""
-    with exits.signals() as should_stop:
+    """Write all values of a result, or of a part of it, as netCDF for programs that do not use impact."""
+    with exits.catch_signals() as should_stop:
         from .. import api
-        from ..results import backend
-        from ..results.selection import model_positions, select
 
-        backend.check_output(output, overwrite=overwrite, source=result)
-        dataset = select(backend.open_result(result), dict(sel or ()))
-        if "model" not in dataset.dims:
-            raise UsageError(f"{safe_text(str(result))}: is a time history, expected a result of a sweep")
-        if model:
-            dataset = dataset.isel(model=model_positions(model, dataset))
-        points = 1
-        for size in dataset.sizes.values():
-            points *= size
-        if points > max_points:
-            raise UsageError(
-                f"{safe_text(str(result))}: got {points:,} points, expected at most {max_points:,} "
-                "(--max-points); select a part, such as --sel e=0.5"
-            )
-        api.save(dataset, output, overwrite=overwrite, should_stop=should_stop)
-    exits.say(f"{safe_text(str(output))}: {points:,} points, {output.stat().st_size:,} bytes")
+        points = api.expand(
+            result, output, sel=dict(sel or ()), models=model, overwrite=overwrite, max_points=max_points,
+            should_stop=should_stop,
+        )  # fmt: skip
+    exits.print_line(f"{safe_text(str(output))}: {points:,} points, {output.stat().st_size:,} bytes")
 
 
 def extend(
-    result: Result,
+    result: ResultArgument,
     sets: Annotated[
         list[str],
         typer.Option(
@@ -73,34 +59,29 @@ def extend(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="The larger result. \\[default: the result itself]")
     ] = None,
-    plugins: Plugins = None,
-    overwrite: Overwrite = False,
-    allow_failed: AllowFailed = False,
-    resume: Resume = False,
-    jobs: Jobs = 1,
-    threads: Threads = 1,
-    max_points: MaxPoints = 10**9,
-    quiet: Quiet = False,
-    as_json: Json = False,
+    plugins: PluginOption = None,
+    overwrite: OverwriteOption = False,
+    allow_failed: AllowFailedOption = False,
+    resume: ResumeOption = False,
+    jobs: JobsOption = 1,
+    threads: ThreadsOption = 1,
+    max_points: MaxPointsOption = 10**9,
+    quiet: QuietOption = False,
+    as_json: JsonOption = False,
 ) -> None:
-    """Add values to the axes of a result: only what is new is integrated, and it equals the sweep done at once."""
-    with exits.signals() as should_stop:
-        from ..engine.plugins import read_plugins
-        from ..results import extend as extending
-        from . import progress, summary
+    """Add values to the axes of a result; only new trajectories are integrated. It equals a single sweep."""
+    with exits.catch_signals() as should_stop:
+        from .. import api
+        from . import summary
+        from .progress import progress
 
-        target = output or result
-        options = ExecutorOptions(jobs, threads)
-        with (
-            options.backend(quiet=quiet, should_stop=should_stop) as backend,
-            progress.progress(quiet=quiet) as report,
-        ):
-            outcome, integrated = extending.extend(
-                result, target, sets, read_plugins(plugins or ()), resume=resume, overwrite=overwrite,
-                max_points=max_points, backend=backend, on_progress=report, should_stop=should_stop,
+        executor = ExecutorOptions(jobs, threads)
+        with progress(quiet=quiet) as on_progress:
+            outcome = api.extend_to_file(
+                result, sets, output=output, resume=resume, overwrite=overwrite, plugins=plugins or (),
+                backend=executor.backend(quiet=quiet, should_stop=should_stop), max_points=max_points,
+                on_progress=on_progress, should_stop=should_stop,
             )  # fmt: skip
-        if should_stop():
-            raise UnfinishedError(f"{safe_text(str(target))} was stored whole")
     if not quiet:
-        exits.say(f"{integrated:,} of {outcome.trajectories:,} trajectories were integrated for it")
-    summary.conclude(outcome, target, fresh=True, quiet=quiet, as_json=as_json, allow_failed=allow_failed)
+        exits.print_line(f"{outcome.integrated:,} of {outcome.trajectories:,} trajectories were integrated for it")
+    summary.conclude(outcome, output or result, quiet=quiet, as_json=as_json, allow_failed=allow_failed)

@@ -10,7 +10,7 @@ import typer
 
 from ..formatting import label, number
 from .console import cell, console, dump, print_rows, table
-from .options import Json
+from .options import JsonOption
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -21,7 +21,7 @@ STORED = ("layout", "seal")
 
 def info(
     file: Annotated[Path, typer.Argument(help="A result or a time history.")],
-    as_json: Json = False,
+    as_json: JsonOption = False,
 ) -> None:
     """What is in a file: axes, variables, worst errors, and where it came from."""
     from .. import api

@@ -124,4 +124,8 @@ def show_help(
 
 def main() -> None:
     """Entry point of the console script `impact`."""
-    sys.exit(exits.enter(partial(app, standalone_mode=False, prog_name="impact"), debug="--debug" in sys.argv))
+    sys.exit(
+        exits.run_command_line(
+            partial(app, standalone_mode=False, prog_name="impact"), debug="--debug" in sys.argv
+        )
+    )

@@ -10,7 +10,7 @@ import typer
 from ..errors import UsageError, did_you_mean
 from ..text import safe_text
 from .console import dump
-from .options import Json
+from .options import JsonOption
 
 UNITS = {"E": "GPa", "nu": "-", "rho": "kg/m3", "yield_strength": "MPa"}
 SCALES = {"GPa": 1e9, "MPa": 1e6}
@@ -18,7 +18,7 @@ SCALES = {"GPa": 1e9, "MPa": 1e6}
 
 def materials(
     name: Annotated[str | None, typer.Argument(help="A material to show alone. \\[default: list them]")] = None,
-    as_json: Json = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Common materials that a config may name without a table: E, nu, rho, yield strength, source."""
     from .. import api

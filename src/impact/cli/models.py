@@ -16,7 +16,7 @@ from ..formatting import decimals, number
 from ..text import safe_text, with_year
 from . import exits
 from .console import cell, console, dump, print_rows, table
-from .options import Json, Plugins
+from .options import JsonOption, PluginOption
 from .params import complete_family, complete_model
 
 if TYPE_CHECKING:
@@ -51,8 +51,8 @@ def models(
         Path | None,
         typer.Option("--check", metavar="FILE", help="Python file of whose models to check the contract."),
     ] = None,
-    plugins: Plugins = None,
-    as_json: Json = False,
+    plugins: PluginOption = None,
+    as_json: JsonOption = False,
 ) -> None:
     """The catalogue of contact force models: equations, references, domains, delivered restitution."""
     from ..contact.models import catalogue, find
@@ -247,9 +247,11 @@ def _check(models: Sequence[ForceModel], *, as_json: bool) -> None:
         console(sys.stdout).print(rows)
         for model, findings in found:
             if not any(one.clause == CLOSED_FORM for one in findings):
-                exits.say(f"{model.key}: has no oracle, so that its restitution was compared with no closed form")
+                exits.print_line(
+                    f"{model.key}: has no oracle, so that its restitution was compared with no closed form"
+                )
     if broken:
-        raise typer.Exit(exits.NOT_EQUAL)
+        raise typer.Exit(exits.EXIT_NOT_EQUAL)
 
 
 CLOSED_FORM = "agrees with its closed form"

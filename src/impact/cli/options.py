@@ -9,51 +9,51 @@ import typer
 
 from .params import Setting, Tolerance, complete_model, once, setting, tolerance, whole_number
 
-Result = Annotated[Path, typer.Argument(help="A result of `impact sweep`.")]
-Output = Annotated[Path, typer.Option("-o", "--output", help="The result file.")]
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace the output if it exists.")]
-Json = Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
-AllowFailed = Annotated[bool, typer.Option("--allow-failed", help="Exit 0 even if points failed.")]
-Resume = Annotated[bool, typer.Option("--resume", help="Resume work that was interrupted.")]
-Sets = Annotated[
+ResultArgument = Annotated[Path, typer.Argument(help="A result of `impact sweep`.")]
+OutputOption = Annotated[Path, typer.Option("-o", "--output", help="The result file.")]
+OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Replace the output if it exists.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")]
+QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
+AllowFailedOption = Annotated[bool, typer.Option("--allow-failed", help="Exit 0 even if points failed.")]
+ResumeOption = Annotated[bool, typer.Option("--resume", help="Resume work that was interrupted.")]
+SetOption = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="PATH=VALUE", help="Change the config, such as sweep.m2=2.0; may be repeated."),
 ]
-Plugins = Annotated[
+PluginOption = Annotated[
     list[Path] | None,
     typer.Option("--plugin", metavar="FILE", help="Python file with models of your own; may be repeated."),
 ]
-Sel = Annotated[
+SelectOption = Annotated[
     list[Setting] | None,
     typer.Option(
         "--sel", metavar="NAME=VALUE", parser=setting, callback=once,
         help="Value of an axis, such as m2=1.0; may be repeated.",
     ),
 ]  # fmt: skip
-Models = Annotated[
+ModelOption = Annotated[
     list[str] | None,
     typer.Option(
         "--model", metavar="KEY", autocompletion=complete_model, help="Only this model; may be repeated."
     ),
 ]
-Jobs = Annotated[
+JobsOption = Annotated[
     int, typer.Option("--jobs", "-j", metavar="N", parser=whole_number, help="Processes that integrate.")
 ]
-Threads = Annotated[
+ThreadsOption = Annotated[
     int,
     typer.Option(
         "--threads", metavar="N", parser=whole_number, help="Threads that integrate, in place of processes."
     ),
 ]
-MaxPoints = Annotated[
+MaxPointsOption = Annotated[
     int,
     typer.Option(
         "--max-points", metavar="N", parser=whole_number,
         help="Refuse more: points in layout full, else trajectories.",
     ),
 ]  # fmt: skip
-Tolerances = Annotated[
+ToleranceOption = Annotated[
     list[Tolerance] | None,
     typer.Option(
         "--tol", metavar="[NAME=]VALUE", parser=tolerance, callback=once,

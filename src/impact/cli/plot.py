@@ -12,7 +12,7 @@ from ..plots.kinds import KINDS, LOG_AXES, WIDTHS
 from ..text import safe_text
 from . import exits
 from .console import dump
-from .options import Json, Models, Overwrite, Plugins, Sel
+from .options import JsonOption, ModelOption, OverwriteOption, PluginOption, SelectOption
 
 if TYPE_CHECKING:
     from ..plots.kinds import PlotData
@@ -45,8 +45,8 @@ def plot(
         str | None, typer.Option("--y", help="Second axis of a map, or of validity. \\[default: the next axis]")
     ] = None,
     variable: Annotated[str, typer.Option("--variable", help="What a map shows.")] = "e_error",
-    sel: Sel = None,
-    model: Models = None,
+    sel: SelectOption = None,
+    model: ModelOption = None,
     log: Annotated[str | None, typer.Option("--log", help="Axes to make logarithmic: x, y or xy.")] = None,
     points: Annotated[
         Path | None,
@@ -98,9 +98,9 @@ def plot(
             "--data-form", metavar="FORM", help="wide: a column for each curve; long: a row for each point."
         ),
     ] = "wide",
-    overwrite: Overwrite = False,
-    plugin: Plugins = None,
-    as_json: Json = False,
+    overwrite: OverwriteOption = False,
+    plugin: PluginOption = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Draw a stored result: by default the final-velocity comparison, Figure 6 of the paper.
 
@@ -150,11 +150,11 @@ def plot(
         for path, content in tables:
             backend.write_file(path, content, overwrite=overwrite)
         drawn[name] = plot_data
-        exits.say(_summary_line(picture, plot_data))
+        exits.print_line(_summary_line(picture, plot_data))
     if not drawn:
         raise UsageError("\n".join(dict.fromkeys(faults.values())))
     for name, fault in faults.items():
-        exits.say(f"{name} is not drawn: {fault}")
+        exits.print_line(f"{name} is not drawn: {fault}")
     if as_json:
         from dataclasses import asdict
 

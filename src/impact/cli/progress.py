@@ -13,7 +13,7 @@ from rich.progress import Progress as Bar
 from rich.text import Text
 
 from .console import console
-from .exits import say
+from .exits import print_line
 
 if TYPE_CHECKING:
     from ..engine.progress import Progress
@@ -98,7 +98,7 @@ def progress(*, quiet: bool) -> Iterator[Callable[[Progress], None]]:
                 bar.start()
         elif now - last >= INTERVAL_S and not task.finished:
             last = now
-            say(line(task, at.of_points))
+            print_line(line(task, at.of_points))
 
     try:
         yield report

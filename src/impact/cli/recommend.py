@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .console import dump
-from .options import Json, Models, Result, Sel
+from .options import JsonOption, ModelOption, ResultArgument, SelectOption
 from .params import number
 
 if TYPE_CHECKING:
@@ -19,14 +19,14 @@ ROWS = 30
 
 
 def recommend(
-    result: Result,
+    result: ResultArgument,
     tol: Annotated[
         float,
         typer.Option("--tol", metavar="VALUE", parser=number, help="What |e_out − e| may be, such as 0.02 or 2%."),
     ] = 0.01,
-    sel: Sel = None,
-    model: Models = None,
-    as_json: Json = False,
+    sel: SelectOption = None,
+    model: ModelOption = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Which model gives the restitution asked for over the swept range, and how wrong is it where it does not?"""
     from .. import api

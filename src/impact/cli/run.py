@@ -13,7 +13,7 @@ from ..formatting import quantity
 from ..text import safe_text
 from . import exits
 from .console import dump, print_rows
-from .options import Json, Overwrite, Plugins, Sets
+from .options import JsonOption, OverwriteOption, PluginOption, SetOption
 from .params import Setting, complete_model, once, setting, whole_number
 
 if TYPE_CHECKING:
@@ -43,8 +43,8 @@ def run(
             help="Value of an input, such as e=0.05; may be repeated.",
         ),
     ] = None,
-    sets: Sets = None,
-    plugins: Plugins = None,
+    sets: SetOption = None,
+    plugins: PluginOption = None,
     history: Annotated[
         Path | None, typer.Option("--history", metavar="FILE", help="Keep the time history in this file.")
     ] = None,
@@ -57,8 +57,8 @@ def run(
             help="Points in time of the history, uniform from contact to release. \\[default: the integrator's]",
         ),
     ] = None,
-    overwrite: Overwrite = False,
-    as_json: Json = False,
+    overwrite: OverwriteOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Run one impact: what goes in, what comes out, and how far it can be trusted."""
     from .. import api
@@ -78,12 +78,12 @@ def run(
     else:
         print_run(impact)
     if impact.status >= FIRST_FAILURE:
-        raise typer.Exit(exits.LANES_FAILED)
+        raise typer.Exit(exits.EXIT_POINTS_FAILED)
     if history is not None:
         if impact.history is None:
             raise UsageError(f"no history to keep: {impact.status.meaning}")
         api.save(impact.history, history, overwrite=overwrite)
-        exits.say(f"{safe_text(str(history))}: {impact.history.sizes['t']} points in time")
+        exits.print_line(f"{safe_text(str(history))}: {impact.history.sizes['t']} points in time")
 
 
 def run_json(impact: Impact) -> dict[str, Any]:

@@ -1,9 +1,9 @@
-"""What a sweep prints on stderr when it is done: what came out, what failed, and what repeats it."""
+"""The summary that a sweep prints: counts, largest errors, failed points and the commands that repeat them."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,24 +15,14 @@ from ..formatting import label, number
 from ..text import safe_text
 from . import exits
 from .console import cell, console, dump, table
-from .progress import progress
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from ..engine.plan import Plan
     from ..results.summary import Summary, SweepOutcome
 
 
-def execute(plan: Plan, should_stop: Callable[[], bool], *, quiet: bool) -> xr.Dataset:
-    """The result of a plan in memory, with progress; a signal ends it."""
-    from .. import api
-
-    with progress(quiet=quiet) as report:
-        return api.execute(plan, on_progress=report, should_stop=should_stop)
-
-
-def summary(outcome: SweepOutcome, output: Path) -> dict[str, Any]:
+def summary_json(outcome: SweepOutcome, output: Path) -> dict[str, Any]:
     """Points, counts per status, and the first failed points with their coordinates and the command for each."""
     from ..results.replay_command import command_start, inputs_of_model, replay_command
     from ..results.summary import counts_by_name
@@ -52,65 +42,62 @@ def summary(outcome: SweepOutcome, output: Path) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def conclude(
-    outcome: SweepOutcome, output: Path, *, fresh: bool, quiet: bool, as_json: bool, allow_failed: bool
-) -> None:
-    """Print what came out of a sweep, and end with the exit code that it has.
+def conclude(outcome: SweepOutcome, output: Path, *, quiet: bool, as_json: bool, allow_failed: bool) -> None:
+    """Print the summary of a sweep, and exit with its code.
 
     Parameters
     ----------
     outcome : the result
     output : its file
-    fresh : whether it was stored just now
     quiet, as_json, allow_failed : as the options of those names
     """
     from ..results.plausibility import result_notes
 
-    fields = summary(outcome, output)
+    fields = summary_json(outcome, output)
     if not quiet:
-        if fresh:
-            with exits.readers_may_leave(sys.stderr):
+        if outcome.is_new:
+            with exits.ignore_broken_pipe(sys.stderr):
                 print_summary(outcome, fields)
             for note in result_notes(outcome.summary):
-                exits.say(f"note: {note}")
+                exits.print_line(f"note: {note}")
         else:
-            exits.say(f"{safe_text(str(output))}: already holds this sweep; nothing to do")
+            exits.print_line(f"{safe_text(str(output))}: already holds this sweep; nothing to do")
     if as_json:
         print(dump(fields))
     if fields["failed"] and not allow_failed:
-        if quiet or not fresh:
-            exits.say(failed_line(fields), error=True)
-        raise typer.Exit(exits.LANES_FAILED)
+        if quiet or not outcome.is_new:
+            exits.print_line(failed_line(fields), error=True)
+        raise typer.Exit(exits.EXIT_POINTS_FAILED)
 
 
-def failed_line(found: Mapping[str, Any]) -> str:
-    """How many points failed, and why."""
-    reasons = (f"{n:,} {name}" for name, n in found["status"].items() if Status[name.upper()] >= FIRST_FAILURE)
-    counts = f"{found['failed']:,} of {found['points']:,} points failed ({', '.join(reasons)})"
-    return f"{safe_text(found['output'])}: {counts}"
+def failed_line(fields: Mapping[str, Any]) -> str:
+    """One line with the number of failed points by status."""
+    reasons = (f"{n:,} {name}" for name, n in fields["status"].items() if Status[name.upper()] >= FIRST_FAILURE)
+    counts = f"{fields['failed']:,} of {fields['points']:,} points failed ({', '.join(reasons)})"
+    return f"{safe_text(fields['output'])}: {counts}"
 
 
-def print_summary(outcome: SweepOutcome, found: Mapping[str, Any]) -> None:
-    """What came out of a sweep, on stderr."""
+def print_summary(outcome: SweepOutcome, fields: Mapping[str, Any]) -> None:
+    """Print the summary of a sweep on stderr."""
     out = console(sys.stderr)
     if outcome.summary.worst:
         out.print(worst_errors(outcome.dataset, outcome.summary))
-    counts = ", ".join(f"{count:,} {name}" for name, count in found["status"].items())
-    distinct = f" from {found['trajectories']:,} trajectories" if found["trajectories"] is not None else ""
-    out.print(cell(f"{found['output']}: {found['points']:,} points{distinct} ({counts})"))
-    for one in found["first_failed"]:
-        where = ", ".join(f"{name}={label(value)}" for name, value in one["at"].items())
-        out.print(cell(f"failed: {where}: {Status[one['status'].upper()].meaning}"))
-        if one["replay"]:
-            # as one line, however long: a command is to be copied
-            out.print(cell(f"  {one['replay']}"), soft_wrap=True)
-    more = found["failed"] - len(found["first_failed"])
+    counts = ", ".join(f"{count:,} {name}" for name, count in fields["status"].items())
+    distinct = f" from {fields['trajectories']:,} trajectories" if fields["trajectories"] is not None else ""
+    out.print(cell(f"{fields['output']}: {fields['points']:,} points{distinct} ({counts})"))
+    for failure in fields["first_failed"]:
+        where = ", ".join(f"{name}={label(value)}" for name, value in failure["at"].items())
+        out.print(cell(f"failed: {where}: {Status[failure['status'].upper()].meaning}"))
+        if failure["replay"]:
+            # no wrapping, so that commands can be copied
+            out.print(cell(f"  {failure['replay']}"), soft_wrap=True)
+    more = fields["failed"] - len(fields["first_failed"])
     if more > 0:
         out.print(cell(f"and {more:,} more"))
 
 
 def worst_errors(dataset: xr.Dataset, totals: Summary) -> Table:
-    """The largest errors per model, as far as the result has them."""
+    """A table of the largest errors per model."""
     columns = {
         "e_error": "max |e_out − e|", "v1_error": "max |v1 error|", "v2_error": "max |v2 error|",
         "closed_form_error": "max |e_out − exact|", "energy_residual": "max |residual|",

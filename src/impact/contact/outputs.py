@@ -16,7 +16,7 @@ from .model import ForceModel, Law
 from .powers import Array, all_within
 from .scaling import dimensionless_values
 from .simulate import CollisionResult, simulate
-from .status import FIRST_FAILURE, LIMIT, NO_IMPACT, OK
+from .status import FIRST_FAILURE, LIMIT, NO_IMPACT, STATUS_OK
 
 Outputs = dict[str, NDArray[Any]]
 InSI = Callable[[Array, Array], Array]
@@ -185,7 +185,7 @@ def _separation_time(
 # formulas by the names of their values; their arguments are names of this dict, or law, impacts and result
 FORMULAS: dict[str, Callable[..., Any]] = {
     "checked": lambda law, impacts: check_inputs(law, impacts),
-    "not_integrated": lambda checked: _mask_if_any(checked != OK),
+    "not_integrated": lambda checked: _mask_if_any(checked != STATUS_OK),
     "missed": lambda checked: _mask_if_any(checked == NO_IMPACT),
     "failed": lambda status: _mask_if_any(status >= FIRST_FAILURE),
     "undefined": _undefined,

@@ -20,7 +20,7 @@ from .numba import dispatch
 from .piecewise import in_parts
 from .powers import Array, distinct_values
 from .scaling import LawValues, chi_of, exact_restitution, with_coefficients, with_units
-from .status import LIMIT, OK, Status
+from .status import LIMIT, STATUS_OK, Status
 from .velocity_coordinates import VelocityCoordinate, is_strong
 
 # the status that belongs to each termination, by its number; no trajectory ends running
@@ -151,7 +151,7 @@ def simulate(
     errors = {} if errors is None else errors
     with np.errstate(all="ignore"):
         for exponent in distinct_values(n):
-            chosen = (status == OK) & (n == exponent)
+            chosen = (status == STATUS_OK) & (n == exponent)
             count, where = int(np.count_nonzero(chosen)), positions(chosen)
             if count:
                 chosen_values = _values_at(values, where)
@@ -214,7 +214,7 @@ def _simulate_distinct(
     strong = is_strong(model, law_values, count)
     parts: list[tuple[Positions, CollisionResult]] = []
     for is_strongly_damped in (False, True):
-        chosen = (status == OK) & (strong == is_strongly_damped)
+        chosen = (status == STATUS_OK) & (strong == is_strongly_damped)
         size = int(np.count_nonzero(chosen))
         if not size:
             continue
@@ -305,11 +305,11 @@ def integrate_phases(
     )  # fmt: skip
 
     # without a recovered indentation the balls stay at their peak
-    stays = (result.status == OK) & (recovered <= 0.0)
+    stays = (result.status == STATUS_OK) & (recovered <= 0.0)
     if stays.any():
         result.status[stays], result.e_out[stays] = LIMIT, 0.0
 
-    where = positions(result.status == OK)
+    where = positions(result.status == STATUS_OK)
     params, recovered = tuple(column[where] for column in params), recovered[where]
     if not recovered.size:
         return RecordedCollision(result, approach, None, params)

@@ -38,4 +38,6 @@ MEANINGS = {
 }
 STATUSES = tuple(map(int, Status))
 # an array is compared with a plain number eight times as fast as with a member of an enum
-OK, NO_IMPACT, LIMIT, FIRST_FAILURE = map(int, (Status.OK, Status.NO_IMPACT, Status.LIMIT, Status.NOT_SEPARATED))
+STATUS_OK, NO_IMPACT, LIMIT, FIRST_FAILURE = map(
+    int, (Status.OK, Status.NO_IMPACT, Status.LIMIT, Status.NOT_SEPARATED)
+)

@@ -16,7 +16,7 @@ from .._version import __version__
 from ..config.grid import MAX_POINTS, Axis, path_of
 from ..config.tables import CORES
 from ..contact.simulate import CollisionResult
-from ..contact.status import OK, Status
+from ..contact.status import STATUS_OK, Status
 from ..engine.execute import never_stop
 from ..engine.executors import SERIAL, Backend
 from ..engine.plan import Inputs, Plan
@@ -281,7 +281,7 @@ class _OldPositions:
         held = table.rows.take(model, np.maximum(old_rows, 0))
         # a status that was assigned before integration may differ between the two sweeps
         status = columns_of(self.new, self.maps, part)["status"]
-        is_known &= np.where(status == OK, ~np.isin(held.status, CHECKED_STATUSES), held.status == status)
+        is_known &= np.where(status == STATUS_OK, ~np.isin(held.status, CHECKED_STATUSES), held.status == status)
         rebound = CollisionResult.blank(part.size)
         rebound.put(np.flatnonzero(is_known), held.take(np.flatnonzero(is_known)))
         return is_known, rebound

@@ -82,6 +82,7 @@ class ShardProgress:
     of_blocks: int
     trajectories: int
     failed: int
+    shard: Shard
 
 
 def sweep_shard(
@@ -129,9 +130,8 @@ def sweep_shard(
             sink.write(json.dumps(record).encode())
         with report_kept_blocks(folder, counter, "the same command", lambda error: []):
             complete_ranges(work_folder, plan, maps, shard_blocks, counter, backend, should_stop)
-    return ShardProgress(
-        folder, len(shard_blocks), len(blocks), counter.progress.trajectories, counter.progress.failed
-    )
+    progress = counter.progress
+    return ShardProgress(folder, len(shard_blocks), len(blocks), progress.trajectories, progress.failed, shard)
 
 
 @dataclass(frozen=True)

@@ -173,12 +173,18 @@ class SweepOutcome:
     ----------
     dataset : its coordinates and attributes; the values of its variables may be placeholders
     summary : of its points
-    trajectories : how many were integrated; None if unknown
+    trajectories : number of different trajectories; None if unknown
+    is_new : whether the file was written now; False if it held this sweep already
+    integrated : how many trajectories were integrated now; None if not counted
+    repeated_blocks : number of blocks that several shards have
     """
 
     dataset: xr.Dataset
     summary: Summary
     trajectories: int | None = None
+    is_new: bool = True
+    integrated: int | None = None
+    repeated_blocks: int = 0
 
 
 def counts_by_name(counts: Mapping[Status, int]) -> dict[str, int]:

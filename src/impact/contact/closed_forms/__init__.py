@@ -1,4 +1,4 @@
-"""Closed forms of the impact of two balls: what the numbers of the program are checked against."""
+"""Closed forms of the impact of two balls, against which the numerical results are checked."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Closed forms of adhesive laws: what is lost in pulling the balls apart."""
+"""Closed forms of adhesive laws: the work lost in pulling the balls apart."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import numpy as np
 
 from ..powers import Array, integer_power, power
 
-# Newton's iterations for the resolvent cubic: from beyond its root they come to it from one side
+# Newton's iterations for the resolvent cubic, which converge from one side
 CUBIC_ITERATIONS = 8
-# halvings of an interval of indentations, to the last bit
+# halvings of an interval of indentations that locate the meeting of two branches to the last bit
 BRANCH_HALVINGS = 60
-# of the work of the neck: ∫ (4t⁶/3 − 2t³)(4t³ − 1) dt, t = y/(b R)^(1/3), from the pull-off, t³ = 1/4, to t = 1
+# factor of the neck's work: ∫ (4t⁶/3 − 2t³)(4t³ − 1) dt, t = y/(b R)^(1/3), from the pull-off, t³ = 1/4, to t = 1
 NECK_WORK = (8 / 15 - 4 / 3 + 1 / 2) - (8 / 15 * 4 ** (-10 / 3) - 4 / 3 * 4 ** (-7 / 3) + 1 / 2 * 4 ** (-4 / 3))
 
 
@@ -43,7 +43,7 @@ def jkr_root(x: Array, R: Array, b: Array) -> Array:
 def jkr_restitution(energy: Array, E: Array, R: Array, b: Array) -> Array:
     """The restitution of elastic balls with adhesion: √(1 − (V_s/V)²), 0 up to the sticking speed V_s.
 
-    The contact begins at δ = 0 and ends at the pull-off; the work of the way between is lost. By Thornton and Ning
+    The contact begins at δ = 0 and ends at the pull-off; the work between the two is lost. By Thornton and Ning
     (1998), equations (54) and (57), V_s = √(14.18/m) (Γ⁵ R⁴/E*²)^(1/6).
 
     Parameters
@@ -79,13 +79,13 @@ def edinburgh_adhesion(
     both = u + w - depth * u * w
     square = depth * (2 - depth * u) * (2 - depth * w) * (u + w + both) / (4 * both * both)
     pull = 1.5 * np.pi * gamma * np.sqrt(np.maximum(square, 0.0))
-    most = 0.5 * K * k2 * plastic
-    limited = pull > most
-    at = np.where(
-        limited, 0.5 * depth, np.power(np.maximum(plastic - np.minimum(pull, most) / (K * k2), 0.0), 1 / n)
+    max_pull = 0.5 * K * k2 * plastic
+    limited = pull > max_pull
+    meeting = np.where(
+        limited, 0.5 * depth, np.power(np.maximum(plastic - np.minimum(pull, max_pull) / (K * k2), 0.0), 1 / n)
     )
     yields = (depth > 0) & (gamma > 0)
-    return np.where(yields, np.minimum(pull, most) / np.power(np.where(yields, at, 1.0), exponent), 0.0)
+    return np.where(yields, np.minimum(pull, max_pull) / np.power(np.where(yields, meeting, 1.0), exponent), 0.0)
 
 
 def edinburgh_restitution(
@@ -93,7 +93,7 @@ def edinburgh_restitution(
 ) -> Array:
     """The restitution of the Edinburgh law of LIGGGHTS without a dashpot; 0 where the adhesion holds the balls.
 
-    Back from δₘ the work is that of k₂(δⁿ − δₚⁿ) down to where it meets −k_a δ^χ, and of that down to zero.
+    The unloading returns the work of k₂(δⁿ − δₚⁿ) from δₘ to its intersection with −k_a δ^χ, and of that to zero.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def edinburgh_restitution(
         middle = 0.5 * (low + high)
         below = stiff * (power(middle, n) - plastic) + adhesion * np.power(middle, exponent) < 0
         low, high = np.where(below, middle, low), np.where(below, high, middle)
-    meets = 0.5 * (low + high)
-    back = stiff * ((power(peak, n + 1) - power(meets, n + 1)) / (n + 1) - plastic * (peak - meets))
-    back = back - adhesion * np.power(meets, exponent + 1) / (exponent + 1)
-    return np.asarray(np.sqrt(np.maximum(2 * back / energy, 0.0)))
+    meeting = 0.5 * (low + high)
+    returned = stiff * ((power(peak, n + 1) - power(meeting, n + 1)) / (n + 1) - plastic * (peak - meeting))
+    returned = returned - adhesion * np.power(meeting, exponent + 1) / (exponent + 1)
+    return np.asarray(np.sqrt(np.maximum(2 * returned / energy, 0.0)))

@@ -1,4 +1,4 @@
-"""Closed forms of F = K δⁿ + α √(m K) δ^((n−1)/2) δ̇: a spring and dashpot whose damping ratio stays the same.
+"""Closed forms of F = K δⁿ + α √(m K) δ^((n−1)/2) δ̇: a spring and dashpot of constant damping ratio.
 
 In the contact's own units x'' = −xⁿ − α x^((n−1)/2) x'. With y = √(2/(n+1)) x^((n+1)/2) and the time
 dτ = √((n+1)/2) x^((n−1)/2) dt the motion is linear for every n:
@@ -7,8 +7,8 @@ dτ = √((n+1)/2) x^((n−1)/2) dt the motion is linear for every n:
 
 from y = 0, v = 1. With ω = √(1 − ζ²) that is y = exp(−ζτ) sin(ωτ)/ω. The indentation is largest, v = 0, at
 τₘ = acos(ζ)/ω, where y = exp(−ζ τₘ); the force is zero, y + 2 ζ v = 0, at 2 τₘ, where v = −exp(−2 ζ τₘ); the gap
-is zero at π/ω, where v = −exp(−π ζ/ω). So where the contact ends is part of the law. For ζ >= 1 write acosh(ζ)
-and √(ζ² − 1): the force still has its zero, the gap has none, and the balls creep apart for ever, e = 0.
+is zero at π/ω, where v = −exp(−π ζ/ω). The end of the contact is therefore part of the law. For ζ >= 1 replace
+acos by acosh and ω by √(ζ² − 1): the force still has a zero, the gap has none, the balls never separate, e = 0.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from ..powers import Array
 
 # below this |t| the slope of h is taken from its series
 SERIES_BELOW_T = 1e-3
-# Newton's iterations for h(t) = L: the start is good to half, the last ones change nothing
+# Newton's iterations for h(t) = L: the start is within a factor of 2, and the last iterations change nothing
 DAMPING_ITERATIONS = 6
 
 
 def _until_peak(zeta: Array) -> Array:
-    """ζ τₘ = ζ acos(ζ)/√(1 − ζ²), or with acosh and √(ζ² − 1) for ζ > 1: without a loss of digits near ζ = 1."""
+    """ζ τₘ = ζ acos(ζ)/√(1 − ζ²), or with acosh and √(ζ² − 1) for ζ > 1, without a loss of digits near 1."""
     half = np.sqrt(0.5 * np.abs(zeta - 1.0))
     under = np.arcsin(np.minimum(half, 1.0)) / np.where(zeta < 1.0, half * np.sqrt(np.abs(1.0 - half * half)), 1.0)
     over = np.arcsinh(half) / np.where(zeta > 1.0, half * np.sqrt(1.0 + half * half), 1.0)
@@ -62,7 +62,7 @@ def force_restitution(zeta: Array | float) -> Array:
 
 
 def approach_restitution(zeta: Array | float) -> Array:
-    """The restitution where the dashpot works on approach only: exp(−ζ acos(ζ)/√(1 − ζ²)), which is yₘ.
+    """The restitution where the dashpot acts on approach only: exp(−ζ acos(ζ)/√(1 − ζ²)), which is yₘ.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def approach_restitution(zeta: Array | float) -> Array:
 
 
 def limited_restitution(zeta: Array | float) -> Array:
-    """The restitution where the dashpot pushes no more than the spring, n = 1, and the contact ends at zero force.
+    """The restitution where the dashpot force is at most that of the spring, n = 1, to zero force.
 
     At first F = 2y: with ω = √2 that is y = sin(ωτ)/ω until y = 2ζ v, at v₁ = 1/√(1 + 8ζ²). From there the motion
     is that of the whole dashpot, which passes y = 2ζ v at τ₁ with tan(ωτ₁) = 2ζω/(1 + 2ζ²), ω = √(1 − ζ²), and
@@ -100,7 +100,7 @@ def _until_spring(zeta: Array) -> Array:
     square = zeta * zeta
     root, slope = np.sqrt(np.abs(zeta - 1.0) * (zeta + 1.0)), 2.0 * zeta / (1.0 + 2.0 * square)
     angle = slope * root
-    # artanh, and where the angle comes near one its logarithm without the difference
+    # artanh; near 1 by its logarithm without the difference 1 − angle
     far = np.log((1.0 + angle) * (1.0 + 2.0 * square) / np.sqrt(1.0 + 8.0 * square))
     over = np.where(angle < 0.5, np.arctanh(np.minimum(angle, 0.5)), far)
     time = np.where(zeta < 1.0, np.arctan(angle), over) / np.where(zeta == 1.0, 1.0, root)
@@ -128,7 +128,7 @@ def force_damping(e: Array | float) -> Array:
 
     With ζ = cos √t, or cosh √−t for ζ > 1, the relation is h(t) = √t cot √t = −ln(e)/2 = L. As a function of t, h
     falls and is concave through t = 0, where h = 1 − t/3 − ..., so that Newton's iteration from beyond the root
-    comes to it from one side; 3(1 − L) is beyond it, and for L > 1 so is 1 − L². Then ζ = L sin(√t)/√t.
+    converges from one side; 3(1 − L) is beyond it, and for L > 1 so is 1 − L². Then ζ = L sin(√t)/√t.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def force_damping(e: Array | float) -> Array:
 
 
 def approach_damping(e: Array | float) -> Array:
-    """The damping ratio ζ that delivers e where the dashpot works on approach only: L = −ln e in `force_damping`.
+    """The damping ratio ζ that delivers e where the dashpot acts on approach only: L = −ln e in `force_damping`.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ def _root_cotangent(t: Array) -> tuple[Array, Array]:
     root = np.sqrt(np.where(t == 0.0, 1.0, np.abs(t)))
     positive = t > 0.0
     tangent = np.where(positive, np.tan(np.where(positive, root, 1.0)), np.tanh(root))
-    # sinh overflows where its square is not wanted any more
+    # limited, since sinh would overflow where 1/sinh² is negligible
     sine = np.where(positive, np.sin(root), np.sinh(np.minimum(root, 300.0)))
     value = np.where(t == 0.0, 1.0, root / tangent)
     slope = np.where(positive, 0.5, -0.5) * (1.0 / (tangent * root) - 1.0 / (sine * sine))

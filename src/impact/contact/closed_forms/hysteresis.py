@@ -11,7 +11,7 @@ from ..powers import Array, integer_power
 SERIES_BELOW_CHI = 0.06
 # likewise of χ − ln(1 + χ)
 WORK_SERIES_BELOW_CHI = 0.01
-# Newton's iterations for e: the start is good to 2 %, the third is exact to rounding
+# Newton's iterations for e: the start is within 2 %, the third iteration is exact to rounding
 RESTITUTION_ITERATIONS = 4
 RESTITUTION_SERIES = (
     1, -2 / 3, 4 / 9, -44 / 135, 104 / 405, -40 / 189, 7648 / 42525, -2848 / 18225, 31712 / 229635,
@@ -26,8 +26,8 @@ DAMPING_SERIES = (
 )  # fmt: skip
 
 
-def _series(coefficients: tuple[float, ...], x: Array) -> Array:
-    """Horner's scheme."""
+def _polynomial(coefficients: tuple[float, ...], x: Array) -> Array:
+    """The polynomial at x, by Horner's scheme; coefficients from the zeroth power on."""
     total = np.zeros_like(x)
     for coefficient in reversed(coefficients):
         total = total * x + coefficient
@@ -35,12 +35,12 @@ def _series(coefficients: tuple[float, ...], x: Array) -> Array:
 
 
 def delivered_restitution(chi: Array | float) -> Array:
-    """The restitution that F = K δⁿ (1 + χ δ̇/v₀) delivers, whatever K, n, m and v₀ are.
+    """The restitution that F = K δⁿ (1 + χ δ̇/v₀) delivers, independent of K, n, m and v₀.
 
     v dv/(1 + χ v/v₀) = −(K/m) δⁿ dδ integrates in closed form; the left side vanishes between v = v₀ and
     v = −e v₀, so that χ (1 + e) = ln[(1 + χ)/(1 − χ e)]. With a = 1 + χ that is e = (1 + W₀(−a exp(−a)))/χ,
-    W₀ the principal Lambert function. In z = χ e and t = χ − ln(1 + χ) it is z = 1 − exp(−z − t), whose digits
-    are kept by Newton's iteration; the right side is concave, so that it comes to the root from one side.
+    W₀ the principal Lambert function. In z = χ e and t = χ − ln(1 + χ) it is z = 1 − exp(−z − t), which
+    Newton's iteration solves without a loss of digits; the right side is concave: it converges from one side.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def delivered_restitution(chi: Array | float) -> Array:
         slope = np.expm1(-(z + t))
         z = z + (z + slope) / slope
     e = np.where(np.isinf(chi), 0.0, z / inner)
-    e[small] = _series(RESTITUTION_SERIES, chi[small])
+    e[small] = _polynomial(RESTITUTION_SERIES, chi[small])
     return e
 
 
@@ -67,7 +67,7 @@ def exact_damping_ratio(e: Array | float) -> Array:
 
     The inverse of `delivered_restitution`. With y = 1 − e χ the relation reads y = (1 + χ) exp(−(1 + e) χ),
     which keeps its digits where y is small; Newton's iteration starts from 3(1 − e)/(2 e^0.89), within 1 % of
-    the root, and is left early by no one, so that a value does not depend on its neighbours.
+    the root; the number of iterations is fixed, so that a value does not depend on the other elements.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def exact_damping_ratio(e: Array | float) -> Array:
         value = inner * chi - 1.0 + (1.0 + chi) * decay
         chi = chi - value / (inner - decay * (inner + (1.0 + inner) * chi))
     chi = np.where(e == 0.0, np.inf, np.where(e > 0.0, chi, np.nan))
-    chi[near_one] = _series(DAMPING_SERIES, 1.0 - e[near_one])
+    chi[near_one] = _polynomial(DAMPING_SERIES, 1.0 - e[near_one])
     return chi
 
 
@@ -94,7 +94,7 @@ def _work_to_peak(chi: Array) -> Array:
     """xₘ^(n+1)/(n+1), the elastic work up to the peak over m v₀²: (χ − ln(1 + χ))/χ²."""
     small = chi < WORK_SERIES_BELOW_CHI
     safe = np.where(small | np.isinf(chi), 1.0, chi)
-    series = _series((1 / 2, -1 / 3, 1 / 4, -1 / 5, 1 / 6, -1 / 7, 1 / 8, -1 / 9), np.where(small, chi, 0.0))
+    series = _polynomial((1 / 2, -1 / 3, 1 / 4, -1 / 5, 1 / 6, -1 / 7, 1 / 8, -1 / 9), np.where(small, chi, 0.0))
     integral = np.where(small, series, (safe - np.log1p(safe)) / integer_power(safe, 2))
     return np.where(np.isinf(chi), 0.0, integral)
 
@@ -113,7 +113,7 @@ def damped_peak_indentation(chi: Array, n: float) -> Array:
 def approach_damped_restitution(chi: Array | float) -> Array:
     """The restitution delivered where F = K δⁿ (1 + χ δ̇/v₀) on approach only, and F = K δⁿ on restitution.
 
-    All elastic work up to the peak is given back: e²/2 = xₘ^(n+1)/(n+1), so that e = √(2(χ − ln(1 + χ)))/χ.
+    All elastic work up to the peak is returned: e²/2 = xₘ^(n+1)/(n+1), so that e = √(2(χ − ln(1 + χ)))/χ.
 
     Parameters
     ----------

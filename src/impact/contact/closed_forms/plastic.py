@@ -1,4 +1,4 @@
-"""Closed forms of elastic-plastic laws: the energy that the restitution gives back over that of the approach."""
+"""Closed forms of elastic-plastic laws: the returned energy over that of the approach."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def luding_restitution(size: Array | float, k2: Array, kc: Array, shallow: Array
     """The restitution of Luding's law without a dashpot; 0 where the adhesion holds the balls.
 
     With K = 1 the approach stores size²/2 = δₘ²/2 up to the plastic depth δ*, beyond it δ*²/2 + δ* y + k₂ y²/2,
-    y = δₘ − δ*. The way back along k gives Fₘ²/(2k) down to F = 0 at δ₀, and from there the adhesion takes the
+    y = δₘ − δ*. The unloading along k returns Fₘ²/(2k) down to F = 0 at δ₀, and from there the adhesion takes the
     triangle k k_c δ₀²/(2(k + k_c)).
 
     Parameters
@@ -46,7 +46,7 @@ def luding_restitution(size: Array | float, k2: Array, kc: Array, shallow: Array
         depth = np.divide(1.0, shallow)
     yields = depth < size
     depth = np.where(yields, depth, 0.0)
-    # δ* y + k₂ y²/2 is the energy beyond δ*, by the root that keeps its digits
+    # y from the energy beyond δ*, δ* y + k₂ y²/2, by the form of the root without cancellation
     beyond = (size - depth) * (size + depth)
     y = beyond / (depth + np.sqrt(depth * depth + k2 * beyond))
     peak, force = np.where(yields, depth + y, size), np.where(yields, depth + k2 * y, size)
@@ -57,7 +57,7 @@ def luding_restitution(size: Array | float, k2: Array, kc: Array, shallow: Array
 
 
 def muthukumar_restitution(root: Array | float, K1: Array, K2: Array, depth: Array) -> Array:
-    """The restitution of a bilinear loading, K₁ to a depth and then K₂, that goes back along K₁ to the line K₂ δ.
+    """The restitution of a bilinear loading, K₁ to a depth and then K₂, unloaded along K₁ to the line K₂ δ.
 
     The approach takes K₂ δₘ²/2 and, of the difference K₁ − K₂, depth²/2 + depth (δₘ − depth); what K₁ − K₂ gives
     back is the triangle of height (K₁ − K₂) depth on K₁'s way to the line, (K₁ − K₂) depth²/2. So δₘ follows from
@@ -67,13 +67,13 @@ def muthukumar_restitution(root: Array | float, K1: Array, K2: Array, depth: Arr
     ----------
     root : v₀ √m, any shape
     K1, K2 : stiffnesses
-    depth : where the loading goes over from the one to the other
+    depth : indentation at which the stiffness of the loading changes
 
     >>> muthukumar_restitution(np.array([0.1, 10.0]), np.array(2.0), np.array(1.0), np.array(1.0)).round(6)
     array([1.      , 0.915429])
     """
     more = K1 - K2
     beyond = root * root - K1 * depth * depth
-    # K₁ depth y + K₂ y²/2 is half of what is beyond
+    # y = δₘ − depth from K₁ depth y + K₂ y²/2 = beyond/2
     y = np.maximum(beyond, 0.0) / (K1 * depth + np.sqrt(K1 * K1 * depth * depth + K2 * np.maximum(beyond, 0.0)))
     return np.asarray(np.sqrt(1.0 - 2.0 * more * depth * y / (root * root)))

@@ -1,4 +1,4 @@
-"""The restitution of viscoelastic spheres that part at zero force, by its Padé form, and the inverse."""
+"""The restitution of viscoelastic spheres that separate at zero force, by its Padé form, and the inverse."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def pade_restitution(g: Array | float) -> Array:
 
 
 def pade_damping(e: Array | float) -> Array:
-    """The g for which `pade_restitution` is e, by halving.
+    """The g for which `pade_restitution` is e, by bisection.
 
     Parameters
     ----------

@@ -36,7 +36,7 @@ JKR_1971 = ForceModel(
     # with y = √a: δ = y⁴/R* − b y and F = E* (4y⁶/(3R*) − 2b y³)
     force=lambda x, E, R_eff, b: jkr_force(x, E, R_eff, b),
     unloading=lambda x, E, R_eff, b: jkr_force(x, E, R_eff, b),
-    # the neck lengthens to here, where δ as a function of y is least
+    # the pull-off, where δ as a function of y is least
     residual=lambda R_eff, b: -0.75 * b * np.cbrt(0.25 * b * R_eff),
     oracle=lambda m, v0, E, R_eff, b: jkr_restitution(m * v0 * v0, E, R_eff, b),
     exponent=1.5,
@@ -45,7 +45,7 @@ JKR_1971 = ForceModel(
 
 
 def jkr_force(x: Array, E: Array, R_eff: Array, b: Array) -> Array:
-    """The force at an indentation, negative where the neck pulls."""
+    """The force at an indentation x, negative where the neck pulls; any shape."""
     y = jkr_root(x, R_eff, b)
     cube = integer_power(y, 3)
     return np.asarray(E * cube * (4 / 3 * cube / R_eff - 2 * b))
@@ -77,7 +77,7 @@ LIGGGHTS_EDINBURGH = ForceModel(
     unloading=lambda x, peak, K, n, k2, gamma, adhesion_exponent, R1, R2: np.maximum(
         *edinburgh_branches(x, peak, K, n, k2, gamma, adhesion_exponent, R1, R2)
     ),
-    # where nothing pulls, the balls part at δₚ
+    # without adhesion the balls separate at δₚ
     residual=lambda peak, n, k2, gamma: np.where(gamma > 0, 0.0, peak * np.power(1 - 1 / k2, 1 / n)),
     unloading_breakpoints=(
         lambda x, peak, K, n, k2, gamma, adhesion_exponent, R1, R2: np.where(
@@ -97,6 +97,6 @@ LIGGGHTS_EDINBURGH = ForceModel(
 def edinburgh_branches(
     x: Array, peak: Array, K: Array, n: float, k2: Array, gamma: Array, exponent: Array, R1: Array, R2: Array
 ) -> tuple[Array, Array]:
-    """The elastic and the adhesive branch of the way back, of which the larger holds."""
+    """The elastic and the adhesive branch of the unloading, whose larger value is the force; any shape."""
     adhesion = edinburgh_adhesion(peak, K, n, k2, gamma, exponent, R1, R2)
     return K * k2 * (power(x, n) - (1 - 1 / k2) * power(peak, n)), -adhesion * np.power(x, exponent)

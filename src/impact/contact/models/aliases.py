@@ -1,4 +1,4 @@
-"""Names under which a law of the catalogue was published again: selectable, the same law to the bit."""
+"""Names under which a law of the catalogue was published again; their results are equal bit for bit."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ def same_law(
 
     Parameters
     ----------
-    law : of the catalogue
-    key, title, year, reference, evidence, doi : of the other publication; its domain is not known
+    law : law of the catalogue
+    key, title, year, reference, evidence, doi : fields of the other publication, whose domain is not known
     """
     return replace(
         law, key=key, title=title, year=year, reference=reference, doi=doi, evidence=evidence, domain={},

@@ -1,4 +1,4 @@
-"""Laws that have another force on restitution than on approach, and no permanent indentation."""
+"""Laws with different forces on approach and on restitution, without a permanent indentation."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .sources import DYS, OPENSEES_JANKOWSKI, RAILWAY
 
 
 def approach_dashpot(key: str, *, zeta: Formula, **about: Unpack[About]) -> ForceModel:
-    """A spring with a dashpot that works on approach only, from the formula of its damping ratio.
+    """A law of a spring and a dashpot that acts on approach only, from the formula of its damping ratio.
 
     Parameters
     ----------

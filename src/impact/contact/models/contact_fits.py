@@ -14,7 +14,7 @@ from .sources import IMPACT_MATERIAL
 
 
 def softer_poisson_ratio(nu1: Array, nu2: Array, Y1: Array, Y2: Array) -> Array:
-    """Poisson's ratio of the ball that yields; of two equally strong ones that at which they yield first."""
+    """Poisson's ratio of the ball that yields; of two equally strong balls that of the one that yields first."""
     return np.where(Y1 < Y2, nu1, np.where(Y1 > Y2, nu2, np.minimum(nu1, nu2)))
 
 
@@ -60,15 +60,15 @@ JACKSON_GREEN_2010 = ForceModel(
 
 
 def jackson_green(w: Array, slope: Array, C: Array, B: Array) -> Array:
-    """F/F_c beyond w = 1.9; `slope` is δ/R, and H falls with the contact radius a, a² = R δ (w/1.9)^B."""
+    """F/F_c beyond w = 1.9, with slope = δ/R; H falls with the contact radius a, a² = R δ (w/1.9)^B."""
     ratio = np.sqrt(slope * np.exp(B * np.log(w / 1.9)))
     hardness = 2.84 - 0.92 * (1 - np.cos(np.pi * ratio))
     plastic = 4 * hardness / C * (1 - np.exp(-np.power(w, 5 / 9) / 25)) * w
     return np.asarray(np.exp(-np.power(w, 5 / 12) / 4) * power(w, 1.5) + plastic)
 
 
-# where the second branch of Kogut and Etsion comes down to the elastic one
-KOGUT_ETSION_YIELD = 1.03 ** (1 / 0.075)
+# w = δ/δ_c at which the second branch of Kogut and Etsion meets the elastic one
+KOGUT_ETSION_MEET = 1.03 ** (1 / 0.075)
 
 KOGUT_ETSION_2005 = ForceModel(
     key="kogut-etsion-2005",
@@ -96,9 +96,11 @@ KOGUT_ETSION_2005 = ForceModel(
         "dc": lambda E, R_eff, Y_min, nu: np.square(np.pi * (0.454 + 0.41 * nu) * 2.8 * Y_min / (2 * E)) * R_eff,
         "Fc": lambda K, dc: K * power(dc, 1.5),
     },
-    breakpoints=(lambda dc: KOGUT_ETSION_YIELD * dc, lambda dc: 6 * dc),
+    breakpoints=(lambda dc: KOGUT_ETSION_MEET * dc, lambda dc: 6 * dc),
     force=lambda elastic, x, dc, Fc: np.where(
-        x < KOGUT_ETSION_YIELD * dc, elastic, Fc * kogut_etsion(np.maximum(x / dc, KOGUT_ETSION_YIELD))
+        x < KOGUT_ETSION_MEET * dc,
+        elastic,
+        Fc * kogut_etsion(np.maximum(x / dc, KOGUT_ETSION_MEET)),
     ),
     unloading=lambda x, peak, residual, force_at_peak, dc: (
         force_at_peak
@@ -119,7 +121,7 @@ def kogut_etsion(w: Array) -> Array:
 
 
 def kogut_etsion_residual(w: Array) -> Array:
-    """δₚ/δₘ."""
+    """δₚ/δₘ [-] at the peak w = δₘ/δ_c."""
     return np.asarray((1 - np.power(w, -0.28)) * (1 - np.power(w, -0.69)))
 
 

@@ -1,7 +1,7 @@
 """Springs with a dashpot of constant damping ratio, F = K δⁿ + α √(m K) δ^((n−1)/2) δ̇: e does not depend on speed.
 
-Such a force pulls before the balls part, so that where the contact ends is part of the law: at zero indentation
-("gap") or, without tension, at zero force ("force").
+Such a force pulls before the balls separate, so that the end of the contact is part of the law: zero indentation
+("gap") or, without tension, zero force ("force").
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ..model import About, ForceModel, Parameter
 from ..powers import Array, power
 from .sources import CHRONO, DEMLAB_VISCOELASTIC, LIGGGHTS, MAPLESIM_HELP, YADE_2025, YADE_BIBLIOGRAPHY
 
-# by where the contact ends
+# closed forms of the restitution, by where the contact ends
 DELIVERED_RESTITUTION: dict[str, Formula] = {
     "gap": lambda zeta: gap_restitution(zeta),
     "force": lambda zeta: force_restitution(zeta),
@@ -27,12 +27,12 @@ DELIVERED_RESTITUTION: dict[str, Formula] = {
 
 
 def dashpot(key: str, *, zeta: Formula, release: Literal["gap", "force"], **about: Unpack[About]) -> ForceModel:
-    """A spring and dashpot, from the formula of its damping ratio ζ = α/√(2(n+1)).
+    """A law of a spring and a dashpot, from the formula of its damping ratio ζ = α/√(2(n+1)).
 
     Parameters
     ----------
     key, about : see `ForceModel`
-    zeta : ζ [-] as a function of what it asks for by name, such as `lambda e: gap_damping(e)`
+    zeta : formula of ζ [-], such as `lambda e: gap_damping(e)`
     release : where the contact ends
 
     >>> law = dashpot("mine", title="Mine", year=2026, equation="ζ = 1 − e", reference="", zeta=lambda e: 1 - e,
@@ -52,7 +52,7 @@ def dashpot(key: str, *, zeta: Formula, release: Literal["gap", "force"], **abou
         release=release,
         velocity_coordinate="force",
         oracle=DELIVERED_RESTITUTION[release],
-        # with n = 3/2 the dashpot goes as the fourth root of the indentation
+        # with n = 3/2 the dashpot is proportional to the fourth root of the indentation
         coordinate_power=2 if about.get("exponent") == 1.0 else 4,
         family="dashpot",
     )
@@ -229,7 +229,7 @@ THORNTON_CUMMINS_CLEARY_2013 = dashpot(
 
 
 def thornton_zeta(e: Array) -> Array:
-    """ζ of Thornton, Cummins and Cleary: their β is √(5/6) times it, since 2 β √(3/2) is α."""
+    """ζ [-] of Thornton, Cummins and Cleary, whose β is √(5/6) ζ, since α = 2 β √(3/2); e of any shape."""
     exponent = np.zeros_like(e)
     for h in reversed(THORNTON_POLYNOMIAL):
         exponent = e * (h + exponent)

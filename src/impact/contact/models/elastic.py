@@ -1,4 +1,4 @@
-"""Elastic contact: equation (10), the undamped end of every other law."""
+"""Elastic contact: equation (10), the limit of the other laws without damping."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Elastic-plastic laws: a yield on approach, an elastic recovery on restitution; the restitution falls with speed.
+"""Elastic-plastic laws: yielding on approach, elastic recovery on restitution; the restitution falls with speed.
 
-A yield strength is that of the softer ball. E* is that of equation (12) for the stiffness K, 3 K/(4 √R*), so that
-it follows a K that is given.
+The yield strength is that of the softer ball. E* is computed from the stiffness K by equation (12), 3 K/(4 √R*),
+so that it agrees with a K set by the user.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from ..model import ForceModel, Parameter
 from ..powers import Array, power
 from .sources import DEMLAB_PLASTIC, YADE_BIBLIOGRAPHY
 
-# E* of the laws that are written in it
+# formula of E* for the laws that use it
 E_OF_K: Formula = lambda K, R_eff: 0.75 * K / np.sqrt(R_eff)  # noqa: E731
 
 
 def yield_indentation(E: Array, R_eff: Array, pressure: Array) -> Array:
-    """Where the largest pressure of a Hertz contact, (2E*/π) √(δ/R*), comes to one that the material yields at."""
+    """Indentation at which the largest pressure of a Hertz contact, (2E*/π) √(δ/R*), reaches a pressure."""
     root = np.pi * pressure / (2 * E)
     return root * root * R_eff
 
@@ -69,14 +69,14 @@ LUDING_2008 = ForceModel(
         Parameter("kc", "1", "adhesive stiffness k_c over K", default=0.0, least=0.0),
         Parameter("phi", "1", "plasticity depth φ", default=0.05, least=1e-6, most=10.0),
     ),
-    # 1/δ*, which is zero where nothing yields
+    # 1/δ*, zero where nothing yields
     coefficients={"shallow": lambda k2, R_eff, phi: (k2 - 1) / (k2 * phi * 2 * R_eff)},
     breakpoints=(lambda shallow: np.divide(1, shallow),),
     force=lambda x, K, k2, shallow: K * (x + (k2 - 1) * np.maximum(x - np.divide(1, shallow), 0)),
     unloading=lambda x, peak, force_at_peak, K, k2, kc, shallow: np.maximum(
         force_at_peak - K * unloading_ratio(peak, k2, shallow) * (peak - x), -kc * K * x
     ),
-    # where nothing pulls, the balls part at δ₀
+    # without adhesion the balls separate at δ₀
     residual=lambda peak, force_at_peak, K, k2, kc, shallow: np.where(
         kc > 0, 0, peak - force_at_peak / (K * unloading_ratio(peak, k2, shallow))
     ),
@@ -132,7 +132,7 @@ THORNTON_1997 = ForceModel(
 
 
 def thornton_radius(force_at_peak: Array, E: Array, py: Array, Fy: Array) -> Array:
-    """The radius of curvature that the plastic flow has left."""
+    """The radius of curvature Rₚ after the plastic flow."""
     return 4 * E / (3 * force_at_peak) * power((2 * force_at_peak + Fy) / (2 * np.pi * py), 1.5)
 
 
@@ -158,7 +158,7 @@ JOHNSON_1985 = ForceModel(
     },
     force=lambda elastic, x, R_eff, pd, yields: np.where(yields > 0, 2 * np.pi * R_eff * pd * x, elastic),
     unloading=returning,
-    # too slow an impact is not fully plastic: it would recover more than it went in
+    # a slow impact is not fully plastic: it would recover more than the peak indentation
     residual=lambda peak, force_at_peak, R_eff, E, yields: (
         yields * (peak - np.minimum(0.75 * force_at_peak / (np.sqrt(2 * R_eff * peak) * E), peak))
     ),

@@ -16,12 +16,12 @@ from .sources import DYS, GHARIB_HURMUZLU, MBDYN, MBDYN_BIBLIOGRAPHY, OPENSEES_H
 
 
 def hysteresis(key: str, *, chi: Formula, **about: Unpack[About]) -> ForceModel:
-    """A member of the hysteresis family, from the formula of its damping ratio χ = λ v₀/K.
+    """A law of the hysteresis family, from the formula of its damping ratio χ = λ v₀/K.
 
     Parameters
     ----------
     key, about : see `ForceModel`
-    chi : χ [-] as a function of what it asks for by name, such as `lambda e: 1 / e`
+    chi : formula of χ [-], such as `lambda e: 1 / e`
 
     >>> law = hysteresis("mine", title="Mine", year=2026, equation="χ = 1 − e", reference="", chi=lambda e: 1 - e)
     >>> law.force(elastic=1.0, v=0.5, v0=1.0, chi=1.0)

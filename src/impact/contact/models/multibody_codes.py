@@ -1,6 +1,6 @@
 """Laws of multibody and robotics codes, in the parameters that those codes use.
 
-Where no K is given it is that of equation (12), or by the code's own rule.
+Where the user sets no K it is that of equation (12), or follows the code's own rule.
 """
 
 from __future__ import annotations
@@ -23,23 +23,23 @@ LINEAR_DAMPING = "F = K δⁿ (1 + χ δ̇/v₀)"
 
 
 def of_code(law: ForceModel, stiffness: Formula | None = None) -> ForceModel:
-    """A law of some form as that of a code, with its rule for K."""
+    """A law in the family "codes", with the code's rule for K."""
     return replace(law, family="codes", stiffness=stiffness)
 
 
 def springs_in_series(a: Array, b: Array) -> Array:
-    """Two springs, one behind the other."""
+    """Stiffness of two springs in series."""
     return a * b / (a + b)
 
 
 def smooth_step(t: Array) -> Array:
-    """The cubic from 0 at 0 to 1 at 1, level at both."""
+    """The cubic from 0 at t = 0 to 1 at t = 1, with zero slope at both; 1 beyond."""
     t = np.minimum(t, 1.0)
     return t * t * (3.0 - 2.0 * t)
 
 
 def flores_chi(e: Array) -> Array:
-    """χ of Flores and others (2011)."""
+    """χ [-] of Flores and others (2011), 8(1 − e)/(5e)."""
     return np.asarray(np.divide(8.0 * (1.0 - e), 5.0 * e))
 
 
@@ -59,9 +59,9 @@ ADAMS_IMPACT = ForceModel(
         Parameter("c", "N s/m", "largest damping", least=0.0),
         Parameter("d", "m", "penetration at which the damping is full", least=1e-9),
     ),
-    # below n = 2 the spring outlasts the damping as the gap closes, and pushes once more after the force was zero
+    # below n = 2 the damping vanishes faster than the spring as δ goes to zero, which then pushes once more
     force=lambda elastic, x, v, c, d: np.maximum(elastic + c * smooth_step(x / d) * v, 0),
-    # where the force begins or ceases to be zero; over the spring, so that it does not fade with the indentation
+    # the second one is where the force becomes zero or positive; it is divided by the spring force to stay finite
     breakpoints=(lambda d: d, lambda elastic, x, v, c, d: 1 + c * smooth_step(x / d) * v / elastic),
     family="codes",
 )
@@ -108,13 +108,13 @@ RECURDYN_EXPONENTS = ForceModel(
 
 
 def simbody_stiffness(E1: Array, E2: Array, nu1: Array, nu2: Array, R_eff: Array) -> Array:
-    """K of Simbody, which mixes the plane strain moduli by their powers 2/3."""
+    """K of Simbody, which combines the plane strain moduli by their powers 2/3."""
     k1, k2 = power(E1 / (1 - nu1 * nu1), 2 / 3), power(E2 / (1 - nu2 * nu2), 2 / 3)
     return 4 / 3 * np.sqrt(R_eff) * springs_in_series(k1, k2) ** 1.5
 
 
 def simbody_dissipation(c1: Array, c2: Array, E1: Array, E2: Array, nu1: Array, nu2: Array) -> Array:
-    """The dissipation of a pair: that of a body weighs as much as the stiffness of the other."""
+    """The dissipation of a pair: that of each body is weighted by the stiffness of the other."""
     k1, k2 = power(E1 / (1 - nu1 * nu1), 2 / 3), power(E2 / (1 - nu2 * nu2), 2 / 3)
     return (c1 * k2 + c2 * k1) / (k1 + k2)
 
@@ -310,7 +310,7 @@ MODIA3D_EXPONENTIAL = of_code(
 
 
 def modia3d_regularized_speed(v0: Array, vs: Array) -> Array:
-    """The speed that Modia3D divides by, which does not fall below v_s/3."""
+    """The speed [m/s] that Modia3D divides by, which is at least v_s/3."""
     return np.where(v0 >= vs, v0, v0 * (v0 / vs) * (1 - v0 / (3 * vs)) + vs / 3)
 
 
@@ -355,7 +355,7 @@ MUJOCO_SOLREF = ForceModel(
         Parameter("timeconst", "s", "time constant τ", default=0.02, least=1e-9),
         Parameter("dampratio", "1", "damping ratio ζ", default=1.0, least=1e-3),
     ),
-    # a spring of its own: a K that is given sets no more than the units
+    # the spring does not depend on K: a K set by the user only changes the contact's own units
     stiffness=lambda m, timeconst, dampratio: m / (timeconst * timeconst * dampratio * dampratio),
     force=lambda x, v, m, timeconst, dampratio: (
         m * (x / (timeconst * timeconst * dampratio * dampratio) + 2.0 * v / timeconst)
@@ -410,7 +410,7 @@ SIMSCAPE_CONTACT = ForceModel(
 
 
 def in_mbdyn(law: ForceModel, key: str, formulation: str) -> ForceModel:
-    """A law under the name that MBDyn has for it."""
+    """A law of the catalogue under its name in MBDyn."""
     return of_code(
         same_law(
             law,

@@ -25,7 +25,7 @@ LANKARANI_NIKRAVESH_1994 = ForceModel(
     ),
     force=spring,
     unloading=returning,
-    # (32), by (31) and fₘ = K δₘⁿ the same as δₘ (1 − e²), which holds for the peak that the integration found
+    # equation (32) is δₘ (1 − e²) by (31) and fₘ = K δₘⁿ, for the integrated peak
     recovered=lambda e, peak: peak * (e * e),
     oracle=lambda e: e,
     family="permanent",

@@ -1,4 +1,4 @@
-"""Springs with a damping that goes as another power of the indentation: the restitution depends on the speed."""
+"""Springs with a damping proportional to another power of the indentation: the restitution depends on speed."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ def drag(
     coordinate_power: int = 2,
     **about: Unpack[About],
 ) -> ForceModel:
-    """A spring and a damping of its own power, F = K δⁿ + c δ^q δ̇.
+    """A law of the form F = K δⁿ + c δ^q δ̇.
 
     Parameters
     ----------
     key, coordinate_power, about : see `ForceModel`
-    c : the damping coefficient as a function of what it asks for by name
+    c : formula of the damping coefficient, such as `lambda gamma, m: gamma * m`
     q : exponent of the indentation in the damping
     release : where the contact ends
     """

@@ -1,4 +1,4 @@
-"""Public sources that several laws were read in, with the commit or date of what was read."""
+"""Public sources of several laws, with the commit or date of the version that was read."""
 
 GHARIB_HURMUZLU = "Gharib and Hurmuzlu (2012)"
 DYS = "ladisk/DyS, MBD_system/contact_model/contact_model.py @5e6a54d (2018)"
