@@ -26,13 +26,13 @@ from impact.results.seal import write_seal
 SECRET = b"the secret 1234567"
 UTF8 = h5py.string_dtype()
 HERE = "not stored in this file, in one piece or in chunks of one size"
-MUCH = "more data than such a file may hold"
-KIND = "neither numbers nor labels"
-HOLDS = "declares what the file does not hold"
-NO_SEAL = "does not begin as a sealed file of impact does"
-CHUNK = "a chunk of another size than its own"
+MUCH = "declares more data than a file of this size may hold"
+KIND = "expected numbers or labels"
+HOLDS = "declares data that the file does not hold"
+NO_SEAL = "does not begin with the header of a sealed file"
+CHUNK = "a chunk of unexpected size"
 AXES = "its axes are not those of the file"
-ODD = "an attribute of an unusual kind or size"
+ODD = "an attribute of unexpected type or size"
 Make = Callable[[Path], object]
 Change = Callable[[h5py.File], object]
 
@@ -222,11 +222,11 @@ CHANGES: dict[str, tuple[Change, str]] = {
     "schema of text": (lambda f: _set(f, "", "schema_version", "1"), "not a number"),
     "schema of two": (lambda f: _set(f, "", "schema_version", [1, 1]), "not a number"),
     "schema of a million": (lambda f: _set(f, "", "schema_version", np.ones(8000, int)), "not a number"),
-    "external link": (_link_to_hdf5, "a link to somewhere else"),
-    "external link to text": (_link_to_text, "a link to somewhere else"),
-    "soft link": (_soft_link, "a link to somewhere else"),
-    "dangling link": (lambda f: f.__setitem__("other", h5py.SoftLink("/nowhere")), "a link to somewhere else"),
-    "second name": (lambda f: f.__setitem__("other", f["v1_post"]), "a dataset of two names"),
+    "external link": (_link_to_hdf5, "not a hard link"),
+    "external link to text": (_link_to_text, "not a hard link"),
+    "soft link": (_soft_link, "not a hard link"),
+    "dangling link": (lambda f: f.__setitem__("other", h5py.SoftLink("/nowhere")), "not a hard link"),
+    "second name": (lambda f: f.__setitem__("other", f["v1_post"]), "a dataset with two names"),
     "a group": (lambda f: f.create_group("other"), "not a dataset"),
     "3,000 groups": (_nested, "not a dataset"),
     "a type": (lambda f: f.__setitem__("other", np.dtype("f8")), "not a dataset"),
@@ -386,7 +386,7 @@ def _put(file: h5py.File, name: str, place: int, value: float) -> None:
 
 
 FIT = "its laws do not fit its table"
-JSON = "no JSON of the right kind"
+JSON = "not JSON of the expected type"
 LAWS = "laws: not those of its models"
 GRID = "axes: not those of its grid"
 WITNESSES = "its witnesses expand to other numbers"
@@ -421,9 +421,9 @@ FACTORED: dict[str, tuple[Change, str]] = {
     "an axis less": (lambda f: _json(f, "axes", lambda axes: axes[:1]), "does not lie along one axis"),
     "axes in another order": (lambda f: _json(f, "axes", lambda axes: axes[::-1]), WITNESSES),
     "axes without an end": (lambda f: _set(f, "", "axes", np.bytes_(b"[" * 100_000)), JSON),
-    "materials in a list": (lambda f: _set(f, "", "materials", np.bytes_(b"[]")), "materials: no JSON"),
+    "materials in a list": (lambda f: _set(f, "", "materials", np.bytes_(b"[]")), "materials: not JSON"),
     "no materials": (lambda f: _set(f, "", "materials", np.bytes_(b"{}")), "not a readable result"),
-    "a material of text": (lambda f: _set(f, "", "materials", np.bytes_(b'{"a": "x"}')), "materials: no JSON"),
+    "a material of text": (lambda f: _set(f, "", "materials", np.bytes_(b'{"a": "x"}')), "materials: not JSON"),
     "a trajectory that is not there": (partial(_put, name="trajectory_of_cell", place=5, value=3), FIT),
     "a trajectory before the first": (partial(_put, name="trajectory_of_cell", place=5, value=-1), FIT),
     "trajectories in fractions": (
@@ -435,7 +435,7 @@ FACTORED: dict[str, tuple[Change, str]] = {
     "an unknown status": (partial(_put, name="trajectory_status", place=5, value=99), FIT),
     "a status of its own kind": (
         lambda f: anew(f, "trajectory_status", data=f["trajectory_status"][()].astype("i2")), FIT),
-    "witnesses elsewhere": (partial(_put, name="witness_index", place=5, value=4), "its witnesses are not spread"),
+    "witnesses elsewhere": (partial(_put, name="witness_index", place=5, value=4), "its witnesses are not at"),
     "no index of witnesses": (lambda f: f.__delitem__("witness_index"), "not a readable result"),
     "no witnesses": (
         lambda f: [f.__delitem__(name) for name in list(f) if name.startswith("witness_")], "not a readable"),

@@ -99,7 +99,7 @@ def test_an_output_is_never_its_own_source(cli: Run, small: Path, tmp_path: Path
     for words in (["sweep", small, "-o", small], ["run", small, "--history", small]):
         refused = cli(*words, "--overwrite", cwd=tmp_path)
         assert (refused.returncode, len(refused.stderr.splitlines())) == (2, 1)
-        assert "is what is read from" in refused.stderr
+        assert "is the file to be read" in refused.stderr
     assert small.read_text(encoding="utf-8") == SMALL
 
 
@@ -506,7 +506,7 @@ def test_a_picture_never_replaces_its_result(cli: Run, stored: Path, tmp_path: P
     result = tmp_path / "result.png"
     result.write_bytes(stored.read_bytes())
     refused = cli("plot", result)
-    assert (refused.returncode, "is what is read from" in refused.stderr) == (2, True)
+    assert (refused.returncode, "is the file to be read" in refused.stderr) == (2, True)
     assert result.read_bytes() == stored.read_bytes()
 
 

@@ -519,14 +519,15 @@ def test_the_tolerance_is_the_one_asked_for_else_the_baselines_else_the_solvers(
 
 
 @pytest.mark.parametrize(("tol", "told"), [
-    (-1.0, "--tol -1.0: wants a number from 0 up"), (math.nan, "--tol nan: wants a number from 0 up"),
-    (math.inf, "--tol inf: wants a number from 0 up"), (True, "--tol True: wants a number from 0 up"),
-    ("1e-8", "--tol 1e-8: wants a number from 0 up"), ({"e_out": "1e-8"}, "--tol e_out=1e-8: wants a number"),
-    ({"e_out": -1e-8}, "--tol e_out=-1e-08: wants a number"), ({"e_out": None}, "--tol e_out=None: wants"),
-    ({"e_oot": 1e-8}, '--tol e_oot: no variable of a result; did you mean "e_out"?'),
-    ({"status": 1e-8}, "--tol status: has none, it is judged exactly"),
-    ({"steps": 1}, "--tol steps: has none, it is not judged"),
-    ({"\x1b[31m": 1e-8}, r"--tol \x1b[31m: no variable of a result; known: "), ({3: 1e-8}, "--tol 3: no variable"),
+    (-1.0, "--tol -1.0: expected a number >= 0"), (math.nan, "--tol nan: expected a number >= 0"),
+    (math.inf, "--tol inf: expected a number >= 0"), (True, "--tol True: expected a number >= 0"),
+    ("1e-8", "--tol 1e-8: expected a number >= 0"), ({"e_out": "1e-8"}, "--tol e_out=1e-8: expected a number"),
+    ({"e_out": -1e-8}, "--tol e_out=-1e-08: expected a number"), ({"e_out": None}, "--tol e_out=None: expected"),
+    ({"e_oot": 1e-8}, '--tol e_oot: not a variable of a result; did you mean "e_out"?'),
+    ({"status": 1e-8}, "--tol status: has no tolerance, it is judged exactly"),
+    ({"steps": 1}, "--tol steps: has no tolerance, it is not judged"),
+    ({"\x1b[31m": 1e-8}, r"--tol \x1b[31m: not a variable of a result; known: "),
+    ({3: 1e-8}, "--tol 3: not a variable"),
 ])  # fmt: skip
 def test_a_wrong_tolerance_is_one_clear_line(figure6: xr.Dataset, tol: Any, told: str) -> None:
     with pytest.raises(UsageError) as raised:
@@ -750,7 +751,7 @@ def test_without_a_file_there_is_no_command(figure6: xr.Dataset, stored: Path) -
 def test_points_of_the_same_labels_are_refused(figure6: xr.Dataset) -> None:
     twice = xr.concat([figure6, figure6.isel(e=[1])], "e", data_vars="minimal")
     for pair in ((twice, figure6), (figure6, twice), (twice, twice)):
-        with pytest.raises(UsageError, match="two points of the same labels"):
+        with pytest.raises(UsageError, match="two points with the same labels"):
             impact.compare(*pair, subset=True)
 
 

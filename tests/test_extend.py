@@ -121,8 +121,8 @@ def test_an_extension_replaces_the_result_and_can_be_extended_again(cli, tmp_pat
     [
         ("sweep.K=2e9", "--set changes K, expected more values of an axis"),
         ("solver.rtol=1e-6", "--set changes solver, expected more values of an axis"),
-        ("sweep.e=[0.3, 0.6]", "has all of that already"),
-        ("sweep.n=1.5", "has all of that already"),
+        ("sweep.e=[0.3, 0.6]", "already has all of these"),
+        ("sweep.n=1.5", "already has all of these"),
         ("sweep.m2=[]", "sweep.m2"),
         ("sweep.zip=[['e', 'v1']]", "vary together now and did not before"),
     ],
@@ -143,7 +143,7 @@ def test_a_part_of_a_result_and_a_history_are_not_extended(cli, tmp_path):
     config, path = tmp_path / "base.toml", tmp_path / "r.h5"
     config.write_text(BASE)
     impact.save(sweep(cli, config, path).isel(e=[0]), tmp_path / "part.h5")
-    with pytest.raises(UsageError, match="is a part of the result of its config, expected the whole"):
+    with pytest.raises(UsageError, match="got a part of the result of its config, expected the whole"):
         impact.extend(tmp_path / "part.h5", ["sweep.m2=[3.0]"])
     impact.save(impact.run(at={"e": 0.5}).history, tmp_path / "history.h5")
     with pytest.raises(UsageError, match="time history"):
@@ -178,7 +178,7 @@ def test_expand_refuses_what_is_too_much_or_in_the_way(cli, tmp_path):
     sweep(cli, config, path)
     for words, expected in (
         (["-o", tmp_path / "x.h5", "--max-points", "7"], "got 8 points, expected at most 7 (--max-points)"),
-        (["-o", path, "--overwrite"], "is what is read from"),
+        (["-o", path, "--overwrite"], "is the file to be read"),
         (["-o", tmp_path / "base.toml"], "exists; give another name"),
         (["-o", tmp_path / "x.h5", "--sel", "v1=9"], "no v1 = 9.0 in this result"),
         (["-o", tmp_path / "x.h5", "--model", "bilinear"], 'no model "bilinear" in this result'),

@@ -17,7 +17,7 @@ from impact.results import backend
 
 Change = Callable[[xr.Dataset], xr.Dataset]
 DEEP = "[" * 100_000
-KIND = "neither numbers nor labels"
+KIND = "expected numbers or labels"
 
 
 def _attribute(name: str, **attributes: object) -> Change:
@@ -25,34 +25,34 @@ def _attribute(name: str, **attributes: object) -> Change:
 
 
 RESULTS: dict[str, tuple[Change, str]] = {
-    "unknown axis": (lambda r: r.rename(e="twice"), "twice: no name of a result"),
+    "unknown axis": (lambda r: r.rename(e="twice"), "twice: not a variable of a result"),
     "bare axis": (lambda r: r.drop_vars("e"), "its axis e has no values"),
     "nothing": (lambda r: r.isel(e=slice(0, 0)), "its axis e has no values"),
     "axis of text": (lambda r: r.assign_coords(e=r["e"].astype(str)), f"e: {KIND}"),
     "numbers of text": (lambda r: r.assign(e_out=r["e_out"].astype(str)), f"e_out: {KIND}"),
     "truths": (lambda r: r.assign(e_out=r["e_out"] > 0.5), f"e_out: {KIND}"),
     "models of numbers": (lambda r: r.assign_coords(model=[1.0, 2.0, 3.0]), f"model: {KIND}"),
-    "unit of numbers": (_attribute("e_out", units=5), "e_out: units or long_name that are no text"),
+    "unit of numbers": (_attribute("e_out", units=5), "e_out: units or long_name is not text"),
     "meaning of numbers": (_attribute("e_out", long_name=np.ones(3)), "e_out: units or long_name"),
     "one model": (lambda r: r.isel(model=0), "sel(model=[...])"),
-    "a model twice": (lambda r: r.assign_coords(model=["a", "b", "a"]), "a model stands twice in it"),
+    "a model twice": (lambda r: r.assign_coords(model=["a", "b", "a"]), "a model occurs twice"),
     **{name: (lambda r, name=name: r.drop_vars(name), f"{name} of the models is missing")
        for name in ("title", "equation", "reference", "doi", "year")},
     "title of all": (lambda r: r.assign_coords(title="x"), "title of the models is missing"),
     "reference by model": (lambda r: r.assign(v1_reference=r["v1_post"]), "v1_reference: lies along model"),
-    "unknown status": (lambda r: r.assign(status=r["status"] + 70), "status: a number without a meaning"),
+    "unknown status": (lambda r: r.assign(status=r["status"] + 70), "status: got a number that is no status"),
     "no config": (lambda r: r.drop_attrs(deep=False).assign_attrs(schema_version=2, title="x"), "no config"),
     "config of numbers": (lambda r: r.assign_attrs(config=5), "no config, or not as text"),
     "tolerance of text": (lambda r: r.assign_attrs(rtol="x"), "no rtol, or not as a number"),
-    "config_set": (lambda r: r.assign_attrs(config_set="{}"), "config_set: no JSON of the right kind"),
-    "plugins": (lambda r: r.assign_attrs(plugins="{}x"), "plugins: no JSON of the right kind"),
-    "no hash": (lambda r: r.assign_attrs(plugins='{"mine": {"file": "my.py"}}'), "plugins: no JSON of the right"),
-    "deep plugins": (lambda r: r.assign_attrs(plugins=DEEP), "plugins: no JSON of the right kind"),
-    "materials": (lambda r: r.assign_attrs(materials=1.0), "materials: no JSON of the right kind"),
+    "config_set": (lambda r: r.assign_attrs(config_set="{}"), "config_set: not JSON of the expected type"),
+    "plugins": (lambda r: r.assign_attrs(plugins="{}x"), "plugins: not JSON of the expected type"),
+    "no hash": (lambda r: r.assign_attrs(plugins='{"mine": {"file": "my.py"}}'), "plugins: not JSON of the"),
+    "deep plugins": (lambda r: r.assign_attrs(plugins=DEEP), "plugins: not JSON of the expected type"),
+    "materials": (lambda r: r.assign_attrs(materials=1.0), "materials: not JSON of the expected type"),
 }  # fmt: skip
 HISTORIES: dict[str, tuple[Change, str]] = {
-    "another axis": (lambda h: h.expand_dims(e=[1.0]), "does not lie along t alone"),
-    "inputs": (lambda h: h.assign_attrs(inputs=DEEP), "inputs: no JSON of the right kind"),
+    "another axis": (lambda h: h.expand_dims(e=[1.0]), "expected t as its only axis"),
+    "inputs": (lambda h: h.assign_attrs(inputs=DEEP), "inputs: not JSON of the expected type"),
 }
 
 
@@ -98,7 +98,7 @@ def test_a_history_is_stored_and_read(history: xr.Dataset, tmp_path: Path) -> No
 
 def test_what_no_file_could_hold_is_not_stored(figure6: xr.Dataset, tmp_path: Path) -> None:
     for odd, words in (
-        (figure6.assign(twice=figure6["e_out"]), r"twice: no name of a result; dataset\.to_netcdf\(path\)"),
+        (figure6.assign(twice=figure6["e_out"]), r"twice: not a variable of a result; dataset\.to_netcdf\(path\)"),
         (figure6.assign(e_out=figure6["e_out"] * 1j), f"e_out: {KIND}"),
     ):
         with pytest.raises(UsageError, match=words):
@@ -106,6 +106,6 @@ def test_what_no_file_could_hold_is_not_stored(figure6: xr.Dataset, tmp_path: Pa
 
 
 def test_an_attribute_that_would_not_be_read_is_not_stored(figure6: xr.Dataset, tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="@x: an attribute of an unusual kind or size"):
+    with pytest.raises(UsageError, match="@x: an attribute of unexpected type or size"):
         impact.save(figure6.assign_attrs(x=np.zeros(65)), tmp_path / "odd.h5")
     assert list(tmp_path.iterdir()) == []

@@ -225,14 +225,14 @@ def test_what_is_unknown_is_passed_over_with_a_note(forked: Forked, small: Path,
         for name in ("twice", "thrice", "x\x1b[31m\u202e\n", "_nc4_non_coord_e_out"):
             file.copy("e_out", name)
     seal(path)
-    with pytest.warns(UserWarning, match=r"passed over .*: _nc4_non_coord_e_out, thrice, twice, x"):
+    with pytest.warns(UserWarning, match=r"ignored .*: _nc4_non_coord_e_out, thrice, twice, x"):
         loaded = impact.load(path)
     assert loaded.identical(impact.load(small))
     for command in COMMANDS:
         done = tell(forked, path, command)
         assert done.returncode == 0
         note = done.stderr.splitlines()[0]
-        assert note.startswith("note: more.h5: passed over")
+        assert note.startswith("note: more.h5: ignored variables")
         assert r"x\x1b[31m\u202e\x0a" in note
         assert len(done.stderr.splitlines()) == 1 + (command[0] not in ("info", "recommend"))
 

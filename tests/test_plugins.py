@@ -244,7 +244,7 @@ def test_an_output_is_never_the_plug_in(forked: Forked, folder: Path) -> None:
         refused = forked(*words, "my_model.py", "--plugin", "my_model.py", "--overwrite", cwd=folder)
         assert (refused.returncode, refused.stderr) == (
             2,
-            "my_model.py: is what is read from, and is not modified\n",
+            "my_model.py: is the file to be read, and is not modified\n",
         )
     assert (folder / "my_model.py").read_text(encoding="utf-8") == before
 

@@ -178,7 +178,7 @@ def test_balls_that_do_not_meet_are_not_judged() -> None:
     result = swept(EXACT, v1=[-1.0, 1.0], v2=0.0)
     assert {one.points for one in impact.recommend(result).models} == {20}
     assert len(impact.recommend(result).best) == 3
-    assert "nothing to judge" in refused(result, sel={"v1": -1.0})
+    assert "nothing to rank" in refused(result, sel={"v1": -1.0})
 
 
 def test_sel_and_models_narrow() -> None:
@@ -286,7 +286,7 @@ def test_strings_of_a_file_do_not_reach_the_terminal(cli: Run, tmp_path: Path) -
 @pytest.mark.parametrize(
     ("choice", "words"),
     [
-        ({"tol": 0.0}, "tol: got 0, wants a positive finite number"),
+        ({"tol": 0.0}, "tol: got 0, expected a positive finite number"),
         ({"tol": math.nan}, "tol: got nan"),
         ({"tol": math.inf}, "tol: got inf"),
         ({"sel": {"m3": 1.0}}, 'no axis "m3" in this result; known: e, m2'),
@@ -299,12 +299,12 @@ def test_what_is_not_there_is_named(choice: dict[str, object], words: str) -> No
 
 
 def test_what_cannot_be_ranked_is_refused() -> None:
-    assert "asks for no e" in refused(swept("hertz", e=None))
-    assert "asks for no e" in refused(swept("hertz").assign_coords(e=("e", np.full(10, np.nan))))
+    assert "has no target e" in refused(swept("hertz", e=None))
+    assert "has no target e" in refused(swept("hertz").assign_coords(e=("e", np.full(10, np.nan))))
     history = impact.run(model="hertz").history
     assert history is not None
     assert "this is a time history" in refused(history)
-    assert "model is no axis" in refused(swept("hertz").sel(model="hertz"))
+    assert "model is not an axis" in refused(swept("hertz").sel(model="hertz"))
     both = swept("hertz").drop_vars(["e_error", "status"])
     assert refused(both) == ("this result has no e_error, status; sweep without [output] variables, or add them")
     odd = swept("hertz")
@@ -317,8 +317,8 @@ def test_what_cannot_be_ranked_is_refused() -> None:
 def test_the_command_refuses_in_one_line(cli: Run, tmp_path: Path) -> None:
     path = stored(tmp_path, swept("hertz", e=None))
     for words, line in (
-        ([path], "this sweep asks for no e, by which models are ranked; give it e or alpha\n"),
-        ([path, "--tol", "-1"], "tol: got -1, wants a positive finite number\n"),
+        ([path], "this sweep has no target e, by which models are ranked; add e or alpha\n"),
+        ([path, "--tol", "-1"], "tol: got -1, expected a positive finite number\n"),
         (
             [path, "--sel", "m2"],
             "impact recommend: Invalid value for '--sel': got \"m2\", expected NAME=VALUE, such as m2=1.0; "

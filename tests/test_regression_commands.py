@@ -233,10 +233,10 @@ def test_unreadable_in_five_formats(forked: Forked, folder: Path, name: str) -> 
 def test_usage_is_exit_2_and_a_line(forked: Forked, folder: Path) -> None:
     wrong = "impact compare: Invalid value for '--tol': "
     for words, told in (
-        (["--tol", "e_oot=1"], '--tol e_oot: no variable of a result; did you mean "e_out"?'),
+        (["--tol", "e_oot=1"], '--tol e_oot: not a variable of a result; did you mean "e_out"?'),
         (["--tol", "much"], wrong + 'got "much", expected VALUE or NAME=VALUE, such as 1e-8, 5% or v1_post'),
         (["--tol", "nan"], wrong + 'got "nan", expected'), (["--tol", "e_out=x"], wrong + 'got "e_out=x"'),
-        (["--tol", "-1"], "--tol -1.0: wants"), (["--tol", "status=1"], "--tol status: has none"),
+        (["--tol", "-1"], "--tol -1.0: wants"), (["--tol", "status=1"], "--tol status: has no tolerance"),
         (["--tol", "1", "--tol", "2"], wrong + "got all twice, expected each name once"),
     ):  # fmt: skip
         done = forked("compare", "different.h5", "base.h5", *words, cwd=folder)
@@ -384,7 +384,8 @@ def test_a_picture_that_cannot_be_stored_is_refused_before_any_work(
     os.link(tmp_path / "new.png", tmp_path / "hard.png")
     (tmp_path / "folder.png").mkdir()
     for picture, told in (
-        ("new.png", "is what is read from"), ("base.svg", "is what is read from"), ("hard.png", "is what is read"),
+        ("new.png", "is the file to be read"), ("base.svg", "is the file to be read"),
+        ("hard.png", "is the file to be read"),
         ("x.jpg", "expected a name that ends in .png"), ("x", "expected a name that ends in .png"),
         ("folder.png", "is not a regular file"), ("absent/x.png", "does not exist"),
     ):  # fmt: skip
@@ -480,15 +481,15 @@ def test_bless_refuses_and_leaves_the_baseline_as_it_was(forked: Forked, folder:
     before = {path: path.read_bytes() for path in tmp_path.iterdir()}
     good = folder / "different.h5"
     for words, told in (
-        ([good, baseline, "--reason", ""], "--reason: empty"),
-        ([good, baseline, "--reason", " \n"], "--reason: empty"),
-        ([good, baseline], "--reason"), ([baseline, baseline, "--reason", "r"], "is what is read from"),
-        ([tmp_path / "same.h5", baseline, "--reason", "r"], "is what is read from"),
+        ([good, baseline, "--reason", ""], "--reason: got an empty text"),
+        ([good, baseline, "--reason", " \n"], "--reason: got an empty text"),
+        ([good, baseline], "--reason"), ([baseline, baseline, "--reason", "r"], "is the file to be read"),
+        ([tmp_path / "same.h5", baseline, "--reason", "r"], "is the file to be read"),
         ([good, tmp_path / "link.h5", "--reason", "r"], "not a regular file"),
         ([good, tmp_path, "--reason", "r"], "not a regular file"),
         ([good, tmp_path / "no" / "b.h5", "--reason", "r"], "does not exist"),
-        ([good, baseline, "--reason", "r", "--tol", "status=1"], "--tol status: has none"),
-        ([good, tmp_path / "fresh.h5", "--reason", "r", "--tol", "-1"], "--tol -1.0: wants a number"),
+        ([good, baseline, "--reason", "r", "--tol", "status=1"], "--tol status: has no tolerance"),
+        ([good, tmp_path / "fresh.h5", "--reason", "r", "--tol", "-1"], "--tol -1.0: expected a number"),
         *(([tmp_path / f"{name}.h5", baseline, "--reason", "r"], f"{name}.h5: ") for name in UNREADABLE),
         *(([tmp_path / f"{name}.h5", tmp_path / "n.h5", "--reason", "r"], f"{name}.h5: ") for name in UNREADABLE),
         *(([good, tmp_path / f"{name}.h5", "--reason", "r"], "") for name in UNREADABLE if name != "absent"),
@@ -525,7 +526,7 @@ def test_bless_from_python(folder: Path, tmp_path: Path) -> None:
     assert verdict.equal
     # what nobody chose is kept as it was in effect, so that a coarser solver does not loosen the guard
     assert json.loads(impact.load(baseline).attrs["tolerances"]) == {"all": 1e-9, "v1_post": 1e-6}
-    with pytest.raises(UsageError, match="--reason: empty"):
+    with pytest.raises(UsageError, match="--reason: got an empty text"):
         impact.bless(folder / "base.h5", baseline, reason="")
 
 

@@ -242,7 +242,7 @@ def test_a_sweep_without_e_says_so() -> None:
         "model": {"kelvin-voigt": {"C": [10.0, 20.0, 40.0]}},
     })  # fmt: skip
     text = build(free)
-    assert "The models are not ranked: this sweep asks for no e" in text
+    assert "The models are not ranked: this sweep has no target e" in text
     assert "The figure error is left out: this result has no error of the restitution, which needs an e" in text
     assert figures(text) == [FIGURES[kind] for kind in ("final-velocities", "restitution", "loop")]
     assert "kelvin-voigt.C\xa0=\xa020" in text
@@ -452,7 +452,7 @@ def test_the_command_replaces_nothing_that_is_no_page(cli: Run, stored: Path, tm
     result = tmp_path / "results.html"
     shutil.copy(stored, result)
     for words, told in (
-        (("report", "results.html"), "is what is read from"),
+        (("report", "results.html"), "is the file to be read"),
         (("report", stored, "-o", "results.h5"), "expected a name that ends in .html"),
         (("report", stored, "-o", "no/page.html"), "the folder no does not exist"),
         (("report", "none.h5"), "does not exist"),

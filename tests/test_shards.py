@@ -163,10 +163,10 @@ def test_foreign_ones_are_told(cli: Run, folder: Path) -> None:
     shards(cli, folder, "2/2")
     done = cli("merge", *own, *other, cwd=folder)
     assert f"{other[0]}: its title or output is not that of {own[0]}; expected" in done.stderr
-    for name, said in (("c.toml", "is no shard"), ("nowhere.work", "is no shard")):
+    for name, said in (("c.toml", "is not a shard"), ("nowhere.work", "is not a shard")):
         done = cli("merge", *own, name, cwd=folder)
         assert done.returncode == 2
-        assert f"{name}: {said}, wants a folder that impact sweep --shard K/N makes" in done.stderr
+        assert f"{name}: {said}; expected a work folder of impact sweep --shard K/N" in done.stderr
     (other[0] / "plan.json").write_text("[")
     assert "its plan.json cannot be read" in cli("merge", *own, *other, cwd=folder).stderr
 
@@ -180,7 +180,7 @@ def test_what_a_folder_says_may_be_anything(cli: Run, folder: Path, text: str) -
     (found / "shard.json").write_text(text)
     done = cli("merge", found, cwd=folder)
     assert done.returncode == 2
-    assert "is no shard, wants a folder that impact sweep --shard K/N makes" in done.stderr
+    assert "is not a shard; expected a work folder of impact sweep --shard K/N" in done.stderr
 
 
 def test_blocks_in_two_shards_have_to_be_equal(cli: Run, folder: Path) -> None:
@@ -245,7 +245,7 @@ def test_another_sweep_does_not_go_on_in_its_folder(cli: Run, folder: Path) -> N
 def test_what_is_no_shard_is_told(cli: Run, folder: Path, text: str) -> None:
     done = cli("sweep", "c.toml", f"--shard={text}", cwd=folder)
     assert done.returncode == 2
-    assert f"--shard {text}: wants K/N with K from 1 to N, such as 3/16" in done.stderr
+    assert f"--shard {text}: expected K/N with K from 1 to N, such as 3/16" in done.stderr
 
 
 @pytest.mark.slow

@@ -17,65 +17,65 @@ from ..results.selection import LABEL_RTOL, NUMBER_DTYPE_KINDS, IndexArray, Labe
 from ..text import safe_text
 from .verdict import Fault, FaultKind
 
-MAX_NAMED_LABELS = 3  # labels of one side that a message names
+MAX_NAMED_LABELS = 3  # labels of one side that a message lists
 # coordinates that vary with the model
 MODEL_COORDINATES = ("model", "exponent", *MODEL_METADATA)
 
 
 @dataclass(frozen=True)
 class Side:
-    """One of two results, at the points that both have.
+    """One of two results, at their common points.
 
     Parameters
     ----------
-    dataset : the result; the values of its variables are read when they are asked for
-    coords : its coordinates at the common points, in memory; what only the other result varies is an axis of
-        length one
-    places : by axis, the places of the common points in the result, in the order of the baseline
+    dataset : the result; which may be lazy
+    coords : its coordinates at the common points, in memory; inputs that only the other result varies have an axis
+        of length one
+    positions : by axis, the positions of the common points in the result, in the order of the baseline
     """
 
     dataset: xr.Dataset
     coords: xr.Dataset
-    places: Mapping[str, IndexArray]
+    positions: Mapping[str, IndexArray]
 
     def read(self, name: str, where: Mapping[str, slice]) -> Labels:
-        """The values of a variable or a coordinate at some of the common points.
+        """Read the values of a variable or a coordinate at some of the common points.
 
         Parameters
         ----------
         name : of the variable
-        where : the part of each axis of the values; along one that the variable has not got they have length one
+        where : the part of each axis; the values have length one along axes that the variable does not have
         """
         if name in self.coords:
             variable = self.coords.variables[name]
             index: dict[Hashable, Any] = {dim: where[str(dim)] for dim in variable.dims}
         else:
             variable = self.dataset.variables[name]
-            index = {dim: _as_slice(self.places[str(dim)][where[str(dim)]]) for dim in variable.dims}
-        # in memory before it is transposed: a lazy array would then be read point by point
+            index = {dim: _as_slice(self.positions[str(dim)][where[str(dim)]]) for dim in variable.dims}
+        # loaded before it is transposed: a transposed lazy array would be read point by point
         values = np.asarray(variable.isel(index).values)
         values = values.transpose([variable.dims.index(dim) for dim in where if dim in variable.dims])
         return values[tuple(slice(None) if dim in variable.dims else np.newaxis for dim in where)]
 
 
-def _as_slice(places: IndexArray) -> IndexArray | slice:
-    """Neighbouring places as a slice, which files and computed variables read faster."""
-    first = int(places[0])
-    is_range = np.array_equal(places, np.arange(first, first + len(places)))
-    return slice(first, first + len(places)) if is_range else places
+def _as_slice(positions: IndexArray) -> IndexArray | slice:
+    """Neighbouring positions as a slice, which files and computed variables read faster."""
+    first = int(positions[0])
+    is_range = np.array_equal(positions, np.arange(first, first + len(positions)))
+    return slice(first, first + len(positions)) if is_range else positions
 
 
 @dataclass(frozen=True)
 class Aligned:
-    """Two results at their common points, and in what their inputs differ.
+    """Two results at their common points, and the differences between their inputs.
 
     Parameters
     ----------
-    new, baseline : the two
+    new, baseline : the results
     sizes : by axis, the number of common points
-    dims : by variable that both have, its axes in the order of the baseline; those that vary along different axes
-        are left out; empty where the two have no point in common
-    faults : in what the inputs differ
+    dims : by common variable, its axes in the order of the baseline, without variables that vary along different
+        axes; empty if the results have no common point
+    faults : the differences between the inputs
     """
 
     new: Side
@@ -86,30 +86,30 @@ class Aligned:
 
 
 def align(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Aligned:
-    """Lay two results point on point by their coordinates; no value of a variable is read.
+    """Align two results by their coordinates; values of variables are not read.
 
     Parameters
     ----------
     new, baseline : results
-    subset : points that only one of them has are no fault
+    subset : ignore points that only one of them has
     """
     new, baseline = _drop_foreign_axes(new, baseline), _drop_foreign_axes(baseline, new)
     a, b = _comparable_coordinates(new, baseline), _comparable_coordinates(baseline, new)
     faults = _faults_of_missing_inputs(a, b)
-    places: dict[str, tuple[IndexArray, IndexArray]] = {}
+    positions: dict[str, tuple[IndexArray, IndexArray]] = {}
     for axis in map(str, dict.fromkeys((*b.dims, *baseline.dims, *a.dims, *new.dims))):
         columns = _label_columns(a, axis), _label_columns(b, axis)
         if columns[0] != columns[1] or not columns[0]:
             text = f"what varies along the axis {safe_text(axis)} is {_join_names(columns[0])}"
             faults.append(Fault("nothing in common", axis, f"{text}, in BASELINE {_join_names(columns[1])}"))
             continue
-        places[axis] = match_labels(
+        positions[axis] = match_labels(
             [a[name].values for name in columns[0]], [b[name].values for name in columns[0]]
         )
-        # the axis has its first column's name
+        # the column that gives the axis its name comes first
         names = [*(n for n in columns[0] if n == axis), *(n for n in columns[0] if n != axis)]
         labels = [[coords[name].values for name in names] for coords in (a, b)]
-        faults += _label_faults(labels[0], labels[1], names, places[axis], subset=subset)
+        faults += _label_faults(labels[0], labels[1], names, positions[axis], subset=subset)
     for name in sorted(str(name) for name in a.coords.keys() & b.coords.keys() if is_input(str(name))):
         if a[name].ndim == b[name].ndim == 0 and not _labels_agree(a[name].values, b[name].values):
             kind: FaultKind = "nothing in common" if subset else "physics config"
@@ -119,8 +119,8 @@ def align(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Aligned:
     if any(fault.kind == "nothing in common" for fault in faults):
         nowhere = Side(new, xr.Dataset(), {}), Side(baseline, xr.Dataset(), {})
         return Aligned(*nowhere, {}, {}, tuple(faults))
-    here, there = ({axis: pair[side] for axis, pair in places.items()} for side in (0, 1))
-    a, b = a.isel(here), b.isel(there)
+    new_positions, baseline_positions = ({axis: pair[side] for axis, pair in positions.items()} for side in (0, 1))
+    a, b = a.isel(new_positions), b.isel(baseline_positions)
     faults += _derived_faults(a, b)
     dims = {}
     for variable in SCHEMA:
@@ -130,12 +130,12 @@ def align(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Aligned:
                 dims[variable.name] = axes
             else:
                 faults.append(Fault("labels", variable.name, f"{variable.name} varies along other axes"))
-    sizes = {axis: len(pair[0]) for axis, pair in places.items()}
-    return Aligned(Side(new, a, here), Side(baseline, b, there), sizes, dims, tuple(faults))
+    sizes = {axis: len(pair[0]) for axis, pair in positions.items()}
+    return Aligned(Side(new, a, new_positions), Side(baseline, b, baseline_positions), sizes, dims, tuple(faults))
 
 
 def _drop_foreign_axes(result: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
-    """A result without the parameters of models that the other has not got; the others do not vary with them."""
+    """A result without the parameters of models that the other one lacks; other models do not depend on them."""
     models = {str(key) for key in np.ravel(other["model"].values)}
     foreign = [str(name) for name in result.coords if owner_of(str(name)) not in models | {""}]
     return result.isel({name: 0 for name in foreign if name in result.dims}).drop_vars(foreign)
@@ -146,12 +146,12 @@ def _comparable_coordinates(result: xr.Dataset, other: xr.Dataset) -> xr.Dataset
     materials = read_attribute(result.attrs, "materials")
     coords = _with_materials(result.coords.to_dataset().compute(), materials, other)
     if "model" not in result.dims:
-        # one model was picked out; it is still a label
+        # one model was selected: its key is still a label
         coords = _with_axis(coords, "model", MODEL_COORDINATES)
     for axis in map(str, other.dims):
         if axis not in coords.dims and axis in coords and coords[axis].ndim == 0:
             coords = _with_axis(coords, axis, [n for n in other.coords if axis in other.variables[n].dims])
-    # a member of a zip group in the other, which here does not vary along their common axis
+    # an input that varies with a zip group in the other result only: repeat it along their common axis
     repeated = {
         name: (
             other[name].dims,
@@ -165,7 +165,7 @@ def _comparable_coordinates(result: xr.Dataset, other: xr.Dataset) -> xr.Dataset
 
 
 def _with_materials(coords: xr.Dataset, materials: Mapping[str, Any], other: xr.Dataset) -> xr.Dataset:
-    """Coordinates with the properties of materials that are axes, or a value of one, in the other result only."""
+    """Coordinates, with the properties of materials that are coordinates of the other result only."""
     for name in map(str, other.coords):
         material, key = material_property(name) or ("", "")
         properties = materials.get(material)
@@ -176,7 +176,7 @@ def _with_materials(coords: xr.Dataset, materials: Mapping[str, Any], other: xr.
 
 
 def _with_axis(coords: xr.Dataset, axis: str, names: Iterable[Hashable]) -> xr.Dataset:
-    """Coordinates of which some have one more axis, of length one."""
+    """Coordinates, some of them with an additional axis of length one."""
     variables = {name: coords.variables[name] for name in names if name in coords}
     return coords.assign_coords(
         {n: xr.Variable((axis, *v.dims), v.values[np.newaxis], v.attrs) for n, v in variables.items()}
@@ -184,7 +184,7 @@ def _with_axis(coords: xr.Dataset, axis: str, names: Iterable[Hashable]) -> xr.D
 
 
 def _axes_of_both(variable: SchemaVariable, result: xr.Dataset, other: xr.Dataset) -> tuple[str, ...]:
-    """The axes of a variable of a result, those of length one that only the other varies before its own."""
+    """The axes of a variable, after additional axes of length one along which only the other result varies."""
     added = [str(dim) for dim in dict.fromkeys(("model", *other.dims)) if dim not in result.dims]
     of_variable = [dim for dim in added if dim != "model" or variable.per == "model"]
     return (*reversed(of_variable), *map(str, result.variables[variable.name].dims))
@@ -200,7 +200,7 @@ def _faults_of_missing_inputs(new: xr.Dataset, baseline: xr.Dataset) -> list[Fau
 
 
 def _label_columns(dataset: xr.Dataset, axis: str) -> list[str]:
-    """The coordinates that tell the places on an axis: its numbers, or its own and the others of its zip group."""
+    """The coordinates that identify the points of an axis: their numbers, or all columns of the axis."""
     if axis == "model" or (is_case(axis) and axis in dataset.coords):
         return [axis]
     return sorted(columns_along(dataset, axis))
@@ -210,19 +210,19 @@ def _label_faults(
     new: Sequence[Labels],
     baseline: Sequence[Labels],
     names: Sequence[str],
-    places: tuple[IndexArray, IndexArray],
+    positions: tuple[IndexArray, IndexArray],
     *,
     subset: bool,
 ) -> list[Fault]:
-    """The labels of an axis that only one side has; those of a zip group with all their columns."""
+    """The labels of an axis that only one result has; labels of a zip group with all columns."""
     axis = names[0]
-    if not len(places[0]):
+    if not len(positions[0]):
         sides = f"{_first_labels(new, names)}, in BASELINE {_first_labels(baseline, names)}"
         return [Fault("nothing in common", axis, f"no value of {safe_text(axis)} is in both: {sides}")]
     if subset:
         return []
     texts = []
-    for columns, common, side in ((new, places[0], "NEW"), (baseline, places[1], "BASELINE")):
+    for columns, common, side in ((new, positions[0], "NEW"), (baseline, positions[1], "BASELINE")):
         unmatched = [np.delete(values, common) for values in columns]
         if len(unmatched[0]):
             texts.append(
@@ -232,12 +232,12 @@ def _label_faults(
 
 
 def _derived_faults(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
-    """Coordinates along several axes, or along models, that have other values: e by alpha, the exponent."""
+    """Coordinates along several axes or models that differ: e from alpha, the exponent."""
     faults = []
     for name in sorted(str(name) for name in new.coords.keys() & baseline.coords.keys()):
         if name == "exponent" or (is_input(name) and baseline[name].ndim):
             a, b = new[name], baseline[name]
-            # e = 1 - alpha v0 is rounded as 1 is
+            # e = 1 - alpha v0 has the absolute rounding error of 1
             rounding = LABEL_RTOL if name == "e" else 0.0
             if set(a.dims) != set(b.dims) or not _labels_agree(a.transpose(*b.dims).values, b.values, rounding):
                 faults.append(_value_fault(name, a, b))
@@ -245,7 +245,7 @@ def _derived_faults(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
 
 
 def _value_fault(name: str, new: xr.DataArray, baseline: xr.DataArray) -> Fault:
-    """That a coordinate has other values; of an input of numbered points, which they are."""
+    """A fault of a coordinate that differs; of an input of numbered points, with the values."""
     axis = str(baseline.dims[0])
     if not is_case(axis) or new.dims != (axis,) or baseline.dims != (axis,):
         return Fault("labels", name, f"the coordinate {safe_text(name)} has other values")
@@ -264,7 +264,7 @@ def _value_fault(name: str, new: xr.DataArray, baseline: xr.DataArray) -> Fault:
 
 
 def _labels_agree(a: Labels, b: Labels, rounding: float = 0.0) -> bool:
-    """Whether all are the same but for rounding, relative, and to so much where they are computed."""
+    """Whether all labels agree within the relative tolerance of labels and an absolute tolerance `rounding`."""
     if a.dtype.kind in NUMBER_DTYPE_KINDS and b.dtype.kind in NUMBER_DTYPE_KINDS:
         return bool(np.isclose(a, b, rtol=LABEL_RTOL, atol=rounding, equal_nan=True).all())
     return bool(np.all(a.astype(str) == b.astype(str)))

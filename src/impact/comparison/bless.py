@@ -29,25 +29,25 @@ def bless(
     allow_failed: bool = False,
     show: Callable[[Verdict], None] = lambda verdict: None,
 ) -> Verdict | None:
-    """Let a result take the place of a baseline, which then carries the reason and the tolerances it is judged by.
+    """Replace a baseline by a result, and store the reason and the tolerances in it.
 
     Parameters
     ----------
     new, baseline : files; the baseline need not exist yet
     reason : why the numbers changed
-    tol : see `compare`; the new baseline carries them, so that a coarser solver does not loosen the guard
+    tol : see `compare`; stored in the new baseline, so that a coarser solver does not loosen later comparisons
     allow_failed : accept a result with failed points
-    show : is told the verdict before anything is written; if it raises an error nothing is
+    show : called with the verdict before anything is written; an exception prevents the replacement
 
     Returns
     -------
-    Verdict, or None : how the two differed; None where there was no baseline
+    Verdict or None : the comparison with the old baseline; None if there was none
 
     Raises
     ------
     ResultError : one of the files is not a readable result
-    UsageError : the reason is empty, a tolerance is not right, the two are one file, or points failed
-    StoreError : the disk is full or failed; the baseline is as it was
+    UsageError : the reason is empty, a tolerance is invalid, both paths are the same file, or points failed
+    StoreError : the disk is full or failed; the baseline is unchanged
 
     >>> import impact, tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -57,7 +57,7 @@ def bless(
     'first'
     """
     if not reason.strip():
-        raise UsageError("--reason: empty, wants why the numbers changed")
+        raise UsageError("--reason: got an empty text, expected why the numbers changed")
     if re.search("[\0\ud800-\udfff]", reason):
         raise UsageError(f'--reason: got "{safe_text(reason, 60)}", expected UTF-8 text without NUL')
     new, baseline = Path(new), Path(baseline)
@@ -66,33 +66,35 @@ def bless(
     check_comparable(result, str(new))
     if not allow_failed:
         _check_no_failures(result, new)
-    before = _load_baseline(baseline)
+    old_baseline = _load_baseline(baseline)
     verdict = None
-    if before is not None:
-        found = compare(result, before, tol=tol)
-        verdict = replace(found, new=str(new), baseline=str(baseline), repeats=command_start(str(new), result))
+    if old_baseline is not None:
+        comparison = compare(result, old_baseline, tol=tol)
+        repeats = command_start(str(new), result)
+        verdict = replace(comparison, new=str(new), baseline=str(baseline), repeats=repeats)
         show(verdict)
-    kept = effective_tolerances(tol, result.attrs if before is None else before.attrs)
-    save_with_attributes(new, baseline, {"reason": reason, "tolerances": json.dumps(kept)})
+    tolerances = effective_tolerances(tol, result.attrs if old_baseline is None else old_baseline.attrs)
+    save_with_attributes(new, baseline, {"reason": reason, "tolerances": json.dumps(tolerances)})
     return verdict
 
 
 def _check_no_failures(result: xr.Dataset, path: Path) -> None:
-    """Refuse a result with failed points, whose NaN every later failure would equal."""
-    tally = summarize(result[["status"]] if "status" in result else result)
-    if tally.not_counted:
-        count = f"{tally.not_counted:,} points are too many to look for failures"
+    """Refuse a result with failed points, since later failures would equal their NaNs."""
+    summary = summarize(result[["status"]] if "status" in result else result)
+    if summary.not_counted:
+        count = f"{summary.not_counted:,} points are too many to look for failures"
         raise UsageError(f"{safe_text(str(path))}: {count}; expected fewer, or --allow-failed")
-    if tally.failed:
-        status, model, places = tally.failed_at[0]
-        point = result["status"].isel(dict(zip(result["status"].dims, (model, *places), strict=True)))
+    if summary.failed:
+        status, model, indices = summary.failed_at[0]
+        point = result["status"].isel(dict(zip(result["status"].dims, (model, *indices), strict=True)))
         at = describe_point(inputs_of_model({str(dim): point[dim].item() for dim in result["status"].dims}))
-        count = f"{tally.failed:,} of {tally.points:,} points failed, the first at {at} ({status.name.lower()})"
-        raise UsageError(f"{safe_text(str(path))}: {count}; expected none, or --allow-failed")
+        count = f"{summary.failed:,} of {summary.points:,} points failed"
+        first = f"the first at {at} ({status.name.lower()})"
+        raise UsageError(f"{safe_text(str(path))}: {count}, {first}; expected none, or --allow-failed")
 
 
 def _load_baseline(baseline: Path) -> xr.Dataset | None:
-    """The baseline as it is, if there is one; what is no result is not written over."""
+    """The current baseline, or None; a file that is not a result is not replaced."""
     if not baseline.exists():
         return None
     try:

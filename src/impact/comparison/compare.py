@@ -29,16 +29,17 @@ def compare(
     tol: float | Tolerances | None = None,
     subset: bool = False,
 ) -> Verdict:
-    """Judge a result by another one, each variable as docs/schema.md says, at the points of equal labels.
+    """Compare a result with a baseline, each variable as docs/schema.md states, at points of equal labels.
 
-    A value is equal where |new - baseline| <= tolerance x scale, the scale being that of the baseline's point. NaN
-    equals NaN where both points have the same status and no such answer, or the law has no such quantity.
+    Values are equal if |new - baseline| <= tolerance x scale, where the scale is that of the baseline's point.
+    NaNs are equal if both points have the same status and that status explains them, or if the law lacks the
+    quantity.
 
-    Datasets may be lazy and of any size: they are read in slabs. If one says along which axes its variables vary
-    (`impact.results.slabs`), only points that represent the others are read, and each counts for all that it
+    Datasets may be lazy and of any size: they are read in slabs. If the axes along which variables vary are known
+    (`impact.results.slabs`), only representative points are read, and each counts for all points that it
     represents. Per model, these are the points along the axes along which the variable, its scale or the status
-    varies in either result. If they are more than 2^26, and the scale is v0, the peak, the value itself or
-    m v0^2/2, they are the points along the axes along which e_out varies, at the first place of the others: then
+    varies in either result. If they are more than 2^26, and the scale is v0, the peak, the value itself or m
+    v0^2/2, they are the points along the axes along which e_out varies, at the first position of the others: then
     |new - baseline|/scale depends on the trajectory only. For v1_post it is (m/m1) |difference of e_out|, which is
     at most |difference of e_out|.
 
@@ -47,12 +48,12 @@ def compare(
     new, baseline : results, or their files
     tol : one tolerance for all variables, relative to the scale of a point, or by name, "all" for the others; by
         default what the baseline carries, else 10 times its solver's rtol
-    subset : judge what both have, and do not mind what only one has
+    subset : compare what both have, and ignore what only one has
 
     Raises
     ------
     ResultError : a file is not a readable result
-    UsageError : a dataset is no result of a sweep, a tolerance is not right, or a variable has more than 10^10
+    UsageError : a dataset is not the result of a sweep, a tolerance is invalid, or a variable has more than 10^10
         points to read
 
     >>> import impact
@@ -86,7 +87,7 @@ def compare(
     judged: list[Judged] = []
     largest: dict[str, Mapping[str, np.ndarray]] = {}
     common = [variable for variable in SCHEMA if variable.name in aligned.dims]
-    # for all before the first is judged: a refusal comes at once
+    # for all variables before the first comparison, so that a refusal comes early
     boxes = representative_boxes(common, aligned)
     for variable in common:
         tolerance = tolerances.get(variable.name, tolerances[ALL_VARIABLES])
@@ -106,7 +107,7 @@ def _along_axes(largest: Mapping[str, Mapping[str, np.ndarray]], coords: xr.Data
     along = {}
     for axis in dict.fromkeys(axis for by_axis in largest.values() for axis in by_axis):
         columns = {name: (axis, by_axis[axis]) for name, by_axis in largest.items() if axis in by_axis}
-        # of a group of neighbours, the label of the first
+        # a group of neighbours has the label of the first
         first = {axis: slice(None, None, group_size(coords.sizes[axis]))}
         labels = {n: v.isel(first) for n, v in coords.variables.items() if v.dims == (axis,)}
         along[axis] = xr.Dataset(columns, labels)
@@ -114,11 +115,11 @@ def _along_axes(largest: Mapping[str, Mapping[str, np.ndarray]], coords: xr.Data
 
 
 def check_comparable(dataset: xr.Dataset, name: str) -> None:
-    """Refuse what is no result of a sweep.
+    """Refuse a dataset that is not the result of a sweep.
 
     Raises
     ------
-    UsageError : it is a time history, or lacks what every result has
+    UsageError : it is a time history, or lacks coordinates or axes that every result has
     """
     shown = safe_text(name)
     is_current = _attributes_equal(dataset.attrs.get("schema_version"), SCHEMA_VERSION)
@@ -129,19 +130,19 @@ def check_comparable(dataset: xr.Dataset, name: str) -> None:
         if coordinate not in dataset.coords:
             raise UsageError(f"{shown}: has no coordinate {coordinate}; compare takes whole results")
         if coordinate != "model" and dataset[coordinate].dtype.kind not in "fiu":
-            raise UsageError(f"{shown}: {coordinate} holds {dataset[coordinate].dtype}, wants numbers")
+            raise UsageError(f"{shown}: {coordinate} holds {dataset[coordinate].dtype}, expected numbers")
     axes = {dim for name, v in dataset.variables.items() if is_input(str(name)) for dim in v.dims}
     for name in (variable.name for variable in SCHEMA):
         if name in dataset and dataset[name].dtype.kind not in "fiu":
-            raise UsageError(f"{shown}: {name} holds {dataset[name].dtype}, wants numbers")
+            raise UsageError(f"{shown}: {name} holds {dataset[name].dtype}, expected numbers")
         if name in dataset and not axes <= set(dataset[name].dims):
             raise UsageError(f"{shown}: {name} does not vary along all axes; compare takes whole results")
 
 
 def _unknown_variables(dataset: xr.Dataset) -> list[str]:
-    """The variables that no result has."""
-    known = {*MODEL_COORDINATES, *(variable.name for variable in SCHEMA)}
-    names = [str(name) for name in dataset.variables if name not in known]
+    """The variables that are not part of a result."""
+    standard_names = {*MODEL_COORDINATES, *(variable.name for variable in SCHEMA)}
+    names = [str(name) for name in dataset.variables if name not in standard_names]
     return [name for name in names if not (is_input(name) or is_case(name))]
 
 
@@ -153,7 +154,7 @@ def _material_faults(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
         a, b = (table[name] for table in materials)
         for field in a.keys() | b.keys():
             path = f"materials.{name}.{field}"
-            # what one of them varies is a coordinate
+            # a property that one of them varies is a coordinate
             if a.get(field) != b.get(field) and not (path in new.coords or path in baseline.coords):
                 shown = [number(v, 12) for v in (a.get(field), b.get(field))]
                 text = f"{path} is {shown[0]}, in BASELINE {shown[1]}"
@@ -172,7 +173,7 @@ def _unit_faults(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
 
 
 def _attribute_notes(new: xr.Dataset, baseline: xr.Dataset) -> list[str]:
-    """What may explain a difference, and is no difference by itself."""
+    """Differences between attributes, which may explain differences between values."""
     notes = []
     for name in ("rtol", "max_steps", "impact_version"):
         a, b = (dataset.attrs.get(name) for dataset in (new, baseline))
@@ -189,12 +190,12 @@ def _attribute_notes(new: xr.Dataset, baseline: xr.Dataset) -> list[str]:
 
 
 def _attributes_equal(a: Any, b: Any) -> bool:
-    """Whether two attributes are equal; from elsewhere, they may be arrays."""
+    """Whether two attributes, which may be arrays, are equal."""
     return bool(np.array_equal(a, b))
 
 
 def _model_metadata_notes(new: xr.Dataset, baseline: xr.Dataset) -> list[str]:
-    """Models about which another thing is said."""
+    """Differences between the metadata of models."""
     notes = []
     for name in MODEL_METADATA:
         if name in new.coords and name in baseline.coords:

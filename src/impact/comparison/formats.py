@@ -13,13 +13,13 @@ from ..text import safe_text
 from .verdict import FAULT_KINDS, Judged, Verdict
 
 PROGRAM = "impact compare"
-# differences that an annotation names
+# differences that an annotation lists
 MAX_ANNOTATED = 3
 
 
 @dataclass(frozen=True)
 class ReportCase:
-    """One thing that was looked at: a variable, or one kind of fault; `texts` say what is wrong with it."""
+    """One test of a report: a variable or a kind of fault; `texts` describe its failures."""
 
     name: str
     texts: tuple[str, ...] = ()
@@ -28,7 +28,7 @@ class ReportCase:
 
 @dataclass(frozen=True)
 class Report:
-    """What the formats are made from: a verdict, or the reason why there is none (`equal` is None then)."""
+    """The data of all formats: a verdict, or the error that prevented one (`equal` is None)."""
 
     new: str
     baseline: str
@@ -47,8 +47,10 @@ def report_of(verdict: Verdict) -> Report:
         if kind != "values"
     )
     values = (
-        ReportCase(one.name) if one.is_equal else ReportCase(one.name, (one.text,), verdict.replay(one))
-        for one in verdict.ranked
+        ReportCase(variable.name)
+        if variable.is_equal
+        else ReportCase(variable.name, (variable.text,), verdict.replay(variable))
+        for variable in verdict.ranked
     )
     return Report(
         safe_text(verdict.new), safe_text(verdict.baseline), verdict.equal, verdict.headline, (*faults, *values),
@@ -57,12 +59,12 @@ def report_of(verdict: Verdict) -> Report:
 
 
 def report_of_error(new: str, baseline: str, error: str) -> Report:
-    """The report where one of the two could not be read."""
+    """The report of an error that prevented the comparison."""
     return Report(safe_text(new), safe_text(baseline), None, "; ".join(error.splitlines()))
 
 
 def as_data(report: Report) -> dict[str, Any]:
-    """Plain data, for JSON; `equal` is null where there is no verdict."""
+    """The report as a dict for JSON; `equal` is null if there is no verdict."""
     return {
         "equal": report.equal, "headline": report.headline, "new": report.new, "baseline": report.baseline,
         "faults": [
@@ -71,9 +73,9 @@ def as_data(report: Report) -> dict[str, Any]:
             for text in case.texts
         ],
         "variables": [
-            {**vars(one), "at": _safe_inputs(one.at), "equal": one.is_equal, "text": one.text,
-             "replay": next((case.replay for case in report.cases if case.name == one.name), "")}
-            for one in report.variables
+            {**vars(variable), "at": _safe_inputs(variable.at), "equal": variable.is_equal, "text": variable.text,
+             "replay": next((case.replay for case in report.cases if case.name == variable.name), "")}
+            for variable in report.variables
         ],
         "notes": list(report.notes),
     }  # fmt: skip
@@ -100,8 +102,8 @@ def as_junit(report: Report) -> str:
         elif case.texts:
             body = "\n".join([*case.texts, *([case.replay] if case.replay else [])])
             ElementTree.SubElement(test, "failure", {"message": case.texts[0]}).text = body
-    said = ElementTree.SubElement(suite, "system-out")
-    said.text = "\n".join([report.headline, *(f"note: {note}" for note in report.notes)])
+    output = ElementTree.SubElement(suite, "system-out")
+    output.text = "\n".join([report.headline, *(f"note: {note}" for note in report.notes)])
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode", xml_declaration=True)
 
@@ -111,23 +113,23 @@ def as_markdown(report: Report) -> str:
     sign = {True: "✅", False: "❌", None: "⚠️"}[report.equal]
     lines = [f"### {sign} {PROGRAM}: {_escape_markdown(report.headline)}", ""]
     lines += [f"`{_escape_code(report.new)}` against the baseline `{_escape_code(report.baseline)}`", ""]
-    told = [
+    fault_lines = [
         f"- {_escape_markdown(text)}" for case in report.cases if case.name in FAULT_KINDS for text in case.texts
     ]
-    lines += [*told, ""] if told else []
-    differing = [one for one in report.variables if not one.is_equal]
+    lines += [*fault_lines, ""] if fault_lines else []
+    differing = [variable for variable in report.variables if not variable.is_equal]
     if differing:
         lines += [
             "| variable | differ | worst | × tolerance | at | new | baseline |",
             "|---|--:|--:|--:|---|--:|--:|",
         ]
-        for one in differing:
-            numbers = f"{number(one.worst, 3)} | {number(one.times, 3)}"
-            values = f"{number(one.new, 12)} | {number(one.baseline, 12)}"
-            counts, point = f"{one.different} of {one.points}", _escape_markdown(one.place)
-            lines.append(f"| `{one.name}` | {counts} | {numbers} | {point} | {values} |")
+        for variable in differing:
+            numbers = f"{number(variable.worst, 3)} | {number(variable.times, 3)}"
+            values = f"{number(variable.new, 12)} | {number(variable.baseline, 12)}"
+            counts, point = f"{variable.different} of {variable.points}", _escape_markdown(variable.place)
+            lines.append(f"| `{variable.name}` | {counts} | {numbers} | {point} | {values} |")
         repeats = dict.fromkeys(case.replay for case in report.cases if case.replay)
-        # a fence of four, because a name may hold three
+        # a fence of four backticks, since a name may contain three
         lines += ["", "````sh", *repeats, "````", ""] if repeats else [""]
     lines += [f"- note: {_escape_markdown(note)}" for note in report.notes]
     return "\n".join(lines).rstrip() + "\n"
@@ -151,15 +153,15 @@ def _annotation(level: str, file: str, text: str) -> str:
     return f"::{level} file={where},title={PROGRAM}::{message}"
 
 
-# what a workflow command cannot hold as it is; the last two in its properties only
+# characters that a workflow command must escape; the last two in its properties only
 GITHUB_ESCAPES: Mapping[str, str] = {"%": "%25", "\r": "%0D", "\n": "%0A", ":": "%3A", ",": "%2C"}
 
 
 def _escape_markdown(text: str) -> str:
-    """Text that Markdown shows as it is."""
+    """Text that Markdown shows literally."""
     return re.sub(r"([\\`*_{}\[\]<>|~#!&$@])", r"\\\1", text)
 
 
 def _escape_code(text: str) -> str:
-    """Text within backticks, which know no escapes."""
+    """Text for code spans, which have no escapes."""
     return text.replace("`", "'").replace("|", "¦")

@@ -27,14 +27,14 @@ from ..results.slabs import (
 from .align import Aligned, Side
 from .verdict import Judged
 
-# a part of the common points, by axis; along the axes that are not in it, the first place stands for all
+# a part of the common points, by axis; along axes that are not in it, the first point represents all
 Box = Mapping[str, slice]
 
-# points of one variable that are compared at most: an hour
+# at most this many points of a variable are compared, which takes an hour
 MAX_COMPARED_POINTS = 10**10
-# an axis with more places has its largest ratios by groups of neighbours: a picture shows no more
+# the largest ratios along longer axes are those of groups of neighbours, enough for a picture
 MAX_RATIO_GROUPS = 2**14
-# what a law may not have, or a sweep without e: NaN where all went well
+# variables that may be NaN at status OK: the law lacks the quantity, or the sweep has no e
 OPTIONAL_VARIABLES = ("damping_ratio", "lambda", "closed_form_error", "e_error", "v1_error", "v2_error")
 # |difference|/scale is that of a trajectory: |Delta v1_post|/v0 = (m/m1) |Delta e_out| <= |Delta e_out|
 DIMENSIONLESS_SCALES = ("scaled by v0", "scaled by the peak", "scaled by itself", "scaled by m v0^2/2")
@@ -43,11 +43,11 @@ SCALE_INPUTS = {"scaled by v0": ("v1", "v2"), "scaled by m v0^2/2": ("v1", "v2",
 
 
 def representative_boxes(variables: Sequence[SchemaVariable], aligned: Aligned) -> dict[str, list[Box]]:
-    """By variable, the parts of the common points that stand for all of them; see `compare` for the rule.
+    """By variable, the parts of the common points that represent all of them; see `compare` for the rule.
 
     Raises
     ------
-    UsageError : a variable has more than `MAX_COMPARED_POINTS` points that none of the others stands for
+    UsageError : a variable has more than `MAX_COMPARED_POINTS` representative points
     """
     boxes: dict[str, list[Box]] = {}
     for variable in variables:
@@ -80,9 +80,9 @@ def _declares_dims(side: Side, name: str) -> bool:
 
 
 def _dataset_of_model(side: Side, model: int) -> xr.Dataset:
-    """The whole result of the model at a common place."""
-    place = int(side.places["model"][model])
-    return side.dataset.isel(model=slice(place, place + 1)) if "model" in side.dataset.dims else side.dataset
+    """One side's dataset of the model at a common position."""
+    position = int(side.positions["model"][model])
+    return side.dataset.isel(model=slice(position, position + 1)) if "model" in side.dataset.dims else side.dataset
 
 
 def _box(dims: Iterable[str], sizes: Mapping[str, int], models: slice) -> Box:
@@ -92,13 +92,13 @@ def _box(dims: Iterable[str], sizes: Mapping[str, int], models: slice) -> Box:
 def _representative_dims(
     variable: SchemaVariable, aligned: Aligned, sides: Sequence[xr.Dataset]
 ) -> tuple[str, ...]:
-    """The axes of a variable whose points stand for all the others.
+    """The axes of a variable whose points represent all others.
 
     Parameters
     ----------
     variable : in both results
     aligned : the results
-    sides : the two, of one model
+    sides : the datasets of one model
     """
 
     def varying(*names: str) -> set[Hashable]:
@@ -112,7 +112,7 @@ def _representative_dims(
     full = varying(variable.name) | scale
     candidates = [full]
     if variable.per == "model" and variable.judged not in ("exact", "reported"):
-        # the status says whether a NaN is an answer
+        # the status decides whether a NaN is an answer
         candidates.insert(0, full | varying("status"))
     if variable.judged in DIMENSIONLESS_SCALES and all("e_out" in side for side in sides):
         candidates.append(varying("e_out"))
@@ -125,13 +125,13 @@ def _representative_dims(
 
 
 def _points(dims: Iterable[str], sizes: Mapping[str, int]) -> int:
-    """Points of one model."""
+    """The number of points of one model."""
     return math.prod(sizes[dim] for dim in dims if dim != "model")
 
 
 @dataclass(frozen=True)
 class Worst:
-    """A point that differs: in how many tolerances, in what is compared among equals, where, and its values."""
+    """A point that differs: ratio to the tolerance, size that decides between equal ratios, index and values."""
 
     times: float
     size: float
@@ -144,20 +144,20 @@ class Worst:
 def judge(
     variable: SchemaVariable, aligned: Aligned, tol: float, boxes: Iterable[Box]
 ) -> tuple[Judged, dict[str, NDArray[Any]]]:
-    """One variable at all common points: |new - baseline| in tolerances, inf where nothing is allowed.
+    """Compare one variable at all common points: |new - baseline| over tolerance, inf if no difference is allowed.
 
     Parameters
     ----------
-    variable : that both have, along the same axes
+    variable : in both results, along the same axes
     aligned : the two results
     tol : relative to the scale of a point
-    boxes : the points to read, see `representative_boxes`; each counts for all that it stands for
+    boxes : the points to read, see `representative_boxes`; each counts for all points that it represents
 
     Returns
     -------
     Judged : the numbers
-    dict : by axis, the largest ratio at each of its places, or in groups of neighbours if they are more than
-        `MAX_RATIO_GROUPS`; constant along an axis of which the first place stands for all
+    dict : by axis, the largest ratio at each of its points, or of groups of neighbours if there are more than
+        `MAX_RATIO_GROUPS` points; constant along an axis of which the first point represents all
     """
     dims = aligned.dims[variable.name]
     shape = tuple(aligned.sizes[dim] for dim in dims)
@@ -192,17 +192,17 @@ def judge(
     ), largest  # fmt: skip
 
 
-def group_size(places: int) -> int:
-    """How many neighbouring places of an axis have one largest ratio.
+def group_size(size: int) -> int:
+    """The number of neighbouring points of an axis that share one largest ratio.
 
     >>> group_size(101), group_size(10**6)
     (1, 62)
     """
-    return -(-places // MAX_RATIO_GROUPS)
+    return -(-size // MAX_RATIO_GROUPS)
 
 
 def _slabs(name: str, aligned: Aligned, box: Box) -> Iterator[dict[str, slice]]:
-    """A box in slabs; of a file with chunks, in such of whole chunks, so that each is read once."""
+    """A box in slabs; of a file with chunks, in slabs of whole chunks, so that each is read once."""
     sizes: dict[Hashable, int] = {dim: part.stop - part.start for dim, part in box.items()}
     variable = aligned.baseline.dataset.variables[name]
     chunks = dict(zip(variable.dims, variable.encoding.get("chunksizes") or (), strict=False))
@@ -222,24 +222,24 @@ def _ratio(
     b: NDArray[Any],
     tol: float,
 ) -> tuple[NDArray[Any], NDArray[Any]]:
-    """The difference of the values of a slab, in tolerances and in the variable's unit."""
+    """The difference of the values of a slab, relative to the tolerance and in the variable's unit."""
     with np.errstate(all="ignore"):
         difference = np.where(a == b, 0.0, np.abs(a.astype(float) - b.astype(float)))
         has_peak = "peak_indentation" in aligned.baseline.dataset
         scale = scale_of(variable, lambda name: aligned.baseline.read(name, where), has_peak=has_peak)
         scale = np.broadcast_to(scale, b.shape)
-        # what was stored in fewer digits has lost the others
+        # allow for the rounding of values that were stored in single precision
         lost = sum(float(np.finfo(values.dtype).eps) for values in (a, b) if values.dtype == np.float32)
         allowed = tol * scale + (lost * np.maximum(np.abs(a), np.abs(b)) if lost else 0.0)
         if variable.judged == "bounded by 10 rtol":
-            # a residual is noise: it is fine below its bound, wherever it was
+            # a residual is noise: any value within its bound is accepted
             counted = np.minimum(difference, np.maximum(np.abs(a), np.abs(b)))
         else:
             counted = difference
         if variable.judged in ("exact", "reported"):
             ratio = np.where(difference == 0.0, 0.0, np.inf)
         else:
-            # of an infinite scale every difference would be a small part
+            # with an infinite scale every difference would be accepted
             has_measure = (allowed > 0.0) & np.isfinite(scale) & np.isfinite(counted)
             ratio = np.where(counted == 0.0, 0.0, np.where(has_measure, counted / allowed, np.inf))
     missing = np.isnan(a.astype(float)), np.isnan(b.astype(float))
@@ -250,7 +250,7 @@ def _ratio(
 
 
 def _may_be_missing(variable: SchemaVariable, aligned: Aligned, where: Mapping[str, slice]) -> NDArray[Any] | bool:
-    """Where NaN in both is no difference: both points ended alike, and not with an answer that has this value."""
+    """Where NaNs in both are equal: the statuses are equal, and the status or the law explains the NaN."""
     if variable.per == "axes" or not all("status" in side.dataset for side in (aligned.new, aligned.baseline)):
         return True
     new, baseline = (side.read("status", where) for side in (aligned.new, aligned.baseline))
@@ -267,13 +267,13 @@ def _worst_of_slab(
 ) -> Worst:
     """The point of a slab with the largest ratio, among equals the first with the largest difference.
 
-    Of flags, which are not more or less different, the first.
+    Among flags, which differ or do not, the first point.
     """
     sizes = np.ones_like(ratio) if variable.judged == "exact" else np.nan_to_num(difference, nan=np.inf)
     index = np.unravel_index(int(np.argmax(np.where(ratio == ratio.max(), sizes, -1.0))), ratio.shape)
     return Worst(
         float(ratio[index]), float(sizes[index]),
-        tuple(part.start + int(place) for part, place in zip(where.values(), index, strict=True)),
+        tuple(part.start + int(offset) for part, offset in zip(where.values(), index, strict=True)),
         float(difference[index]), float(a[index]), float(b[index]),
     )  # fmt: skip
 
@@ -282,14 +282,14 @@ def _worse(first: Worst | None, second: Worst, shape: Sequence[int]) -> Worst:
     """The worse of two points, among equals the first in the order of the baseline."""
     if first is None:
         return second
-    return max(first, second, key=lambda point: (point.times, point.size, [-place for place in point.index]))
+    return max(first, second, key=lambda point: (point.times, point.size, [-index for index in point.index]))
 
 
 def _inputs_of_point(coords: xr.Dataset, index: Mapping[str, int]) -> dict[str, float | str]:
-    """The inputs of a point of the new result: with them a config, read again here, has the point."""
+    """The inputs of a point of the new result, with which its config gives the same point again."""
     at = {
-        name: coords.variables[name].values[place].item()
-        for dim, place in index.items()
+        name: coords.variables[name].values[position].item()
+        for dim, position in index.items()
         for name in dict.fromkeys([dim, *columns_along(coords, dim)])
     }
     return {

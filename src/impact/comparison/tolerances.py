@@ -15,26 +15,26 @@ from ..text import safe_text
 
 Tolerances = Mapping[str, float]
 
-# the name under which a tolerance is for all variables that have none of their own
+# name of the tolerance for variables that have none of their own
 ALL_VARIABLES = "all"
-# without one, a value may differ by this many tolerances of the solver
+# the default tolerance is this many times the solver's rtol
 DEFAULT_RTOL_FACTOR = 10.0
 JUDGED_BY_NAME = {variable.name: variable.judged for variable in SCHEMA}
 TOLERANCE_VARIABLES = [name for name, judged in JUDGED_BY_NAME.items() if judged not in ("exact", "reported")]
 
 
 def effective_tolerances(tol: float | Tolerances | None, attributes: Mapping[str, Any]) -> dict[str, float]:
-    """Tolerances by variable, "all" for the others: those asked for, else the baseline's, else its solver's.
+    """Tolerances by variable, "all" for the others: from the caller, else the baseline, else its solver.
 
     Parameters
     ----------
-    tol : one for all variables, which takes the place of all that the baseline carries, or by name
-    attributes : of the baseline; `tolerances` is JSON, by name
+    tol : one tolerance for all variables, which replaces all of the baseline's, or tolerances by name
+    attributes : of the baseline; its `tolerances` are JSON, by name
 
     Raises
     ------
-    UsageError : a name is no variable with a tolerance, or a value is not a number from 0 up
-    ResultError : what the baseline carries is not that
+    UsageError : a name is not a variable with a tolerance, or a value is not a number >= 0
+    ResultError : the tolerances of the baseline are invalid
 
     >>> effective_tolerances({"e_out": 1e-6}, {"rtol": 1e-10, "tolerances": '{"all": 1e-8}'})
     {'all': 1e-08, 'e_out': 1e-06}
@@ -43,30 +43,33 @@ def effective_tolerances(tol: float | Tolerances | None, attributes: Mapping[str
     >>> effective_tolerances(None, {"rtol": 1e-10})
     {'all': 1e-09}
     """
-    asked = dict(tol or {}) if isinstance(tol, Mapping | None) else {ALL_VARIABLES: tol}
-    _check_tolerances(asked)
-    if ALL_VARIABLES in asked:
-        return asked
+    requested = dict(tol or {}) if isinstance(tol, Mapping | None) else {ALL_VARIABLES: tol}
+    _check_tolerances(requested)
+    if ALL_VARIABLES in requested:
+        return requested
     rtol = attributes["rtol"]
     if not _is_number(rtol) or not 0.0 < rtol <= 1.0:
-        raise ResultError("the attribute rtol of the baseline is not that of a result")
+        raise ResultError("the attribute rtol of the baseline is invalid")
     try:
-        kept = read_attribute(attributes, "tolerances")
-        _check_tolerances(kept)
+        stored = read_attribute(attributes, "tolerances")
+        _check_tolerances(stored)
     except (ResultError, UsageError):
-        raise ResultError("the attribute tolerances of the baseline is not that of a result") from None
-    return {ALL_VARIABLES: DEFAULT_RTOL_FACTOR * float(rtol), **kept, **asked}
+        raise ResultError("the attribute tolerances of the baseline is invalid") from None
+    return {ALL_VARIABLES: DEFAULT_RTOL_FACTOR * float(rtol), **stored, **requested}
 
 
 def _check_tolerances(tolerances: Mapping[str, Any]) -> None:
     for name, value in tolerances.items():
         if name != ALL_VARIABLES and name not in TOLERANCE_VARIABLES:
-            has_none = {"exact": "has none, it is judged exactly;", "reported": "has none, it is not judged;"}
-            how = has_none[JUDGED_BY_NAME[name]] if name in JUDGED_BY_NAME else "no variable of a result;"
+            has_none = {
+                "exact": "has no tolerance, it is judged exactly;",
+                "reported": "has no tolerance, it is not judged;",
+            }
+            how = has_none[JUDGED_BY_NAME[name]] if name in JUDGED_BY_NAME else "not a variable of a result;"
             raise UsageError(f"--tol {safe_text(str(name))}: {how} {did_you_mean(str(name), TOLERANCE_VARIABLES)}")
         if not _is_number(value) or not 0.0 <= value <= sys.float_info.max:
             shown = value if name == ALL_VARIABLES else f"{name}={value}"
-            raise UsageError(f"--tol {safe_text(str(shown))}: wants a number from 0 up, such as --tol 1e-8")
+            raise UsageError(f"--tol {safe_text(str(shown))}: expected a number >= 0, such as --tol 1e-8")
 
 
 def _is_number(value: object) -> TypeGuard[float]:

@@ -14,16 +14,16 @@ from ..results.replay_command import describe_point, replay_command
 from ..text import safe_text
 
 FaultKind = Literal["nothing in common", "physics config", "labels", "units", "missing variable", "values"]
-# in the order in which a verdict tells them: what explains the most first
+# in the order of a verdict: kinds that explain others first
 FAULT_KINDS: tuple[FaultKind, ...] = (
     "nothing in common", "physics config", "labels", "units", "missing variable", "values",
 )  # fmt: skip
-MAX_NAMED_FAULTS = 4  # of the things of one kind that the first line names
+MAX_NAMED_FAULTS = 4  # names per kind in the first line
 
 
 @dataclass(frozen=True)
 class Fault:
-    """One thing, other than a value, in which two results differ: of what kind, its name, a sentence."""
+    """One difference between two results, other than a value: its kind, name and a sentence."""
 
     kind: FaultKind
     name: str
@@ -37,13 +37,13 @@ class Judged:
     Parameters
     ----------
     name : of the variable
-    judged : how, see `impact.results.schema.SCHEMA`
-    tolerance : relative to the scale of a point; NaN where there is none (exact, reported)
-    points, different : common points, and those of them that differ
+    judged : how it is compared, see `impact.results.schema.SCHEMA`
+    tolerance : relative to the scale of a point; NaN if there is none (exact, reported)
+    points, different : number of common points, and of those that differ
     worst : |new - baseline| at the worst point, in the variable's unit
-    times : the same in tolerances of that point; inf where nothing is allowed, or one of the two is NaN
-    at : the inputs of the worst point by config name, and its model; empty where all are the same
-    new, baseline : the values there
+    times : the same over the tolerance at that point; inf if no difference is allowed, or one value is NaN
+    at : the inputs of the worst point by config name, and its model; empty if all points are equal
+    new, baseline : the values at the worst point
     """
 
     name: str
@@ -73,7 +73,7 @@ class Judged:
 
     @property
     def text(self) -> str:
-        """How many of how many differ, and the worst case with its coordinates."""
+        """The number of points that differ, and the worst point with its coordinates."""
         if not self.different:
             return f"{self.name}: none of {self.points} differ"
         many = f"{self.name}: {self.different} of {self.points} differ"
@@ -98,26 +98,26 @@ def _format_outcome(name: str, value: float) -> str:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Whether a result is equal to its baseline, in what it is not, and where.
+    """Whether a result is equal to its baseline, and the differences.
 
     `str(verdict)` is the report, so that `assert verdict.equal, str(verdict)` is a test.
 
     Parameters
     ----------
-    new, baseline : what was compared, by the names of their files
-    faults : what differs besides values
-    variables : the variables that both have
-    notes : what is said but not judged
-    worst_along : by axis, the largest |new - baseline| in tolerances at each of its places, for every judged
+    new, baseline : names of the files
+    faults : differences other than values
+    variables : the comparisons of the common variables
+    notes : differences that do not affect equality
+    repeats : the first words of a command that runs one of the points again; empty if there is none
+    worst_along : by axis, the largest |new - baseline| over tolerance at each of its points, for every compared
         variable that has the axis, with the labels of the baseline; neighbours on a very long axis are grouped
         under the label of the first
-    repeats : how a command that runs one of the points again begins; empty where there is none
 
     >>> import impact
     >>> result = impact.sweep("configs/figure6.toml")
     >>> moved = result.assign(e_out=result["e_out"] + 2e-9)
     >>> verdict = impact.compare(moved, result)
-    >>> verdict.equal, [one.name for one in verdict.differing]
+    >>> verdict.equal, [variable.name for variable in verdict.differing]
     (False, ['e_out'])
     """
 
@@ -136,7 +136,7 @@ class Verdict:
     @property
     def differing(self) -> tuple[Judged, ...]:
         """The variables whose values differ, the worst first."""
-        # among equals a status is told first, which explains the NaNs of the others
+        # among equal ratios the status comes first, since it explains the NaNs of other variables
         different = (variable for variable in self.variables if not variable.is_equal)
         return tuple(sorted(different, key=lambda variable: (-variable.times, variable.judged != "exact")))
 
@@ -147,7 +147,7 @@ class Verdict:
 
     @property
     def headline(self) -> str:
-        """The first line: equal and how closely, or not equal in what."""
+        """The first line: the closest variable if equal, else the names of what differs."""
         if self.equal:
             judged = [variable for variable in self.variables if variable.judged != "reported"]
             values = sum(variable.points for variable in judged)
@@ -171,7 +171,7 @@ class Verdict:
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """What differs, a line each; after a value's the command that repeats its worst point."""
+        """The differences, a line each; after a variable the command that runs its worst point again."""
         faults = sorted(self.faults, key=lambda fault: FAULT_KINDS.index(fault.kind))
         lines = [f"{fault.kind}: {fault.text}" for fault in faults]
         for variable in self.differing:
@@ -181,7 +181,7 @@ class Verdict:
         return tuple(lines)
 
     def replay(self, variable: Judged) -> str:
-        """The command that runs the worst point of a variable again; empty where there is none."""
+        """The command that runs the worst point of a variable again; empty if there is none."""
         if not self.repeats or not variable.at:
             return ""
         return replay_command(self.repeats, variable.at)

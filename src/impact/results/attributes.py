@@ -13,7 +13,7 @@ from ..text import safe_text
 
 
 class PluginRecord(BaseModel):
-    """What a result records of a model that is not built in; see `impact.engine.plugins.Plugin.record`."""
+    """What a result records about a model that is not built in; see `impact.engine.plugins.Plugin.record`."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
@@ -43,17 +43,17 @@ def read_attribute(attributes: Mapping[Any, Any], name: str, source: str = "", *
     attributes : of a result
     name : one of `ATTRIBUTE_TYPES`
     source : name of the result, for messages
-    required : refuse a result without the attribute; else its value is empty there
+    required : raise an error if the attribute is missing; otherwise return an empty value
 
     Raises
     ------
-    ResultError : it is missing, is not JSON, or is JSON of another kind
+    ResultError : it is missing, is not JSON, or is JSON of another type
 
     >>> read_attribute({"config_set": '["sweep.m2=2.0"]'}, "config_set")
     ['sweep.m2=2.0']
     >>> read_attribute({"plugins": '{"mine": 3}'}, "plugins", "r.h5")
     Traceback (most recent call last):
-    impact.errors.ResultError: r.h5: attribute plugins: no JSON of the right kind
+    impact.errors.ResultError: r.h5: attribute plugins: not JSON of the expected type
     """
     kind = ATTRIBUTE_TYPES[name]
     if name not in attributes and not required:
@@ -64,7 +64,7 @@ def read_attribute(attributes: Mapping[Any, Any], name: str, source: str = "", *
             return _adapter(name).validate_json(text, strict=True)
     except ValidationError:
         pass
-    what = "missing" if text is None else "no JSON of the right kind"
+    what = "missing" if text is None else "not JSON of the expected type"
     raise ResultError(f"{safe_text(source)}{': ' if source else ''}attribute {name}: {what}")
 
 

@@ -29,18 +29,18 @@ from .slabs import slabs
 from .validation import TABLE_VARIABLES, is_quantity, schema_violation
 
 DEFAULT_OUTPUT = Output()
-# bytes up to which a result is held in memory
+# larger results are not loaded into memory
 MAX_LOADED_BYTES = 2**29
-# what is copied of a file at a time
+# bytes of a file that are copied at a time
 COPY_BUFFER_BYTES = 2**22
 
 
 def check_output(path: Path, *, overwrite: bool, source: Path | None = None) -> None:
-    """Refuse an output that cannot be written, before any work is done; and one that is its own source.
+    """Refuse an output that cannot be written, before any work starts, or that is the file to be read.
 
     Raises
     ------
-    UsageError : it exists and is not to be overwritten, is no regular file, or its folder cannot be written to
+    UsageError : it exists and must not be overwritten, is not a regular file, or its folder is not writable
     """
     shown = safe_text(str(path))
     folder = path.parent
@@ -58,31 +58,31 @@ def check_output(path: Path, *, overwrite: bool, source: Path | None = None) -> 
     if not stat.S_ISREG(mode):
         raise UsageError(f"{shown}: is not a regular file, and is not modified")
     if source is not None and source.exists() and path.samefile(source):
-        raise UsageError(f"{shown}: is what is read from, and is not modified")
+        raise UsageError(f"{shown}: is the file to be read, and is not modified")
     if not overwrite:
         raise UsageError(f"{shown}: exists; give another name, or overwrite it (--overwrite)")
 
 
 def _check_name_length(path: Path) -> None:
-    """Refuse a name with which the files beside it, such as RESULT.12345678.part, would be too long."""
+    """Refuse a name that is too long for the temporary files beside it, such as RESULT.12345678.part."""
     try:
-        most = os.pathconf(path.parent, "PC_NAME_MAX")
+        limit = os.pathconf(path.parent, "PC_NAME_MAX")
     except (OSError, ValueError, AttributeError):
         return
-    room = len(".12345678.part")
+    suffix_length = len(".12345678.part")
     length = len(os.fsencode(path.name))
-    if length > most - room:
+    if length > limit - suffix_length:
         shown = safe_text(str(path), 60)
-        raise UsageError(f"{shown}: got a name of {length} bytes, expected at most {most - room}")
+        raise UsageError(f"{shown}: got a name of {length} bytes, expected at most {limit - suffix_length}")
 
 
 def write_file(path: Path, content: bytes | memoryview, *, overwrite: bool) -> None:
-    """Write a file so that its name appears only when it is complete, and stays after a power cut.
+    """Write a file atomically: its name appears when it is complete, and it survives a power failure.
 
     Raises
     ------
     UsageError : see `check_output`
-    StoreError : the disk is full or failed; nothing is left under the name
+    StoreError : the disk is full or failed; no file of that name is left
     """
     check_output(path, overwrite=overwrite)
     with atomic_write(path, overwrite=overwrite) as sink:
@@ -91,7 +91,7 @@ def write_file(path: Path, content: bytes | memoryview, *, overwrite: bool) -> N
 
 def write_sealed(
     sink: Sink,
-    outline: xr.Dataset,
+    template: xr.Dataset,
     values: Iterable[tuple[str, tuple[int | slice, ...], NDArray[Any]]],
     output: Output = DEFAULT_OUTPUT,
 ) -> str:
@@ -100,17 +100,17 @@ def write_sealed(
     Parameters
     ----------
     sink : the file
-    outline : the dataset; the values of its variables do not count
-    values : those, as name, place and values
-    output : how they are stored
+    template : coordinates, attributes and variables of the dataset; the values of its variables are ignored
+    values : the values of the variables: name, region and array
+    output : dtype, compression and chunks
 
     Returns
     -------
     str : the seal
     """
-    with open_for_writing(sink, outline, output) as put:
-        for name, where, part in values:
-            put(name, where, part)
+    with open_for_writing(sink, template, output) as write_region:
+        for name, region, array in values:
+            write_region(name, region, array)
     seal = write_seal(sink)
     sink.check()
     return seal
@@ -128,18 +128,17 @@ def save(
 
     Parameters
     ----------
-    dataset : a result, or a part of one; of one that is computed or read when it is indexed no more than
-        a slab is held at a time
+    dataset : a result, or a part of one; a lazy one is read slab by slab
     path : the file
     overwrite : replace a file that exists
-    output : how it is stored
-    should_stop : whether to stop, asked now and then
+    output : dtype, compression and chunks
+    should_stop : called before each slab; writing stops if it returns True
 
     Raises
     ------
     UsageError : the file exists, its folder cannot be written to, or the dataset is no result
     StoreError : the disk is full or failed
-    UnfinishedError : it was stopped; nothing was written
+    UnfinishedError : writing was stopped; nothing was written
 
     >>> import impact, tempfile
     >>> result = impact.sweep("configs/figure6.toml")
@@ -153,9 +152,9 @@ def save(
         raise UsageError(
             f"{safe_text(str(path))}: this dataset is not a result of impact: it has no schema_version"
         )
-    odd = schema_violation(dataset)
-    if odd:
-        raise UsageError(f"{safe_text(str(path))}: {odd}; dataset.to_netcdf(path) stores anything")
+    violation = schema_violation(dataset)
+    if violation:
+        raise UsageError(f"{safe_text(str(path))}: {violation}; dataset.to_netcdf(path) stores any dataset")
     check_output(path, overwrite=overwrite)
 
     def parts() -> Iterator[tuple[str, tuple[slice, ...], NDArray[Any]]]:
@@ -171,7 +170,7 @@ def save(
 
 
 def save_with_attributes(source: Path, path: Path, attributes: Mapping[str, str]) -> None:
-    """Copy a result with other attributes, in the layout that it has; a file that exists is replaced.
+    """Copy a result file and set some attributes; its layout stays, an existing file is replaced.
 
     Raises
     ------
@@ -181,7 +180,7 @@ def save_with_attributes(source: Path, path: Path, attributes: Mapping[str, str]
         while content := file.read(COPY_BUFFER_BYTES):
             sink.write(content)
         sink.check()
-        # what is stored of an attribute depends on what stood there before: they are written anew
+        # the bytes of a modified attribute depend on its former value: create it again
         with h5py.File(sink, "r+") as stored:
             for name, text in attributes.items():
                 encoded = text.encode()
@@ -192,7 +191,7 @@ def save_with_attributes(source: Path, path: Path, attributes: Mapping[str, str]
 
 
 def check_readable(sink: Sink, path: Path) -> None:
-    """Refuse to give its name to a file that would not be read again."""
+    """Refuse a file that `open_result` would refuse, before it gets its name."""
     try:
         with h5py.File(sink, "r") as file:
             read_variables(file)
@@ -201,9 +200,9 @@ def check_readable(sink: Sink, path: Path) -> None:
 
 
 def open_result(path: str | Path) -> xr.Dataset:
-    """Open a result, whose values are read or computed when they are indexed.
+    """Open a result; its values are read or computed when they are indexed.
 
-    Its seal is checked at once. `dataset.encoding` has the layout ("full" or "factored") and the seal.
+    Its seal is checked first. `dataset.encoding` has the layout ("full" or "factored") and the seal.
 
     Parameters
     ----------
@@ -211,22 +210,22 @@ def open_result(path: str | Path) -> xr.Dataset:
 
     Raises
     ------
-    ResultError : it does not exist, is no result, is damaged, or is of another schema version
+    ResultError : it does not exist, is not a result, is damaged, or has another schema version
 
     Warns
     -----
-    UserWarning : it holds more than a result does, which is passed over
+    UserWarning : it holds variables that are not part of a result; they are ignored
     """
     return open_with_table(path)[0]
 
 
 def open_with_table(path: str | Path) -> tuple[xr.Dataset, TrajectoryTable | None]:
-    """The same, and the trajectory table of a factored file."""
+    """Open a result, and the trajectory table of a factored file."""
     path = Path(path)
     shown = safe_text(str(path))
     try:
         seal = check_seal(path)
-        # by its path: a signal that comes while h5py calls a Python stream is lost
+        # opened by its path: a signal that arrives while h5py calls a Python stream is lost
         file = h5py.File(path, "r", driver="sec2")
     except ResultError as error:
         raise ResultError(f"{shown}: {error}") from None
@@ -234,9 +233,9 @@ def open_with_table(path: str | Path) -> tuple[xr.Dataset, TrajectoryTable | Non
         raise ResultError(f"{shown}: is not a readable result ({safe_text(str(error), 80)})") from error
     try:
         dataset, table, unknown = _read_dataset(file)
-        odd = schema_violation(dataset)
-        if odd:
-            raise ResultError(f"is not a readable result ({odd})")
+        violation = schema_violation(dataset)
+        if violation:
+            raise ResultError(f"is not a readable result ({violation})")
     except ResultError as error:
         file.close()
         raise _with_file_name(shown, error) from None
@@ -245,26 +244,26 @@ def open_with_table(path: str | Path) -> tuple[xr.Dataset, TrajectoryTable | Non
         raise
     except Exception as error:
         file.close()
-        # h5py and xarray raise almost anything on an odd file
+        # h5py and xarray raise almost any exception on a malformed file
         raise ResultError(f"{shown}: is not a readable result ({safe_text(str(error), 80)})") from error
     if unknown:
         names = safe_text(", ".join(unknown))
-        warnings.warn(f"{shown}: passed over what is no part of a result: {names}", stacklevel=2)
+        warnings.warn(f"{shown}: ignored variables that are not part of a result: {names}", stacklevel=2)
     dataset.encoding = {"source": str(path), "seal": seal, "layout": dataset.encoding["layout"]}
     dataset.set_close(file.close)
     return dataset, table
 
 
 def _with_file_name(shown: str, error: ResultError) -> ResultError:
-    """An error that begins with the name of its file."""
+    """The error with a message that begins with the name of the file."""
     return error if str(error).startswith(f"{shown}: ") else ResultError(f"{shown}: {error}")
 
 
 def load(path: str | Path) -> xr.Dataset:
-    """Open a result, and read or compute all of its values if they are few: at most 512 MB.
+    """Open a result, and read or compute all of its values if they take at most 512 MB.
 
-    Of a larger one they are read or computed when they are indexed; see `open_result`, also for what it raises and
-    warns of.
+    The values of a larger result are read or computed when they are indexed; see `open_result`, also for
+    exceptions and warnings.
 
     >>> import impact
     >>> impact.load("README.md")  # doctest: +ELLIPSIS
@@ -279,9 +278,13 @@ def load(path: str | Path) -> xr.Dataset:
         try:
             if table is None:
                 return dataset.load()
-            # all variables of a slab together: they have much in common
-            held = [replace(one, dtype=dataset[one.name].dtype.str[1:]) for one in SCHEMA if one.name in dataset]
-            return in_memory(dataset, table, held)
+            # all variables of a slab together: they share most of the computation
+            variables = [
+                replace(variable, dtype=dataset[variable.name].dtype.str[1:])
+                for variable in SCHEMA
+                if variable.name in dataset
+            ]
+            return in_memory(dataset, table, variables)
         except MemoryError:
             raise
         except ResultError as error:
@@ -291,29 +294,30 @@ def load(path: str | Path) -> xr.Dataset:
 
 
 def _read_dataset(file: h5py.File) -> tuple[xr.Dataset, TrajectoryTable | None, tuple[str, ...]]:
-    """The dataset in a file, its trajectory table if it has one, and names that are no part of a result."""
+    """The dataset in a file, its trajectory table if it has one, and names that are not part of a result."""
     variables, attributes, unknown = read_variables(file)
-    given = [name for name, variable in variables.items() if not is_quantity(name, tuple(map(str, variable.dims)))]
-    table = {name for name in variables if name in TABLE_VARIABLES}
-    coordinates = {name: variables[name].load() for name in given if name not in table}
+    dims = {name: tuple(map(str, variable.dims)) for name, variable in variables.items()}
+    coordinate_names = [name for name in variables if not is_quantity(name, dims[name])]
+    table_names = {name for name in variables if name in TABLE_VARIABLES}
+    coordinates = {name: variables[name].load() for name in coordinate_names if name not in table_names}
     if "laws" not in attributes:
         computed = {name: variable for name, variable in variables.items() if name not in coordinates}
         dataset = xr.Dataset(computed, coordinates, attributes)
         dataset.encoding = {"layout": "full"}
         return dataset, None, unknown
-    witnesses = {name: variables[name].load() for name in table if name.startswith("witness_")}
+    witnesses = {name: variables[name].load() for name in table_names if name.startswith("witness_")}
     stored = xr.Dataset(witnesses, coordinates, attributes)
 
-    arrays = {name: StoredArray(name, file[name]) for name in table}
+    arrays = {name: StoredArray(name, file[name]) for name in table_names}
     sizes = {name: array.shape[0] for name, array in arrays.items()}
-    found = stored_table(stored, sizes, lambda name, part: arrays[name].read((part,)))
+    trajectory_table = stored_table(stored, sizes, lambda name, part: arrays[name].read((part,)))
     quantities = witness_variables(stored)
-    check_witnesses(found, quantities, stored)
-    outline = stored.drop_vars(witnesses).drop_attrs(deep=False)
-    kept = {name: value for name, value in attributes.items() if name not in ("axes", "laws")}
-    dataset = lazy_dataset(outline.assign_attrs(kept), found, quantities)
+    check_witnesses(trajectory_table, quantities, stored)
+    template = stored.drop_vars(witnesses).drop_attrs(deep=False)
+    dataset_attributes = {name: value for name, value in attributes.items() if name not in ("axes", "laws")}
+    dataset = lazy_dataset(template.assign_attrs(dataset_attributes), trajectory_table, quantities)
     dataset.encoding = {"layout": "factored"}
-    return dataset, found, unknown
+    return dataset, trajectory_table, unknown
 
 
 class ImpactBackend(BackendEntrypoint):

@@ -22,23 +22,25 @@ from .expand import expanded_slabs, table_of
 from .factored import factored_template
 from .schema import dataset_template, stored_variables
 
-# numbers of workers of which the time is told
+# numbers of workers for which the time is estimated
 WORKER_COUNTS = (1, 2, 8, 32, 128, 512)
-# what the driver does for a block that goes elsewhere is about so many times what is timed here: the rest is that
-# of dask, as scripts/bench_scaling.py measures it
+# the time of the driver for a block on a remote worker over the time that is measured by `estimate`: the rest is
+# spent in dask, see scripts/bench_scaling.py
 DASK_OVERHEAD = 2.0
 
 
 @dataclass(frozen=True)
 class ModelCounts:
-    """How the points of a model collapse.
+    """The points and the distinct trajectories of a model.
 
     Parameters
     ----------
     model : its key
-    points, cells, trajectories : of its own; of the product of the axes that its values come from; integrated
-    axes : those axes
-    within : where equal values are found: over the whole "plan", within a "block" only, or "not" at all
+    points : number of points of the model
+    cells : number of cells of the axes that the trajectories depend on
+    trajectories : number of distinct trajectories, which are integrated
+    axes : the axes that the trajectories depend on
+    within : scope of deduplication: the whole "plan", each "block", or "not" at all
     """
 
     model: str
@@ -51,11 +53,19 @@ class ModelCounts:
 
 @dataclass(frozen=True)
 class Estimate:
-    """What a sweep would take: bytes of the result before it is packed, and of what is kept while it runs.
+    """The size and the duration of a sweep.
 
-    The writing to the disk comes on top of the seconds. `core` is what would integrate; `wire` are the bytes that
-    go to workers elsewhere and come back, `by_workers` the seconds with some of them; the last number is the
-    largest that is of use, because then the driver is busy.
+    Parameters
+    ----------
+    points, trajectories : numbers of all models together
+    models : the numbers of each model
+    bytes : of the result before compression
+    kept : bytes of the work folder
+    seconds : without the time of the disk
+    core : the core that would integrate
+    wire : bytes that are sent to remote workers and back
+    by_workers : seconds by number of remote workers; the last number is the largest that helps, since then the
+        driver is busy all the time
     """
 
     points: int
@@ -79,12 +89,12 @@ def estimate(plan: Plan, jobs: int = 1) -> Estimate:
     """
     maps = trajectory_maps(plan)
     plan = with_core(plan, maps)
-    total = sum(own.count for own in maps)
+    total = sum(seconds_per_trajectory_of_driver.count for seconds_per_trajectory_of_driver in maps)
     ranges = list(trajectory_ranges(maps))
-    # one in the middle is neither the first values nor the last
+    # a range in the middle, to avoid the extreme values at both ends
     chosen = ranges[len(ranges) // 2]
     model = plan.models[chosen.model]
-    # the first time loads, or even compiles, what integrates
+    # the first run loads or compiles the core
     for _ in range(2):
         with _timed() as integrating:
             rebound, _ = integrate_columns(model, columns_of(plan, maps, chosen), plan.config.solver)
@@ -93,7 +103,7 @@ def estimate(plan: Plan, jobs: int = 1) -> Estimate:
         back = pickle.dumps(rebound, pickle.HIGHEST_PROTOCOL)
         pickle.loads(back)
         write_block(io.BytesIO(), "", rebound)
-    # what became of the trajectories of a slab does not matter for its time: those of the range, again and again
+    # the time of a slab does not depend on the values of its trajectories: repeat those of the range
     places = np.arange(RANGE_TRAJECTORIES) % chosen.size
     table = table_of(plan, maps, lambda _, start, stop: rebound.take(places[: stop - start]))
     with _timed() as assembling:
@@ -102,10 +112,10 @@ def estimate(plan: Plan, jobs: int = 1) -> Estimate:
             hashlib.sha256(array.tobytes())
     slab = values["status"].size
     is_full = plan.layout == "full"
-    each, own = integrating() / chosen.size, DASK_OVERHEAD * driving() / chosen.size
-    after = assembling() / slab * plan.stored_points if is_full else 0.0
-    busy = min(max(round(each / own), 1), len(ranges))
-    kept = total * sum(getattr(rebound, name).itemsize for name in TABLE_COLUMNS)
+    each, seconds_per_trajectory_of_driver = integrating() / chosen.size, DASK_OVERHEAD * driving() / chosen.size
+    writing_seconds = assembling() / slab * plan.stored_points if is_full else 0.0
+    busy = min(max(round(each / seconds_per_trajectory_of_driver), 1), len(ranges))
+    work_folder_bytes = total * sum(getattr(rebound, name).itemsize for name in TABLE_COLUMNS)
     whole = dataset_template(plan)
     counts = [*(count for count in WORKER_COUNTS if count < busy), busy]
     return Estimate(
@@ -113,27 +123,27 @@ def estimate(plan: Plan, jobs: int = 1) -> Estimate:
         total,
         tuple(_model_counts(plan, own_map) for own_map in maps),
         (whole if is_full else factored_template(whole, table, stored_variables(plan))).nbytes,
-        kept,
-        each * total / jobs + after,
+        work_folder_bytes,
+        each * total / jobs + writing_seconds,
         plan.config.solver.core,
         round((sent + len(back)) / chosen.size * total),
-        {count: max(each / count, own) * total + after for count in counts},
+        {count: max(each / count, seconds_per_trajectory_of_driver) * total + writing_seconds for count in counts},
     )
 
 
 @contextmanager
 def _timed() -> Iterator[Callable[[], float]]:
-    """How many seconds it took, when it is over."""
+    """A function that returns the seconds that the block took."""
     begun = time.perf_counter()
     ended = begun
     yield lambda: ended - begun
     ended = time.perf_counter()
 
 
-def _model_counts(plan: Plan, own: TrajectoryMap) -> ModelCounts:
-    axes = tuple(plan.config.axes[axis].name for axis in own.axes)
-    key = plan.models[own.model].key
-    within: Literal["plan", "block", "not"] = "block" if not own.is_shared else "plan"
+def _model_counts(plan: Plan, trajectory_map: TrajectoryMap) -> ModelCounts:
+    axes = tuple(plan.config.axes[axis].name for axis in trajectory_map.axes)
+    key = plan.models[trajectory_map.model].key
+    within: Literal["plan", "block", "not"] = "block" if not trajectory_map.is_shared else "plan"
     if not plan.config.solver.collapse:
         within = "not"
-    return ModelCounts(key, plan.inputs.points_of(key), own.cells, own.count, axes, within)
+    return ModelCounts(key, plan.inputs.points_of(key), trajectory_map.cells, trajectory_map.count, axes, within)

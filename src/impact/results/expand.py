@@ -1,7 +1,7 @@
 """Expand the trajectory table of a sweep into the outputs of any part of its grid.
 
-What is integrated is a table of distinct trajectories per model, in the contact's own units. All else in a result
-is a pure function of the inputs, this table and a place of the grid, and is computed here and nowhere else.
+A sweep integrates a table of distinct trajectories per model, in dimensionless form. Everything else in a result
+is a pure function of the inputs, this table and an index of the grid, and is computed in this module only.
 """
 
 from __future__ import annotations
@@ -32,41 +32,41 @@ from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryMap, axes_of_arr
 from .schema import SchemaVariable, attributes_of
 from .slabs import ORIGINAL_DIMS, VARIES_ALONG, aligned_slabs, slabs
 
-# values up to which a law's rule of K is looked at as a whole, and stored in a file
+# a law's rule of K is evaluated as a whole, and stored in a file, up to this many values
 MAX_STIFFNESS_VALUES = 10**6
-# sizes of a contact within these are far from what a floating-point number can hold, whatever rounding adds
+# magnitudes within these limits are far from overflow and underflow, whatever the rounding
 SAFE_MAGNITUDES = (1e-250, 1e250)
-# bytes that are computed or read at once, at most
+# at most this many bytes are computed or read by one indexing operation
 MAX_INDEXED_BYTES = 16 * 2**30
 
 
 @dataclass(frozen=True)
 class TrajectoryRows:
-    """The integrated trajectories of each model, of which no more is held than what is asked for needs.
+    """The integrated trajectories of each model, read in segments when they are needed.
 
     Parameters
     ----------
-    maps : which trajectory each cell takes, by model
-    read : the trajectories of a model from one to another
-    segment : how many are read at a time, at most
+    maps : by model, the trajectory of each cell
+    read : returns the trajectories of a model from a start to a stop: `read(model, start, stop)`
+    segment : how many trajectories are read at a time, at most
     """
 
     maps: Sequence[TrajectoryMap]
     read: Callable[[int, int, int], CollisionResult]
     segment: int = RANGE_TRAJECTORIES
-    # those of the model that was asked for last, where its cells share them
+    # all trajectories of the model that was read last, if its cells share them
     _whole: dict[int, CollisionResult] = field(default_factory=dict)
 
     def take(self, model: int, rows: NDArray[np.intp]) -> CollisionResult:
-        """Some trajectories of a model, arrays of the shape of `rows`."""
-        own = self.maps[model]
-        if not own.is_shared:
+        """Trajectories of a model by their row numbers; arrays of the shape of `rows`."""
+        trajectory_map = self.maps[model]
+        if not trajectory_map.is_shared:
             flat = self._segments(model, rows.reshape(-1))
             return flat.take(np.arange(rows.size).reshape(rows.shape))
         whole = self._whole.get(model)
         if whole is None:
-            # any of them may be needed at any time
-            whole = self._segments(model, np.arange(own.count))
+            # cells share trajectories in any order: keep all of them
+            whole = self._segments(model, np.arange(trajectory_map.count))
             self._whole.clear()
             self._whole[model] = whole
         return whole.take(rows)
@@ -74,25 +74,25 @@ class TrajectoryRows:
     def _segments(self, model: int, rows: NDArray[np.intp]) -> CollisionResult:
         count = self.maps[model].count
         size = even_size(count, self.segment)
-        found, segment = CollisionResult.blank(rows.size), rows // size
+        trajectories, segment = CollisionResult.blank(rows.size), rows // size
         for number in np.unique(segment).tolist():
             where = np.flatnonzero(segment == number)
             start = number * size
-            found.put(where, self.read(model, start, min(start + size, count)).take(rows[where] - start))
-        return found
+            trajectories.put(where, self.read(model, start, min(start + size, count)).take(rows[where] - start))
+        return trajectories
 
 
 @dataclass(frozen=True)
 class TrajectoryTable:
-    """The trajectories of a sweep, and all that their outputs depend on besides.
+    """The trajectories of a sweep, with everything else that the outputs depend on.
 
     Parameters
     ----------
     inputs : of the sweep
-    laws : the models, or what is known of them without their formulas
-    maps : which trajectory each point takes, by model
+    laws : the models; those of a file have no formulas
+    maps : by model, the trajectory of each cell
     rows : the trajectories
-    stiffness : K of each law that has a rule for it and no formula here; None otherwise
+    stiffness : K of each law that has a rule for it but no formula (a law of a file); None otherwise
     """
 
     inputs: Inputs
@@ -103,7 +103,7 @@ class TrajectoryTable:
 
     @cached_property
     def checks(self) -> tuple[frozenset[str], ...]:
-        """What has to be checked at each point of a model; see `impact.contact.outputs.check_inputs`."""
+        """By model, the checks that are necessary at each point; see `impact.contact.impacts.check_inputs`."""
         return tuple(
             checks_that_may_fail(self.inputs, law, stiffness)
             for law, stiffness in zip(self.laws, self.stiffness, strict=True)
@@ -125,14 +125,14 @@ def expand(table: TrajectoryTable, model: int, index: Index, names: Sequence[str
     Parameters
     ----------
     table : of the sweep
-    model : place of the model
-    index : the cells, integer arrays that broadcast against each other, one for each axis
+    model : number of the model
+    index : the cells, one integer array for each axis; the arrays broadcast against each other
     names : of the outputs, see docs/schema.md
 
     Returns
     -------
-    dict : by name, arrays that broadcast to the shape of the index; what does not vary along an axis has length
-        one there. A plan without axes has one cell.
+    dict : by name, arrays that broadcast to the shape of the index, of length one along axes on which the output
+        does not vary. A plan without axes has one cell.
     """
     return _expand(table, model, index, names)[1]
 
@@ -150,17 +150,17 @@ def _expand(table: TrajectoryTable, model: int, index: Index, names: Sequence[st
 def varies_along(table: TrajectoryTable, model: int, names: Sequence[str]) -> dict[str, tuple[int, ...]]:
     """The axes of the grid along which outputs of a model vary, at most."""
     law, inputs = table.laws[model], table.inputs
-    # K may depend on n by its value: Hertz's for n = 3/2
+    # K may depend on the value of n: Hertz's K is for n = 3/2
     index = probe_index(inputs, {"n"})
     impacts = build_impacts(inputs, law, index, table.stiffness[model])
-    # where something may fail, something does: masks then have all the axes that they may have
+    # assume that every check that may fail does, so that the masks have all axes that they may have
     with np.errstate(all="ignore"):
-        looked_at = {
+        checked_arrays = {
             "e": [impacts.e],
             "v0": [impacts.v0],
             "length": [impacts.v0, impacts.length, impacts.energy, impacts.time],
         }
-    shapes = [array.shape for check in table.checks[model] for array in looked_at[check]]
+    shapes = [array.shape for check in table.checks[model] for array in checked_arrays[check]]
     checked = np.broadcast_shapes((1,) * dimensions(index), *shapes)
     status = _alternating_statuses(checked, Status.NO_IMPACT, Status.OUT_OF_RANGE)
     shape = table.maps[model].rows(index).shape
@@ -172,20 +172,19 @@ def varies_along(table: TrajectoryTable, model: int, names: Sequence[str]) -> di
 
 
 def _alternating_statuses(shape: tuple[int, ...], *statuses: Status) -> NDArray[np.int8]:
-    """Each of some statuses at some places, where there are several."""
-    found = np.full(shape, Status.OK, np.int8)
-    if found.size > 1:
-        for place, status in enumerate(statuses):
-            found.reshape(-1)[place :: len(statuses) + 1] = status
-    return found
+    """An array in which OK and each of some statuses alternate; OK only if it has one element."""
+    status_array = np.full(shape, Status.OK, np.int8)
+    if status_array.size > 1:
+        for offset, status in enumerate(statuses):
+            status_array.reshape(-1)[offset :: len(statuses) + 1] = status
+    return status_array
 
 
 def checks_that_may_fail(inputs: Inputs, law: Law, stiffness: Stiffness | None = None) -> frozenset[str]:
     """The checks of `check_inputs` that may fail at some point of the grid; the others hold at all of them.
 
-    The sizes of a contact are monotonic in the closing speed, the masses, the radii, K and n each, or nearly
-    so: they are safe at all points if at the ends of what each of these may be, in any combination, they are far
-    from what a number can hold.
+    The scales of a contact are monotonic, or nearly so, in each of closing speed, masses, radii, K and n: they are
+    safe at all points if they are far from overflow and underflow at all combinations of the extreme values.
     """
     slowest, fastest, slowest_approach = _closing_speeds(inputs)
     if not fastest > 0.0:
@@ -214,35 +213,35 @@ def checks_that_may_fail(inputs: Inputs, law: Law, stiffness: Stiffness | None =
         if not all(np.all((size > SAFE_MAGNITUDES[0]) & (size < SAFE_MAGNITUDES[1])) for size in sizes):
             failing.add("length")
         if "alpha" in inputs.names():
-            asked = 1.0 - np.multiply.outer(
+            restitution = 1.0 - np.multiply.outer(
                 np.asarray(inputs.values("alpha"), float), np.array([slowest, fastest])
             )
         else:
-            asked = np.asarray(inputs.values("e") if "e" in inputs.names() else np.nan, float)
-    if "e" in law.quantities and not np.all((asked >= 0.0) & (asked <= 1.0)):
+            restitution = np.asarray(inputs.values("e") if "e" in inputs.names() else np.nan, float)
+    if "e" in law.quantities and not np.all((restitution >= 0.0) & (restitution <= 1.0)):
         failing.add("e")
     return frozenset(failing)
 
 
 def _closing_speeds(inputs: Inputs) -> tuple[float, float, float]:
-    """The least and greatest closing speed v1 - v2 [m/s], and a bound from below of the positive ones."""
+    """The least and the greatest closing speed v1 - v2 [m/s], and a lower bound of the positive ones."""
     v1, v2 = (np.asarray(inputs.values(name), float) for name in ("v1", "v2"))
     slowest, fastest = float(v1.min() - v2.max()), float(v1.max() - v2.min())
-    known = np.abs(np.concatenate([v1.reshape(-1), v2.reshape(-1)]))
-    # the difference of two numbers is no smaller than the spacing of the smaller one
-    bound = float(known[known > 0.0].min(initial=np.inf)) * float(np.finfo(float).eps) / 2.0
+    magnitudes = np.abs(np.concatenate([v1.reshape(-1), v2.reshape(-1)]))
+    # a difference of two numbers is at least the spacing of numbers at the smaller one
+    bound = float(magnitudes[magnitudes > 0.0].min(initial=np.inf)) * float(np.finfo(float).eps) / 2.0
     return slowest, fastest, slowest if slowest > 0.0 else bound
 
 
 def whole_stiffness(
     inputs: Inputs, law: Law, stiffness: Stiffness | None = None
 ) -> tuple[tuple[int, ...], Array | None]:
-    """K by a law's own rule over the axes that it depends on [N/m^n]; no values where they are too many.
+    """K [N/m^n] by a law's own rule, over the axes that it depends on; None if the values are too many.
 
     Returns
     -------
-    axes : the axes
-    K : of the shape of the grid, with length one along the others
+    axes : the axes that K depends on
+    K : of the shape of the grid, with length one along the other axes
     """
     probed = build_impacts(inputs, law, probe_index(inputs, {"n"}), stiffness).K
     axes = tuple(sorted(axes_of_arrays([probed])))
@@ -258,7 +257,7 @@ class ExpandedArray(BackendArray):
     Parameters
     ----------
     table : of the sweep
-    variable : which
+    variable : the variable to compute
     """
 
     def __init__(self, table: TrajectoryTable, variable: SchemaVariable) -> None:
@@ -270,14 +269,14 @@ class ExpandedArray(BackendArray):
         return indexing.explicit_indexing_adapter(key, self.shape, indexing.IndexingSupport.OUTER, self._read)
 
     def _read(self, key: tuple[Any, ...]) -> NDArray[Any]:
-        places = [np.atleast_1d(np.arange(size)[part]) for size, part in zip(self.shape, key, strict=True)]
-        shape = tuple(part.size for part in places)
+        positions = [np.atleast_1d(np.arange(size)[part]) for size, part in zip(self.shape, key, strict=True)]
+        shape = tuple(part.size for part in positions)
         check_memory(self.variable.name, shape, self.dtype)
         values = np.empty(shape, self.dtype)
         of_models = self.variable.per == "model"
-        models, axes = (places[0], places[1:]) if of_models else (np.zeros(1, np.intp), places)
+        models, axes = (positions[0], positions[1:]) if of_models else (np.zeros(1, np.intp), positions)
         for row, model in enumerate(models.tolist()):
-            # an array even where there is no axis
+            # a view, also if there is no axis
             out = values[row, ...] if of_models else values
             for where in slabs(dict(enumerate(out.shape))):
                 part = tuple(where.values())
@@ -285,32 +284,32 @@ class ExpandedArray(BackendArray):
                 out[part or ...] = _without_dummy_axis(
                     expand(self.table, model, index, [self.variable.name])[self.variable.name], part
                 )
-        kept = tuple(0 if isinstance(part, int | np.integer) else slice(None) for part in key)
-        return np.asarray(values[kept])
+        selected = tuple(0 if isinstance(part, int | np.integer) else slice(None) for part in key)
+        return np.asarray(values[selected])
 
 
 def _without_dummy_axis(values: NDArray[Any], where: tuple[slice, ...]) -> NDArray[Any]:
-    """Values of a slab; of a plan without axes the only cell has an axis."""
+    """Values of a slab; a plan without axes has a dummy axis of length one, which is dropped."""
     return values if where else values.reshape(())
 
 
 def check_memory(name: str, shape: Sequence[int], dtype: np.dtype[Any]) -> None:
-    """Refuse to compute or read more than the memory may hold, before it is begun.
+    """Refuse to compute or read an array that is too large for memory.
 
     Raises
     ------
-    MemoryError : so it is
+    MemoryError : it takes more than `max_indexed_bytes()`
     """
-    size, most = math.prod(shape) * dtype.itemsize, max_indexed_bytes()
-    if size > most:
+    size, limit = math.prod(shape) * dtype.itemsize, max_indexed_bytes()
+    if size > limit:
         raise MemoryError(
-            f"{name}: {math.prod(shape):,} values take {size:,} bytes, expected at most {most:,}; select a part "
+            f"{name}: {math.prod(shape):,} values take {size:,} bytes, expected at most {limit:,}; select a part "
             "first, such as result.isel(...) or result.sel(...)"
         )
 
 
 def max_indexed_bytes() -> int:
-    """The bytes that may be computed or read at once: half of this machine's memory, at most 16 GiB."""
+    """Limit of the bytes computed or read at once: half of the memory, at most 16 GiB."""
     try:
         whole = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (ValueError, OSError, AttributeError):
@@ -318,14 +317,14 @@ def max_indexed_bytes() -> int:
     return min(MAX_INDEXED_BYTES, whole // 2)
 
 
-def lazy_dataset(outline: xr.Dataset, table: TrajectoryTable, variables: Sequence[SchemaVariable]) -> xr.Dataset:
+def lazy_dataset(template: xr.Dataset, table: TrajectoryTable, variables: Sequence[SchemaVariable]) -> xr.Dataset:
     """A result whose variables are computed when they are read.
 
     Parameters
     ----------
-    outline : its coordinates and attributes
+    template : coordinates and attributes of the result
     table : of the sweep
-    variables : those that it has
+    variables : of the result
     """
     axes = [axis.name for axis in table.inputs.axes]
     names = [variable.name for variable in variables]
@@ -334,14 +333,14 @@ def lazy_dataset(outline: xr.Dataset, table: TrajectoryTable, variables: Sequenc
     for variable in variables:
         dims = ["model", *axes] if variable.per == "model" else axes
         by_model = {
-            law.key: tuple(axes[axis] for axis in own[variable.name])
-            for law, own in zip(table.laws, along, strict=True)
+            law.key: tuple(axes[axis] for axis in axes_by_variable[variable.name])
+            for law, axes_by_variable in zip(table.laws, along, strict=True)
         }
         array = indexing.LazilyIndexedArray(ExpandedArray(table, variable))
         computed[variable.name] = xr.Variable(
             dims, array, attributes_of(variable), {VARIES_ALONG: by_model, ORIGINAL_DIMS: tuple(dims)}
         )
-    dataset = outline.drop_vars(list(outline.data_vars)).assign(computed)
+    dataset = template.drop_vars(list(template.data_vars)).assign(computed)
     for dim in map(str, dataset.dims):
         dataset = dataset if dim in dataset.xindexes else dataset.set_xindex(dim)
     return dataset
@@ -350,27 +349,27 @@ def lazy_dataset(outline: xr.Dataset, table: TrajectoryTable, variables: Sequenc
 def expanded_slabs(
     table: TrajectoryTable, variables: Sequence[SchemaVariable], lengths: Sequence[int] = ()
 ) -> Iterator[tuple[int, tuple[slice, ...], Impacts, dict[str, NDArray[Any]]]]:
-    """All values of a result, slab by slab: the model, the place, the impacts, and values by name.
+    """All values of a result, slab by slab: number of the model, region, impacts, and values by name.
 
-    What depends on the axes alone is there once, with the first model.
+    Variables that do not depend on the model are yielded once, with the first model.
 
     Parameters
     ----------
     table, variables : see `lazy_dataset`
-    lengths : of chunks along the axes, which are then whole in every slab
+    lengths : lengths of chunks along the axes; every slab then holds whole chunks
     """
     sizes: dict[Hashable, int] = dict(enumerate(table.inputs.shape))
     for model in range(len(table.laws)):
-        for places in aligned_slabs(sizes, lengths) if lengths else slabs(sizes):
-            where = tuple(places.values())
-            wanted = [variable for variable in variables if variable.per == "model" or model == 0]
+        for slab in aligned_slabs(sizes, lengths) if lengths else slabs(sizes):
+            where = tuple(slab.values())
+            slab_variables = [variable for variable in variables if variable.per == "model" or model == 0]
             index = table.inputs.index(where)
-            impacts, arrays = _expand(table, model, index, [variable.name for variable in wanted])
+            impacts, arrays = _expand(table, model, index, [variable.name for variable in slab_variables])
             shape = tuple(part.stop - part.start for part in where)
             values = {}
-            for variable in wanted:
+            for variable in slab_variables:
                 array = np.broadcast_to(_without_dummy_axis(arrays.pop(variable.name), where), shape)
-                # copied only where it is a view of fewer values, or of another type
+                # copied only if it is a broadcast view or has another dtype
                 values[variable.name] = np.asarray(array, variable.dtype, order="C")
             yield model, where, impacts, values
 
@@ -380,8 +379,8 @@ def in_memory(dataset: xr.Dataset, table: TrajectoryTable, variables: Sequence[S
     arrays = {variable.name: np.empty(dataset[variable.name].shape, variable.dtype) for variable in variables}
     for model, where, _, values in expanded_slabs(table, variables):
         for name, part in values.items():
-            place: tuple[Any, ...] = (model, *where) if "model" in dataset[name].dims else where
-            arrays[name][place or ...] = part
+            region: tuple[Any, ...] = (model, *where) if "model" in dataset[name].dims else where
+            arrays[name][region or ...] = part
     return dataset.assign(
         {name: (dataset[name].dims, array, dataset[name].attrs) for name, array in arrays.items()}
     )

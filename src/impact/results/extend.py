@@ -33,7 +33,7 @@ from .selection import IndexArray, match_labels
 from .summary import SweepOutcome
 from .sweep import Extension, SlabValues, sweep_into
 
-# statuses that are given before anything is integrated
+# statuses that are assigned before integration
 CHECKED_STATUSES = (Status.NO_IMPACT, Status.INVALID_PARAMETER, Status.OUT_OF_RANGE)
 
 
@@ -55,21 +55,21 @@ def extend(
     Parameters
     ----------
     source : the result
-    output : the file of the larger one, which may be the same
+    output : the file of the extended result, which may be the same
     overrides : changes to its config, such as "sweep.m2=[1.0, 2.0]"; values that the result has are kept
-    plugins : models that are not built in, those that it was made with among them
+    plugins : models that are not built in, including those of the result
     resume, overwrite, backend, on_progress, should_stop : see `impact.results.sweep.sweep_into`
     max_points : refuse a sweep of more points
 
     Returns
     -------
-    The larger result, in all variables and coordinates what a sweep of its config at once gives, and how many
-    trajectories were integrated for it.
+    The extended result, with the same variables and coordinates as a single sweep of its config, and the number of
+    trajectories that were integrated for it.
 
     Raises
     ------
-    ResultError : the source is not a readable result, or of another version of this program
-    UsageError : what is changed is more than values of axes and models; see also `sweep_into`
+    ResultError : the source is not a readable result, or was written by another version of impact
+    UsageError : the overrides change more than values of axes and models; see also `sweep_into`
     """
     name = safe_text(str(source))
     before, table = open_with_table(source)
@@ -79,7 +79,7 @@ def extend(
         _check_whole(before, old, name)
         new = _extended_plan(before, old, overrides, plugins, source, max_points)
         if before.attrs.get("core") in CORES:
-            # the trajectories that are known are of this core
+            # the existing trajectories were integrated by this core
             solver = replace(new.config.solver, core=str(before.attrs["core"]))
             new = replace(new, config=replace(new.config, solver=solver))
         _check_changes(old, new, name)
@@ -88,63 +88,67 @@ def extend(
         _check_none_lost(old, axes, name)
         seal = str(before.encoding["seal"])
         history = [*read_attribute(before.attrs, "extended", str(source)), {"seal": seal, "set": list(overrides)}]
-        places = _OldPositions(old, new, trajectory_maps(new), axes)
-        counted: dict[int, int] = {}
+        old_positions = _OldPositions(old, new, trajectory_maps(new), axes)
+        n_integrated: dict[int, int] = {}
 
-        # a full result has no trajectories to hand on to a table, only the values of its points
-        fill = places.filler(before) if table is None and new.layout == "full" else None
+        # a full result has no trajectories, only the values of its points
+        fill = old_positions.filler(before) if table is None and new.layout == "full" else None
 
-        def known(part: TrajectoryRange) -> tuple[NDArray[np.bool_], CollisionResult] | None:
-            found = None
+        def find_reused(part: TrajectoryRange) -> tuple[NDArray[np.bool_], CollisionResult] | None:
+            reused = None
             if table is not None:
-                found = places.from_table(part, table)
+                reused = old_positions.from_table(part, table)
             elif fill is not None:
-                found = places.not_needed(part)
-            counted[part.number] = part.size - (0 if found is None else int(np.count_nonzero(found[0])))
-            return found
+                reused = old_positions.not_needed(part)
+            n_integrated[part.number] = part.size - (0 if reused is None else int(np.count_nonzero(reused[0])))
+            return reused
 
-        extension = Extension(seal, json.dumps(history), known, fill)
+        extension = Extension(seal, json.dumps(history), find_reused, fill)
         outcome = sweep_into(
             output, new, resume=resume, overwrite=overwrite, in_place=output == source, backend=backend,
             on_progress=on_progress, should_stop=should_stop, extension=extension,
         )  # fmt: skip
-    return outcome, sum(counted.values())
+    return outcome, sum(n_integrated.values())
 
 
 def _check_whole(before: xr.Dataset, old: Plan, name: str) -> None:
-    """Refuse what is no whole result of a sweep of this version."""
+    """Refuse a result that is incomplete or was written by another version."""
     version = safe_text(str(before.attrs.get("impact_version")), 40)
     if version != __version__:
         raise ResultError(f"{name}: was made by impact {version}, this is {__version__}; sweep its config again")
     sizes = {"model": len(old.models), **{axis.name: axis.size for axis in old.config.axes}}
     if before.attrs.get("fingerprint") != old.fingerprint or dict(before.sizes) != sizes:
-        raise UsageError(f"{name}: is a part of the result of its config, expected the whole")
+        raise UsageError(f"{name}: got a part of the result of its config, expected the whole")
 
 
 def _extended_plan(
     before: xr.Dataset, old: Plan, overrides: Sequence[str], plugins: Plugins, source: Path, max_points: int
 ) -> Plan:
-    """The plan with the overrides, in which the values and models that the result has are kept."""
-    asked = stored_config(before.attrs, overrides, plugins, str(source), max_points)
-    more = []
-    for axis in asked.axes:
+    """The plan with the overrides, and all values and models of the result."""
+    config = stored_config(before.attrs, overrides, plugins, str(source), max_points)
+    appended_overrides = []
+    for axis in config.axes:
         name = axis.name
-        was = np.atleast_1d(old.inputs.values(name)) if _has_value(old.inputs, name) else np.array([])
-        is_there = len(match_labels([np.asarray(axis.columns[name])], [was])[0]) == was.size if was.size else True
-        if len(axis.columns) == 1 and not axis.numbered and not is_there:
-            values = [*was.tolist(), *(value for value in axis.columns[name] if value not in was.tolist())]
-            more.append(f"{'.'.join(map(str, path_of(name)))}={_toml_array(values)}")
-    missing = [model.key for model in old.models if model not in asked.models]
+        old_values = np.atleast_1d(old.inputs.values(name)) if _has_value(old.inputs, name) else np.array([])
+        in_both = (
+            match_labels([np.asarray(axis.columns[name])], [old_values])[0] if old_values.size else old_values
+        )
+        has_all_old_values = len(in_both) == old_values.size
+        if len(axis.columns) == 1 and not axis.numbered and not has_all_old_values:
+            new_values = (value for value in axis.columns[name] if value not in old_values.tolist())
+            values = [*old_values.tolist(), *new_values]
+            appended_overrides.append(f"{'.'.join(map(str, path_of(name)))}={_toml_array(values)}")
+    missing = [model.key for model in old.models if model not in config.models]
     if missing:
-        keys = [*(model.key for model in old.models), *(m.key for m in asked.models if m not in old.models)]
-        more.append(f"models={json.dumps(keys)}")
-    if more:
-        asked = stored_config(before.attrs, [*overrides, *more], plugins, str(source), max_points)
-    return Plan(asked, plugins.of(asked.models))
+        keys = [*(model.key for model in old.models), *(m.key for m in config.models if m not in old.models)]
+        appended_overrides.append(f"models={json.dumps(keys)}")
+    if appended_overrides:
+        config = stored_config(before.attrs, [*overrides, *appended_overrides], plugins, str(source), max_points)
+    return Plan(config, plugins.of(config.models))
 
 
 def _has_value(inputs: Inputs, name: str) -> bool:
-    """Whether an axis or a scalar had a value, be it a property of a material."""
+    """Whether an axis or a scalar, which may be a property of a material, had a value."""
     return inputs.values(name).item(0) is not None
 
 
@@ -156,9 +160,9 @@ def _toml_array(values: Sequence[object]) -> str:
 
 def _check_changes(old: Plan, new: Plan, name: str) -> None:
     """Refuse changes of anything but values of axes and models."""
-    before, after = dict(old.physics), dict(new.physics)
+    old_physics, new_physics = dict(old.physics), dict(new.physics)
     free = ("models", "axes", "scalars", "materials", "plugins")
-    changed = [key for key in before if key not in free and before[key] != after[key]]
+    changed = [key for key in old_physics if key not in free and old_physics[key] != new_physics[key]]
     changed += [
         f"model {key}" for key in old.plugins.hashes if old.plugins.hashes[key] != new.plugins.hashes.get(key)
     ]
@@ -170,7 +174,7 @@ def _check_changes(old: Plan, new: Plan, name: str) -> None:
         if key in used and used[key][field] != value and f"materials.{key}.{field}" not in swept
     ]
     outputs = old.config.output, new.config.output
-    # values that are copied have the variables and the digits of the result
+    # copied values have the variables and the precision of the result
     changed += [
         f"output.{key}" for key in ("variables", "dtype") if getattr(outputs[0], key) != getattr(outputs[1], key)
     ]
@@ -186,22 +190,24 @@ def _check_changes(old: Plan, new: Plan, name: str) -> None:
             "such as --set 'sweep.m2=[1.0, 2.0]', or more models"
         )
     if old.models == new.models and old.config.axes == new.config.axes:
-        raise UsageError(f"{name}: has all of that already; expected more values of an axis, or more models")
+        raise UsageError(f"{name}: already has all of these; expected more values of an axis, or more models")
 
 
 @dataclass(frozen=True)
 class _AxisPositions:
-    """Where the values of an axis stand in the old result: its axis there, if any, and places; -1 is new."""
+    """The old axis that an axis corresponds to, if any, and the old positions of its values; -1 is new."""
 
     axis: int | None
-    places: IndexArray
+    positions: IndexArray
 
 
 def _check_none_lost(old: Plan, axes: Sequence[_AxisPositions], name: str) -> None:
-    """Refuse a plan that lacks a value of the smaller one."""
+    """Refuse a plan that lacks a value of the old one."""
     for number, axis in enumerate(old.config.axes):
-        held = {place for own in axes if own.axis == number for place in own.places.tolist()}
-        lost = [place for place in range(axis.size) if place not in held]
+        positions = {
+            position for new_axis in axes if new_axis.axis == number for position in new_axis.positions.tolist()
+        }
+        lost = [position for position in range(axis.size) if position not in positions]
         if lost:
             row = {column: safe_text(str(values[lost[0]]), 40) for column, values in axis.columns.items()}
             values = ", ".join(f"{column}={value}" for column, value in row.items())
@@ -212,68 +218,68 @@ def _check_none_lost(old: Plan, axes: Sequence[_AxisPositions], name: str) -> No
 
 
 def _axis_positions(axis: Axis, old: Inputs, name: str) -> _AxisPositions:
-    """Where the values of an axis stood.
+    """The positions that the values of an axis have in the old result.
 
     Raises
     ------
-    UsageError : its columns were axes of their own
+    UsageError : its columns were several axes, or its points had other labels or another order
     """
-    axes = {place for column in axis.columns for place in old.axes_of(column)}
+    axes = {axis_number for column in axis.columns for axis_number in old.axes_of(column)}
     if len(axes) > 1:
         shown = safe_text(", ".join(map(str, axis.columns)))
         raise UsageError(f"{name}: {shown} vary together now and did not before; sweep the new config")
-    numbered = {old.axes[place].numbered for place in axes}
+    numbered = {old.axes[axis_number].numbered for axis_number in axes}
     if numbered - {axis.numbered}:
         raise UsageError(f"{name}: the points of {safe_text(axis.name)} had other labels; sweep the new config")
     columns = [np.atleast_1d(old.values(column)).tolist() for column in axis.columns]
     size = max(map(len, columns))
     before = [*zip(*(values * size if len(values) == 1 else values for values in columns), strict=True)]
     rows = [*zip(*axis.columns.values(), strict=True)]
-    if {old.axes[place].numbered for place in axes} - {axis.numbered}:
+    if {old.axes[axis_number].numbered for axis_number in axes} - {axis.numbered}:
         raise UsageError(f"{name}: the points of {safe_text(axis.name)} had other labels; sweep the new config")
     if axes and axis.numbered:
-        # a case keeps its number: those that the result has come first, as they were
+        # a case keeps its number: the cases of the result come first, unchanged
         changed = [number for number, row in enumerate(before) if rows[number : number + 1] != [row]]
         if changed:
             raise UsageError(
                 f"{name}: --set changes {safe_text(axis.name)} {changed[0]}, expected the cases that the result "
                 "has, in their order, and more after them"
             )
-        found = [number if number < size else -1 for number in range(axis.size)]
+        positions = [number if number < size else -1 for number in range(axis.size)]
     else:
-        place = {row: number for number, row in enumerate(before)}
-        found = [place.get(row, -1) for row in rows]
-    return _AxisPositions(next(iter(axes), None), np.array(found, np.intp))
+        old_position = {row: number for number, row in enumerate(before)}
+        positions = [old_position.get(row, -1) for row in rows]
+    return _AxisPositions(next(iter(axes), None), np.array(positions, np.intp))
 
 
 @dataclass(frozen=True)
 class _OldPositions:
-    """Where the trajectories and points of the larger sweep stand in the smaller one."""
+    """The trajectories and points of the old sweep that those of the new one equal."""
 
     old: Plan
     new: Plan
     maps: Sequence[TrajectoryMap]
     axes: tuple[_AxisPositions, ...]
-    # by model, for each trajectory the one that it was before, or -1
+    # by model, for each trajectory its row in the old table, or -1
     _rows: dict[int, IndexArray] = field(default_factory=dict)
 
     def model(self, model: int) -> int | None:
-        """The place that a model had."""
-        keys = [one.key for one in self.old.models]
+        """The number that a model had in the old plan, or None."""
+        keys = [model_of_old_plan.key for model_of_old_plan in self.old.models]
         key = self.new.models[model].key
         return keys.index(key) if key in keys else None
 
     def from_table(
         self, part: TrajectoryRange, table: TrajectoryTable
     ) -> tuple[NDArray[np.bool_], CollisionResult] | None:
-        """The trajectories of a range that the smaller result has in its table."""
+        """The trajectories of a range that the old result has in its table."""
         model = self.model(part.model)
         if model is None:
             return None
-        before = self._old_rows(part, table.maps[model])
-        is_known = before >= 0
-        held = table.rows.take(model, np.maximum(before, 0))
-        # what was checked beforehand at the values of the smaller sweep need not hold at those of the larger one
+        old_rows = self._old_rows(part, table.maps[model])
+        is_known = old_rows >= 0
+        held = table.rows.take(model, np.maximum(old_rows, 0))
+        # a status that was assigned before integration may differ between the two sweeps
         status = columns_of(self.new, self.maps, part)["status"]
         is_known &= np.where(status == STATUS_OK, ~np.isin(held.status, CHECKED_STATUSES), held.status == status)
         rebound = CollisionResult.blank(part.size)
@@ -281,60 +287,63 @@ class _OldPositions:
         return is_known, rebound
 
     def not_needed(self, part: TrajectoryRange) -> tuple[NDArray[np.bool_], CollisionResult] | None:
-        """The trajectories of a range that only points have which the smaller result holds in full."""
-        own = self.maps[part.model]
-        others = [axis for axis in range(len(self.axes)) if axis not in own.axes]
-        if self.model(part.model) is None or any((self.axes[axis].places < 0).any() for axis in others):
+        """The trajectories of a range that are needed only by points that the old result holds in full."""
+        trajectory_map = self.maps[part.model]
+        others = [axis for axis in range(len(self.axes)) if axis not in trajectory_map.axes]
+        if self.model(part.model) is None or any((self.axes[axis].positions < 0).any() for axis in others):
             return None
-        if own.of_cell is None:
-            is_old = self._is_old(own, np.arange(part.start, part.stop))
+        if trajectory_map.of_cell is None:
+            is_old = self._is_old(trajectory_map, np.arange(part.start, part.stop))
         else:
-            needed = np.zeros(own.count, bool)
-            needed[own.of_cell[~self._is_old(own, np.arange(own.cells))]] = True
+            needed = np.zeros(trajectory_map.count, bool)
+            needed[trajectory_map.of_cell[~self._is_old(trajectory_map, np.arange(trajectory_map.cells))]] = True
             is_old = ~needed[part.start : part.stop]
         return is_old, CollisionResult.blank(part.size)
 
-    def _is_old(self, own: TrajectoryMap, cells: IndexArray) -> NDArray[np.bool_]:
-        along = np.unravel_index(cells, own.shape) if own.shape else ()
+    def _is_old(self, trajectory_map: TrajectoryMap, cells: IndexArray) -> NDArray[np.bool_]:
+        along = np.unravel_index(cells, trajectory_map.shape) if trajectory_map.shape else ()
         is_old = np.ones(cells.shape, bool)
-        for axis, place in zip(own.axes, along, strict=True):
-            is_old &= self.axes[axis].places[place] >= 0
+        for axis, coordinate in zip(trajectory_map.axes, along, strict=True):
+            is_old &= self.axes[axis].positions[coordinate] >= 0
         return is_old
 
-    def _old_rows(self, part: TrajectoryRange, before: TrajectoryMap) -> IndexArray:
-        own = self.maps[part.model]
-        if own.of_cell is None:
-            return self._rows_of_cells(own, before, np.arange(part.start, part.stop))
+    def _old_rows(self, part: TrajectoryRange, old_map: TrajectoryMap) -> IndexArray:
+        trajectory_map = self.maps[part.model]
+        if trajectory_map.of_cell is None:
+            return self._rows_of_cells(trajectory_map, old_map, np.arange(part.start, part.stop))
         if part.model not in self._rows:
-            rows = np.full(own.count, -1, np.intp)
-            of_cells = self._rows_of_cells(own, before, np.arange(own.cells))
-            rows[own.of_cell[of_cells >= 0]] = of_cells[of_cells >= 0]
+            rows = np.full(trajectory_map.count, -1, np.intp)
+            of_cells = self._rows_of_cells(trajectory_map, old_map, np.arange(trajectory_map.cells))
+            rows[trajectory_map.of_cell[of_cells >= 0]] = of_cells[of_cells >= 0]
             self._rows[part.model] = rows
         return self._rows[part.model][part.start : part.stop]
 
-    def _rows_of_cells(self, own: TrajectoryMap, before: TrajectoryMap, cells: IndexArray) -> IndexArray:
-        """The trajectory that each cell had, or -1."""
-        along = dict(zip(own.axes, np.unravel_index(cells, own.shape) if own.shape else (), strict=True))
+    def _rows_of_cells(
+        self, trajectory_map: TrajectoryMap, old_map: TrajectoryMap, cells: IndexArray
+    ) -> IndexArray:
+        """The old row of each cell's trajectory, or -1."""
+        coordinates = np.unravel_index(cells, trajectory_map.shape) if trajectory_map.shape else ()
+        along = dict(zip(trajectory_map.axes, coordinates, strict=True))
         index = [np.zeros(cells.shape, np.intp) for _ in self.old.config.axes]
-        for axis, place in along.items():
-            was = self.axes[axis].axis
-            if was is not None:
-                index[was] = np.maximum(self.axes[axis].places[place], 0)
-        covered = {self.axes[axis].axis for axis in own.axes}
-        if not set(before.axes) <= covered:
+        for axis, coordinate in along.items():
+            old_axis = self.axes[axis].axis
+            if old_axis is not None:
+                index[old_axis] = np.maximum(self.axes[axis].positions[coordinate], 0)
+        covered = {self.axes[axis].axis for axis in trajectory_map.axes}
+        if not set(old_map.axes) <= covered:
             return np.full(cells.shape, -1, np.intp)
-        rows = before.rows(tuple(index)) if index else np.zeros(cells.shape, np.intp)
-        return np.where(self._is_old(own, cells), rows, -1)
+        rows = old_map.rows(tuple(index)) if index else np.zeros(cells.shape, np.intp)
+        return np.where(self._is_old(trajectory_map, cells), rows, -1)
 
     def filler(self, before: xr.Dataset) -> Callable[[int, tuple[slice, ...], SlabValues], None]:
-        """What puts the values that the smaller result holds into those of a slab."""
+        """A function that copies the values of the old result into the values of a slab."""
         names = [axis.name for axis in self.old.config.axes]
 
         def fill(model: int, where: tuple[slice, ...], values: SlabValues) -> None:
             old_model = self.model(model)
             if old_model is None:
                 return
-            parts = [axis.places[place] for axis, place in zip(self.axes, where, strict=True)]
+            parts = [axis.positions[part] for axis, part in zip(self.axes, where, strict=True)]
             inside = np.ix_(*(np.flatnonzero(part >= 0) for part in parts))
             if any(part.size == 0 for part in inside):
                 return
@@ -343,7 +352,7 @@ class _OldPositions:
                 for axis, part in zip(self.axes, parts, strict=True)
                 if axis.axis is not None
             }
-            # where the axes of the smaller result stand among those of this slab
+            # the order of the axes of the old result among those of this slab
             order = [axis.axis for axis in self.axes if axis.axis is not None]
             for name, array in values.items():
                 variable = before[name]

@@ -1,7 +1,7 @@
 """The factored layout: a file of axes, trajectory table and law metadata, for any number of points.
 
-Some points, the witnesses, are stored in full. When a file is opened they are computed again: where they come to
-other numbers, the file belongs to another version, and is refused.
+Some points, the witnesses, are stored in full. When a file is opened they are computed again: if they differ, the
+file was written by a version that computes other numbers, and is refused.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ from .expand import MAX_STIFFNESS_VALUES, TrajectoryRows, TrajectoryTable, expan
 from .schema import SCHEMA, SchemaVariable, attributes_of, derived_names, is_input, scale_of
 
 N_WITNESSES = 1_000
-# how far a witness may be from what is stored, of the scale that `compare` uses for its variable
+# tolerance of a witness, relative to the scale that `compare` uses for its variable
 WITNESS_TOLERANCE = 1e-12
 SLAB_ROWS = 2**16
-# what a file says of a law, as JSON
+# fields of a law in the JSON attribute `laws`, and their types
 LAW_FIELD_TYPES: Mapping[str, type] = {
     "parameters": list, "domain": dict, "asks_for_e": bool, "is_permanent": bool, "axes": list,
     "trajectories": int, "is_shared": bool,
@@ -49,7 +49,7 @@ ReadVariable = Callable[[str, slice], NDArray[Any]]
 
 @dataclass(frozen=True)
 class StoredLaw:
-    """What a file keeps of a law: all that outputs depend on besides the trajectory, and no formula."""
+    """A law as stored in a file: everything that outputs depend on besides the trajectory, without formulas."""
 
     key: str
     exponent: float | None
@@ -61,13 +61,13 @@ class StoredLaw:
 
 
 def factored_template(
-    outline: xr.Dataset, table: TrajectoryTable, variables: Sequence[SchemaVariable]
+    result_template: xr.Dataset, table: TrajectoryTable, variables: Sequence[SchemaVariable]
 ) -> xr.Dataset:
-    """What a factored file holds: coordinates, attributes, and variables whose values do not count yet.
+    """The dataset of a factored file: coordinates, attributes, and variables with placeholder values.
 
     Parameters
     ----------
-    outline : coordinates and attributes of the result
+    result_template : coordinates and attributes of the result
     table : of the sweep
     variables : of the result
 
@@ -76,13 +76,13 @@ def factored_template(
     UsageError : a law's rule of K takes too many values to be stored
     """
     laws, stiffness = {}, 0
-    for law, own, rule in zip(table.laws, table.maps, table.stiffness, strict=True):
+    for law, trajectory_map, rule in zip(table.laws, table.maps, table.stiffness, strict=True):
         about: dict[str, Any] = {
             "exponent": law.exponent, "parameters": [parameter.name for parameter in law.parameters],
             "domain": {name: list(ends) for name, ends in law.domain.items()}, "asks_for_e": "e" in law.quantities,
             "is_permanent": law.is_permanent,
-            "axes": [table.inputs.axes[axis].name for axis in own.axes], "trajectories": own.count,
-            "is_shared": own.is_shared, "stiffness_axes": None,
+            "axes": [table.inputs.axes[axis].name for axis in trajectory_map.axes],
+            "trajectories": trajectory_map.count, "is_shared": trajectory_map.is_shared, "stiffness_axes": None,
         }  # fmt: skip
         if rule is not None or has_stiffness_rule(table.inputs, law):
             axes, K = whole_stiffness(table.inputs, law, rule)
@@ -91,40 +91,42 @@ def factored_template(
             about["stiffness_axes"] = [table.inputs.axes[axis].name for axis in axes]
             stiffness += K.size
         laws[law.key] = about
-    rows, cells = (
-        sum(sizes) for sizes in zip(*((own.count, own.cells * own.is_shared) for own in table.maps), strict=True)
-    )
+    rows = sum(trajectory_map.count for trajectory_map in table.maps)
+    cells = sum(trajectory_map.cells for trajectory_map in table.maps if trajectory_map.is_shared)
     witnesses = len(witness_indices(len(table.laws) * table.inputs.cells))
     blank = CollisionResult.blank(1)
-    held: dict[str, Any] = {
+    variables_of_file: dict[str, Any] = {
         f"trajectory_{name}": _placeholder(
             "trajectory", rows, getattr(blank, name).dtype, f"{name} of a trajectory"
         )
         for name in TABLE_COLUMNS
     }
     if cells:
-        held["trajectory_of_cell"] = _placeholder(
+        variables_of_file["trajectory_of_cell"] = _placeholder(
             "cell", cells, np.dtype("i4"), "number of the trajectory of a cell"
         )
     if stiffness:
-        held["law_stiffness"] = _placeholder(
+        variables_of_file["law_stiffness"] = _placeholder(
             "stiffness_value", stiffness, np.dtype("f8"), "K by the rules of the laws"
         )
-    held["witness_index"] = _placeholder("witness", witnesses, np.dtype("i8"), "place in C order of (model, axes)")
+    variables_of_file["witness_index"] = _placeholder(
+        "witness", witnesses, np.dtype("i8"), "place in C order of (model, axes)"
+    )
     for variable in variables:
         attributes = attributes_of(variable)
-        held[f"witness_{variable.name}"] = (
+        variables_of_file[f"witness_{variable.name}"] = (
             "witness", np.broadcast_to(np.zeros((), variable.dtype), witnesses), attributes,
         )  # fmt: skip
     order = [axis.name for axis in table.inputs.axes]
-    made = xr.Dataset(held, outline.coords, {**outline.attrs, "axes": json.dumps(order), "laws": json.dumps(laws)})
-    # without a variable that names them, the coordinates would be variables to a reader of netCDF
-    names = [str(name) for name in outline.coords if name not in outline.dims]
-    return made.assign_attrs(coordinates=" ".join(names))
+    attributes = {**result_template.attrs, "axes": json.dumps(order), "laws": json.dumps(laws)}
+    template = xr.Dataset(variables_of_file, result_template.coords, attributes)
+    # readers of netCDF take coordinates that no variable names for variables
+    names = [str(name) for name in result_template.coords if name not in result_template.dims]
+    return template.assign_attrs(coordinates=" ".join(names))
 
 
 def check_factored(inputs: Inputs, laws: Sequence[Law]) -> None:
-    """Refuse laws that cannot be stored so, before anything is integrated.
+    """Refuse laws that cannot be stored in this layout, before integration.
 
     Raises
     ------
@@ -137,8 +139,8 @@ def check_factored(inputs: Inputs, laws: Sequence[Law]) -> None:
 
 def _too_many_stiffness_values(law: Law) -> UsageError:
     return UsageError(
-        f"output.layout: {law.key} has a rule of K that takes more than {MAX_STIFFNESS_VALUES:,} values here, "
-        'expected at most so many to be factored; set output.layout = "full"'
+        f"output.layout: {law.key} has a rule of K that takes more than {MAX_STIFFNESS_VALUES:,} values, "
+        'the limit of the factored layout; set output.layout = "full"'
     )
 
 
@@ -149,18 +151,18 @@ def _placeholder(dim: str, size: int, dtype: np.dtype[Any], meaning: str) -> tup
 def table_values(
     table: TrajectoryTable, variables: Sequence[SchemaVariable]
 ) -> Iterator[tuple[str, slice, NDArray[Any]]]:
-    """The values of a factored file: name, place and values, no more than a little at a time."""
+    """The values of a factored file, a few at a time: name of the variable, region and values."""
     start = cell = 0
-    for model, own in enumerate(table.maps):
-        for first in range(0, own.count, SLAB_ROWS):
-            rows = np.arange(first, min(first + SLAB_ROWS, own.count))
+    for model, trajectory_map in enumerate(table.maps):
+        for first in range(0, trajectory_map.count, SLAB_ROWS):
+            rows = np.arange(first, min(first + SLAB_ROWS, trajectory_map.count))
             part = table.rows.take(model, rows)
             for name in TABLE_COLUMNS:
                 yield f"trajectory_{name}", slice(start + first, start + first + rows.size), getattr(part, name)
-        start += own.count
-        if own.of_cell is not None:
-            yield "trajectory_of_cell", slice(cell, cell + own.cells), own.of_cell
-            cell += own.cells
+        start += trajectory_map.count
+        if trajectory_map.of_cell is not None:
+            yield "trajectory_of_cell", slice(cell, cell + trajectory_map.cells), trajectory_map.of_cell
+            cell += trajectory_map.cells
     value = 0
     for law, rule in zip(table.laws, table.stiffness, strict=True):
         if rule is not None or has_stiffness_rule(table.inputs, law):
@@ -168,14 +170,14 @@ def table_values(
             assert K is not None
             yield "law_stiffness", slice(value, value + K.size), K.reshape(-1)
             value += K.size
-    places = witness_indices(len(table.laws) * table.inputs.cells)
-    yield "witness_index", slice(0, len(places)), places
-    for name, values in witness_values(table, variables, places).items():
-        yield f"witness_{name}", slice(0, len(places)), values
+    indices = witness_indices(len(table.laws) * table.inputs.cells)
+    yield "witness_index", slice(0, len(indices)), indices
+    for name, values in witness_values(table, variables, indices).items():
+        yield f"witness_{name}", slice(0, len(indices)), values
 
 
 def witness_indices(points: int) -> NDArray[np.int64]:
-    """Places of witnesses, spread over all points: multiples of the golden section, the first and the last.
+    """Indices of witnesses, spread over all points by the golden section, with the first and the last point.
 
     >>> witness_indices(3).tolist()
     [0, 1, 2]
@@ -183,32 +185,32 @@ def witness_indices(points: int) -> NDArray[np.int64]:
     if points <= N_WITNESSES:
         return np.arange(points)
     step = int(points * 0.6180339887498949)
-    # without a common factor all places differ
+    # without a common factor all indices differ
     while math.gcd(step, points) > 1:
         step += 1
-    return np.array(sorted({points - 1, *(place * step % points for place in range(N_WITNESSES - 1))}), np.int64)
+    return np.array(sorted({points - 1, *(number * step % points for number in range(N_WITNESSES - 1))}), np.int64)
 
 
 def witness_values(
-    table: TrajectoryTable, variables: Sequence[SchemaVariable], places: NDArray[np.int64]
+    table: TrajectoryTable, variables: Sequence[SchemaVariable], indices: NDArray[np.int64]
 ) -> dict[str, NDArray[Any]]:
-    """The values of some points of a result, by name; arrays of shape (places,)."""
-    models, cells = np.divmod(places, table.inputs.cells)
-    found = {variable.name: np.empty(places.size, variable.dtype) for variable in variables}
+    """The values of some points of a result, by name; arrays of shape (len(indices),)."""
+    models, cells = np.divmod(indices, table.inputs.cells)
+    values_by_name = {variable.name: np.empty(indices.size, variable.dtype) for variable in variables}
     for model in np.unique(models).tolist():
         where = np.flatnonzero(models == model)
-        values = expand(table, model, _unravel_cells(table.inputs, cells[where]), list(found))
-        for name, array in found.items():
+        values = expand(table, model, _unravel_cells(table.inputs, cells[where]), list(values_by_name))
+        for name, array in values_by_name.items():
             array[where] = np.broadcast_to(values[name], where.shape)
-    return found
+    return values_by_name
 
 
 def _unravel_cells(inputs: Inputs, cells: NDArray[np.int64]) -> Index:
-    """The places of some cells along each axis."""
+    """The index of some cells along each axis, from their index in C order."""
     index = []
     for size in reversed(inputs.shape):
-        cells, place = np.divmod(cells, size)
-        index.append(place)
+        cells, position = np.divmod(cells, size)
+        index.append(position)
     return tuple(reversed(index))
 
 
@@ -217,17 +219,17 @@ def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: ReadVariab
 
     Parameters
     ----------
-    dataset : its coordinates and attributes
-    sizes : the lengths of the variables of the table
-    read : values of a variable of the table, from one place to another
+    dataset : coordinates and attributes of the file
+    sizes : lengths of the variables of the table
+    read : returns a slice of a variable of the table: `read(name, slice)`
 
     Raises
     ------
-    ResultError : what it says of its laws does not fit what it holds
+    ResultError : the attribute `laws` does not fit the variables
     """
     laws = _read_laws(dataset)
     inputs = read_inputs(dataset)
-    places = {axis.name: place for place, axis in enumerate(inputs.axes)}
+    axis_numbers = {axis.name: number for number, axis in enumerate(inputs.axes)}
     maps, rules, stored = [], [], []
     starts = [0]
     cell = value = 0
@@ -235,49 +237,49 @@ def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: ReadVariab
         for model, (key, about) in enumerate(laws.items()):
             if any(type(about[name]) is not kind for name, kind in LAW_FIELD_TYPES.items()):
                 raise TypeError
-            axes = tuple(places[name] for name in about["axes"])
+            axes = tuple(axis_numbers[name] for name in about["axes"])
             if len({*axes}) < len(axes):
                 raise ValueError
             shape = tuple(inputs.shape[axis] for axis in axes)
-            own = TrajectoryMap(model, axes, shape)
+            trajectory_map = TrajectoryMap(model, axes, shape)
             if about["is_shared"]:
-                of_cell = read("trajectory_of_cell", slice(cell, cell + own.cells))
+                of_cell = read("trajectory_of_cell", slice(cell, cell + trajectory_map.cells))
                 count = int(about["trajectories"])
-                # the cell from which a trajectory was taken is not needed to read it
-                own = TrajectoryMap(model, axes, shape, np.broadcast_to(np.intp(0), count), of_cell)
-                cell += own.cells
-                if of_cell.dtype.kind != "i" or of_cell.shape != (own.cells,):
+                # the first cell of a trajectory is not needed to read it
+                trajectory_map = TrajectoryMap(model, axes, shape, np.broadcast_to(np.intp(0), count), of_cell)
+                cell += trajectory_map.cells
+                if of_cell.dtype.kind != "i" or of_cell.shape != (trajectory_map.cells,):
                     raise ValueError
                 if of_cell.min() < 0 or of_cell.max() >= count:
                     raise ValueError
-            maps.append(own)
-            starts.append(starts[-1] + own.count)
+            maps.append(trajectory_map)
+            starts.append(starts[-1] + trajectory_map.count)
             rule = None
             if about["stiffness_axes"] is not None:
-                chosen = tuple(places[name] for name in about["stiffness_axes"])
+                chosen = tuple(axis_numbers[name] for name in about["stiffness_axes"])
                 size = math.prod(inputs.shape[axis] for axis in chosen)
                 rule = _stiffness_lookup(inputs, chosen, read("law_stiffness", slice(value, value + size)))
                 value += size
             rules.append(rule)
             stored.append(_stored_law(key, about))
-        held = {f"trajectory_{name}": starts[-1] for name in TABLE_COLUMNS}
-        held |= {"trajectory_of_cell": cell} if cell else {}
-        held |= {"law_stiffness": value} if value else {}
-        if held != {name: size for name, size in sizes.items() if not name.startswith("witness_")}:
+        expected_sizes = {f"trajectory_{name}": starts[-1] for name in TABLE_COLUMNS}
+        expected_sizes |= {"trajectory_of_cell": cell} if cell else {}
+        expected_sizes |= {"law_stiffness": value} if value else {}
+        if expected_sizes != {name: size for name, size in sizes.items() if not name.startswith("witness_")}:
             raise ValueError
         _check_trajectory_statuses(sizes["trajectory_status"], read)
     except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError):
         raise ResultError("is not a readable result (its laws do not fit its table)") from None
 
-    def rows(model: int, start: int, stop: int) -> CollisionResult:
+    def read_rows(model: int, start: int, stop: int) -> CollisionResult:
         part = slice(starts[model] + start, starts[model] + stop)
         return CollisionResult(**{name: read(f"trajectory_{name}", part) for name in TABLE_COLUMNS})
 
-    return TrajectoryTable(inputs, tuple(stored), tuple(maps), TrajectoryRows(maps, rows), tuple(rules))
+    return TrajectoryTable(inputs, tuple(stored), tuple(maps), TrajectoryRows(maps, read_rows), tuple(rules))
 
 
 def _check_trajectory_statuses(rows: int, read: ReadVariable) -> None:
-    """Refuse a status that has no meaning, which a computed one would have as well."""
+    """Refuse unknown statuses, since the computed ones would be unknown as well."""
     for first in range(0, rows, SLAB_ROWS):
         values = read("trajectory_status", slice(first, min(first + SLAB_ROWS, rows)))
         if values.dtype != np.int8 or not np.isin(np.unique(values), STATUSES).all():
@@ -303,20 +305,20 @@ def _stored_law(key: str, about: Mapping[str, Any]) -> StoredLaw:
 
 
 def _stiffness_lookup(inputs: Inputs, axes: tuple[int, ...], values: Array) -> Stiffness:
-    """K at some cells, from its values over the axes that it depends on."""
+    """A function that looks K up at some cells, from its values over the axes that it depends on."""
     K = values.reshape([size if axis in axes else 1 for axis, size in enumerate(inputs.shape)] or (1,))
 
     def at(index: Index) -> Array:
         if not index:
             return K
         zero = np.zeros((1,) * index[0].ndim, np.intp)
-        return np.asarray(K[tuple(place if axis in axes else zero for axis, place in enumerate(index))])
+        return np.asarray(K[tuple(positions if axis in axes else zero for axis, positions in enumerate(index))])
 
     return at
 
 
 def read_inputs(dataset: xr.Dataset) -> Inputs:
-    """What a sweep gave a value to, from the coordinates of its result."""
+    """The inputs of a sweep, from the coordinates of its result."""
     derived = derived_names(dataset.coords)
     scalars: dict[str, Any] = {}
     axes: dict[str, dict[str, Any]] = {name: {} for name in read_axis_names(dataset)}
@@ -338,8 +340,8 @@ def read_inputs(dataset: xr.Dataset) -> Inputs:
             for name, about in stored.items()
         }
     except (TypeError, ValueError):
-        raise ResultError("is not a readable result (materials: no JSON of the right kind)") from None
-    # an axis is named by its first column, if it is not numbered
+        raise ResultError("is not a readable result (materials: not JSON of the expected type)") from None
+    # an axis that is not numbered has the name of its first column
     ordered = (
         Axis({name: columns[name], **columns}) if name in columns else Axis(columns, numbered=name)
         for name, columns in axes.items()
@@ -349,7 +351,7 @@ def read_inputs(dataset: xr.Dataset) -> Inputs:
 
 
 def _fixed_properties(properties: Mapping[str, float | None]) -> dict[str, float]:
-    """The properties of a material that are no axes."""
+    """The properties of a material that are not axes."""
     return {key: value for key, value in properties.items() if value is not None}
 
 
@@ -363,7 +365,7 @@ def read_axis_names(dataset: xr.Dataset) -> list[str]:
 
 
 def check_witnesses(table: TrajectoryTable, variables: Sequence[SchemaVariable], stored: xr.Dataset) -> None:
-    """Refuse a file whose witnesses expand to other numbers than it holds.
+    """Refuse a file whose witnesses expand to other numbers than those stored.
 
     Parameters
     ----------
@@ -373,20 +375,20 @@ def check_witnesses(table: TrajectoryTable, variables: Sequence[SchemaVariable],
 
     Raises
     ------
-    ResultError : so it is; with both versions
+    ResultError : a witness differs; the message names both versions
     """
-    places = np.asarray(stored["witness_index"].values, np.int64)
+    indices = np.asarray(stored["witness_index"].values, np.int64)
     points = len(table.laws) * table.inputs.cells
-    if not np.array_equal(places, witness_indices(points)):
-        raise ResultError("is not a readable result (its witnesses are not spread as they have to be)")
-    here = witness_values(table, variables, places)
-    cells = places % table.inputs.cells
+    if not np.array_equal(indices, witness_indices(points)):
+        raise ResultError("is not a readable result (its witnesses are not at the expected positions)")
+    expanded = witness_values(table, variables, indices)
+    cells = indices % table.inputs.cells
     index = _unravel_cells(table.inputs, cells)
-    known = {name: values_at(table.inputs, name, index) for name in ("v1", "v2")}
-    known |= {f"m{ball}": mass_at(table.inputs, ball, index) for ball in "12"}
+    inputs = {name: values_at(table.inputs, name, index) for name in ("v1", "v2")}
+    inputs |= {f"m{ball}": mass_at(table.inputs, ball, index) for ball in "12"}
     for variable in variables:
-        expected, got = stored[f"witness_{variable.name}"].values, here[variable.name]
-        columns = {**known, variable.name: expected}
+        expected, got = stored[f"witness_{variable.name}"].values, expanded[variable.name]
+        columns = {**inputs, variable.name: expected}
         has_peak = "witness_peak_indentation" in stored
         if has_peak:
             columns["peak_indentation"] = stored["witness_peak_indentation"].values
@@ -406,7 +408,7 @@ def check_witnesses(table: TrajectoryTable, variables: Sequence[SchemaVariable],
 
 
 def witness_variables(stored: xr.Dataset) -> tuple[SchemaVariable, ...]:
-    """The variables of a result of which a file has witnesses, with the dtypes that these have."""
+    """The variables of a file's witnesses, with their dtypes in the file."""
     return tuple(
         replace(variable, dtype=stored[f"witness_{variable.name}"].dtype.str[1:])
         for variable in SCHEMA

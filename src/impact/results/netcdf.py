@@ -1,7 +1,7 @@
 """Results as netCDF-4 files in HDF5: written slab by slab, and validated before they are read.
 
-HDF5 can name other files as the place of its data, can declare what it does not hold, and can hold a little under
-many names. A result does none of that: datasets of numbers and letters in one group, and small attributes.
+HDF5 can refer to data in other files, declare data that is missing, and give several names to one dataset. A
+result does none of that: it has datasets of numbers and bytes in one group, and small attributes.
 """
 
 from __future__ import annotations
@@ -33,18 +33,18 @@ from .validation import TABLE_VARIABLES, is_name
 
 Region = tuple[int | slice, ...]
 WriteRegion = Callable[[str, Region, NDArray[Any]], None]
-# values of a chunk of a compressed variable, where none is asked for
+# values per chunk of a compressed variable, if the config does not set chunks
 CHUNK_VALUES = 2**16
-# what no result comes near
+# limits that are far above every result
 MAX_DATASETS = 1_000
 MAX_ATTRIBUTES = 10_000
-MAX_ATTRIBUTE_VALUES = 64  # of an attribute
+MAX_ATTRIBUTE_VALUES = 64  # values of one attribute
 MAX_ATTRIBUTE_BYTES = 80_000_000  # bytes of all attributes; a config may have 64 MB
 MAX_LABEL_BYTES = 4_000_000  # bytes of all labels
 MAX_CHUNKS_OF_FILE = 200_000  # of all datasets together
-# what is compressed may be so many times the file, which is as much as deflate can, where it is more than little
+# uncompressed bytes per byte of the file, about the most that deflate can reach, and bytes that are always allowed
 MAX_COMPRESSION_RATIO, ALWAYS_ALLOWED_BYTES = 1_100, 2**26
-# what netCDF writes for other readers
+# attributes that netCDF itself writes
 NETCDF_ATTRIBUTES = frozenset({
     "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_NCProperties", "coordinates", "CLASS", "_Netcdf4Dimid",
     "_Netcdf4Coordinates", "_Encoding",
@@ -53,34 +53,34 @@ SKIPPED_ATTRIBUTES = frozenset({"NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_NC
 
 
 @contextmanager
-def open_for_writing(sink: Sink, outline: xr.Dataset, output: Output) -> Iterator[WriteRegion]:
-    """Write a dataset into a file: its coordinates and attributes at once, its variables as they come.
+def open_for_writing(sink: Sink, template: xr.Dataset, output: Output) -> Iterator[WriteRegion]:
+    """Write a dataset: coordinates and attributes first, then regions of its variables in any order.
 
     Parameters
     ----------
     sink : the file
-    outline : the dataset; the values of its variables do not count
-    output : how it is stored
+    template : coordinates, attributes and variables of the dataset; the values of its variables are ignored
+    output : compression and chunks
 
     Yields
     ------
-    put : writes the values of a variable at a place
+    write_region : writes values into a region of a variable
     """
-    # variables in the order in which they are made
+    # track_order: variables stay in the order of their creation
     with (
         h5py.File(sink, "w", track_order=True, userblock_size=USER_BLOCK_BYTES) as plain,
         h5netcdf.File(plain, "w") as file,
     ):
         texts = {
-            str(name): encode_text(variable) for name, variable in outline.coords.items() if is_text(variable)
+            str(name): encode_text(variable) for name, variable in template.coords.items() if is_text(variable)
         }
         widths = dict.fromkeys(sorted(values.shape[-1] for values in texts.values()))
         file.dimensions = {
-            **{str(name): size for name, size in outline.sizes.items()},
+            **{str(name): size for name, size in template.sizes.items()},
             **{f"string{width}": width for width in widths},
         }
-        coordinates = [str(name) for name in outline.coords if name not in outline.dims]
-        for name, variable in outline.coords.items():
+        coordinates = [str(name) for name in template.coords if name not in template.dims]
+        for name, variable in template.coords.items():
             if name in texts:
                 values = texts[str(name)]
                 dims = (*variable.dims, f"string{values.shape[-1]}")
@@ -89,25 +89,27 @@ def open_for_writing(sink: Sink, outline: xr.Dataset, output: Output) -> Iterato
             else:
                 added = file.create_variable(str(name), variable.dims, variable.dtype, data=variable.values)
                 _set_attributes(added, variable.attrs)
-        for name, variable in outline.data_vars.items():
+        for name, variable in template.data_vars.items():
             storage = _storage_options(variable, output)
             added = file.create_variable(str(name), variable.dims, variable.dtype, **storage)
-            near = [other for other in coordinates if {*outline[other].dims} <= {*variable.dims}]
+            related = [other for other in coordinates if {*template[other].dims} <= {*variable.dims}]
             _set_attributes(
                 added,
-                variable.attrs if name in TABLE_VARIABLES else {**variable.attrs, "coordinates": " ".join(near)},
+                variable.attrs
+                if name in TABLE_VARIABLES
+                else {**variable.attrs, "coordinates": " ".join(related)},
             )
-        _set_attributes(file, dict(outline.attrs))
+        _set_attributes(file, dict(template.attrs))
         sink.check()
 
-        # written to by h5py itself, which asks less each time
-        made = {str(name): plain[str(name)] for name in outline.data_vars}
+        # written by h5py directly, which has less overhead per call
+        datasets = {str(name): plain[str(name)] for name in template.data_vars}
 
-        def put(name: str, where: Region, values: NDArray[Any]) -> None:
-            made[name][where or ...] = values
+        def write_region(name: str, region: Region, values: NDArray[Any]) -> None:
+            datasets[name][region or ...] = values
             sink.check()
 
-        yield put
+        yield write_region
     sink.check()
 
 
@@ -116,30 +118,30 @@ def is_text(variable: xr.DataArray | xr.Variable) -> bool:
 
 
 def encode_text(variable: xr.DataArray) -> NDArray[np.bytes_]:
-    """Texts as letters, the netCDF classic convention: an array of single bytes with one more axis."""
+    """Text as an array of single bytes with one more axis, the netCDF classic convention."""
     encoded = [str(text).encode() for text in np.asarray(variable.values, object).reshape(-1)]
     width = max(1, *map(len, encoded)) if encoded else 1
     return np.array(encoded, f"S{width}").reshape(variable.shape)[..., np.newaxis].view("S1")
 
 
 def _set_attributes(holder: Any, attributes: Mapping[Any, Any]) -> None:
-    """Attributes, those of text as so many bytes, a number that a reader knows beforehand."""
+    """Set attributes; text has a fixed length in bytes, which a reader can check before it reads."""
     for name, value in attributes.items():
         if isinstance(value, str):
-            written = value.encode()
-            value = np.array(written, h5py.string_dtype("utf-8", max(len(written), 1)))
+            encoded = value.encode()
+            value = np.array(encoded, h5py.string_dtype("utf-8", max(len(encoded), 1)))
         holder.attrs[str(name)] = value
 
 
 def _storage_options(variable: xr.DataArray, output: Output) -> dict[str, Any]:
-    """How a variable is stored: in one piece unless it is compressed, or chunks are asked for."""
+    """Options of a variable: contiguous unless the config sets compression or chunks."""
     if not variable.ndim or (output.compression == "none" and not output.chunks):
         return {}
     if output.chunks:
         lengths = {"model": 1, **output.chunks}
         chunks = tuple(min(lengths.get(str(dim), size), size) for dim, size in variable.sizes.items())
     else:
-        # whole along the last axes, one place along the first
+        # whole along the last axes, of length one along the first
         chunks, room = (), CHUNK_VALUES
         for dim, size in reversed(list(variable.sizes.items())):
             length = 1 if dim == "model" else max(min(size, room), 1)
@@ -152,7 +154,7 @@ def _storage_options(variable: xr.DataArray, output: Output) -> dict[str, Any]:
 
 
 class StoredArray(BackendArray):
-    """A variable of a file that is read when it is indexed."""
+    """A variable of a file, read when it is indexed."""
 
     def __init__(self, name: str, dataset: h5py.Dataset) -> None:
         self.name, self.dataset = name, dataset
@@ -164,69 +166,69 @@ class StoredArray(BackendArray):
         return indexing.explicit_indexing_adapter(key, self.shape, support, self.read)
 
     def read(self, key: tuple[Any, ...]) -> NDArray[Any]:
-        """Some values; `key` has a number, a slice or an array of places for each axis.
+        """Read values; `key` has an integer, a slice or an integer array for each axis.
 
         Raises
         ------
         ResultError : they cannot be read
-        MemoryError : they are too many to be read at once
+        MemoryError : they take more memory than `check_memory` allows
         """
-        places = [np.atleast_1d(np.arange(size)[part]) for size, part in zip(self.shape, key, strict=True)]
-        check_memory(self.name, tuple(part.size for part in places), self.dtype)
+        positions = [np.atleast_1d(np.arange(size)[part]) for size, part in zip(self.shape, key, strict=True)]
+        check_memory(self.name, tuple(part.size for part in positions), self.dtype)
         try:
-            self._check_chunks(places)
+            self._check_chunks(positions)
             return np.asarray(self.dataset[key])
         except (OSError, RuntimeError, ValueError, zlib.error) as error:
             path = safe_text(str(self.dataset.file.filename)) if self.dataset else "the result"
             reason = f"{safe_text(self.name, 40)}: {safe_text(str(error), 80)}"
             raise ResultError(f"{path}: is not a readable result ({reason})") from error
 
-    def _check_chunks(self, places: Sequence[NDArray[np.intp]]) -> None:
-        """Unpack the chunks that hold some values, no further than their size.
+    def _check_chunks(self, positions: Sequence[NDArray[np.intp]]) -> None:
+        """Check that the chunks of some values decompress to exactly their declared size.
 
-        HDF5 unpacks one to whatever it holds, and reads on behind one that holds less.
+        HDF5 decompresses a chunk to any size, and reads beyond the end of a chunk that is too short.
         """
         if not self.dataset.compression:
             return
         chunks = self.dataset.chunks
         size = math.prod(chunks) * self.dtype.itemsize
-        for corner in product(*(np.unique(p // c * c).tolist() for p, c in zip(places, chunks, strict=True))):
+        for corner in product(*(np.unique(p // c * c).tolist() for p, c in zip(positions, chunks, strict=True))):
             if corner not in self._checked:
                 unfiltered, packed = self.dataset.id.read_direct_chunk(corner)
                 if unfiltered or len(zlib.decompressobj().decompress(packed, size + 1)) != size:
-                    raise ValueError("a chunk of another size than its own")
+                    raise ValueError("a chunk of unexpected size")
                 self._checked.add(corner)
 
 
 def read_variables(file: h5py.File) -> tuple[dict[str, xr.Variable], dict[str, object], tuple[str, ...]]:
-    """What is in a file whose seal holds: variables, of which those of numbers are read later; attributes; and the
-    names that are no part of a result.
+    """Variables, attributes, and names that are not part of a result, of a file with a valid seal.
 
-    Numbers are as they are stored, whatever an attribute says of scales, fill values and times.
+    Numbers are read when they are indexed, as they are stored: attributes for scales, fill values and times are
+    ignored.
 
     Raises
     ------
-    ResultError : it holds what a result never does
+    ResultError : its structure is not that of a result
     """
     _check_schema_version(file)
     datasets = {name: h5py.Dataset(dataset) for name, dataset in _open_datasets(file).items()}
     dims = _check_sizes(file, datasets)
-    known = {name: dataset for name, dataset in datasets.items() if is_name(name)}
-    # a dimension without values of its own stands in the file as well
+    accepted = {name: dataset for name, dataset in datasets.items() if is_name(name)}
+    # a dimension without coordinates is a dataset in the file as well
     unknown = [
         name
         for name in datasets
-        if name not in known and not _is_dimension_without_values(datasets[name], name, dims)
+        if name not in accepted and not _is_dimension_without_values(datasets[name], name, dims)
     ]
-    holders = {"": file, **known}
+    holders = {"": file, **accepted}
     if sum(h5a.get_num_attrs(holder.id) for holder in holders.values()) > MAX_ATTRIBUTES:
         raise _unreadable(f"more than {MAX_ATTRIBUTES:,} attributes")
     if sum(_attribute_text_bytes(name, holder) for name, holder in holders.items()) > MAX_ATTRIBUTE_BYTES:
         raise _unreadable(f"more than {MAX_ATTRIBUTE_BYTES:,} bytes of text")
     variables = {}
-    for name, dataset in known.items():
+    for name, dataset in accepted.items():
         if not dataset.id.get_storage_size():
-            raise _unreadable("declares what the file does not hold", name)
+            raise _unreadable("declares data that the file does not hold", name)
         attributes = _read_attributes(dataset)
         if dataset.dtype.kind == "S":
             values = StoredArray(name, dataset).read((slice(None),) * dataset.ndim)
@@ -249,34 +251,34 @@ def _check_schema_version(file: h5py.File) -> None:
     attribute = h5a.open(file.id, b"schema_version")
     if not _is_number_type(attribute.get_type()) or attribute.shape not in ((), (1,)):
         raise _unreadable("schema_version: not a number")
-    found = np.ravel(file.attrs["schema_version"])[0]
-    if found != SCHEMA_VERSION:
-        raise ResultError(f"has schema version {found}, this program reads {SCHEMA_VERSION}")
+    version = np.ravel(file.attrs["schema_version"])[0]
+    if version != SCHEMA_VERSION:
+        raise ResultError(f"has schema version {version}, this program reads {SCHEMA_VERSION}")
 
 
 def _open_datasets(file: h5py.File) -> dict[str, h5d.DatasetID]:
-    """The datasets of the file, by name; no link is followed out of it, or to the same thing twice."""
+    """The datasets of the file, by name; only hard links, each to another object, are followed."""
     root = file.id
     if root.get_num_objs() > MAX_DATASETS:
         raise _unreadable(f"more than {MAX_DATASETS:,} datasets")
-    found: dict[str, h5d.DatasetID] = {}
+    datasets: dict[str, h5d.DatasetID] = {}
     objects = set()
     for link in root:
         name = link.decode(errors="surrogateescape")
         info = root.links.get_info(link)
         if info.type != h5l.TYPE_HARD:
-            raise _unreadable("a link to somewhere else", name)
+            raise _unreadable("not a hard link", name)
         objects.add(info.u)
-        found[name] = h5o.open(root, link)
-        if not isinstance(found[name], h5d.DatasetID):
+        datasets[name] = h5o.open(root, link)
+        if not isinstance(datasets[name], h5d.DatasetID):
             raise _unreadable("not a dataset", name)
-    if len(objects) < len(found):
-        raise _unreadable("a dataset of two names")
-    return found
+    if len(objects) < len(datasets):
+        raise _unreadable("a dataset with two names")
+    return datasets
 
 
 def _check_sizes(file: h5py.File, datasets: Mapping[str, h5py.Dataset]) -> dict[str, tuple[str, ...]]:
-    """The dimensions of each dataset, all of which the file itself holds."""
+    """The dimensions of each dataset, after a check that the file itself holds all data."""
     size = file.id.get_filesize()
     chunks = compressed = plain = text = 0
     for name, dataset in datasets.items():
@@ -289,15 +291,17 @@ def _check_sizes(file: h5py.File, datasets: Mapping[str, h5py.Dataset]) -> dict[
             plain += declared
         text += declared if dataset.dtype.kind == "S" else 0
     if plain > size or compressed > max(ALWAYS_ALLOWED_BYTES, MAX_COMPRESSION_RATIO * size):
-        raise _unreadable("more data than such a file may hold")
+        raise _unreadable("declares more data than a file of this size may hold")
     if chunks > MAX_CHUNKS_OF_FILE:
         raise _unreadable(f"more than {MAX_CHUNKS_OF_FILE:,} chunks")
-    # of one that is missing, any number of values would be read as zeros
+    # missing chunks would be read as zeros, at no cost in the file
     missing = [
-        name for name, one in datasets.items() if one.chunks and one.id.get_num_chunks() != _count_chunks(one)
+        name
+        for name, dataset in datasets.items()
+        if dataset.chunks and dataset.id.get_num_chunks() != _count_chunks(dataset)
     ]
     if missing:
-        raise _unreadable("declares what the file does not hold", missing[0])
+        raise _unreadable("declares data that the file does not hold", missing[0])
     if text > MAX_LABEL_BYTES:
         raise _unreadable(f"more than {MAX_LABEL_BYTES:,} bytes of labels")
     return _dims_by_dataset(datasets)
@@ -308,7 +312,7 @@ def _count_chunks(dataset: h5py.Dataset) -> int:
 
 
 def _is_number_type(kind: h5t.TypeID) -> bool:
-    """Whether it is an integer or floating-point number of the usual bits."""
+    """Whether it is an integer or floating-point type in a standard format."""
     plain = isinstance(kind, h5t.TypeIntegerID | h5t.TypeFloatID) and kind.get_size() <= 8
     return plain and h5t.py_create(kind.dtype).equal(kind)
 
@@ -318,16 +322,16 @@ def _is_byte_type(kind: h5t.TypeID) -> bool:
 
 
 def _declared_bytes(name: str, dataset: h5d.DatasetID) -> int:
-    """The bytes of a dataset, which is stored in the file in one piece, or in chunks of one size."""
+    """The bytes of a dataset, which must be stored in the file itself, contiguous or in chunks."""
     kind, shape = dataset.get_type(), dataset.shape
     if not (_is_number_type(kind) or (_is_byte_type(kind) and shape)):
-        raise _unreadable("neither numbers nor labels", name)
+        raise _unreadable("expected numbers or labels", name)
     plist = dataset.get_create_plist()
     declared = math.prod(shape) * kind.get_size() if shape is not None else 0
     if plist.get_layout() == h5d.CHUNKED:
-        filters = [plist.get_filter(place)[0] for place in range(plist.get_nfilters())]
+        filters = [plist.get_filter(number)[0] for number in range(plist.get_nfilters())]
         whole = shape == dataset.get_space().get_simple_extent_dims(maxdims=True)
-        # a chunk that is larger than the whole would be unpacked to its own size
+        # a chunk larger than the dataset would be decompressed to the size of the chunk
         fits = whole and all(c <= n for c, n in zip(plist.get_chunk(), shape, strict=True))
         stored = fits and filters in ([], [h5z.FILTER_DEFLATE], [h5z.FILTER_SHUFFLE, h5z.FILTER_DEFLATE])
     else:
@@ -340,7 +344,7 @@ def _declared_bytes(name: str, dataset: h5d.DatasetID) -> int:
 
 
 def _dims_by_dataset(datasets: Mapping[str, h5py.Dataset]) -> dict[str, tuple[str, ...]]:
-    """The dimensions of each dataset, by the numbers that netCDF gives to them and to their values."""
+    """The dimensions of each dataset, from the dimension IDs of netCDF."""
     numbers = {
         name: np.ravel(dataset.attrs.get("_Netcdf4Coordinates", ())).tolist() for name, dataset in datasets.items()
     }
@@ -352,22 +356,23 @@ def _dims_by_dataset(datasets: Mapping[str, h5py.Dataset]) -> dict[str, tuple[st
     sizes = {name: datasets[name].shape[0] for name in scales.values() if datasets[name].shape}
     dims = {}
     for name, dataset in datasets.items():
-        own = tuple(scales.get(number, "") for number in numbers[name])
-        if not own and name in sizes:
-            own = (name,)
-        if len({*own}) != len(own) or tuple(sizes.get(dim) for dim in own) != dataset.shape:
+        dataset_dims = tuple(scales.get(number, "") for number in numbers[name])
+        if not dataset_dims and name in sizes:
+            dataset_dims = (name,)
+        shape = tuple(sizes.get(dim) for dim in dataset_dims)
+        if len({*dataset_dims}) != len(dataset_dims) or shape != dataset.shape:
             raise _unreadable("its axes are not those of the file", name)
-        dims[name] = own
+        dims[name] = dataset_dims
     return dims
 
 
 def _is_dimension_without_values(dataset: h5py.Dataset, name: str, dims: Mapping[str, tuple[str, ...]]) -> bool:
-    """Whether it is a dimension without values of its own."""
+    """Whether it is a dimension without coordinates."""
     return dims[name] == (name,) and not dataset.id.get_storage_size()
 
 
 def _attribute_text_bytes(name: str, holder: h5py.File | h5py.Dataset) -> int:
-    """The bytes of text of the attributes that are read; each has a kind and a size that one may read."""
+    """The bytes of text of the attributes that are read, after a check of their types and sizes."""
     total = 0
     for key in (key for key in holder.attrs if key not in SKIPPED_ATTRIBUTES):
         attribute = holder.attrs.get_id(key)
@@ -375,16 +380,17 @@ def _attribute_text_bytes(name: str, holder: h5py.File | h5py.Dataset) -> int:
         if isinstance(kind, h5t.TypeStringID) and not kind.is_variable_str() and shape == ():
             total += kind.get_size()
         elif not _is_number_type(kind) or shape is None or math.prod(shape) > MAX_ATTRIBUTE_VALUES:
-            raise _unreadable("an attribute of an unusual kind or size", f"{name}@{key}")
+            raise _unreadable("an attribute of unexpected type or size", f"{name}@{key}")
     return total
 
 
 def _read_attributes(holder: h5py.File | h5py.Dataset) -> dict[str, object]:
-    """Attributes as they were before they were stored."""
-    found: dict[str, object] = {}
+    """The attributes that were set by `_set_attributes`."""
+    attributes: dict[str, object] = {}
     for name in holder.attrs:
         if name not in NETCDF_ATTRIBUTES:
             value = holder.attrs[name]
             array = np.ravel(value)
-            found[name] = value.decode() if isinstance(value, bytes) else array[0] if array.size == 1 else value
-    return found
+            number_or_array = array[0] if array.size == 1 else value
+            attributes[name] = value.decode() if isinstance(value, bytes) else number_or_array
+    return attributes

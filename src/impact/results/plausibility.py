@@ -9,7 +9,7 @@ from ..formatting import number
 from ..text import safe_text
 from .summary import MAX_SMALL_INDENTATION, Summary
 
-# Young's moduli outside are most likely in another unit: gels have 1e3 Pa, diamond has 1e12 Pa
+# Young's moduli outside these limits are probably in another unit: gels have 1e3 Pa, diamond has 1e12 Pa
 MIN_MODULUS_PA, MAX_MODULUS_PA = 1e3, 1e13
 
 
@@ -21,7 +21,7 @@ def material_notes(
     Parameters
     ----------
     materials : their properties by name
-    axes : the values of those that are axes, such as "materials.steel.E"
+    axes : values of properties that are axes, by name, such as "materials.steel.E"
 
     >>> list(material_notes({"steel": {"E": 210.0}, "rubber": {"E": 5e6}}, {}))
     ['materials.steel.E: got 210 Pa; did you mean 210 GPa?']
@@ -37,14 +37,14 @@ def material_notes(
                 break
 
 
-def result_notes(tally: Summary) -> Iterator[str]:
-    """A sentence for each thing that is implausible in what came out of a sweep."""
-    if tally.points and not tally.not_counted and tally.counts.keys() == {Status.NO_IMPACT}:
-        yield f"none of {tally.points:,} points is an impact: v1 <= v2, the balls do not approach"
-    if tally.deep:
-        many = f"{tally.deep:,} of {tally.points:,} points"
+def result_notes(summary: Summary) -> Iterator[str]:
+    """A sentence for each implausible property of a sweep's outcome."""
+    if summary.points and not summary.not_counted and summary.counts.keys() == {Status.NO_IMPACT}:
+        yield f"none of {summary.points:,} points is an impact: v1 <= v2, the balls do not approach"
+    if summary.deep:
+        many = f"{summary.deep:,} of {summary.points:,} points"
         limit = f"{MAX_SMALL_INDENTATION:.0%} of the smaller radius"
         yield (
-            f"peak indentation above {limit} at {many}, at most {tally.deepest:.0%}; Hertz theory assumes small "
+            f"peak indentation above {limit} at {many}, at most {summary.deepest:.0%}; Hertz theory assumes small "
             "indentation"
         )

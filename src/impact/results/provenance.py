@@ -31,22 +31,22 @@ def stored_config(
     Parameters
     ----------
     attributes : of the result
-    overrides : changes to its config, after those that it was made with
-    plugins : models that are not built in, those that it was made with among them
+    overrides : changes to its config, applied after the stored ones
+    plugins : models that are not built in, including those of the result
     name : of the result, for messages
     max_points : refuse a sweep of more points
-    allow_changed_plugins : accept another version of a model of one's own; see `changed_plugins`
+    allow_changed_plugins : accept another version of a plug-in; see `changed_plugins`
 
     Raises
     ------
-    UsageError : it is a time history, or was made with a model that is not given, or is another version
-    ResultError, ConfigError : what it carries cannot be read, or is no config here
+    UsageError : it is a time history, or one of its plug-ins is missing or has changed
+    ResultError, ConfigError : the stored config cannot be read, or is invalid in this version
     """
     text = attributes.get("config")
     if text is None:
         raise UsageError(f"{safe_text(name)}: holds no config; it is a time history")
     if not isinstance(text, str):
-        raise ResultError(f"{safe_text(name)}: its attribute config is no text")
+        raise ResultError(f"{safe_text(name)}: its attribute config is not text")
     check_plugins(attributes, plugins, name)
     if not allow_changed_plugins:
         for reason in (*changed_plugins(attributes, plugins, name), *unknown_plugins(attributes, plugins, name)):
@@ -56,9 +56,9 @@ def stored_config(
 
 
 def config_of_part(config: Config, dataset: xr.Dataset) -> Config:
-    """The part of a config that a result holds: its axes with the values that are labels there.
+    """The part of a config that a result holds: its axes, reduced to the values that are labels of the result.
 
-    An axis without such a value keeps its first one, at which a comparison shows the difference.
+    An axis without a common value keeps its first value, so that a comparison shows the difference.
     """
     axes = []
     for axis in config.axes:
@@ -68,23 +68,23 @@ def config_of_part(config: Config, dataset: xr.Dataset) -> Config:
         names = [name for name, labels in held.items() if first is not None and labels.dims == first.dims]
         values = [np.asarray(labels_of[name]) for name in names]
         labels = [np.ravel(held[name].values) for name in names]
-        places = sorted(match_labels(values, labels)[0].tolist()) if names else []
-        chosen = np.array(places or [0])
+        positions = sorted(match_labels(values, labels)[0].tolist()) if names else []
+        chosen = np.array(positions or [0])
         columns = {name: tuple(np.asarray(v)[chosen].tolist()) for name, v in axis.columns.items()}
-        numbers = tuple(axis.labels[place] for place in chosen) if axis.numbered else ()
+        numbers = tuple(axis.labels[position] for position in chosen) if axis.numbered else ()
         axes.append(replace(axis, columns=columns, numbers=numbers))
     return replace(config, axes=tuple(axes))
 
 
 def check_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str) -> None:
-    """Refuse if a model of one's own that a result was made with is not given again.
+    """Raise an error if a plug-in that a result was made with is missing.
 
-    Nothing is imported because a result names it: what it names is compared with what is given, and reported.
+    Nothing is imported because a result names it: the names are only compared and reported.
 
     Parameters
     ----------
     attributes : of the result
-    plugins : what is given now; more than the result was made with is no fault
+    plugins : the current plug-ins, which may be more than those of the result
     name : of the result, for messages
 
     Raises
@@ -96,13 +96,13 @@ def check_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str)
     Traceback (most recent call last):
     impact.errors.UsageError: results.h5: made with mine of my.py; give it again with --plugin FILE
     """
-    made = _stored_plugins(attributes, name)
-    given = _current_plugins(plugins)
-    # the hash of a file is not that of a value: given in another way, a model cannot be known to be the same
+    stored = _stored_plugins(attributes, name)
+    current = _current_plugins(plugins)
+    # hashes of files and of Python values differ: a model supplied in another way cannot be compared
     missing = {
         key: record
-        for key, record in made.items()
-        if key not in given or _how_to_supply(given[key]) != _how_to_supply(record)
+        for key, record in stored.items()
+        if key not in current or _how_to_supply(current[key]) != _how_to_supply(record)
     }
     if missing:
         named = ", ".join(
@@ -114,35 +114,35 @@ def check_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str)
 
 
 def changed_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str) -> tuple[str, ...]:
-    """A sentence for each model that a result was made with and that is given in another version.
+    """A sentence for each plug-in whose current version differs from that of a result.
 
     Parameters
     ----------
     attributes : of the result
-    plugins : what is given now, all that the result was made with among them
+    plugins : the current plug-ins, including those of the result
     name : of the result, for messages
     """
-    given = _current_plugins(plugins)
+    current = _current_plugins(plugins)
     return tuple(
         f"{safe_text(name)}: was made with another version of "
         f"{safe_text(_plugin_origin(record) or f'the model {key}')}: "
-        f"its SHA-256 is {safe_text(record.sha256, 64)}, this one's is {given[key].sha256}"
+        f"its SHA-256 is {safe_text(record.sha256, 64)}, this one's is {current[key].sha256}"
         for key, record in _stored_plugins(attributes, name).items()
-        if record.sha256 and given[key].sha256 and record.sha256 != given[key].sha256
+        if record.sha256 and current[key].sha256 and record.sha256 != current[key].sha256
     )
 
 
 def unknown_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str) -> tuple[str, ...]:
-    """A sentence for each model of which no hash says whether it is the one that a result was made with.
+    """A sentence for each plug-in without a hash, which cannot be compared with that of a result.
 
     Parameters are those of `changed_plugins`.
     """
-    given = _current_plugins(plugins)
+    current = _current_plugins(plugins)
     return tuple(
         f"{safe_text(name)}: the model {safe_text(key)} is a Python value that no file defines, so that it cannot "
         "be known to be the one that the result was made with; expected a model in a Python file"
         for key, record in _stored_plugins(attributes, name).items()
-        if not (record.sha256 and given[key].sha256)
+        if not (record.sha256 and current[key].sha256)
     )
 
 
@@ -161,7 +161,7 @@ def _plugin_origin(record: PluginRecord) -> str | None:
 
 
 def _how_to_supply(record: PluginRecord) -> str:
-    """How a model is given again."""
+    """How a user supplies a plug-in."""
     if record.package:
         return "the package installed"
     return "plugins=[...]" if record.file is None else "--plugin FILE"

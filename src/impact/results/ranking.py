@@ -24,36 +24,35 @@ from .selection import model_positions, select
 from .slabs import Slab, distinct_points, is_computed, over_varying_dims, slabs, varying_dims
 
 Mask = NDArray[np.bool_]
-# points up to which variables that are computed are ranked: some minutes
+# lazy results with more points are not ranked; this many take some minutes
 MAX_RANKED_POINTS = 2**30
-# values of a law's own parameters, in all combinations
+# combinations of the values of a law's own parameters
 MAX_PARAMETER_COMBINATIONS = 2**24
 RANKED_VARIABLES = ("e_error", "status")
-# ranges of e that a table names
+# ranges of e that a table lists
 MAX_RANGES = 8
-# bits of a double, and of the upper part in which it is summed
+# bits of a double, and of the upper of the two parts in which it is summed
 MANTISSA_BITS, UPPER_BITS = 53, 27
 
 
 @dataclass(frozen=True)
 class Ranked:
-    """How well one model gives the restitution asked for, with the values of its own parameters that do it best.
+    """How well one model delivers the target restitution, with the best values of its own parameters.
 
     Parameters
     ----------
     model : its key
-    parameters : those values by the path in the config, such as "model.bilinear.K"; where they are axes
-    points : those judged, where an e was asked for and the balls meet
-    within : those of them where |e_out - e| is within the tolerance
-    failed : those of them that failed, which are not within it
-    mean_error, max_error : of |e_out - e| over those that did not fail; NaN where all did
-    at : the point with the largest error: what is swept, by config name, and e; empty where all failed
-    e_out : the restitution delivered there
-    served : the ranges of e, least and greatest, in which all points are within the tolerance; None where e does
-        not vary along one axis
+    parameters : the best values by path in the config, such as "model.bilinear.K"; empty if none is an axis
+    points : number of points with a target e and an impact
+    within : number of those points with |e_out - e| within the tolerance
+    failed : number of those points that failed; they are not within the tolerance
+    mean_error, max_error : of |e_out - e| over the points that did not fail; NaN if all failed
+    at : the point with the largest error: its swept inputs by config name, and e; empty if all failed
+    e_out : the delivered restitution at that point
+    served : the ranges of e, as (least, greatest), in which all points are within the tolerance; None unless e
+        varies along one axis
 
-    A mean error is the exact mean of its numbers, rounded once: it does not depend on their order, nor on whether
-    they are in memory.
+    A mean error is the exact mean, rounded once: it depends neither on the order of the points nor on slabs.
     """
 
     model: str
@@ -84,7 +83,7 @@ class Ranked:
 
     @property
     def percent(self) -> str:
-        """The share as text, which is 0 or 100 only where none or all are within the tolerance.
+        """The share as text: 0% and 100% mean exactly none and all.
 
         >>> nan = math.nan
         >>> [Ranked("hertz", {}, 3000, n, 0, nan, nan, {}, nan, None).percent for n in (0, 1, 2000, 2999, 3000)]
@@ -120,7 +119,7 @@ class Ranking:
     Parameters
     ----------
     tol : the tolerance of |e_out - e|
-    models : those judged, the best first; among equals in the order of the result
+    models : the ranked models, the best first; equal ones in the order of the result
     """
 
     tol: float
@@ -128,7 +127,7 @@ class Ranking:
 
     @property
     def headings(self) -> tuple[str, ...]:
-        """Of a table of `Ranked.row`; the first and the last two columns are text, the others numbers."""
+        """Headings of a table of `Ranked.row`; the first and the last two columns are text, the others numbers."""
         return (
             "model",
             f"within {number(self.tol)}",
@@ -142,7 +141,7 @@ class Ranking:
     @property
     def best(self) -> tuple[Ranked, ...]:
         """The models that are within the tolerance at all points."""
-        return tuple(one for one in self.models if one.serves_everywhere)
+        return tuple(ranked for ranked in self.models if ranked.serves_everywhere)
 
     @property
     def headline(self) -> str:
@@ -166,32 +165,31 @@ def ranking(
     models: Sequence[str] | None = None,
     max_points: int = MAX_RANKED_POINTS,
 ) -> Ranking:
-    """Rank the models of a result by how well they give the restitution asked for.
+    """Rank the models of a result by how well they deliver the target restitution.
 
-    Judged is |e_out - e| at all points where an e was asked for and the balls meet. A point that failed, or that
-    no restitution can have (1 - alpha v0 below 0), is judged too: it is not within the tolerance.
-    Axes of a model's own parameters are choices: the model is judged over all other axes, with the values that
-    give the largest share of points within the tolerance, among equals the smallest error.
-    The result may be of any size: points that differ along axes on which nothing varies are evaluated once, and
-    count as often as they occur.
+    The criterion is |e_out - e| at all points with a target e and an impact. A point that failed, or whose target
+    e is below 0 (1 - alpha v0 < 0), counts as not within the tolerance. The values of a model's own parameters are
+    chosen: the model is ranked over all other axes, with the values that give the largest share of points within
+    the tolerance, and among those the smallest error. The result may be of any size: points that differ only along
+    axes on which nothing varies are evaluated once, and counted as often as they occur.
 
     Parameters
     ----------
     dataset : a result
-    tol : what |e_out - e| may be
-    sel : values of axes, by name; all points of the others are judged
+    tol : tolerance of |e_out - e|
+    sel : values of axes, by name
     models : keys of the models to rank; by default all
-    max_points : how many points may be evaluated, where variables are computed when they are indexed
+    max_points : limit of the points to evaluate of a lazy result
 
     Raises
     ------
-    UsageError : the result has no errors of e to judge by, or has not got what is asked for; tol is not positive;
-        too many points would have to be evaluated
+    UsageError : the result has no target e, lacks a model or value that is selected, or has too many points; or
+        tol is not positive
     """
     _check_rankable(dataset, tol)
     chosen = model_positions(models, dataset) if models else range(dataset.sizes["model"])
     selected = select(dataset[list(RANKED_VARIABLES)], sel or {})
-    by_model = [_select_model(selected, place) for place in chosen]
+    by_model = [_select_model(selected, position) for position in chosen]
     evaluated = [_reduce_dims(of_model)[0] for of_model in by_model if is_computed(of_model.variables["e_error"])]
     points = sum(math.prod(of_model.sizes.values()) for of_model in evaluated)
     if points > max_points:
@@ -199,48 +197,49 @@ def ranking(
             f"got {points:,} different points to rank, expected at most {max_points:,}; select values of axes"
         )
     ranked = [_rank_model(of_model, tol) for of_model in by_model]
-    if not any(one.points for one in ranked):
-        raise UsageError("there is nothing to judge: at no point is an e asked for of balls that meet")
+    if not any(model.points for model in ranked):
+        raise UsageError("nothing to rank: no point has both a target e and an impact")
     return Ranking(tol, tuple(sorted(ranked, key=_sort_key)))
 
 
 def _check_rankable(dataset: xr.Dataset, tol: float) -> None:
-    """Refuse what cannot be ranked."""
+    """Refuse a dataset or a tolerance by which models cannot be ranked."""
     if not 0.0 < tol < math.inf:
-        raise UsageError(f"tol: got {tol:g}, wants a positive finite number")
+        raise UsageError(f"tol: got {tol:g}, expected a positive finite number")
     if "t" in dataset.dims:
         raise UsageError("this is a time history; models are ranked by the result of a sweep")
     if "model" not in dataset.dims:
-        raise UsageError("model is no axis of this result; select models as a list, sel(model=[...])")
+        raise UsageError("model is not an axis of this result; select models as a list, sel(model=[...])")
     missing = [name for name in RANKED_VARIABLES if name not in dataset]
     if missing:
         raise UsageError(f"this result has no {', '.join(missing)}; sweep without [output] variables, or add them")
     if "e" not in dataset.coords or not _asks_for_e(dataset):
-        raise UsageError("this sweep asks for no e, by which models are ranked; give it e or alpha")
+        raise UsageError("this sweep has no target e, by which models are ranked; add e or alpha")
     dims = set(dataset["e_error"].dims)
     if "model" not in dims or dims != set(dataset["status"].dims) or not dims.issuperset(dataset["e"].dims):
         raise UsageError("e_error, status and e of this result do not lie along the axes of a sweep")
 
 
-def _sort_key(one: Ranked) -> tuple[float, ...]:
+def _sort_key(ranked: Ranked) -> tuple[float, ...]:
     # a model that failed everywhere has no errors
-    return (-one.share, *(math.inf if math.isnan(error) else error for error in (one.max_error, one.mean_error)))
+    errors = (ranked.max_error, ranked.mean_error)
+    return (-ranked.share, *(math.inf if math.isnan(error) else error for error in errors))
 
 
 def _asks_for_e(dataset: xr.Dataset) -> bool:
-    """Whether there is a point at which an e is asked for."""
+    """Whether any point has a target e."""
     e, _ = distinct_points(dataset, "e")
     return any(not np.isnan(e.isel(where).values).all() for where in slabs(e.sizes))
 
 
-def _select_model(dataset: xr.Dataset, place: int) -> xr.Dataset:
-    """A model of a result, without the axes of other models' parameters."""
-    first = dict.fromkeys(foreign_dims(dataset, str(dataset["model"].values[place])), 0)
-    return dataset.isel({"model": place, **first})
+def _select_model(dataset: xr.Dataset, position: int) -> xr.Dataset:
+    """One model of a result, without the axes of other models' parameters."""
+    first = dict.fromkeys(foreign_dims(dataset, str(dataset["model"].values[position])), 0)
+    return dataset.isel({"model": position, **first})
 
 
 def _reduce_dims(of_model: xr.Dataset) -> tuple[xr.Dataset, int]:
-    """What is judged of a model, over the axes along which it or e varies, and how often each point counts."""
+    """The ranked variables of a model, over the axes along which they or e vary, and the weight of each point."""
     along_one = of_model.variables["e"].ndim == 1
     return over_varying_dims(
         of_model, RANKED_VARIABLES, *(of_model.variables["e"].dims if along_one else varying_dims(of_model, "e"))
@@ -249,14 +248,14 @@ def _reduce_dims(of_model: xr.Dataset) -> tuple[xr.Dataset, int]:
 
 @dataclass(frozen=True)
 class _JudgedSlab:
-    """Points of a slab: e and its error, and which are judged, failed, known, and within the tolerance."""
+    """Points of a slab: target e, its error, and which points count, failed, have an error and are within tol."""
 
     asked: NDArray[Any]
     error: NDArray[Any]
     distance: NDArray[np.float64]
     judged: Mask
     failed: Mask
-    known: Mask
+    evaluable: Mask
     within: Mask
 
 
@@ -267,75 +266,76 @@ def _judge_slab(evaluated: xr.Dataset, where: Slab, sizes: Mapping[Hashable, int
     distance = np.abs(np.asarray(error, float))
     judged = ~np.isnan(asked) & (status != Status.NO_IMPACT)
     failed = judged & (status >= FIRST_FAILURE)
-    known = judged & ~failed & ~np.isnan(distance)
-    return _JudgedSlab(asked, error, distance, judged, failed, known, known & (distance <= tol))
+    evaluable = judged & ~failed & ~np.isnan(distance)
+    return _JudgedSlab(asked, error, distance, judged, failed, evaluable, evaluable & (distance <= tol))
 
 
-def _best_parameters(of_model: xr.Dataset, own: Sequence[Hashable], tol: float) -> dict[Hashable, int]:
-    """The place on each axis of a model's own parameters at which it does best over all other axes."""
-    evaluated, _ = over_varying_dims(of_model, RANKED_VARIABLES, *own, *varying_dims(of_model, "e"))
-    shape = tuple(evaluated.sizes[dim] for dim in own)
+def _best_parameters(of_model: xr.Dataset, parameter_dims: Sequence[Hashable], tol: float) -> dict[Hashable, int]:
+    """The index on each axis of a model's own parameters at which it ranks best over all other axes."""
+    evaluated, _ = over_varying_dims(of_model, RANKED_VARIABLES, *parameter_dims, *varying_dims(of_model, "e"))
+    shape = tuple(evaluated.sizes[dim] for dim in parameter_dims)
     if math.prod(shape) > MAX_PARAMETER_COMBINATIONS:
         raise UsageError(
             f"got {math.prod(shape):,} combinations of parameters of {of_model['model'].item()}, expected at most "
             f"{MAX_PARAMETER_COMBINATIONS:,}; select values of them"
         )
     dims = evaluated.variables["e_error"].dims
-    sizes = {dim: evaluated.sizes[dim] for dim in (*own, *(dim for dim in dims if dim not in own))}
+    other_dims = (dim for dim in dims if dim not in parameter_dims)
+    sizes = {dim: evaluated.sizes[dim] for dim in (*parameter_dims, *other_dims)}
     points, within, errors = np.zeros(shape, int), np.zeros(shape, int), np.full(shape, np.nan)
-    others = tuple(range(len(own), len(sizes)))
+    others = tuple(range(len(parameter_dims), len(sizes)))
     for where in slabs(sizes):
         part = _judge_slab(evaluated, where, sizes, tol)
-        place = tuple(where[dim] for dim in own)
-        points[place] += part.judged.sum(axis=others)
-        within[place] += part.within.sum(axis=others)
-        largest = np.fmax.reduce(np.where(part.known, part.distance, np.nan), axis=others, initial=np.nan)
-        errors[place] = np.fmax(errors[place], largest)
+        parameter_slab = tuple(where[dim] for dim in parameter_dims)
+        points[parameter_slab] += part.judged.sum(axis=others)
+        within[parameter_slab] += part.within.sum(axis=others)
+        largest = np.fmax.reduce(np.where(part.evaluable, part.distance, np.nan), axis=others, initial=np.nan)
+        errors[parameter_slab] = np.fmax(errors[parameter_slab], largest)
     share = within / np.maximum(points, 1)
     best = np.lexsort((np.where(np.isnan(errors), np.inf, errors).reshape(-1), -share.reshape(-1)))[0]
-    return dict(zip(own, (int(at) for at in np.unravel_index(best, shape)), strict=True))
+    return dict(zip(parameter_dims, (int(at) for at in np.unravel_index(best, shape)), strict=True))
 
 
 def _rank_model(of_model: xr.Dataset, tol: float) -> Ranked:
-    """How well a model does, from its e_error and status, of the shape of the axes, and the e asked for."""
+    """The rank of a model, from its e_error and status and from the target e."""
     key = str(of_model["model"].item())
-    own = [dim for dim in own_dims(of_model, key) if dim in of_model.variables["e_error"].dims]
-    best = _best_parameters(of_model, own, tol) if own else {}
+    parameter_dims = [dim for dim in own_dims(of_model, key) if dim in of_model.variables["e_error"].dims]
+    best = _best_parameters(of_model, parameter_dims, tol) if parameter_dims else {}
     chosen = _inputs_at(of_model, best)
     of_model = of_model.isel(best)
     axes = of_model.variables["e_error"].dims
     evaluated, weight = _reduce_dims(of_model)
     sizes = {dim: evaluated.sizes[dim] for dim in evaluated.variables["e_error"].dims}
     e, along_one = evaluated.variables["e"], of_model.variables["e"].ndim == 1
-    # along e, where it varies along one axis: whether there is a point to judge, and one that is not within tol
+    # if e varies along one axis, for each e: whether any point counts, and whether any is not within tol
     asked_at, missed_at = np.zeros(e.shape, bool), np.zeros(e.shape, bool)
-    points = known_points = within_points = failed_points = 0
+    points = evaluable_points = within_points = failed_points = 0
     total, max_error, e_out = Fraction(), math.nan, math.nan
     worst: dict[Hashable, int] | None = None
     for where in slabs(sizes):
         part = _judge_slab(evaluated, where, sizes, tol)
-        distance, known = part.distance, part.known
+        distance, evaluable = part.distance, part.evaluable
         points += weight * int(part.judged.sum())
-        known_points += weight * int(known.sum())
+        evaluable_points += weight * int(evaluable.sum())
         within_points += weight * int(part.within.sum())
         failed_points += weight * int(part.failed.sum())
-        if known.any():
-            total += weight * _exact_sum(distance[known & np.isfinite(distance)])
-            index = np.unravel_index(int(np.argmax(np.where(known, distance, -1.0))), distance.shape)
+        if evaluable.any():
+            total += weight * _exact_sum(distance[evaluable & np.isfinite(distance)])
+            index = np.unravel_index(int(np.argmax(np.where(evaluable, distance, -1.0))), distance.shape)
             if worst is None or distance[index] > max_error:
                 max_error = float(distance[index])
                 e_out = float(part.asked[index]) + float(part.error[index])
                 worst = {dim: where[dim].start + int(at) for dim, at in zip(sizes, index, strict=True)}
         if along_one:
-            others = tuple(place for place, dim in enumerate(sizes) if dim not in e.dims)
+            others = tuple(axis for axis, dim in enumerate(sizes) if dim not in e.dims)
             along = where[e.dims[0]]
             asked_at[along] |= np.logical_or.reduce(part.judged, axis=others)
             missed_at[along] |= np.logical_or.reduce(part.judged & ~part.within, axis=others)
     at: dict[str, float | str] = {}
     mean_error = math.nan
     if worst is not None:
-        # an error without bound comes from a file that was not written by a sweep
-        mean_error = max_error if math.isinf(max_error) else float(total / known_points)
+        # an infinite error comes from a file that was not written by a sweep
+        mean_error = max_error if math.isinf(max_error) else float(total / evaluable_points)
         asked_there = e.isel({dim: worst[dim] for dim in e.dims}).values.item()
         at = {**_inputs_at(of_model, {dim: worst.get(dim, 0) for dim in axes}), **chosen, "e": float(asked_there)}
     parameters = {".".join(map(str, path_of(name))): chosen[name] for name in chosen if owner_of(name) == key}
@@ -353,7 +353,7 @@ def _read_slab(variable: xr.Variable, where: Slab, sizes: Mapping[Hashable, int]
 
 
 def _exact_sum(values: NDArray[np.float64]) -> Fraction:
-    """The sum of finite numbers that are not negative, without rounding; at most 2**26 of them.
+    """The exact sum of at most 2**26 finite, non-negative numbers.
 
     >>> _exact_sum(np.array([1e16, 1.0, 1e-16])) == Fraction(1e16) + 1 + Fraction(1e-16)
     True
@@ -361,7 +361,7 @@ def _exact_sum(values: NDArray[np.float64]) -> Fraction:
     if not values.size:
         return Fraction()
     mantissas, exponents = np.frexp(values)
-    # whole numbers in two parts, whose sums are exact in double
+    # integers in two parts, whose sums are exact in double precision
     scaled = np.ldexp(mantissas, UPPER_BITS)
     upper = np.floor(scaled)
     lower = np.ldexp(scaled - upper, MANTISSA_BITS - UPPER_BITS)
@@ -374,21 +374,21 @@ def _exact_sum(values: NDArray[np.float64]) -> Fraction:
     return total * Fraction(2) ** (least - MANTISSA_BITS)
 
 
-def _inputs_at(of_model: xr.Dataset, places: Mapping[Hashable, int]) -> dict[str, float | str]:
-    """What is swept, at a place along each axis, without the parameters of other models."""
+def _inputs_at(of_model: xr.Dataset, positions: Mapping[Hashable, int]) -> dict[str, float | str]:
+    """The swept inputs at a position along each axis, without the parameters of other models."""
     variables, key = of_model.variables, str(of_model["model"].item())
     return {
-        name: variables[name].values[place].item()
-        for dim, place in places.items()
+        name: variables[name].values[position].item()
+        for dim, position in positions.items()
         for name in dict.fromkeys([str(dim), *columns_along(of_model, dim)])
         if owner_of(name) in ("", key)
     }
 
 
 def _served_ranges(e: NDArray[Any], asked: Mask, missed: Mask) -> tuple[tuple[float, float], ...]:
-    """The ranges of neighbouring values of e at which every judged point is within the tolerance."""
-    # in order, each value once: that of alpha and of speeds that vary with it may come again
-    values, place = np.unique(e[asked], return_inverse=True)
-    served = np.bincount(place, missed[asked], values.size) == 0
+    """The ranges of neighbouring values of e at which every point that counts is within the tolerance."""
+    # sorted, each value once: several combinations of alpha and speeds may give the same e
+    values, value_index = np.unique(e[asked], return_inverse=True)
+    served = np.bincount(value_index, missed[asked], values.size) == 0
     edges = np.diff(np.concatenate(([0], served, [0])))
     return tuple(zip(values[edges[:-1] == 1].tolist(), values[edges[1:] == -1].tolist(), strict=True))

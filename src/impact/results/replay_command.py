@@ -17,9 +17,9 @@ InputValue = TypeVar("InputValue")
 
 
 def command_start(path: str, dataset: xr.Dataset) -> tuple[str, ...]:
-    """How a command begins that runs a point of a result again; empty for a dataset that is in no file.
+    """The first words of a command that runs a point of a result again; empty for a dataset without a file.
 
-    So it is where a model was given as a value: no command can give it again.
+    Also empty if a model is a Python value, which no command line can name.
 
     >>> command_start("new.h5", xr.Dataset(attrs={"plugins": '{"mine": {"file": "my.py", "sha256": ""}}'}))
     ('impact', 'run', 'new.h5', '--plugin', 'my.py')
@@ -40,7 +40,7 @@ def inputs_of_model(at: Mapping[str, InputValue]) -> dict[str, InputValue]:
 
 
 def describe_point(at: Mapping[str, float | str]) -> str:
-    """The inputs of a point in a message, without the digits that rounding left.
+    """The inputs of a point for a message, rounded to 12 digits.
 
     >>> describe_point({"model": "hertz", "e": 0.1 + 0.2})
     'model=hertz, e=0.3'
@@ -48,16 +48,16 @@ def describe_point(at: Mapping[str, float | str]) -> str:
     return ", ".join(f"{safe_text(name)}={safe_text(number(value, 12), 60)}" for name, value in at.items())
 
 
-def replay_command(begin: Sequence[str], at: Mapping[str, object]) -> str:
-    """The whole command: how it begins, and the model and the inputs of the point.
+def replay_command(start: Sequence[str], at: Mapping[str, object]) -> str:
+    """The whole command: its first words, then the model and the inputs of the point.
 
     >>> replay_command(("impact", "run", "new.h5"), {"model": "hertz", "case": 3})
     'impact run new.h5 --model hertz --at case=3'
     >>> replay_command(("impact", "run", "new.h5"), {"model": "hertz", "e": 0.5, "material": "soft steel"})
     "impact run new.h5 --model hertz --at e=0.5 --at 'material=soft steel'"
     """
-    words = list(begin)
+    words = list(start)
     for name, value in at.items():
-        given = repr(value) if isinstance(value, float) else str(value)
-        words += ["--model", given] if name == "model" else ["--at", f"{name}={given}"]
+        text = repr(value) if isinstance(value, float) else str(value)
+        words += ["--model", text] if name == "model" else ["--at", f"{name}={text}"]
     return safe_text(shlex.join(words), 2000)

@@ -26,9 +26,9 @@ from ..engine.plan import Index, Inputs, Plan, is_foreign, is_own, material_prop
 from ..formatting import number
 
 SCHEMA_VERSION = 2
-# models with another exponent are named in at most so many characters
+# longer lists of models with another exponent are abbreviated
 MAX_EXPONENT_LETTERS = 48
-# coordinates along `model` that are texts about it
+# coordinates along `model` with metadata of the models
 MODEL_METADATA = ("title", "year", "equation", "reference", "doi")
 
 
@@ -36,8 +36,8 @@ MODEL_METADATA = ("title", "year", "equation", "reference", "doi")
 class SchemaVariable:
     """One variable of a result.
 
-    `per` says whether it depends on the model or on the axes alone; `judged` how a comparison judges it: by its
-    difference over a scale, by a bound on itself, exactly, or not at all.
+    `per` states whether it depends on the model or on the axes only; `judged` how a comparison judges it: by its
+    difference relative to a scale, by a bound of its own value, exactly, or not at all.
     """
 
     name: str
@@ -51,7 +51,7 @@ class SchemaVariable:
 
     @property
     def by_default(self) -> bool:
-        """Whether it is stored where `[output] variables` does not say which."""
+        """Whether it is stored if `[output] variables` is not set."""
         return self.name in BY_DEFAULT
 
 
@@ -123,12 +123,12 @@ RECORDED_PACKAGES = ("numpy", "h5py", "h5netcdf", "xarray")
 def scale_of(
     variable: SchemaVariable, read: Callable[[str], NDArray[Any]], *, has_peak: bool
 ) -> NDArray[np.float64]:
-    """The scale of a variable, of a shape that broadcasts to that of the points.
+    """The scale of a variable's differences in its own unit; its shape broadcasts to that of the points.
 
     Parameters
     ----------
-    variable : which
-    read : gives values by name: v1, v2 [m/s], m1, m2 [kg], the variable itself, `peak_indentation` [m]; arrays
+    variable : the variable
+    read : returns values by name: v1, v2 [m/s], m1, m2 [kg], the variable itself, `peak_indentation` [m]; arrays
         that broadcast against each other
     has_peak : whether the result has `peak_indentation`
     """
@@ -150,40 +150,41 @@ def scale_of(
 
 
 def stored_variables(plan: Plan) -> tuple[SchemaVariable, ...]:
-    """The variables of the result of a plan; the status is always there: without it a NaN would have no reason."""
+    """The variables of the result of a plan; always with the status, which explains NaNs."""
     chosen = {"status", *(plan.config.output.variables or BY_DEFAULT)}
-    return tuple(replace(one, dtype=plan.config.output.dtype if one.dtype == "f8" else one.dtype)
-                 for one in SCHEMA if one.name in chosen)  # fmt: skip
+    return tuple(replace(variable, dtype=plan.config.output.dtype if variable.dtype == "f8" else variable.dtype)
+                 for variable in SCHEMA if variable.name in chosen)  # fmt: skip
 
 
 def dataset_template(plan: Plan) -> xr.Dataset:
-    """The dataset of a plan without its values: each variable is zero, of no memory, and not to be written to.
+    """The dataset of a plan with placeholder values: read-only zeros that take no memory.
 
-    It has no index yet: to be stored it needs none, and making one takes longer than all the rest.
+    It has no index: storing it needs none, and building one takes longer than everything else.
     """
     axes = tuple(axis.name for axis in plan.config.axes)
     dataset = xr.Dataset(
         coords=xr.Coordinates(_plan_coordinates(plan), indexes={}), attrs=_provenance_attributes(plan)
     )
-    for one in stored_variables(plan):
+    for variable in stored_variables(plan):
         dims, shape = (
-            (axes, plan.shape) if one.per == "axes" else (("model", *axes), (len(plan.models), *plan.shape))
+            (axes, plan.shape) if variable.per == "axes" else (("model", *axes), (len(plan.models), *plan.shape))
         )
-        dataset[one.name] = (dims, np.broadcast_to(np.zeros((), one.dtype), shape), attributes_of(one))
+        zeros = np.broadcast_to(np.zeros((), variable.dtype), shape)
+        dataset[variable.name] = (dims, zeros, attributes_of(variable))
     return dataset
 
 
 def attributes_of(variable: SchemaVariable) -> dict[str, object]:
-    found: dict[str, object] = {
+    attributes: dict[str, object] = {
         "units": variable.unit, "long_name": variable.meaning, "equation": variable.equation,
     }  # fmt: skip
     if variable.name == "status":
-        found["flag_values"] = np.array([int(status) for status in Status], np.int8)
-        found["flag_meanings"] = " ".join(status.name.lower() for status in Status)
+        attributes["flag_values"] = np.array([int(status) for status in Status], np.int8)
+        attributes["flag_meanings"] = " ".join(status.name.lower() for status in Status)
     if variable.name == "in_domain":
-        found["flag_values"] = np.array([0, 1], np.int8)
-        found["flag_meanings"] = "outside_claimed_domain within_claimed_domain"
-    return found
+        attributes["flag_values"] = np.array([0, 1], np.int8)
+        attributes["flag_meanings"] = "outside_claimed_domain within_claimed_domain"
+    return attributes
 
 
 def _plan_coordinates(plan: Plan) -> dict[str, object]:
@@ -192,39 +193,39 @@ def _plan_coordinates(plan: Plan) -> dict[str, object]:
     def texts(field: str) -> tuple[str, list[str], dict[str, str]]:
         return "model", [str(getattr(model, field)) for model in models], {"long_name": f"{field} of the model"}
 
-    found: dict[str, object] = {
+    coordinates: dict[str, object] = {
         "model": ("model", [model.key for model in models], {"long_name": "contact force model"}),
         **{field: texts(field) for field in ("title", "equation", "reference", "doi")},
         "year": ("model", [model.year for model in models], {"long_name": "year of the model"}),
     }
     for axis in plan.config.axes:
         if axis.numbered:
-            found[axis.name] = (axis.name, list(axis.labels), {"long_name": "number of the case"})
+            coordinates[axis.name] = (axis.name, list(axis.labels), {"long_name": "number of the case"})
         for name, values in axis.columns.items():
-            found[name] = (axis.name, list(values), _coordinate_attributes(plan, name))
+            coordinates[name] = (axis.name, list(values), _coordinate_attributes(plan, name))
     for name, value in plan.config.scalars.items():
-        found[name] = ((), value, _coordinate_attributes(plan, name))
-    found["exponent"] = _exponent_coordinate(plan)
+        coordinates[name] = ((), value, _coordinate_attributes(plan, name))
+    coordinates["exponent"] = _exponent_coordinate(plan)
     if "alpha" in plan.inputs.names():
-        found["e"] = _restitution_coordinate(plan)
+        coordinates["e"] = _restitution_coordinate(plan)
     for ball in "12":
         if f"m{ball}" not in plan.inputs.names():
-            found[f"m{ball}"] = _mass_coordinate(plan, ball)
-    return found
+            coordinates[f"m{ball}"] = _mass_coordinate(plan, ball)
+    return coordinates
 
 
 def _coordinate_attributes(plan: Plan, name: str) -> dict[str, str]:
-    """Units and meaning of a coordinate."""
+    """Units and meaning of a coordinate, as attributes."""
     material, field = material_property(name) or ("", "")
     if material:
         return {
             "units": udunits(MATERIAL_QUANTITIES[field].unit),
             "long_name": f"{MATERIAL_QUANTITIES[field].meaning} of {material}",
         }
-    key, _, own = name.rpartition(".")
+    key, _, parameter = name.rpartition(".")
     for model in plan.models:
         if model.key == key:
-            quantity = model_quantities(model)[own]
+            quantity = model_quantities(model)[parameter]
             return {"units": udunits(quantity.unit), "long_name": quantity.meaning}
     if name in MATERIAL_KEYS:
         return {"long_name": MATERIAL_KEYS[name]}
@@ -237,20 +238,20 @@ def udunits(unit: str) -> str:
     >>> udunits("m/s"), udunits("N/m^n"), udunits("kg/m^3"), udunits("1")
     ('m s-1', 'N m-n', 'kg m-3', '1')
     """
-    return re.sub(r"/\s*([A-Za-z]+)(?:\^(\S+))?", lambda found: f" {found[1]}-{found[2] or 1}", unit)
+    return re.sub(r"/\s*([A-Za-z]+)(?:\^(\S+))?", lambda match: f" {match[1]}-{match[2] or 1}", unit)
 
 
 def plain_unit(unit: str) -> str:
-    """The other way round, as a reader writes it.
+    """The inverse of `udunits`: a unit in the spelling of the config.
 
     >>> plain_unit("m s-1"), plain_unit("N m-1.5"), plain_unit("kg")
     ('m/s', 'N/m^1.5', 'kg')
     """
-    return re.sub(r" ([A-Za-z]+)-(\S+)", lambda found: f"/{found[1]}" + f"^{found[2]}" * (found[2] != "1"), unit)
+    return re.sub(r" ([A-Za-z]+)-(\S+)", lambda match: f"/{match[1]}" + f"^{match[2]}" * (match[2] != "1"), unit)
 
 
 def exponent_text(by_model: Mapping[str, float]) -> str:
-    """The exponent n of some models, where laws may have their own.
+    """The exponent n of some models as text, with the models whose own exponent differs.
 
     >>> exponent_text({"hertz": 1.5, "bilinear": 1.0, "lankarani-nikravesh-1990": 1.5})
     '1.5 (1 for bilinear)'
@@ -264,7 +265,7 @@ def exponent_text(by_model: Mapping[str, float]) -> str:
 
 
 def exponents_of(dataset: xr.Dataset) -> str | None:
-    """The exponent n of the models of a result in words; None where it varies along an axis, or is not known."""
+    """The exponent n of the models of a result as text; None if it varies along an axis or is unknown."""
     exponent = dataset.coords.get("exponent")
     if exponent is None or not set(exponent.dims) <= {"model"}:
         return None
@@ -273,12 +274,12 @@ def exponents_of(dataset: xr.Dataset) -> str | None:
 
 
 def is_input(name: str) -> bool:
-    """Whether a coordinate has the name of an input: it is not a text about a model, nor the number of a case."""
+    """Whether a coordinate has the name of an input, unlike metadata of models and numbers of cases."""
     return name in SWEEP_QUANTITIES or name in MATERIAL_KEYS or "." in name
 
 
 def is_case(name: str) -> bool:
-    """Whether a dimension has numbers for its points: that of a table of cases, or of a group like it.
+    """Whether a dimension numbers its points: that of a table of cases, or of a similar group.
 
     >>> is_case("case"), is_case("case_2"), is_case("m1")
     (True, True, False)
@@ -287,20 +288,20 @@ def is_case(name: str) -> bool:
 
 
 def derived_names(coords: Mapping[Any, xr.DataArray]) -> frozenset[str]:
-    """The coordinates that have the name of an input and were computed from others: e by alpha, m by R and rho."""
+    """The coordinates with names of inputs that were computed: e from alpha, masses from R and rho."""
     masses = {name for name in ("m1", "m2") if name in coords and "equation" in coords[name].attrs}
     return frozenset(masses | ({"e"} if "alpha" in coords else set()))
 
 
 def columns_along(dataset: xr.Dataset, dim: Hashable) -> list[str]:
-    """The inputs that vary along a dimension and no other: the columns of its axis."""
+    """The inputs that vary along a dimension only: the columns of its axis."""
     derived = derived_names(dataset.coords)
     along = [str(name) for name, coordinate in dataset.coords.variables.items() if coordinate.dims == (dim,)]
     return [name for name in along if is_input(name) and name not in derived]
 
 
 def foreign_dims(dataset: xr.Dataset, key: str) -> list[Hashable]:
-    """The dimensions along which only parameters of other models than one vary, so that nothing of it does."""
+    """The dimensions along which only parameters of other models vary, so that nothing of this model does."""
     return [dim for dim in dataset.dims if is_foreign(columns_along(dataset, dim), key)]
 
 
@@ -310,29 +311,29 @@ def own_dims(dataset: xr.Dataset, key: str) -> list[Hashable]:
 
 
 def parts_of_models(dataset: xr.Dataset) -> Iterator[xr.Dataset]:
-    """The part of each model of a result, at the first place along the parameters of other models."""
+    """The part of each model of a result, at the first position along the parameters of other models."""
     for model, key in enumerate(dataset["model"].values):
         first = dict.fromkeys(foreign_dims(dataset, str(key)), slice(0, 1))
         yield dataset.isel({"model": model, **first})
 
 
 def count_points(dataset: xr.Dataset) -> int:
-    """How many points a result has; along the parameters of other models, the points of a model are one."""
+    """The number of points of a result, without repetitions along parameters of other models."""
     if "model" not in dataset.dims:
         return math.prod(dataset.sizes.values())
     return sum(math.prod(part.sizes.values()) for part in parts_of_models(dataset))
 
 
 def _exponent_coordinate(plan: Plan) -> tuple[tuple[str, ...], object, dict[str, str]]:
-    """The compliance exponent of each model: its own, or the sweep's, which may be an axis."""
+    """The compliance exponent of each model: its own, else that of the sweep, which may be an axis."""
     about = {"units": "1", "long_name": "compliance exponent n"}
-    own = np.array([np.nan if model.exponent is None else model.exponent for model in plan.models])
+    law_exponents = np.array([np.nan if model.exponent is None else model.exponent for model in plan.models])
     axes = plan.inputs.axes_of("n")
     if not axes:
-        return ("model",), np.where(np.isnan(own), plan.config.scalars["n"], own), about
+        return ("model",), np.where(np.isnan(law_exponents), plan.config.scalars["n"], law_exponents), about
     axis = plan.config.axes[axes[0]]
     values = np.asarray(axis.columns["n"], float)
-    return ("model", axis.name), np.where(np.isnan(own)[:, None], values, own[:, None]), about
+    return ("model", axis.name), np.where(np.isnan(law_exponents)[:, None], values, law_exponents[:, None]), about
 
 
 def _restitution_coordinate(plan: Plan) -> tuple[tuple[str, ...], object, dict[str, str]]:
@@ -350,7 +351,7 @@ def _mass_coordinate(plan: Plan, ball: str) -> tuple[tuple[str, ...], object, di
 def _derived_values(
     plan: Plan, names: Sequence[str], formula: Callable[[Inputs, Index], Array]
 ) -> tuple[tuple[str, ...], Array]:
-    """What is computed from inputs, with its dimensions: the axes of those."""
+    """Values that are computed from inputs, and their dimensions: the axes of those inputs."""
     axes = sorted({axis for name in names for axis in plan.inputs.axes_of(name)})
     where = [slice(None) if axis in axes else slice(1) for axis in range(len(plan.shape))]
     shape = [plan.shape[axis] for axis in axes]

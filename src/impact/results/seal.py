@@ -15,7 +15,7 @@ from typing import Any, BinaryIO
 from ..errors import ResultError
 from .schema import SCHEMA_VERSION
 
-# HDF5 leaves so many bytes at the beginning of a file to others: its "user block"
+# bytes at the start of an HDF5 file that the format leaves to applications: its "user block"
 USER_BLOCK_BYTES = 512
 MAGIC = b"impact result\n"
 HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
@@ -32,7 +32,7 @@ def render_header(seal: str) -> bytes:
 
 
 def write_seal(file: Any) -> str:
-    """Seal a file that is open to read and write, and whose user block is empty so far; returns the seal."""
+    """Seal a file that is open for reading and writing and has an empty user block; returns the seal."""
     seal = _digest(file)
     file.seek(0)
     file.write(render_header(seal))
@@ -40,33 +40,33 @@ def write_seal(file: Any) -> str:
 
 
 def check_seal(path: Path) -> str:
-    """The seal of a file, which holds.
+    """The seal of a file, after a check that it is valid.
 
     Raises
     ------
-    ResultError : the file does not exist, is no sealed result, is of another schema version, or is damaged
+    ResultError : the file does not exist, is not a sealed result, has another schema version, or is damaged
     """
     with open_regular_file(path) as file:
-        found = file.read(USER_BLOCK_BYTES)
-        if found.startswith(HDF5_MAGIC):
+        header = file.read(USER_BLOCK_BYTES)
+        if header.startswith(HDF5_MAGIC):
             raise ResultError(
                 f"is of schema version 1, or no result of impact; expected version {SCHEMA_VERSION}: {SWEEP_AGAIN}"
             )
-        if not found.startswith(MAGIC):
-            raise ResultError("is not a readable result (it does not begin as a sealed file of impact does)")
-        version = found[len(MAGIC) :].partition(b"\n")[0].removeprefix(b"schema ")
+        if not header.startswith(MAGIC):
+            raise ResultError("is not a readable result (it does not begin with the header of a sealed file)")
+        version = header[len(MAGIC) :].partition(b"\n")[0].removeprefix(b"schema ")
         if version.isdigit() and int(version) != SCHEMA_VERSION and len(version) < 5:
             raise ResultError(
                 f"has schema version {int(version)}, this program reads {SCHEMA_VERSION}; {SWEEP_AGAIN}"
             )
         seal = _digest(file)
-    if found != render_header(seal):
-        raise ResultError("is damaged: its content does not have the SHA-256 that it was sealed with")
+    if header != render_header(seal):
+        raise ResultError("is damaged: the SHA-256 of its content differs from its seal")
     return seal
 
 
 def is_result(path: Path) -> bool:
-    """Whether a file begins as a result does, of this version or of the first."""
+    """Whether a file begins like a result of this schema version or of version 1."""
     if not path.is_file():
         return False
     with path.open("rb") as file:
@@ -75,7 +75,7 @@ def is_result(path: Path) -> bool:
 
 @contextmanager
 def open_regular_file(path: Path) -> Iterator[BinaryIO]:
-    """A regular file, opened to read."""
+    """A regular file, opened for reading."""
     if not path.is_file():
         raise ResultError("is not a regular file" if path.exists() else "does not exist")
     with path.open("rb") as file:

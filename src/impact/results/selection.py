@@ -17,10 +17,9 @@ if TYPE_CHECKING:
 
 Mask = NDArray[np.bool_]
 
-# a value given by hand matches one that was computed when it differs by rounding only
+# relative tolerance by which a value from a user matches a computed label
 SELECTION_RTOL = 1e-9
-# two labels are the same when they differ by the rounding of a range at most: powers and logarithms differ in
-# their last bits from one processor to another
+# relative tolerance of equal labels: powers and logarithms of ranges differ in their last bits between processors
 LABEL_RTOL = 1e-12
 NUMBER_DTYPE_KINDS = "fiu"
 
@@ -29,27 +28,26 @@ IndexArray = NDArray[np.intp]
 
 
 def model_positions(models: Sequence[str], dataset: xr.Dataset) -> list[int]:
-    """The places of models along `model`, in the order of their keys; one that is named twice counts once.
+    """The positions of models along `model`, in the order of the keys; repeated keys count once.
 
     Raises
     ------
     UsageError : a model is not in the result
     """
-    known = [str(key) for key in dataset["model"].values]
+    keys = [str(key) for key in dataset["model"].values]
     for key in models:
-        if key not in known:
-            raise UsageError(f'no model "{safe_text(key)}" in this result; {did_you_mean(key, known)}')
-    return [known.index(key) for key in dict.fromkeys(models)]
+        if key not in keys:
+            raise UsageError(f'no model "{safe_text(key)}" in this result; {did_you_mean(key, keys)}')
+    return [keys.index(key) for key in dict.fromkeys(models)]
 
 
 def select(dataset: xr.Dataset, sel: Mapping[str, float | str]) -> xr.Dataset:
-    """The result at values of axes, or of coordinates along an axis; several along one have to agree.
+    """Select a result at values of axes, or of coordinates along an axis; several along one axis have to agree.
 
     Parameters
     ----------
     dataset : a result
-    sel : the values, by name; an axis that has its value is none any more, but where several numbered points have
-        it, they are kept
+    sel : the values, by name; the axis is dropped, unless several numbered points have the value: these stay
 
     Raises
     ------
@@ -66,7 +64,7 @@ def select(dataset: xr.Dataset, sel: Mapping[str, float | str]) -> xr.Dataset:
         if dim in masks and same.any():
             same &= masks[dim]
         if not same.any():
-            shown = ", ".join(label(one) for one in values[:8].tolist())
+            shown = ", ".join(label(value_of_axis) for value_of_axis in values[:8].tolist())
             has = safe_text(shown + (", ..." if values.size > 8 else ""))
             raise UsageError(f"no {safe_text(f'{name} = {value}')} in this result; {safe_text(name)} is {has}")
         masks[dim] = same
@@ -74,13 +72,13 @@ def select(dataset: xr.Dataset, sel: Mapping[str, float | str]) -> xr.Dataset:
 
 
 def _matching_positions(labels: xr.DataArray, same: Mask) -> int | IndexArray:
-    """The place that is asked for; several of an axis whose points are numbered, which may be alike otherwise."""
+    """The selected position; on an axis with numbered points all positions that match."""
     is_numbered = labels.dtype.kind in "iu" and np.count_nonzero(same) > 1
     return np.flatnonzero(same) if is_numbered else int(np.argmax(same))
 
 
 def _matches_value(values: np.ndarray, value: float | str) -> Mask:
-    """Which values are the one asked for."""
+    """A mask of the values that equal a value."""
     if values.dtype.kind not in NUMBER_DTYPE_KINDS:
         return np.asarray(values.astype(str) == str(value))
     number = _as_number(value)
@@ -95,24 +93,24 @@ def _as_number(value: float | str) -> float | None:
 
 
 def match_labels(new: Sequence[Labels], baseline: Sequence[Labels]) -> tuple[IndexArray, IndexArray]:
-    """The places of equal labels on an axis in both, in the order of the baseline."""
+    """The positions of equal labels of an axis in two results, in the order of the baseline."""
     pairs = list(zip(new, baseline, strict=True))
     if all(np.array_equal(a, b) for a, b in pairs) and any(_is_increasing(a) for a, _ in pairs):
-        # as of most pairs; sorting a long axis takes ten times its memory
-        places = np.arange(len(new[0]))
-        return places, places
+        # the usual case; sorting a long axis takes ten times its memory
+        positions = np.arange(len(new[0]))
+        return positions, positions
     for rounding in (LABEL_RTOL, 0.0):
         rows = np.stack([_number_labels(a, b, rounding) for a, b in zip(new, baseline, strict=True)], axis=1)
-        # only a column of labels with a row for each is unique on an axis: what rounding would merge is told apart
+        # labels are unique on an axis: if rounding merges some, compare them exactly
         _, row = np.unique(rows, axis=0, return_inverse=True)
-        own, other = row[: len(new[0])], row[len(new[0]) :]
-        if len(np.unique(own)) == len(own) and len(np.unique(other)) == len(other):
+        new_rows, baseline_rows = row[: len(new[0])], row[len(new[0]) :]
+        if len(np.unique(new_rows)) == len(new_rows) and len(np.unique(baseline_rows)) == len(baseline_rows):
             break
     else:
-        raise UsageError("an axis has two points of the same labels; compare takes results of a sweep")
-    _, here, there = np.intersect1d(own, other, return_indices=True)
-    order = np.argsort(there, kind="stable")
-    return here[order], there[order]
+        raise UsageError("an axis has two points with the same labels; expected the result of a sweep")
+    _, new_positions, baseline_positions = np.intersect1d(new_rows, baseline_rows, return_indices=True)
+    order = np.argsort(baseline_positions, kind="stable")
+    return new_positions[order], baseline_positions[order]
 
 
 def _is_increasing(values: Labels) -> bool:
@@ -120,9 +118,9 @@ def _is_increasing(values: Labels) -> bool:
 
 
 def _number_labels(new: Labels, baseline: Labels, rounding: float) -> IndexArray:
-    """A number for each label of both, equal where the labels are."""
+    """A number for each label of both results; equal labels have equal numbers."""
     numbers = new.dtype.kind in NUMBER_DTYPE_KINDS and baseline.dtype.kind in NUMBER_DTYPE_KINDS
-    new, baseline = (one.astype(float if numbers else str) for one in (new, baseline))
+    new, baseline = (labels.astype(float if numbers else str) for labels in (new, baseline))
     values, number = np.unique(np.concatenate([new, baseline]), return_inverse=True)
     if numbers:
         another = ~np.isclose(values[1:], values[:-1], rtol=rounding, atol=0.0)

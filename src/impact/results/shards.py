@@ -32,9 +32,9 @@ from .schema import dataset_template
 from .summary import SweepOutcome
 from .sweep import check_storable, complete_ranges, range_reader, reload_range, store_result
 
-# what a folder says of its shard, beside the plan
+# describes the shard of a work folder, beside the plan
 SHARD_FILE_NAME = "shard.json"
-MAX_LISTED_SHARDS = 5  # shards that are named
+MAX_LISTED_SHARDS = 5  # missing shards that a message lists
 RECORDED_ATTRIBUTES = ("config", "config_set", "plugins", "fingerprint")
 
 
@@ -47,19 +47,19 @@ class Shard:
 
     @classmethod
     def parse(cls, text: str) -> Shard:
-        """The shard of a text such as "3/16".
+        """Parse a text such as "3/16".
 
         Raises
         ------
-        UsageError : it is none
+        UsageError : it is not a shard
 
         >>> Shard.parse("3/16")
         Shard(number=3, of=16)
         """
-        found = re.fullmatch(r"([0-9]{1,9})/([0-9]{1,9})", text)
-        shard = cls(*map(int, found.groups())) if found else cls(0, 0)
+        match = re.fullmatch(r"([0-9]{1,9})/([0-9]{1,9})", text)
+        shard = cls(*map(int, match.groups())) if match else cls(0, 0)
         if not 1 <= shard.number <= shard.of:
-            raise UsageError(f"--shard {safe_text(text)}: wants K/N with K from 1 to N, such as 3/16")
+            raise UsageError(f"--shard {safe_text(text)}: expected K/N with K from 1 to N, such as 3/16")
         return shard
 
     def has(self, part: TrajectoryRange) -> bool:
@@ -75,7 +75,7 @@ class Shard:
 
 @dataclass(frozen=True)
 class ShardProgress:
-    """What a shard has finished."""
+    """The finished part of a shard."""
 
     folder: Path
     blocks: int
@@ -96,15 +96,15 @@ def sweep_shard(
     on_progress: ProgressCallback = lambda progress: None,
     should_stop: Callable[[], bool] = never_stop,
 ) -> ShardProgress:
-    """Integrate a shard of a plan into its work folder, and go on with what is there.
+    """Integrate a shard of a plan into its work folder, and resume it if the folder exists.
 
     Parameters
     ----------
-    output : the result that it is to be part of, beside which the folder stands
-    plan : of the whole
-    shard : which part
-    command : words that sweep the whole; what makes a shard that is missing is told by them
-    overwrite : begin anew
+    output : the result that the shards make; the work folder is beside it
+    plan : of the whole sweep
+    shard : the part to integrate
+    command : words of the command that runs the whole sweep, for messages about missing shards
+    overwrite : start again
     backend, on_progress, should_stop : see `impact.results.sweep.sweep_into`
 
     Raises
@@ -115,28 +115,28 @@ def sweep_shard(
     maps = trajectory_maps(plan)
     plan = with_core(plan, maps)
     blocks = list(trajectory_ranges(maps))
-    own = [one for one in blocks if shard.has(one)]
-    counter = ProgressCounter.start(sum(one.size for one in own), plan.points, on_progress)
+    shard_blocks = [block for block in blocks if shard.has(block)]
+    counter = ProgressCounter.start(sum(block.size for block in shard_blocks), plan.points, on_progress)
     folder = shard.folder(output)
     with open_work_folder(folder, plan, resume=not overwrite, overwrite=overwrite) as work_folder:
         attributes = dataset_template(plan).attrs
-        about = {
+        record = {
             "shard": [shard.number, shard.of],
             "command": list(command),
             "core": plan.config.solver.core,
             "attributes": {name: attributes[name] for name in RECORDED_ATTRIBUTES},
         }
         with atomic_write(folder / SHARD_FILE_NAME, overwrite=True) as sink:
-            sink.write(json.dumps(about).encode())
+            sink.write(json.dumps(record).encode())
         with report_kept_blocks(folder, counter, "the same command", lambda error: []):
-            complete_ranges(work_folder, plan, maps, own, counter, backend, should_stop)
+            complete_ranges(work_folder, plan, maps, shard_blocks, counter, backend, should_stop)
     progress = counter.progress
-    return ShardProgress(folder, len(own), len(blocks), progress.trajectories, progress.failed, shard)
+    return ShardProgress(folder, len(shard_blocks), len(blocks), progress.trajectories, progress.failed, shard)
 
 
 @dataclass(frozen=True)
 class _ShardRecord:
-    """What a folder says of its shard."""
+    """The record of a shard in its work folder."""
 
     shard: Shard
     command: tuple[str, ...]
@@ -153,83 +153,83 @@ def merge(
     on_progress: ProgressCallback = lambda progress: None,
     should_stop: Callable[[], bool] = never_stop,
 ) -> tuple[SweepOutcome, int]:
-    """Store the result that shards make; their folders stay as they are.
+    """Merge shards into a result; their work folders are not modified.
 
     Parameters
     ----------
     folders : of the shards, in any order
     output : the file
-    plugins : the models of one's own that they were made with
+    plugins : models that are not built in, including those of the sweep
     overwrite : replace the file if it exists
     on_progress, should_stop : see `impact.results.sweep.sweep_into`
 
     Returns
     -------
-    The result, and how many blocks were in more than one folder, where they have the same bits.
+    The result, and the number of blocks that several folders have, with the same bits.
 
     Raises
     ------
-    UsageError : a folder is no shard, or of another sweep; or shards are missing or unfinished, each of which is
-        told with the command that makes it
-    ResultError : a block is in two folders, and they differ
-    InUseError : a shard is still being made
-    StoreError, UnfinishedError : nothing was stored; the folders have all of it
+    UsageError : a folder is not a shard, or of another sweep; or shards are missing or unfinished: the message has
+        the command for each of them
+    ResultError : two folders have the same block with different bits
+    InUseError : a shard is still running
+    StoreError, UnfinishedError : nothing was stored; the folders keep all finished trajectories
     """
     check_output(output, overwrite=overwrite)
-    told = {folder: _read_record(folder) for folder in {one.resolve(): one for one in folders}.values()}
-    first, about = next(iter(told.items()))
-    config = stored_config(about.attributes, [], plugins, str(first))
-    # the core that it was settled on, whichever is here
-    config = replace(config, solver=replace(config.solver, core=about.core))
+    records = {folder: _read_record(folder) for folder in {path.resolve(): path for path in folders}.values()}
+    first, first_record = next(iter(records.items()))
+    config = stored_config(first_record.attributes, [], plugins, str(first))
+    # the core that the shards were integrated by, which may not be the default of this machine
+    config = replace(config, solver=replace(config.solver, core=first_record.core))
     plan = Plan(config, plugins.of(config.models))
     maps = trajectory_maps(plan)
     blocks = list(trajectory_ranges(maps))
-    counter = ProgressCounter.start(sum(own.count for own in maps), plan.points, on_progress)
-    for folder, one in told.items():
-        if one.attributes["fingerprint"] != about.attributes["fingerprint"]:
-            # what differs in the trajectories is told by its name first
+    counter = ProgressCounter.start(sum(trajectory_map.count for trajectory_map in maps), plan.points, on_progress)
+    for folder, record in records.items():
+        if record.attributes["fingerprint"] != first_record.attributes["fingerprint"]:
+            # a difference in the trajectories is reported first, by its name
             with lock_work_folder(folder, plan):
                 raise UsageError(
                     f"{safe_text(str(folder))}: its title or output is not that of {safe_text(str(first))}; "
                     "expected the folders of one sweep"
                 )
-    # a folder is locked while it is looked at, one after the other: there may be more of them than open files
-    where, twice = _locate_ranges([*told], plan, blocks, counter, should_stop)
-    lacking = [part for part in blocks if part.number not in where]
-    if lacking:
-        raise UsageError("\n".join(_missing_shards(output, lacking, told)))
+    # folders are locked one after the other: there may be more of them than the limit of open files
+    where, n_repeated = _locate_ranges([*records], plan, blocks, counter, should_stop)
+    missing = [part for part in blocks if part.number not in where]
+    if missing:
+        raise UsageError("\n".join(_missing_shards(output, missing, records)))
     table = table_of(plan, maps, range_reader(maps, lambda number: reload_range(where[number], blocks[number])))
     try:
-        return store_result(output, plan, table, None, overwrite, counter, should_stop), twice
+        return store_result(output, plan, table, None, overwrite, counter, should_stop), n_repeated
     except (StoreError, UnfinishedError) as error:
         raise type(error)(
-            "; ".join(filter(None, [str(error), "the folders have all that is finished"]))
+            "; ".join(filter(None, [str(error), "the work folders keep all finished trajectories"]))
         ) from error
 
 
 def _read_record(folder: Path) -> _ShardRecord:
-    """What a folder says of its shard; it may come from anywhere.
+    """Read the record of a shard, validated since the folder may come from anywhere.
 
     Raises
     ------
-    UsageError : it is no shard
+    UsageError : the folder is not a shard
     """
     try:
         if not (folder / SHARD_FILE_NAME).is_file():
             raise ValueError
-        found = json.loads((folder / SHARD_FILE_NAME).read_text(encoding="utf-8"))
-        number, of = found["shard"]
-        command, core, attributes = found["command"], found["core"], found["attributes"]
-        right = (
+        fields = json.loads((folder / SHARD_FILE_NAME).read_text(encoding="utf-8"))
+        number, of = fields["shard"]
+        command, core, attributes = fields["command"], fields["core"], fields["attributes"]
+        is_valid = (
             isinstance(number, int) and isinstance(of, int) and 1 <= number <= of
-            and isinstance(command, list) and all(isinstance(one, str) for one in command)
+            and isinstance(command, list) and all(isinstance(word, str) for word in command)
             and core in CORES and {*RECORDED_ATTRIBUTES} <= attributes.keys()
         )  # fmt: skip
-        if not right:
+        if not is_valid:
             raise ValueError
     except (OSError, ValueError, TypeError, AttributeError, KeyError, RecursionError):
         shown = safe_text(str(folder))
-        raise UsageError(f"{shown}: is no shard, wants a folder that impact sweep --shard K/N makes") from None
+        raise UsageError(f"{shown}: is not a shard; expected a work folder of impact sweep --shard K/N") from None
     return _ShardRecord(Shard(number, of), tuple(command), core, attributes)
 
 
@@ -240,7 +240,7 @@ def _locate_ranges(
     counter: ProgressCounter,
     should_stop: Callable[[], bool],
 ) -> tuple[dict[int, WorkFolder], int]:
-    """In which folder each range is, and how many are in several."""
+    """The work folder of each range, and the number of ranges that are in several folders."""
     where: dict[int, WorkFolder] = {}
     repeated: set[int] = set()
     for folder in folders:
@@ -248,17 +248,19 @@ def _locate_ranges(
             for part in blocks:
                 if should_stop():
                     raise UnfinishedError("nothing was written")
-                found = work_folder.load(part)
-                if found is None:
+                trajectories = work_folder.load(part)
+                if trajectories is None:
                     continue
                 if part.number not in where:
                     where[part.number] = work_folder
-                    counter.count(part, found)
+                    counter.count(part, trajectories)
                     counter.report()
                     continue
                 repeated.add(part.number)
                 other = reload_range(where[part.number], part)
-                if any(values.tobytes() != vars(other)[name].tobytes() for name, values in vars(found).items()):
+                if any(
+                    values.tobytes() != vars(other)[name].tobytes() for name, values in vars(trajectories).items()
+                ):
                     raise ResultError(
                         f"{safe_text(str(work_folder.path(part.number)))}: differs from "
                         f"{safe_text(str(where[part.number].path(part.number)))}; expected both to be of "
@@ -268,18 +270,18 @@ def _locate_ranges(
 
 
 def _missing_shards(
-    output: Path, lacking: Sequence[TrajectoryRange], told: Mapping[Path, _ShardRecord]
+    output: Path, missing: Sequence[TrajectoryRange], records: Mapping[Path, _ShardRecord]
 ) -> list[str]:
-    """A line for each shard that is missing or unfinished, with what makes it."""
-    about = next(iter(told.values()))
-    folders = {one.shard: folder for folder, one in told.items()}
+    """A line for each shard that is missing or unfinished, with the command that completes it."""
+    first_record = next(iter(records.values()))
+    folders = {record.shard: folder for folder, record in records.items()}
     blocks: dict[Shard, int] = {}
-    for part in lacking:
-        shard = Shard(part.number % about.shard.of + 1, about.shard.of)
+    for part in missing:
+        shard = Shard(part.number % first_record.shard.of + 1, first_record.shard.of)
         blocks[shard] = blocks.get(shard, 0) + 1
     lines = []
-    for shard in sorted(blocks, key=lambda one: one.number)[:MAX_LISTED_SHARDS]:
-        again = safe_text(shlex.join([*about.command, "--shard", str(shard)]), 500)
+    for shard in sorted(blocks, key=lambda shard: shard.number)[:MAX_LISTED_SHARDS]:
+        again = safe_text(shlex.join([*first_record.command, "--shard", str(shard)]), 500)
         lacks = f"lacks {blocks[shard]:,} block{'' if blocks[shard] == 1 else 's'}"
         if shard in folders:
             lines.append(f"{safe_text(str(folders[shard]))}: shard {shard} {lacks}; {again} finishes it")

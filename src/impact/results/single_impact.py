@@ -37,9 +37,9 @@ from .seal import is_result
 STARTER_CONFIG = files("impact") / "config" / "starter.toml"
 
 ConfigSource = str | Path | Mapping[str, object] | xr.Dataset | None
-# from overrides to the config with them
+# returns the config with some overrides
 ReadConfig = Callable[[Sequence[str]], Config]
-# name, unit, meaning of what follows from the inputs and the motion of one impact
+# name, unit and meaning of the quantities that are derived from the inputs and the history of one impact
 DERIVED_QUANTITIES = (
     ("m1", "kg", "mass of ball 1"),
     ("m2", "kg", "mass of ball 2"),
@@ -62,15 +62,17 @@ class Impact:
     Parameters
     ----------
     model : the model
-    point : the inputs by their config names; a name in `first` is an axis of the source at its first value
+    point : the inputs by their config names
+    first : names of axes of the source that are at their first value
     values : the outputs under the names of the result file, in SI
     materials : those of the balls, by name
-    derived : the quantities of DERIVED by name, in SI; NaN where one does not apply
+    derived : the quantities of DERIVED_QUANTITIES by name, in SI; NaN for those that do not apply
     exponent : compliance exponent n of the law
-    damping : damping factor lambda = chi K/v0 [N s/m^(n+1)], NaN where the law has none
+    closing_speed : v0 = v1 - v2 [m/s]
+    damping : damping factor lambda = chi K/v0 [N s/m^(n+1)], NaN if the law has none
     e_kinematic, e_kinetic, e_energetic : restitution from velocities, impulses and works, equations (1) to (3);
-        the last two by quadrature of the force over the history, 0 where the balls stay together
-    history : the time history as a dataset over t, or None where there is no motion to follow
+        the last two by quadrature of the force over the history, 0 if the balls stay together
+    history : the time history as a dataset over t, or None if the motion cannot be integrated
     """
 
     model: ForceModel
@@ -93,9 +95,13 @@ class Impact:
 
 
 def run_single_impact(plan: Plan, first: tuple[str, ...], times: int | None = None) -> Impact:
-    """The only impact of a plan; `first` are axes of its source that are at their first value.
+    """Integrate the only impact of a plan.
 
-    `times` is how many points in time its history has, see `impact.contact.history.follow`.
+    Parameters
+    ----------
+    plan : without axes
+    first : names of axes of the source that are at their first value
+    times : number of points in time of the history, see `impact.contact.history.follow`
     """
     config = plan.config
     law = config.models[0]
@@ -109,7 +115,7 @@ def run_single_impact(plan: Plan, first: tuple[str, ...], times: int | None = No
     going = values["status"] == Status.OK
     history = follow(law, impacts, rtol=solver.rtol, max_steps=solver.max_steps, times=times) if going else None
     v0 = impacts.v0[0].item()
-    # a law may have an n of its own, in place of the one given
+    # a law may have its own n, which replaces that of the config
     point = {**config.scalars, "n": impacts.n[0].item()}
     if "alpha" in config.scalars:
         point["e"] = impacts.e[0].item()
@@ -134,23 +140,23 @@ def run_single_impact(plan: Plan, first: tuple[str, ...], times: int | None = No
 def _derived_quantities(
     law: ForceModel, impacts: Impacts, values: Mapping[str, float], history: History | None
 ) -> dict[str, float]:
-    """The quantities of DERIVED."""
-    found = {name: getattr(impacts, name)[0].item() for name in ("m1", "m2", "R1", "R2", "m")}
+    """The values of DERIVED_QUANTITIES."""
+    quantities = {name: getattr(impacts, name)[0].item() for name in ("m1", "m2", "R1", "R2", "m")}
     if law.unloading in (returning, stiffer) and values["status"] in (Status.OK, Status.LIMIT):
         recovered = values["peak_indentation"] - values["permanent_indentation"]
-        found["K_r"] = values["peak_force"] / recovered ** impacts.n[0].item() if recovered else math.inf
+        quantities["K_r"] = values["peak_force"] / recovered ** impacts.n[0].item() if recovered else math.inf
     if history is not None:
-        found |= {name: getattr(history, name) for name in ("tau_c", "tau_r", "W_c", "W_r")}
+        quantities |= {name: getattr(history, name) for name in ("tau_c", "tau_r", "W_c", "W_r")}
     elif values["status"] == Status.LIMIT:
-        # all that the balls bring is taken from them, and nothing given back
-        found["tau_c"], found["W_c"] = (impacts.m * impacts.v0)[0].item(), 0.5 * impacts.energy[0].item()
-        found["tau_r"] = found["W_r"] = 0.0
+        # the approach takes all kinetic energy, and the restitution returns none
+        quantities["tau_c"], quantities["W_c"] = (impacts.m * impacts.v0)[0].item(), 0.5 * impacts.energy[0].item()
+        quantities["tau_r"] = quantities["W_r"] = 0.0
     if "chi" in law.coefficients and law.unloading is None:
         chi, v0 = values["damping_ratio"], impacts.v0[0].item()
-        # the damping of a limit is infinite
+        # the limit has infinite damping
         chi = math.inf if values["status"] == Status.LIMIT else chi
-        found["rebound_speed_bound"] = v0 / chi if chi else math.inf
-    return {name: found.get(name, math.nan) for name, _, _ in DERIVED_QUANTITIES}
+        quantities["rebound_speed_bound"] = v0 / chi if chi else math.inf
+    return {name: quantities.get(name, math.nan) for name, _, _ in DERIVED_QUANTITIES}
 
 
 def history_dataset(history: History, model: str, point: Mapping[str, float | str]) -> xr.Dataset:
@@ -160,7 +166,7 @@ def history_dataset(history: History, model: str, point: Mapping[str, float | st
     ----------
     history : the history
     model : key of the model
-    point : the inputs of the impact by their config names, kept in the attribute `inputs`
+    point : the inputs of the impact by their config names, stored in the attribute `inputs`
     """
     dataset = xr.Dataset(
         {
@@ -186,34 +192,34 @@ def histories(
     at: Mapping[str, float | str],
     plugins: Plugins,
 ) -> list[xr.Dataset]:
-    """Time histories of one point by several models; of a time history, itself.
+    """Time histories of one point by several models; a dataset that is a time history is returned as it is.
 
     Parameters
     ----------
     dataset : a result, or a time history
     models : keys; by default all
-    at : values of the axes, which need not be on the grid; one that is not named takes its first value. A
-        parameter of one model is no input of the others
+    at : values of axes, which need not be on the grid; other axes take their first value. A parameter of one model
+        is ignored by the others
     plugins : models that are not built in
 
     Raises
     ------
-    UsageError : a model or an axis is not in the result, or no model has a motion to follow there
+    UsageError : a model or an axis is not in the result, or no model has a history at this point
     """
     if "t" in dataset.dims:
         return [dataset]
-    known = [str(key) for key in dataset["model"].values.ravel()]
+    keys = [str(key) for key in dataset["model"].values.ravel()]
     for key in models or ():
-        if key not in known:
-            raise UsageError(f'no model "{safe_text(key)}" in this result; {did_you_mean(key, known)}')
+        if key not in keys:
+            raise UsageError(f'no model "{safe_text(key)}" in this result; {did_you_mean(key, keys)}')
     check_plugins(dataset.attrs, plugins, "the result")
     for changed in changed_plugins(dataset.attrs, plugins, "the result"):
-        # the motion of another law is not that of the result
+        # a changed law has another motion than the result
         raise UsageError(changed)
     followed: list[xr.Dataset] = []
     ends: dict[str, str] = {}
     first: dict[str, float | str] = {}
-    for key in dict.fromkeys(models or known):
+    for key in dict.fromkeys(models or keys):
         others = {str(name) for name in dataset.coords if owner_of(str(name)) not in ("", key)}
         of_model = {name: value for name, value in at.items() if name not in others}
         config, names = single_point(dataset, (), plugins, key, of_model)
@@ -241,41 +247,41 @@ def single_point(
 
     Parameters
     ----------
-    source : path of a TOML file or of a result, a mapping of the shape of the former, a result, or None for the
-        starter at e = 0.5; a part of a result stands for the values that it was taken at
+    source : path of a TOML file or of a result, a mapping with the keys of a TOML file, a result, or None for the
+        starter config at e = 0.5; a part of a result fixes the values at which it was selected
     overrides : changes to its config
-    plugins : models that are not built in; one that has changed since the result was made gives a warning
+    plugins : models that are not built in; a warning is issued for one that has changed since the result was made
     model : key of the model; by default the config's first
-    at : values by config name, which need not be on the grid. Those that vary together, in a zip group or in
-        numbered cases, have to be; the number of a case is chosen by the name of its dimension
+    at : values by config name, which need not be on the grid, except for inputs that vary together, in a zip group
+        or in numbered cases; a case is chosen by the name of its dimension and its number
 
     Returns
     -------
-    (Config, names) : a config without axes, and the names of the axes that were not named: they took their first
+    (Config, names) : a config without axes, and the names of the axes that are not in `at` and took their first
         value
 
     Raises
     ------
-    ConfigError, UsageError : a name is not known here, or a value is not allowed
-    ResultError : what a result carries cannot be read
+    ConfigError, UsageError : a name is not an input of the config, or a value is not allowed
+    ResultError : the config of a result cannot be read
     """
     read, parted = _config_reader(source, overrides, plugins)
-    # each override, and how it is called in a message: as it was asked for
-    asked = {} if model is None else {f"models={json.dumps([model])}": f"--model {model}"}
-    config = _read_with_option_names(read, asked)
+    # each override, and the option that messages name instead
+    option_names = {} if model is None else {f"models={json.dumps([model])}": f"--model {model}"}
+    config = _read_with_option_names(read, option_names)
     columns = [_selectable_columns(axis) for axis in config.axes]
     varied = {name for names in columns for name in names}
     if at and {"e", "alpha"} <= at.keys():
         raise UsageError("--at alpha: got alpha beside e, expected one of the two")
     at = {**{name: value for name, value in parted.items() if name in varied}, **(at or {})}
     together = {name for names in columns if len(names) > 1 for name in names}
-    known = [*(name for names in columns for name in names), *config.scalars]
+    inputs = [*(name for names in columns for name in names), *config.scalars]
     for name, value in at.items():
-        if name not in known and name not in SWEEP_QUANTITIES:
-            raise UsageError(f'no input "{safe_text(name)}" here; {did_you_mean(name, known)}')
+        if name not in inputs and name not in SWEEP_QUANTITIES:
+            raise UsageError(f'no input "{safe_text(name)}" here; {did_you_mean(name, inputs)}')
         if name not in together:
-            asked[f"{_override_path(name)}={_toml_value(value)}"] = f"--at {name}={value}"
-    config = _read_with_option_names(read, asked)
+            option_names[f"{_override_path(name)}={_toml_value(value)}"] = f"--at {name}={value}"
+    config = _read_with_option_names(read, option_names)
 
     scalars = dict(config.scalars)
     first: list[str] = []
@@ -289,7 +295,7 @@ def single_point(
 def _config_reader(
     source: ConfigSource, overrides: Sequence[str], plugins: Plugins
 ) -> tuple[ReadConfig, dict[str, float | str]]:
-    """How the config of a source is read, and the single values of a part of a result."""
+    """A function that reads the config of a source, and the scalar coordinates of a part of a result."""
     if source is None:
         text = STARTER_CONFIG.read_text(encoding="utf-8")
         first = ["sweep.e=0.5", *overrides]
@@ -320,18 +326,18 @@ def _stored_config_reader(
 
 
 def _selectable_columns(axis: Axis) -> dict[str, Sequence[float | str]]:
-    """The values along an axis by the names that choose a point of it: its columns, and the number of a case."""
+    """The values that can select a point of an axis: its columns, and the number of a case."""
     return {**({axis.numbered: axis.labels} if axis.numbered else {}), **axis.columns}
 
 
 def _position_on_axis(axis: Axis, at: Mapping[str, float | str]) -> int:
-    """The place on an axis where its columns have the values asked for."""
+    """The position on an axis at which its columns have the values of `at`."""
     columns = _selectable_columns(axis)
-    for place in range(axis.size):
-        if all(columns[name][place] == value for name, value in at.items() if name in columns):
-            return place
-    asked = ", ".join(f"{name} = {value}" for name, value in at.items() if name in columns)
-    raise UsageError(f"{safe_text(asked)}: not on the zipped axis {axis.name}; these values vary together")
+    for position in range(axis.size):
+        if all(columns[name][position] == value for name, value in at.items() if name in columns):
+            return position
+    requested = ", ".join(f"{name} = {value}" for name, value in at.items() if name in columns)
+    raise UsageError(f"{safe_text(requested)}: not on the zipped axis {axis.name}; these values vary together")
 
 
 def _override_path(name: str) -> str:
@@ -348,15 +354,15 @@ def _toml_value(value: float | str) -> str:
     return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
 
 
-def _read_with_option_names(read: ReadConfig, asked: Mapping[str, str]) -> Config:
-    """A config whose problems are called by what was asked for, not by the overrides that stand for it."""
+def _read_with_option_names(read: ReadConfig, option_names: Mapping[str, str]) -> Config:
+    """Read a config; messages about its overrides name the options of the user instead."""
     try:
-        return read(list(asked))
+        return read(list(option_names))
     except ConfigError as error:
-        names = {f"--set {override}:": f"{name}:" for override, name in asked.items()}
+        names = {f"--set {override}:": f"{name}:" for override, name in option_names.items()}
         raise ConfigError([_with_option_name(line, names) for line in error.problems]) from None
 
 
 def _with_option_name(line: str, names: Mapping[str, str]) -> str:
-    """A line that begins with one of the names, beginning with what it stands for."""
+    """A line of a message with the override at its start replaced by the option."""
     return next((safe_text(new) + line[len(old) :] for old, new in names.items() if line.startswith(old)), line)

@@ -1,8 +1,8 @@
 """Slabs: parts of a large result that fit in memory; the axes along which a variable varies.
 
-The variables of a large result are computed, or read, when they are indexed. A variable that is computed says in
-`encoding["varies_along"]`, by model, along which axes it varies: along the others it has the same value
-everywhere, so that a count over all points is a count over these axes, times the size of the others.
+The variables of a large result are computed or read when they are indexed. A computed variable lists in
+`encoding["varies_along"]`, by model, the axes along which it varies. It is constant along the others, so that a
+count over all points is a count over these axes times the size of the others.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from collections.abc import Hashable, Iterator, Mapping, Sequence
 import numpy as np
 import xarray as xr
 
-# points of a slab: enough to pay for the interpreter, few enough to stay in cache and in little memory
+# points of a slab: enough to amortize Python's overhead, few enough to fit in cache
 SLAB_POINTS = 2**17
-# points up to which something is computed in full that nothing but a summary asks for: a few seconds
+# lazy variables with more points are not evaluated for a summary; this many take a few seconds
 MAX_SUMMARY_POINTS = 2**26
 VARIES_ALONG, ORIGINAL_DIMS = "varies_along", "axes"
 
@@ -24,7 +24,7 @@ Slab = dict[Hashable, slice]
 
 
 def slabs(sizes: Mapping[Hashable, int], points: int = SLAB_POINTS) -> Iterator[Slab]:
-    """All points in C order, in slabs of at most so many.
+    """All points in C order, in slabs of at most `points` points.
 
     >>> list(slabs({"e": 2, "v1": 3}, 2))[:2]
     [{'e': slice(0, 1, None), 'v1': slice(0, 2, None)}, {'e': slice(0, 1, None), 'v1': slice(2, 3, None)}]
@@ -32,7 +32,7 @@ def slabs(sizes: Mapping[Hashable, int], points: int = SLAB_POINTS) -> Iterator[
     [{}]
     """
     shape = tuple(sizes.values())
-    # the axes after `split` are whole in every slab, those before it have one place
+    # axes after `split` are whole in every slab, those before it have length one
     split = next((axis for axis in range(len(shape)) if math.prod(shape[axis + 1 :]) <= points), 0)
     step = max(1, points // max(1, math.prod(shape[split + 1 :])))
     lengths = (*(1 for _ in shape[:split]), step, *shape[split + 1 :])
@@ -42,7 +42,7 @@ def slabs(sizes: Mapping[Hashable, int], points: int = SLAB_POINTS) -> Iterator[
 def aligned_slabs(
     sizes: Mapping[Hashable, int], lengths: Sequence[int], points: int = SLAB_POINTS
 ) -> Iterator[Slab]:
-    """All points, in slabs of whole chunks of some lengths along the axes, as many as make up about `points`.
+    """All points, in slabs of whole chunks with the given lengths along the axes, of about `points` points.
 
     >>> [where["v1"] for where in aligned_slabs({"e": 2, "v1": 4}, (2, 2), 4)]
     [slice(0, 2, None), slice(2, 4, None)]
@@ -54,7 +54,7 @@ def aligned_slabs(
 
 
 def _tiles(sizes: Mapping[Hashable, int], lengths: Sequence[int]) -> Iterator[Slab]:
-    # an axis without values has no slab
+    # an empty axis has no slab
     steps = [range(0, size, max(1, length)) for size, length in zip(sizes.values(), lengths, strict=True)]
     for starts in itertools.product(*steps):
         yield {
@@ -69,58 +69,58 @@ def is_lazy(variable: xr.Variable) -> bool:
 
 
 def is_computed(variable: xr.Variable) -> bool:
-    """Whether the values of a variable are computed when they are indexed, by the axes along which it varies."""
+    """Whether a variable is computed when it is indexed, and the axes along which it varies are known."""
     return is_lazy(variable) and VARIES_ALONG in variable.encoding
 
 
 def is_large(variable: xr.Variable) -> bool:
-    """Whether a variable has more values than are read at once, and is not in memory."""
+    """Whether a variable is lazy and has more values than one slab."""
     return is_lazy(variable) and variable.size > SLAB_POINTS
 
 
 def varying_dims(dataset: xr.Dataset, name: str) -> tuple[Hashable, ...]:
-    """The dimensions along which a variable varies, as far as it is known; all of one that is in memory.
+    """The dimensions along which a variable varies, as far as known; all dimensions of one in memory.
 
-    That depends on the models: ask for one after the other, `dataset.isel(model=place)`.
+    They depend on the model: call it for one model at a time, `dataset.isel(model=number)`.
     """
     variable = dataset.variables[name]
     if not is_computed(variable) or "model" not in dataset.coords:
         return variable.dims
     by_model = variable.encoding[VARIES_ALONG]
     keys = [str(key) for key in np.ravel(dataset["model"].values)]
-    # of a model that was given another key nothing is known
+    # nothing is known about a model whose key was changed
     along = {"model", *(dim for key in keys for dim in by_model.get(key, variable.dims))}
-    # an axis that was renamed since is not known
+    # nothing is known about an axis that was renamed
     along |= {*variable.dims} - {*variable.encoding.get(ORIGINAL_DIMS, variable.dims)}
     return tuple(dim for dim in variable.dims if dim in along)
 
 
 def distinct_points(dataset: xr.Dataset, name: str) -> tuple[xr.Variable, int]:
-    """A variable with one place, the first, along each dimension on which it does not vary.
+    """A variable, reduced to the first position along each dimension on which it does not vary.
 
     Returns
     -------
-    (xarray.Variable, int) : with all dimensions of the variable, and how often each of its points counts
+    (xarray.Variable, int) : with all dimensions of the variable, and the weight of each of its points
     """
-    kept, variable = varying_dims(dataset, name), dataset.variables[name]
-    fixed = [dim for dim in variable.dims if dim not in kept]
+    varying, variable = varying_dims(dataset, name), dataset.variables[name]
+    fixed = [dim for dim in variable.dims if dim not in varying]
     weight = math.prod(variable.sizes[dim] for dim in fixed)
     return variable.isel(dict.fromkeys(fixed, slice(0, 1))), weight
 
 
 def over_varying_dims(dataset: xr.Dataset, names: Sequence[str], *more: Hashable) -> tuple[xr.Dataset, int]:
-    """Some variables over the dimensions along which any of them varies, and how often each point of that counts.
+    """Some variables over the dimensions along which any of them varies, and the weight of each point.
 
-    The other dimensions are at their first place.
+    The other dimensions are at their first position.
 
     Parameters
     ----------
     dataset : a result
     names : of the variables
-    more : dimensions that are kept in any case
+    more : dimensions that are never reduced
     """
-    kept = {*more, *(dim for name in names for dim in varying_dims(dataset, name))}
+    varying = {*more, *(dim for name in names for dim in varying_dims(dataset, name))}
     dims = dict.fromkeys(dim for name in names for dim in dataset.variables[name].dims)
-    fixed = [dim for dim in dims if dim not in kept]
+    fixed = [dim for dim in dims if dim not in varying]
     weight = math.prod(dataset.sizes[dim] for dim in fixed)
     return dataset[list(names)].isel(dict.fromkeys(fixed, 0)), weight

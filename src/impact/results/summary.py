@@ -15,28 +15,28 @@ from ..contact.status import FIRST_FAILURE, Status
 from .schema import parts_of_models
 from .slabs import MAX_SUMMARY_POINTS, distinct_points, is_computed, slabs
 
-# the errors of which the largest is told
+# variables of which the largest absolute value is reported
 ERROR_VARIABLES = ("e_error", "v1_error", "v2_error", "closed_form_error", "energy_residual")
 MAX_FAILED_AT = 3
-# of the smaller radius, above which an indentation is not small
+# limit of small indentations, as a fraction of the smaller radius
 MAX_SMALL_INDENTATION = 0.1
 
 
 @dataclass
 class Summary:
-    """What came out.
+    """Counts and extremes of the points of a result.
 
     Parameters
     ----------
-    points : how many
-    counts : points by status
-    worst : the largest absolute value by error, then by the place of the model; NaN where there is none, and
-        missing where it was not evaluated
-    failed_at : the first points that failed: status, place of the model, and places on the axes
-    max_failed_at : how many of these are kept
-    not_counted : how many points have a status that was not evaluated
-    deep, deepest : how many points have a peak indentation above `MAX_SMALL_INDENTATION`, and the largest one, in
-        units of the smaller radius; of points whose radii are known
+    points : number of points
+    counts : number of points by status
+    worst : the largest absolute value by error variable and number of the model; NaN if all are NaN, missing if
+        not evaluated
+    failed_at : the first points that failed: status, number of the model, and index along the axes
+    max_failed_at : how many of these are recorded
+    not_counted : number of points whose status was not evaluated
+    deep, deepest : number of points with a peak indentation above `MAX_SMALL_INDENTATION`, and the largest one, as
+        fractions of the smaller radius; only of points with known radii
     """
 
     points: int = 0
@@ -45,7 +45,7 @@ class Summary:
     failed_at: list[tuple[Status, int, tuple[int, ...]]] = field(default_factory=list)
     max_failed_at: int = field(default=MAX_FAILED_AT, compare=False)
     not_counted: int = 0
-    # a file does not hold the radii, so that these are known after a sweep only
+    # a file does not hold the radii: these are available after a sweep only
     deep: int = field(default=0, compare=False)
     deepest: float = field(default=0.0, compare=False)
 
@@ -61,15 +61,15 @@ class Summary:
         radius: NDArray[Any] | None = None,
         weight: int = 1,
     ) -> Summary:
-        """Count some points of one model.
+        """Add some points of one model.
 
         Parameters
         ----------
-        values : by variable, all of one shape; without a status nothing is counted but the errors
-        model : place of the model
-        start : place of the first point along each axis
-        radius : of the smaller ball [m], NaN where it is not known; its shape broadcasts to that of the values
-        weight : how many points of the result each of these stands for
+        values : by variable, all of one shape; without a status only the errors are evaluated
+        model : number of the model
+        start : index of the first point along each axis
+        radius : of the smaller ball [m], NaN if unknown; its shape broadcasts to that of the values
+        weight : number of points of the result that each of these represents
         """
         if "status" in values:
             self._count(values["status"], model, start, weight)
@@ -90,8 +90,8 @@ class Summary:
         self.points += weight * status.size
         times = np.bincount(status.reshape(-1))
         for number in np.flatnonzero(times).tolist():
-            known = Status(number)
-            self.counts[known] = self.counts.get(known, 0) + weight * int(times[number])
+            status_code = Status(number)
+            self.counts[status_code] = self.counts.get(status_code, 0) + weight * int(times[number])
         if times[FIRST_FAILURE:].any() and len(self.failed_at) < self.max_failed_at:
             for at in np.argwhere(status >= FIRST_FAILURE)[: self.max_failed_at - len(self.failed_at)].tolist():
                 places = tuple(first + offset for first, offset in zip(start, at, strict=True))
@@ -106,21 +106,21 @@ class Summary:
 def summarize(
     dataset: xr.Dataset, max_failed_at: int = MAX_FAILED_AT, max_points: float = MAX_SUMMARY_POINTS
 ) -> Summary:
-    """What came out, of a result of any size.
+    """Summarize a result of any size.
 
     Each variable is evaluated over the axes along which it varies, one model after another, and each of its points
-    counts as often as it occurs. One that is computed and varies over more than `max_points` points is not
-    evaluated: a worst error is then missing, and of a status the points are `not_counted`. What is read from a
-    file is read in any case.
+    counts as often as it occurs. A computed variable that varies over more than `max_points` points is not
+    evaluated: the error is then missing from `worst`, or the points are `not_counted`. Variables that are stored
+    in a file are always read.
 
     Parameters
     ----------
     dataset : a result
-    max_failed_at : how many of the first failed points are kept: in C order, those that differ, at the first place
+    max_failed_at : how many failed points are recorded: the first distinct ones in C order, at the first position
         along each axis on which the status does not vary
-    max_points : of a variable that is computed, for one model
+    max_points : limit for a computed variable of one model
     """
-    tally = Summary(max_failed_at=max_failed_at)
+    summary = Summary(max_failed_at=max_failed_at)
     names = [name for name in ("status", *ERROR_VARIABLES) if name in dataset]
     for model, of_model in enumerate(parts_of_models(dataset)):
         for name in names:
@@ -128,15 +128,15 @@ def summarize(
             if variable.size <= max_points or not is_computed(variable):
                 for where in slabs(variable.sizes):
                     start = [where[dim].start for dim in variable.dims]
-                    tally.add({name: variable.isel(where).values}, model, start, weight=weight)
+                    summary.add({name: variable.isel(where).values}, model, start, weight=weight)
             elif name == "status":
-                tally.points += weight * variable.size
-                tally.not_counted += weight * variable.size
-    return tally
+                summary.points += weight * variable.size
+                summary.not_counted += weight * variable.size
+    return summary
 
 
 class Extremes(NamedTuple):
-    """The smallest and the largest finite value, NaN where there is none, and how many are not finite."""
+    """The smallest and the largest finite value, NaN if there is none, and the number of other values."""
 
     smallest: float
     largest: float
@@ -146,7 +146,7 @@ class Extremes(NamedTuple):
 def extremes_of(dataset: xr.Dataset, name: str) -> Extremes | None:
     """The extremes of a variable of a result of any size, over the axes along which it varies.
 
-    None of one that is computed, and varies over more than `MAX_SUMMARY_POINTS` points of all models together.
+    None for a computed variable that varies over more than `MAX_SUMMARY_POINTS` points of all models together.
     """
     of_models = parts_of_models(dataset) if "model" in dataset.variables[name].dims else (dataset,)
     parts = [distinct_points(part, name) for part in of_models]
@@ -167,16 +167,16 @@ def extremes_of(dataset: xr.Dataset, name: str) -> Extremes | None:
 
 @dataclass(frozen=True)
 class SweepOutcome:
-    """A result that may be too large to hold: what it is, and what came out.
+    """The result of a sweep, which may be larger than memory, and its summary.
 
     Parameters
     ----------
     dataset : its coordinates and attributes; the values of its variables may be placeholders
     summary : of its points
-    trajectories : number of different trajectories, where it is known
+    trajectories : number of different trajectories; None if unknown
     is_new : whether the file was written now; False if it held this sweep already
-    integrated : how many trajectories were integrated now, where that is counted
-    repeated_blocks : blocks that were in more than one shard
+    integrated : how many trajectories were integrated now; None if not counted
+    repeated_blocks : number of blocks that several shards have
     """
 
     dataset: xr.Dataset

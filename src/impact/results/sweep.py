@@ -40,9 +40,9 @@ from .schema import SchemaVariable, dataset_template, stored_variables
 from .summary import Summary, SweepOutcome, summarize
 from .validation import is_name
 
-# bytes that a result takes besides its values, about
+# approximate bytes of a result besides its values
 OVERHEAD_BYTES = 2**16
-# points up to which a sweep of one range keeps nothing: it is repeated faster than it is read
+# smaller sweeps of one range have no checkpoint: they are repeated faster than read
 NO_CHECKPOINT_POINTS = 2**20
 
 SlabValues = dict[str, NDArray[Any]]
@@ -50,20 +50,20 @@ SlabValues = dict[str, NDArray[Any]]
 
 @dataclass(frozen=True)
 class Extension:
-    """What of a sweep is known from a smaller one, see `impact.results.extend`.
+    """What a sweep takes over from an old result, see `impact.results.extend`.
 
     Parameters
     ----------
-    seal : of the result that is extended
-    note : what the new one says of it
-    known : the trajectories that are not integrated again
-    fill : puts known values into those of a slab, given the model, the place and the values; None where all are
-        computed from the trajectories
+    seal : of the old result
+    note : JSON text for the attribute `extended` of the new result
+    find_reused : returns the trajectories of a range that are not integrated again
+    fill : copies old values into a slab: `fill(model, region, values)`; None if all values are computed from
+        trajectories
     """
 
     seal: str
     note: str
-    known: FindReused
+    find_reused: FindReused
     fill: Callable[[int, tuple[slice, ...], SlabValues], None] | None = None
 
 
@@ -87,31 +87,31 @@ def sweep_into(
     plan : what to run
     resume : continue with the work folder that an interrupted sweep left
     overwrite : replace the file if it exists, and a work folder if it is not to be resumed
-    in_place : replace the file, and no work folder
-    backend : who integrates
-    on_progress : receives the progress, now and then
-    should_stop : whether to stop; what was begun is finished and kept
-    extension : what is known already
+    in_place : replace the file, but not a work folder
+    backend : processes, threads or workers that integrate
+    on_progress : called with the progress from time to time
+    should_stop : the sweep stops if it returns True; ranges that are running are finished and kept
+    extension : values and trajectories of an old result
 
     Raises
     ------
-    UsageError : the output, or the work folder, is not to be touched
+    UsageError : the output or the work folder exists and must not be replaced
     InUseError : another process writes the output
-    StoreError : the disk is full or failed, or processes were killed; what is finished is kept
-    UnfinishedError : it was stopped; likewise
+    StoreError : the disk is full or failed, or processes were killed; finished ranges are kept
+    UnfinishedError : the sweep was stopped; finished ranges are kept
     """
     check_output(output, overwrite=overwrite or in_place)
     check_storable(plan)
     maps = trajectory_maps(plan)
     plan = with_core(plan, maps)
     ranges = list(trajectory_ranges(maps))
-    total = sum(own.count for own in maps)
+    total = sum(trajectory_map.count for trajectory_map in maps)
     counter = ProgressCounter.start(total, plan.points, on_progress)
-    known = extension.known if extension else lambda part: None
+    find_reused = extension.find_reused if extension else lambda part: None
     few = plan.stored_points <= NO_CHECKPOINT_POINTS or plan.layout == "factored"
     if total <= RANGE_TRAJECTORIES and few and not os.path.lexists(work_folder_of(output)):
         finished = {}
-        for part, rebound in integrate_ranges(plan, maps, ranges, find_reused=known):
+        for part, rebound in integrate_ranges(plan, maps, ranges, find_reused=find_reused):
             finished[part.number] = rebound
             counter.count(part, rebound)
         table = table_of(plan, maps, range_reader(maps, finished.__getitem__))
@@ -124,14 +124,14 @@ def sweep_into(
     with open_work_folder(
         folder, plan, resume=resume, overwrite=overwrite, extends=extension.seal if extension else ""
     ) as work_folder:
-        # another may have stored it since
+        # another process may have stored it in the meantime
         check_output(output, overwrite=overwrite or in_place)
-        # without the other word a result that is to be replaced would be in the way
+        # without --overwrite, an existing result would be refused
         again = "--resume --overwrite" if os.path.lexists(output) and not extension else "--resume"
         with report_kept_blocks(
             folder, counter, again, lambda error: _missing_space(error, output, plan, counter)
         ):
-            complete_ranges(work_folder, plan, maps, ranges, counter, backend, should_stop, known)
+            complete_ranges(work_folder, plan, maps, ranges, counter, backend, should_stop, find_reused)
             table = table_of(
                 plan, maps, range_reader(maps, lambda number: reload_range(work_folder, ranges[number]))
             )
@@ -157,14 +157,14 @@ def complete_ranges(
     counter: ProgressCounter,
     backend: Backend,
     should_stop: Callable[[], bool],
-    known: FindReused = lambda part: None,
+    find_reused: FindReused = lambda part: None,
 ) -> None:
-    """Have all of some ranges in a work folder.
+    """Integrate the ranges that a work folder does not have yet.
 
     Raises
     ------
     StoreError, UsageError : see `sweep_into`
-    UnfinishedError : it was stopped
+    UnfinishedError : the sweep was stopped
     """
     todo: list[TrajectoryRange] = []
     for part in ranges:
@@ -175,7 +175,7 @@ def complete_ranges(
             counter.count(part, before)
     counter.report()
     for part, rebound in integrate_ranges(
-        plan, maps, todo, backend=backend, should_stop=should_stop, find_reused=known
+        plan, maps, todo, backend=backend, should_stop=should_stop, find_reused=find_reused
     ):
         work_folder.store(part, rebound)
         counter.count(part, rebound)
@@ -187,18 +187,18 @@ def complete_ranges(
 def sweep_in_memory(
     plan: Plan, *, backend: Backend = SERIAL, on_progress: ProgressCallback, should_stop: Callable[[], bool]
 ) -> xr.Dataset:
-    """Run a plan; its result is in memory if it is small, else it is computed when it is indexed.
+    """Run a plan; a small result is in memory, a large one is computed when it is indexed.
 
     For the parameters see `sweep_into`.
 
     Raises
     ------
-    UnfinishedError : it was stopped; nothing is kept
+    UnfinishedError : the sweep was stopped; nothing is kept
     """
     check_labels(plan)
     maps = trajectory_maps(plan)
     plan = with_core(plan, maps)
-    counter = ProgressCounter.start(sum(own.count for own in maps), plan.points, on_progress)
+    counter = ProgressCounter.start(sum(trajectory_map.count for trajectory_map in maps), plan.points, on_progress)
     finished: dict[int, CollisionResult] = {}
     for part, rebound in integrate_ranges(
         plan, maps, trajectory_ranges(maps), backend=backend, should_stop=should_stop
@@ -216,17 +216,17 @@ def sweep_in_memory(
 def range_reader(
     maps: Sequence[TrajectoryMap], load: Callable[[int], CollisionResult]
 ) -> Callable[[int, int, int], CollisionResult]:
-    """The finished ranges of a plan as what a `TrajectoryTable` reads; `load` gives the one of a number."""
-    before = np.cumsum([0, *(-(-own.count // RANGE_TRAJECTORIES) for own in maps)])
+    """The `read` function of `TrajectoryRows` for finished ranges; `load` returns a range by its number."""
+    first_range = np.cumsum([0, *(-(-trajectory_map.count // RANGE_TRAJECTORIES) for trajectory_map in maps)])
 
     def read(model: int, start: int, stop: int) -> CollisionResult:
-        return load(int(before[model]) + start // even_size(maps[model].count, RANGE_TRAJECTORIES))
+        return load(int(first_range[model]) + start // even_size(maps[model].count, RANGE_TRAJECTORIES))
 
     return read
 
 
 def reload_range(work_folder: WorkFolder, part: TrajectoryRange) -> CollisionResult:
-    """A range that was finished.
+    """Load a finished range.
 
     Raises
     ------
@@ -239,7 +239,7 @@ def reload_range(work_folder: WorkFolder, part: TrajectoryRange) -> CollisionRes
 
 
 def check_storable(plan: Plan) -> None:
-    """Refuse a plan whose result could not be stored, before anything is integrated.
+    """Refuse a plan whose result could not be stored, before integration.
 
     Raises
     ------
@@ -251,11 +251,11 @@ def check_storable(plan: Plan) -> None:
 
 
 def check_labels(plan: Plan) -> None:
-    """Refuse a plan whose labels would not be read again, before anything is integrated.
+    """Refuse a plan whose labels could not be read again, before integration.
 
     Raises
     ------
-    UsageError : they are too long, or a material that has an axis could not be part of a name in the file
+    UsageError : they are too long, or a material with an axis has a name that a file cannot hold
     """
     columns = [name for axis in plan.config.axes for name in axis.columns]
     odd = [name for name in columns if material_property(name) and not is_name(name)]
@@ -263,7 +263,8 @@ def check_labels(plan: Plan) -> None:
         raise UsageError(
             f"{safe_text(odd[0])}: expected a material name without spaces and slashes, to be an axis"
         )
-    size = sum(encode_text(one).size for one in dataset_template(plan).coords.values() if is_text(one))
+    coordinates = dataset_template(plan).coords.values()
+    size = sum(encode_text(coordinate).size for coordinate in coordinates if is_text(coordinate))
     if size > MAX_LABEL_BYTES:
         raise UsageError(
             f"its labels take {size:,} bytes, expected at most {MAX_LABEL_BYTES:,}: give materials shorter names"
@@ -271,8 +272,8 @@ def check_labels(plan: Plan) -> None:
 
 
 def find_finished(path: Path, plan: Plan) -> SweepOutcome | None:
-    """What a file holds, if it is the whole result of a plan."""
-    # a model without a hash cannot be known to be the same; of a name that is too long, pathlib would raise
+    """The result in a file, if it is the whole result of a plan; else None."""
+    # a model without a hash cannot be compared; pathlib would raise an error for a name that is too long
     if None in plan.plugins.hashes.values() or os.path.islink(path) or not os.path.isfile(path):
         return None
     try:
@@ -286,19 +287,20 @@ def find_finished(path: Path, plan: Plan) -> SweepOutcome | None:
     if dict(dataset.sizes) != {"model": len(plan.models), **axes}:
         dataset.close()
         return None
-    return SweepOutcome(dataset, summarize(dataset), sum(own.count for own in trajectory_maps(plan)))
+    trajectories = sum(trajectory_map.count for trajectory_map in trajectory_maps(plan))
+    return SweepOutcome(dataset, summarize(dataset), trajectories)
 
 
 def _missing_space(error: Exception, output: Path, plan: Plan, counter: ProgressCounter) -> list[str]:
-    """On a full disk, how much more room it takes."""
+    """A sentence with the missing disk space, if the disk is full."""
     cause = error.__cause__
     if not isinstance(cause, OSError) or cause.errno not in (errno.ENOSPC, errno.EDQUOT):
         return []
     row = sum(getattr(CollisionResult.blank(1), name).nbytes for name in TABLE_COLUMNS)
     result = counter.progress.of_trajectories * row if plan.layout == "factored" else dataset_template(plan).nbytes
-    wanted = result + OVERHEAD_BYTES + (counter.progress.of_trajectories - counter.progress.trajectories) * row
+    needed = result + OVERHEAD_BYTES + (counter.progress.of_trajectories - counter.progress.trajectories) * row
     free = shutil.disk_usage(output.parent).free
-    return [f"it takes {wanted:,} bytes more, {free:,} are free"]
+    return [f"it takes {needed:,} bytes more, {free:,} are free"]
 
 
 def store_result(
@@ -311,14 +313,14 @@ def store_result(
     should_stop: Callable[[], bool],
     extension: Extension | None = None,
 ) -> SweepOutcome:
-    """Write the result of a trajectory table in the layout of its plan, and give it its name."""
-    at, variables, tally = counter.progress, stored_variables(plan), Summary()
+    """Write the result of a trajectory table in the layout of its plan."""
+    at, variables, summary = counter.progress, stored_variables(plan), Summary()
     whole = dataset_template(plan)
     if extension:
         whole = whole.assign_attrs(extended=extension.note)
 
     def check(points: int) -> None:
-        counter.on_progress(replace(at, points=points, failed=max(tally.failed, at.failed)))
+        counter.on_progress(replace(at, points=points, failed=max(summary.failed, at.failed)))
         if should_stop():
             raise UnfinishedError
 
@@ -331,8 +333,8 @@ def store_result(
             for name, array in values.items():
                 yield name, (model, *where) if "model" in whole[name].dims else where, array
             axes = plan.inputs.axes_of_model(table.laws[model].key)
-            _add_slab(tally, axes, model, where, impacts, values)
-            check(tally.points)
+            _add_slab(summary, axes, model, where, impacts, values)
+            check(summary.points)
 
     def factored() -> Iterator[tuple[str, tuple[slice], NDArray[Any]]]:
         for name, where, array in table_values(table, variables):
@@ -340,39 +342,39 @@ def store_result(
             check(0)
 
     is_full = plan.layout == "full"
-    made = whole if is_full else factored_template(whole, table, variables)
+    template = whole if is_full else factored_template(whole, table, variables)
     with atomic_write(output, overwrite=overwrite, part=part) as sink:
-        seal = write_sealed(sink, made, full() if is_full else factored(), plan.config.output)
+        seal = write_sealed(sink, template, full() if is_full else factored(), plan.config.output)
         check_readable(sink, output)
     if not is_full:
         whole = lazy_dataset(whole, table, variables)
         is_small = plan.stored_points <= NO_CHECKPOINT_POINTS
-        tally = _summarize_points(table, variables) if is_small else summarize(whole)
+        summary = _summarize_points(table, variables) if is_small else summarize(whole)
     whole.encoding = {"source": str(output), "seal": seal, "layout": plan.layout}
-    return SweepOutcome(whole, tally, at.of_trajectories)
+    return SweepOutcome(whole, summary, at.of_trajectories)
 
 
 def _summarize_points(table: TrajectoryTable, variables: Sequence[SchemaVariable]) -> Summary:
-    """What came out, point by point: unlike `summarize` it knows the radii."""
-    tally = Summary()
+    """Summarize a trajectory table point by point; unlike `summarize` this has the radii."""
+    summary = Summary()
     for model, where, impacts, values in expanded_slabs(table, variables):
         axes = table.inputs.axes_of_model(table.laws[model].key)
-        _add_slab(tally, axes, model, where, impacts, values)
-    return tally
+        _add_slab(summary, axes, model, where, impacts, values)
+    return summary
 
 
 def _add_slab(
-    tally: Summary,
+    summary: Summary,
     axes: Collection[int],
     model: int,
     where: tuple[slice, ...],
     impacts: Impacts,
     values: SlabValues,
 ) -> None:
-    """Count the points of a slab, those that differ by parameters of other models once."""
+    """Add the points of a slab; points that differ only by parameters of other models count once."""
     if any(part.start > 0 for axis, part in enumerate(where) if axis not in axes):
         return
     first = tuple(slice(None) if axis in axes else slice(1) for axis in range(len(where)))
     counted = {name: array[first or ...] for name, array in values.items()}
     radius = np.fmin(impacts.R1, impacts.R2)
-    tally.add(counted, model, [place.start for place in where], radius)
+    summary.add(counted, model, [part.start for part in where], radius)

@@ -1,6 +1,6 @@
 """Validate a dataset as a result or a time history: its names, axes, types and attributes.
 
-`load` passes over other names, `save` refuses them.
+`load` ignores other names, `save` refuses them.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from .attributes import ATTRIBUTE_TYPES, read_attribute
 from .schema import HISTORY_VARIABLES, MODEL_METADATA, SCHEMA, is_case
 from .slabs import VARIES_ALONG, is_lazy, slabs
 
-RESULT_VARIABLES = frozenset(one.name for one in SCHEMA)
+RESULT_VARIABLES = frozenset(variable.name for variable in SCHEMA)
 HISTORY_NAMES = frozenset(name for name, _, _ in HISTORY_VARIABLES)  # over the time t
 TEXT_COORDINATES = frozenset({"model", *MODEL_METADATA, *MATERIAL_KEYS} - {"year"})
-# the table of a factored file, see `impact.results.factored`
+# the trajectory table of a factored file, see `impact.results.factored`
 TABLE_VARIABLES = frozenset({
     *(f"trajectory_{name}" for name in TABLE_COLUMNS), "trajectory_of_cell", "law_stiffness",
     "witness_index", *(f"witness_{name}" for name in RESULT_VARIABLES),
@@ -36,12 +36,12 @@ ALLOWED_NAMES = (
     | TABLE_VARIABLES
     | {"t", "year", "exponent", *SWEEP_QUANTITIES}
 )
-# a parameter of a model's own: the key of the model, and a name of Python
+# a parameter of one model: the key of the model, and a Python identifier
 PARAMETER_NAME = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*\.[^\W\d]\w*")
 
 
 def is_name(name: str) -> bool:
-    """Whether a variable of a result may be called this.
+    """Whether a variable of a result may have this name.
 
     >>> is_name("e_out"), is_name("ismail-stronge-2008.gamma"), is_name("materials.steel.E"), is_name("twice")
     (True, True, True, False)
@@ -49,23 +49,23 @@ def is_name(name: str) -> bool:
     if name in ALLOWED_NAMES or PARAMETER_NAME.fullmatch(name) or is_case(name):
         return True
     material, key = material_property(name) or ("", "")
-    # netCDF separates names by spaces, and HDF5 groups by slashes
+    # netCDF separates names by spaces, HDF5 separates groups by slashes
     return key in MATERIAL_QUANTITIES and material.isprintable() and re.fullmatch(r"[^\s/]+", material) is not None
 
 
 def is_quantity(name: str, axes: tuple[str, ...]) -> bool:
-    """Whether it was computed; what was given is a coordinate. A velocity of a ball is one or the other."""
+    """Whether a variable is an output; inputs are coordinates. The velocity of a ball may be either."""
     return name in RESULT_VARIABLES or (name in HISTORY_NAMES and axes == ("t",))
 
 
-# attributes of a result that the program reads: text, some of which is JSON, and numbers
+# required attributes of a result: text, in part JSON, and numbers
 TEXT_ATTRIBUTES = ("title", "config", "config_set", "fingerprint", "impact_version", "packages", "plugins")
 NUMBER_ATTRIBUTES = ("rtol", "max_steps")
-# attributes that say that a file is factored, which a dataset has not
+# attributes of factored files, which a dataset does not have
 FACTORED_ATTRIBUTES = ("laws", "axes")
-# statuses that are looked at at a time
+# statuses that are checked at a time
 STATUS_SLAB_POINTS = 2**22
-# of a variable of a result
+# by name of a variable of a result
 ALLOWED_DTYPES = {
     variable.name: [np.dtype(variable.dtype)] if variable.dtype != "f8" else [np.dtype("f8"), np.dtype("f4")]
     for variable in SCHEMA
@@ -73,7 +73,7 @@ ALLOWED_DTYPES = {
 
 
 def schema_violation(dataset: xr.Dataset) -> str | None:
-    """The first reason why a dataset is no result and no time history, or None."""
+    """The first reason why a dataset is neither a result nor a time history, or None."""
     checks = (
         _name_violations,
         _axis_violations,
@@ -87,7 +87,7 @@ def schema_violation(dataset: xr.Dataset) -> str | None:
 def _name_violations(dataset: xr.Dataset) -> Iterator[str]:
     unknown = sorted({str(name) for name in (*dataset.variables, *dataset.dims) if not is_name(str(name))})
     if unknown:
-        yield f"{', '.join(unknown)}: no name of a result"
+        yield f"{', '.join(unknown)}: not a variable of a result"
 
 
 def _axis_violations(dataset: xr.Dataset) -> Iterator[str]:
@@ -99,12 +99,12 @@ def _axis_violations(dataset: xr.Dataset) -> Iterator[str]:
 def _type_violations(dataset: xr.Dataset) -> Iterator[str]:
     for name, variable in dataset.variables.items():
         if variable.dtype.kind not in ("UO" if name in TEXT_COORDINATES else "iuf"):
-            yield f"{name}: neither numbers nor labels, or one for the other"
+            yield f"{name}: expected numbers or labels of the right type"
         wrong = name in ALLOWED_DTYPES and variable.dtype not in ALLOWED_DTYPES[str(name)]
         if wrong:
             yield f"{name}: got {variable.dtype}, expected {' or '.join(map(str, ALLOWED_DTYPES[str(name)]))}"
         if not all(isinstance(variable.attrs.get(about, ""), str) for about in ("units", "long_name")):
-            yield f"{name}: units or long_name that are no text"
+            yield f"{name}: units or long_name is not text"
 
 
 def _attribute_violations(dataset: xr.Dataset) -> Iterator[str]:
@@ -119,24 +119,24 @@ def _attribute_violations(dataset: xr.Dataset) -> Iterator[str]:
 
 
 def _history_violations(dataset: xr.Dataset) -> Iterator[str]:
-    for name, one in dataset.variables.items():
-        if one.dims != (() if name == "model" else ("t",)):
-            yield f"{name}: does not lie along t alone"
+    for name, variable in dataset.variables.items():
+        if variable.dims != (() if name == "model" else ("t",)):
+            yield f"{name}: expected t as its only axis"
 
 
 def _result_violations(dataset: xr.Dataset) -> Iterator[str]:
     if "model" not in dataset.dims:
-        yield "model is no axis; select models as a list, sel(model=[...])"
+        yield "model is not an axis; select models as a list, sel(model=[...])"
     elif not dataset.indexes["model"].is_unique:
-        yield "a model stands twice in it"
+        yield "a model occurs twice"
     for name in MODEL_METADATA:
         if name not in dataset or dataset[name].dims != ("model",):
             yield f"{name} of the models is missing"
-    for one in SCHEMA:
-        if one.name in dataset and one.per == "axes" and "model" in dataset[one.name].dims:
-            yield f"{one.name}: lies along model"
+    for variable in SCHEMA:
+        if variable.name in dataset and variable.per == "axes" and "model" in dataset[variable.name].dims:
+            yield f"{variable.name}: lies along model"
     if "status" in dataset and _has_unknown_status(dataset["status"]):
-        yield "status: a number without a meaning"
+        yield "status: got a number that is no status"
     for key in TEXT_ATTRIBUTES:
         if not isinstance(dataset.attrs.get(key), str):
             yield f"no {key}, or not as text"
@@ -146,7 +146,7 @@ def _result_violations(dataset: xr.Dataset) -> Iterator[str]:
 
 
 def _has_unknown_status(status: xr.DataArray) -> bool:
-    """Whether a status has no meaning; one that is computed always has."""
+    """Whether a status is unknown; computed statuses are always known."""
     if is_lazy(status.variable) and VARIES_ALONG in status.encoding:
         return False
     parts = (status.isel(where).values for where in slabs(status.sizes, STATUS_SLAB_POINTS))
