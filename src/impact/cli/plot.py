@@ -108,7 +108,7 @@ def plot(
     Of several kinds those that apply are drawn, and the others are named with the reason.
     """
     from .. import api
-    from ..plots.data import as_table, check_table, read_points
+    from ..plots.data import check_table, encode_table, read_points
     from ..plots.kinds import Choice, draw
     from ..plots.style import check_picture, length, save_figure
     from ..results import backend
@@ -142,7 +142,7 @@ def plot(
             figure = draw(
                 plot_data, *size, style=style, title=not no_title, labels=_parse_labels(label), points=measured
             )
-            tables = [(path, as_table(plot_data, path.suffix.lower(), data_form)) for path in table]
+            tables = [(path, encode_table(plot_data, path.suffix.lower(), data_form)) for path in table]
         except UsageError as error:
             faults[name] = str(error)
             continue

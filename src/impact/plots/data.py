@@ -50,7 +50,7 @@ def check_table(path: Path, form: str) -> None:
         raise UsageError(f"--data-form: got {safe_text(form)}, expected {' or '.join(TABLE_FORMS)}")
 
 
-def as_table(plot_data: PlotData, suffix: str, form: str = "wide") -> bytes:
+def encode_table(plot_data: PlotData, suffix: str, form: str = "wide") -> bytes:
     """The data of a picture as the bytes of a table; all digits are written, except to .tex.
 
     Parameters
