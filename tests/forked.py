@@ -99,13 +99,14 @@ def printed_on_terminal(
     stream: str = "stdout",
     width: int = 80,
     cwd: Path = ROOT,
+    code: str = "",
     **environment: str,
 ) -> tuple[Done, str]:
     """Run a command line of which a stream is a terminal; how it ended and what the terminal shows."""
     driver, terminal = pty.openpty()
     fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 50, width, 0, 0))
     # the width of the terminal counts only where no variable has another
-    code = "import os\nfor name in {'COLUMNS', 'LINES', 'TERM'} - {*%r}:\n    os.environ.pop(name, None)"
+    unset = "import os\nfor name in {'COLUMNS', 'LINES', 'TERM'} - {*%r}:\n    os.environ.pop(name, None)\n"
     printed = b""
 
     def read() -> None:
@@ -117,7 +118,7 @@ def printed_on_terminal(
     reader = threading.Thread(target=read)
     reader.start()
     streams = {stream: os.ttyname(terminal)}
-    done = forked(*words, cwd=cwd, code=code % [*environment], **streams, **environment)
+    done = forked(*words, cwd=cwd, code=unset % [*environment] + code, **streams, **environment)
     os.close(terminal)
     reader.join()
     os.close(driver)

@@ -236,7 +236,8 @@ def test_usage_is_exit_2_and_a_line(forked: Forked, folder: Path) -> None:
         (["--tol", "e_oot=1"], '--tol e_oot: not a variable of a result; did you mean "e_out"?'),
         (["--tol", "much"], wrong + 'got "much", expected VALUE or NAME=VALUE, such as 1e-8, 5% or v1_post'),
         (["--tol", "nan"], wrong + 'got "nan", expected'), (["--tol", "e_out=x"], wrong + 'got "e_out=x"'),
-        (["--tol", "-1"], "--tol -1.0: wants"), (["--tol", "status=1"], "--tol status: has no tolerance"),
+        (["--tol", "-1"], "--tol -1.0: expected a number >= 0"),
+        (["--tol", "status=1"], "--tol status: has no tolerance"),
         (["--tol", "1", "--tol", "2"], wrong + "got all twice, expected each name once"),
     ):  # fmt: skip
         done = forked("compare", "different.h5", "base.h5", *words, cwd=folder)

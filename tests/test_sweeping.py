@@ -55,6 +55,8 @@ rtol = 1e-4
 
 # of which a sweep takes two seconds
 THREE = 'models=["bilinear", "gharib-hurmuzlu-2012", "lankarani-nikravesh-1990"]'
+# progress is shown from the beginning, not after a second
+AT_ONCE = "from impact.cli import progress\nprogress.FIRST_S = 0.0"
 MINE = """import impact
 MINE = impact.hysteresis("mine", title="", year=2026, equation="", reference="", chi=lambda e: 1 - e)
 """
@@ -146,25 +148,23 @@ def test_too_many_points_are_refused_before_there_is_anything(forked: Forked, bl
 # ---- how far it is
 
 
-@pytest.mark.slow
-def test_a_line_now_and_then_where_there_is_no_terminal(cli: Run, blocks: Path) -> None:
+def test_a_line_now_and_then_where_there_is_no_terminal(forked: Forked, blocks: Path) -> None:
     # one line after a second, and not one for each block
-    done = cli("sweep", blocks, "--set", "solver.rtol=1e-10", "--set", THREE, cwd=blocks.parent)
+    done = forked("sweep", blocks, cwd=blocks.parent, code=AT_ONCE)
     lines = [line for line in done.stderr.splitlines() if line.startswith(("trajectories ", "points "))]
     assert 1 <= len(lines) <= 5
     number = r"[\d,]+"
-    whole = rf"(trajectories {number} of 120,000 for 240,000 points|points {number} of 240,000)"
+    whole = rf"(trajectories {number} of 40,001 for 160,000 points|points {number} of 160,000)"
     assert all(re.fullmatch(rf"{whole}(, {number}/s, [\d:]+ left)?", line) for line in lines), lines
     assert "\x1b" not in done.stderr
-    silent = cli("sweep", blocks, "--overwrite", "--quiet", cwd=blocks.parent)
+    silent = forked("sweep", blocks, "--overwrite", "--quiet", cwd=blocks.parent, code=AT_ONCE)
     assert (silent.returncode, silent.stdout, silent.stderr) == (0, "", "")
 
 
 def test_a_bar_on_a_terminal(forked: Forked, blocks: Path) -> None:
-    words = ("sweep", blocks, "--set", THREE)
-    done, printed = printed_on_terminal(forked, *words, stream="stderr", cwd=blocks.parent)
+    done, printed = printed_on_terminal(forked, "sweep", blocks, stream="stderr", cwd=blocks.parent, code=AT_ONCE)
     assert done.returncode == 0, printed
-    assert re.search(r"trajectories [\d,]+ of 120,000", printed)
+    assert re.search(r"trajectories [\d,]+ of 40,001", printed)
     assert "━" in printed
     # it goes when it is done
     assert printed.rstrip().endswith("limit)")
