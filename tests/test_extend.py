@@ -18,6 +18,8 @@ from .conftest import Run
 BASE = """
 title = "Base"
 models = ["gharib-hurmuzlu-2012", "hertz"]
+[solver]
+rtol = 1e-4
 [sweep]
 e = [0.3, 0.6]
 v1 = [1.0, 2.0]
@@ -27,6 +29,8 @@ K = 1e9
 """
 DASHPOT = """
 models = ["kelvin-voigt", "gharib-hurmuzlu-2012"]
+[solver]
+rtol = 1e-4
 [sweep]
 e = [0.3, 0.6]
 v1 = 1.0

@@ -12,6 +12,8 @@ from .conftest import Run
 
 CONFIG = """
 models = ["hertz", "gharib-hurmuzlu-2012"]
+[solver]
+rtol = 1e-4
 [sweep]
 e = [0.2, 0.5]
 v1 = 1.0

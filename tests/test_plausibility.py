@@ -14,6 +14,8 @@ from .conftest import ROOT
 from .forked import Forked
 
 SWEEP = """models = ["hertz", "gharib-hurmuzlu-2012"]
+[solver]
+rtol = 1e-4
 [sweep]
 e = [0.2, 0.8]
 v1 = 1.0

@@ -31,6 +31,8 @@ from impact import hysteresis
 MINE = hysteresis("mine-2026", title="Mine", year=2026, equation="", reference="", chi=lambda e: {chi})
 """
 CONFIG = """models = ["hertz", "mine-2026"]
+[solver]
+rtol = 1e-4
 [sweep]
 e = [0.2, 0.8]
 v1 = 1.0

@@ -440,6 +440,8 @@ def test_what_no_memory_holds_is_refused_before_it_is_computed(tmp_path: Path) -
 # what could be neither stored nor read is refused before anything is integrated, which leaves a file
 SWEEP = """
 models = ["mine-2026"]
+[solver]
+rtol = 1e-4
 [sweep]
 v1 = [1.0, 2.0]
 m1 = 1.0
