@@ -90,11 +90,13 @@ def test_a_dry_run_tells_what_a_sweep_takes_and_writes_nothing(cli: Run, blocks:
 
 def test_a_dry_run_tells_what_goes_over_the_wire_and_how_many_workers_are_of_use(cli: Run, blocks: Path) -> None:
     words = ("sweep", blocks, "--dry-run", "--set", "solver.collapse=false", "--set", 'solver.core="numpy"')
-    told = cli(*words, cwd=blocks.parent).stdout.splitlines()[-1]
+    larger = [word for name in ("v1", "m1") for word in ("--set", f"sweep.{name}.linspace=[1,2,100]")]
+    line = cli(*words, *larger, cwd=blocks.parent).stdout.splitlines()[-1]
+    counts = r"(about \d+:\d\d:\d\d by \d+(, | workers)){2,}"
+    assert re.fullmatch(rf"on a cluster: [\d,]+ bytes over the wire; {counts}; more are of no use", line), line
+    # of a short sweep nothing is printed about a cluster
+    assert "cluster" not in cli(*words, cwd=blocks.parent).stdout
     found = json.loads(cli(*words, "--json", cwd=blocks.parent).stdout)
-    counts = r"((about \d+:\d\d:\d\d|under a second) by \d+(, | workers)){2,}"
-    wire = f"{found['wire']:,} bytes over the wire"
-    assert re.fullmatch(f"on a cluster: {wire}; {counts}; more are of no use", told), told
     plan = prepare(blocks, ["solver.collapse=false", 'solver.core="numpy"'])
     maps = trajectory_maps(plan)
     sent = 0

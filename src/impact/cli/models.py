@@ -1,4 +1,4 @@
-"""The command `models`: the catalogue, one law, or whether a law of one's own keeps the contract."""
+"""The command `models`: the catalogue, one law, or the checks of a user-defined law."""
 
 from __future__ import annotations
 
@@ -141,10 +141,12 @@ def _print_models(models: Sequence[ForceModel]) -> None:
             rows.add_row(model.key, *_model_cells(model, asked, others))
     out.print(rows)
     if asked:
-        out.print("\nThe columns e=... show the restitution that a model delivers when it is asked for e.")
+        out.print("\nThe columns e=... show the delivered restitution for each requested e.")
     if "core" in others:
-        out.print('The core is what integrates a law, or a phase of it, where numba is installed (extra "fast").')
-    out.print("A law with [parameters] of its own is driven by them; `impact models KEY` describes one in full.")
+        out.print(
+            'The column core shows what integrates a law, or a phase of it, if numba is installed (extra "fast").'
+        )
+    out.print("A model with [parameters] depends on them; `impact models KEY` describes one model in full.")
     counts = count_states(model.evidence for model in models)
     out.print(f"Evidence for the formulas of these {len(models)} entries: {counts}.")
 
@@ -159,7 +161,7 @@ def _catalogue_columns(room: int) -> tuple[tuple[float, ...], tuple[str, ...]]:
     asked = {0: (), 1: (0.5,), 2: (0.1, 0.9), 3: (0.1, 0.5, 0.9)}.get(count, E_VALUES[: count - 1] + E_VALUES[-1:])
     room -= E_WIDTH * len(asked)
     others = []
-    for name, width in (("equation", EQUATION_WIDTH), ("core", CORE_WIDTH), ("said to hold for", DOMAIN_WIDTH)):
+    for name, width in (("equation", EQUATION_WIDTH), ("core", CORE_WIDTH), ("stated domain", DOMAIN_WIDTH)):
         if room >= width:
             others.append(name)
             room -= width
@@ -177,10 +179,10 @@ def _model_cells(model: ForceModel, asked: Sequence[float], others: Sequence[str
     texts = {
         "equation": model.equation + (f"  [{parameters}]" if parameters else ""),
         "core": _cores(model).split()[0].rstrip(","),
-        "said to hold for": model.domain_text or "–",
+        "stated domain": model.domain_text or "–",
     }
     if model.same_as:
-        texts = {"equation": f"same law as {model.same_as}", "core": "", "said to hold for": ""}
+        texts = {"equation": f"same law as {model.same_as}", "core": "", "stated domain": ""}
     for name in others:
         yield Text(texts[name])
 
@@ -190,7 +192,7 @@ def _print_model(model: ForceModel) -> None:
     rows = {
         "model": model.key, "same law as": model.same_as, "title": with_year(model.title, model.year),
         "family": model.family, "equation": model.equation, "reference": model.reference, "doi": model.doi,
-        "evidence": str(model.evidence), "said to hold for": model.domain_text or "not stated",
+        "evidence": str(model.evidence), "stated domain": model.domain_text or "not stated",
         "exponent": "the sweep's n" if model.exponent is None else f"n = {number(model.exponent)}, its own",
         "ends at": _release(model), "integrated by": _cores(model),
     }  # fmt: skip

@@ -173,7 +173,7 @@ def _parse_labels(words: list[str] | None) -> dict[str, str]:
 
 
 def _path_of_kind(path: Path, kind: str, kinds: int) -> Path:
-    """A file of its own for each of several kinds."""
+    """A separate file for each of several kinds."""
     return path if kinds == 1 else path.with_name(f"{path.stem}-{kind}{path.suffix}")
 
 

@@ -1,4 +1,4 @@
-"""The progress of a sweep on stderr: a bar on a terminal, else a line now and then."""
+"""The progress of a sweep on stderr: a bar on a terminal, else a line every ten seconds."""
 
 from __future__ import annotations
 

@@ -40,6 +40,9 @@ COLLAPSE = {
     "not": "every point is integrated (solver.collapse = false)",
 }
 
+# seconds from which on a dry run prints what a cluster would take
+CLUSTER_MIN_S = 60.0
+
 
 def sweep(
     config: Annotated[Path, typer.Argument(help="The sweep, a TOML file; `impact init` writes one.")],
@@ -139,7 +142,7 @@ def _print_estimate(expected: Estimate, *, as_json: bool) -> None:
     total = f"{expected.points:,} points from {expected.trajectories:,} trajectories"
     time = f"{_duration(expected.seconds)} by {expected.core} and what the disk takes"
     out.print(f"{total}, {size}, {time}; nothing was written")
-    if len(expected.by_workers) > 1:
+    if expected.seconds >= CLUSTER_MIN_S:
         many = ", ".join(f"{_duration(seconds)} by {count:,}" for count, seconds in expected.by_workers.items())
         out.print(f"on a cluster: {expected.wire:,} bytes over the wire; {many} workers; more are of no use")
 
