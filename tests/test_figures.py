@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import hashlib
+import shutil
 import subprocess
 import sys
 from itertools import combinations
@@ -27,6 +28,7 @@ from impact.plots.kinds import KINDS, MOTION_KINDS, WIDTHS, Choice
 from impact.plots.style import save_figure
 
 from .conftest import ROOT, Run
+from .forked import Forked
 
 CURVES = [kind for kind in KINDS if kind not in ("map", "validity")]
 
@@ -414,6 +416,16 @@ def test_no_other_ending(figure6: xr.Dataset, tmp_path: Path, monkeypatch: pytes
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.skipif(shutil.which("xelatex") is None, reason="no xelatex")
+def test_a_pgf_file_is_a_picture_that_latex_typesets(figure6: xr.Dataset, tmp_path: Path) -> None:
+    save_figure(impact.plot(figure6, width="84mm"), tmp_path / "results.pgf")
+    document = r"\documentclass{article}\usepackage{pgf}\def\mathdefault#1{#1}\begin{document}\input{results.pgf}"
+    (tmp_path / "paper.tex").write_text(document + r"\end{document}", encoding="utf-8")
+    words = ["xelatex", "-interaction=nonstopmode", "-halt-on-error", "paper.tex"]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, "Output written on paper.pdf (1 page" in done.stdout) == (0, True), done.stdout[-500:]
+
+
 def test_text_from_a_file_is_text(figure6: xr.Dataset, tmp_path: Path) -> None:
     odd = figure6.assign_attrs(title="$\\frac{1$ \x1b[31m \u202e $x$ " + "W" * 90)
     odd["title"] = ("model", ["$x^{$", "a_b$ $\\oops$", "[red]" + "W" * 60])
@@ -583,23 +595,24 @@ def test_the_table_behind_a_picture_has_a_column_for_each_curve(cli: Run, stored
     assert loops.notna().all(axis=None) == (len({loops[name].count() for name in loops}) == 1)
 
 
-def test_tables_in_other_formats(cli: Run, stored: Path, tmp_path: Path) -> None:
-    done = cli("plot", stored, "-o", "a.svg", "--data", "a.tex", cwd=tmp_path)
+def test_tables_in_other_formats(forked: Forked, stored: Path, tmp_path: Path) -> None:
+    done = forked("plot", stored, "-o", "a.svg", "--data", "a.tex", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     text = (tmp_path / "a.tex").read_text("utf-8")
     assert r"\begin{tabular}" in text
     assert r"v1\_post reference [m/s]" in text
-    done = cli("plot", stored, "-o", "b.svg", "--data", "b.parquet", cwd=tmp_path)
-    try:
-        import pyarrow  # noqa: F401
-    except ImportError:
-        assert done.returncode == 2
-        assert done.stderr == (
-            '--data: .parquet needs pyarrow, which is not installed: pip install "impact-sweep[parquet]"\n'
-        )
-        assert not (tmp_path / "b.svg").exists()
-    else:
-        assert "v1_post reference [m/s]" in pd.read_parquet(tmp_path / "b.parquet")
+    words = ("plot", stored, "-o", "b.svg", "--data", "b.parquet")
+    refused = forked(*words, cwd=tmp_path, code="import sys; sys.modules['pyarrow'] = None")
+    assert refused.returncode == 2
+    assert refused.stderr == (
+        '--data: .parquet needs pyarrow, which is not installed: pip install "impact-sweep[parquet]"\n'
+    )
+    assert not (tmp_path / "b.svg").exists()
+    assert forked(*words, cwd=tmp_path).returncode == 0
+    assert forked("plot", stored, "-o", "c.svg", "--data", "c.csv", cwd=tmp_path).returncode == 0
+    columns, rows = pd.read_csv(tmp_path / "c.csv"), pd.read_parquet(tmp_path / "b.parquet")
+    assert list(rows.columns) == list(columns.columns)
+    np.testing.assert_array_equal(rows.to_numpy(), columns.to_numpy())
 
 
 def test_a_picture_that_exists_is_replaced_on_request_only(cli: Run, stored: Path, tmp_path: Path) -> None:

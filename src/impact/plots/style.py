@@ -171,9 +171,11 @@ def encoded(figure: Figure, kind: str, style: str | Path | None = None) -> bytes
     UsageError : LaTeX cannot typeset its text
     """
     buffer = io.BytesIO()
+    # some formats have no metadata, and do not accept the argument
+    options = {"metadata": METADATA[kind]} if METADATA[kind] else {}
     with styled(style):
         try:
-            figure.savefig(buffer, format=kind, metadata=METADATA[kind] or None)
+            figure.savefig(buffer, format=kind, **options)
         except RuntimeError as error:
             # LaTeX runs for the format .pgf, and if the user sets text.usetex
             reason = safe_text(" ".join(str(error).split()), 300)
