@@ -172,7 +172,7 @@ def encoded(figure: Figure, kind: str, style: str | Path | None = None) -> bytes
     """
     buffer = io.BytesIO()
     # some formats have no metadata, and do not accept the argument
-    options = {"metadata": METADATA[kind]} if METADATA[kind] else {}
+    options: dict[str, Any] = {"metadata": METADATA[kind]} if METADATA[kind] else {}
     with styled(style):
         try:
             figure.savefig(buffer, format=kind, **options)
