@@ -83,7 +83,7 @@ def run_command_line(command: Callable[[], object], *, debug: bool) -> int:
         with contextlib.suppress(AttributeError):
             # a locale that cannot encode a formula shows escapes instead of a traceback
             stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
-    warnings.showwarning = _print_warning
+    warnings.showwarning = _warning_printer()
     code = _exit_code(command, debug=debug)
     try:
         # a failing flush at the exit of the interpreter would change the exit code
@@ -157,9 +157,20 @@ def _out_of_memory(error: Exception) -> str:
     return "out of memory" + (f": {what}" if what else "")
 
 
-def _print_warning(message: Warning | str, *_: object, **__: object) -> None:
-    """Print a warning, of this program or of a library, as a line on stderr."""
-    print_line(f"note: {safe_text(str(message), 1000)}")
+def _warning_printer() -> Callable[..., None]:
+    """A function that prints a warning, of this package or a library, as a line on stderr, and each line once.
+
+    The filters of `warnings` forget what was shown when a library changes them.
+    """
+    printed: set[str] = set()
+
+    def print_warning(message: Warning | str, *_: object, **__: object) -> None:
+        line = f"note: {safe_text(str(message), 1000)}"
+        if line not in printed:
+            printed.add(line)
+            print_line(line)
+
+    return print_warning
 
 
 def _usage_message(error: TyperException) -> str:
