@@ -84,8 +84,8 @@ def core(
 
     def outputs(block: tuple[ForceModel, Impacts]) -> tuple[float, int]:
         contact = collide(*block, rtol=rtol, max_steps=10_000, collapse=False, core=by)
-        found = {name: contact[name] for name in OUTPUTS}
-        return float(np.max(np.abs(found["closed_form_error"]))), int(found["steps"].sum())
+        values = {name: contact[name] for name in OUTPUTS}
+        return float(np.max(np.abs(values["closed_form_error"]))), int(values["steps"].sum())
 
     with choose_backend(1, threads).executor() as pool:
         begun = time.perf_counter()

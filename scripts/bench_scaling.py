@@ -111,7 +111,7 @@ class Cost:
 
 def measured(plan: Plan, backend: Backend, scheduler: psutil.Process | None = None) -> tuple[float, Cost]:
     """Seconds that a sweep takes, and what its trajectories alone cost; the best of a few."""
-    return min((_measured(plan, backend, scheduler) for _ in range(3)), key=lambda one: one[0])
+    return min((_measured(plan, backend, scheduler) for _ in range(3)), key=lambda timing: timing[0])
 
 
 def _measured(plan: Plan, backend: Backend, scheduler: psutil.Process | None) -> tuple[float, Cost]:

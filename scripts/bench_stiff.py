@@ -31,19 +31,19 @@ def main() -> None:
     table = Table("model", "e", "χ", "steps", "of those at 0.1", "|e_out/exact − 1|", "time, relative",
                   "peak force, relative", box=None)  # fmt: skip
     for key in MODELS:
-        lanes = impacts(e=e)
-        contact = collide(find(key), lanes, rtol=DEFAULT_RTOL, max_steps=10_000)
-        unit = lanes.length / lanes.v0
+        batch = impacts(e=e)
+        contact = collide(find(key), batch, rtol=DEFAULT_RTOL, max_steps=10_000)
+        unit = batch.length / batch.v0
         for place, asked in enumerate(e):
             chi = contact["damping_ratio"][place]
-            exact, time, force = quadratures(chi, 1.5)
-            own = contact["contact_time"][place] / unit[place]
-            pushed = contact["peak_force"][place] * lanes.length[place] / (lanes.m[place] * lanes.v0[place] ** 2)
+            exact, exact_time, exact_force = quadratures(chi, 1.5)
+            time = contact["contact_time"][place] / unit[place]
+            force = contact["peak_force"][place] * batch.length[place] / (batch.m[place] * batch.v0[place] ** 2)
             table.add_row(
                 key, f"{asked:.0e}", f"{chi:.3g}", str(contact["steps"][place]),
                 f"{contact['steps'][place] / contact['steps'][0]:.2f}",
                 f"{abs(contact['e_out'][place] / exact - 1):.1e}",
-                f"{abs(own / time - 1):.1e}", f"{abs(pushed / force - 1):.1e}",
+                f"{abs(time / exact_time - 1):.1e}", f"{abs(force / exact_force - 1):.1e}",
             )  # fmt: skip
     Console(width=130).print(f"rtol {DEFAULT_RTOL:g}", table, sep="\n")
 

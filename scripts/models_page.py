@@ -115,7 +115,7 @@ FAMILIES = {
     "so that e_out² is the ratio of the recovered work to the work of the approach.",
     "adhesive": "The balls attract each other while in contact. The work of separation is lost, so that the "
     "restitution increases with the speed from zero at a sticking speed, below which the balls stay together.",
-    "codes": "Laws of multibody, robotics and granular codes that were not published under a name of their own, "
+    "codes": "Laws of multibody, robotics and granular codes that have no published name, "
     "with the parameters of those codes. If K is not set, it is that of the Hertz contact, or is computed by the "
     "rule of the code.",
 }

@@ -164,18 +164,18 @@ def _watched(note: int) -> None:
 
     sweep_into, store = sweeping.sweep_into, work.WorkFolder.store
 
-    def told(*words: Any, **more: Any) -> Any:
+    def noted_sweep(*words: Any, **more: Any) -> Any:
         _tell(note, "begun")
         try:
             return sweep_into(*words, **more)
         finally:
             _tell(note, "ended")
 
-    def kept(own: Any, part: Any, rebound: Any) -> None:
-        store(own, part, rebound)
+    def noted_store(folder: Any, part: Any, collisions: Any) -> None:
+        store(folder, part, collisions)
         _tell(note, "kept", part.number)
 
-    sweeping.sweep_into, work.WorkFolder.store = told, kept  # type: ignore[method-assign]
+    sweeping.sweep_into, work.WorkFolder.store = noted_sweep, noted_store  # type: ignore[method-assign]
 
 
 # ---- the server

@@ -102,7 +102,7 @@ def print_info(dataset: xr.Dataset, path: Path) -> None:
 
 
 def _values_text(dataset: xr.Dataset, name: str) -> str:
-    """The values of a coordinate: few of them one by one, of many the ends and how many there are."""
+    """The values of a coordinate: a list of a few values, or the range and number of many."""
     from ..results.slabs import is_large
     from ..results.summary import extremes_of
 

@@ -120,7 +120,7 @@ def _delivered(model: ForceModel) -> dict[str, float]:
 
 
 def _print_models(models: Sequence[ForceModel]) -> None:
-    """The catalogue, a line a model, family by family, with as many columns as there is room for."""
+    """Print the catalogue: one line for each model, by family, with the columns that fit the terminal."""
     from rich.text import Text
 
     from ..contact.evidence import count_states
