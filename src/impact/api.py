@@ -159,10 +159,15 @@ def sweep(
             raise UsageError("resume and overwrite: expected an output beside them")
         return execute(prepare(source, overrides, plugins, max_points), choose_backend(jobs, threads, executor))
     sweep_to_file(
-        source, output, overrides=overrides, plugins=plugins,
-        backend=nullcontext(choose_backend(jobs, threads, executor)), max_points=max_points, resume=resume,
+        source,
+        output,
+        overrides=overrides,
+        plugins=plugins,
+        backend=nullcontext(choose_backend(jobs, threads, executor)),
+        max_points=max_points,
+        resume=resume,
         overwrite=overwrite,
-    )  # fmt: skip
+    )
     return load(output)
 
 
@@ -227,9 +232,14 @@ def sweep_to_file(
             check_output(output, overwrite=overwrite, source=Path(path))
     with backend or nullcontext(SERIAL) as integrator:
         outcome = sweep_into(
-            output, plan, resume=resume, overwrite=overwrite, backend=integrator, on_progress=on_progress,
+            output,
+            plan,
+            resume=resume,
+            overwrite=overwrite,
+            backend=integrator,
+            on_progress=on_progress,
             should_stop=should_stop,
-        )  # fmt: skip
+        )
     if should_stop():
         raise UnfinishedError(f"{shown} was stored whole")
     return outcome
@@ -280,9 +290,15 @@ def sweep_shard(
     command += [word for path in plugins if isinstance(path, str | Path) for word in ("--plugin", str(path))]
     with backend or nullcontext(SERIAL) as integrator:
         done = write_shard(
-            Path(output), plan, part, command, overwrite=overwrite, backend=integrator, on_progress=on_progress,
+            Path(output),
+            plan,
+            part,
+            command,
+            overwrite=overwrite,
+            backend=integrator,
+            on_progress=on_progress,
             should_stop=should_stop,
-        )  # fmt: skip
+        )
     if should_stop():
         raise UnfinishedError(f"{safe_text(str(done.folder))} has the whole shard")
     return done
@@ -325,9 +341,13 @@ def merge(
     303
     """
     outcome, repeated = merge_shards(
-        [Path(folder) for folder in folders], Path(output), read_plugins(plugins), overwrite=overwrite,
-        on_progress=on_progress, should_stop=should_stop,
-    )  # fmt: skip
+        [Path(folder) for folder in folders],
+        Path(output),
+        read_plugins(plugins),
+        overwrite=overwrite,
+        on_progress=on_progress,
+        should_stop=should_stop,
+    )
     if should_stop():
         raise UnfinishedError(f"{safe_text(str(output))} was stored whole")
     return replace(outcome, repeated_blocks=repeated)
@@ -499,9 +519,17 @@ def extend_to_file(
     target = Path(result if output is None else output)
     with backend or nullcontext(SERIAL) as integrator:
         outcome, integrated = extend_result(
-            Path(result), target, overrides, read_plugins(plugins), resume=resume, overwrite=overwrite,
-            max_points=max_points, backend=integrator, on_progress=on_progress, should_stop=should_stop,
-        )  # fmt: skip
+            Path(result),
+            target,
+            overrides,
+            read_plugins(plugins),
+            resume=resume,
+            overwrite=overwrite,
+            max_points=max_points,
+            backend=integrator,
+            on_progress=on_progress,
+            should_stop=should_stop,
+        )
     if should_stop():
         raise UnfinishedError(f"{safe_text(str(target))} was stored whole")
     return replace(outcome, integrated=integrated)

@@ -121,9 +121,13 @@ def rerun(
         _check_plot(plot, result)
         try:
             verdict = api.rerun(
-                result, plugins=plugins or (), tol=dict(tol or ()) or None, subset=subset, max_points=max_points,
+                result,
+                plugins=plugins or (),
+                tol=dict(tol or ()) or None,
+                subset=subset,
+                max_points=max_points,
                 execute=run_plan,
-            )  # fmt: skip
+            )
         except ImpactError as error:
             _print_report(formats.report_of_error("the rerun", str(result), str(error)), format)
             raise

@@ -23,7 +23,7 @@ from .options import (
     ResumeOption,
     SelectOption,
     ThreadsOption,
-)  # fmt: skip
+)
 
 
 def expand(
@@ -39,9 +39,14 @@ def expand(
         from .. import api
 
         points = api.expand(
-            result, output, sel=dict(sel or ()), models=model, overwrite=overwrite, max_points=max_points,
+            result,
+            output,
+            sel=dict(sel or ()),
+            models=model,
+            overwrite=overwrite,
+            max_points=max_points,
             should_stop=should_stop,
-        )  # fmt: skip
+        )
     exits.print_line(f"{safe_text(str(output))}: {points:,} points, {output.stat().st_size:,} bytes")
 
 
@@ -78,10 +83,17 @@ def extend(
         executor = ExecutorOptions(jobs, threads)
         with progress(quiet=quiet) as on_progress:
             outcome = api.extend_to_file(
-                result, sets, output=output, resume=resume, overwrite=overwrite, plugins=plugins or (),
-                backend=executor.backend(quiet=quiet, should_stop=should_stop), max_points=max_points,
-                on_progress=on_progress, should_stop=should_stop,
-            )  # fmt: skip
+                result,
+                sets,
+                output=output,
+                resume=resume,
+                overwrite=overwrite,
+                plugins=plugins or (),
+                backend=executor.backend(quiet=quiet, should_stop=should_stop),
+                max_points=max_points,
+                on_progress=on_progress,
+                should_stop=should_stop,
+            )
     if not quiet:
         exits.print_line(f"{outcome.integrated:,} of {outcome.trajectories:,} trajectories were integrated for it")
     summary.conclude(outcome, output or result, quiet=quiet, as_json=as_json, allow_failed=allow_failed)

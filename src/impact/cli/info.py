@@ -73,9 +73,15 @@ def print_info(dataset: xr.Dataset, path: Path) -> None:
         unit = plain_unit(str(coordinate.attrs.get("units", "1")))
         rows[str(name)] = text + ("" if unit == "1" else f" [{unit}]")
     for name in (
-        "rtol", "materials", "impact_version", "schema_version", "fingerprint", "plugins", "tolerances",
+        "rtol",
+        "materials",
+        "impact_version",
+        "schema_version",
+        "fingerprint",
+        "plugins",
+        "tolerances",
         "reason",
-    ):  # fmt: skip
+    ):
         if attributes.get(name, "{}") != "{}":
             rows[name] = attributes[name]
     if read_attribute(attributes, "config_set"):
@@ -92,9 +98,12 @@ def print_info(dataset: xr.Dataset, path: Path) -> None:
         extremes = extremes_of(dataset, str(name))
         ends = [number(end) for end in extremes[:2]] if extremes else ["–", "–"]
         listed.add_row(
-            cell(name), cell(variable.attrs.get("units", "")), cell(", ".join(map(str, variable.dims))), *ends,
+            cell(name),
+            cell(variable.attrs.get("units", "")),
+            cell(", ".join(map(str, variable.dims))),
+            *ends,
             f"{extremes.missing:,}" if extremes else "–",
-        )  # fmt: skip
+        )
     out.print(listed)
     if tally and tally.worst:
         out.print()

@@ -101,12 +101,16 @@ def model_json(model: ForceModel) -> dict[str, Any]:
     parameters = [vars(parameter) for parameter in model.parameters]
     names = ("key", "title", "year", "family", "equation", "reference", "doi", "same_as")
     return {
-        **{name: getattr(model, name) for name in names}, "evidence": vars(model.evidence),
+        **{name: getattr(model, name) for name in names},
+        "evidence": vars(model.evidence),
         "domain": {name: list(ends) for name, ends in model.domain.items()},
-        "domain_source": model.domain_source, "parameters": parameters,
-        "exponent": model.exponent, "release": model.release, "delivered_restitution": _delivered(model),
+        "domain_source": model.domain_source,
+        "parameters": parameters,
+        "exponent": model.exponent,
+        "release": model.release,
+        "delivered_restitution": _delivered(model),
         "integrated_by": _cores(model),
-    }  # fmt: skip
+    }
 
 
 def _delivered(model: ForceModel) -> dict[str, float]:
@@ -190,12 +194,19 @@ def _model_cells(model: ForceModel, asked: Sequence[float], others: Sequence[str
 def _print_model(model: ForceModel) -> None:
     """All about one model."""
     rows = {
-        "model": model.key, "same law as": model.same_as, "title": with_year(model.title, model.year),
-        "family": model.family, "equation": model.equation, "reference": model.reference, "doi": model.doi,
-        "evidence": str(model.evidence), "stated domain": model.domain_text or "not stated",
+        "model": model.key,
+        "same law as": model.same_as,
+        "title": with_year(model.title, model.year),
+        "family": model.family,
+        "equation": model.equation,
+        "reference": model.reference,
+        "doi": model.doi,
+        "evidence": str(model.evidence),
+        "stated domain": model.domain_text or "not stated",
         "exponent": "the sweep's n" if model.exponent is None else f"n = {number(model.exponent)}, its own",
-        "ends at": _release(model), "integrated by": _cores(model),
-    }  # fmt: skip
+        "ends at": _release(model),
+        "integrated by": _cores(model),
+    }
     for index, parameter in enumerate(model.parameters):
         # the table is named once
         rows[" " * index if index else f"[model.{model.key}]"] = _parameter(parameter)
@@ -240,8 +251,18 @@ def _check_contract(models: Sequence[ForceModel], *, as_json: bool) -> None:
     findings_by_model = [(model, list(contract(model))) for model in models]
     broken = [finding for _, findings in findings_by_model for finding in findings if not finding.holds]
     if as_json:
-        print(dump([{"model": model.key, "holds": all(finding.holds for finding in findings),
-                     "clauses": list(_clauses(findings))} for model, findings in findings_by_model]))  # fmt: skip
+        print(
+            dump(
+                [
+                    {
+                        "model": model.key,
+                        "holds": all(finding.holds for finding in findings),
+                        "clauses": list(_clauses(findings)),
+                    }
+                    for model, findings in findings_by_model
+                ]
+            )
+        )
     else:
         rows = table("model", "clause", "", "worst", "bound")
         rows.columns[1].justify = "left"

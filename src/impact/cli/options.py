@@ -35,10 +35,13 @@ PluginOption = Annotated[
 SelectOption = Annotated[
     list[Setting] | None,
     typer.Option(
-        "--sel", metavar="NAME=VALUE", parser=parse_setting, callback=reject_duplicates,
+        "--sel",
+        metavar="NAME=VALUE",
+        parser=parse_setting,
+        callback=reject_duplicates,
         help="Value of an axis, such as m2=1.0; may be repeated.",
     ),
-]  # fmt: skip
+]
 ModelOption = Annotated[
     list[str] | None,
     typer.Option(
@@ -57,15 +60,20 @@ ThreadsOption = Annotated[
 MaxPointsOption = Annotated[
     int,
     typer.Option(
-        "--max-points", metavar="N", parser=parse_whole_number,
+        "--max-points",
+        metavar="N",
+        parser=parse_whole_number,
         help="Refuse more: points in layout full, else trajectories.",
     ),
-]  # fmt: skip
+]
 ToleranceOption = Annotated[
     list[Tolerance] | None,
     typer.Option(
-        "--tol", metavar="[NAME=]VALUE", parser=parse_tolerance, callback=reject_duplicates,
+        "--tol",
+        metavar="[NAME=]VALUE",
+        parser=parse_tolerance,
+        callback=reject_duplicates,
         help="Tolerance relative to the scale of a point, such as 1e-8 or 5%, for all variables or for one; may "
         "be repeated. \\[default: the baseline's, else 10 times its solver's rtol]",
     ),
-]  # fmt: skip
+]

@@ -72,11 +72,16 @@ def line(task: Task, points: int) -> str:
 def new_bar(get_time: Callable[[], float] | None = None) -> Bar:
     """A bar on stderr, not yet shown; `get_time` is the clock, in seconds."""
     return Bar(
-        TextColumn("{task.description} {task.completed:,.0f} of {task.total:,.0f}"), BarColumn(),
-        RemainingColumn(), TextColumn("{task.fields[failed]}"), console=console(sys.stderr), transient=True,
+        TextColumn("{task.description} {task.completed:,.0f} of {task.total:,.0f}"),
+        BarColumn(),
+        RemainingColumn(),
+        TextColumn("{task.fields[failed]}"),
+        console=console(sys.stderr),
+        transient=True,
         get_time=get_time,
-        speed_estimate_period=RATE_PERIOD_S, disable=not sys.stderr.isatty(),
-    )  # fmt: skip
+        speed_estimate_period=RATE_PERIOD_S,
+        disable=not sys.stderr.isatty(),
+    )
 
 
 @contextmanager

@@ -43,9 +43,11 @@ def recommend(
 def ranking_json(ranking: Ranking) -> dict[str, Any]:
     """A ranking as plain data."""
     return {
-        "headline": ranking.headline, "tol": ranking.tol, "best": [row.model for row in ranking.best],
+        "headline": ranking.headline,
+        "tol": ranking.tol,
+        "best": [row.model for row in ranking.best],
         "models": [{**vars(row), "share": row.share} for row in ranking.models],
-    }  # fmt: skip
+    }
 
 
 def _print_ranking(ranking: Ranking) -> None:

@@ -89,13 +89,19 @@ def run(
 def run_json(impact: Impact) -> dict[str, Any]:
     """One impact as plain data."""
     return {
-        "model": impact.model.key, "inputs": dict(impact.point), "first_value_of": list(impact.first),
-        "exponent": impact.exponent, "closing_speed": impact.closing_speed,
+        "model": impact.model.key,
+        "inputs": dict(impact.point),
+        "first_value_of": list(impact.first),
+        "exponent": impact.exponent,
+        "closing_speed": impact.closing_speed,
         "outputs": {**impact.values, "status": impact.status.name.lower()},
         "materials": {name: asdict(material) for name, material in impact.materials.items()},
-        "derived": dict(impact.derived), "damping": impact.damping, "e_kinematic": impact.e_kinematic,
-        "e_kinetic": impact.e_kinetic, "e_energetic": impact.e_energetic,
-    }  # fmt: skip
+        "derived": dict(impact.derived),
+        "damping": impact.damping,
+        "e_kinematic": impact.e_kinematic,
+        "e_kinetic": impact.e_kinetic,
+        "e_energetic": impact.e_energetic,
+    }
 
 
 def print_run(impact: Impact) -> None:

@@ -36,10 +36,16 @@ def summary_json(outcome: SweepOutcome, output: Path) -> dict[str, Any]:
         again = replay_command(command, at) if command else None
         failures.append({"status": status.name.lower(), "at": at, "replay": again})
     return {
-        "output": str(output), "points": totals.points, "models": dataset.sizes["model"],
-        "trajectories": outcome.trajectories, "status": counts_by_name(totals.counts), "failed": totals.failed,
-        "first_failed": failures, "layout": dataset.encoding.get("layout"), "seal": dataset.encoding.get("seal"),
-    }  # fmt: skip
+        "output": str(output),
+        "points": totals.points,
+        "models": dataset.sizes["model"],
+        "trajectories": outcome.trajectories,
+        "status": counts_by_name(totals.counts),
+        "failed": totals.failed,
+        "first_failed": failures,
+        "layout": dataset.encoding.get("layout"),
+        "seal": dataset.encoding.get("seal"),
+    }
 
 
 def conclude(outcome: SweepOutcome, output: Path, *, quiet: bool, as_json: bool, allow_failed: bool) -> None:
@@ -99,9 +105,12 @@ def print_summary(outcome: SweepOutcome, fields: Mapping[str, Any]) -> None:
 def worst_errors(dataset: xr.Dataset, totals: Summary) -> Table:
     """A table of the largest errors per model."""
     columns = {
-        "e_error": "max |e_out − e|", "v1_error": "max |v1 error|", "v2_error": "max |v2 error|",
-        "closed_form_error": "max |e_out − exact|", "energy_residual": "max |residual|",
-    }  # fmt: skip
+        "e_error": "max |e_out − e|",
+        "v1_error": "max |v1 error|",
+        "v2_error": "max |v2 error|",
+        "closed_form_error": "max |e_out − exact|",
+        "energy_residual": "max |residual|",
+    }
     held = [name for name in columns if name in totals.worst]
     rows = table("model", *(columns[name] for name in held))
     for model, key in enumerate(dataset["model"].values):

@@ -88,8 +88,11 @@ def sweep(
 
         executor = ExecutorOptions(jobs, threads, scheduler, scheduler_file)
         inputs: dict[str, Any] = {
-            "overrides": sets or (), "plugins": plugins or (), "max_points": max_points, "on_note": print_note,
-        }  # fmt: skip
+            "overrides": sets or (),
+            "plugins": plugins or (),
+            "max_points": max_points,
+            "on_note": print_note,
+        }
         if dry_run:
             if shard is not None:
                 raise UsageError(f"--shard {safe_text(shard)}: given beside --dry-run, which is of the whole")
@@ -173,9 +176,13 @@ def merge(
 
         with progress(quiet=quiet) as on_progress:
             outcome = api.merge(
-                folders, output, plugins=plugins or (), overwrite=overwrite, on_progress=on_progress,
+                folders,
+                output,
+                plugins=plugins or (),
+                overwrite=overwrite,
+                on_progress=on_progress,
                 should_stop=should_stop,
-            )  # fmt: skip
+            )
     if outcome.repeated_blocks and not quiet:
         exits.print_line(f"{outcome.repeated_blocks:,} blocks were in more than one folder, with the same bits")
     summary.conclude(outcome, output, quiet=quiet, as_json=as_json, allow_failed=allow_failed)

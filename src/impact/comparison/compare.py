@@ -96,10 +96,14 @@ def compare(
     if not judged and not faults:
         faults.append(Fault("nothing in common", "", "the two have no variable in common"))
     return Verdict(
-        new=names[0], baseline=names[1], faults=tuple(faults), variables=tuple(judged), notes=tuple(notes),
+        new=names[0],
+        baseline=names[1],
+        faults=tuple(faults),
+        variables=tuple(judged),
+        notes=tuple(notes),
         repeats=command_start(files[0], a) or command_start(files[1], b),
         worst_along=_along_axes(largest, aligned.baseline.coords),
-    )  # fmt: skip
+    )
 
 
 def _along_axes(largest: Mapping[str, Mapping[str, np.ndarray]], coords: xr.Dataset) -> dict[str, xr.Dataset]:

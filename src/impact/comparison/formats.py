@@ -53,9 +53,14 @@ def report_of(verdict: Verdict) -> Report:
         for variable in verdict.ranked
     )
     return Report(
-        safe_text(verdict.new), safe_text(verdict.baseline), verdict.equal, verdict.headline, (*faults, *values),
-        verdict.notes, verdict.ranked,
-    )  # fmt: skip
+        safe_text(verdict.new),
+        safe_text(verdict.baseline),
+        verdict.equal,
+        verdict.headline,
+        (*faults, *values),
+        verdict.notes,
+        verdict.ranked,
+    )
 
 
 def report_of_error(new: str, baseline: str, error: str) -> Report:
@@ -66,19 +71,28 @@ def report_of_error(new: str, baseline: str, error: str) -> Report:
 def as_data(report: Report) -> dict[str, Any]:
     """The report as a dict for JSON; `equal` is null if there is no verdict."""
     return {
-        "equal": report.equal, "headline": report.headline, "new": report.new, "baseline": report.baseline,
+        "equal": report.equal,
+        "headline": report.headline,
+        "new": report.new,
+        "baseline": report.baseline,
         "faults": [
             {"kind": case.name, "text": text}
-            for case in report.cases if case.name in FAULT_KINDS
+            for case in report.cases
+            if case.name in FAULT_KINDS
             for text in case.texts
         ],
         "variables": [
-            {**vars(variable), "at": _safe_inputs(variable.at), "equal": variable.is_equal, "text": variable.text,
-             "replay": next((case.replay for case in report.cases if case.name == variable.name), "")}
+            {
+                **vars(variable),
+                "at": _safe_inputs(variable.at),
+                "equal": variable.is_equal,
+                "text": variable.text,
+                "replay": next((case.replay for case in report.cases if case.name == variable.name), ""),
+            }
             for variable in report.variables
         ],
         "notes": list(report.notes),
-    }  # fmt: skip
+    }
 
 
 def _safe_inputs(at: Mapping[str, float | str]) -> dict[str, float | str]:

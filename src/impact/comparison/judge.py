@@ -183,13 +183,17 @@ def judge(
                 else:
                     np.maximum.at(largest[dim], np.arange(part.start, part.stop) // group_size(size), maxima)
     return Judged(
-        name=variable.name, judged=variable.judged,
+        name=variable.name,
+        judged=variable.judged,
         tolerance=math.nan if variable.judged in ("exact", "reported") else tol,
-        points=math.prod(shape), different=different,
-        worst=worst.difference if worst else 0.0, times=worst.times if worst else 0.0,
+        points=math.prod(shape),
+        different=different,
+        worst=worst.difference if worst else 0.0,
+        times=worst.times if worst else 0.0,
         at=_inputs_of_point(aligned.new.coords, dict(zip(dims, worst.index, strict=True))) if worst else {},
-        new=worst.new if worst else math.nan, baseline=worst.baseline if worst else math.nan,
-    ), largest  # fmt: skip
+        new=worst.new if worst else math.nan,
+        baseline=worst.baseline if worst else math.nan,
+    ), largest
 
 
 def group_size(size: int) -> int:
@@ -272,10 +276,13 @@ def _worst_of_slab(
     sizes = np.ones_like(ratio) if variable.judged == "exact" else np.nan_to_num(difference, nan=np.inf)
     index = np.unravel_index(int(np.argmax(np.where(ratio == ratio.max(), sizes, -1.0))), ratio.shape)
     return Worst(
-        float(ratio[index]), float(sizes[index]),
+        float(ratio[index]),
+        float(sizes[index]),
         tuple(part.start + int(offset) for part, offset in zip(where.values(), index, strict=True)),
-        float(difference[index]), float(a[index]), float(b[index]),
-    )  # fmt: skip
+        float(difference[index]),
+        float(a[index]),
+        float(b[index]),
+    )
 
 
 def _worse(first: Worst | None, second: Worst, shape: Sequence[int]) -> Worst:

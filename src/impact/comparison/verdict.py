@@ -16,8 +16,13 @@ from ..text import safe_text
 FaultKind = Literal["nothing in common", "physics config", "labels", "units", "missing variable", "values"]
 # in the order of a verdict: kinds that explain others first
 FAULT_KINDS: tuple[FaultKind, ...] = (
-    "nothing in common", "physics config", "labels", "units", "missing variable", "values",
-)  # fmt: skip
+    "nothing in common",
+    "physics config",
+    "labels",
+    "units",
+    "missing variable",
+    "values",
+)
 MAX_NAMED_FAULTS = 4  # names per kind in the first line
 
 

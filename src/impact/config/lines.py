@@ -33,10 +33,23 @@ EXPECTED_BY_KEY = {
 }
 # other words that users may write for a key
 KEY_SYNONYMS = {
-    "restitution": "e", "cor": "e", "mass1": "m1", "mass2": "m2", "speed1": "v1", "speed2": "v2",
-    "velocity1": "v1", "velocity2": "v2", "radius1": "R1", "radius2": "R2", "stiffness": "K", "exponent": "n",
-    "youngs_modulus": "E", "poisson": "nu", "poissons_ratio": "nu", "density": "rho",
-}  # fmt: skip
+    "restitution": "e",
+    "cor": "e",
+    "mass1": "m1",
+    "mass2": "m2",
+    "speed1": "v1",
+    "speed2": "v2",
+    "velocity1": "v1",
+    "velocity2": "v2",
+    "radius1": "R1",
+    "radius2": "R2",
+    "stiffness": "K",
+    "exponent": "n",
+    "youngs_modulus": "E",
+    "poisson": "nu",
+    "poissons_ratio": "nu",
+    "density": "rho",
+}
 
 BARE_KEY = r"[A-Za-z0-9_-]++"
 TOML_TOKEN = re.compile(

@@ -49,10 +49,23 @@ def sample(model: ForceModel) -> Impacts:
     hertz = hertz_stiffness(E1, nu1, E2, nu2, R1, R2)
     strength = np.full(count, 3e8)
     impacts = Impacts(
-        e=e, v1=v1, v2=v2, m1=m1, m2=m2, R1=R1, R2=R2, n=n, E1=E1, nu1=nu1, yield_strength1=strength,
-        E2=E2, nu2=nu2, yield_strength2=strength, K=stiffness(n, hertz, effective_mass(m1, m2), v1 - v2),
+        e=e,
+        v1=v1,
+        v2=v2,
+        m1=m1,
+        m2=m2,
+        R1=R1,
+        R2=R2,
+        n=n,
+        E1=E1,
+        nu1=nu1,
+        yield_strength1=strength,
+        E2=E2,
+        nu2=nu2,
+        yield_strength2=strength,
+        K=stiffness(n, hertz, effective_mass(m1, m2), v1 - v2),
         parameters={parameter.name: np.ones(count) for parameter in model.parameters},
-    )  # fmt: skip
+    )
     values = {parameter.name: _parameter_values(model, parameter, impacts) for parameter in model.parameters}
     return replace(impacts, parameters=values)
 
@@ -109,10 +122,20 @@ def contract(model: ForceModel) -> Iterator[Finding]:
     other = _collide(model, in_other_units(model, impacts))
     yield Finding("a change of units changes nothing", worst(other["e_out"] - base["e_out"]), 10 * CONTRACT_RTOL)
     swapped = replace(
-        impacts, v1=-impacts.v2, v2=-impacts.v1, m1=impacts.m2, m2=impacts.m1, R1=impacts.R2, R2=impacts.R1,
-        E1=impacts.E2, E2=impacts.E1, nu1=impacts.nu2, nu2=impacts.nu1, yield_strength1=impacts.yield_strength2,
+        impacts,
+        v1=-impacts.v2,
+        v2=-impacts.v1,
+        m1=impacts.m2,
+        m2=impacts.m1,
+        R1=impacts.R2,
+        R2=impacts.R1,
+        E1=impacts.E2,
+        E2=impacts.E1,
+        nu1=impacts.nu2,
+        nu2=impacts.nu1,
+        yield_strength1=impacts.yield_strength2,
         yield_strength2=impacts.yield_strength1,
-    )  # fmt: skip
+    )
     other = _collide(model, swapped)
     yield Finding(
         "swapped balls swap velocities", worst((other["v1_post"] + base["v2_post"]) / impacts.v0), ROUNDING_ERROR

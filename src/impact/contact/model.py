@@ -14,10 +14,23 @@ from .units import dimension
 
 # arguments of formulas besides the law's own parameters and coefficients, and their units
 QUANTITIES = {
-    "e": "1", "n": "1", "K": "N/m^n", "m": "kg", "v0": "m/s", "R1": "m", "R2": "m", "E1": "Pa", "E2": "Pa",
-    "nu1": "1", "nu2": "1", "yield_strength1": "Pa", "yield_strength2": "Pa",
-    "R_eff": "m", "E_eff": "Pa", "Y_min": "Pa",
-}  # fmt: skip
+    "e": "1",
+    "n": "1",
+    "K": "N/m^n",
+    "m": "kg",
+    "v0": "m/s",
+    "R1": "m",
+    "R2": "m",
+    "E1": "Pa",
+    "E2": "Pa",
+    "nu1": "1",
+    "nu2": "1",
+    "yield_strength1": "Pa",
+    "yield_strength2": "Pa",
+    "R_eff": "m",
+    "E_eff": "Pa",
+    "Y_min": "Pa",
+}
 # the quantities that others are computed from
 BASE_QUANTITIES = {
     "R_eff": ("R1", "R2"),

@@ -23,10 +23,27 @@ InSI = Callable[[Array, Array], Array]
 
 # the outputs that a result has by default, in its order; OUTPUTS also has those on request
 BY_DEFAULT = (
-    "v1_post", "v2_post", "v1_reference", "v2_reference", "v1_error", "v2_error", "e_out", "e_error",
-    "peak_indentation", "permanent_indentation", "peak_force", "contact_time", "energy_loss", "stiffness",
-    "damping_ratio", "energy_residual", "closed_form_error", "status", "in_domain", "steps",
-)  # fmt: skip
+    "v1_post",
+    "v2_post",
+    "v1_reference",
+    "v2_reference",
+    "v1_error",
+    "v2_error",
+    "e_out",
+    "e_error",
+    "peak_indentation",
+    "permanent_indentation",
+    "peak_force",
+    "contact_time",
+    "energy_loss",
+    "stiffness",
+    "damping_ratio",
+    "energy_residual",
+    "closed_form_error",
+    "status",
+    "in_domain",
+    "steps",
+)
 OUTPUTS = (*BY_DEFAULT, "e_kinetic", "e_energetic", "lambda", "separation_time")
 
 
@@ -96,9 +113,16 @@ def collide(
     with np.errstate(all="ignore"):
         values, checked = dimensionless_values(model, impacts), check_inputs(model, impacts)
     result = simulate(
-        model, impacts.n, values, checked,
-        rtol=rtol, max_steps=max_steps, collapse=collapse, core=core, errors=errors,
-    )  # fmt: skip
+        model,
+        impacts.n,
+        values,
+        checked,
+        rtol=rtol,
+        max_steps=max_steps,
+        collapse=collapse,
+        core=core,
+        errors=errors,
+    )
     return outputs(model, impacts, result, names, checked)
 
 

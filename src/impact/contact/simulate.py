@@ -299,10 +299,18 @@ def integrate_phases(
     residual, recovered, params = motion.unloading_state(law, params, peak, at_peak)
     unknown = np.full(n, np.nan)
     result = CollisionResult(
-        e_out=unknown.copy(), peak=peak, permanent=residual.copy(), force=np.maximum(approach.maximum, at_peak),
-        contact_time=approach.state[2].copy(), approach_work=2.0 * approach.state[3], restitution_work=np.zeros(n),
-        steps=approach.steps.copy(), status=_status_of_solution(approach), chi=unknown, exact=unknown,
-    )  # fmt: skip
+        e_out=unknown.copy(),
+        peak=peak,
+        permanent=residual.copy(),
+        force=np.maximum(approach.maximum, at_peak),
+        contact_time=approach.state[2].copy(),
+        approach_work=2.0 * approach.state[3],
+        restitution_work=np.zeros(n),
+        steps=approach.steps.copy(),
+        status=_status_of_solution(approach),
+        chi=unknown,
+        exact=unknown,
+    )
 
     # without a recovered indentation the balls stay at their peak
     stays = (result.status == STATUS_OK) & (recovered <= 0.0)

@@ -59,10 +59,23 @@ def build_impacts(inputs: Inputs, model: Law, index: Index, stiffness: Stiffness
         e = restitution_at(inputs, index)
     parameters = {parameter.name: value(f"{model.key}.{parameter.name}") for parameter in model.parameters}
     impacts = Impacts(
-        e=e, v1=v1, v2=v2, m1=m1, m2=m2, K=K, n=n, R1=R1, R2=R2, E1=E1, nu1=nu1, E2=E2, nu2=nu2,
-        yield_strength1=of_material("1", "yield_strength"), yield_strength2=of_material("2", "yield_strength"),
+        e=e,
+        v1=v1,
+        v2=v2,
+        m1=m1,
+        m2=m2,
+        K=K,
+        n=n,
+        R1=R1,
+        R2=R2,
+        E1=E1,
+        nu1=nu1,
+        E2=E2,
+        nu2=nu2,
+        yield_strength1=of_material("1", "yield_strength"),
+        yield_strength2=of_material("2", "yield_strength"),
         parameters=parameters,
-    )  # fmt: skip
+    )
     if not has_stiffness_rule(inputs, model) or stiffness is not None:
         return impacts
     assert model.stiffness is not None

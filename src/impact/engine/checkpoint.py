@@ -196,8 +196,14 @@ def _prepare_folder(folder: Path, record: Mapping[str, Any], *, resume: bool, ov
 def _sweep_record(plan: Plan, extends: str = "") -> dict[str, Any]:
     """The identity of a sweep: everything that its finished blocks depend on."""
     solver = plan.config.solver
-    return {"schema": TABLE_COLUMNS, "block": RANGE_TRAJECTORIES, "collapse": solver.collapse, "core": solver.core,
-            "physics": plan.physics, **({"extends": extends} if extends else {})}  # fmt: skip
+    return {
+        "schema": TABLE_COLUMNS,
+        "block": RANGE_TRAJECTORIES,
+        "collapse": solver.collapse,
+        "core": solver.core,
+        "physics": plan.physics,
+        **({"extends": extends} if extends else {}),
+    }
 
 
 def _record_digest(record: Mapping[str, Any]) -> str:

@@ -71,9 +71,16 @@ def integrate_columns(model: ForceModel, columns: Columns, solver: Solver) -> In
     errors: dict[str, str] = {}
     values = {name: column for name, column in columns.items() if name not in ("n", "status")}
     collisions = simulate(
-        model, columns["n"], values, columns["status"],
-        rtol=solver.rtol, max_steps=solver.max_steps, collapse=solver.collapse, core=solver.core, errors=errors,
-    )  # fmt: skip
+        model,
+        columns["n"],
+        values,
+        columns["status"],
+        rtol=solver.rtol,
+        max_steps=solver.max_steps,
+        collapse=solver.collapse,
+        core=solver.core,
+        errors=errors,
+    )
     return collisions, errors
 
 

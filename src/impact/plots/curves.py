@@ -263,11 +263,12 @@ def _curve_data(
         heading, conditions = title, ": ".join(filter(None, (heading, conditions)))
     values = data[x].values
     x_axis: dict[str, Any] = {
-        "x_name": x, "x_label": words_of(data[x].attrs, x),
+        "x_name": x,
+        "x_label": words_of(data[x].attrs, x),
         "x_unit": safe_text(plain_unit(str(data[x].attrs.get("units", "1")))),
         "x_log": is_geometric(values) or ("x" in choice.log and bool(np.all(values > 0.0))),
         "joined": is_ordered(dataset, x),
-    }  # fmt: skip
+    }
     panels = [replace(panel, y_log=panel.y_log or "y" in choice.log, **x_axis) for panel in panels]
     empty = {c.model: None for panel in panels for c in panel.curves if c.model and not np.isfinite(c.y).any()}
     without_value = tuple(f"{key}, which has no point here" for key in empty)
@@ -333,9 +334,16 @@ def _draw_bands(axes: Axes, panel: Panel) -> None:
         if panel.y_log:
             axes.axhline(band, color="#5a9cc5", linewidth=0.8, zorder=0.5)
             axes.annotate(
-                f"{band:g}", (1, band), (-2, 1), xycoords=("axes fraction", "data"), textcoords="offset points",
-                ha="right", va="bottom", fontsize="x-small", color="#0072B2",
-            )  # fmt: skip
+                f"{band:g}",
+                (1, band),
+                (-2, 1),
+                xycoords=("axes fraction", "data"),
+                textcoords="offset points",
+                ha="right",
+                va="bottom",
+                fontsize="x-small",
+                color="#0072B2",
+            )
         else:
             axes.axhspan(-band, band, color=colour, linewidth=0, zorder=0.5)
 
@@ -378,6 +386,11 @@ def _label_curve_ends(axes: Axes, curves: Sequence[Curve]) -> None:
         near = [other for other, _ in ordered if abs(other - y) < 0.06 * (high - low)]
         aside = (-8 if rank == 0 else 8) if len(near) > 1 else 0
         axes.annotate(
-            symbol(name), ends[name], (6, aside), textcoords="offset points", va="center", fontsize="large",
+            symbol(name),
+            ends[name],
+            (6, aside),
+            textcoords="offset points",
+            va="center",
+            fontsize="large",
             annotation_clip=False,
-        )  # fmt: skip
+        )

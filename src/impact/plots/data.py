@@ -108,10 +108,18 @@ class Points:
         artists: dict[str, Artist] = {}
         for index, name in enumerate(shown):
             bars = axes.errorbar(
-                self.columns[panel.x_name], self.columns[name], self.columns.get(SIGMA), color="black", zorder=3,
-                marker="o", markersize=4.0, linestyle="none", elinewidth=0.9, capsize=2.0,
+                self.columns[panel.x_name],
+                self.columns[name],
+                self.columns.get(SIGMA),
+                color="black",
+                zorder=3,
+                marker="o",
+                markersize=4.0,
+                linestyle="none",
+                elinewidth=0.9,
+                capsize=2.0,
                 markerfacecolor="black" if index == 0 else "white",
-            )  # fmt: skip
+            )
             artists[MEASURED if len(shown) == 1 else f"{MEASURED} {name}"] = bars[0]
         return artists
 

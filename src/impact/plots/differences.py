@@ -147,9 +147,11 @@ def _draw_panel(
     for index, name in enumerate(names):
         ratio = np.asarray(panel.ratios.get(name, np.full(len(x), np.nan)), float)
         style: dict[str, Any] = {
-            "color": COLOURS[index % len(COLOURS)], "marker": MARKERS[index % len(MARKERS)],
-            "markerfacecolor": "white", "markersize": 4.5 if len(x) <= MANY_POINTS else 2.5,
-        }  # fmt: skip
+            "color": COLOURS[index % len(COLOURS)],
+            "marker": MARKERS[index % len(MARKERS)],
+            "markerfacecolor": "white",
+            "markersize": 4.5 if len(x) <= MANY_POINTS else 2.5,
+        }
         counted = np.where(np.isfinite(ratio) & (ratio > 0.0), np.maximum(ratio, bottom), np.nan)
         (entries[name],) = axes.plot(x, counted, linewidth=0.9, linestyle="" if panel.names else "-", **style)
         # a difference without a number, such as a NaN against a number, is drawn in a band at the top
@@ -175,9 +177,16 @@ def _draw_panel(
 def _draw_limit(axes: Axes, height: float, name: str, **style: Any) -> None:
     axes.axhline(height, color="black", **style)
     axes.annotate(
-        name, (1.0, height), (-2, -3), xycoords=("axes fraction", "data"), textcoords="offset points", ha="right",
-        va="top", fontsize="x-small", color="#555555",
-    )  # fmt: skip
+        name,
+        (1.0, height),
+        (-2, -3),
+        xycoords=("axes fraction", "data"),
+        textcoords="offset points",
+        ha="right",
+        va="top",
+        fontsize="x-small",
+        color="#555555",
+    )
 
 
 def _label_ticks(axes: Axes, panel: DifferencePanel, x: np.ndarray) -> None:
@@ -186,6 +195,10 @@ def _label_ticks(axes: Axes, panel: DifferencePanel, x: np.ndarray) -> None:
     names = panel.names[::every]
     is_wide = sum(map(len, names)) > MAX_NAMES_LENGTH
     axes.set_xticks(
-        x[::every], names, parse_math=False, fontsize="small", rotation=20 if is_wide else 0,
+        x[::every],
+        names,
+        parse_math=False,
+        fontsize="small",
+        rotation=20 if is_wide else 0,
         ha="right" if is_wide else "center",
-    )  # fmt: skip
+    )

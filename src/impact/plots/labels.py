@@ -17,18 +17,52 @@ from ..results.schema import HISTORY_VARIABLES, SCHEMA, is_input
 from ..text import safe_text, with_year
 from .slices import NO_BREAK
 
-GREEK = (
-    "alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "kappa", "lambda", "mu", "nu", "xi",
-    "rho", "sigma", "tau", "phi", "chi", "psi", "omega",
-)  # fmt: skip
+GREEK = frozenset(
+    [
+        "alpha",
+        "beta",
+        "gamma",
+        "delta",
+        "epsilon",
+        "zeta",
+        "eta",
+        "theta",
+        "kappa",
+        "lambda",
+        "mu",
+        "nu",
+        "xi",
+        "rho",
+        "sigma",
+        "tau",
+        "phi",
+        "chi",
+        "psi",
+        "omega",
+    ]
+)
 # symbols of the paper for names that are words; v_post and abs_e_error are each a label of several variables
 MATH_SYMBOLS = {
-    "e_out": r"e_\mathrm{out}", "e_error": r"e_\mathrm{out}-e", "abs_e_error": r"|e_\mathrm{out}-e|",
-    "v1_post": "v_1^+", "v2_post": "v_2^+", "v1_reference": "v_1^+", "v2_reference": "v_2^+", "v_post": "v_i^+",
-    "v_i": "v_i", "v": r"\dot{\delta}", "peak_indentation": r"\delta_m", "permanent_indentation": r"\delta_p",
-    "peak_force": "f_m", "stiffness": "K", "damping_ratio": r"\chi", "E1": "E_1", "E2": "E_2",
-    "e_kinetic": r"e_\mathrm{kinetic}", "e_energetic": r"e_\mathrm{energetic}",
-}  # fmt: skip
+    "e_out": r"e_\mathrm{out}",
+    "e_error": r"e_\mathrm{out}-e",
+    "abs_e_error": r"|e_\mathrm{out}-e|",
+    "v1_post": "v_1^+",
+    "v2_post": "v_2^+",
+    "v1_reference": "v_1^+",
+    "v2_reference": "v_2^+",
+    "v_post": "v_i^+",
+    "v_i": "v_i",
+    "v": r"\dot{\delta}",
+    "peak_indentation": r"\delta_m",
+    "permanent_indentation": r"\delta_p",
+    "peak_force": "f_m",
+    "stiffness": "K",
+    "damping_ratio": r"\chi",
+    "E1": "E_1",
+    "E2": "E_2",
+    "e_kinetic": r"e_\mathrm{kinetic}",
+    "e_energetic": r"e_\mathrm{energetic}",
+}
 # name of the impulse-momentum solution in the paper
 REFERENCE = "Impulse-momentum"
 

@@ -223,7 +223,11 @@ def _map_data(
     label = "Error" if variable == "e_error" else label[:1].upper() + label[1:]
     title = safe_text(f"{label if kind == 'map' else 'Closest model'} over {x} and {y}")
     return MapData(
-        f"{title}: {heading_text}" if heading_text else title, conditions_of(data, x, y), variable, x, y,
+        f"{title}: {heading_text}" if heading_text else title,
+        conditions_of(data, x, y),
+        variable,
+        x,
+        y,
         labels=(x_label, y_label, label),
         units=(x_unit, y_unit, unit),
         x_values=tuple(data[x].values.tolist()),
@@ -235,7 +239,7 @@ def _map_data(
         panels=tuple(Field(*name, _nested_tuples(part)) for name, part in zip(names, values, strict=True)),
         not_drawn=not_drawn,
         left_out=left_out,
-    )  # fmt: skip
+    )
 
 
 def edges_of(values: Sequence[float], log: bool) -> FloatArray:
@@ -381,8 +385,15 @@ def _draw_values(
             # contours that reach the edges of the cells, with an outline visible on dark and on light colours
             wider = np.ma.masked_invalid(np.pad(field.filled(np.nan), 1, mode="edge"))
             across, up = [x[0], *plot_data.x_values, x[-1]], [y[0], *plot_data.y_values, y[-1]]
-            drawn = panel_axes.contour(across, up, wider, inside, colors="black", linewidths=0.8,
-                                linestyles=[CONTOURS[abs(level)] for level in inside])  # fmt: skip
+            drawn = panel_axes.contour(
+                across,
+                up,
+                wider,
+                inside,
+                colors="black",
+                linewidths=0.8,
+                linestyles=[CONTOURS[abs(level)] for level in inside],
+            )
             drawn.set_path_effects([withStroke(linewidth=1.8, foreground="white")])
         for level in map(abs, inside):
             line = Line2D([], [], color="black", linewidth=0.8, linestyle=CONTOURS[level])

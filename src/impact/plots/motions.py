@@ -113,10 +113,16 @@ def _curves_over(
     panels = []
     for x, y, end in pairs:
         curves = [
-            Curve(_model_label(of_model, equations), str(of_model["model"].item()), _series(of_model, x),
-                  _series(of_model, y), end, y)
+            Curve(
+                _model_label(of_model, equations),
+                str(of_model["model"].item()),
+                _series(of_model, x),
+                _series(of_model, y),
+                end,
+                y,
+            )
             for of_model in histories
-        ]  # fmt: skip
+        ]
         (x_label, x_unit), (y_label, y_unit) = _axis_label_and_unit(first, x), _axis_label_and_unit(first, y)
         panels.append(Panel(x_label, y_label, tuple(curves), x_unit, y_unit, x_name=x, y_name=y))
     return CurveData(title, _conditions_text(histories), tuple(panels))

@@ -161,9 +161,10 @@ def read(data: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
 def x_axis(dataset: xr.Dataset, x: str | None) -> str:
     """The coordinate to draw over: `x`, else e, else the first axis of numbers."""
     lines = [
-        str(name) for name, coord in dataset.coords.items()
+        str(name)
+        for name, coord in dataset.coords.items()
         if coord.ndim == 1 and coord.dims != ("model",) and coord.dtype.kind in "fiu"
-    ]  # fmt: skip
+    ]
     if x is not None:
         if x not in lines:
             if x in dataset.coords and dataset[x].ndim > 1:
@@ -198,8 +199,11 @@ def conditions_of(dataset: xr.Dataset, *drawn: str) -> str:
 
 def scalars_of(dataset: xr.Dataset) -> dict[str, object]:
     """The coordinates of a slice that have one value."""
-    return {str(name): coordinate.values.item() for name, coordinate in dataset.coords.items()
-            if coordinate.ndim == 0 and is_input(str(name))}  # fmt: skip
+    return {
+        str(name): coordinate.values.item()
+        for name, coordinate in dataset.coords.items()
+        if coordinate.ndim == 0 and is_input(str(name))
+    }
 
 
 def described_inputs(inputs: Mapping[str, object], units: Mapping[str, str], exponent: str | None = None) -> str:

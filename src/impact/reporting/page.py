@@ -98,9 +98,13 @@ def _template() -> Template:
 
     environment = Environment(
         loader=FunctionLoader(lambda name: files(__package__).joinpath(name).read_text(encoding="utf-8")),
-        autoescape=True, finalize=text, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
+        autoescape=True,
+        finalize=text,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
         keep_trailing_newline=True,
-    )  # fmt: skip
+    )
     return environment.get_template("page.html.j2")
 
 
@@ -129,8 +133,11 @@ def _single_values(dataset: xr.Dataset) -> Iterator[tuple[str, str, str]]:
             yield str(name), value, str(coordinate.attrs.get("long_name", ""))
     units = {key: rule.unit.removesuffix("1") for key, rule in MATERIAL_QUANTITIES.items()}
     for name, material in read_attribute(dataset.attrs, "materials").items():
-        values = (f"{key} = {label(value)} {units.get(key, '')}".strip() for key, value in material.items()
-                  if value is not None)  # fmt: skip
+        values = (
+            f"{key} = {label(value)} {units.get(key, '')}".strip()
+            for key, value in material.items()
+            if value is not None
+        )
         yield name, ", ".join(values), "material"
 
 
@@ -210,9 +217,11 @@ def _facts(dataset: xr.Dataset) -> list[tuple[str, str]]:
         "fingerprint": attributes.get("fingerprint", ""),
         "seal": dataset.encoding.get("seal") or "",
         "reason": attributes.get("reason", ""),
-        **{f"plug-in {key}": ", ".join(f"{name} {text}" for name, text in plugin if text is not None)
-           for key, plugin in read_attribute(dataset.attrs, "plugins").items()},
-    }  # fmt: skip
+        **{
+            f"plug-in {key}": ", ".join(f"{name} {text}" for name, text in plugin if text is not None)
+            for key, plugin in read_attribute(dataset.attrs, "plugins").items()
+        },
+    }
     return [(name, str(fact)) for name, fact in facts.items() if fact]
 
 
@@ -231,10 +240,15 @@ def _model_section(of_model: xr.Dataset) -> dict[str, Any]:
         evidence.append((key, about.state, "; ".join(filter(None, source)) or "–"))
     is_doi = re.fullmatch(r"10\.[0-9]{4,}/\S+", doi)
     return {
-        "key": key, "title": with_year(title, year), "equation": equation, "reference": reference, "doi": doi,
+        "key": key,
+        "title": with_year(title, year),
+        "equation": equation,
+        "reference": reference,
+        "doi": doi,
         "link": f"https://doi.org/{quote(doi, safe='/', errors='replace')}" if is_doi else "",
-        "domain": declaration.domain_text if declaration else "", "evidence": evidence,
-    }  # fmt: skip
+        "domain": declaration.domain_text if declaration else "",
+        "evidence": evidence,
+    }
 
 
 def _plural_s(number: int) -> str:

@@ -105,9 +105,16 @@ def extend(
 
         extension = Extension(seal, json.dumps(history), find_reused, fill)
         outcome = sweep_into(
-            output, new, resume=resume, overwrite=overwrite, in_place=output == source, backend=backend,
-            on_progress=on_progress, should_stop=should_stop, extension=extension,
-        )  # fmt: skip
+            output,
+            new,
+            resume=resume,
+            overwrite=overwrite,
+            in_place=output == source,
+            backend=backend,
+            on_progress=on_progress,
+            should_stop=should_stop,
+            extension=extension,
+        )
     return outcome, sum(n_integrated.values())
 
 
@@ -181,9 +188,10 @@ def _check_changes(old: Plan, new: Plan, name: str) -> None:
     changed += [key for key in old.inputs.names() if key not in new.inputs.names()]
     changed += [key for key in swept if key not in old.inputs.names() and "." not in key]
     moved = [
-        key for key in old.inputs.scalars
+        key
+        for key in old.inputs.scalars
         if key in new.inputs.scalars and old.inputs.scalars[key] != new.inputs.scalars[key]
-    ]  # fmt: skip
+    ]
     if changed or moved:
         raise UsageError(
             f"{name}: --set changes {safe_text(', '.join([*changed, *moved]))}, expected more values of an axis, "

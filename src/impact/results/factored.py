@@ -40,9 +40,14 @@ WITNESS_TOLERANCE = 1e-12
 SLAB_ROWS = 2**16
 # fields of a law in the JSON attribute `laws`, and their types
 LAW_FIELD_TYPES: Mapping[str, type] = {
-    "parameters": list, "domain": dict, "asks_for_e": bool, "is_permanent": bool, "axes": list,
-    "trajectories": int, "is_shared": bool,
-}  # fmt: skip
+    "parameters": list,
+    "domain": dict,
+    "asks_for_e": bool,
+    "is_permanent": bool,
+    "axes": list,
+    "trajectories": int,
+    "is_shared": bool,
+}
 
 ReadVariable = Callable[[str, slice], NDArray[Any]]
 
@@ -78,12 +83,16 @@ def factored_template(
     laws, stiffness = {}, 0
     for law, trajectory_map, rule in zip(table.laws, table.maps, table.stiffness, strict=True):
         about: dict[str, Any] = {
-            "exponent": law.exponent, "parameters": [parameter.name for parameter in law.parameters],
-            "domain": {name: list(ends) for name, ends in law.domain.items()}, "asks_for_e": "e" in law.quantities,
+            "exponent": law.exponent,
+            "parameters": [parameter.name for parameter in law.parameters],
+            "domain": {name: list(ends) for name, ends in law.domain.items()},
+            "asks_for_e": "e" in law.quantities,
             "is_permanent": law.is_permanent,
             "axes": [table.inputs.axes[axis].name for axis in trajectory_map.axes],
-            "trajectories": trajectory_map.count, "is_shared": trajectory_map.is_shared, "stiffness_axes": None,
-        }  # fmt: skip
+            "trajectories": trajectory_map.count,
+            "is_shared": trajectory_map.is_shared,
+            "stiffness_axes": None,
+        }
         if rule is not None or has_stiffness_rule(table.inputs, law):
             axes, K = whole_stiffness(table.inputs, law, rule)
             if K is None:
@@ -115,8 +124,10 @@ def factored_template(
     for variable in variables:
         attributes = attributes_of(variable)
         variables_of_file[f"witness_{variable.name}"] = (
-            "witness", np.broadcast_to(np.zeros((), variable.dtype), witnesses), attributes,
-        )  # fmt: skip
+            "witness",
+            np.broadcast_to(np.zeros((), variable.dtype), witnesses),
+            attributes,
+        )
     order = [axis.name for axis in table.inputs.axes]
     attributes = {**result_template.attrs, "axes": json.dumps(order), "laws": json.dumps(laws)}
     template = xr.Dataset(variables_of_file, result_template.coords, attributes)

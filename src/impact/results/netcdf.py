@@ -45,10 +45,19 @@ MAX_CHUNKS_OF_FILE = 200_000  # of all datasets together
 # uncompressed bytes per byte of the file, about the most that deflate can reach, and bytes that are always allowed
 MAX_COMPRESSION_RATIO, ALWAYS_ALLOWED_BYTES = 1_100, 2**26
 # attributes that netCDF itself writes
-NETCDF_ATTRIBUTES = frozenset({
-    "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_NCProperties", "coordinates", "CLASS", "_Netcdf4Dimid",
-    "_Netcdf4Coordinates", "_Encoding",
-})  # fmt: skip
+NETCDF_ATTRIBUTES = frozenset(
+    {
+        "NAME",
+        "DIMENSION_LIST",
+        "REFERENCE_LIST",
+        "_NCProperties",
+        "coordinates",
+        "CLASS",
+        "_Netcdf4Dimid",
+        "_Netcdf4Coordinates",
+        "_Encoding",
+    }
+)
 SKIPPED_ATTRIBUTES = frozenset({"NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_NCProperties", "coordinates"})
 
 

@@ -341,8 +341,17 @@ def _rank_model(of_model: xr.Dataset, tol: float) -> Ranked:
     parameters = {".".join(map(str, path_of(name))): chosen[name] for name in chosen if owner_of(name) == key}
     served = _served_ranges(e.values, asked_at, missed_at) if along_one else None
     return Ranked(
-        key, parameters, points, within_points, failed_points, mean_error, max_error, at, e_out, served,
-    )  # fmt: skip
+        key,
+        parameters,
+        points,
+        within_points,
+        failed_points,
+        mean_error,
+        max_error,
+        at,
+        e_out,
+        served,
+    )
 
 
 def _read_slab(variable: xr.Variable, where: Slab, sizes: Mapping[Hashable, int]) -> NDArray[Any]:

@@ -43,8 +43,16 @@ class SchemaVariable:
     name: str
     unit: str
     per: Literal["model", "axes"]
-    judged: Literal["scaled by v0", "scaled by 1", "scaled by the peak", "scaled by itself",
-                    "scaled by m v0^2/2", "bounded by 10 rtol", "exact", "reported"]  # fmt: skip
+    judged: Literal[
+        "scaled by v0",
+        "scaled by 1",
+        "scaled by the peak",
+        "scaled by itself",
+        "scaled by m v0^2/2",
+        "bounded by 10 rtol",
+        "exact",
+        "reported",
+    ]
     meaning: str
     equation: str
     dtype: str = "f8"
@@ -152,8 +160,11 @@ def scale_of(
 def stored_variables(plan: Plan) -> tuple[SchemaVariable, ...]:
     """The variables of the result of a plan; always with the status, which explains NaNs."""
     chosen = {"status", *(plan.config.output.variables or BY_DEFAULT)}
-    return tuple(replace(variable, dtype=plan.config.output.dtype if variable.dtype == "f8" else variable.dtype)
-                 for variable in SCHEMA if variable.name in chosen)  # fmt: skip
+    return tuple(
+        replace(variable, dtype=plan.config.output.dtype if variable.dtype == "f8" else variable.dtype)
+        for variable in SCHEMA
+        if variable.name in chosen
+    )
 
 
 def dataset_template(plan: Plan) -> xr.Dataset:
@@ -176,8 +187,10 @@ def dataset_template(plan: Plan) -> xr.Dataset:
 
 def attributes_of(variable: SchemaVariable) -> dict[str, object]:
     attributes: dict[str, object] = {
-        "units": variable.unit, "long_name": variable.meaning, "equation": variable.equation,
-    }  # fmt: skip
+        "units": variable.unit,
+        "long_name": variable.meaning,
+        "equation": variable.equation,
+    }
     if variable.name == "status":
         attributes["flag_values"] = np.array([int(status) for status in Status], np.int8)
         attributes["flag_meanings"] = " ".join(status.name.lower() for status in Status)

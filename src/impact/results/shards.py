@@ -221,10 +221,14 @@ def _read_record(folder: Path) -> _ShardRecord:
         number, of = fields["shard"]
         command, core, attributes = fields["command"], fields["core"], fields["attributes"]
         is_valid = (
-            isinstance(number, int) and isinstance(of, int) and 1 <= number <= of
-            and isinstance(command, list) and all(isinstance(word, str) for word in command)
-            and core in CORES and {*RECORDED_ATTRIBUTES} <= attributes.keys()
-        )  # fmt: skip
+            isinstance(number, int)
+            and isinstance(of, int)
+            and 1 <= number <= of
+            and isinstance(command, list)
+            and all(isinstance(word, str) for word in command)
+            and core in CORES
+            and {*RECORDED_ATTRIBUTES} <= attributes.keys()
+        )
         if not is_valid:
             raise ValueError
     except (OSError, ValueError, TypeError, AttributeError, KeyError, RecursionError):

@@ -25,10 +25,15 @@ RESULT_VARIABLES = frozenset(variable.name for variable in SCHEMA)
 HISTORY_NAMES = frozenset(name for name, _, _ in HISTORY_VARIABLES)  # over the time t
 TEXT_COORDINATES = frozenset({"model", *MODEL_METADATA, *MATERIAL_KEYS} - {"year"})
 # the trajectory table of a factored file, see `impact.results.factored`
-TABLE_VARIABLES = frozenset({
-    *(f"trajectory_{name}" for name in TABLE_COLUMNS), "trajectory_of_cell", "law_stiffness",
-    "witness_index", *(f"witness_{name}" for name in RESULT_VARIABLES),
-})  # fmt: skip
+TABLE_VARIABLES = frozenset(
+    {
+        *(f"trajectory_{name}" for name in TABLE_COLUMNS),
+        "trajectory_of_cell",
+        "law_stiffness",
+        "witness_index",
+        *(f"witness_{name}" for name in RESULT_VARIABLES),
+    }
+)
 ALLOWED_NAMES = (
     RESULT_VARIABLES
     | HISTORY_NAMES

@@ -63,7 +63,8 @@ LIGGGHTS_EDINBURGH = ForceModel(
     "off and "
     "no pullOffForce",
     evidence=Evidence(
-        "seen", "CFDEMproject/LIGGGHTS-PUBLIC, src/normal_model_edinburgh.h @84ba3d76 (3.8.0, 2017)",
+        "seen",
+        "CFDEMproject/LIGGGHTS-PUBLIC, src/normal_model_edinburgh.h @84ba3d76 (3.8.0, 2017)",
         note="without the dashpot that may stand beside it; a wall is the limit of two spheres, LIGGGHTS takes "
         "another "
         "radius of the intersection there",
@@ -91,7 +92,7 @@ LIGGGHTS_EDINBURGH = ForceModel(
     ),
     stiffness=lambda n, E_eff, R_eff: np.where(n == 1.0, 2 * np.sqrt(R_eff), 4 / 3) * np.sqrt(R_eff) * E_eff,
     family="adhesive",
-)  # fmt: skip
+)
 
 
 def edinburgh_branches(

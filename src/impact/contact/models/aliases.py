@@ -22,9 +22,17 @@ def same_law(
     key, title, year, reference, evidence, doi : fields of the other publication, whose domain is not known
     """
     return replace(
-        law, key=key, title=title, year=year, reference=reference, doi=doi, evidence=evidence, domain={},
-        domain_source="", same_as=law.key,
-    )  # fmt: skip
+        law,
+        key=key,
+        title=title,
+        year=year,
+        reference=reference,
+        doi=doi,
+        evidence=evidence,
+        domain={},
+        domain_source="",
+        same_as=law.key,
+    )
 
 
 MARHEFKA_ORIN_1999 = same_law(

@@ -55,13 +55,21 @@ def stiffness_by_speed(E_eff: Array, R_eff: Array, m: Array, vc: Array) -> Array
 LIGGGHTS_REFERENCE = "LIGGGHTS-PUBLIC, pair style gran, model"
 
 LIGGGHTS_HERTZ = in_code(
-    TSUJI_1992, "liggghts-hertz", "LIGGGHTS hertz (3.0.0 to 3.8.0)", 2014, f"{LIGGGHTS_REFERENCE} hertz",
+    TSUJI_1992,
+    "liggghts-hertz",
+    "LIGGGHTS hertz (3.0.0 to 3.8.0)",
+    2014,
+    f"{LIGGGHTS_REFERENCE} hertz",
     f"{LIGGGHTS}normal_model_hertz.h",
-)  # fmt: skip
+)
 LIGGGHTS_HERTZ_LIMIT = in_code(
-    TSUJI_1992_NO_TENSION, "liggghts-hertz-limit-force", "LIGGGHTS hertz, limitForce (3.0.0 to 3.8.0)", 2014,
-    f"{LIGGGHTS_REFERENCE} hertz", f"{LIGGGHTS}normal_model_hertz.h",
-)  # fmt: skip
+    TSUJI_1992_NO_TENSION,
+    "liggghts-hertz-limit-force",
+    "LIGGGHTS hertz, limitForce (3.0.0 to 3.8.0)",
+    2014,
+    f"{LIGGGHTS_REFERENCE} hertz",
+    f"{LIGGGHTS}normal_model_hertz.h",
+)
 
 LIGGGHTS_HOOKE = of_code(
     dashpot(
@@ -90,16 +98,25 @@ CHRONO_SMC_HOOKE = with_release(
 )
 
 LIGGGHTS_HOOKE_LIMIT = in_code(
-    CHRONO_SMC_HOOKE, "liggghts-hooke-limit-force", "LIGGGHTS hooke, limitForce (3.0.0 to 3.8.0)", 2014,
-    f"{LIGGGHTS_REFERENCE} hooke, without the option viscous", f"{LIGGGHTS}normal_model_hooke.h",
-)  # fmt: skip
+    CHRONO_SMC_HOOKE,
+    "liggghts-hooke-limit-force",
+    "LIGGGHTS hooke, limitForce (3.0.0 to 3.8.0)",
+    2014,
+    f"{LIGGGHTS_REFERENCE} hooke, without the option viscous",
+    f"{LIGGGHTS}normal_model_hooke.h",
+)
 
 # ---- Chrono
 
 CHRONO_HERTZ = in_code(
-    TSUJI_1992_NO_TENSION, "chrono-smc-hertz", "Chrono SMC, Hertz (sequential core, 2016 to 2026)", 2016,
-    "Project Chrono, ChContactSMC", CHRONO, "the multicore solver does not cut the tension off, as in tsuji-1992",
-)  # fmt: skip
+    TSUJI_1992_NO_TENSION,
+    "chrono-smc-hertz",
+    "Chrono SMC, Hertz (sequential core, 2016 to 2026)",
+    2016,
+    "Project Chrono, ChContactSMC",
+    CHRONO,
+    "the multicore solver does not cut the tension off, as in tsuji-1992",
+)
 
 CHRONO_SMC_PLAINCOULOMB = of_code(
     dashpot(
@@ -140,18 +157,29 @@ YADE_EN = of_code(
     )
 )
 YADE_EN_CLAMPED = in_code(
-    TSUJI_1992_NO_TENSION, "yade-en-clamped", "YADE HertzMindlin en (September 2013 to 2022.01a)", 2013,
-    f"{HERTZ_MINDLIN}, en, with the damping of Tsuji and others", CLAMPED_SOURCE,
-)  # fmt: skip
+    TSUJI_1992_NO_TENSION,
+    "yade-en-clamped",
+    "YADE HertzMindlin en (September 2013 to 2022.01a)",
+    2013,
+    f"{HERTZ_MINDLIN}, en, with the damping of Tsuji and others",
+    CLAMPED_SOURCE,
+)
 YADE_EN_PULLING = in_code(
-    TSUJI_1992, "yade-en-pulling", "YADE HertzMindlin en (2011 to September 2013)", 2011,
+    TSUJI_1992,
+    "yade-en-pulling",
+    "YADE HertzMindlin en (2011 to September 2013)",
+    2011,
     f"{HERTZ_MINDLIN}, en, with the damping of Tsuji and others",
     "YADE, pkg/dem/HertzMindlin.cpp, commit ddb7a1a19 (January 2011)",
-)  # fmt: skip
+)
 YADE_EN_AT_SPEED = in_code(
-    KUWABARA_KONO_AT_SPEED, "yade-en-at-speed", "YADE HertzMindlin en and vn (since 2024.02a)", 2024,
-    f"{HERTZ_MINDLIN}, en at the speed vn", MINDLIN_SOURCE,
-)  # fmt: skip
+    KUWABARA_KONO_AT_SPEED,
+    "yade-en-at-speed",
+    "YADE HertzMindlin en and vn (since 2024.02a)",
+    2024,
+    f"{HERTZ_MINDLIN}, en at the speed vn",
+    MINDLIN_SOURCE,
+)
 
 YADE_BETAN = of_code(
     dashpot(
@@ -192,19 +220,30 @@ YADE_BETAN_DIRECT = of_code(
 
 VISCO_ELASTIC = "YADE, Law2_ScGeom_ViscElPhys_Basic"
 YADE_VISCOELASTIC = in_code(
-    KELVIN_VOIGT_NO_TENSION, "yade-viscoelastic", "YADE viscoelastic (since January 2014)", 2014,
-    f"{VISCO_ELASTIC}, kn and cn", f"{YADE_2025}, ViscoelasticPM.cpp",
-)  # fmt: skip
+    KELVIN_VOIGT_NO_TENSION,
+    "yade-viscoelastic",
+    "YADE viscoelastic (since January 2014)",
+    2014,
+    f"{VISCO_ELASTIC}, kn and cn",
+    f"{YADE_2025}, ViscoelasticPM.cpp",
+)
 YADE_VISCOELASTIC_PULLING = in_code(
-    KELVIN_VOIGT, "yade-viscoelastic-pulling", "YADE viscoelastic (2009 to January 2014)", 2009,
+    KELVIN_VOIGT,
+    "yade-viscoelastic-pulling",
+    "YADE viscoelastic (2009 to January 2014)",
+    2009,
     f"{VISCO_ELASTIC}, kn and cn",
     "YADE, pkg/dem/ViscoelasticPM.cpp, commit fe8647e14 (January 2014), which adds the limit",
-)  # fmt: skip
+)
 YADE_VISCOELASTIC_EN = in_code(
-    SCHWAGER_POSCHEL_2007, "yade-viscoelastic-en", "YADE viscoelastic, en with young (since June 2015)", 2015,
-    f"{VISCO_ELASTIC}, en with young and poisson", f"{YADE_2025}, ViscoelasticPM.cpp",
+    SCHWAGER_POSCHEL_2007,
+    "yade-viscoelastic-en",
+    "YADE viscoelastic, en with young (since June 2015)",
+    2015,
+    f"{VISCO_ELASTIC}, en with young and poisson",
+    f"{YADE_2025}, ViscoelasticPM.cpp",
     "YADE finds the damping to 1 % of en, this law exactly",
-)  # fmt: skip
+)
 
 # ---- MFiX
 
@@ -272,17 +311,20 @@ KRATOS_LINEAR = of_code(
     stiffness=lambda E_eff, R_eff, R1, R2: (
         np.where(np.isinf(R1) | np.isinf(R2), 1.0, 1.432) * np.pi * 0.31225 * E_eff * R_eff
     ),
-)  # fmt: skip
+)
 
 # ---- MercuryDPM and DEMLab
 
 MERCURYDPM_LINEAR = in_code(
-    ANAGNOSTOPOULOS_1988, "mercurydpm-linear-viscoelastic", "MercuryDPM LinearViscoelastic (state of 2015)", 2013,
+    ANAGNOSTOPOULOS_1988,
+    "mercurydpm-linear-viscoelastic",
+    "MercuryDPM LinearViscoelastic (state of 2015)",
+    2013,
     "MercuryDPM, kernel",
     "gladk/MercuryDPM, Kernel/Interactions/NormalForceInteractions/LinearViscoelasticInteraction.cc @c50970e "
     "(2015)",
     "its first year was not seen",
-)  # fmt: skip
+)
 
 DEMLAB_TTI = of_code(
     dashpot(

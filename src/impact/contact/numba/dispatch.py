@@ -129,7 +129,13 @@ def integrate_compiled(
     solution = Solution.empty(n)
     rows = (np.ascontiguousarray(start), np.ascontiguousarray(strength), np.ascontiguousarray(bound))
     kernel(form)(
-        *rows, rk45.first_step(problem, rtol), rtol, max_steps,
-        solution.state, solution.maximum, solution.steps, solution.termination,
-    )  # fmt: skip
+        *rows,
+        rk45.first_step(problem, rtol),
+        rtol,
+        max_steps,
+        solution.state,
+        solution.maximum,
+        solution.steps,
+        solution.termination,
+    )
     return solution

@@ -95,17 +95,23 @@ def rk_step(form, s, y, s1, y1, watched, h, strength):
         form, s + h * (A[2][0] * s1) + (h * A[2][1]) * s2, y + h * (A[2][0] * y1) + (h * A[2][1]) * y2, strength
     )
     s4, y4, t4, work4 = rates(
-        form, s + h * (A[3][0] * s1 + A[3][1] * s2) + (h * A[3][2]) * s3,
-        y + h * (A[3][0] * y1 + A[3][1] * y2) + (h * A[3][2]) * y3, strength,
-    )  # fmt: skip
+        form,
+        s + h * (A[3][0] * s1 + A[3][1] * s2) + (h * A[3][2]) * s3,
+        y + h * (A[3][0] * y1 + A[3][1] * y2) + (h * A[3][2]) * y3,
+        strength,
+    )
     s5, y5, t5, work5 = rates(
-        form, s + h * (A[4][0] * s1 + A[4][1] * s2 + A[4][2] * s3) + (h * A[4][3]) * s4,
-        y + h * (A[4][0] * y1 + A[4][1] * y2 + A[4][2] * y3) + (h * A[4][3]) * y4, strength,
-    )  # fmt: skip
+        form,
+        s + h * (A[4][0] * s1 + A[4][1] * s2 + A[4][2] * s3) + (h * A[4][3]) * s4,
+        y + h * (A[4][0] * y1 + A[4][1] * y2 + A[4][2] * y3) + (h * A[4][3]) * y4,
+        strength,
+    )
     s6, y6, t6, work6 = rates(
-        form, s + h * (A[5][0] * s1 + A[5][1] * s2 + A[5][2] * s3 + A[5][3] * s4) + (h * A[5][4]) * s5,
-        y + h * (A[5][0] * y1 + A[5][1] * y2 + A[5][2] * y3 + A[5][3] * y4) + (h * A[5][4]) * y5, strength,
-    )  # fmt: skip
+        form,
+        s + h * (A[5][0] * s1 + A[5][1] * s2 + A[5][2] * s3 + A[5][3] * s4) + (h * A[5][4]) * s5,
+        y + h * (A[5][0] * y1 + A[5][1] * y2 + A[5][2] * y3 + A[5][3] * y4) + (h * A[5][4]) * y5,
+        strength,
+    )
     new_s = s + h * solution(s1, s3, s4, s5, s6)
     new_y = y + h * solution(y1, y3, y4, y5, y6)
     more_t, more_work = h * solution(t1, t3, t4, t5, t6), h * solution(work1, work3, work4, work5, work6)

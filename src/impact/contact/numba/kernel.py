@@ -34,7 +34,7 @@ from .expressions import (
     secant_update,
     slope_of_force,
     trapezoid,
-)  # fmt: skip
+)
 from .simd_math import inlined, kept_on_disk
 
 # lanes of a group, and groups advanced in turn
@@ -248,9 +248,15 @@ def refine_maximum(form, w):
     for count in range(SECANT_STEPS + 1 if unrefined else 0):
         for j in range(LANES):
             s, y, _, _, rate_s, rate_y, watched, _ = rk_step(
-                form, w[PEAK_S * LANES + j], w[PEAK_Y * LANES + j], w[RATE_S * LANES + j], w[RATE_Y * LANES + j],
-                w[WATCHED * LANES + j], w[H * LANES + j], w[STRENGTH * LANES + j],
-            )  # fmt: skip
+                form,
+                w[PEAK_S * LANES + j],
+                w[PEAK_Y * LANES + j],
+                w[RATE_S * LANES + j],
+                w[RATE_Y * LANES + j],
+                w[WATCHED * LANES + j],
+                w[H * LANES + j],
+                w[STRENGTH * LANES + j],
+            )
             slope = slope_of_force(
                 form, s, y, rate_s, rate_y, watched, w[small * LANES + j], w[STRENGTH * LANES + j]
             )
