@@ -135,7 +135,7 @@ def rerun(
 
 
 def _check_plot(plot: Path | None, *sources: Path) -> None:
-    """Refuse a picture that cannot be stored before any work is dvariable."""
+    """Refuse a picture that cannot be stored before any work is done."""
     if plot is not None:
         from ..plots.style import check_picture
         from ..results.backend import check_output
