@@ -14,14 +14,14 @@ from hypothesis import settings
 
 import impact
 
-from .forked import Done, Forked, forking
+from .fork_server import CompletedCommand, ForkServer, start_fork_server
 
 # no test is about time
 settings.register_profile("untimed", deadline=None)
 settings.load_profile("untimed")
 
 ROOT = Path(__file__).parent.parent
-Run = Callable[..., Done | subprocess.CompletedProcess[str]]
+Run = Callable[..., CompletedCommand | subprocess.CompletedProcess[str]]
 
 WIDE = """
 title = "Four axes"
@@ -49,17 +49,19 @@ gamma = [1.5, 4.0]
 
 
 @pytest.fixture(scope="session")
-def forked() -> Iterator[Forked]:
+def forked() -> Iterator[ForkServer]:
     """Run the program hundreds of times: processes of a server that has imported what they need."""
-    with forking() as run:
+    with start_fork_server() as run:
         yield run
 
 
 @pytest.fixture(scope="session")
-def cli(forked: Forked) -> Run:
+def cli(forked: ForkServer) -> Run:
     """Run the program in a process of its own, begun anew where the interpreter reads its environment."""
 
-    def run(*words: str | Path, cwd: Path = ROOT, **environment: str) -> Done | subprocess.CompletedProcess[str]:
+    def run(
+        *words: str | Path, cwd: Path = ROOT, **environment: str
+    ) -> CompletedCommand | subprocess.CompletedProcess[str]:
         if environment.keys() <= {"COLUMNS", "NO_COLOR"}:
             return forked(*words, cwd=cwd, limit=120, **environment)
         return subprocess.run(

@@ -28,7 +28,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, NoReturn
 
-from .forked import PAUSE, ROOT, _command
+from .fork_server import POLL_INTERVAL_S, ROOT, run_command
 
 RANGE, SLAB = 64, 128  # trajectories of a range, and points of a slab: many of each in little time
 CONFIG, RESULT, WORK = "c.toml", "results.h5", "results.h5.work"
@@ -224,7 +224,7 @@ def _become(argv: list[str], cwd: str, told: str, fault: list[Any]) -> NoReturn:
     if fault:
         {one.__name__: one for one in (signalled, failing, recorded, limited)}[fault[0]](note, *fault[1:])
     with open(f"{told}.out", "wb") as out, open(f"{told}.err", "wb") as err:
-        _command(argv, cwd, "", out.fileno(), err.fileno())
+        run_command(argv, cwd, "", out.fileno(), err.fileno())
 
 
 def _wait(pid: int, limit: float) -> int | None:
@@ -238,7 +238,7 @@ def _wait(pid: int, limit: float) -> int | None:
             os.kill(pid, signal.SIGKILL)
             os.waitpid(pid, 0)
             return None
-        time.sleep(PAUSE)
+        time.sleep(POLL_INTERVAL_S)
 
 
 # ---- the client's side
@@ -310,7 +310,7 @@ def until(condition: Callable[[], bool]) -> None:
     begun = time.monotonic()
     while not condition():
         assert time.monotonic() - begun < PATIENCE
-        time.sleep(PAUSE)
+        time.sleep(POLL_INTERVAL_S)
 
 
 def _of_process(pid: int, name: str) -> str:

@@ -20,7 +20,7 @@ from rich.cells import cell_len
 import impact
 
 from .conftest import ROOT, WIDE, Run
-from .forked import Forked, printed_on_terminal
+from .fork_server import ForkServer, printed_on_terminal
 
 SMALL = """models = ["hertz", "gharib-hurmuzlu-2012"]
 [sweep]
@@ -285,7 +285,7 @@ def test_a_mistake_is_one_line(cli: Run, words: list[str], line: str) -> None:
     assert len(refused.stderr.splitlines()) == 1
 
 
-def test_a_full_standard_output_is_a_storage_error(forked: Forked) -> None:
+def test_a_full_standard_output_is_a_storage_error(forked: ForkServer) -> None:
     done = forked("models", stdout="/dev/full")
     assert (done.returncode, done.stderr) == (4, "cannot write: No space left on device\n")
 
@@ -314,7 +314,7 @@ COMMANDS_AND_CODES = [
 
 @pytest.mark.parametrize(("words", "code"), COMMANDS_AND_CODES)
 def test_a_full_standard_error_does_not_change_the_exit_code(
-    forked: Forked, tmp_path: Path, words: list[str], code: int
+    forked: ForkServer, tmp_path: Path, words: list[str], code: int
 ) -> None:
     (tmp_path / "c.toml").write_text(NO_REBOUND, encoding="utf-8")
     assert forked(*words, cwd=tmp_path, stderr="/dev/full").returncode == code
@@ -382,7 +382,7 @@ resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + 2**25,)
 """
 
 
-def test_a_sweep_too_large_for_the_memory_is_a_storage_error(forked: Forked, tmp_path: Path) -> None:
+def test_a_sweep_too_large_for_the_memory_is_a_storage_error(forked: ForkServer, tmp_path: Path) -> None:
     (tmp_path / "c.toml").write_text(NO_REBOUND, encoding="utf-8")
     words = ("sweep", "c.toml", "--set", "sweep.v1={ linspace = [1.0, 2.0, 10000000] }")
     done = forked(*words, cwd=tmp_path, code=SHORT_OF_MEMORY, limit=60.0)
@@ -581,7 +581,7 @@ sink._publish = signalled
 
 @pytest.mark.parametrize(("name", "code"), [("SIGINT", 130), ("SIGTERM", 143)])
 def test_a_signal_while_storing_is_not_lost(
-    forked: Forked, small: Path, tmp_path: Path, name: str, code: int
+    forked: ForkServer, small: Path, tmp_path: Path, name: str, code: int
 ) -> None:
     done = forked("sweep", small.name, cwd=tmp_path, code=SAVING.replace("NAME", name))
     assert done.returncode == code
@@ -589,7 +589,7 @@ def test_a_signal_while_storing_is_not_lost(
     assert impact.load(tmp_path / "results.h5").sizes["e"] == 3
 
 
-def test_an_internal_error_is_one_line_and_a_report(forked: Forked, tmp_path: Path, stored: Path) -> None:
+def test_an_internal_error_is_one_line_and_a_report(forked: ForkServer, tmp_path: Path, stored: Path) -> None:
     # a function of the program replaced by one that fails stands for a mistake of its own
     code = (
         "import tempfile, impact.api as api\n"
@@ -605,7 +605,7 @@ def test_an_internal_error_is_one_line_and_a_report(forked: Forked, tmp_path: Pa
     assert "Traceback" in report.read_text(encoding="utf-8")
 
 
-def test_a_cluster_without_dask_names_the_extra(forked: Forked, small: Path, tmp_path: Path) -> None:
+def test_a_cluster_without_dask_names_the_extra(forked: ForkServer, small: Path, tmp_path: Path) -> None:
     hidden = "import sys; sys.modules['distributed'] = None"
     done = forked("sweep", small, "--scheduler", "local", cwd=tmp_path, code=hidden)
     expected = 'expected dask.distributed, which is not installed: pip install "impact-sweep[distributed]"'
@@ -644,7 +644,7 @@ def test_models_by_a_pattern(cli: Run) -> None:
 
 @pytest.mark.parametrize(("width", "columns"), [(40, 1), (80, 5), (120, 5)])
 def test_the_catalogue_keeps_the_restitution_on_a_narrow_terminal(
-    forked: Forked, width: int, columns: int
+    forked: ForkServer, width: int, columns: int
 ) -> None:
     done, printed = printed_on_terminal(forked, "models", width=width, NO_COLOR="1")
     assert done.returncode == 0
@@ -656,7 +656,7 @@ def test_the_catalogue_keeps_the_restitution_on_a_narrow_terminal(
     assert re.search(r"^tsuji-1992 +0\.\d{4}", "\n".join(lines), re.MULTILINE)
 
 
-def test_a_shell_completes_models_and_families(forked: Forked) -> None:
+def test_a_shell_completes_models_and_families(forked: ForkServer) -> None:
     def completed(*words: str) -> list[str]:
         index = str(len(words) - 1)
         line = {"COMP_WORDS": " ".join(words), "COMP_CWORD": index, "_IMPACT_COMPLETE": "complete_bash"}

@@ -17,7 +17,7 @@ from impact.comparison.verdict import Verdict
 from impact.errors import ResultError, UsageError
 from impact.results.schema import SCHEMA
 
-from .forked import Forked
+from .fork_server import ForkServer
 
 GEOMETRIC = {
     "models": ["hertz", "lankarani-nikravesh-1990"],
@@ -686,7 +686,7 @@ gamma = [1.5, 4.0]
 
 
 @pytest.mark.parametrize("name", REPLAYED)
-def test_the_command_runs_the_worst_point_again(forked: Forked, tmp_path: Path, name: str) -> None:
+def test_the_command_runs_the_worst_point_again(forked: ForkServer, tmp_path: Path, name: str) -> None:
     (tmp_path / "a config.toml").write_text(REPLAYED[name], encoding="utf-8")
     result = impact.sweep(tmp_path / "a config.toml")
     impact.save(result, tmp_path / "base line.h5")
@@ -721,7 +721,7 @@ def test_the_command_runs_the_worst_point_again(forked: Forked, tmp_path: Path, 
 
 
 def test_a_label_that_rounds_differently_elsewhere_is_replayed_by_this_ones(
-    tmp_path: Path, forked: Forked
+    tmp_path: Path, forked: ForkServer
 ) -> None:
     # zipped values are looked up: the new file's own are the ones that are there
     config = {
@@ -812,7 +812,7 @@ def test_a_single_point_has_no_coordinates_to_tell() -> None:
 
 
 def test_the_worst_point_of_a_part_is_run_again_where_the_part_is(
-    forked: Forked, figure6: xr.Dataset, wide: xr.Dataset, tmp_path: Path
+    forked: ForkServer, figure6: xr.Dataset, wide: xr.Dataset, tmp_path: Path
 ) -> None:
     for whole, place, point in (
         (figure6, {"e": 5}, {"e": 0.05}),

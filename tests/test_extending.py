@@ -17,7 +17,7 @@ from impact.engine.plugins import installed, read_plugins
 from impact.errors import ModelError
 
 from .conftest import ROOT, Run
-from .forked import Done, Forked
+from .fork_server import CompletedCommand, ForkServer
 
 PAGE = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
 BROKEN = """
@@ -124,10 +124,10 @@ def install(folder: Path, text: str, value: str = "our_package.laws") -> Path:
 
 
 @pytest.fixture
-def with_package(forked: Forked) -> Callable[..., Done]:
+def with_package(forked: ForkServer) -> Callable[..., CompletedCommand]:
     """Run a command line where a folder is one of installed packages, for its processes, too."""
 
-    def run(*words: str, site: Path, cwd: Path = ROOT) -> Done:
+    def run(*words: str, site: Path, cwd: Path = ROOT) -> CompletedCommand:
         code = f"import sys; sys.path.insert(0, {str(site)!r})\n"
         code += "from impact.engine.plugins import installed; installed.cache_clear()"
         return forked(*words, cwd=cwd, code=code, limit=120.0, PYTHONPATH=os.pathsep.join([str(site), *sys.path]))
@@ -136,7 +136,7 @@ def with_package(forked: Forked) -> Callable[..., Done]:
 
 
 def test_the_laws_of_an_installed_package_are_in_the_catalogue(
-    cli: Run, with_package: Callable[..., Done], tmp_path: Path
+    cli: Run, with_package: Callable[..., CompletedCommand], tmp_path: Path
 ) -> None:
     site = install(tmp_path, LAWS)
     (tmp_path / "config.toml").write_text(SWEEP, encoding="utf-8")
@@ -158,7 +158,7 @@ def test_the_laws_of_an_installed_package_are_in_the_catalogue(
 
 
 def test_all_is_what_is_built_in_whatever_is_installed(
-    cli: Run, with_package: Callable[..., Done], tmp_path: Path
+    cli: Run, with_package: Callable[..., CompletedCommand], tmp_path: Path
 ) -> None:
     site = install(tmp_path, LAWS)
     text = SWEEP.replace(
@@ -175,7 +175,7 @@ def test_all_is_what_is_built_in_whatever_is_installed(
     assert keys[0] == keys[1]
 
 
-def test_no_data_file_brings_a_package_in(with_package: Callable[..., Done], tmp_path: Path) -> None:
+def test_no_data_file_brings_a_package_in(with_package: Callable[..., CompletedCommand], tmp_path: Path) -> None:
     # what is not installed as a package is imported for no entry in a TOML
     site = install(tmp_path, LAWS)
     for path in (site / "our_package-1.2.dist-info").iterdir():

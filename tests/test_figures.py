@@ -28,7 +28,7 @@ from impact.plots.kinds import KINDS, MOTION_KINDS, WIDTHS, Choice
 from impact.plots.style import save_figure
 
 from .conftest import ROOT, Run
-from .forked import Forked
+from .fork_server import ForkServer
 
 CURVES = [kind for kind in KINDS if kind not in ("map", "validity")]
 
@@ -595,7 +595,7 @@ def test_the_table_behind_a_picture_has_a_column_for_each_curve(cli: Run, stored
     assert loops.notna().all(axis=None) == (len({loops[name].count() for name in loops}) == 1)
 
 
-def test_tables_in_other_formats(forked: Forked, stored: Path, tmp_path: Path) -> None:
+def test_tables_in_other_formats(forked: ForkServer, stored: Path, tmp_path: Path) -> None:
     done = forked("plot", stored, "-o", "a.svg", "--data", "a.tex", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     text = (tmp_path / "a.tex").read_text("utf-8")
@@ -610,7 +610,7 @@ def test_tables_in_other_formats(forked: Forked, stored: Path, tmp_path: Path) -
     assert not (tmp_path / "b.svg").exists()
 
 
-def test_a_parquet_table_holds_what_the_csv_table_holds(forked: Forked, stored: Path, tmp_path: Path) -> None:
+def test_a_parquet_table_holds_what_the_csv_table_holds(forked: ForkServer, stored: Path, tmp_path: Path) -> None:
     pytest.importorskip("pyarrow")
     for name in ("a.csv", "b.parquet"):
         assert forked("plot", stored, "-o", f"{name}.svg", "--data", name, cwd=tmp_path).returncode == 0

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 import impact
 from impact.contact.status import Status
 
-from .forked import Forked
+from .fork_server import ForkServer
 
 # it starts many processes or reads many files: `make test-faults` runs it
 pytestmark = pytest.mark.slow
@@ -240,7 +240,7 @@ def test_every_variable_bites_at_every_kind_of_point(wide: xr.Dataset, figure6: 
 
 @pytest.mark.slow
 def test_no_change_passes_through_files(
-    forked: Forked, figure6: xr.Dataset, wide: xr.Dataset, tmp_path: Path
+    forked: ForkServer, figure6: xr.Dataset, wide: xr.Dataset, tmp_path: Path
 ) -> None:
     files = {}
     for result, name in ((figure6, "figure6.h5"), (wide, "wide.h5")):

@@ -11,7 +11,7 @@ import pytest
 import impact
 
 from .conftest import ROOT
-from .forked import Forked
+from .fork_server import ForkServer
 
 SWEEP = """models = ["hertz", "gharib-hurmuzlu-2012"]
 [solver]
@@ -43,7 +43,7 @@ NONE = "none of 4 points is an impact: v1 <= v2, the balls do not approach"
         ("sweep.v1=400", []),
     ],
 )
-def test_a_note_for_what_is_implausible(forked: Forked, tmp_path: Path, change: str, notes: list[str]) -> None:
+def test_a_note_for_what_is_implausible(forked: ForkServer, tmp_path: Path, change: str, notes: list[str]) -> None:
     (tmp_path / "config.toml").write_text(SWEEP, encoding="utf-8")
     done = forked("sweep", "config.toml", "--set", change, "--json", cwd=tmp_path)
     assert done.returncode == 0
@@ -59,13 +59,13 @@ def test_a_note_for_what_is_implausible(forked: Forked, tmp_path: Path, change: 
     assert (again.returncode, again.stderr) == (0, "")
 
 
-def test_a_modulus_that_is_an_axis_is_no_implausible_number(forked: Forked, tmp_path: Path) -> None:
+def test_a_modulus_that_is_an_axis_is_no_implausible_number(forked: ForkServer, tmp_path: Path) -> None:
     (tmp_path / "config.toml").write_text(SWEEP.replace('E = "210 GPa"', 'E = ["70 GPa", "210 GPa"]'))
     done = forked("sweep", "config.toml", cwd=tmp_path)
     assert (done.returncode, done.stderr.count("note: ")) == (0, 0)
 
 
-def test_an_implausible_modulus_among_the_values_of_an_axis_is_noted(forked: Forked, tmp_path: Path) -> None:
+def test_an_implausible_modulus_among_the_values_of_an_axis_is_noted(forked: ForkServer, tmp_path: Path) -> None:
     (tmp_path / "config.toml").write_text(SWEEP.replace('E = "210 GPa"', 'E = ["70 GPa", 210]'))
     done = forked("sweep", "config.toml", cwd=tmp_path)
     note = MODULUS.format("210 Pa; did you mean 210 GPa?")
@@ -74,7 +74,7 @@ def test_an_implausible_modulus_among_the_values_of_an_axis_is_noted(forked: For
     assert "<p>Note: materials.steel.E: got 210 Pa; did you mean 210 GPa?</p>" in page
 
 
-def test_the_configs_of_the_project_give_no_note(forked: Forked, tmp_path: Path) -> None:
+def test_the_configs_of_the_project_give_no_note(forked: ForkServer, tmp_path: Path) -> None:
     for config in sorted((ROOT / "configs").glob("*.toml")):
         done = forked("sweep", config, "-o", f"{config.stem}.h5", "--allow-failed", cwd=tmp_path)
         assert done.returncode == 0

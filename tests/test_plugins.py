@@ -22,7 +22,7 @@ from impact.engine.plugins import Plugins, read_plugins
 from impact.errors import ModelError, ResultError, UsageError
 from impact.results.provenance import check_plugins
 
-from .forked import Forked
+from .fork_server import ForkServer
 
 CHI = "(1 - e * e) / e"
 PLUGIN = """\
@@ -61,7 +61,7 @@ def _value() -> impact.ForceModel:
     )
 
 
-def test_a_file_and_the_same_model_as_a_value_give_the_same_bits(forked: Forked, folder: Path) -> None:
+def test_a_file_and_the_same_model_as_a_value_give_the_same_bits(forked: ForkServer, folder: Path) -> None:
     done = forked("sweep", "config.toml", "--plugin", "my_model.py", cwd=folder)
     assert done.returncode == 0, done.stderr
     ours = impact.load(folder / "results.h5")
@@ -74,7 +74,7 @@ def test_a_file_and_the_same_model_as_a_value_give_the_same_bits(forked: Forked,
     assert {name for name in ours.attrs if ours.attrs[name] != theirs.attrs[name]} == told
 
 
-def test_the_result_says_the_files_name_and_hash_and_no_folder(forked: Forked, folder: Path) -> None:
+def test_the_result_says_the_files_name_and_hash_and_no_folder(forked: ForkServer, folder: Path) -> None:
     forked("sweep", "config.toml", "--plugin", folder / "my_model.py", cwd=folder)
     attributes = impact.load(folder / "results.h5").attrs
     sha256 = hashlib.sha256((folder / "my_model.py").read_bytes()).hexdigest()
@@ -91,7 +91,7 @@ def test_from_python_by_name_too(folder: Path) -> None:
     assert shot.values["e_out"] == float(swept["e_out"].sel(model="mine-2026", e=0.8))
 
 
-def test_run_and_several_plug_ins(forked: Forked, folder: Path) -> None:
+def test_run_and_several_plug_ins(forked: ForkServer, folder: Path) -> None:
     other = _write(folder / "other.py").read_text(encoding="utf-8").replace("mine-2026", "other")
     (folder / "other.py").write_text(other, encoding="utf-8")
     words = ["--plugin", "my_model.py", "--plugin", "other.py"]
@@ -130,7 +130,7 @@ def test_a_plug_in_leaves_no_trace_but_its_models(folder: Path) -> None:
     assert CHI in inspect.getsource(model.coefficients["chi"])
 
 
-def test_what_is_hashed_is_all_there_is(forked: Forked, folder: Path) -> None:
+def test_what_is_hashed_is_all_there_is(forked: ForkServer, folder: Path) -> None:
     (folder / "code").mkdir()
     (folder / "code" / "beside.py").write_text("FACTOR = 1.0\n", encoding="utf-8")
     (folder / "code" / "my.py").write_text("from beside import FACTOR\n", encoding="utf-8")
@@ -138,7 +138,7 @@ def test_what_is_hashed_is_all_there_is(forked: Forked, folder: Path) -> None:
     assert (done.returncode, done.stderr) == (2, "code/my.py:1: ModuleNotFoundError: No module named 'beside'\n")
 
 
-def test_the_same_sweep_twice_and_with_a_changed_plug_in(forked: Forked, folder: Path) -> None:
+def test_the_same_sweep_twice_and_with_a_changed_plug_in(forked: ForkServer, folder: Path) -> None:
     words = ["sweep", "config.toml", "--plugin", "my_model.py"]
     forked(*words, cwd=folder)
     before = (folder / "results.h5").read_bytes()
@@ -185,7 +185,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("name", BAD)
-def test_a_bad_plug_in_is_one_line_and_nothing_is_written(forked: Forked, folder: Path, name: str) -> None:
+def test_a_bad_plug_in_is_one_line_and_nothing_is_written(forked: ForkServer, folder: Path, name: str) -> None:
     content, line = BAD[name]
     path = folder / "bad.py"
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
@@ -211,7 +211,7 @@ def test_a_bad_plug_in_is_one_line_and_nothing_is_written(forked: Forked, folder
         ("x" * 300 + ".py", "x" * 199 + "…: cannot be read: File name too long"),
     ],
 )
-def test_what_is_no_python_file_is_refused(forked: Forked, folder: Path, path: str, line: str) -> None:
+def test_what_is_no_python_file_is_refused(forked: ForkServer, folder: Path, path: str, line: str) -> None:
     (folder / "folder.py").mkdir()
     os.mkfifo(folder / "fifo.py")
     done = forked("sweep", "config.toml", "--plugin", path, cwd=folder)
@@ -221,7 +221,7 @@ def test_what_is_no_python_file_is_refused(forked: Forked, folder: Path, path: s
     assert not (folder / "results.h5").exists()
 
 
-def test_two_plug_ins_with_one_key_are_refused(forked: Forked, folder: Path) -> None:
+def test_two_plug_ins_with_one_key_are_refused(forked: ForkServer, folder: Path) -> None:
     _write(folder / "other.py")
     done = forked("sweep", "config.toml", "--plugin", "my_model.py", "--plugin", "other.py", cwd=folder)
     assert (done.returncode, done.stderr) == (
@@ -240,7 +240,7 @@ def test_what_is_neither_a_model_nor_a_path_is_refused() -> None:
             impact.models(alone)  # type: ignore[arg-type]
 
 
-def test_an_output_is_never_the_plug_in(forked: Forked, folder: Path) -> None:
+def test_an_output_is_never_the_plug_in(forked: ForkServer, folder: Path) -> None:
     before = (folder / "my_model.py").read_text(encoding="utf-8")
     for words in (["sweep", "config.toml", "-o"], ["run", "config.toml", "--history"]):
         refused = forked(*words, "my_model.py", "--plugin", "my_model.py", "--overwrite", cwd=folder)
@@ -251,7 +251,7 @@ def test_an_output_is_never_the_plug_in(forked: Forked, folder: Path) -> None:
     assert (folder / "my_model.py").read_text(encoding="utf-8") == before
 
 
-def test_a_result_needs_its_plug_in_again(forked: Forked, folder: Path) -> None:
+def test_a_result_needs_its_plug_in_again(forked: ForkServer, folder: Path) -> None:
     forked("sweep", "config.toml", "--plugin", "my_model.py", cwd=folder)
     words = ["run", "results.h5", "--model", "mine-2026", "--at", "e=0.8", "--json"]
     (folder / "my_model.py").rename(folder / "moved.py")
@@ -276,7 +276,7 @@ def test_a_result_needs_its_plug_in_again(forked: Forked, folder: Path) -> None:
     assert json.loads(changed.stdout)["outputs"]["e_out"] != float(stored["e_out"])
 
 
-def test_a_result_needs_its_value_again(forked: Forked, folder: Path) -> None:
+def test_a_result_needs_its_value_again(forked: ForkServer, folder: Path) -> None:
     path = folder / "results.h5"
     impact.save(impact.sweep(folder / "config.toml", plugins=[_value()]), path)
     assert impact.run(path, model="mine-2026", plugins=[_value()]).model.title == "Mine"
@@ -290,7 +290,7 @@ def test_a_result_needs_its_value_again(forked: Forked, folder: Path) -> None:
         impact.run(path, plugins=[other])
 
 
-def test_a_model_more_than_the_result_was_made_with_is_welcome(forked: Forked, folder: Path) -> None:
+def test_a_model_more_than_the_result_was_made_with_is_welcome(forked: ForkServer, folder: Path) -> None:
     forked("sweep", "config.toml", "--set", 'models=["hertz"]', cwd=folder)
     done = forked("run", "results.h5", "--plugin", "my_model.py", "--model", "mine-2026", "--json", cwd=folder)
     assert json.loads(done.stdout)["model"] == "mine-2026"
@@ -310,7 +310,7 @@ def test_an_attribute_from_anywhere_is_reported_in_a_line(attribute: str) -> Non
             check_plugins(attributes, Plugins(), "r.h5")
 
 
-def test_hostile_names_in_a_result_are_escaped(forked: Forked, folder: Path) -> None:
+def test_hostile_names_in_a_result_are_escaped(forked: ForkServer, folder: Path) -> None:
     result = impact.sweep(folder / "config.toml", overrides=['models="hertz"'])
     bad = "\x1b[31m\u202e\n[red]" + "x" * 5000
     for plugins, words, code in (
@@ -326,7 +326,7 @@ def test_hostile_names_in_a_result_are_escaped(forked: Forked, folder: Path) -> 
         assert len(done.stderr) < 600
 
 
-def test_nothing_that_a_file_names_is_imported(forked: Forked, folder: Path) -> None:
+def test_nothing_that_a_file_names_is_imported(forked: ForkServer, folder: Path) -> None:
     marker = folder / "marker"
     evil = folder / "evil.py"
     evil.write_text(f"open({str(marker)!r}, 'w').close()\n{PLUGIN.format(chi=CHI)}", encoding="utf-8")
@@ -457,7 +457,9 @@ AMBIGUOUS = (
 
 
 @pytest.mark.parametrize("words", [(), ("--jobs", "2"), ("--threads", "2")])
-def test_an_error_of_a_law_is_printed_once_with_its_place(forked: Forked, folder: Path, words: list[str]) -> None:
+def test_an_error_of_a_law_is_printed_once_with_its_place(
+    forked: ForkServer, folder: Path, words: list[str]
+) -> None:
     (folder / "branching.py").write_text(BRANCHING, encoding="utf-8")
     changes = (
         'models=["branching", "partly", "many"]', "sweep.e.linspace=[0.01,0.99,20]",
@@ -474,7 +476,7 @@ def test_an_error_of_a_law_is_printed_once_with_its_place(forked: Forked, folder
     ]
 
 
-def test_the_replay_of_a_law_that_branches_fails_as_the_sweep_did(forked: Forked, folder: Path) -> None:
+def test_the_replay_of_a_law_that_branches_fails_as_the_sweep_did(forked: ForkServer, folder: Path) -> None:
     (folder / "branching.py").write_text(BRANCHING, encoding="utf-8")
     words = ("config.toml", "--set", 'models=["branching"]', "--plugin", "branching.py", "--allow-failed")
     done = forked("sweep", *words, "--json", cwd=folder)

@@ -28,7 +28,7 @@ from impact.errors import ResultError, StoreError, UsageError
 from impact.results.backend import write_sealed
 
 from .conftest import ROOT
-from .forked import Done, Forked, abandoned_pipe, printed_on_terminal
+from .fork_server import CompletedCommand, ForkServer, abandoned_pipe, printed_on_terminal
 
 FORMATS = ("table", "json", "junit", "markdown", "github")
 KEY = "lankarani-nikravesh-1990"
@@ -115,7 +115,7 @@ def _table_rows(text: str) -> list[list[str]]:
     return [[cell.strip() for cell in row[1:-1]] for row in rows]
 
 
-def _is_clean(done: Done) -> bool:
+def _is_clean(done: CompletedCommand) -> bool:
     """Whether no character that steers a terminal, or is not seen, was printed."""
     return not [c for c in done.stdout + done.stderr if category(c) in ("Cc", "Cf", "Zl", "Zp") and c != "\n"]
 
@@ -123,7 +123,7 @@ def _is_clean(done: Done) -> bool:
 # five formats
 
 
-def test_equal_in_five_formats(forked: Forked, folder: Path) -> None:
+def test_equal_in_five_formats(forked: ForkServer, folder: Path) -> None:
     told = {}
     for name in FORMATS:
         done = forked("compare", "equal.h5", "base.h5", "--format", name, cwd=folder)
@@ -143,7 +143,7 @@ def test_equal_in_five_formats(forked: Forked, folder: Path) -> None:
     assert _github(told["github"]) == [("notice", "base.h5", headline)]
 
 
-def test_different_in_five_formats(forked: Forked, folder: Path) -> None:
+def test_different_in_five_formats(forked: ForkServer, folder: Path) -> None:
     told = {}
     for name in FORMATS:
         done = forked("compare", "faulty.h5", "base.h5", "--format", name, cwd=folder)
@@ -183,7 +183,7 @@ def test_different_in_five_formats(forked: Forked, folder: Path) -> None:
 
 
 def test_github_gets_one_annotation_with_the_worst_three(
-    forked: Forked, figure6: xr.Dataset, folder: Path, tmp_path: Path
+    forked: ForkServer, figure6: xr.Dataset, folder: Path, tmp_path: Path
 ) -> None:
     moved = figure6.copy(deep=True)
     for place, name in enumerate(("v1_post", "v2_post", "e_out", "energy_loss", "contact_time"), 1):
@@ -207,7 +207,7 @@ def test_github_gets_one_annotation_with_the_worst_three(
 
 
 @pytest.mark.parametrize("name", UNREADABLE)
-def test_unreadable_in_five_formats(forked: Forked, folder: Path, name: str) -> None:
+def test_unreadable_in_five_formats(forked: ForkServer, folder: Path, name: str) -> None:
     for format, words in zip(FORMATS, ("new", "baseline") * 3, strict=False):
         pair = (f"{name}.h5", "base.h5") if words == "new" else ("base.h5", f"{name}.h5")
         done = forked("compare", *pair, "--format", format, cwd=folder)
@@ -230,7 +230,7 @@ def test_unreadable_in_five_formats(forked: Forked, folder: Path, name: str) -> 
                 assert _github(done.stdout) == [("error", pair[1], line)]
 
 
-def test_usage_is_exit_2_and_a_line(forked: Forked, folder: Path) -> None:
+def test_usage_is_exit_2_and_a_line(forked: ForkServer, folder: Path) -> None:
     wrong = "impact compare: Invalid value for '--tol': "
     for words, told in (
         (["--tol", "e_oot=1"], '--tol e_oot: not a variable of a result; did you mean "e_out"?'),
@@ -248,7 +248,7 @@ def test_usage_is_exit_2_and_a_line(forked: Forked, folder: Path) -> None:
     assert forked("compare", "different.h5", cwd=folder).returncode == 2
 
 
-def test_tolerances_from_the_command_line(forked: Forked, folder: Path) -> None:
+def test_tolerances_from_the_command_line(forked: ForkServer, folder: Path) -> None:
     for words, code in (
         (["--tol", "1.7e-7"], 0), (["--tol", "1.5e-7"], 1), (["--tol", "v1_post=1.7e-7"], 0),
         (["--tol", "v2_post=1.7e-7"], 1), (["--tol", "1.7e-5%"], 0), (["--tol", "v1_post=1.5e-5%"], 1),
@@ -262,7 +262,7 @@ def test_tolerances_from_the_command_line(forked: Forked, folder: Path) -> None:
     )
 
 
-def test_subset_and_nothing_in_common(forked: Forked, folder: Path) -> None:
+def test_subset_and_nothing_in_common(forked: ForkServer, folder: Path) -> None:
     done = forked("compare", "low.h5", "base.h5", cwd=folder)
     assert (done.returncode, done.stdout.splitlines()[0]) == (1, "not equal: labels (e)")
     assert forked("compare", "low.h5", "base.h5", "--subset", cwd=folder).returncode == 0
@@ -277,7 +277,7 @@ BAD = "\x1b[31m\u202e\u200b[red]|`a`` ````$\\frac{1$\x07<b>&\"'%0A::,=\nx\x9b"
 
 
 @pytest.mark.slow
-def test_hostile_strings_in_every_format(forked: Forked, tmp_path: Path) -> None:
+def test_hostile_strings_in_every_format(forked: ForkServer, tmp_path: Path) -> None:
     steel = {"E": 2e11, "nu": 0.3, "rho": 7850}
     config = {
         "title": BAD, "models": ["hertz", "bilinear"], "materials": {BAD: steel, f"{BAD}2": steel},
@@ -345,7 +345,9 @@ def test_hostile_strings_in_every_format(forked: Forked, tmp_path: Path) -> None
 
 
 @pytest.mark.slow
-def test_pictures_of_every_kind_of_verdict(forked: Forked, folder: Path, wide: xr.Dataset, tmp_path: Path) -> None:
+def test_pictures_of_every_kind_of_verdict(
+    forked: ForkServer, folder: Path, wide: xr.Dataset, tmp_path: Path
+) -> None:
     moved = wide.copy(deep=True)
     moved["contact_time"] *= 1 + 1e-7 * np.arange(moved["contact_time"].size).reshape(moved["contact_time"].shape)
     moved["e_out"][1, 1, 1, 1, 1, 1] = np.nan
@@ -378,7 +380,7 @@ def test_pictures_of_every_kind_of_verdict(forked: Forked, folder: Path, wide: x
 
 
 def test_a_picture_that_cannot_be_stored_is_refused_before_any_work(
-    forked: Forked, folder: Path, tmp_path: Path
+    forked: ForkServer, folder: Path, tmp_path: Path
 ) -> None:
     for name in ("new.png", "base.svg"):
         shutil.copy(folder / "base.h5", tmp_path / name)
@@ -407,7 +409,7 @@ def test_a_picture_that_cannot_be_stored_is_refused_before_any_work(
 # bless
 
 
-def test_bless_makes_and_replaces_a_baseline(forked: Forked, folder: Path, tmp_path: Path) -> None:
+def test_bless_makes_and_replaces_a_baseline(forked: ForkServer, folder: Path, tmp_path: Path) -> None:
     baseline = tmp_path / "baseline.h5"
     done = forked("bless", "base.h5", baseline, "--reason", "first", "--tol", "1e-8", cwd=folder)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", f"{baseline}: made, with the reason\n")
@@ -448,7 +450,7 @@ def test_bless_makes_and_replaces_a_baseline(forked: Forked, folder: Path, tmp_p
 
 
 @pytest.mark.skipif(os.getuid() != 0, reason="only root gives files away")
-def test_bless_keeps_the_owner_of_the_baseline(forked: Forked, folder: Path, tmp_path: Path) -> None:
+def test_bless_keeps_the_owner_of_the_baseline(forked: ForkServer, folder: Path, tmp_path: Path) -> None:
     baseline = tmp_path / "baseline.h5"
     shutil.copy(folder / "base.h5", baseline)
     os.chown(baseline, 4321, 1234)
@@ -458,7 +460,7 @@ def test_bless_keeps_the_owner_of_the_baseline(forked: Forked, folder: Path, tmp
     assert (now.st_uid, now.st_gid, stat.S_IMODE(now.st_mode)) == (4321, 1234, 0o604)
 
 
-def test_bless_accepts_failed_points_only_where_they_are_allowed(forked: Forked, tmp_path: Path) -> None:
+def test_bless_accepts_failed_points_only_where_they_are_allowed(forked: ForkServer, tmp_path: Path) -> None:
     sweep = {"alpha": [0.1, 0.6], "v1": [1.0, 2.0], "m1": 1.0, "m2": 1.0, "K": 6e9}
     impact.save(impact.sweep({"models": ["hertz", KEY], "sweep": sweep}), tmp_path / "new.h5")
     words = ["bless", "new.h5", "base.h5", "--reason", "first"]
@@ -471,7 +473,7 @@ def test_bless_accepts_failed_points_only_where_they_are_allowed(forked: Forked,
     assert forked("compare", "new.h5", "base.h5", cwd=tmp_path).returncode == 0
 
 
-def test_bless_refuses_and_leaves_the_baseline_as_it_was(forked: Forked, folder: Path, tmp_path: Path) -> None:
+def test_bless_refuses_and_leaves_the_baseline_as_it_was(forked: ForkServer, folder: Path, tmp_path: Path) -> None:
     baseline = tmp_path / "baseline.h5"
     shutil.copy(folder / "base.h5", baseline)
     for name in UNREADABLE:
@@ -534,7 +536,7 @@ def test_bless_from_python(folder: Path, tmp_path: Path) -> None:
 # rerun
 
 
-def test_a_rerun_is_equal(forked: Forked, folder: Path, wide: xr.Dataset, tmp_path: Path) -> None:
+def test_a_rerun_is_equal(forked: ForkServer, folder: Path, wide: xr.Dataset, tmp_path: Path) -> None:
     impact.save(wide, tmp_path / "wide.h5")
     impact.save(impact.sweep(SMALL), tmp_path / "mapping.h5")
     (tmp_path / "config.toml").write_text(
@@ -550,7 +552,7 @@ def test_a_rerun_is_equal(forked: Forked, folder: Path, wide: xr.Dataset, tmp_pa
     assert impact.rerun(tmp_path / "set.h5").equal
 
 
-def test_a_rerun_finds_what_was_changed(forked: Forked, folder: Path) -> None:
+def test_a_rerun_finds_what_was_changed(forked: ForkServer, folder: Path) -> None:
     done = forked("rerun", "different.h5", cwd=folder)
     assert done.returncode == 1
     assert done.stdout.startswith("not equal: values (v1_post)\nv1_post: 2 of 303 differ, worst 1.6e-07 = 160 x ")
@@ -584,7 +586,7 @@ def test_a_rerun_is_of_the_models_and_tolerances_that_took_effect(tmp_path: Path
 
 
 def test_a_rerun_repeats_the_points_that_the_file_holds(
-    forked: Forked, figure6: xr.Dataset, wide: xr.Dataset, tmp_path: Path
+    forked: ForkServer, figure6: xr.Dataset, wide: xr.Dataset, tmp_path: Path
 ) -> None:
     impact.save(figure6.isel(e=slice(10, 20), model=[2, 0]), tmp_path / "part.h5")
     done = forked("rerun", "part.h5", cwd=tmp_path)
@@ -604,7 +606,7 @@ def test_a_rerun_repeats_the_points_that_the_file_holds(
         assert verdict.variables[0].points == part["v1_post"].size
 
 
-def test_a_rerun_allocates_no_more_than_the_file_holds(forked: Forked, tmp_path: Path) -> None:
+def test_a_rerun_allocates_no_more_than_the_file_holds(forked: ForkServer, tmp_path: Path) -> None:
     small = impact.sweep(SMALL)
     axes = {
         "e": {"linspace": [0.25, 0.75, 1_001]},
@@ -629,7 +631,7 @@ MINE = hysteresis("mine-2026", title="Mine", year=2026, equation="", reference="
 """
 
 
-def test_a_rerun_wants_the_same_plug_in_again(forked: Forked, tmp_path: Path) -> None:
+def test_a_rerun_wants_the_same_plug_in_again(forked: ForkServer, tmp_path: Path) -> None:
     config = 'models = ["hertz", "mine-2026"]\n[sweep]\ne = [0.2, 0.8]\nv1 = 1\nm1 = 1\nm2 = 1\nK = 6e9\n'
     (tmp_path / "config.toml").write_text(config, encoding="utf-8")
     plugin = tmp_path / "mine.py"
@@ -647,7 +649,7 @@ def test_a_rerun_wants_the_same_plug_in_again(forked: Forked, tmp_path: Path) ->
     assert impact.rerun(tmp_path / "results.h5", plugins=[plugin]).equal
 
 
-def test_a_rerun_judges_a_changed_plug_in_with_a_note(forked: Forked, tmp_path: Path) -> None:
+def test_a_rerun_judges_a_changed_plug_in_with_a_note(forked: ForkServer, tmp_path: Path) -> None:
     config = 'models = ["mine-2026"]\n[sweep]\ne = [0.2, 0.8]\nv1 = 1\nm1 = 1\nm2 = 1\nK = 6e9\n'
     (tmp_path / "config.toml").write_text(config, encoding="utf-8")
     plugin = tmp_path / "mine.py"
@@ -678,7 +680,7 @@ def _stored_as_it_is(dataset: xr.Dataset, path: Path) -> None:
         write_sealed(sink, dataset, ((str(name), (), one.values) for name, one in dataset.data_vars.items()))
 
 
-def test_a_rerun_of_a_result_whose_config_cannot_be_read(forked: Forked, tmp_path: Path) -> None:
+def test_a_rerun_of_a_result_whose_config_cannot_be_read(forked: ForkServer, tmp_path: Path) -> None:
     result = impact.sweep(SMALL)
     for attributes in ({"config": "models = ["}, {"config": "{}"}, {"config_set": "3"}, {"rtol": "fast"}):
         _stored_as_it_is(result.assign_attrs(attributes), tmp_path / "bad.h5")
@@ -708,7 +710,7 @@ LAW = ForceModel("slow", "Slow", 2026, "F = K δⁿ", "", force=force)
 """
 
 
-def test_a_signal_ends_a_rerun(forked: Forked, tmp_path: Path) -> None:
+def test_a_signal_ends_a_rerun(forked: ForkServer, tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(SLOW)
     impact.save(impact.sweep(SMALL | {"models": ["slow"]}, plugins=[tmp_path / "mine.py"]), tmp_path / "long.h5")
     (tmp_path / "slow").touch()
@@ -727,7 +729,7 @@ READ_IN_PART = [
 
 @pytest.mark.parametrize(("format", "new", "code"), READ_IN_PART)
 def test_a_reader_who_leaves_early_does_not_change_the_exit_code(
-    forked: Forked, folder: Path, tmp_path: Path, format: str, new: str, code: int
+    forked: ForkServer, folder: Path, tmp_path: Path, format: str, new: str, code: int
 ) -> None:
     words = ("compare", f"{new}.h5", "base.h5", "--format", format)
     with abandoned_pipe(tmp_path) as pipe:
@@ -751,7 +753,7 @@ def test_a_reader_who_leaves_an_interpreter_early_does_not_change_the_exit_code(
 
 
 def test_bless_replaces_nothing_where_nobody_reads_the_verdict(
-    forked: Forked, folder: Path, tmp_path: Path
+    forked: ForkServer, folder: Path, tmp_path: Path
 ) -> None:
     baseline = tmp_path / "base.h5"
     shutil.copy(folder / "base.h5", baseline)
@@ -762,7 +764,7 @@ def test_bless_replaces_nothing_where_nobody_reads_the_verdict(
             assert baseline.read_bytes() == (folder / "base.h5").read_bytes()
 
 
-def test_bless_refuses_a_reason_that_is_not_text(forked: Forked, folder: Path, tmp_path: Path) -> None:
+def test_bless_refuses_a_reason_that_is_not_text(forked: ForkServer, folder: Path, tmp_path: Path) -> None:
     for reason in (b"caf\xe9", "a lone \ud800 surrogate"):
         with pytest.raises(UsageError, match="--reason: got"):
             impact.bless(folder / "equal.h5", tmp_path / "new.h5", reason=os.fsdecode(reason))
@@ -771,7 +773,7 @@ def test_bless_refuses_a_reason_that_is_not_text(forked: Forked, folder: Path, t
     assert not (tmp_path / "new.h5").exists()
 
 
-def test_a_narrow_terminal_shows_sentences_and_no_table(forked: Forked, folder: Path) -> None:
+def test_a_narrow_terminal_shows_sentences_and_no_table(forked: ForkServer, folder: Path) -> None:
     words = ("compare", folder / "different.h5", folder / "base.h5")
     for columns, has_table in (("40", False), ("120", True)):
         _, printed = printed_on_terminal(forked, *words, COLUMNS=columns)

@@ -19,7 +19,7 @@ from impact.results.sweep import sweep_into
 
 from .clusters import content, sweep
 from .conftest import Run
-from .forked import Forked
+from .fork_server import ForkServer
 
 # a block of each law
 CONFIG = """title = "In parts"
@@ -125,7 +125,7 @@ resource.setrlimit(resource.RLIMIT_NOFILE, (40, 40))
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a limit of open files")
-def test_more_shards_than_open_files_are_merged(cli: Run, forked: Forked, folder: Path) -> None:
+def test_more_shards_than_open_files_are_merged(cli: Run, forked: ForkServer, folder: Path) -> None:
     # of the 60 only five have a range, and each is a folder with a lock
     found = shards(cli, folder, "1/60", "2/60", "3/60", "4/60", "5/60")
     for number in range(6, 61):

@@ -29,7 +29,7 @@ from impact.results.seal import write_seal
 from impact.results.sweep import sweep_into
 
 from .conftest import ROOT, Run
-from .forked import Forked
+from .fork_server import ForkServer
 
 
 def test_what_was_saved_is_loaded(stored: Path, figure6: xr.Dataset) -> None:
@@ -273,7 +273,7 @@ ctypes.CDLL(None).capset((ctypes.c_uint32 * 2)(0x20080522, 0), (ctypes.c_uint32 
 """
 
 
-def test_a_folder_that_may_be_written_to_and_not_read_holds_the_result(forked: Forked, tmp_path: Path) -> None:
+def test_a_folder_that_may_be_written_to_and_not_read_holds_the_result(forked: ForkServer, tmp_path: Path) -> None:
     folder = tmp_path / "folder"
     folder.mkdir()
     text = (ROOT / "configs" / "figure6.toml").read_text(encoding="utf-8")

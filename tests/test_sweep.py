@@ -34,7 +34,7 @@ from impact.results.summary import summarize
 from impact.results.sweep import find_finished, sweep_into
 
 from .conftest import ROOT, WIDE, Run
-from .forked import Forked, printed_on_terminal
+from .fork_server import ForkServer, printed_on_terminal
 
 # more than one block, and done in a second
 BLOCKS = """models = ["bilinear", "hertz"]
@@ -125,7 +125,7 @@ def test_a_dry_run_says_where_equal_values_are_not_looked_for(cli: Run, blocks: 
     assert "too many cells to compare, equal ones are found within a block" in told.stdout
 
 
-def test_too_many_points_are_refused_before_there_is_anything(forked: Forked, blocks: Path) -> None:
+def test_too_many_points_are_refused_before_there_is_anything(forked: ForkServer, blocks: Path) -> None:
     grid = [f"sweep.{name}.geomspace=[1,2,10000]" for name in ("v1", "m1", "m2")]
     sets = [word for one in grid for word in ("--set", one)]
     count = "80,000,000,000,000,000"
@@ -150,7 +150,7 @@ def test_too_many_points_are_refused_before_there_is_anything(forked: Forked, bl
 # ---- how far it is
 
 
-def test_a_line_now_and_then_where_there_is_no_terminal(forked: Forked, blocks: Path) -> None:
+def test_a_line_now_and_then_where_there_is_no_terminal(forked: ForkServer, blocks: Path) -> None:
     # one line after a second, and not one for each block
     done = forked("sweep", blocks, cwd=blocks.parent, code=AT_ONCE)
     lines = [line for line in done.stderr.splitlines() if line.startswith(("trajectories ", "points "))]
@@ -163,7 +163,7 @@ def test_a_line_now_and_then_where_there_is_no_terminal(forked: Forked, blocks: 
     assert (silent.returncode, silent.stdout, silent.stderr) == (0, "", "")
 
 
-def test_a_bar_on_a_terminal(forked: Forked, blocks: Path) -> None:
+def test_a_bar_on_a_terminal(forked: ForkServer, blocks: Path) -> None:
     done, printed = printed_on_terminal(forked, "sweep", blocks, stream="stderr", cwd=blocks.parent, code=AT_ONCE)
     assert done.returncode == 0, printed
     assert re.search(r"trajectories [\d,]+ of 40,001", printed)

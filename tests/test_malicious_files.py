@@ -19,8 +19,8 @@ from impact.errors import ResultError
 from impact.results.backend import open_result
 from impact.results.sweep import sweep_into
 
-from .forked import Done, Forked
-from .malicious import CHANGES, FACTORED, HARMLESS, JUNK, NOT_SEALED, PATCHES, SECRET, change_law, seal
+from .fork_server import CompletedCommand, ForkServer
+from .malicious_files import CHANGES, FACTORED, HARMLESS, JUNK, NOT_SEALED, PATCHES, SECRET, change_law, seal
 
 FILE = "FILE"
 COMMANDS = (
@@ -58,11 +58,11 @@ def factored(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def tell(forked: Forked, path: Path, command: tuple[str, ...]) -> Done:
+def tell(forked: ForkServer, path: Path, command: tuple[str, ...]) -> CompletedCommand:
     return forked(*(path.name if word == FILE else word for word in command), cwd=path.parent)
 
 
-def check_refused(forked: Forked, path: Path, words: str) -> None:
+def check_refused(forked: ForkServer, path: Path, words: str) -> None:
     """Every command refuses the file in these words, at little cost, and leaves the folder as it is."""
     before = sorted(path.parent.iterdir())
     for command in COMMANDS:
@@ -80,7 +80,7 @@ def check_refused(forked: Forked, path: Path, words: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NOT_SEALED)
-def test_what_is_not_sealed_is_refused(forked: Forked, tmp_path: Path, name: str) -> None:
+def test_what_is_not_sealed_is_refused(forked: ForkServer, tmp_path: Path, name: str) -> None:
     make, words = NOT_SEALED[name]
     make(tmp_path / "bad.h5")
     check_refused(forked, tmp_path / "bad.h5", words)
@@ -136,12 +136,14 @@ def test_a_sealed_file_with_one_thing_wrong_is_no_result(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
-def test_every_command_refuses_it(forked: Forked, make_bad: Callable[[str], tuple[Path, str]], name: str) -> None:
+def test_every_command_refuses_it(
+    forked: ForkServer, make_bad: Callable[[str], tuple[Path, str]], name: str
+) -> None:
     check_refused(forked, *make_bad(name))
 
 
 @pytest.mark.parametrize("name", ["10 MB of labels", "zip bomb in a chunk", "e_out as i4", "another witness"])
-def test_a_command_refuses_it(forked: Forked, make_bad: Callable[[str], tuple[Path, str]], name: str) -> None:
+def test_a_command_refuses_it(forked: ForkServer, make_bad: Callable[[str], tuple[Path, str]], name: str) -> None:
     path, words = make_bad(name)
     done = forked("info", path.name, cwd=path.parent)
     assert (done.returncode, done.stdout) == (2, "")
@@ -193,7 +195,7 @@ def test_a_chunk_of_another_size_is_found_when_it_is_read(small: Path, tmp_path:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", HARMLESS)
-def test_what_is_not_read_does_no_harm(forked: Forked, small: Path, tmp_path: Path, name: str) -> None:
+def test_what_is_not_read_does_no_harm(forked: ForkServer, small: Path, tmp_path: Path, name: str) -> None:
     path = tmp_path / "odd.h5"
     shutil.copy(small, path)
     HARMLESS[name](path)
@@ -206,7 +208,9 @@ def test_what_is_not_read_does_no_harm(forked: Forked, small: Path, tmp_path: Pa
 
 @pytest.mark.slow
 @pytest.mark.parametrize("layout", ["small", "factored"])
-def test_a_genuine_file_is_not(forked: Forked, small: Path, factored: Path, tmp_path: Path, layout: str) -> None:
+def test_a_genuine_file_is_not(
+    forked: ForkServer, small: Path, factored: Path, tmp_path: Path, layout: str
+) -> None:
     shutil.copy({"small": small, "factored": factored}[layout], tmp_path / "good.h5")
     for command in COMMANDS:
         assert tell(forked, tmp_path / "good.h5", command).returncode == 0
@@ -218,7 +222,7 @@ def test_a_genuine_file_is_not(forked: Forked, small: Path, factored: Path, tmp_
     ]
 
 
-def test_what_is_unknown_is_passed_over_with_a_note(forked: Forked, small: Path, tmp_path: Path) -> None:
+def test_what_is_unknown_is_passed_over_with_a_note(forked: ForkServer, small: Path, tmp_path: Path) -> None:
     path = tmp_path / "more.h5"
     shutil.copy(small, path)
     with h5py.File(path, "r+") as file:
