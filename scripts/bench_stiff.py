@@ -17,7 +17,7 @@ from rich.table import Table
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from tests.problems import impacts, quadratures
+from tests.problems import hysteresis_reference, table1_impacts
 
 from impact.config.load import DEFAULT_RTOL
 from impact.contact.models import find
@@ -31,12 +31,12 @@ def main() -> None:
     table = Table("model", "e", "χ", "steps", "of those at 0.1", "|e_out/exact − 1|", "time, relative",
                   "peak force, relative", box=None)  # fmt: skip
     for key in MODELS:
-        batch = impacts(e=e)
+        batch = table1_impacts(e=e)
         contact = collide(find(key), batch, rtol=DEFAULT_RTOL, max_steps=10_000)
         unit = batch.length / batch.v0
         for place, asked in enumerate(e):
             chi = contact["damping_ratio"][place]
-            exact, exact_time, exact_force = quadratures(chi, 1.5)
+            exact, exact_time, exact_force = hysteresis_reference(chi, 1.5)
             time = contact["contact_time"][place] / unit[place]
             force = contact["peak_force"][place] * batch.length[place] / (batch.m[place] * batch.v0[place] ** 2)
             table.add_row(

@@ -22,135 +22,153 @@ from impact.ode.problem import Problem
 
 
 @dataclass(frozen=True)
-class Known:
-    """An initial value problem of one lane and its answer.
+class SolvedProblem:
+    """An initial value problem of one trajectory and its exact solution.
 
-    `exact` gives the two components at a time; `ends` is the time of the event, `quadrature` the second
-    quadrature there, `highest` the largest value of the watched product of the components.
+    `exact` gives the two components at a time; `event_time` is the time of the event, `quadrature` the second
+    quadrature there, `maximum` the largest value of the watched product of the components.
     """
 
     name: str
     problem: Problem
-    start: tuple[float, float]
+    initial_state: tuple[float, float]
     exact: Callable[[float], tuple[float, float]]
-    ends: float
+    event_time: float
     quadrature: float
-    highest: float
+    maximum: float
 
     def __str__(self) -> str:
         return self.name
 
 
-def _rates(second, quadrature):
-    """Rates of y0' = y1, y1' = second(y0, y1), time and another quadrature; y0 y1 is watched."""
+def _rates(acceleration, quadrature):
+    """Rates of y0' = y1, y1' = acceleration(y0, y1), time and another quadrature; y0 y1 is watched."""
 
-    def rates(y, columns, out=None):
-        one = np.ones_like(y[0])
-        return np.array([y[1], second(*y, *columns), one, quadrature(*y), y[0] * y[1]])
+    def rates(y, params, out=None):
+        time_rate = np.ones_like(y[0])
+        return np.array([y[1], acceleration(*y, *params), time_rate, quadrature(*y), y[0] * y[1]])
 
     return rates
 
 
-def _until(level: float):
-    """The end: y1 falls through a level; a trajectory whose y0 is huge cannot reach it."""
+def _ends_below(level: float):
+    """The event: y1 falls below a level; a trajectory whose y0 is huge cannot reach it."""
     return {
-        "event": lambda y, k, columns: (y[1] - level, k[1]),
-        "unreachable": lambda y, k, columns: y[0] > 1e6,
+        "event": lambda y, k, params: (y[1] - level, k[1]),
+        "unreachable": lambda y, k, params: y[0] > 1e6,
         "floor": (1.0, 1.0),
         "watch": True,
     }
 
 
 # y'' = −y from rest length: sin and cos over a quarter of a period
-OSCILLATOR = Known(
+OSCILLATOR = SolvedProblem(
     "oscillator",
-    Problem(_rates(lambda a, b: -a, lambda a, b: a * b), **_until(0.0)),
-    start=(0.0, 1.0),
+    Problem(_rates(lambda a, b: -a, lambda a, b: a * b), **_ends_below(0.0)),
+    initial_state=(0.0, 1.0),
     exact=lambda t: (math.sin(t), math.cos(t)),
-    ends=math.pi / 2,
+    event_time=math.pi / 2,
     quadrature=0.5,
-    highest=0.5,
+    maximum=0.5,
 )
 # y'' = −2 y y': tanh and sech², until sech² = 1/2
-TANH = Known(
+TANH = SolvedProblem(
     "tanh",
-    Problem(_rates(lambda a, b: -2.0 * a * b, lambda a, b: a), **_until(0.5)),
-    start=(0.0, 1.0),
+    Problem(_rates(lambda a, b: -2.0 * a * b, lambda a, b: a), **_ends_below(0.5)),
+    initial_state=(0.0, 1.0),
     exact=lambda t: (math.tanh(t), 1.0 / math.cosh(t) ** 2),
-    ends=math.atanh(math.sqrt(0.5)),
+    event_time=math.atanh(math.sqrt(0.5)),
     quadrature=0.5 * math.log(2.0),
-    highest=2.0 / 27.0**0.5,
+    maximum=2.0 / 27.0**0.5,
 )
 # y'' = −y'²: a logarithm and its derivative, until the derivative is 1/4
-LOGARITHM = Known(
+LOGARITHM = SolvedProblem(
     "logarithm",
-    Problem(_rates(lambda a, b: -b * b, lambda a, b: b * b), **_until(0.25)),
-    start=(0.0, 1.0),
+    Problem(_rates(lambda a, b: -b * b, lambda a, b: b * b), **_ends_below(0.25)),
+    initial_state=(0.0, 1.0),
     exact=lambda t: (math.log1p(t), 1.0 / (1.0 + t)),
-    ends=3.0,
+    event_time=3.0,
     quadrature=0.75,
-    highest=1.0 / math.e,
+    maximum=1.0 / math.e,
 )
 PROBLEMS = (OSCILLATOR, TANH, LOGARITHM)
 
-# y'' = −k y − c y' + q y'², with a column for each: a lane can be made to end late (small k), to be lost (k <= 0),
-# to creep without an end (large c), to blow up (q = 1, at time 1) or to have a rate that is not a number
+# y'' = −k y − c y' + q y'², with parameters k, c and q: a trajectory ends late (small k), never reaches the event
+# (k <= 0), creeps without an end (large c), diverges (q = 1, at time 1) or has a rate that is not a number
 SPRINGS = Problem(
     _rates(lambda a, b, k, c, q: -k * a - c * b + q * b * b, lambda a, b: a * b),
-    **_until(0.0),
+    **_ends_below(0.0),
 )
 
 
-# the laws of the catalogue, each under one name
+# the laws of the catalogue, without further names of the same law
 LAWS = [key for key, model in catalogue().items() if not model.same_as]
-# to be tested one by one: those of codes, which are forms of the others, with the slow tests
+# a test parameter for each law; laws of codes, which are forms of the others, belong to the slow tests
 EACH_LAW = [
     pytest.param(key, marks=pytest.mark.slow) if catalogue()[key].family == "codes" else key for key in LAWS
 ]
 
 
-def impacts(n: float = 1.5, **changes: object) -> Impacts:
-    """Impacts of the balls of Table 1 at e = 0.5, with changes by name; what varies is an array.
+def table1_impacts(n: float = 1.5, **changes: object) -> Impacts:
+    """Impacts of the balls of Table 1 at e = 0.5, with changes by name; values that vary are arrays.
 
     The balls are of 1 kg, E = 56 GPa, nu = 0.3 and 2712 kg/m3, the first at 1 m/s and the second at rest.
     `parameters` are those of the law, by name.
     """
-    given = {"e": 0.5, "v1": 1.0, "v2": 0.0, "m1": 1.0, "m2": 1.0, "E1": 56e9, "E2": 56e9}
-    parameters = changes.pop("parameters", {})
-    names = [*given, *(name for name in changes if name not in given), *parameters]
-    values = np.broadcast_arrays(*({**given, **changes, **parameters}[name] for name in names))
-    at = {name: np.atleast_1d(np.array(value, float)) for name, value in zip(names, values, strict=True)}
-    poisson, strength, density = (np.full_like(at["e"], value) for value in (0.3, 3e8, 2712.0))
+    law_parameters = changes.pop("parameters", {})
+    table_1 = {"e": 0.5, "v1": 1.0, "v2": 0.0, "m1": 1.0, "m2": 1.0, "E1": 56e9, "E2": 56e9}
+    inputs = table_1 | changes
+    arrays = [
+        np.atleast_1d(np.array(value, float))
+        for value in np.broadcast_arrays(*inputs.values(), *law_parameters.values())
+    ]
+    values = dict(zip(inputs, arrays, strict=False))
+    parameters = dict(zip(law_parameters, arrays[len(inputs) :], strict=True))
+    poisson, strength, density, exponent = (np.full_like(values["e"], value) for value in (0.3, 3e8, 2712.0, n))
     for ball in "12":
-        at.setdefault(f"R{ball}", sphere_radius(at[f"m{ball}"], density))
-    exponent = np.full_like(at["e"], n)
+        values.setdefault(f"R{ball}", sphere_radius(values[f"m{ball}"], density))
     # of two planes, or at a speed whose square overflows, there is no stiffness
     with np.errstate(all="ignore"):
-        hertz = hertz_stiffness(at["E1"], poisson, at["E2"], poisson, at["R1"], at["R2"])
-        at.setdefault("K", stiffness(exponent, hertz, effective_mass(at["m1"], at["m2"]), at["v1"] - at["v2"]))
-    own = {name: at.pop(name) for name in parameters}
+        hertz = hertz_stiffness(values["E1"], poisson, values["E2"], poisson, values["R1"], values["R2"])
+        mass = effective_mass(values["m1"], values["m2"])
+        values.setdefault("K", stiffness(exponent, hertz, mass, values["v1"] - values["v2"]))
     return Impacts(
-        **at, n=exponent, nu1=poisson, nu2=poisson, yield_strength1=strength, yield_strength2=strength,
-        parameters=own,
-    )  # fmt: skip
+        **values,
+        n=exponent,
+        nu1=poisson,
+        nu2=poisson,
+        yield_strength1=strength,
+        yield_strength2=strength,
+        parameters=parameters,
+    )
 
 
-def with_parameters(model: ForceModel, lanes: Impacts, value: object) -> Impacts:
-    """The impacts with the law's own parameters, each above its least by a value in the contact's own units.
+def with_parameters(model: ForceModel, impacts: Impacts, value: object) -> Impacts:
+    """The impacts with parameters of the law, each above its least by a value in the contact's own units.
 
-    Of a parameter with a typical value it is that value times it.
+    A parameter with a typical value becomes that value times `value`.
     """
-    ones = np.ones(len(lanes))
-    pure = {one.name: max(one.least, 0.0) + value * ones for one in model.parameters if one.unit == "1"}
-    # the units of the others may be made of them
-    unit = replace(lanes, parameters={**{one.name: ones for one in model.parameters}, **pure})
-    typical = {one.name: one.typical * value * ones for one in model.parameters if one.typical is not None}
-    others = [one.name for one in model.parameters if one.unit != "1" and one.typical is None]
-    own = typical | {name: value / unit.dimensionless(model, name) for name in others}
-    return replace(lanes, parameters={**pure, **own})
+    ones = np.ones(len(impacts))
+    pure = {
+        parameter.name: max(parameter.least, 0.0) + value * ones
+        for parameter in model.parameters
+        if parameter.unit == "1"
+    }
+    typical = {
+        parameter.name: parameter.typical * value * ones
+        for parameter in model.parameters
+        if parameter.typical is not None
+    }
+    others = [
+        parameter.name for parameter in model.parameters if parameter.unit != "1" and parameter.typical is None
+    ]
+    # exponents of the units of the others may be parameters without a unit
+    unit = replace(impacts, parameters={parameter.name: ones for parameter in model.parameters} | pure)
+    scaled = {name: value / unit.dimensionless(model, name) for name in others}
+    return replace(impacts, parameters=pure | typical | scaled)
 
 
-def quadratures(chi: float, n: float) -> tuple[float, float, float]:
+def hysteresis_reference(chi: float, n: float) -> tuple[float, float, float]:
     """Restitution, time and peak force of F = xⁿ (1 + χ v) with m = v₀ = 1, to 15 digits.
 
     With w = ln(1 + χ v)/χ the motion is dw/dt = −xⁿ, so that x^(n+1)/(n+1) = G(w₀) − G(w) with G(w) =

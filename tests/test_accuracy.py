@@ -17,7 +17,7 @@ from impact.contact.simulate import RecordedCollision, integrate_phases
 from impact.contact.status import Status
 from impact.contact.velocity_coordinates import STRONG_DAMPING
 
-from .problems import LAWS, impacts, quadratures, with_parameters
+from .problems import LAWS, hysteresis_reference, table1_impacts, with_parameters
 
 EXPONENTS = (1.0, 1.3, 1.5, 2.0, 3.0)
 E = np.unique([*np.geomspace(0.001, 0.1, 60), *np.linspace(0.05, 1.0, 191)])
@@ -48,7 +48,7 @@ def struck(model, lanes: Impacts) -> Outputs:
 def over_e(key: str, n: float) -> tuple[Impacts, Outputs]:
     # the restitution of Ismail and Stronge is that of E, the damping of others falls from 1.1 to 0.1
     values = 1.0 / E - 1.0 if key == "ismail-stronge-2008" else 1.1 - E
-    lanes = with_parameters(find(key), impacts(n, e=E), values)
+    lanes = with_parameters(find(key), table1_impacts(n, e=E), values)
     return lanes, struck(find(key), lanes)
 
 
@@ -102,7 +102,7 @@ def test_permanent_indentation_is_that_of_its_closed_form(key, n):
 
 @functools.cache
 def over_chi(n: float) -> tuple[Impacts, Outputs]:
-    lanes = impacts(n, e=np.array(CHI) / 1e3)
+    lanes = table1_impacts(n, e=np.array(CHI) / 1e3)
     return lanes, struck(ANY_CHI, lanes)
 
 
@@ -111,7 +111,7 @@ def over_chi(n: float) -> tuple[Impacts, Outputs]:
 def test_damped_contact_agrees_with_quadrature(place, n):
     lanes, contact = over_chi(n)
     chi, length, v0 = contact["damping_ratio"][place], lanes.length[place], lanes.v0[place]
-    e_out, time, force = quadratures(chi, n)
+    e_out, time, force = hysteresis_reference(chi, n)
     assert contact["e_out"][place] == pytest.approx(e_out, rel=0, abs=1e-9)
     assert contact["contact_time"][place] * v0 / length == pytest.approx(time, rel=1e-8)
     assert contact["peak_force"][place] * length / (lanes.m[place] * v0**2) == pytest.approx(force, rel=1e-8)
@@ -121,14 +121,14 @@ def test_damped_contact_agrees_with_quadrature(place, n):
 
 @pytest.mark.parametrize("key", ["gharib-hurmuzlu-2012", "exact-hysteresis"])
 def test_extreme_damping_is_accurate_and_not_stiff(key):
-    contact = struck(find(key), impacts(e=[1e-6, 0.1]))
+    contact = struck(find(key), table1_impacts(e=[1e-6, 0.1]))
     assert np.all(contact["status"] == Status.OK)
     assert contact["e_out"][0] == pytest.approx(1e-6, rel=1e-9)
     assert worst(contact["energy_residual"]) <= 10 * DEFAULT_RTOL
     assert contact["steps"][0] <= 3 * contact["steps"][1]
-    lanes = impacts(e=[1e-6, 0.1])
+    lanes = table1_impacts(e=[1e-6, 0.1])
     for place in range(2):
-        _, time, force = quadratures(contact["damping_ratio"][place], 1.5)
+        _, time, force = hysteresis_reference(contact["damping_ratio"][place], 1.5)
         length, v0 = lanes.length[place], lanes.v0[place]
         assert contact["contact_time"][place] * v0 / length == pytest.approx(time, rel=1e-8)
         assert contact["peak_force"][place] * length / (lanes.m[place] * v0**2) == pytest.approx(force, rel=1e-8)
@@ -151,7 +151,7 @@ def largest_force(chi: float, n: float) -> float:
 def test_peak_force_is_found_between_the_steps_wherever_it_falls(n, rtol, bound):
     # many values, because it depends on where the steps end how far the peak is from one
     e = np.linspace(0.02, 0.999, 600)
-    lanes = impacts(n, e=e)
+    lanes = table1_impacts(n, e=e)
     contact = collide(find("hunt-crossley-1975"), lanes, rtol=rtol, max_steps=10_000)
     own = contact["peak_force"] * lanes.length / (lanes.m * lanes.v0**2)
     exact = np.array([largest_force(chi, n) for chi in contact["damping_ratio"].tolist()])
@@ -179,7 +179,7 @@ def test_both_momentum_coordinates_agree(name):
     "key", ["hertz", "lankarani-nikravesh-1990", "gharib-hurmuzlu-2012", "bilinear", "exact-dashpot-no-tension"]
 )
 def test_the_error_is_below_the_tolerance_and_falls_with_it(key):
-    lanes = impacts(find(key).exponent or 1.5, e=np.linspace(0.05, 1.0, 40))
+    lanes = table1_impacts(find(key).exponent or 1.5, e=np.linspace(0.05, 1.0, 40))
     tolerances = np.array([1e-5, 1e-7, 1e-9, 1e-11])
     errors = [
         worst(collide(find(key), lanes, rtol=rtol, max_steps=100_000)["closed_form_error"]) for rtol in tolerances

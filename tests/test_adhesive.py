@@ -12,7 +12,7 @@ from impact.contact.models import find
 from impact.contact.outputs import Outputs, collide
 from impact.contact.status import Status
 
-from .problems import impacts
+from .problems import table1_impacts
 
 GAMMA = 0.2
 # balls of 10 µg, of which adhesion takes much at some centimetres a second
@@ -20,7 +20,7 @@ SMALL = {"m1": 1e-8, "m2": 2e-8, "E1": 2e9, "E2": 56e9}
 
 
 def struck(key: str, n: float = 1.5, **given) -> Outputs:
-    return collide(find(key), impacts(n, **given), rtol=1e-10, max_steps=10_000)
+    return collide(find(key), table1_impacts(n, **given), rtol=1e-10, max_steps=10_000)
 
 
 def sticking_speed(lanes: Impacts) -> float:
@@ -30,7 +30,7 @@ def sticking_speed(lanes: Impacts) -> float:
 
 
 def test_balls_with_a_neck_rebound_by_thornton_and_ning_and_stick_below_a_speed():
-    vs = sticking_speed(impacts(v1=1.0, **SMALL))
+    vs = sticking_speed(table1_impacts(v1=1.0, **SMALL))
     ratio = np.array([0.1, 0.5, 0.99, 1.01, 1.1, 2.0, 10.0, 1e3])
     contact = struck("jkr-1971", v1=ratio * vs, parameters={"gamma": GAMMA}, **SMALL)
     expected = np.sqrt(np.maximum(1 - 1 / ratio**2, 0.0))
@@ -120,9 +120,9 @@ def test_the_edinburgh_law_is_the_one_that_liggghts_steps_through(n, k2, chi, ga
 
 
 def test_the_edinburgh_law_sticks_and_ends_where_its_surface_energy_says():
-    lanes = impacts(1.5, v1=np.geomspace(0.003, 1.0, 12), m1=0.01, m2=0.02, K=1e7)
+    lanes = table1_impacts(1.5, v1=np.geomspace(0.003, 1.0, 12), m1=0.01, m2=0.02, K=1e7)
     own = {"k2": np.full(12, 3.0), "gamma": np.full(12, 40.0), "adhesion_exponent": np.ones(12)}
-    lanes = impacts(1.5, v1=lanes.v1, m1=0.01, m2=0.02, K=1e7, parameters=own)
+    lanes = table1_impacts(1.5, v1=lanes.v1, m1=0.01, m2=0.02, K=1e7, parameters=own)
     sticky = collide(find("liggghts-edinburgh"), lanes, rtol=1e-10, max_steps=10_000)
     assert sticky["status"][0] == Status.LIMIT
     assert sticky["status"][-1] == Status.OK

@@ -28,7 +28,7 @@ from impact.contact.outputs import collide
 from impact.contact.scaling import delivered
 from impact.contact.status import Status
 
-from .problems import impacts
+from .problems import table1_impacts
 
 E = np.arange(1, 201) * 0.005
 ALL = "0.005-1"
@@ -240,7 +240,7 @@ def dimensionless(contact: dict[str, Any]) -> dict[str, np.ndarray]:
 
 
 def linear(key: str, zeta: np.ndarray) -> dict[str, Any]:
-    lanes = impacts(1.0, e=np.full(zeta.size, 0.5), v1=3.0, m2=0.7)
+    lanes = table1_impacts(1.0, e=np.full(zeta.size, 0.5), v1=3.0, m2=0.7)
     lanes = replace(lanes, parameters={"C": 2.0 * zeta * np.sqrt(lanes.m * lanes.K)})
     return {**collide(find(key), lanes, rtol=DEFAULT_RTOL, max_steps=100_000), "impacts": lanes}
 
@@ -302,7 +302,7 @@ DAMPING = np.array([0.01, 0.03, 0.1, 0.3, 0.6, 1.0, 1.5, 2.0, 3.0, 5.0, 20.0])
 
 def rate_dependent(key: str, g: np.ndarray, v1: object = 1.0, v0_of_g: object = None) -> dict[str, Any]:
     """Impacts at speeds v1 whose parameter has the damping g at the speed v0_of_g; by default their own."""
-    lanes = impacts(1.5, e=np.full(g.size, 0.5), v1=v1, m2=0.4)
+    lanes = table1_impacts(1.5, e=np.full(g.size, 0.5), v1=v1, m2=0.4)
     _, name, parameter = RATE_DEPENDENT[key]
     at = parameter(g, lanes.K / lanes.m, lanes.v0 if v0_of_g is None else v0_of_g, lanes.m)
     lanes = replace(lanes, parameters={name: at})
@@ -407,15 +407,15 @@ def test_kuwabara_and_kono_is_as_far_from_its_pade_forms_as_is_known(above, belo
 def test_kuwabara_and_kono_for_a_restitution_at_a_speed_delivers_it_there():
     e = np.linspace(0.02, 1.0, 50)
     for speed in (0.1, 5.0):
-        lanes = impacts(1.5, e=e, v1=speed, m2=0.4, parameters={"ve": speed})
+        lanes = table1_impacts(1.5, e=e, v1=speed, m2=0.4, parameters={"ve": speed})
         contact = collide(find("kuwabara-kono-at-speed"), lanes, rtol=DEFAULT_RTOL, max_steps=100_000)
         assert np.abs(contact["e_out"] - e).max() < 7e-4
     # by the numbers of YADE's own formula, integrated elsewhere
-    lanes = impacts(1.5, e=[0.1, 0.3, 0.5, 0.7, 0.9], parameters={"ve": 1.0})
+    lanes = table1_impacts(1.5, e=[0.1, 0.3, 0.5, 0.7, 0.9], parameters={"ve": 1.0})
     contact = collide(find("kuwabara-kono-at-speed"), lanes, rtol=DEFAULT_RTOL, max_steps=100_000)
     assert contact["e_out"] == pytest.approx([0.0994, 0.2998, 0.49996, 0.7000, 0.9000], abs=6e-5)
     # a faster impact loses more: e(v) is that of one A
-    lanes = impacts(1.5, e=[0.5, 0.5], v1=[1.0, 32.0], parameters={"ve": 1.0})
+    lanes = table1_impacts(1.5, e=[0.5, 0.5], v1=[1.0, 32.0], parameters={"ve": 1.0})
     slow, fast = collide(find("kuwabara-kono-at-speed"), lanes, rtol=DEFAULT_RTOL, max_steps=100_000)["e_out"]
     g = pade_damping(np.array([0.5]))[0]
     assert slow - fast == pytest.approx(0.5 - float(pade_restitution(np.array([2.0 * g]))[0]), abs=2e-3)
@@ -430,7 +430,7 @@ def test_kuwabara_and_kono_for_a_restitution_at_a_speed_delivers_it_there():
     ],
 )
 def test_a_damping_of_ones_own_is_the_law_that_has_its_exponent(q, key, name, own):
-    lanes = impacts(1.5, e=np.full(9, 0.5), v1=np.geomspace(0.01, 10.0, 9), m2=0.4)
+    lanes = table1_impacts(1.5, e=np.full(9, 0.5), v1=np.geomspace(0.01, 10.0, 9), m2=0.4)
     C = 0.3 * lanes.m * lanes.v0 / lanes.length ** (q + 1)
     general, special = (
         collide(find(law), replace(lanes, parameters=given), rtol=DEFAULT_RTOL, max_steps=10_000)
@@ -456,7 +456,7 @@ CALIBRATED = (
 )
 def test_a_dashpot_of_calibrated_damping_delivers_what_is_asked_for(key, n):
     e = np.unique([*np.geomspace(1e-12, 1.0, 60), *np.linspace(0.05, 1.0, 39)])
-    contact = collide(find(key), impacts(n, e=e), rtol=DEFAULT_RTOL, max_steps=10_000)
+    contact = collide(find(key), table1_impacts(n, e=e), rtol=DEFAULT_RTOL, max_steps=10_000)
     assert np.all(contact["status"] == Status.OK)
     assert np.abs(contact["e_out"] - e).max() <= 1e-9
     # what is left of the speed keeps its digits, too; to the end of the gap it fades over a long time

@@ -17,13 +17,13 @@ from impact.contact.scaling import delivered
 from impact.contact.status import Status
 from impact.errors import ConfigError
 
-from .problems import impacts
+from .problems import table1_impacts
 
 SPEEDS = np.geomspace(1e-3, 10.0, 9)
 
 
 def struck(key: str, n: float = 1.5, **given) -> Outputs:
-    contact = collide(find(key), impacts(n, **given), rtol=1e-10, max_steps=10_000)
+    contact = collide(find(key), table1_impacts(n, **given), rtol=1e-10, max_steps=10_000)
     assert np.all(contact["status"] == Status.OK)
     return contact
 
@@ -85,7 +85,7 @@ def test_adams_pushes_once_more_as_the_gap_closes(n, damping):
     again = brentq(lambda x: raw(x, v), 1e-12, x * (1 - 1e-6), xtol=1e-15)
     assert again > 1e-6
     _, last = until(lambda t, y: y[0], (again, v))
-    lanes = impacts(n)
+    lanes = table1_impacts(n)
     own = {"c": damping * lanes.m * lanes.v0 / lanes.length, "d": 0.3 * lanes.length}
     assert struck("adams-impact", n, parameters=own)["e_out"][0] == pytest.approx(-last, abs=1e-9)
     assert -last > -v
@@ -98,24 +98,24 @@ def test_adams_pushes_once_more_as_the_gap_closes(n, damping):
     ("damping", "e_out"), [(0.1, 0.856085), (0.5, 0.560826), (1.0, 0.406197), (2.0, 0.269006), (10.0, 0.072049)]
 )
 def test_elastogap_at_dampings_in_the_units_of_the_contact(damping, e_out):
-    lanes = impacts()
+    lanes = table1_impacts()
     contact = struck("modelica-elastogap", parameters={"d": damping * lanes.m * lanes.v0 / lanes.length})
     assert f"{contact['e_out'][0]:.6f}" == f"{e_out:.6f}"
 
 
 def test_of_peak_and_bend_in_one_step_the_sooner_ends_it():
-    lanes = impacts(2.0, e=np.full(400, 0.5))
+    lanes = table1_impacts(2.0, e=np.full(400, 0.5))
     own = {
         "c": np.full(400, 0.27) * lanes.K * lanes.length**2 / lanes.v0,
         "d": np.geomspace(0.5, 1.5, 400) * lanes.length,
     }
-    lanes = impacts(2.0, e=np.full(400, 0.5), parameters=own)
+    lanes = table1_impacts(2.0, e=np.full(400, 0.5), parameters=own)
     loose, fine = (collide(find("adams-impact"), lanes, rtol=rtol, max_steps=10**4) for rtol in (1e-4, 1e-8))
     assert loose["peak_indentation"] == pytest.approx(fine["peak_indentation"], rel=1e-3)
 
 
 def test_a_release_is_located_where_the_force_hardly_falls_below_zero():
-    lanes = impacts(1.5, e=[1.0])
+    lanes = table1_impacts(1.5, e=[1.0])
     coarse, fine = (
         collide(find("lammps-tsuji-without-root-limit"), lanes, rtol=rtol, max_steps=10**5)
         for rtol in (1e-10, 1e-12)
@@ -126,11 +126,14 @@ def test_a_release_is_located_where_the_force_hardly_falls_below_zero():
 
 @pytest.mark.parametrize("n", [1.0, 1.5, 2.5])
 def test_elastogap_locates_where_its_damping_stops_to_be_limited(n):
-    lanes = impacts(n, e=np.full(20, 0.5))
+    lanes = table1_impacts(n, e=np.full(20, 0.5))
     own = {"d": np.geomspace(1e-3, 30.0, 20) * lanes.m * lanes.v0 / lanes.length}
     contacts = [
         collide(
-            find("modelica-elastogap"), impacts(n, e=np.full(20, 0.5), parameters=own), rtol=rtol, max_steps=10**5
+            find("modelica-elastogap"),
+            table1_impacts(n, e=np.full(20, 0.5), parameters=own),
+            rtol=rtol,
+            max_steps=10**5,
         )
         for rtol in (1e-10, 1e-12)
     ]
@@ -152,7 +155,7 @@ def test_a_limited_damper_on_a_linear_spring_has_a_closed_form():
                 else mp.exp(mp.mpf(2) / 3 - 2)
             )
             assert found == pytest.approx(float(exact), rel=3e-14)
-    lanes = impacts(1.0, e=np.full(zeta.size, 0.5))
+    lanes = table1_impacts(1.0, e=np.full(zeta.size, 0.5))
     contact = struck("maplesim-linear-limited", 1.0, e=np.full(zeta.size, 0.5),
                      parameters={"d": 2.0 * zeta * np.sqrt(lanes.m * lanes.K)})  # fmt: skip
     assert np.abs(contact["closed_form_error"]).max() <= 1e-9
@@ -176,7 +179,7 @@ LAMMPS_RATES = {
 def rated(key: str, g: np.ndarray) -> Outputs:
     """Impacts by a law of LAMMPS with the damping g in the contact's own units."""
     _, name, own = LAMMPS_RATES[key.removesuffix("-limit")]
-    lanes = impacts(1.5, e=np.full(g.size, 0.5))
+    lanes = table1_impacts(1.5, e=np.full(g.size, 0.5))
     lanes = replace(lanes, parameters={name: own(g, lanes)})
     return collide(find(key), lanes, rtol=1e-10, max_steps=10_000)
 
@@ -305,7 +308,7 @@ def test_the_form_of_hunt_and_crossley(key, own, e):
 @pytest.mark.parametrize("damping", [0.0, 0.1, 1.0, 10.0])
 @pytest.mark.parametrize("n", [1.0, 1.5, 2.2])
 def test_recurdyn_with_exponents_where_it_has_closed_forms(n, damping):
-    lanes = impacts(n, v1=SPEEDS)
+    lanes = table1_impacts(n, v1=SPEEDS)
     for m2, e_out in ((1.0, delivered_restitution(damping)), (2.0, 1 / np.sqrt(1 + damping))):
         own = {"c": damping * lanes.K / lanes.v0**m2, "damping_exponent": m2, "indentation_exponent": n}
         contact = struck("recurdyn-exponents", n, v1=SPEEDS, parameters=own)
@@ -328,7 +331,7 @@ def test_recurdyn_with_exponents_by_a_second_integration(m2, m3):
     found = solve_ivp(
         motion, (0.0, 30.0), (0.0, 1.0), "DOP853", events=gap, rtol=1e-12, atol=1e-15, first_step=1e-6
     )
-    lanes = impacts(v1=SPEEDS)
+    lanes = table1_impacts(v1=SPEEDS)
     own = {
         "c": 0.4 * lanes.m * lanes.v0 ** (2 - m2) / lanes.length ** (1 + m3),
         "damping_exponent": m2,
@@ -458,7 +461,7 @@ def test_yade_takes_any_betan(betan, e_out):
 
 
 def test_a_linear_spring_of_lammps_with_a_viscoelastic_damping_by_a_second_integration():
-    lanes = impacts(1.0)
+    lanes = table1_impacts(1.0)
     root = np.sqrt(1 / (1 / lanes.R1[0] + 1 / lanes.R2[0]))
     K, m, v0, eta = 1e7, 0.5, 1.0, 2e6
     force = second(lambda x, v: K * max(x, 0.0) + eta * m * root * np.sqrt(max(x, 0.0)) * v, m, v0)
@@ -479,7 +482,7 @@ def test_dissipations_of_two_materials_weigh_by_the_other_stiffness():
 
 def test_velocities_follow_from_the_restitution():
     contact = struck("drake-point-contact", 1.0, v1=SPEEDS, v2=-0.1, m2=3.0, K=1e6, parameters={"d": 1.0})
-    v1, v2 = velocities_after(impacts(1.0, v1=SPEEDS, v2=-0.1, m2=3.0, K=1e6), contact["e_out"])
+    v1, v2 = velocities_after(table1_impacts(1.0, v1=SPEEDS, v2=-0.1, m2=3.0, K=1e6), contact["e_out"])
     assert contact["v1_post"].tobytes() == v1.tobytes()
     assert contact["v2_post"].tobytes() == v2.tobytes()
 

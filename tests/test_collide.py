@@ -17,7 +17,7 @@ from impact.contact.outputs import OUTPUTS, Outputs, collide
 from impact.contact.status import FIRST_FAILURE, Status
 from impact.errors import ConfigError
 
-from .problems import LAWS, impacts, with_parameters
+from .problems import LAWS, table1_impacts, with_parameters
 
 RTOL, MAX_STEPS = 1e-10, 10_000
 NAMES = list(OUTPUTS)
@@ -55,7 +55,7 @@ MISSING = {
 @pytest.mark.parametrize("given", MISSING.values(), ids=MISSING)
 @pytest.mark.parametrize("key", ["hertz", "gharib-hurmuzlu-2012", "bilinear"])
 def test_balls_that_do_not_approach_keep_their_velocities(key, given):
-    contact = struck(find(key), impacts(find(key).exponent or 1.5, **given))
+    contact = struck(find(key), table1_impacts(find(key).exponent or 1.5, **given))
     assert contact["status"][0] == Status.NO_IMPACT
     for velocities in (contact["v1_post"], contact["v1_reference"]):
         assert velocities[0] == given["v1"]
@@ -87,20 +87,20 @@ HOPELESS = {
 @pytest.mark.parametrize(("given", "status"), HOPELESS.values(), ids=HOPELESS)
 @pytest.mark.parametrize("key", ["gharib-hurmuzlu-2012", "lankarani-nikravesh-1994"])
 def test_impact_without_an_answer_says_why_and_is_nan(key, given, status):
-    contact = struck(find(key), impacts(**given))
+    contact = struck(find(key), table1_impacts(**given))
     assert contact["status"][0] == status
     for name in FAILED:
         assert np.isnan(contact[name][0]), name
 
 
 def test_an_impulse_too_large_for_a_number_gives_no_reference():
-    contact = struck(find("hertz"), impacts(e=0.5, v1=1e10, m1=1e300, m2=1e300))
+    contact = struck(find("hertz"), table1_impacts(e=0.5, v1=1e10, m1=1e300, m2=1e300))
     assert np.isnan([contact["v1_reference"][0], contact["v2_reference"][0]]).all()
 
 
 @pytest.mark.parametrize("e", [-0.1, 1.2, np.nan])
 def test_law_that_is_not_driven_by_e_does_not_mind_it(e):
-    contact = struck(find("hertz"), impacts(e=e))
+    contact = struck(find("hertz"), table1_impacts(e=e))
     assert contact["status"][0] == Status.OK
     assert contact["e_out"][0] == pytest.approx(1.0, rel=0, abs=1e-9)
     assert np.isnan(contact["v1_reference"][0])
@@ -115,7 +115,7 @@ def test_coefficient_out_of_its_range(value, status):
         return elastic * (1.0 + damping * v)
 
     model = law(force, "c", coefficients={"damping": lambda c: np.where(c == 2.0, value, c)})
-    lanes = impacts(e=[0.5, 0.5], parameters={"c": [0.5, 2.0]})
+    lanes = table1_impacts(e=[0.5, 0.5], parameters={"c": [0.5, 2.0]})
     assert struck(model, lanes)["status"].tolist() == [Status.OK, status]
 
 
@@ -191,7 +191,7 @@ def test_poisoned_lane_fails_alone(force, statuses, collapse):
     chi = np.tile(np.linspace(0.01, 1.5, 200), COUNT // 200)
     chi[POISONED] = POISON
     model = law(force, "chi", oracle=lambda chi: delivered_restitution(chi))
-    lanes = impacts(e=0.5, m1=np.linspace(1.0, 2.0, COUNT), parameters={"chi": chi})
+    lanes = table1_impacts(e=0.5, m1=np.linspace(1.0, 2.0, COUNT), parameters={"chi": chi})
     poisoned = struck(model, lanes, collapse)
     assert Status(poisoned["status"][POISONED]) in statuses
     for name in FAILED:
@@ -207,7 +207,9 @@ def test_law_that_always_raises_fails_everywhere():
     def force(elastic):
         raise ZeroDivisionError
 
-    assert struck(law(force), impacts(e=np.linspace(0, 1, 7)))["status"].tolist() == [Status.MODEL_ERROR] * 7
+    assert (
+        struck(law(force), table1_impacts(e=np.linspace(0, 1, 7)))["status"].tolist() == [Status.MODEL_ERROR] * 7
+    )
 
 
 # ---- collapse
@@ -225,7 +227,7 @@ speed = st.sampled_from([-0.5, -0.0, 0.0, 1.0, 1.25, 1e-3, 30.0])
 def test_collapse_changes_no_bit(key, rows):
     e, v1, v2, m1 = np.array(rows).T
     model = find(key)
-    lanes = impacts(model.exponent or 1.5, e=e, v1=v1, v2=v2, m1=m1)
+    lanes = table1_impacts(model.exponent or 1.5, e=e, v1=v1, v2=v2, m1=m1)
     lanes = replace(lanes, parameters={one.name: 1.0 + np.abs(e) for one in model.parameters})
     assert differences(struck(find(key), lanes), struck(find(key), lanes, collapse=False)) == []
 
@@ -235,7 +237,7 @@ def test_collapse_changes_no_bit(key, rows):
 def test_trajectory_has_the_same_bits_in_any_order_and_block(key, seed, size):
     chance = np.random.default_rng(seed)
     e, n = chance.uniform(0.0, 1.0, 20), find(key).exponent or 1.5
-    lanes = with_parameters(find(key), impacts(n, e=e, v1=chance.uniform(0.1, 10.0, 20)), 1.0 - e)
+    lanes = with_parameters(find(key), table1_impacts(n, e=e, v1=chance.uniform(0.1, 10.0, 20)), 1.0 - e)
     whole = struck(find(key), lanes)
     order = chance.permutation(20)
     for start in range(0, 20, size):
@@ -244,7 +246,7 @@ def test_trajectory_has_the_same_bits_in_any_order_and_block(key, seed, size):
 
 
 def test_exponents_do_not_mix():
-    first, second = impacts(1.5, e=[0.3, 0.6]), impacts(2.5, e=[0.3, 0.6])
+    first, second = table1_impacts(1.5, e=[0.3, 0.6]), table1_impacts(2.5, e=[0.3, 0.6])
     both = Impacts(
         **{f.name: np.concatenate([getattr(first, f.name), getattr(second, f.name)])
            for f in fields(Impacts) if f.name != "parameters"}
@@ -277,7 +279,7 @@ ROOT = np.sqrt(1.0 - ZETA * ZETA)
     ],
 )
 def test_linear_damped_contact_ends_at_its_release(release, e_out, contact_time):
-    lanes = impacts(1.0, parameters={"zeta": ZETA})
+    lanes = table1_impacts(1.0, parameters={"zeta": ZETA})
     contact = struck(kelvin_voigt(release), lanes)
     assert np.all(contact["status"] == Status.OK)
     assert contact["e_out"] == pytest.approx(e_out, rel=0, abs=1e-9)
@@ -290,7 +292,7 @@ def test_linear_damped_contact_ends_at_its_release(release, e_out, contact_time)
 
 @pytest.mark.parametrize(("release", "delivered"), [("force", True), ("gap", False)])
 def test_overdamped_contact_parts_only_where_its_force_vanishes(release, delivered):
-    lanes = impacts(1.0, parameters={"zeta": [1.5]})
+    lanes = table1_impacts(1.0, parameters={"zeta": [1.5]})
     contact = collide(kelvin_voigt(release), lanes, rtol=RTOL, max_steps=1000)
     if delivered:
         root = np.sqrt(1.5**2 - 1.0)
@@ -305,7 +307,9 @@ def test_damping_with_a_quarter_power_is_exact_in_its_smooth_coordinate(zeta):
     def force(K, m, x, v, elastic, alpha):
         return elastic + alpha * np.sqrt(m * K) * np.sqrt(np.sqrt(x)) * v
 
-    contact = struck(law(force, "alpha", coordinate_power=4), impacts(parameters={"alpha": [zeta * np.sqrt(5.0)]}))
+    contact = struck(
+        law(force, "alpha", coordinate_power=4), table1_impacts(parameters={"alpha": [zeta * np.sqrt(5.0)]})
+    )
     exact = np.exp(-np.pi * zeta / np.sqrt(1.0 - zeta * zeta))
     assert contact["e_out"][0] == pytest.approx(exact, rel=0, abs=1e-9)
     assert abs(contact["energy_residual"][0]) <= 10 * RTOL
@@ -326,7 +330,7 @@ DAMPED = ForceModel(
 def test_masses_moduli_and_speeds_of_any_size_give_the_same_dimensionless_answer(n):
     mass, modulus, speed = (10.0 ** grid.ravel() for grid in np.meshgrid(LOGS, LOGS, LOGS))
     given = {"e": 0.3, "v1": speed, "m1": mass, "m2": 3.0 * mass, "E1": modulus, "E2": modulus}
-    lanes = impacts(n, **given)
+    lanes = table1_impacts(n, **given)
     lanes = replace(lanes, parameters={"c": 0.4 * lanes.K / lanes.v0, "gap": 0.05 * lanes.length})
     contact = struck(DAMPED, lanes)
     assert np.all(contact["status"] == Status.OK)
@@ -355,7 +359,7 @@ OF_NO_SIZE = [
 def test_built_in_laws_scale_as_well(key):
     n = find(key).exponent or 1.5
     mass, modulus, speed = (10.0 ** grid.ravel() for grid in np.meshgrid(LOGS, LOGS, LOGS))
-    lanes = impacts(n, e=0.3, v1=speed, m1=mass, m2=mass, E1=modulus, E2=modulus)
+    lanes = table1_impacts(n, e=0.3, v1=speed, m1=mass, m2=mass, E1=modulus, E2=modulus)
     lanes = with_parameters(find(key), lanes, 1.0)
     contact = struck(find(key), lanes)
     # parameters that have a unit are rounded where they are converted
@@ -432,7 +436,7 @@ def test_balls_that_part_slowly_only_lack_steps():
 
 
 def test_a_law_may_ask_for_effective_radius_and_modulus_and_the_lower_yield_strength():
-    lanes = impacts(m2=[1.0, 5.0, np.inf], E2=[56e9, 2e6, 210e9])
+    lanes = table1_impacts(m2=[1.0, 5.0, np.inf], E2=[56e9, 2e6, 210e9])
     in_effective = law(lambda x, E_eff, R_eff: 4 / 3 * E_eff * np.sqrt(R_eff) * x**1.5)
     contact, hertz = struck(in_effective, lanes), struck(find("hertz"), lanes)
     assert contact["peak_indentation"] == pytest.approx(hertz["peak_indentation"], rel=1e-9)

@@ -24,7 +24,7 @@ from impact.engine.trajectories import trajectory_maps
 from impact.errors import ConfigError, UsageError
 
 from .conftest import ROOT, Run
-from .problems import impacts, with_parameters
+from .problems import table1_impacts, with_parameters
 
 RTOL, EQUAL = 1e-10, 1e-12
 compiled = pytest.mark.skipif(not is_installed(), reason='numba is not installed (extra "fast")')
@@ -52,7 +52,7 @@ def struck(model: ForceModel, lanes: Impacts, core: str, rtol: float = RTOL, max
 
 def of(key: str, n: float, e: np.ndarray) -> Impacts:
     """Impacts by a law, from strong damping to none."""
-    model, lanes = find(key), impacts(n, e=e)
+    model, lanes = find(key), table1_impacts(n, e=e)
     return with_parameters(model, lanes, np.geomspace(0.01, 30.0, e.size)) if model.parameters else lanes
 
 
@@ -202,10 +202,10 @@ FORMS = """
 import numpy as np
 from impact.contact.outputs import collide
 from impact.contact.models import find
-from tests.problems import impacts
+from tests.problems import table1_impacts
 for key in ("flores-2011", "exact-dashpot-no-tension", "gharib-hurmuzlu-2012-energetic"):
     e = np.linspace(1e-4, 1.0, {count})
-    one, other = (collide(find(key), impacts(1.5, e=e), rtol={rtol}, max_steps=10_000, core=core)
+    one, other = (collide(find(key), table1_impacts(1.5, e=e), rtol={rtol}, max_steps=10_000, core=core)
                   for core in ("numpy", "numba"))
     assert np.array_equal(one["status"], other["status"])
     assert np.array_equal(one["steps"], other["steps"])

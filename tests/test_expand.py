@@ -21,7 +21,7 @@ from impact.results.expand import CHECKS, checks_that_may_fail
 from impact.results.schema import SCHEMA
 from impact.results.sweep import sweep_into
 
-from .problems import impacts
+from .problems import table1_impacts
 from .test_collapse import DASHPOT, MATERIALS, NEEDS, OWN, SPEED
 
 # a rule of K of its own, which asks for the exponent, a speed and the masses
@@ -140,7 +140,7 @@ def test_what_is_not_checked_never_fails(config: dict[str, object]) -> None:
     [({"v0"}, Status.NO_IMPACT), ({"length"}, Status.NO_IMPACT), ({"e"}, Status.OK), (set(), Status.OK)],
 )
 def test_balls_that_part_have_a_status_by_their_speed_or_their_sizes(checks: set[str], status: Status) -> None:
-    checked = check_inputs(impact.models()["hertz"], impacts(v1=-1.0), frozenset(checks))
+    checked = check_inputs(impact.models()["hertz"], table1_impacts(v1=-1.0), frozenset(checks))
     assert np.broadcast_to(checked, 1).tolist() == [status]
 
 

@@ -15,7 +15,7 @@ from impact.contact.outputs import collide
 from impact.contact.status import Status
 
 from .conftest import Run
-from .problems import LAWS, impacts, with_parameters
+from .problems import LAWS, table1_impacts, with_parameters
 
 RTOL = 1e-10
 # Table 1: radius [m], stiffness [N/m^1.5], peak indentation [m]
@@ -26,7 +26,7 @@ def test_the_three_restitutions_of_every_law_are_one_number() -> None:
     e = np.array([0.2, 0.9])
     differences = [dict[str, float](), dict[str, float]()]
     for key in LAWS:
-        trajectories = with_parameters(find(key), impacts(find(key).exponent or 1.5, e=e), 0.5)
+        trajectories = with_parameters(find(key), table1_impacts(find(key).exponent or 1.5, e=e), 0.5)
         contact = collide(find(key), trajectories, rtol=RTOL, max_steps=100_000)
         restitutions = np.array([contact[name] for name in ("e_out", "e_kinetic", "e_energetic")])
         status = np.broadcast_to(contact["status"], e.shape)

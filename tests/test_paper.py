@@ -17,7 +17,7 @@ from impact.contact.models import find
 from impact.contact.outputs import Outputs, collide
 from impact.contact.status import Status
 
-from .problems import EACH_LAW, impacts, with_parameters
+from .problems import EACH_LAW, table1_impacts, with_parameters
 
 RTOL, MAX_STEPS = 1e-10, 100_000
 HYSTERESIS = {
@@ -39,7 +39,7 @@ def struck(key: str, lanes: Impacts) -> Outputs:
 
 def at(key: str, e: object) -> Outputs:
     """The case of Table 1 at these restitutions; a linear law has its own n."""
-    return struck(key, impacts(find(key).exponent or 1.5, e=np.asarray(e, float)))
+    return struck(key, table1_impacts(find(key).exponent or 1.5, e=np.asarray(e, float)))
 
 
 def error_of(key: str, e: object) -> np.ndarray:
@@ -54,13 +54,13 @@ def test_radius_of_table_1():
 
 
 def test_stiffness_and_effective_mass_of_table_1():
-    lanes = impacts()
+    lanes = table1_impacts()
     assert lanes.K[0] == pytest.approx(STIFFNESS, rel=1e-9)
     assert lanes.m[0] == MASS
 
 
 def test_peak_and_time_of_table_1_in_closed_form():
-    lanes = impacts()
+    lanes = table1_impacts()
     peak = peak_indentation(lanes.m, lanes.v0, lanes.K, 1.5)[0]
     assert peak == pytest.approx(PEAK, rel=1e-9)
     assert lanes.K[0] * peak**1.5 == pytest.approx(FORCE, rel=1e-8)
@@ -68,7 +68,7 @@ def test_peak_and_time_of_table_1_in_closed_form():
 
 
 def test_peak_and_time_of_table_1_come_out_of_the_integration():
-    contact = struck("hertz", impacts(e=1.0))
+    contact = struck("hertz", table1_impacts(e=1.0))
     assert contact["peak_indentation"][0] == pytest.approx(PEAK, rel=1e-9)
     assert contact["peak_force"][0] == pytest.approx(FORCE, rel=1e-8)
     assert contact["contact_time"][0] == pytest.approx(TIME, rel=3e-7)
@@ -105,7 +105,7 @@ PAIRS = [(1.0, 1.0), (2.0, 0.3), (1e-3, 1e3), (5.0, np.inf), (np.inf, 5.0)]
 @pytest.mark.parametrize("e", [0.0, 0.3, 1.0])
 def test_impulse_and_momentum(m1, m2, e):
     v1, v2 = 3.0, -1.5
-    lanes = impacts(e=e, m1=m1, m2=m2, v1=v1, v2=v2, R1=0.1, R2=0.1)
+    lanes = table1_impacts(e=e, m1=m1, m2=m2, v1=v1, v2=v2, R1=0.1, R2=0.1)
     (after1,), (after2,) = velocities_after(lanes, lanes.e)
     # (5), and a wall moves on as it did
     assert after2 - after1 == pytest.approx(e * (v1 - v2), rel=1e-14, abs=1e-14)
@@ -124,7 +124,7 @@ def test_impulse_and_momentum(m1, m2, e):
 @pytest.mark.parametrize(("m1", "m2"), PAIRS[:3])
 def test_impulse_velocity_diagram(m1, m2):
     # (8), (9): the lines meet at tau_c = m v0 and end at tau_c (1 + e)
-    e, lanes = 0.4, impacts(e=0.4, m1=m1, m2=m2, v2=-0.5)
+    e, lanes = 0.4, table1_impacts(e=0.4, m1=m1, m2=m2, v2=-0.5)
     tau = lanes.m * lanes.v0
     (stopped1,), (stopped2,) = velocities_at(lanes, tau)
     common = (m1 * lanes.v1[0] + m2 * lanes.v2[0]) / (m1 + m2)
@@ -141,7 +141,7 @@ def test_impulse_velocity_diagram(m1, m2):
 
 @pytest.mark.parametrize("key", EACH_LAW)
 def test_kinematic_kinetic_and_energetic_restitution_are_one_number(key):
-    lanes = with_parameters(find(key), impacts(find(key).exponent or 1.5, e=0.2), 0.5)
+    lanes = with_parameters(find(key), table1_impacts(find(key).exponent or 1.5, e=0.2), 0.5)
     history = follow(find(key), lanes, rtol=RTOL, max_steps=MAX_STEPS)
     kinematic = -history.v[-1] / history.v[0]
     assert kinematic == pytest.approx(struck(key, lanes)["e_out"][0], rel=1e-12, abs=RTOL)
@@ -231,7 +231,7 @@ def test_infinite_damping_has_no_indentation_and_no_finite_force_and_time(key):
 
 @pytest.mark.parametrize("key", PERMANENT)
 def test_infinite_unloading_stiffness_keeps_the_peak_and_half_the_time(key):
-    contact, lanes = at(key, [0.0]), impacts(find(key).exponent or 1.5)
+    contact, lanes = at(key, [0.0]), table1_impacts(find(key).exponent or 1.5)
     n = lanes.n[0]
     peak = peak_indentation(MASS, 1.0, lanes.K[0], n)
     assert contact["peak_indentation"][0] == pytest.approx(peak, rel=1e-9)
@@ -317,11 +317,11 @@ def test_both_permanent_laws_are_the_same_force_history():
 
 @pytest.mark.parametrize("gamma", [1.0, 2.0, 10.0])
 def test_43_delivers_the_reciprocal_of_gamma(gamma):
-    contact = struck("ismail-stronge-2008", impacts(1.0, parameters={"gamma": gamma}))
+    contact = struck("ismail-stronge-2008", table1_impacts(1.0, parameters={"gamma": gamma}))
     assert contact["e_out"][0] == pytest.approx(1.0 / gamma, rel=0, abs=1e-9)
 
 
 @pytest.mark.parametrize("key", HYSTERESIS)
 def test_restitution_of_the_hysteresis_family_depends_on_the_damping_ratio_alone(key):
-    lanes = impacts(m1=[1.0, 7.0, 1e-3], v1=[1.0, 20.0, 0.3], E2=[56e9, 2e6, 210e9])
+    lanes = table1_impacts(m1=[1.0, 7.0, 1e-3], v1=[1.0, 20.0, 0.3], E2=[56e9, 2e6, 210e9])
     assert np.unique(struck(key, lanes)["e_out"]).size == 1

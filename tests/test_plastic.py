@@ -10,7 +10,7 @@ from impact.contact.models import find
 from impact.contact.outputs import Outputs, collide
 from impact.contact.status import Status
 
-from .problems import impacts, with_parameters
+from .problems import table1_impacts, with_parameters
 
 RTOL = 1e-10
 SPEEDS = np.geomspace(1e-4, 30.0, 12)
@@ -29,11 +29,11 @@ def over_speed(key: str) -> tuple[Impacts, Outputs]:
     """Impacts at many speeds, with parameters of one contact in SI, so that slow ones do not yield."""
     model = find(key)
     n = model.exponent or 1.5
-    stiff = float(impacts(n).K[0])
+    stiff = float(table1_impacts(n).K[0])
     own = {"walton-braun-variable": {"S": 3e4}, "luding-2008": {"k2": 5.0, "kc": 0.02, "phi": 1e-3},
            "thornton-1997": {"c": 1.6}, "johnson-1985": {"c": 3.0}, "jackson-green-2010": {},
            "muthukumar-2003": {"d": 1e-4}, "kogut-etsion-2005": {}}[key]  # fmt: skip
-    lanes = impacts(n, v1=SPEEDS, K=stiff, parameters=own)
+    lanes = table1_impacts(n, v1=SPEEDS, K=stiff, parameters=own)
     contact = struck(model, lanes)
     assert np.all(contact["status"] == Status.OK)
     return lanes, contact
@@ -45,7 +45,7 @@ def test_an_unloading_that_is_a_share_of_the_elastic_force_returns_that_share_of
         "softer", "Softer", 2026, equation="", reference="", force=lambda elastic: elastic,
         unloading=lambda elastic: 0.25 * elastic,
     )  # fmt: skip
-    contact = struck(law, impacts(n))
+    contact = struck(law, table1_impacts(n))
     assert contact["status"][0] == Status.OK
     assert contact["e_out"][0] == pytest.approx(0.5, abs=1e-9)
 
@@ -217,22 +217,22 @@ def test_below_the_yield_speed_it_is_elastic(key):
 
 def test_thornton_at_multiples_of_the_yield_speed():
     # its closed form depends on V/V_y alone; far beyond it goes as 1.185 (V_y/V)^(1/4)
-    R, E, Y, _ = materials(impacts())
+    R, E, Y, _ = materials(table1_impacts())
     dy = (np.pi * 1.6 * Y / (2 * E)) ** 2 * R
-    lanes = impacts(parameters={"c": 1.6})
+    lanes = table1_impacts(parameters={"c": 1.6})
     speed = float(np.sqrt(0.8 * lanes.K[0] / lanes.m[0] * dy**2.5))
     times = np.array([0.5, 1.0, 10.0, 100.0, 1e5])
-    contact = struck(find("thornton-1997"), impacts(v1=times * speed, parameters={"c": 1.6}))
+    contact = struck(find("thornton-1997"), table1_impacts(v1=times * speed, parameters={"c": 1.6}))
     assert contact["e_out"][:4] == pytest.approx([1.0, 1.0, 0.658558, 0.374299], abs=5e-7)
     assert contact["e_out"][4] == pytest.approx(1.185 * times[4] ** -0.25, rel=1e-3)
 
 
 def test_jackson_and_green_is_near_the_fit_of_their_restitution():
-    R, E, Y, nu = materials(impacts())
+    R, E, Y, nu = materials(table1_impacts())
     dc = (np.pi * 1.295 * np.exp(0.736 * nu) * Y / (2 * E)) ** 2 * R
-    critical = float(np.sqrt(0.8 * 4.0 / 3.0 * E * np.sqrt(R) * dc**2.5 / impacts().m[0]))
+    critical = float(np.sqrt(0.8 * 4.0 / 3.0 * E * np.sqrt(R) * dc**2.5 / table1_impacts().m[0]))
     times = np.unique([*np.geomspace(0.5, 1000.0, 60), 2.3, 60.0])
-    e_out = struck(find("jackson-green-2010"), impacts(v1=times * critical))["e_out"]
+    e_out = struck(find("jackson-green-2010"), table1_impacts(v1=times * critical))["e_out"]
     slow = 1 - 0.1 * np.log(times) * (np.maximum(times - 1, 0) / 59) ** 0.156
     fast = 1 - 0.1 * np.log(60) - 0.11 * np.log(times / 60) * np.maximum(times - 60, 0) ** (2.36 * Y / E)
     off = e_out - np.where(times < 1, 1.0, np.where(times < 60, slow, fast))
@@ -246,9 +246,9 @@ def test_jackson_and_green_is_near_the_fit_of_their_restitution():
 
 def test_johnson_yields_at_his_yield_speed():
     # (1/2) m V_y² ≈ 53 R³ Y⁵/E*⁴ in his book, with two digits of (8/15)(0.8π)⁵
-    R, E, Y, _ = materials(impacts())
-    V = float(np.sqrt(2 * 53 * R**3 * Y**5 / E**4 / impacts().m[0]))
-    contact = struck(find("johnson-1985"), impacts(v1=np.array([0.99, 1.01]) * V, parameters={"c": 3.0}))
+    R, E, Y, _ = materials(table1_impacts())
+    V = float(np.sqrt(2 * 53 * R**3 * Y**5 / E**4 / table1_impacts().m[0]))
+    contact = struck(find("johnson-1985"), table1_impacts(v1=np.array([0.99, 1.01]) * V, parameters={"c": 3.0}))
     assert contact["e_out"][0] == pytest.approx(1.0, abs=1e-9)
     assert contact["permanent_indentation"][0] == 0.0
     # the recovery that would be more than went in is cut to all of it, by a curve where the approach was a line
@@ -264,10 +264,10 @@ def test_walton_and_braun_have_one_law_over_the_speed():
 def test_adhesion_holds_what_yields():
     def contact(k2: float) -> Outputs:
         # as deep as an elastic impact goes
-        lanes = impacts(1.0)
+        lanes = table1_impacts(1.0)
         depth, R = float(lanes.v0[0] * np.sqrt(lanes.m[0] / lanes.K[0])), materials(lanes)[0]
         own = {"k2": k2, "kc": 3.0, "phi": depth * 4.0 / (5.0 * 2 * R)}
-        return struck(find("luding-2008"), impacts(1.0, parameters=own))
+        return struck(find("luding-2008"), table1_impacts(1.0, parameters=own))
 
     held = contact(5.0)
     assert held["status"][0] == Status.LIMIT
@@ -279,9 +279,9 @@ def test_adhesion_holds_what_yields():
 @pytest.mark.parametrize(("e", "e_out"), [(0.1, 0.609), (0.3, 0.636), (0.5, 0.692), (0.7, 0.784), (0.9, 0.917)])
 def test_muthukumar_at_the_indentation_of_its_design(e, e_out):
     # designed for the peak of the elastic impact, which a stiffer loading does not come to
-    lanes = impacts(e=e)
+    lanes = table1_impacts(e=e)
     peak = float((1.25 * lanes.m / lanes.K)[0] ** 0.4)
-    contact = struck(find("muthukumar-2003"), impacts(e=e, parameters={"d": peak}))
+    contact = struck(find("muthukumar-2003"), table1_impacts(e=e, parameters={"d": peak}))
     assert contact["e_out"][0] == pytest.approx(e_out, abs=5e-4)
 
 
@@ -299,14 +299,14 @@ def ramp(**given) -> ForceModel:
 
 def test_no_step_goes_across_a_bend():
     depths = np.geomspace(0.01, 2.0, 40)
-    lanes = impacts(parameters={"C": 0.7, "d": depths})
+    lanes = table1_impacts(parameters={"C": 0.7, "d": depths})
     bent, across = ramp(breakpoints=(lambda d: d,)), ramp()
     best = struck(bent, lanes, 1e-13)
     assert np.all(best["status"] == Status.OK)
     with_bends, without = (np.max(np.abs(struck(one, lanes)["e_out"] - best["e_out"])) for one in (bent, across))
     assert with_bends <= 1e-9 < without
     # a bend beyond the peak, or none, is none
-    deep = impacts(parameters={"C": 0.7, "d": np.array([2.0])})
+    deep = table1_impacts(parameters={"C": 0.7, "d": np.array([2.0])})
     for none in (np.nan, np.inf, -1.0, 5.0):
         odd = ramp(breakpoints=(lambda d, at=none: d * at,))
         assert struck(odd, deep)["e_out"].tobytes() == struck(across, deep)["e_out"].tobytes()
@@ -324,7 +324,7 @@ def test_parts_of_a_phase_depend_on_no_company(key):
 @pytest.mark.parametrize("key", PLASTIC)
 def test_time_goes_on_across_bends(key):
     # a contact in parts takes as long at a tighter tolerance, and as in history
-    lanes = with_parameters(find(key), impacts(find(key).exponent or 1.5, v1=3.0), 0.3)
+    lanes = with_parameters(find(key), table1_impacts(find(key).exponent or 1.5, v1=3.0), 0.3)
     loose, tight = struck(find(key), lanes), struck(find(key), lanes, 1e-13)
     assert loose["contact_time"] == pytest.approx(tight["contact_time"], rel=1e-8)
     assert loose["energy_residual"] == pytest.approx(0.0, abs=1e-9)

@@ -15,13 +15,13 @@ from impact.ode import events, maximum, rk45, tableau
 from impact.ode.problem import Problem, Solution, Termination
 from impact.ode.rk45 import Workspace, integrate, rk_step
 
-from .problems import OSCILLATOR, PROBLEMS, SPRINGS, TANH, Known
+from .problems import OSCILLATOR, PROBLEMS, SPRINGS, TANH, SolvedProblem
 
 RTOLS = 10.0 ** -np.arange(4, 13)
 
 
-def solve(known: Known, rtol: float, record: bool = False) -> Solution:
-    start = np.array(known.start).reshape(2, 1)
+def solve(known: SolvedProblem, rtol: float, record: bool = False) -> Solution:
+    start = np.array(known.initial_state).reshape(2, 1)
     return integrate(known.problem, start, (), rtol=rtol, max_steps=1000, record=record)
 
 
@@ -37,11 +37,11 @@ def bits(solution: Solution, index: int) -> bytes:
     return b"".join(array[..., index].tobytes() for array in arrays)
 
 
-def fixed_step_error(known: Known, count: int, embedded: bool) -> float:
+def fixed_step_error(known: SolvedProblem, count: int, embedded: bool) -> float:
     """The error at the end after equal steps, advanced by the solution or by the embedded one."""
-    rates, h = known.problem.rates, np.array([known.ends / count])
+    rates, h = known.problem.rates, np.array([known.event_time / count])
     y = np.zeros((4, 1))
-    y[:2, 0] = known.start
+    y[:2, 0] = known.initial_state
     k = rates(y[:2], ())
     for _ in range(count):
         y, stages = rk_step(known.problem, y, k, h, (), Workspace.of(h.size))
@@ -49,7 +49,7 @@ def fixed_step_error(known: Known, count: int, embedded: bool) -> float:
         if embedded:
             y = y - h * sum(float(e) * stage[:4] for e, stage in zip(tableau.E, stages, strict=True))
             k = rates(y[:2], ())
-    return np.abs(y[:2, 0] - known.exact(known.ends)).max()
+    return np.abs(y[:2, 0] - known.exact(known.event_time)).max()
 
 
 @pytest.mark.parametrize("known", [OSCILLATOR, TANH], ids=str)
@@ -62,7 +62,7 @@ def test_halved_steps_have_the_slope_of_the_order(known, embedded, order):
 
 @pytest.mark.parametrize("known", PROBLEMS, ids=str)
 def test_tighter_tolerance_lowers_the_error_in_proportion(known):
-    errors = [abs(solve(known, rtol).state[0, 0] - known.exact(known.ends)[0]) for rtol in RTOLS]
+    errors = [abs(solve(known, rtol).state[0, 0] - known.exact(known.event_time)[0]) for rtol in RTOLS]
     assert np.all(np.diff(errors) < 0.0)
     assert np.all(errors < 3.0 * RTOLS)
     assert np.all(errors > 0.03 * RTOLS)
@@ -73,14 +73,14 @@ def test_ends_with_its_quadratures_and_maximum_at_the_event(known):
     solution = solve(known, 1e-11)
     assert solution.termination[0] == Termination.EVENT_REACHED
     assert solution.state[:, 0] == pytest.approx(
-        [*known.exact(known.ends), known.ends, known.quadrature], rel=0, abs=1e-10
+        [*known.exact(known.event_time), known.event_time, known.quadrature], rel=0, abs=1e-10
     )
-    assert solution.maximum[0] == pytest.approx(known.highest, rel=1e-10)
+    assert solution.maximum[0] == pytest.approx(known.maximum, rel=1e-10)
 
 
 @pytest.mark.parametrize("known", PROBLEMS, ids=str)
 def test_event_is_met_to_rounding(known):
-    assert solve(known, 1e-6).state[1, 0] == pytest.approx(known.exact(known.ends)[1], rel=0, abs=1e-15)
+    assert solve(known, 1e-6).state[1, 0] == pytest.approx(known.exact(known.event_time)[1], rel=0, abs=1e-15)
 
 
 @pytest.mark.parametrize("known", PROBLEMS, ids=str)
@@ -292,5 +292,5 @@ def test_every_recorded_step_begins_where_the_one_before_ended(known):
 
 def test_the_maximum_is_located_where_it_is_asked_for_only():
     unwatched = replace(OSCILLATOR.problem, watch=False)
-    start = np.array(OSCILLATOR.start).reshape(2, 1)
+    start = np.array(OSCILLATOR.initial_state).reshape(2, 1)
     assert integrate(unwatched, start, (), rtol=1e-9, max_steps=1000).maximum.tolist() == [-np.inf]
