@@ -37,7 +37,7 @@ from scipy.integrate import solve_ivp
 
 import impact
 from impact.api import execute, prepare
-from impact.contact.closed_forms import delivered_restitution
+from impact.contact.closed_forms.hysteresis import delivered_restitution
 from impact.contact.impacts import Impacts
 from impact.contact.model import ForceModel
 from impact.contact.numba.dispatch import is_installed

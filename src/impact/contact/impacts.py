@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from .closed_forms import peak_indentation
+from .closed_forms.elastic import peak_indentation
 from .materials import effective_compliance, effective_mass, effective_radius
 from .model import ForceModel, Law
 from .powers import Array, all_within, powers

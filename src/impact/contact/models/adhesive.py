@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..closed_forms import edinburgh_adhesion, edinburgh_restitution, jkr_restitution, jkr_root
+from ..closed_forms.adhesive import edinburgh_adhesion, edinburgh_restitution, jkr_restitution, jkr_root
 from ..evidence import Evidence
 from ..force_expressions import spring
 from ..model import ForceModel, Parameter

@@ -7,7 +7,8 @@ from typing import Unpack
 
 import numpy as np
 
-from ..closed_forms import approach_damped_restitution, approach_damping, approach_restitution
+from ..closed_forms.dashpot import approach_damping, approach_restitution
+from ..closed_forms.hysteresis import approach_damped_restitution
 from ..evidence import Evidence
 from ..force_expressions import damped, spring, stiffer
 from ..formula import Formula

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..closed_forms import muthukumar_restitution
+from ..closed_forms.plastic import muthukumar_restitution
 from ..evidence import Evidence
 from ..force_expressions import returning
 from ..model import ForceModel, Parameter

@@ -11,7 +11,7 @@ from typing import Any, Literal, Unpack
 
 import numpy as np
 
-from ..closed_forms import force_damping, force_restitution, gap_damping, gap_restitution
+from ..closed_forms.dashpot import force_damping, force_restitution, gap_damping, gap_restitution
 from ..evidence import Evidence
 from ..force_expressions import dragged
 from ..formula import Formula

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..closed_forms import luding_restitution, thornton_restitution
+from ..closed_forms.plastic import luding_restitution, thornton_restitution
 from ..evidence import Evidence
 from ..force_expressions import returning, spring
 from ..formula import Formula

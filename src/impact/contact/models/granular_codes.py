@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..closed_forms import force_damping, gap_damping
+from ..closed_forms.dashpot import force_damping, gap_damping
 from ..evidence import Evidence
 from ..model import ForceModel, Parameter
 from ..powers import Array, power

@@ -6,7 +6,7 @@ from typing import Unpack
 
 import numpy as np
 
-from ..closed_forms import delivered_restitution, exact_damping_ratio
+from ..closed_forms.hysteresis import delivered_restitution, exact_damping_ratio
 from ..evidence import Evidence
 from ..force_expressions import damped
 from ..formula import Formula

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..closed_forms import force_restitution, limited_restitution
+from ..closed_forms.dashpot import force_restitution, limited_restitution
 from ..evidence import Evidence
 from ..formula import Formula
 from ..model import ForceModel, Parameter

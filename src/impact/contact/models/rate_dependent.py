@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal, Unpack
 
-from ..closed_forms import pade_damping
+from ..closed_forms.viscoelastic import pade_damping
 from ..evidence import Evidence
 from ..force_expressions import dragged
 from ..formula import Formula
