@@ -13,7 +13,7 @@ import pytest
 import xarray as xr
 
 import impact
-from impact.cli.info import info_json, print_info
+from impact.cli.info import print_info
 from impact.contact.status import FIRST_FAILURE, Status
 from impact.errors import UsageError
 from impact.plots.kinds import KINDS, Choice
@@ -183,10 +183,12 @@ def test_info_evaluates_the_few_points_that_differ(
     assert (rows["points"], rows["layout"], rows["seal"]) == ("12,000,000,000,000", "factored", "5ea1")
     assert rows["m1"] == "0.1 … 10, 10000 values [kg]"
     assert "content_digest" not in rows
-    told = info_json(sealed)
-    assert (told["points"], told["layout"], told["seal"]) == (OWN * WEIGHT, "factored", "5ea1")
-    assert (info_json(dataset)["layout"], info_json(dataset)["seal"]) == (None, None)
     assert max(reads.total.values()) <= 4 * OWN
+    described = impact.info(sealed)
+    assert (described["points"], described["layout"], described["seal"]) == (OWN * WEIGHT, "factored", "5ea1")
+    assert described["variables"]["e_out"]["largest"] == float(small["e_out"].max())
+    in_memory = impact.info(small)
+    assert (in_memory["layout"], in_memory["seal"]) == (None, None)
 
 
 def test_a_report_reads_the_few_points_that_differ(small: xr.Dataset) -> None:

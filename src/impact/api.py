@@ -8,8 +8,9 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
+from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from .comparison.bless import bless as bless
 from .comparison.compare import compare as compare
@@ -34,7 +35,7 @@ from .engine.plugins import read_plugins
 from .engine.progress import Progress, ProgressCallback
 from .engine.trajectories import check_count
 from .errors import ImpactError as ImpactError
-from .errors import UnfinishedError, UsageError
+from .errors import UnfinishedError, UsageError, did_you_mean
 from .results.backend import check_output, open_result, write_file
 from .results.backend import load as load
 from .results.backend import save as save
@@ -49,7 +50,7 @@ from .results.shards import merge as merge_shards
 from .results.shards import sweep_shard as write_shard
 from .results.single_impact import STARTER_CONFIG, histories, run_single_impact, single_point
 from .results.single_impact import Impact as Impact
-from .results.summary import SweepOutcome
+from .results.summary import SweepOutcome, describe
 from .results.sweep import find_finished, sweep_in_memory, sweep_into
 from .text import safe_text
 
@@ -59,8 +60,17 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from .contact.checks import Finding
     from .plots.kinds import Choice, PlotData
     from .results.estimate import Estimate
+
+
+class PlotFiles(NamedTuple):
+    """Pictures in files and their data, by kind, and the reason why a kind was left out."""
+
+    pictures: dict[str, Path]
+    plot_data: dict[str, PlotData]
+    left_out: dict[str, str]
 
 
 def ignore_progress(progress: Progress) -> None:
@@ -643,14 +653,77 @@ def rerun(
     return replace(verdict, new="the rerun", baseline=str(result), repeats=again)
 
 
-def models(plugins: Sequence[ForceModel | str | Path] = ()) -> Mapping[str, ForceModel]:
-    """The catalogue of contact force models, by key.
+def models(
+    plugins: Sequence[ForceModel | str | Path] = (), *, pattern: str = "*", family: str | None = None
+) -> Mapping[str, ForceModel]:
+    """The catalogue of contact force models, by key, or a part of it.
+
+    Parameters
+    ----------
+    plugins : plug-in models, and paths of Python files with such models, which come last
+    pattern : pattern of the keys, such as "lammps-*"
+    family : name of the family; by default all families
+
+    Raises
+    ------
+    UsageError : no model matches the pattern, or there is no such family
+    ModelError : a plug-in cannot be read or is invalid
 
     >>> import impact
     >>> impact.models()["gharib-hurmuzlu-2012"].equation
     'F = K δⁿ (1 + χ δ̇/v₀),  χ = 1/e  (28)'
+    >>> list(impact.models(pattern="lankarani-*"))
+    ['lankarani-nikravesh-1990', 'lankarani-nikravesh-1994']
     """
-    return catalogue(read_plugins(plugins).models)
+    all_models = catalogue(read_plugins(plugins).models)
+    families = sorted({model.family for model in all_models.values()})
+    if family is not None and family not in families:
+        raise UsageError(f'--family: no family "{safe_text(family)}"; {did_you_mean(family, families)}')
+    of_family = {key: model for key, model in all_models.items() if family in (None, model.family)}
+    matching = {key: model for key, model in of_family.items() if fnmatchcase(key, pattern)}
+    if not matching:
+        raise UsageError(
+            f'no model matches "{safe_text(pattern)}"; {did_you_mean(pattern.strip("*?"), list(of_family))}'
+        )
+    return matching
+
+
+def check_model(model: ForceModel) -> list[Finding]:
+    """Check a model, such as a plug-in, against every clause of the contract, with forty dissimilar impacts.
+
+    Returns
+    -------
+    list of Finding : the clause, the largest deviation, its bound, and whether the clause holds
+
+    >>> import impact
+    >>> all(finding.holds for finding in impact.check_model(impact.models()["bilinear"]))
+    True
+    """
+    # its module integrates, which a program that only imports impact does without
+    from .contact.checks import contract
+
+    return list(contract(model))
+
+
+def info(result: xr.Dataset | str | Path) -> dict[str, Any]:
+    """What is in a result or a time history of any size.
+
+    Returns
+    -------
+    dict : points; layout and seal of the file, None in memory; dimensions; coordinates; units, dims, smallest and
+        largest value and number of missing values of each variable; counts of points by status; largest errors by
+        variable and model; attributes. A value is None, or missing, where a summary would evaluate too many
+        points; `not_evaluated` counts the points without a status
+
+    Raises
+    ------
+    ResultError : the file is not a readable result
+
+    >>> import impact
+    >>> impact.info(impact.sweep("configs/figure6.toml"))["status"]
+    {'ok': 301, 'limit': 2}
+    """
+    return describe(load(result) if isinstance(result, str | Path) else result)
 
 
 def plot(
@@ -716,6 +789,105 @@ def plot(
     choice = Choice(x, y, variable, sel, models, log, equations)
     plot_data = get_plot_data(dataset, kind, choice, plugins)
     return draw(plot_data, width, height, style=style, title=title, labels=labels, points=points, ax=ax)
+
+
+def plot_to_files(
+    result: str | Path,
+    output: str | Path | None = None,
+    *,
+    kinds: Sequence[str] = ("final-velocities",),
+    x: str | None = None,
+    y: str | None = None,
+    variable: str = "e_error",
+    sel: Mapping[str, float | str] | None = None,
+    models: Sequence[str] | None = None,
+    log: str = "",
+    points: str | Path | None = None,
+    width: float | str | None = None,
+    height: float | str | None = None,
+    style: str | Path | None = None,
+    title: bool = True,
+    labels: Mapping[str, str] | None = None,
+    equations: bool = False,
+    data: str | Path | None = None,
+    data_form: str = "wide",
+    overwrite: bool = False,
+    plugins: Sequence[ForceModel | str | Path] = (),
+) -> PlotFiles:
+    """Draw a stored result into a file for each kind of picture.
+
+    Kinds that the result does not have the data for are left out; it is an error if none can be drawn.
+
+    Parameters
+    ----------
+    result : file of a result, or of a time history
+    output : the picture, with the ending of its format; by default the result's name with .png. The name of each
+        of several kinds has the kind in it
+    kinds : see `impact.plots.kinds.KINDS`
+    data : file for the numbers behind the picture: .csv, .tex or .parquet
+    data_form : "wide", a column for each curve, or "long", a row for each point
+    overwrite : replace existing files
+    x, y, variable, sel, models, log, points, width, height, style, title, labels, equations, plugins : see `plot`
+
+    Returns
+    -------
+    PlotFiles : by kind the picture and its data, and the reason why a kind is left out
+
+    Raises
+    ------
+    UsageError : no kind can be drawn, an argument is invalid, or a file exists
+    ResultError : the result is not readable
+    StoreError : the disk is full or failed
+
+    >>> import impact, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     impact.save(impact.sweep("configs/figure6.toml"), f"{folder}/r.h5")
+    ...     [path.name for path in impact.plot_to_files(f"{folder}/r.h5").pictures.values()]
+    ['r.png']
+    """
+    from .plots.data import check_table, encode_table, read_points
+    from .plots.kinds import Choice, check_kind, draw
+    from .plots.style import check_picture, length, save_figure
+
+    choice = Choice(x, y, variable, sel, models, log, equations)
+    kinds = list(dict.fromkeys(kinds))
+    for kind in kinds:
+        check_kind(kind)
+    size = length(width, "--width"), length(height, "--height")
+    result = Path(result)
+    output = Path(output) if output is not None else result.with_suffix(".png")
+    check_picture(output)
+    if data is not None:
+        check_table(Path(data), data_form)
+
+    def path_of(kind: str, path: str | Path) -> Path:
+        path = Path(path)
+        return path if len(kinds) == 1 else path.with_name(f"{path.stem}-{kind}{path.suffix}")
+
+    pictures = {kind: path_of(kind, output) for kind in kinds}
+    tables = {kind: path_of(kind, data) for kind in kinds} if data is not None else {}
+    for path in (*pictures.values(), *tables.values()):
+        for source in (result, *([Path(points)] if points else [])):
+            check_output(path, overwrite=overwrite, source=source)
+    measured = None if points is None else read_points(points)
+    dataset = load(result)
+    drawn: dict[str, PlotData] = {}
+    left_out: dict[str, str] = {}
+    for kind in kinds:
+        try:
+            plot_data = get_plot_data(dataset, kind, choice, plugins)
+            figure = draw(plot_data, *size, style=style, title=title, labels=labels, points=measured)
+            table = encode_table(plot_data, tables[kind].suffix.lower(), data_form) if tables else b""
+        except UsageError as error:
+            left_out[kind] = str(error)
+            continue
+        save_figure(figure, pictures[kind], overwrite=overwrite, style=style)
+        if tables:
+            write_file(tables[kind], table, overwrite=overwrite)
+        drawn[kind] = plot_data
+    if not drawn:
+        raise UsageError("\n".join(dict.fromkeys(left_out.values())))
+    return PlotFiles({kind: pictures[kind] for kind in drawn}, drawn, left_out)
 
 
 def get_plot_data(

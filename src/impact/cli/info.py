@@ -15,8 +15,16 @@ from .options import JsonOption
 if TYPE_CHECKING:
     import xarray as xr
 
-# how a result is stored, where it was read from a file
-STORED = ("layout", "seal")
+SHOWN_ATTRIBUTES = (
+    "rtol",
+    "materials",
+    "impact_version",
+    "schema_version",
+    "fingerprint",
+    "plugins",
+    "tolerances",
+    "reason",
+)
 
 
 def info(
@@ -28,42 +36,24 @@ def info(
 
     dataset = api.load(file)
     if as_json:
-        print(dump(info_json(dataset)))
+        print(dump(api.info(dataset)))
     else:
         print_info(dataset, file)
 
 
-def info_json(dataset: xr.Dataset) -> dict[str, Any]:
-    """What is in a file as plain data; its layout and its seal are null where they are not known."""
-    import numpy as np
-
-    from ..results.schema import count_points
-
-    return {
-        "points": count_points(dataset),
-        **{name: dataset.encoding.get(name) for name in STORED},
-        "dimensions": {str(name): size for name, size in dataset.sizes.items()},
-        "coordinates": [str(name) for name in dataset.coords],
-        "variables": {str(n): {"units": v.attrs.get("units"), "dims": list(v.dims)} for n, v in dataset.items()},
-        "attributes": {
-            str(n): v if isinstance(v, str) else np.asarray(v).tolist() for n, v in dataset.attrs.items()
-        },
-    }
-
-
 def print_info(dataset: xr.Dataset, path: Path) -> None:
     """What is in a file, of any size; "–" where more would have to be evaluated than a summary is worth."""
+    from .. import api
     from ..results.attributes import read_attribute
-    from ..results.schema import count_points, exponents_of, plain_unit
-    from ..results.summary import counts_by_name, extremes_of, summarize
+    from ..results.schema import exponents_of, plain_unit
     from .summary import worst_errors
 
+    description = api.info(dataset)
     attributes = dataset.attrs
-    tally = summarize(dataset) if "model" in dataset.dims else None
-    sizes = " × ".join(f"{name} {size}" for name, size in dataset.sizes.items())
+    sizes = " × ".join(f"{name} {size}" for name, size in description["dimensions"].items())
     rows: dict[str, Any] = {"file": path, "title": attributes.get("title", ""), "dimensions": sizes}
-    rows["points"] = f"{count_points(dataset):,}"
-    rows |= {name: dataset.encoding[name] for name in STORED if dataset.encoding.get(name) is not None}
+    rows["points"] = f"{description['points']:,}"
+    rows |= {name: description[name] for name in ("layout", "seal") if description[name] is not None}
     for name, coordinate in dataset.coords.items():
         if name in ("title", "equation", "reference", "doi", "year"):
             continue
@@ -72,42 +62,32 @@ def print_info(dataset: xr.Dataset, path: Path) -> None:
             text = exponents_of(dataset) or text
         unit = plain_unit(str(coordinate.attrs.get("units", "1")))
         rows[str(name)] = text + ("" if unit == "1" else f" [{unit}]")
-    for name in (
-        "rtol",
-        "materials",
-        "impact_version",
-        "schema_version",
-        "fingerprint",
-        "plugins",
-        "tolerances",
-        "reason",
-    ):
+    for name in SHOWN_ATTRIBUTES:
         if attributes.get(name, "{}") != "{}":
             rows[name] = attributes[name]
     if read_attribute(attributes, "config_set"):
         rows["config_set"] = attributes["config_set"]
-    if tally and tally.counts:
-        rows["status"] = ", ".join(f"{count:,} {name}" for name, count in counts_by_name(tally.counts).items())
-    if tally and tally.not_counted:
-        rows["not evaluated"] = f"the status of {tally.not_counted:,} points"
+    if description["status"]:
+        rows["status"] = ", ".join(f"{count:,} {name}" for name, count in description["status"].items())
+    if description["not_evaluated"]:
+        rows["not evaluated"] = f"the status of {description['not_evaluated']:,} points"
     print_rows(rows)
     out = console(sys.stdout)
     out.print()
     listed = table("variable", "unit", "dimensions", "smallest", "largest", "missing")
-    for name, variable in dataset.items():
-        extremes = extremes_of(dataset, str(name))
-        ends = [number(end) for end in extremes[:2]] if extremes else ["–", "–"]
+    for name, variable in description["variables"].items():
+        evaluated = variable["missing"] is not None
         listed.add_row(
             cell(name),
-            cell(variable.attrs.get("units", "")),
-            cell(", ".join(map(str, variable.dims))),
-            *ends,
-            f"{extremes.missing:,}" if extremes else "–",
+            cell(variable["units"] or ""),
+            cell(", ".join(map(str, variable["dims"]))),
+            *(number(variable[end]) if evaluated else "–" for end in ("smallest", "largest")),
+            f"{variable['missing']:,}" if evaluated else "–",
         )
     out.print(listed)
-    if tally and tally.worst:
+    if description["worst"]:
         out.print()
-        out.print(worst_errors(dataset, tally))
+        out.print(worst_errors(description["worst"]))
 
 
 def _values_text(dataset: xr.Dataset, name: str) -> str:

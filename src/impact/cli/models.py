@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Sequence
-from fnmatch import fnmatchcase
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..errors import UsageError, did_you_mean
 from ..formatting import decimals, number
-from ..text import safe_text, with_year
+from ..text import with_year
 from . import exits
 from .console import cell, console, dump, print_rows, table
 from .options import JsonOption, PluginOption
@@ -55,7 +53,8 @@ def models(
     as_json: JsonOption = False,
 ) -> None:
     """The catalogue of contact force models: equations, references, domains, delivered restitution."""
-    from ..contact.models import catalogue, find
+    from .. import api
+    from ..contact.models import find
     from ..engine.plugins import read_plugins
 
     if check is not None:
@@ -65,35 +64,17 @@ def models(
             as_json=as_json,
         )
         return
-    others = read_plugins(plugins or ()).models
     is_pattern = key is None or bool({*"*?["} & {*key})
     if is_pattern:
-        chosen = _matching(key or "*", _of_family(family, list(catalogue(others).values())))
+        chosen = list(api.models(plugins or (), pattern=key or "*", family=family).values())
     else:
-        chosen = [find(str(key), others)]
+        chosen = [find(str(key), read_plugins(plugins or ()).models)]
     if as_json:
         print(dump([model_json(model) for model in chosen]))
     elif is_pattern:
         _print_models(chosen)
     else:
         _print_model(chosen[0])
-
-
-def _matching(pattern: str, models: Sequence[ForceModel]) -> Sequence[ForceModel]:
-    """The models whose keys match a pattern."""
-    matching = [model for model in models if fnmatchcase(model.key, pattern)]
-    if not matching:
-        keys = [model.key for model in models]
-        raise UsageError(f'no model matches "{safe_text(pattern)}"; {did_you_mean(pattern.strip("*?"), keys)}')
-    return matching
-
-
-def _of_family(family: str | None, models: Sequence[ForceModel]) -> Sequence[ForceModel]:
-    """The models of a family, or all."""
-    families = sorted({model.family for model in models})
-    if family is not None and family not in families:
-        raise UsageError(f'--family: no family "{safe_text(family)}"; {did_you_mean(family, families)}')
-    return [model for model in models if family in (None, model.family)]
 
 
 def model_json(model: ForceModel) -> dict[str, Any]:
@@ -152,7 +133,8 @@ def _print_models(models: Sequence[ForceModel]) -> None:
         )
     out.print("A model with [parameters] depends on them; `impact models KEY` describes one model in full.")
     counts = count_states(model.evidence for model in models)
-    out.print(f"Evidence for the formulas of these {len(models)} entries: {counts}.")
+    entries = "this entry" if len(models) == 1 else f"these {len(models)} entries"
+    out.print(f"Evidence for the formulas of {entries}: {counts}.")
 
 
 def _catalogue_columns(room: int) -> tuple[tuple[float, ...], tuple[str, ...]]:
@@ -246,9 +228,9 @@ def _check_contract(models: Sequence[ForceModel], *, as_json: bool) -> None:
     """Print what came of every clause of the contract; exit 1 if one does not hold."""
     from rich.text import Text
 
-    from ..contact.checks import contract
+    from .. import api
 
-    findings_by_model = [(model, list(contract(model))) for model in models]
+    findings_by_model = [(model, api.check_model(model)) for model in models]
     broken = [finding for _, findings in findings_by_model for finding in findings if not finding.holds]
     if as_json:
         print(

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..errors import UsageError, did_you_mean
-from ..plots.kinds import KINDS, LOG_AXES, WIDTHS
+from ..errors import UsageError
+from ..plots.kinds import KINDS, WIDTHS
 from ..text import safe_text
 from . import exits
 from .console import dump
@@ -16,6 +17,8 @@ from .options import JsonOption, ModelOption, OverwriteOption, PluginOption, Sel
 
 if TYPE_CHECKING:
     from ..plots.kinds import PlotData
+
+DEFAULT_KINDS = ("final-velocities",)
 
 
 def plot(
@@ -35,7 +38,7 @@ def plot(
             "--kind",
             "-k",
             metavar="KIND",
-            help=f"{', '.join(KINDS)}; may be repeated. \\[default: {next(iter(KINDS))}]",
+            help=f"{', '.join(KINDS)}; may be repeated. \\[default: {DEFAULT_KINDS[0]}]",
         ),
     ] = None,
     x: Annotated[
@@ -47,7 +50,7 @@ def plot(
     variable: Annotated[str, typer.Option("--variable", help="What a map shows.")] = "e_error",
     sel: SelectOption = None,
     model: ModelOption = None,
-    log: Annotated[str | None, typer.Option("--log", help="Axes to make logarithmic: x, y or xy.")] = None,
+    log: Annotated[str, typer.Option("--log", metavar="AXES", help="Axes to make logarithmic: x, y or xy.")] = "",
     points: Annotated[
         Path | None,
         typer.Option(
@@ -108,57 +111,35 @@ def plot(
     Of several kinds those that apply are drawn, and the others are named with the reason.
     """
     from .. import api
-    from ..plots.data import check_table, encode_table, read_points
-    from ..plots.kinds import Choice, draw
-    from ..plots.style import check_picture, length, save_figure
-    from ..results import backend
 
-    if log not in (None, *LOG_AXES):
-        raise UsageError(f"--log: got {safe_text(str(log))}, expected {', '.join(LOG_AXES)}")
-    kinds = list(dict.fromkeys(kind or ["final-velocities"]))
-    for name in kinds:
-        if name not in KINDS:
-            raise UsageError(f'--kind: no kind "{safe_text(name)}"; {did_you_mean(name, list(KINDS))}')
-    size = length(width, "--width"), length(height, "--height")
-    output = output or result.with_suffix(".png")
-    check_picture(output)
-    if data is not None:
-        check_table(data, data_form)
-    files = {
-        name: [_path_of_kind(path, name, len(kinds)) for path in (output, data) if path is not None]
-        for name in kinds
-    }
-    for path in (path for paths in files.values() for path in paths):
-        for source in (result, *([points] if points else [])):
-            backend.check_output(path, overwrite=overwrite, source=source)
-    measured = None if points is None else read_points(points)
-    dataset = api.load(result)
-    choice = Choice(x, y, variable, dict(sel or ()), model, log or "", equations)
-    drawn: dict[str, PlotData] = {}
-    faults: dict[str, str] = {}
-    for name, (picture, *table) in files.items():
-        try:
-            plot_data = api.get_plot_data(dataset, name, choice, plugin or ())
-            figure = draw(
-                plot_data, *size, style=style, title=not no_title, labels=_parse_labels(label), points=measured
-            )
-            tables = [(path, encode_table(plot_data, path.suffix.lower(), data_form)) for path in table]
-        except UsageError as error:
-            faults[name] = str(error)
-            continue
-        save_figure(figure, picture, overwrite=overwrite, style=style)
-        for path, content in tables:
-            backend.write_file(path, content, overwrite=overwrite)
-        drawn[name] = plot_data
-        exits.print_line(_summary_line(picture, plot_data))
-    if not drawn:
-        raise UsageError("\n".join(dict.fromkeys(faults.values())))
-    for name, fault in faults.items():
-        exits.print_line(f"{name} is not drawn: {fault}")
+    files = api.plot_to_files(
+        result,
+        output,
+        kinds=kind or DEFAULT_KINDS,
+        x=x,
+        y=y,
+        variable=variable,
+        sel=dict(sel or ()),
+        models=model,
+        log=log,
+        points=points,
+        width=width,
+        height=height,
+        style=style,
+        title=not no_title,
+        labels=_parse_labels(label),
+        equations=equations,
+        data=data,
+        data_form=data_form,
+        overwrite=overwrite,
+        plugins=plugin or (),
+    )
+    for name, picture in files.pictures.items():
+        exits.print_line(_summary_line(picture, files.plot_data[name]))
+    for name, reason in files.left_out.items():
+        exits.print_line(f"{name} is not drawn: {reason}")
     if as_json:
-        from dataclasses import asdict
-
-        print(dump({name: asdict(plot_data) for name, plot_data in drawn.items()}))
+        print(dump({name: asdict(plot_data) for name, plot_data in files.plot_data.items()}))
 
 
 def _parse_labels(words: list[str] | None) -> dict[str, str]:
@@ -170,11 +151,6 @@ def _parse_labels(words: list[str] | None) -> dict[str, str]:
             raise UsageError(f"--label: got {safe_text(word)}, expected KEY=TEXT, such as e='Restitution $e$'")
         labels[key] = text
     return labels
-
-
-def _path_of_kind(path: Path, kind: str, kinds: int) -> Path:
-    """A separate file for each of several kinds."""
-    return path if kinds == 1 else path.with_name(f"{path.stem}-{kind}{path.suffix}")
 
 
 def _summary_line(picture: Path, plot_data: PlotData) -> str:

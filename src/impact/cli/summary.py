@@ -17,9 +17,7 @@ from . import exits
 from .console import cell, console, dump, table
 
 if TYPE_CHECKING:
-    import xarray as xr
-
-    from ..results.summary import Summary, SweepOutcome
+    from ..results.summary import SweepOutcome
 
 
 def summary_json(outcome: SweepOutcome, output: Path) -> dict[str, Any]:
@@ -85,9 +83,11 @@ def failed_line(fields: Mapping[str, Any]) -> str:
 
 def print_summary(outcome: SweepOutcome, fields: Mapping[str, Any]) -> None:
     """Print the summary of a sweep on stderr."""
+    from ..results.summary import worst_by_model
+
     out = console(sys.stderr)
     if outcome.summary.worst:
-        out.print(worst_errors(outcome.dataset, outcome.summary))
+        out.print(worst_errors(worst_by_model(outcome.summary, outcome.dataset)))
     counts = ", ".join(f"{count:,} {name}" for name, count in fields["status"].items())
     distinct = f" from {fields['trajectories']:,} trajectories" if fields["trajectories"] is not None else ""
     out.print(cell(f"{fields['output']}: {fields['points']:,} points{distinct} ({counts})"))
@@ -102,18 +102,17 @@ def print_summary(outcome: SweepOutcome, fields: Mapping[str, Any]) -> None:
         out.print(cell(f"and {more:,} more"))
 
 
-def worst_errors(dataset: xr.Dataset, totals: Summary) -> Table:
-    """A table of the largest errors per model."""
-    columns = {
+def worst_errors(worst: Mapping[str, Mapping[str, float]]) -> Table:
+    """A table of the largest errors, by variable and model."""
+    headings = {
         "e_error": "max |e_out − e|",
         "v1_error": "max |v1 error|",
         "v2_error": "max |v2 error|",
         "closed_form_error": "max |e_out − exact|",
         "energy_residual": "max |residual|",
     }
-    held = [name for name in columns if name in totals.worst]
-    rows = table("model", *(columns[name] for name in held))
-    for model, key in enumerate(dataset["model"].values):
-        largest = (totals.worst[name].get(model, float("nan")) for name in held)
-        rows.add_row(cell(key), *(number(value, 3) for value in largest))
+    shown = [name for name in headings if name in worst]
+    rows = table("model", *(headings[name] for name in shown))
+    for model in dict.fromkeys(model for name in shown for model in worst[name]):
+        rows.add_row(cell(model), *(number(worst[name].get(model, float("nan")), 3) for name in shown))
     return rows

@@ -44,7 +44,12 @@ LOG_AXES = ("x", "y", "xy")
 
 @dataclass(frozen=True)
 class Choice:
-    """Which part of a result is drawn; see `impact.plot`."""
+    """Which part of a result is drawn; see `impact.plot`.
+
+    Raises
+    ------
+    UsageError : `log` names no axes
+    """
 
     x: str | None = None
     y: str | None = None
@@ -53,6 +58,16 @@ class Choice:
     models: Sequence[str] | None = None
     log: str = ""
     equations: bool = False
+
+    def __post_init__(self) -> None:
+        if self.log not in ("", *LOG_AXES):
+            raise UsageError(f"--log: got {safe_text(self.log)}, expected {', '.join(LOG_AXES)}")
+
+
+def check_kind(kind: str) -> None:
+    """Raise a UsageError, which names the nearest kind, if there is no such kind of picture."""
+    if kind not in KINDS:
+        raise UsageError(f'--kind: no kind "{safe_text(kind)}"; {did_you_mean(kind, list(KINDS))}')
 
 
 def plot_data_of(
@@ -71,8 +86,7 @@ def plot_data_of(
     ------
     UsageError : there is no such kind, or the result does not contain what it needs
     """
-    if kind not in KINDS:
-        raise UsageError(f'--kind: no kind "{safe_text(kind)}"; {did_you_mean(kind, list(KINDS))}')
+    check_kind(kind)
     from . import curves, maps
     from .motions import MOTIONS
 

@@ -12,7 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ..contact.status import FIRST_FAILURE, Status
-from .schema import parts_of_models
+from .schema import count_points, parts_of_models
 from .slabs import MAX_SUMMARY_POINTS, distinct_points, is_computed, slabs
 
 # variables of which the largest absolute value is reported
@@ -185,6 +185,43 @@ class SweepOutcome:
     is_new: bool = True
     integrated: int | None = None
     repeated_blocks: int = 0
+
+
+def describe(dataset: xr.Dataset) -> dict[str, Any]:
+    """What is in a result or a time history, as plain data; see `impact.info`."""
+    summary = summarize(dataset) if "model" in dataset.dims else Summary()
+    variables: dict[str, Any] = {}
+    for name, variable in dataset.items():
+        extremes = extremes_of(dataset, str(name))
+        variables[str(name)] = {
+            "units": variable.attrs.get("units"),
+            "dims": list(variable.dims),
+            **(extremes._asdict() if extremes else dict.fromkeys(Extremes._fields)),
+        }
+    return {
+        "points": count_points(dataset),
+        # of a result in memory neither is known
+        **{name: dataset.encoding.get(name) for name in ("layout", "seal")},
+        "dimensions": {str(name): size for name, size in dataset.sizes.items()},
+        "coordinates": [str(name) for name in dataset.coords],
+        "variables": variables,
+        "status": counts_by_name(summary.counts),
+        "not_evaluated": summary.not_counted,
+        "worst": worst_by_model(summary, dataset),
+        "attributes": {
+            str(name): value if isinstance(value, str) else np.asarray(value).tolist()
+            for name, value in dataset.attrs.items()
+        },
+    }
+
+
+def worst_by_model(summary: Summary, dataset: xr.Dataset) -> dict[str, dict[str, float]]:
+    """The largest absolute errors by variable and key of the model."""
+    keys = dataset["model"].values.tolist() if summary.worst else []
+    return {
+        name: {keys[model]: largest for model, largest in by_model.items()}
+        for name, by_model in summary.worst.items()
+    }
 
 
 def counts_by_name(counts: Mapping[Status, int]) -> dict[str, int]:
