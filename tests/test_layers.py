@@ -11,7 +11,7 @@ import pytest
 
 SOURCE = Path(__file__).parent.parent / "src" / "impact"
 LAYERS = (
-    {"_version", "atomic", "errors", "formatting", "text"},
+    {"_version", "array_types", "atomic", "errors", "formatting", "text"},
     {"ode"},
     {"contact"},
     {"config"},

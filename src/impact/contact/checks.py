@@ -8,11 +8,11 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from ..array_types import Array
 from .impacts import Impacts, stiffness
 from .materials import effective_mass, hertz_stiffness, sphere_radius
 from .model import QUANTITIES, ForceModel, Parameter
 from .outputs import OUTPUTS, Outputs, collide
-from .powers import Array
 from .status import FIRST_FAILURE, Status
 from .units import dimension
 

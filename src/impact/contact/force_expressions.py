@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from .powers import Array, power
+from ..array_types import Array
+from .powers import power
 
 
 def spring(elastic: Array) -> Array:

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..array_types import Array
 from ..ode.problem import Params, Problem, Step
 from . import motion
 from .impacts import Impacts
 from .model import ForceModel
-from .powers import Array
 from .scaling import dimensionless_values, with_coefficients, with_units
 from .simulate import integrate_phases
 from .status import Status

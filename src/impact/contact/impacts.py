@@ -9,10 +9,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ..array_types import Array
 from .closed_forms.elastic import peak_indentation
 from .materials import effective_compliance, effective_mass, effective_radius
 from .model import ForceModel, Law
-from .powers import Array, all_within, powers
+from .powers import all_within, powers
 from .status import Status
 from .units import dimension
 

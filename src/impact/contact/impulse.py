@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..array_types import Array
 from .impacts import Impacts
-from .powers import Array, all_within
+from .powers import all_within
 
 MAX_FLOAT = float(np.finfo(float).max)
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .powers import Array
+from ..array_types import Array
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..array_types import Array, Mask
 from ..errors import ModelError
 from ..ode.events import choose
-from ..ode.problem import Array, Mask, Params, Problem, Rates
+from ..ode.problem import Params, Problem, Rates
 from .formula import Formula, argument_names, call_by_name
 from .model import FORCE_ARGUMENTS, ForceModel
 from .piecewise import BREAKPOINT_TOLERANCE, Breakpoint

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..ode.problem import Mask
+from ..array_types import Array, Mask
 from .formula import argument_names
 from .impacts import Impacts, check_inputs
 from .impulse import velocities_after
 from .model import ForceModel, Law
-from .powers import Array, all_within
+from .powers import all_within
 from .scaling import dimensionless_values
 from .simulate import CollisionResult, simulate
 from .status import FIRST_FAILURE, LIMIT, NO_IMPACT, STATUS_OK

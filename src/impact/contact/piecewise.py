@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..ode.problem import N_COMPONENTS, N_INTEGRATED, Array, Event, Params, Problem, Solution, Step, Termination
+from ..array_types import Array
+from ..ode.problem import N_COMPONENTS, N_INTEGRATED, Event, Params, Problem, Solution, Step, Termination
 
 # the formula of the force changes where this changes its sign; NaN for no breakpoint
 Breakpoint = Callable[[Array, Params], Array]

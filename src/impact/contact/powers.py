@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from ..array_types import Array
 
 
 def power(base: Array, exponent: float) -> Array:

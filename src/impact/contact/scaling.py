@@ -6,11 +6,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ..array_types import Array
 from ..errors import ModelError
 from .formula import argument_names, call_by_name
 from .impacts import Impacts
 from .model import QUANTITIES, ForceModel
-from .powers import Array
 from .units import names_in
 
 # by name: numbers that are the same for all impacts, and arrays of shape (n,)

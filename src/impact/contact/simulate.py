@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from ..array_types import Array
 from ..errors import ModelError
 from ..ode.problem import Params, Problem, Solution, Termination
 from ..ode.rk45 import Workspace, integrate
@@ -18,7 +19,7 @@ from .formula import argument_names, explained
 from .model import ForceModel
 from .numba import dispatch
 from .piecewise import in_parts
-from .powers import Array, distinct_values
+from .powers import distinct_values
 from .scaling import LawValues, chi_of, exact_restitution, with_coefficients, with_units
 from .status import LIMIT, STATUS_OK, Status
 from .velocity_coordinates import VelocityCoordinate, is_strong

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from functools import cache
 from typing import NamedTuple
 
+from ..array_types import Array
 from ..errors import ModelError
-from .powers import Array
 
 
 class Dimension(NamedTuple):

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..ode.problem import Array
+from ..array_types import Array
 from .formula import call_by_name
 from .model import COORDINATE_COEFFICIENTS, ForceModel
 from .powers import integer_power, power

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .problem import N_COMPONENTS, N_INTEGRATED, Array, Mask, Problem, Termination
+from ..array_types import Array, Mask
+from .problem import N_COMPONENTS, N_INTEGRATED, Problem, Termination
 
 if TYPE_CHECKING:
     from .rk45 import State, TrialStep

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..array_types import Array, Mask
 from .events import choose
-from .problem import N_COMPONENTS, N_INTEGRATED, WATCHED_ROW, Array, Mask, Params, Problem
+from .problem import N_COMPONENTS, N_INTEGRATED, WATCHED_ROW, Params, Problem
 
 if TYPE_CHECKING:
     from .rk45 import State, TrialStep

@@ -10,10 +10,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ..array_types import Array, Mask
 from .tableau import DENSE_WEIGHTS
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Params = tuple[Array, ...]
 Event = Callable[[Array, Array, Params], tuple[Array, Array]]
 

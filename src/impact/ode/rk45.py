@@ -14,20 +14,10 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
+from ..array_types import Array, Mask
 from .events import choose, locate_event
 from .maximum import PeakCandidate, refine_maximum, update_peaks
-from .problem import (
-    N_COMPONENTS,
-    N_INTEGRATED,
-    WATCHED_ROW,
-    Array,
-    Mask,
-    Params,
-    Problem,
-    Solution,
-    Step,
-    Termination,
-)
+from .problem import N_COMPONENTS, N_INTEGRATED, WATCHED_ROW, Params, Problem, Solution, Step, Termination
 from .tableau import A, E
 
 # the controller: a step is multiplied by SAFETY/error^CONTROLLER_EXPONENT, within

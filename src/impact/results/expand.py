@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 from xarray.backends import BackendArray
 from xarray.core import indexing
 
+from ..array_types import Array
 from ..config.grid import Axis
 from ..contact.impacts import CHECKS, Impacts, check_inputs
 from ..contact.model import Law
 from ..contact.outputs import Outputs, outputs
-from ..contact.powers import Array
 from ..contact.simulate import CollisionResult
 from ..contact.status import Status
 from ..engine.build_impacts import Stiffness, build_impacts, has_stiffness_rule

@@ -17,11 +17,11 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from .._version import __version__
+from ..array_types import Array
 from ..config.grid import Axis
 from ..contact.formula import Formula
 from ..contact.materials import Material
 from ..contact.model import Law, Parameter
-from ..contact.powers import Array
 from ..contact.simulate import TABLE_COLUMNS, CollisionResult
 from ..contact.status import STATUSES
 from ..engine.build_impacts import Stiffness, has_stiffness_rule, mass_at, values_at

@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from ..array_types import Mask
 from ..config.grid import path_of
 from ..contact.status import FIRST_FAILURE, Status
 from ..engine.plan import owner_of
@@ -23,7 +24,6 @@ from .schema import columns_along, foreign_dims, own_dims
 from .selection import model_positions, select
 from .slabs import Slab, distinct_points, is_computed, over_varying_dims, slabs, varying_dims
 
-Mask = NDArray[np.bool_]
 # lazy results with more points are not ranked; this many take some minutes
 MAX_RANKED_POINTS = 2**30
 # combinations of the values of a law's own parameters
@@ -199,7 +199,7 @@ def ranking(
     ranked = [_rank_model(of_model, tol) for of_model in by_model]
     if not any(model.points for model in ranked):
         raise UsageError("nothing to rank: no point has both a target e and an impact")
-    return Ranking(tol, tuple(sorted(ranked, key=_sort_key)))
+    return Ranking(tol, tuple(sorted(ranked, key=_rank_key)))
 
 
 def _check_rankable(dataset: xr.Dataset, tol: float) -> None:
@@ -220,7 +220,7 @@ def _check_rankable(dataset: xr.Dataset, tol: float) -> None:
         raise UsageError("e_error, status and e of this result do not lie along the axes of a sweep")
 
 
-def _sort_key(ranked: Ranked) -> tuple[float, ...]:
+def _rank_key(ranked: Ranked) -> tuple[float, ...]:
     # a model that failed everywhere has no errors
     errors = (ranked.max_error, ranked.mean_error)
     return (-ranked.share, *(math.inf if math.isnan(error) else error for error in errors))
@@ -301,7 +301,7 @@ def _rank_model(of_model: xr.Dataset, tol: float) -> Ranked:
     key = str(of_model["model"].item())
     parameter_dims = [dim for dim in own_dims(of_model, key) if dim in of_model.variables["e_error"].dims]
     best = _best_parameters(of_model, parameter_dims, tol) if parameter_dims else {}
-    chosen = _inputs_at(of_model, best)
+    chosen = _swept_inputs(of_model, best)
     of_model = of_model.isel(best)
     axes = of_model.variables["e_error"].dims
     evaluated, weight = _reduce_dims(of_model)
@@ -337,7 +337,11 @@ def _rank_model(of_model: xr.Dataset, tol: float) -> Ranked:
         # an infinite error comes from a file that was not written by a sweep
         mean_error = max_error if math.isinf(max_error) else float(total / evaluable_points)
         asked_there = e.isel({dim: worst[dim] for dim in e.dims}).values.item()
-        at = {**_inputs_at(of_model, {dim: worst.get(dim, 0) for dim in axes}), **chosen, "e": float(asked_there)}
+        at = {
+            **_swept_inputs(of_model, {dim: worst.get(dim, 0) for dim in axes}),
+            **chosen,
+            "e": float(asked_there),
+        }
     parameters = {".".join(map(str, path_of(name))): chosen[name] for name in chosen if owner_of(name) == key}
     served = _served_ranges(e.values, asked_at, missed_at) if along_one else None
     return Ranked(
@@ -383,7 +387,7 @@ def _exact_sum(values: NDArray[np.float64]) -> Fraction:
     return total * Fraction(2) ** (least - MANTISSA_BITS)
 
 
-def _inputs_at(of_model: xr.Dataset, positions: Mapping[Hashable, int]) -> dict[str, float | str]:
+def _swept_inputs(of_model: xr.Dataset, positions: Mapping[Hashable, int]) -> dict[str, float | str]:
     """The swept inputs at a position along each axis, without the parameters of other models."""
     variables, key = of_model.variables, str(of_model["model"].item())
     return {

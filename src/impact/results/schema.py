@@ -16,10 +16,10 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from .._version import __version__
+from ..array_types import Array
 from ..config.tables import MATERIAL_KEYS, MATERIAL_QUANTITIES, SWEEP_QUANTITIES, model_quantities
 from ..contact.materials import effective_mass
 from ..contact.outputs import BY_DEFAULT
-from ..contact.powers import Array
 from ..contact.status import Status
 from ..engine.build_impacts import mass_at, restitution_at
 from ..engine.plan import Index, Inputs, Plan, is_foreign, is_own, material_property

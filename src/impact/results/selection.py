@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..array_types import Mask
 from ..errors import UsageError, did_you_mean
 from ..formatting import label
 from ..text import safe_text
@@ -15,7 +16,6 @@ from ..text import safe_text
 if TYPE_CHECKING:
     import xarray as xr
 
-Mask = NDArray[np.bool_]
 
 # relative tolerance by which a value from a user matches a computed label
 SELECTION_RTOL = 1e-9

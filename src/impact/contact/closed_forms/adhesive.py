@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..powers import Array, integer_power, power
+from ...array_types import Array
+from ..powers import integer_power, power
 
 # Newton's iterations for the resolvent cubic, which converge from one side
 CUBIC_ITERATIONS = 8

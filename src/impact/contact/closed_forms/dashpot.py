@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..powers import Array
+from ...array_types import Array
 
 # below this |t| the slope of h is taken from its series
 SERIES_BELOW_T = 1e-3

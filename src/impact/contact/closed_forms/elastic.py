@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ..powers import Array
+from ...array_types import Array
 
 
 def peak_indentation(m: Array, v0: Array, K: Array, n: float | Array) -> Array:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..powers import Array, integer_power
+from ...array_types import Array
+from ..powers import integer_power
 
 # e = Σ aₖ χᵏ, from χ (1 + e) = ln[(1 + χ)/(1 − χ e)] order by order in exact fractions.
 # Below this χ Newton's iteration has lost more digits than the truncated series.

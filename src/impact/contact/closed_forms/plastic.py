@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ..powers import Array
+from ...array_types import Array
 
 
 def thornton_restitution(q: Array | float) -> Array:

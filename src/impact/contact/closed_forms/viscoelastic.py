@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..powers import Array
+from ...array_types import Array
 
 # Müller and Pöschel (2011), the form [3/6] in w = √g, g = (3/2) A (K/m)^(2/5) v^(1/5), from the zeroth power
 PADE_NUMERATOR = (1.0, 1.07232, 0.574198, 0.141552)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...array_types import Array
 from ..closed_forms.adhesive import edinburgh_adhesion, edinburgh_restitution, jkr_restitution, jkr_root
 from ..evidence import Evidence
 from ..force_expressions import spring
 from ..model import ForceModel, Parameter
-from ..powers import Array, integer_power, power
+from ..powers import integer_power, power
 from .elastoplastic import E_OF_K
 
 JKR_1971 = ForceModel(

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...array_types import Array
 from ..closed_forms.plastic import muthukumar_restitution
 from ..evidence import Evidence
 from ..force_expressions import returning
 from ..model import ForceModel, Parameter
-from ..powers import Array, power
+from ..powers import power
 from .elastoplastic import E_OF_K
 from .sources import IMPACT_MATERIAL
 

@@ -11,12 +11,13 @@ from typing import Any, Literal, Unpack
 
 import numpy as np
 
+from ...array_types import Array
 from ..closed_forms.dashpot import force_damping, force_restitution, gap_damping, gap_restitution
 from ..evidence import Evidence
 from ..force_expressions import dragged
 from ..formula import Formula
 from ..model import About, ForceModel, Parameter
-from ..powers import Array, power
+from ..powers import power
 from .sources import CHRONO, DEMLAB_VISCOELASTIC, LIGGGHTS, MAPLESIM_HELP, YADE_2025, YADE_BIBLIOGRAPHY
 
 # closed forms of the restitution, by where the contact ends

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...array_types import Array
 from ..closed_forms.plastic import luding_restitution, thornton_restitution
 from ..evidence import Evidence
 from ..force_expressions import returning, spring
 from ..formula import Formula
 from ..model import ForceModel, Parameter
-from ..powers import Array, power
+from ..powers import power
 from .sources import DEMLAB_PLASTIC, YADE_BIBLIOGRAPHY
 
 # formula of E* for the laws that use it

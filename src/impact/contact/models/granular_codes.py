@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...array_types import Array
 from ..closed_forms.dashpot import force_damping, gap_damping
 from ..evidence import Evidence
 from ..model import ForceModel, Parameter
-from ..powers import Array, power
+from ..powers import power
 from .aliases import same_law
 from .dashpot import (
     ANAGNOSTOPOULOS_1988,

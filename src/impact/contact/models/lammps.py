@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from ...array_types import Array
 from ..evidence import Evidence
 from ..model import ForceModel, Parameter
-from ..powers import Array
 from .dashpot import (
     ANAGNOSTOPOULOS_1988,
     ANAGNOSTOPOULOS_1988_NO_TENSION,

@@ -9,11 +9,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...array_types import Array
 from ..closed_forms.dashpot import force_restitution, limited_restitution
 from ..evidence import Evidence
 from ..formula import Formula
 from ..model import ForceModel, Parameter
-from ..powers import Array, power, powers
+from ..powers import power, powers
 from .aliases import same_law
 from .dashpot import KELVIN_VOIGT_NO_TENSION
 from .hysteresis import FLORES_2011, HUNT_CROSSLEY_1975, LANKARANI_NIKRAVESH_1990, hysteresis

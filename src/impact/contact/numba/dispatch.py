@@ -8,8 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...array_types import Array
 from ...ode import rk45
-from ...ode.problem import Array, Params, Problem, Solution
+from ...ode.problem import Params, Problem, Solution
 from .. import force_expressions, motion
 from ..model import ForceModel
 from ..powers import integer_power, power
