@@ -63,8 +63,10 @@ regress-%: $(BIN)/impact
 docs: $(VENV)/dev  ## regenerate docs/schema.md, docs/models.md and the README's picture
 	$(BIN)/python scripts/make_docs.py
 
-bench: $(VENV)/dev  ## measure the core against a solve_ivp loop
+bench: $(VENV)/dev  ## measure the cores against a solve_ivp loop, parallel sweeps, and the start of commands
 	$(BIN)/python scripts/bench_core.py
+	$(BIN)/python scripts/bench_parallel.py
+	$(BIN)/python scripts/bench_start.py
 
 clean:  ## remove the virtual environment and the results
 	rm -rf $(VENV) $(PEERS) $(RESULTS)

@@ -1,31 +1,20 @@
-"""How many impacts a second does the core integrate, against a loop of scipy's solve_ivp at matched accuracy?
+"""Throughput of the integration cores, compared with a loop of scipy's solve_ivp at the same accuracy.
 
-Every model of the paper that e drives, mixed; e from 0.05 to 0.99, all impacts distinct, nothing collapsed, all
-outputs computed. Both sides have to deliver max |e_out - exact| <= 1e-8: the tolerance of each is the loosest of
-a list that does. They run in turn for some rounds, since a machine that is shared is now faster, now slower.
-Printed is the middle one of the rounds' ratios, with the least and the most: of the NumPy core and, where numba is
-installed, of the compiled one, on one thread and on several; how many times one thread's rate several have, in
-the middle round and of the fastest of either; and
-what part of the rate at which the arithmetic of the accepted steps would go as a loop of multiply-adds. That loop,
-and processes that each do the same by themselves, tell what several threads could gain on the machine. Then sweeps
-by one process, by several and by threads, from the plan to the dataset, with their start; and what the start of a
-command takes with each core, compiled anew and from what is kept.
+Ten models of the paper share the impacts, with e from 0.05 to 0.99. All impacts are distinct, deduplication is
+off, and all outputs are computed. Each engine uses the largest tolerance of a list with max |e_out - exact| <=
+1e-8. The engines run in turn for several rounds, because the load of a shared machine varies. The table shows the
+median rates, the median ratio to the loop with its minimum and maximum, and the speedup by several threads: the
+median over the rounds, and the best rate divided by the best rate of one thread.
 
-    python scripts/bench_core.py [--impacts 2000000] [--loop 300] [--rounds 15] [--jobs 2]
+    python scripts/bench_core.py [--impacts 2000000] [--loop 300] [--rounds 15] [--threads 2]
 """
 
 from __future__ import annotations
 
 import argparse
 import os
-import subprocess
-import sys
-import tempfile
 import time
-from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
-from multiprocessing import get_context
-from pathlib import Path
+from collections.abc import Sequence
 from statistics import median
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -36,7 +25,6 @@ from rich.table import Table
 from scipy.integrate import solve_ivp
 
 import impact
-from impact.api import execute, prepare
 from impact.contact.closed_forms.hysteresis import delivered_restitution
 from impact.contact.impacts import Impacts
 from impact.contact.model import ForceModel
@@ -45,283 +33,195 @@ from impact.contact.outputs import OUTPUTS, collide
 from impact.engine.executors import choose_backend
 from impact.engine.trajectories import RANGE_TRAJECTORIES, even_size
 
-# those of the paper whose restitution is e's alone: (10), (19)-(23), (28), (29), (33) and (43)
-PAPER = (
-    "hertz", "hunt-crossley-1975", "herbert-mcwhannell-1977", "lee-wang-1983", "lankarani-nikravesh-1990",
-    "exact-hysteresis", "gharib-hurmuzlu-2012", "lankarani-nikravesh-1994", "gharib-hurmuzlu-2012-energetic",
+# models of the paper whose restitution depends on e only: equations (10), (19)-(23), (28), (29), (33) and (43)
+PAPER_MODELS = (
+    "hertz",
+    "hunt-crossley-1975",
+    "herbert-mcwhannell-1977",
+    "lee-wang-1983",
+    "lankarani-nikravesh-1990",
+    "exact-hysteresis",
+    "gharib-hurmuzlu-2012",
+    "lankarani-nikravesh-1994",
+    "gharib-hurmuzlu-2012-energetic",
     "bilinear",
-)  # fmt: skip
-FIGURE6 = Path(__file__).parents[1] / "configs" / "figure6.toml"
-ACCURACY = 1e-8
-# ten to a decade
-TOLERANCES = tuple(float(f"{one:.2g}") for one in np.geomspace(1e-6, 1e-12, 61))
+)
+MAX_ERROR = 1e-8
+# ten per decade
+TOLERANCES = tuple(float(f"{rtol:.2g}") for rtol in np.geomspace(1e-6, 1e-12, 61))
 
 
-def table1(e: np.ndarray, model: ForceModel) -> Impacts:
+def restitutions(count: int) -> np.ndarray:
+    """Distinct values of e for a number of impacts."""
+    return np.linspace(0.05, 0.99, count)
+
+
+def table1_impacts(e: np.ndarray, model: ForceModel) -> Impacts:
     """Impacts of the two balls of Table 1."""
 
-    def all_of(value: float) -> np.ndarray:
+    def full(value: float) -> np.ndarray:
         return np.full(e.size, value)
 
-    unknown = all_of(np.nan)
-    n = model.exponent or 1.5
+    unknown = full(np.nan)
     return Impacts(
-        e=e, v1=all_of(1.0), v2=all_of(0.0), m1=all_of(1.0), m2=all_of(1.0), K=all_of(6.118486349e9), n=all_of(n),
-        R1=unknown, R2=unknown, E1=unknown, nu1=unknown, yield_strength1=unknown, E2=unknown, nu2=unknown,
+        e=e,
+        v1=full(1.0),
+        v2=full(0.0),
+        m1=full(1.0),
+        m2=full(1.0),
+        K=full(6.118486349e9),
+        n=full(model.exponent or 1.5),
+        R1=unknown,
+        R2=unknown,
+        E1=unknown,
+        nu1=unknown,
+        yield_strength1=unknown,
+        E2=unknown,
+        nu2=unknown,
         yield_strength2=unknown,
-    )  # fmt: skip
+    )
 
 
-def core(
-    models: list[ForceModel], e: np.ndarray, rtol: float, by: str, threads: int = 1
-) -> tuple[float, float, int]:
-    """Seconds, worst error and mean steps of a core, in blocks as a sweep runs them, with all outputs."""
+def run_core(e: np.ndarray, rtol: float, core: str, threads: int = 1) -> tuple[float, float, int]:
+    """Run a core on blocks of the same size as in a sweep, and compute all outputs.
+
+    Parameters
+    ----------
+    e : restitution of each impact; the models of the paper take turns
+    core : "numpy" or "numba"
+
+    Returns
+    -------
+    seconds, largest error of e_out, mean number of steps per impact
+    """
     blocks = []
-    for place, model in enumerate(models):
-        mine = e[place :: len(models)]
-        size = even_size(mine.size, RANGE_TRAJECTORIES)
-        blocks += [(model, table1(mine[first : first + size], model)) for first in range(0, mine.size, size)]
+    for k, key in enumerate(PAPER_MODELS):
+        model, model_e = impact.models()[key], e[k :: len(PAPER_MODELS)]
+        size = even_size(model_e.size, RANGE_TRAJECTORIES)
+        starts = range(0, model_e.size, size)
+        blocks += [(model, table1_impacts(model_e[start : start + size], model)) for start in starts]
 
-    def outputs(block: tuple[ForceModel, Impacts]) -> tuple[float, int]:
-        contact = collide(*block, rtol=rtol, max_steps=10_000, collapse=False, core=by)
+    def run_block(block: tuple[ForceModel, Impacts]) -> tuple[float, int]:
+        contact = collide(*block, rtol=rtol, max_steps=10_000, collapse=False, core=core)
         values = {name: contact[name] for name in OUTPUTS}
         return float(np.max(np.abs(values["closed_form_error"]))), int(values["steps"].sum())
 
     with choose_backend(1, threads).executor() as pool:
-        begun = time.perf_counter()
-        found = list(pool.map(outputs, blocks))
-        seconds = time.perf_counter() - begun
-    return seconds, max(worst for worst, _ in found), sum(steps for _, steps in found) // e.size
+        start = time.perf_counter()
+        errors, steps = zip(*pool.map(run_block, blocks), strict=True)
+        seconds = time.perf_counter() - start
+    return seconds, max(errors), sum(steps) // e.size
 
 
-# the operations of one step, counted where the kernel is plain Python
-COUNT = """
-from impact.contact.numba.dispatch import END_AT_PEAK, EQ_DAMPED, Form
-from impact.contact.numba.expressions import rk_step
-class Counted(float):
-    total = 0
-def counted(name):
-    def operation(self, other):
-        Counted.total += 1
-        return Counted(getattr(float, name)(self, other))
-    return operation
-for name in ("add", "radd", "sub", "rsub", "mul", "rmul", "truediv", "rtruediv"):
-    setattr(Counted, f"__{name}__", counted(f"__{name}__"))
-rk_step(Form(EQ_DAMPED, END_AT_PEAK, 2, 3), *map(Counted, (0.5, 0.5, 0.5, 0.1, 0.1, 0.01, 1.0)))
-print(Counted.total)
-"""
+def core_tolerance(cores: Sequence[str], e: np.ndarray) -> float:
+    """The largest tolerance at which all cores are accurate to MAX_ERROR."""
+    return next(rtol for rtol in TOLERANCES if all(run_core(e, rtol, core)[1] <= MAX_ERROR for core in cores))
 
 
-def multiply_adds() -> Callable[[int], float]:
-    """What measures how many operations a second a loop of multiply-adds does, on so many threads at once."""
-    from numba import njit
-
-    @njit(fastmath={"contract"}, nogil=True)
-    def multiply_and_add(x: np.ndarray, times: int) -> None:
-        for _ in range(times):
-            for j in range(192):
-                x[j] = x[j] * 0.999 + 0.001
-
-    multiply_and_add(np.ones(192), 1)
-
-    def rate(threads: int) -> float:
-        with ThreadPoolExecutor(threads) as pool:
-            begun = time.perf_counter()
-            list(pool.map(lambda _: multiply_and_add(np.ones(192), 1_000_000), range(16)))
-            return 16 * 2 * 192 * 1_000_000 / (time.perf_counter() - begun)
-
-    return rate
-
-
-def by_itself(e: np.ndarray, rtol: float) -> float:
-    """Impacts a second of the compiled core, in a process of its own."""
-    return e.size / core([impact.models()[key] for key in PAPER], e, rtol, "numba")[0]
-
-
-def gained(several: list[float], one: list[float]) -> tuple[str, str]:
-    """How many times one thread's rate several have: the middle of the rounds, and the fastest by the fastest."""
-    middle = median(more / alone for more, alone in zip(several, one, strict=True))
-    return f"{middle:.2f}", f"{max(several) / max(one):.2f}"
-
-
-def operations() -> int:
-    """Additions, multiplications and divisions of a step."""
-    environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
-    told = subprocess.run(
-        [sys.executable, "-c", COUNT], env=environment, capture_output=True, text=True, check=True
-    )
-    return int(told.stdout)
-
-
-def starts() -> Table:
-    """What a sweep of a few impacts takes from the command line, the middle one of five."""
-    table = Table("the start of a sweep", "seconds", box=None)
-    command = [sys.executable, "-m", "impact", "sweep", str(FIGURE6), "--quiet", "--overwrite", "-o"]
-
-    def seconds(folder: str, by: str, times: int, **environment: str) -> float:
-        taken = []
-        for _ in range(times):
-            begun = time.perf_counter()
-            subprocess.run([*command, f"{folder}/out.h5", "--set", f'solver.core="{by}"'], check=True,
-                           env={**os.environ, **environment})  # fmt: skip
-            taken.append(time.perf_counter() - begun)
-        return sorted(taken)[times // 2]
-
-    with tempfile.TemporaryDirectory() as folder:
-        table.add_row("numpy", f"{seconds(folder, 'numpy', 5):.2f}")
-        table.add_row("numba, compiled anew", f"{seconds(folder, 'numba', 1, NUMBA_CACHE_DIR=folder):.2f}")
-        table.add_row("numba, kept", f"{seconds(folder, 'numba', 5, NUMBA_CACHE_DIR=folder):.2f}")
-    return table
-
-
-def one_by_solve_ivp(model: ForceModel, e: float, rtol: float) -> float:
-    """The delivered restitution of one impact as one writes it by hand: x, v in scaled units, two phases."""
+def solve_ivp_restitution(model: ForceModel, e: float, rtol: float) -> float:
+    """The delivered restitution of one impact, as a user of scipy would compute it: two phases, scaled units."""
     n = model.exponent or 1.5
     chi = float(np.asarray(model.coefficients["chi"](e))) if "chi" in model.coefficients else 0.0
 
-    def inward(_: float, y: list[float]) -> tuple[float, float]:
+    def approach(_: float, y: list[float]) -> tuple[float, float]:
         x = y[0]
         return y[1], -(x**n if x > 0.0 else 0.0) * (1.0 + chi * y[1])
 
-    def stopped(_: float, y: list[float]) -> float:
+    def zero_velocity(_: float, y: list[float]) -> float:
         return y[1]
 
-    stopped.terminal, stopped.direction = True, -1  # type: ignore[attr-defined]
-    first = solve_ivp(inward, (0.0, 1e3), (0.0, 1.0), rtol=rtol, atol=rtol, events=stopped)
+    zero_velocity.terminal, zero_velocity.direction = True, -1  # type: ignore[attr-defined]
+    first = solve_ivp(approach, (0.0, 1e3), (0.0, 1.0), rtol=rtol, atol=rtol, events=zero_velocity)
     peak = first.y[0, -1]
     residual, stiffness = 0.0, 1.0
     if model.unloading is not None:
         residual, stiffness = peak * (1.0 - e * e), e ** (-2.0 * n)
 
-    def outward(_: float, y: list[float]) -> tuple[float, float]:
+    def restitution(_: float, y: list[float]) -> tuple[float, float]:
         x = y[0] - residual
         return y[1], -stiffness * (x**n if x > 0.0 else 0.0) * (1.0 + chi * y[1])
 
-    def parted(_: float, y: list[float]) -> float:
+    def zero_indentation(_: float, y: list[float]) -> float:
         return y[0] - residual
 
-    parted.terminal, parted.direction = True, -1  # type: ignore[attr-defined]
-    last = solve_ivp(outward, (0.0, 1e3), (peak, 0.0), rtol=rtol, atol=rtol, events=parted)
-    return -last.y[1, -1]
+    zero_indentation.terminal, zero_indentation.direction = True, -1  # type: ignore[attr-defined]
+    second = solve_ivp(restitution, (0.0, 1e3), (peak, 0.0), rtol=rtol, atol=rtol, events=zero_indentation)
+    return -second.y[1, -1]
 
 
-def loop(models: list[ForceModel], e: np.ndarray, rtol: float) -> tuple[float, float]:
-    """Seconds and worst error of the loop."""
-    worst, begun = 0.0, time.perf_counter()
-    for place, one in enumerate(e.tolist()):
-        model = models[place % len(models)]
-        out = one_by_solve_ivp(model, one, rtol)
-        exact = one
+def run_loop(e: np.ndarray, rtol: float) -> tuple[float, float]:
+    """Seconds and largest error of the loop of solve_ivp."""
+    models = [impact.models()[key] for key in PAPER_MODELS]
+    largest, start = 0.0, time.perf_counter()
+    for k, requested in enumerate(e.tolist()):
+        model = models[k % len(models)]
+        exact = requested
         if "chi" in model.coefficients:
-            exact = float(delivered_restitution(float(np.asarray(model.coefficients["chi"](one)))))
+            exact = float(delivered_restitution(float(np.asarray(model.coefficients["chi"](requested)))))
         elif model.key == "hertz":
             exact = 1.0
-        worst = max(worst, abs(out - exact))
-    return time.perf_counter() - begun, worst
+        largest = max(largest, abs(solve_ivp_restitution(model, requested, rtol) - exact))
+    return time.perf_counter() - start, largest
 
 
-def sweep(models: list[ForceModel], impacts: int, rtol: float, by: str, jobs: int, threads: int) -> float:
-    """Impacts a second of a sweep, from its plan to its dataset in memory."""
-    plan = prepare(
-        {
-            "models": [model.key for model in models],
-            "sweep": {"e": {"linspace": [0.05, 0.99, impacts // len(models)]}, "v1": 1.0, "m1": 1.0, "m2": 1.0,
-                      "material": "table1"},
-            "materials": {"table1": {"E": 56e9, "nu": 0.3, "rho": 2712.0}},
-            "solver": {"rtol": rtol, "collapse": False, "core": by},
-        }
-    )  # fmt: skip
-    begun = time.perf_counter()
-    execute(plan, choose_backend(jobs, threads))
-    return plan.points / (time.perf_counter() - begun)
-
-
-def side_by_side(asked: argparse.Namespace, models: list[ForceModel], cores: list[str]) -> float:
-    """Run the engines in turn, and print what they do at matched accuracy. Returns the tolerance of the cores."""
-    # a second for either: with fewer the last blocks, at which not all threads are, would count
-    impacts = {
-        "numpy": np.linspace(0.05, 0.99, asked.impacts // 5),
-        "numba": np.linspace(0.05, 0.99, asked.impacts),
-    }
-    few = np.linspace(0.05, 0.99, asked.loop)
-
-    rtol = next(r for r in TOLERANCES if all(core(models, few, r, by)[1] <= ACCURACY for by in cores))
-    loop_rtol = next(r for r in TOLERANCES if loop(models, few, r)[1] <= ACCURACY)
-    rows = [("numpy", 1), *((("numba", threads) for threads in sorted({1, asked.jobs})) if len(cores) > 1 else ())]
-    loops, engines = [], {row: [] for row in rows}
-    arithmetic = multiply_adds() if "numba" in cores else None
-    flops: dict[int, list[float]] = {1: [], asked.jobs: []}
-    # processes that share no interpreter tell what the machine itself lets several threads gain
-    processes, apart = ProcessPoolExecutor(asked.jobs, get_context("spawn")), []
-    if arithmetic:
-        list(processes.map(by_itself, [few] * asked.jobs * 8, [rtol] * asked.jobs * 8))
-    for turn in range(asked.rounds):
-        loops.append(loop(models, few, loop_rtol))
-        # forth and back: what comes after another finds its caches and its memory
-        for row in rows[:: -1 if turn % 2 else 1]:
-            e = impacts[row[0]]
-            seconds, worst, steps = core(models, e, rtol, *row)
-            engines[row].append((e.size / seconds, worst, steps))
-        if arithmetic:
-            for threads, found in flops.items():
-                found.append(arithmetic(threads))
-            apart.append(sum(processes.map(by_itself, [impacts["numba"]] * asked.jobs, [rtol] * asked.jobs)))
-    base = [asked.loop / seconds for seconds, _ in loops]
-    table = Table(
-        "engine", "threads", "rtol", "worst error", "steps", "impacts/s", "ratio", "least", "most",
-        "of one thread", "at best", "of the limit", box=None,
-    )  # fmt: skip
-    worst = f"{loops[0][1]:.2g}"
-    table.add_row("solve_ivp RK45, loop", "1", f"{loop_rtol:g}", worst, "", f"{median(base):,.0f}", "1")
-    each = operations() if arithmetic else 0
-    for (by, threads), found in engines.items():
-        _, worst, steps = found[0]
-        if worst > ACCURACY:
-            raise SystemExit(f"the core is off by {worst:.2g}, expected at most {ACCURACY:g}")
-        rates = [rate for rate, _, _ in found]
-        ratios = [rate / one for rate, one in zip(rates, base, strict=True)]
-        gain = gained(rates, [rate for rate, _, _ in engines[by, 1]])
-        share = f"{100 * median(rates) * steps * each / median(flops[threads]):.0f} %" if by == "numba" else ""
-        table.add_row(
-            f"impact, {by}", str(threads), f"{rtol:g}", f"{worst:.2g}", str(steps), f"{median(rates):,.0f}",
-            *(f"{one:,.0f}" for one in (median(ratios), min(ratios), max(ratios))), *gain, share,
-        )  # fmt: skip
-    processes.shutdown()
-    if arithmetic:
-        gain = gained(apart, [rate for rate, _, _ in engines["numba", 1]])
-        name = f"the same, {asked.jobs} processes"
-        table.add_row(name, "1 each", "", "", "", f"{median(apart):,.0f}", "", "", "", *gain)
-    for threads, found in flops.items() if arithmetic else ():
-        rate = f"{median(found) / 1e9:,.0f} GFLOP/s"
-        table.add_row("multiply-adds", str(threads), "", "", "", rate, "", "", "", *gained(found, flops[1]))
-    sizes = f"{asked.impacts:,} impacts (numpy: a fifth, loop: {asked.loop}), {asked.rounds} rounds"
-    about = f"{len(models)} models, {sizes}, {os.cpu_count()} cores"
-    Console(width=140).print(about, table, sep="\n")
-    return rtol
+def speedup(rates: Sequence[float], single: Sequence[float]) -> tuple[str, str]:
+    """The speedup over one thread: the median over the rounds, and the best rate over the best rate."""
+    ratio = median(rate / reference for rate, reference in zip(rates, single, strict=True))
+    return f"{ratio:.2f}", f"{max(rates) / max(single):.2f}"
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--impacts", type=int, default=2_000_000, help="of the compiled core")
+    parser.add_argument("--impacts", type=int, default=2_000_000, help="impacts of the compiled core")
     parser.add_argument("--loop", type=int, default=300, help="impacts of the loop")
     parser.add_argument("--rounds", type=int, default=15)
-    parser.add_argument("--jobs", type=int, default=2, help="processes of the sweep")
-    asked = parser.parse_args()
-    models = [impact.models()[key] for key in PAPER]
+    parser.add_argument("--threads", type=int, default=2, help="threads of the compiled core")
+    args = parser.parse_args()
     cores = ["numpy", "numba"] if is_installed() else ["numpy"]
-    rtol = side_by_side(asked, models, cores)
-    # processes take most of a second to begin, whatever they are to do
-    for by in cores:
-        table = Table(
-            f"a sweep ({by}) of", "1 [impacts/s]", f"--jobs {asked.jobs}", f"--threads {asked.jobs}", box=None
+    # about a second for each core: in a shorter run the last blocks, when some threads are idle, would count
+    e = {"numpy": restitutions(args.impacts // 5), "numba": restitutions(args.impacts)}
+    loop_e = restitutions(args.loop)
+    rtol = core_tolerance(cores, loop_e)
+    loop_rtol = next(rtol for rtol in TOLERANCES if run_loop(loop_e, rtol)[1] <= MAX_ERROR)
+
+    engines = [("numpy", 1)]
+    if "numba" in cores:
+        engines += [("numba", threads) for threads in sorted({1, args.threads})]
+    loop_rates: list[float] = []
+    rates: dict[tuple[str, int], list[float]] = {engine: [] for engine in engines}
+    accuracy: dict[tuple[str, int], tuple[float, int]] = {}
+    for round_number in range(args.rounds):
+        seconds, loop_error = run_loop(loop_e, loop_rtol)
+        loop_rates.append(args.loop / seconds)
+        # alternate the order: an engine finds the caches and the memory in the state left by the engine before it
+        for core, threads in engines[:: -1 if round_number % 2 else 1]:
+            seconds, error, steps = run_core(e[core], rtol, core, threads)
+            rates[core, threads].append(e[core].size / seconds)
+            accuracy[core, threads] = error, steps
+
+    head = ("engine", "threads", "rtol", "largest error", "steps", "impacts/s")
+    table = Table(*head, "ratio", "min", "max", "speedup", "best", box=None)
+    loop_row = ("solve_ivp RK45, loop", "1", f"{loop_rtol:g}", f"{loop_error:.2g}", "")
+    table.add_row(*loop_row, f"{median(loop_rates):,.0f}", "1")
+    for core, threads in engines:
+        error, steps = accuracy[core, threads]
+        if error > MAX_ERROR:
+            raise SystemExit(f"{core}: got an error of {error:.2g}, expected at most {MAX_ERROR:g}")
+        core_rates = rates[core, threads]
+        ratios = [rate / loop_rate for rate, loop_rate in zip(core_rates, loop_rates, strict=True)]
+        table.add_row(
+            f"impact, {core}",
+            str(threads),
+            f"{rtol:g}",
+            f"{error:.2g}",
+            str(steps),
+            f"{median(core_rates):,.0f}",
+            *(f"{ratio:,.0f}" for ratio in (median(ratios), min(ratios), max(ratios))),
+            *speedup(core_rates, rates[core, 1]),
         )
-        for impacts in (1_000_000, 4_000_000):
-            ways = ((1, 1), (asked.jobs, 1), (1, asked.jobs))
-            one, *more = (sweep(models, impacts, rtol, by, jobs, threads) for jobs, threads in ways)
-            table.add_row(f"{impacts:,}", f"{one:,.0f}", *(f"{rate:,.0f} ({rate / one:.2f})" for rate in more))
-        Console(width=140).print(table)
-    if len(cores) > 1:
-        Console().print(starts())
+    sizes = f"{args.impacts:,} impacts (numpy: a fifth, loop: {args.loop}), {args.rounds} rounds"
+    title = f"{len(PAPER_MODELS)} models, {sizes}, {os.cpu_count()} cores"
+    Console(width=140).print(title, table, sep="\n")
 
 
 if __name__ == "__main__":

@@ -1,13 +1,12 @@
-"""How does a sweep scale over processes and over dask's workers, and when is the driver the bottleneck?
+"""Scaling of a sweep over processes and dask workers, and the number of workers that one driver can supply.
 
-One sweep of two laws, all impacts distinct, nothing collapsed, goes into a file by one process, by two, by one
-and by two workers of dask; scheduler and workers are started by command line on this machine. Printed are
-trajectories a second from the plan to the whole file, and their ratio to one process. For dask also the
-processor time of the driver and of the scheduler for a range while workers integrate, beyond what they take when
-idle, and the bytes over the wire for a trajectory, as the loopback interface counts them; and from these how
-many workers they keep busy: the time that a worker takes for a range over theirs. The file is assembled when all
-is integrated, in its own time. The files go where TMPDIR says; in memory, the disk is left out of it, on which
-each range waits once.
+A sweep of two models, all impacts distinct and without deduplication, is written to a file by one process, two
+processes, one dask worker and two dask workers. Scheduler and workers are started from the command line on this
+machine. The table shows trajectories per second, from the plan to the complete file, and the ratio to one process.
+For dask it also shows the CPU time of driver and scheduler per range, minus their CPU time when idle, and the
+bytes sent per trajectory, as counted by the loopback interface. The number of workers that can be kept busy is the
+time that a worker needs for a range, divided by the larger of these two CPU times. The files are written to
+TMPDIR; use a folder in memory to exclude the disk, which is synchronized once per range.
 
     TMPDIR=/dev/shm python scripts/bench_scaling.py [--points 500000] [--core numpy]
 """
@@ -47,33 +46,30 @@ from impact.engine.trajectories import (
 )
 from impact.results.sweep import sweep_into
 
-IDLE = 5.0  # s
-LAWS = ("lankarani-nikravesh-1990", "gharib-hurmuzlu-2012")
+IDLE_TIME_S = 5.0
+MODELS = ("lankarani-nikravesh-1990", "gharib-hurmuzlu-2012")
 
 
-def plan_of(points: int, core: str) -> Plan:
-    """Impacts of the two balls of Table 1, all distinct."""
-    found = prepare({
-        "models": list(LAWS),
+def table1_plan(points: int, core: str) -> Plan:
+    """A plan of distinct impacts of the two balls of Table 1."""
+    sweep = {"v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6.118486349e9}
+    config = {
+        "models": list(MODELS),
         "solver": {"collapse": False, "core": core},
-        "sweep": {
-            "e": {"linspace": [0.05, 0.99, points // len(LAWS)]},
-            "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6.118486349e9,
-        },
-    })  # fmt: skip
-    return with_core(found, trajectory_maps(found))
+        "sweep": {"e": {"linspace": [0.05, 0.99, points // len(MODELS)]}, **sweep},
+    }
+    plan = prepare(config)
+    return with_core(plan, trajectory_maps(plan))
 
 
 @contextmanager
-def dask(folder: Path, workers: int) -> Iterator[tuple[Path, psutil.Process]]:
-    """A scheduler and workers, and the scheduler's process."""
+def dask_processes(folder: Path, workers: int) -> Iterator[tuple[Path, psutil.Process]]:
+    """Start a scheduler and workers; yields the scheduler file and the process of the scheduler."""
     file, children = folder / f"scheduler{workers}.json", []
 
-    def start(*words: str) -> subprocess.Popen[bytes]:
-        child = subprocess.Popen(
-            [sys.executable, "-m", "dask", *words, "--scheduler-file", str(file), "--no-dashboard"], cwd=folder,
-            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-        )  # fmt: skip
+    def start(*arguments: str) -> subprocess.Popen[bytes]:
+        command = [sys.executable, "-m", "dask", *arguments, "--scheduler-file", str(file), "--no-dashboard"]
+        child = subprocess.Popen(command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         children.append(child)
         return child
 
@@ -92,95 +88,106 @@ def dask(folder: Path, workers: int) -> Iterator[tuple[Path, psutil.Process]]:
 
 @dataclass(frozen=True)
 class Cost:
-    """Seconds on the clock, processor seconds of driver and scheduler, and bytes sent, up to a moment."""
+    """Wall time and CPU times of driver and scheduler [s], and bytes sent over the loopback interface."""
 
-    clock: float
+    wall: float
     driver: float
     scheduler: float
-    wire: int
+    bytes_sent: int
 
     @classmethod
     def now(cls, scheduler: psutil.Process | None) -> Cost:
-        theirs = scheduler.cpu_times() if scheduler is not None else None
+        """The counters at this moment."""
+        cpu = scheduler.cpu_times() if scheduler is not None else None
         sent = psutil.net_io_counters(pernic=True)["lo"].bytes_sent
-        return cls(time.perf_counter(), time.process_time(), theirs.user + theirs.system if theirs else 0.0, sent)
+        return cls(time.perf_counter(), time.process_time(), cpu.user + cpu.system if cpu else 0.0, sent)
 
-    def since(self, then: Cost) -> Cost:
-        return Cost(*(getattr(self, name) - getattr(then, name) for name in vars(self)))
-
-
-def measured(plan: Plan, backend: Backend, scheduler: psutil.Process | None = None) -> tuple[float, Cost]:
-    """Seconds that a sweep takes, and what its trajectories alone cost; the best of a few."""
-    return min((_measured(plan, backend, scheduler) for _ in range(3)), key=lambda timing: timing[0])
+    def since(self, start: Cost) -> Cost:
+        """The difference from earlier counters."""
+        return Cost(*(getattr(self, name) - getattr(start, name) for name in vars(self)))
 
 
-def _measured(plan: Plan, backend: Backend, scheduler: psutil.Process | None) -> tuple[float, Cost]:
-    begun, ends = Cost.now(scheduler), []
+def best_cost(plan: Plan, backend: Backend, scheduler: psutil.Process | None = None) -> tuple[float, Cost]:
+    """Seconds of a whole sweep, and the cost of its integration; the fastest of three runs."""
+    return min((sweep_cost(plan, backend, scheduler) for _ in range(3)), key=lambda timing: timing[0])
 
-    def on_progress(at: Progress) -> None:
-        if at.trajectories in (0, at.of_trajectories) and not at.points:
-            ends.append(Cost.now(scheduler))
+
+def sweep_cost(plan: Plan, backend: Backend, scheduler: psutil.Process | None) -> tuple[float, Cost]:
+    """Seconds of a whole sweep, and the cost of its integration."""
+    start, integration = Cost.now(scheduler), []
+
+    def on_progress(progress: Progress) -> None:
+        if progress.trajectories in (0, progress.of_trajectories) and not progress.points:
+            integration.append(Cost.now(scheduler))
 
     with tempfile.TemporaryDirectory() as folder:
         sweep_into(Path(folder) / "results.h5", plan, backend=backend, on_progress=on_progress)
-    return Cost.now(scheduler).since(begun).clock, ends[-1].since(ends[0])
+    return Cost.now(scheduler).since(start).wall, integration[-1].since(integration[0])
 
 
-def by_dask(plan: Plan, key: str, columns: Columns, workers: int) -> tuple[float, Cost]:
-    """The same, by workers that have loaded what they need."""
+def dask_cost(plan: Plan, key: str, columns: Columns, workers: int) -> tuple[float, Cost]:
+    """The same with dask workers that have loaded their libraries; the cost without that of idle processes."""
     with (
         tempfile.TemporaryDirectory() as folder,
-        dask(Path(folder), workers) as (file, scheduler),
+        dask_processes(Path(folder), workers) as (file, scheduler),
         cluster(file) as joined,
     ):
         while joined.backend.capacity() < BLOCKS_IN_FLIGHT * workers:
             time.sleep(0.1)
         with joined.backend.executor() as executor:
-            wait([executor.submit(integrate_remotely, key, columns, context_of(plan)) for _ in range(4 * workers)])
-        # both do something while nothing is asked of them
-        begun = Cost.now(scheduler)
-        time.sleep(IDLE)
-        idle = Cost.now(scheduler).since(begun)
-        seconds, cost = measured(plan, joined.backend, scheduler)
-        share = cost.clock / idle.clock
-        return seconds, Cost(
-            cost.clock, cost.driver - share * idle.driver, cost.scheduler - share * idle.scheduler, cost.wire
-        )
+            context = context_of(plan)
+            wait([executor.submit(integrate_remotely, key, columns, context) for _ in range(4 * workers)])
+        start = Cost.now(scheduler)
+        time.sleep(IDLE_TIME_S)
+        idle = Cost.now(scheduler).since(start)
+        seconds, cost = best_cost(plan, joined.backend, scheduler)
+        share = cost.wall / idle.wall
+        driver, scheduling = cost.driver - share * idle.driver, cost.scheduler - share * idle.scheduler
+        return seconds, Cost(cost.wall, driver, scheduling, cost.bytes_sent)
+
+
+def range_time(plan: Plan, key: str, columns: Columns) -> float:
+    """CPU seconds of one range, without the compilation in a first run."""
+    (model,) = (model for model in plan.models if model.key == key)
+    for _ in range(2):
+        start = time.process_time()
+        integrate_columns(model, columns, plan.config.solver)
+        seconds = time.process_time() - start
+    return seconds
 
 
 def main() -> None:
-    parse = argparse.ArgumentParser(description="How a sweep scales.")
-    parse.add_argument("--points", type=int, default=500_000)
-    parse.add_argument("--core", default="numpy", choices=["numpy", "numba"])
-    asked = parse.parse_args()
-    if asked.points <= RANGE_TRAJECTORIES:
-        parse.error(f"--points: got {asked.points:,}, expected more than {RANGE_TRAJECTORIES:,}")
-    plan = plan_of(asked.points, asked.core)
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--points", type=int, default=500_000)
+    parser.add_argument("--core", default="numpy", choices=["numpy", "numba"])
+    args = parser.parse_args()
+    if args.points <= RANGE_TRAJECTORIES:
+        parser.error(f"--points: got {args.points:,}, expected more than {RANGE_TRAJECTORIES:,}")
+    plan = table1_plan(args.points, args.core)
     maps = trajectory_maps(plan)
     ranges = list(trajectory_ranges(maps))
     middle = ranges[len(ranges) // 2]
-    model, columns = plan.models[middle.model], columns_of(plan, maps, middle)
-    for _ in range(2):
-        begun = time.process_time()
-        integrate_columns(model, columns, plan.config.solver)
-        alone = time.process_time() - begun
-    print(f"{plan.points:,} points, {len(ranges)} ranges, {asked.core}, {os.cpu_count()} cores")
-    rows = Table("", "trajectories/s", "ratio", "driver", "scheduler", "bytes", box=None)
-    one, cost = measured(plan, choose_backend(1))
-    for way, (seconds, cost) in (
-        ("1 process", (one, None)),
-        ("2 processes", (measured(plan, choose_backend(2))[0], None)),
-        ("1 worker of dask", by_dask(plan, model.key, columns, 1)),
-        ("2 workers of dask", by_dask(plan, model.key, columns, 2)),
-    ):
-        told = [f"{plan.points / seconds:,.0f}", f"{one / seconds:.2f}"]
-        if cost is not None:
-            each = (cost.driver / len(ranges), cost.scheduler / len(ranges))
-            told += [*(f"{1e3 * own:.1f} ms" for own in each), f"{cost.wire / plan.points:.0f}"]
-        rows.add_row(way, *told)
-    Console(width=120).print(rows)
-    each = max(cost.driver, cost.scheduler) / len(ranges)
-    print(f"a worker takes {1e3 * alone:.0f} ms for a range: {alone / each:.0f} workers keep the busier one busy")
+    key, columns = plan.models[middle.model].key, columns_of(plan, maps, middle)
+    worker_time = range_time(plan, key, columns)
+    print(f"{plan.points:,} points, {len(ranges)} ranges, {args.core}, {os.cpu_count()} cores")
+    table = Table("", "trajectories/s", "ratio", "driver", "scheduler", "bytes", box=None)
+    single, _ = best_cost(plan, choose_backend(1))
+    for name, seconds in (("1 process", single), ("2 processes", best_cost(plan, choose_backend(2))[0])):
+        table.add_row(name, f"{plan.points / seconds:,.0f}", f"{single / seconds:.2f}")
+    for workers in (1, 2):
+        seconds, cost = dask_cost(plan, key, columns, workers)
+        driver, scheduler = cost.driver / len(ranges), cost.scheduler / len(ranges)
+        table.add_row(
+            f"{workers} dask worker{'s' if workers > 1 else ''}",
+            f"{plan.points / seconds:,.0f}",
+            f"{single / seconds:.2f}",
+            f"{1e3 * driver:.1f} ms",
+            f"{1e3 * scheduler:.1f} ms",
+            f"{cost.bytes_sent / plan.points:.0f}",
+        )
+    Console(width=120).print(table)
+    supplied = worker_time / max(driver, scheduler)
+    print(f"a worker needs {1e3 * worker_time:.0f} ms for a range; one driver can supply {supplied:.0f} workers")
 
 
 if __name__ == "__main__":

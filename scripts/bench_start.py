@@ -1,7 +1,8 @@
-"""How long does a command take that has little to do, against the libraries that it cannot do without?
+"""Run time of short commands, compared with the start of the libraries that they need.
 
-`impact --help` beside a bare typer program, and the sweep of Figure 6 beside the import of its libraries: whole
-processes, in turn, in one run; printed are medians and their ratios.
+`impact --help` is compared with a minimal typer program, and the sweep of Figure 6 with the import of its
+libraries. The same sweep is timed with each core, and with the compiled core before and after its code is cached.
+All times are of whole processes; the pairs run in turn. The tables show medians and their ratios.
 
     python scripts/bench_start.py [--repeats 15]
 """
@@ -20,7 +21,9 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-BARE = """
+from impact.contact.numba.dispatch import is_installed
+
+TYPER_PROGRAM = """
 import typer
 app = typer.Typer()
 @app.command()
@@ -32,11 +35,13 @@ LIBRARIES = "import xarray, h5netcdf, pydantic, typer, rich"
 FIGURE6 = Path(__file__).parents[1] / "configs" / "figure6.toml"
 
 
-def seconds(words: list[str]) -> float:
-    """The time of a process."""
-    begun = time.perf_counter()
-    subprocess.run([sys.executable, *words], check=True, capture_output=True)
-    return time.perf_counter() - begun
+def run_time(arguments: list[str], **environment: str) -> float:
+    """Seconds of a Python process with these arguments."""
+    start = time.perf_counter()
+    subprocess.run(
+        [sys.executable, *arguments], check=True, capture_output=True, env={**os.environ, **environment}
+    )
+    return time.perf_counter() - start
 
 
 def main() -> None:
@@ -46,17 +51,33 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         sweep = ["-m", "impact", "sweep", str(FIGURE6), "-o", f"{folder}/figure6.h5", "--overwrite", "-q"]
         pairs = {
-            "impact --help": (["-m", "impact", "--help"], ["-c", BARE, "--help"], "a bare typer program"),
-            "impact sweep configs/figure6.toml": (sweep, ["-c", LIBRARIES], "the import of its libraries"),
+            "impact --help": (
+                ["-m", "impact", "--help"],
+                ["-c", TYPER_PROGRAM, "--help"],
+                "minimal typer program",
+            ),
+            "impact sweep configs/figure6.toml": (sweep, ["-c", LIBRARIES], "import of its libraries"),
         }
-        table = Table("command", "median [s]", "beside", "median [s]", "ratio", box=None)
-        for name, (ours, theirs, beside) in pairs.items():
-            for words in (ours, theirs):
-                seconds(words)
-            times = [(seconds(ours), seconds(theirs)) for _ in range(repeats)]
-            a, b = (statistics.median(one) for one in zip(*times, strict=True))
-            table.add_row(name, f"{a:.3f}", beside, f"{b:.3f}", f"{a / b:.2f}")
-    Console().print(f"{repeats} times each, {os.cpu_count()} cores", table, sep="\n")
+        table = Table("command", "median (s)", "compared with", "median (s)", "ratio", box=None)
+        for name, (command, reference, reference_name) in pairs.items():
+            for arguments in (command, reference):
+                run_time(arguments)
+            times = [(run_time(command), run_time(reference)) for _ in range(repeats)]
+            ours, theirs = (statistics.median(seconds) for seconds in zip(*times, strict=True))
+            table.add_row(name, f"{ours:.3f}", reference_name, f"{theirs:.3f}", f"{ours / theirs:.2f}")
+
+        cores = Table("core of the sweep", "median (s)", box=None)
+
+        def add_core(name: str, core: str, count: int, **environment: str) -> None:
+            command = [*sweep, "--set", f'solver.core="{core}"']
+            times = [run_time(command, **environment) for _ in range(count)]
+            cores.add_row(name, f"{statistics.median(times):.2f}")
+
+        add_core("numpy", "numpy", repeats)
+        if is_installed():
+            add_core("numba, compiled in the run", "numba", 1, NUMBA_CACHE_DIR=folder)
+            add_core("numba, cached", "numba", repeats, NUMBA_CACHE_DIR=folder)
+    Console().print(f"{repeats} repeats, {os.cpu_count()} cores", table, cores, sep="\n")
 
 
 if __name__ == "__main__":

@@ -1,9 +1,10 @@
-"""How long does a sweep take to be stored in full, and how much memory, beside a plain write of the same bytes?
+"""Time and memory to store a sweep in full, compared with a plain write of the same number of bytes.
 
-One law over two axes that it does not depend on, so that nearly all of the time goes into the points. Printed
-are seconds and peak memory of `impact sweep` in layout full, of the same by another source tree if one is given,
-and of a plain h5py write of as many bytes, slab by slab, with SHA-256 and fsync; alternating, the best of a few.
-Then the same sweep in layout factored, its size, and the time to read one slice of either file.
+One model over two axes that it does not depend on, so that nearly all of the time is spent in storing points. The
+table shows seconds and peak memory of a plain h5py write, slab by slab, with SHA-256 and fsync; of `impact sweep`
+in layout full; and, with `--against`, of the same by another source tree. They run in turn; the best of the
+repeats counts. Then the same sweep in layout factored, the sizes of both files, and the time to read one slice of
+each.
 
     python scripts/bench_storage.py [--points 1e7] [--repeat 3] [--against OTHER/src]
 """
@@ -43,8 +44,8 @@ variables = {variables}
 """
 
 
-def plain(path: Path, points: int) -> None:
-    """Write as many bytes as the sweep does, and make sure of them as it does."""
+def write_plain(path: Path, points: int) -> None:
+    """Write as many bytes as the sweep, with the same checksum and fsync."""
     values = np.random.default_rng(0).random(SLAB)
     with h5py.File(path, "w") as file:
         for name in VARIABLES:
@@ -59,16 +60,16 @@ def plain(path: Path, points: int) -> None:
         os.fsync(stream.fileno())
 
 
-def measured(words: list[str], source: Path | None = None) -> tuple[float, float]:
-    """Seconds and peak memory [MB] of a command of ours, in a process of its own."""
+def run_python(arguments: list[str], source: Path | None = None) -> tuple[float, float]:
+    """Seconds and peak memory [MB] of a Python process; `source` is the src folder of another version."""
     environment = {**os.environ, **({"PYTHONPATH": str(source)} if source else {})}
-    begun = time.perf_counter()
-    child = subprocess.Popen([sys.executable, *words], env=environment)
+    start = time.perf_counter()
+    child = subprocess.Popen([sys.executable, *arguments], env=environment)
     _, status, usage = os.wait4(child.pid, 0)
     child.returncode = os.waitstatus_to_exitcode(status)
     if child.returncode:
-        raise SystemExit(f"{' '.join(words)}: exit {child.returncode}")
-    return time.perf_counter() - begun, usage.ru_maxrss / 1024.0
+        raise SystemExit(f"{' '.join(arguments)}: exit {child.returncode}")
+    return time.perf_counter() - start, usage.ru_maxrss / 1024.0
 
 
 def main() -> None:
@@ -80,7 +81,7 @@ def main() -> None:
     options = parser.parse_args()
     points = int(options.points)
     if options.plain:
-        plain(options.plain, points)
+        write_plain(options.plain, points)
         return
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -90,37 +91,37 @@ def main() -> None:
         sweep = ["-m", "impact", "sweep", str(config), "--quiet", "--overwrite", "-o"]
         commands: dict[str, tuple[list[str], Path | None]] = {
             "plain h5py write, SHA-256, fsync": (
-                [__file__, "--points", str(points), "--plain", str(folder / "plain.h5")], None,
+                [__file__, "--points", str(points), "--plain", str(folder / "plain.h5")],
+                None,
             ),
             "impact sweep, layout full": ([*sweep, str(full), "--set", 'output.layout="full"'], None),
-        }  # fmt: skip
+        }
         if options.against:
-            commands["the same by the other version"] = ([*sweep, str(other)], options.against)
+            commands["the same, other version"] = ([*sweep, str(other)], options.against)
         best: dict[str, tuple[float, float]] = {}
         for _ in range(options.repeat):
-            for label, (words, source) in commands.items():
-                taken = measured(words, source)
-                best[label] = min(best.get(label, taken), taken)
-        best["impact sweep, layout factored"] = measured(
+            for label, (arguments, source) in commands.items():
+                cost = run_python(arguments, source)
+                best[label] = min(best.get(label, cost), cost)
+        best["impact sweep, layout factored"] = run_python(
             [*sweep, str(factored), "--set", 'output.layout="factored"']
         )
         first = next(iter(best.values()))[0]
         rows = Table(
-            "", "seconds", "ratio", "peak memory [MB]", title=f"{points:,} points, {len(VARIABLES)} variables"
+            "", "seconds", "ratio", "peak memory (MB)", title=f"{points:,} points, {len(VARIABLES)} variables"
         )
         for label, (seconds, memory) in best.items():
             rows.add_row(label, f"{seconds:.2f}", f"{seconds / first:.2f}", f"{memory:.0f}")
         out = Console()
         out.print(rows)
         for path in (full, factored):
-            begun = time.perf_counter()
+            start = time.perf_counter()
             result = impact.load(path)
             opened = time.perf_counter()
             result["v1_post"].isel(v1=0, m1=0).load()
-            out.print(
-                f"{path.stem}: {path.stat().st_size:,} bytes, opened in {opened - begun:.2f} s, a slice over e in "
-                f"{1e3 * (time.perf_counter() - opened):.1f} ms"
-            )
+            slice_ms = 1e3 * (time.perf_counter() - opened)
+            size = f"{path.stem}: {path.stat().st_size:,} bytes"
+            out.print(f"{size}, opened in {opened - start:.2f} s, a slice over e read in {slice_ms:.1f} ms")
             result.close()
     out.print(f"peak memory of this process: {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0:.0f} MB")
 

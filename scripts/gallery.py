@@ -1,4 +1,4 @@
-"""docs/gallery.md: a picture of each kind, and the command that makes it."""
+"""docs/gallery.md: a plot of each kind, with the command that draws it."""
 
 from __future__ import annotations
 
@@ -28,52 +28,68 @@ plotted numbers.
 ```
 {pictures}
 """
-# where the sweeps of the results are
+# the config of each result
 RESULTS = {"figure6": "configs/figure6.toml", "speeds": "docs/gallery/speeds.toml"}
 
 
 @dataclass(frozen=True)
 class Entry:
-    """A kind of picture, the result it is drawn from, further words of its command, and what is seen in it."""
+    """A plot of the gallery.
+
+    Parameters
+    ----------
+    kind : kind of plot
+    result : name of the result that it is drawn from
+    options : further options of the command
+    caption : what the plot shows
+    """
 
     kind: str
     result: str
-    words: str
-    seen: str
+    options: str
+    caption: str
 
     @property
     def command(self) -> list[str]:
-        """The words of the command."""
+        """The command that draws the plot, as a list of arguments."""
         kind = [] if self.kind == next(iter(KINDS)) else ["--kind", self.kind]
-        words = shlex.split(self.words)
-        return ["impact", "plot", f"{self.result}.h5", *kind, *words, "-o", f"{self.kind}.svg"]
+        options = [*kind, *shlex.split(self.options)]
+        return ["impact", "plot", f"{self.result}.h5", *options, "-o", f"{self.kind}.svg"]
 
 
 ENTRIES = (
     Entry(
-        "final-velocities", "figure6", "",
+        "final-velocities",
+        "figure6",
+        "",
         "Figure 6 of Gharib and Hurmuzlu (2012). The model with permanent indentation agrees with the "
         "impulse-momentum solution; each of the two damped models agrees near one end of the range only.",
     ),
     Entry("restitution", "figure6", "", "Delivered restitution of each model over the requested restitution."),
     Entry("error", "figure6", "", "Delivered minus requested restitution, with bands at 0.01 and 0.05."),
     Entry(
-        "map", "speeds", "",
+        "map",
+        "speeds",
+        "",
         "Error of the restitution over restitution and speed. Models driven by e do not depend on the speed. In "
         "Thornton's elastic-plastic model the restitution depends on the speed only. Modia3D uses e = 0 up to "
         "0.1 m/s here.",
     ),
     Entry("validity", "speeds", "", "The closest model at each point, and its error."),
     Entry(
-        "loop", "figure6", "--sel e=0.5",
+        "loop",
+        "figure6",
+        "--sel e=0.5",
         "Force over indentation, as in Figures 3 and 5. The enclosed area is the energy loss.",
     ),
     Entry("history", "figure6", "--sel e=0.5", "Indentation, its rate and the force over time, same impact."),
     Entry(
-        "impulse", "figure6", "--sel e=0.5 --model lankarani-nikravesh-1990 --model gharib-hurmuzlu-2012",
+        "impulse",
+        "figure6",
+        "--sel e=0.5 --model lankarani-nikravesh-1990 --model gharib-hurmuzlu-2012",
         "The impulse-velocity diagram, Figure 2. All models follow the same lines and differ in the end point.",
     ),
-)  # fmt: skip
+)
 
 
 def gallery_page() -> str:
@@ -89,7 +105,7 @@ def _sections() -> Iterator[str]:
         yield f"""
 ## {entry.kind}
 
-{entry.seen}
+{entry.caption}
 
 ```sh
 {shlex.join(entry.command)}
@@ -99,43 +115,46 @@ def _sections() -> Iterator[str]:
 
 
 def write_gallery(folder: Path) -> None:
-    """Run the commands of the page: its pictures, and numbers.json, by which is told whether they are fresh."""
+    """Run the commands of the page: writes the pictures, and numbers.json, by which a test detects stale ones."""
     folder.mkdir(exist_ok=True)
     with TemporaryDirectory() as name:
         results = Path(name)
         for result, path in RESULTS.items():
             _run("sweep", str(ROOT / path), "-o", str(results / f"{result}.h5"), "--quiet")
-        found = {}
+        numbers = {}
         for entry in ENTRIES:
-            _, *words = entry.command
-            words[1] = str(results / words[1])
-            words[-1] = str(folder / words[-1])
+            _, *arguments = entry.command
+            arguments[1] = str(results / arguments[1])
+            arguments[-1] = str(folder / arguments[-1])
             table = results / f"{entry.kind}.csv"
-            _run(*words, "--data", str(table), "--data-form", "long", "--overwrite")
-            found[entry.kind] = summary(table)
-    (folder / "numbers.json").write_text(json.dumps(found, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+            _run(*arguments, "--data", str(table), "--data-form", "long", "--overwrite")
+            numbers[entry.kind] = summary(table)
+    (folder / "numbers.json").write_text(
+        json.dumps(numbers, indent=1, ensure_ascii=False) + "\n", encoding="utf-8"
+    )
 
 
 def summary(table: Path) -> dict[str, object]:
-    """What is kept of the numbers behind a picture.
+    """Summarize the columns of a table of plotted numbers.
 
-    Of a column of numbers how many there are, their mean, root mean square and mean by place, which tells when
-    they change places; of a column of text its different values, in order.
+    A column of numbers gives its count, mean, root mean square, and the mean weighted by the row number, which
+    changes if numbers change their order. A column of text gives its distinct values.
     """
     head, *rows = csv.reader(table.read_text(encoding="utf-8").splitlines())
-    found: dict[str, object] = {}
+    columns: dict[str, object] = {}
     for name, column in zip(head, zip(*rows, strict=True), strict=True):
         try:
             values = np.array(column, float)
         except ValueError:
-            found[name] = list(dict.fromkeys(column))
+            columns[name] = list(dict.fromkeys(column))
             continue
-        place = np.arange(values.size) / values.size
+        weights = np.arange(values.size) / values.size
         finite = np.isfinite(values)
-        means = [np.mean(one[finite]) for one in (values, values * values, values * place)]
-        found[name] = [int(finite.sum()), *(float(f"{one:.9g}") for one in (means[0], means[1] ** 0.5, means[2]))]
-    return found
+        mean, mean_square, weighted = (np.mean(x[finite]) for x in (values, values * values, values * weights))
+        numbers = (mean, mean_square**0.5, weighted)
+        columns[name] = [int(finite.sum()), *(float(f"{number:.9g}") for number in numbers)]
+    return columns
 
 
-def _run(*words: str) -> None:
-    subprocess.run([sys.executable, "-m", "impact", *words], check=True, stderr=subprocess.DEVNULL)
+def _run(*arguments: str) -> None:
+    subprocess.run([sys.executable, "-m", "impact", *arguments], check=True, stderr=subprocess.DEVNULL)

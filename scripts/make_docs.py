@@ -1,4 +1,4 @@
-"""Regenerate what the documentation takes from the program: schema, models, gallery, the README's picture.
+"""Generate the pages and pictures of the documentation that follow from the program.
 
 python scripts/make_docs.py
 """
@@ -14,16 +14,32 @@ from impact.contact.status import Status
 from impact.plots.style import save_figure
 from impact.results.schema import HISTORY_VARIABLES, SCHEMA, SCHEMA_VERSION
 from models_page import models_page
-from models_pictures import curves
+from models_pictures import pictures
 
 ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "src" / "impact"
-# from the top down
+# an importing package comes before the packages that it imports
 PACKAGES = (
-    "cli", "api", "reporting", "plots", "comparison", "results", "engine", "config", "contact", "contact/models",
-    "contact/closed_forms", "contact/numba", "ode", "formatting", "text", "errors", "atomic", "_version",
-)  # fmt: skip
-# the figures of the paper that follow one impact, and their kinds
+    "cli",
+    "api",
+    "reporting",
+    "plots",
+    "comparison",
+    "results",
+    "engine",
+    "config",
+    "contact",
+    "contact/models",
+    "contact/closed_forms",
+    "contact/numba",
+    "ode",
+    "formatting",
+    "text",
+    "errors",
+    "atomic",
+    "_version",
+)
+# the figures of the paper that show a single impact, and their kinds
 PAPER_FIGURES = {
     "figure2": "impulse",
     "figure3": "loop",
@@ -119,24 +135,24 @@ All variables have the dimension `t` [s], the time since first contact.
 def schema_page() -> str:
     """docs/schema.md as text."""
     variables = []
-    for one in SCHEMA:
-        dims = "model, axes" if one.per == "model" else "axes"
-        equation = one.equation.replace("|", "\\|")
-        variables.append(f"| `{one.name}` | {one.unit} | {dims} | {one.judged} | {one.meaning} | {equation} |")
+    for variable in SCHEMA:
+        dims = "model, axes" if variable.per == "model" else "axes"
+        cells = (variable.unit, dims, variable.judged, variable.meaning, variable.equation.replace("|", "\\|"))
+        variables.append(f"| `{variable.name}` | {' | '.join(cells)} |")
     statuses = [f"| {status.value} | {status.name.lower()} | {status.meaning} |" for status in Status]
     history = [f"| `{name}` | {unit} | {meaning} |" for name, unit, meaning in HISTORY_VARIABLES]
     tables = {"variables": variables, "statuses": statuses, "history": history}
-    on_request = ", ".join(f"`{one.name}`" for one in SCHEMA if not one.by_default)
-    by_name = {"on_request": on_request, "version": SCHEMA_VERSION}
-    return SCHEMA_PAGE.format(**by_name, **{name: "\n".join(rows) for name, rows in tables.items()})
+    on_request = ", ".join(f"`{variable.name}`" for variable in SCHEMA if not variable.by_default)
+    rows_as_text = {name: "\n".join(rows) for name, rows in tables.items()}
+    return SCHEMA_PAGE.format(on_request=on_request, version=SCHEMA_VERSION, **rows_as_text)
 
 
 def architecture_page(page: str) -> str:
-    """docs/architecture.md with the first line of each module, packages from the top down.
+    """docs/architecture.md with a new list of modules, each with the first line of its docstring.
 
     Parameters
     ----------
-    page : its text, whose list is replaced
+    page : the present text of the page
     """
     begin, end = "<!-- modules -->\n", "<!-- end of modules -->"
     before, _, rest = page.partition(begin)
@@ -152,19 +168,19 @@ def architecture_page(page: str) -> str:
     return f"{before}{begin}{chr(10).join(lines[1:])}\n{end}{rest.partition(end)[2]}"
 
 
-def write_curves(folder: Path) -> None:
-    """The small pictures of docs/models.md, and no others."""
+def write_pictures(folder: Path) -> None:
+    """Write the small pictures of docs/models.md, and delete those of models that no longer exist."""
     folder.mkdir(exist_ok=True)
-    pictures = curves()
-    for left in folder.glob("*.svg"):
-        if left.name not in pictures:
-            left.unlink()
-    for name, picture in pictures.items():
+    fresh = pictures()
+    for path in folder.glob("*.svg"):
+        if path.name not in fresh:
+            path.unlink()
+    for name, picture in fresh.items():
         (folder / name).write_text(picture, encoding="utf-8")
 
 
 def write_paper_figures(folder: Path) -> None:
-    """The pictures of docs/paper.md; that of Figure 6 is the README's."""
+    """Write the pictures of docs/paper.md, except Figure 6, which is written for the README."""
     folder.mkdir(exist_ok=True)
     for name, kind in PAPER_FIGURES.items():
         result = impact.sweep(ROOT / "configs" / f"{name}.toml")
@@ -176,7 +192,7 @@ def main() -> None:
     architecture = ROOT / "docs" / "architecture.md"
     architecture.write_text(architecture_page(architecture.read_text(encoding="utf-8")), encoding="utf-8")
     (ROOT / "docs" / "models.md").write_text(models_page(), encoding="utf-8")
-    write_curves(ROOT / "docs" / "models")
+    write_pictures(ROOT / "docs" / "models")
     (ROOT / "docs" / "gallery.md").write_text(gallery_page(), encoding="utf-8")
     write_gallery(ROOT / "docs" / "gallery")
     write_paper_figures(ROOT / "docs" / "paper")

@@ -1,7 +1,4 @@
-"""docs/models.md and its small pictures: the catalogue as the declarations have it, and what each law delivers.
-
-`models_page` and `curves` follow from the catalogue alone; scripts/make_docs.py writes them down.
-"""
+"""docs/models.md: the declarations of the catalogue, and the restitution that each model delivers."""
 
 from __future__ import annotations
 
@@ -15,23 +12,9 @@ from impact.contact.evidence import count_states
 from impact.contact.model import ForceModel, Parameter
 from impact.contact.models import catalogue
 from impact.text import with_year
-from models_claims import claims
-from models_measured import (
-    BALLS,
-    BOUNDS,
-    DAMPING,
-    MATERIAL,
-    SPEEDS,
-    cell,
-    error,
-    formula,
-    largest,
-    measured,
-    number,
-    short,
-    table,
-    within,
-)
+from models_deviations import deviations
+from models_restitution import BALLS, BOUNDS, DAMPING, MATERIAL, SPEEDS, error, restitution_curves
+from models_tables import cell, formula, largest, number, short, table, within
 
 PAGE = """\
 # The contact force laws
@@ -84,7 +67,7 @@ source, and the entry names that source. The {count} entries are {evidence}.
 
 ## Known deviations
 
-{claims}
+{deviations}
 
 ## Laws not included
 
@@ -156,14 +139,20 @@ LEFT_OUT = {
 
 
 def keys_of(model: ForceModel) -> str:
-    """A law's key, and those of its other names."""
+    """The key of a model, and the keys under which it was published again."""
     others = [f"`{other.key}`" for other in catalogue().values() if other.same_as == model.key]
     return f"`{model.key}`" + (f"<br>also {', '.join(others)}" if others else "")
 
 
+# the first column is at least as wide as the picture because its head does not break
+FIRST_HEAD = ("restitution&nbsp;curve, key", "equation", "ends at", "n")
+HEAD_OVER_E = (*FIRST_HEAD, "stated domain", *(f"error below {bound:g}" for bound in BOUNDS), "largest error")
+HEAD_OVER_SPEED = (*FIRST_HEAD, "parameters", "e_out of the curve")
+
+
 def first_cells(model: ForceModel) -> list[str]:
-    """What the row of every law begins with."""
-    over = "e" if measured()[model.key].over == "e" else "v₀"
+    """The cells of FIRST_HEAD."""
+    over = "e" if restitution_curves()[model.key].over == "e" else "v₀"
     gap = "δ = δₚ" if model.is_permanent else "δ = 0"
     return [
         f"![e_out over {over} of {model.key}](models/{model.key}.svg)<br>{keys_of(model)}",
@@ -173,44 +162,38 @@ def first_cells(model: ForceModel) -> list[str]:
     ]
 
 
-# the first column is as wide as its picture because its name is not broken
-FIRST = ("restitution&nbsp;curve, key", "equation", "ends at", "n")
-BY_E = (*FIRST, "stated domain", *(f"error below {bound:g}" for bound in BOUNDS), "largest error")
-BY_OWN = (*FIRST, "parameters", "e_out of the curve")
-
-
-def row_by_e(model: ForceModel) -> list[str]:
-    """The row of a law that e drives."""
+def row_over_e(model: ForceModel) -> list[str]:
+    """The row of a model whose curve is over e."""
     errors = error(model)
     inside = (formula(within(errors, bound)) for bound in BOUNDS)
     worst = largest(errors).replace(" ", "<br>", 1)
     return [*first_cells(model), formula(model.domain_text) or "–", *inside, worst]
 
 
-def parameter_text(one: Parameter) -> str:
+def parameter_text(parameter: Parameter) -> str:
     """A parameter with its unit, limits and default."""
-    ends = [f"{word} {end:g}" for word, end in (("from", one.least), ("to", one.most)) if np.isfinite(end)]
-    default = "no default" if one.default is None else f"default {one.default:g}"
-    unit = "" if one.unit == "1" else f" [{one.unit}]"
-    return f"`{one.name}`{unit}, {one.meaning}; {' '.join(ends) or 'any value'}, {default}"
+    limits = [f"{word} {x:g}" for word, x in (("from", parameter.least), ("to", parameter.most)) if np.isfinite(x)]
+    default = "no default" if parameter.default is None else f"default {parameter.default:g}"
+    unit = "" if parameter.unit == "1" else f" [{parameter.unit}]"
+    return f"`{parameter.name}`{unit}, {parameter.meaning}; {' '.join(limits) or 'any value'}, {default}"
 
 
-def row_by_own(model: ForceModel) -> list[str]:
-    """The row of a law that parameters of its own drive."""
-    found = measured()[model.key]
-    flat = np.ptp(found.e_out) < 1e-6
-    ends = [f"{number(found.e_out[place])} at {SPEEDS[place]:g} m/s" for place in (0, -1)]
-    outcome = [f"{number(found.e_out[0])} at every speed"] if flat else ends
-    units = {one.name: "" if one.unit == "1" else f" {one.unit}" for one in model.parameters}
-    values = [f"{name} = {short(found.settings[name])}{unit}" for name, unit in units.items()]
-    return [
-        *first_cells(model), "<br>".join(cell(parameter_text(one)) for one in model.parameters),
-        formula(", ".join([*outcome, *values])),
-    ]  # fmt: skip
+def row_over_speed(model: ForceModel) -> list[str]:
+    """The row of a model whose curve is over the closing speed."""
+    curve = restitution_curves()[model.key]
+    constant = np.ptp(curve.e_out) < 1e-6
+    ends = [f"{number(curve.e_out[k])} at {SPEEDS[k]:g} m/s" for k in (0, -1)]
+    e_out = [f"{number(curve.e_out[0])} at every speed"] if constant else ends
+    units = {
+        parameter.name: "" if parameter.unit == "1" else f" {parameter.unit}" for parameter in model.parameters
+    }
+    values = [f"{name} = {short(curve.params[name])}{unit}" for name, unit in units.items()]
+    parameters = "<br>".join(cell(parameter_text(parameter)) for parameter in model.parameters)
+    return [*first_cells(model), parameters, formula(", ".join([*e_out, *values]))]
 
 
-def source(model: ForceModel) -> str:
-    """A law's reference and how far it is known, as an item of a list."""
+def reference_line(model: ForceModel) -> str:
+    """The reference and the evidence of a model as a list item."""
     doi = f", [doi:{cell(model.doi)}](https://doi.org/{quote(model.doi, safe='/:;')})" if model.doi else ""
     same = f" The same law as `{model.same_as}`." if model.same_as else ""
     name = f"- `{model.key}`, {with_year(model.title, model.year)}: {cell(model.reference)}{doi}."
@@ -218,18 +201,19 @@ def source(model: ForceModel) -> str:
 
 
 def family_section(family: str, members: Sequence[ForceModel]) -> str:
-    """The laws of a family: what they are, and where they come from."""
-    own = [model for model in members if not model.same_as]
-    by_e = [row_by_e(model) for model in own if measured()[model.key].over == "e"]
-    by_own = [row_by_own(model) for model in own if measured()[model.key].over == "v0"]
-    tables = [table(head, rows) for head, rows in ((BY_E, by_e), (BY_OWN, by_own)) if rows]
-    return "\n\n".join([f"\n## {family.capitalize()}", FAMILIES[family], *tables, "\n".join(map(source, members))])
+    """The section of a family: description, tables and references."""
+    distinct = [model for model in members if not model.same_as]
+    over_e = [row_over_e(model) for model in distinct if restitution_curves()[model.key].over == "e"]
+    over_speed = [row_over_speed(model) for model in distinct if restitution_curves()[model.key].over == "v0"]
+    tables = [table(head, rows) for head, rows in ((HEAD_OVER_E, over_e), (HEAD_OVER_SPEED, over_speed)) if rows]
+    references = "\n".join(map(reference_line, members))
+    return "\n\n".join([f"\n## {family.capitalize()}", FAMILIES[family], *tables, references])
 
 
 def models_page() -> str:
     """docs/models.md as text."""
     families = groupby(catalogue().values(), lambda model: model.family)
-    left_out = ("\n  - ".join([f"- {group}", *ones]) for group, ones in LEFT_OUT.items())
+    left_out = ("\n  - ".join([f"- {group}", *laws]) for group, laws in LEFT_OUT.items())
     return PAGE.format(
         balls=f"{BALLS['m1']:g} kg, E = {MATERIAL['E'] / 1e9:g} GPa, ν = {MATERIAL['nu']:g} and "
         f"ρ = {MATERIAL['rho']:g} kg/m³; a yield strength is {MATERIAL['yield_strength'] / 1e6:g} MPa",
@@ -237,6 +221,6 @@ def models_page() -> str:
         count=len(catalogue()),
         evidence=count_states(model.evidence for model in catalogue().values()),
         families="\n".join(family_section(family, list(members)) for family, members in families),
-        claims=claims(),
+        deviations=deviations(),
         left_out="\n".join(left_out),
     )

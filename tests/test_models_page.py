@@ -18,10 +18,11 @@ from impact.contact.models import catalogue
 from .conftest import ROOT
 
 sys.path.insert(0, str(ROOT / "scripts"))
-import models_claims
-import models_measured
+import models_deviations
 import models_page
 import models_pictures
+import models_restitution
+import models_tables
 
 PAGE = (ROOT / "docs" / "models.md").read_text(encoding="utf-8")
 PICTURES = {path.name: path.read_text(encoding="utf-8") for path in (ROOT / "docs" / "models").iterdir()}
@@ -32,7 +33,7 @@ def test_the_page_is_fresh() -> None:
 
 
 def test_the_pictures_are_fresh_and_none_is_left_over() -> None:
-    fresh = models_pictures.curves()
+    fresh = models_pictures.pictures()
     assert fresh.keys() == PICTURES.keys(), "docs/models/ has pictures too many or too few: run `make docs`"
     stale = [name for name, picture in fresh.items() if PICTURES[name] != picture]
     assert not stale, f"stale in docs/models/: {', '.join(stale)}; run `make docs`"
@@ -91,22 +92,24 @@ def test_what_the_solver_leaves_open_changes_nothing(monkeypatch: pytest.MonkeyP
     def shaken(values: np.ndarray | None) -> np.ndarray | None:
         return None if values is None else values + noise.uniform(-1e-10, 1e-10, values.shape)
 
-    exact, found = models_measured.delivers, models_measured.measured()
+    exact, found = models_restitution.closed_form_restitution, models_restitution.restitution_curves()
     other = {key: replace(one, e_out=shaken(one.e_out)) for key, one in found.items()}
-    monkeypatch.setattr(models_claims, "delivers", lambda model, e: shaken(exact(model, e)))
-    for user in (models_claims, models_page, models_pictures):
-        monkeypatch.setattr(user, "measured", lambda: other)
+    monkeypatch.setattr(models_deviations, "closed_form_restitution", lambda model, e: shaken(exact(model, e)))
+    for user in (models_deviations, models_page, models_pictures):
+        monkeypatch.setattr(user, "restitution_curves", lambda: other)
     assert models_page.models_page() == PAGE
-    assert models_pictures.curves() == PICTURES
+    assert models_pictures.pictures() == PICTURES
 
 
 def test_a_law_without_a_closed_form_is_integrated() -> None:
     law = catalogue()["flores-2011"]
-    e = models_measured.GRID[::20]
+    e = models_restitution.GRID[::20]
     np.testing.assert_allclose(
-        models_measured.swept([law], {law.key: {}}, e=e)[law.key], models_measured.delivers(law, e), atol=1e-9
+        models_restitution.integrated_restitution([law], {law.key: {}}, e=e)[law.key],
+        models_restitution.closed_form_restitution(law, e),
+        atol=1e-9,
     )
 
 
 def test_the_examples() -> None:
-    assert all(doctest.testmod(one).failed == 0 for one in (models_page, models_measured))
+    assert all(doctest.testmod(one).failed == 0 for one in (models_page, models_tables))
