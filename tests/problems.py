@@ -7,7 +7,7 @@ exact solution at its own time.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import mpmath as mp
@@ -103,10 +103,26 @@ SPRINGS = Problem(
 
 # the laws of the catalogue, without further names of the same law
 LAWS = [key for key, model in catalogue().items() if not model.same_as]
-# a test parameter for each law; laws of codes, which are forms of the others, belong to the slow tests
-EACH_LAW = [
-    pytest.param(key, marks=pytest.mark.slow) if catalogue()[key].family == "codes" else key for key in LAWS
-]
+
+
+def _form(model: ForceModel) -> tuple[object, ...]:
+    """The compiled formulas of a law without its coefficients, its release and its velocity coordinate."""
+    codes = [getattr(formula, "__code__", None) for formula in (model.force, model.unloading)]
+    formulas = [(code.co_code, code.co_consts, code.co_names) if code else None for code in codes]
+    return (*map(str, formulas), model.release, model.velocity_coordinate, len(model.breakpoints))
+
+
+def _each_law() -> Iterator[object]:
+    """A test parameter for each law; laws of codes and further laws of the same form are slow tests."""
+    forms = set()
+    for key in LAWS:
+        model = catalogue()[key]
+        repeated = model.family == "codes" or _form(model) in forms
+        forms.add(_form(model))
+        yield pytest.param(key, marks=pytest.mark.slow) if repeated else key
+
+
+EACH_LAW = list(_each_law())
 
 
 def table1_impacts(n: float = 1.5, **changes: object) -> Impacts:
