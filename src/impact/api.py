@@ -649,8 +649,8 @@ def rerun(
         part = f"repeated {plan.points:,} of {whole.points:,} points of the config: the file holds no others"
         verdict = replace(verdict, notes=(part, *verdict.notes))
     files = [word for path in plugins if isinstance(path, str | Path) for word in ("--plugin", str(path))]
-    again = ("impact", "run", str(result), *files) if command_start(str(result), stored) else ()
-    return replace(verdict, new="the rerun", baseline=str(result), repeats=again)
+    command = ("impact", "run", str(result), *files) if command_start(str(result), stored) else ()
+    return replace(verdict, new="the rerun", baseline=str(result), repeats=command)
 
 
 def models(

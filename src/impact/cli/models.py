@@ -111,11 +111,11 @@ def _print_models(models: Sequence[ForceModel]) -> None:
     from ..contact.evidence import count_states
 
     out = console(sys.stdout)
-    room = out.width - max(len(model.key) for model in models)
-    asked, others = _catalogue_columns(max(room, E_WIDTH))
+    width_left = out.width - max(len(model.key) for model in models)
+    asked, others = _catalogue_columns(max(width_left, E_WIDTH))
     rows = table("model", *(f"e={number(e)}" for e in asked), *others)
     # on the narrowest terminal the keys are folded, so that one value stays
-    rows.columns[0].no_wrap = room >= E_WIDTH
+    rows.columns[0].no_wrap = width_left >= E_WIDTH
     for column in rows.columns[1 + len(asked) :]:
         column.justify = "left"
     for column in rows.columns[1 : 1 + len(asked)]:
@@ -137,20 +137,20 @@ def _print_models(models: Sequence[ForceModel]) -> None:
     out.print(f"Evidence for the formulas of {entries}: {counts}.")
 
 
-def _catalogue_columns(room: int) -> tuple[tuple[float, ...], tuple[str, ...]]:
+def _catalogue_columns(width_left: int) -> tuple[tuple[float, ...], tuple[str, ...]]:
     """The values of e, and the other columns, that a table of the catalogue shows beside the keys.
 
     >>> _catalogue_columns(3), _catalogue_columns(20), _catalogue_columns(43)
     (((), ()), ((0.1, 0.9), ()), ((0.1, 0.3, 0.5, 0.7, 0.9), ()))
     """
-    count = min(len(E_VALUES), room // E_WIDTH)
+    count = min(len(E_VALUES), width_left // E_WIDTH)
     asked = {0: (), 1: (0.5,), 2: (0.1, 0.9), 3: (0.1, 0.5, 0.9)}.get(count, E_VALUES[: count - 1] + E_VALUES[-1:])
-    room -= E_WIDTH * len(asked)
+    width_left -= E_WIDTH * len(asked)
     others = []
     for name, width in (("equation", EQUATION_WIDTH), ("core", CORE_WIDTH), ("stated domain", DOMAIN_WIDTH)):
-        if room >= width:
+        if width_left >= width:
             others.append(name)
-            room -= width
+            width_left -= width
     return asked, tuple(others)
 
 

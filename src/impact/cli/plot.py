@@ -142,13 +142,13 @@ def plot(
         print(dump({name: asdict(plot_data) for name, plot_data in files.plot_data.items()}))
 
 
-def _parse_labels(words: list[str] | None) -> dict[str, str]:
+def _parse_labels(options: list[str] | None) -> dict[str, str]:
     """KEY=TEXT options."""
     labels: dict[str, str] = {}
-    for word in words or ():
-        key, equals, text = word.partition("=")
+    for option in options or ():
+        key, equals, text = option.partition("=")
         if not (key and equals and text):
-            raise UsageError(f"--label: got {safe_text(word)}, expected KEY=TEXT, such as e='Restitution $e$'")
+            raise UsageError(f"--label: got {safe_text(option)}, expected KEY=TEXT, such as e='Restitution $e$'")
         labels[key] = text
     return labels
 

@@ -34,8 +34,8 @@ class RemainingColumn(TimeRemainingColumn):
 
 def remaining(task: Task) -> float | None:
     """Seconds that the rest of a phase takes; None as long as its rate is not known well enough."""
-    settled = task.elapsed is not None and task.elapsed >= SETTLING_S
-    return task.time_remaining if settled else None
+    is_settled = task.elapsed is not None and task.elapsed >= SETTLING_S
+    return task.time_remaining if is_settled else None
 
 
 def update(bar: Bar, at: Progress) -> Task:
@@ -60,13 +60,13 @@ def line(task: Task, points: int) -> str:
     task : of a bar, see `update`
     points : of the whole sweep
     """
-    words = f"{task.description} {task.completed:,.0f} of {task.total:,.0f}"
+    text = f"{task.description} {task.completed:,.0f} of {task.total:,.0f}"
     if task.description == "trajectories":
-        words += f" for {points:,} points"
+        text += f" for {points:,} points"
     seconds = remaining(task)
     if seconds is not None:
-        words += f", {task.speed:,.0f}/s, {timedelta(seconds=round(seconds))} left"
-    return words + (f", {task.fields['failed']}" if task.fields["failed"] else "")
+        text += f", {task.speed:,.0f}/s, {timedelta(seconds=round(seconds))} left"
+    return text + (f", {task.fields['failed']}" if task.fields["failed"] else "")
 
 
 def new_bar(get_time: Callable[[], float] | None = None) -> Bar:

@@ -28,11 +28,11 @@ def summary_json(outcome: SweepOutcome, output: Path) -> dict[str, Any]:
     dataset, totals = outcome.dataset, outcome.summary
     command = command_start(str(output), dataset)
     failures = []
-    for status, model, places in totals.failed_at:
-        point = dataset["status"].isel(dict(zip(dataset["status"].dims, (model, *places), strict=True)))
+    for status, model, index in totals.failed_at:
+        point = dataset["status"].isel(dict(zip(dataset["status"].dims, (model, *index), strict=True)))
         at = inputs_of_model({str(dim): point[dim].values.item() for dim in dataset["status"].dims})
-        again = replay_command(command, at) if command else None
-        failures.append({"status": status.name.lower(), "at": at, "replay": again})
+        command_of_point = replay_command(command, at) if command else None
+        failures.append({"status": status.name.lower(), "at": at, "replay": command_of_point})
     return {
         "output": str(output),
         "points": totals.points,

@@ -17,7 +17,7 @@ from ..results.replay_command import command_start
 from ..results.schema import MODEL_METADATA, SCHEMA, SCHEMA_VERSION, is_case, is_input
 from ..text import safe_text
 from .align import MODEL_COORDINATES, align
-from .judge import group_size, judge, representative_boxes
+from .judge import group_size, judge, representative_regions
 from .tolerances import ALL_VARIABLES, Tolerances, effective_tolerances
 from .verdict import Fault, Judged, Verdict
 
@@ -88,10 +88,10 @@ def compare(
     largest: dict[str, Mapping[str, np.ndarray]] = {}
     common = [variable for variable in SCHEMA if variable.name in aligned.dims]
     # for all variables before the first comparison, so that a refusal comes early
-    boxes = representative_boxes(common, aligned)
+    regions = representative_regions(common, aligned)
     for variable in common:
         tolerance = tolerances.get(variable.name, tolerances[ALL_VARIABLES])
-        outcome, largest[variable.name] = judge(variable, aligned, tolerance, boxes[variable.name])
+        outcome, largest[variable.name] = judge(variable, aligned, tolerance, regions[variable.name])
         judged.append(outcome)
     if not judged and not faults:
         faults.append(Fault("nothing in common", "", "the two have no variable in common"))

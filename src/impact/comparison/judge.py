@@ -28,7 +28,7 @@ from .align import Aligned, Side
 from .verdict import Judged
 
 # a part of the common points, by axis; along axes that are not in it, the first point represents all
-Box = Mapping[str, slice]
+Region = Mapping[str, slice]
 
 # at most this many points of a variable are compared, which takes an hour
 MAX_COMPARED_POINTS = 10**10
@@ -42,36 +42,36 @@ DIMENSIONLESS_SCALES = ("scaled by v0", "scaled by the peak", "scaled by itself"
 SCALE_INPUTS = {"scaled by v0": ("v1", "v2"), "scaled by m v0^2/2": ("v1", "v2", "m1", "m2")}
 
 
-def representative_boxes(variables: Sequence[SchemaVariable], aligned: Aligned) -> dict[str, list[Box]]:
+def representative_regions(variables: Sequence[SchemaVariable], aligned: Aligned) -> dict[str, list[Region]]:
     """By variable, the parts of the common points that represent all of them; see `compare` for the rule.
 
     Raises
     ------
     UsageError : a variable has more than `MAX_COMPARED_POINTS` representative points
     """
-    boxes: dict[str, list[Box]] = {}
+    regions: dict[str, list[Region]] = {}
     for variable in variables:
         if any(_declares_dims(side, variable.name) for side in (aligned.new, aligned.baseline)):
-            boxes[variable.name] = []
+            regions[variable.name] = []
         else:
-            boxes[variable.name] = [_box(aligned.dims[variable.name], aligned.sizes, slice(None))]
-    reduced = [variable for variable in variables if not boxes[variable.name]]
+            regions[variable.name] = [_region(aligned.dims[variable.name], aligned.sizes, slice(None))]
+    reduced = [variable for variable in variables if not regions[variable.name]]
     for model in range(aligned.sizes.get("model", 0)) if reduced else ():
         sides = [_dataset_of_model(side, model) for side in (aligned.new, aligned.baseline)]
         for variable in reduced:
             if "model" in aligned.dims[variable.name]:
                 dims = _representative_dims(variable, aligned, sides)
-                boxes[variable.name].append(_box(dims, aligned.sizes, slice(model, model + 1)))
+                regions[variable.name].append(_region(dims, aligned.sizes, slice(model, model + 1)))
     for variable in reduced:
         if "model" not in aligned.dims[variable.name]:
             dims = _representative_dims(variable, aligned, [aligned.new.dataset, aligned.baseline.dataset])
-            boxes[variable.name].append(_box(dims, aligned.sizes, slice(None)))
-    for name, parts in boxes.items():
-        points = sum(math.prod(part.stop - part.start for part in box.values()) for box in parts)
+            regions[variable.name].append(_region(dims, aligned.sizes, slice(None)))
+    for name, parts in regions.items():
+        points = sum(math.prod(part.stop - part.start for part in region.values()) for region in parts)
         if points > MAX_COMPARED_POINTS:
             expected = f"expected at most {MAX_COMPARED_POINTS:,}; select a part of the results"
             raise UsageError(f"{name}: got {points:,} points to compare, {expected}")
-    return boxes
+    return regions
 
 
 def _declares_dims(side: Side, name: str) -> bool:
@@ -85,7 +85,7 @@ def _dataset_of_model(side: Side, model: int) -> xr.Dataset:
     return side.dataset.isel(model=slice(position, position + 1)) if "model" in side.dataset.dims else side.dataset
 
 
-def _box(dims: Iterable[str], sizes: Mapping[str, int], models: slice) -> Box:
+def _region(dims: Iterable[str], sizes: Mapping[str, int], models: slice) -> Region:
     return {dim: slice(*(models if dim == "model" else slice(None)).indices(sizes[dim])[:2]) for dim in dims}
 
 
@@ -142,7 +142,7 @@ class Worst:
 
 
 def judge(
-    variable: SchemaVariable, aligned: Aligned, tol: float, boxes: Iterable[Box]
+    variable: SchemaVariable, aligned: Aligned, tol: float, regions: Iterable[Region]
 ) -> tuple[Judged, dict[str, NDArray[Any]]]:
     """Compare one variable at all common points: |new - baseline| over tolerance, inf if no difference is allowed.
 
@@ -151,7 +151,7 @@ def judge(
     variable : in both results, along the same axes
     aligned : the two results
     tol : relative to the scale of a point
-    boxes : the points to read, see `representative_boxes`; each counts for all points that it represents
+    regions : the points to read, see `representative_regions`; each counts for all points that it represents
 
     Returns
     -------
@@ -163,9 +163,9 @@ def judge(
     shape = tuple(aligned.sizes[dim] for dim in dims)
     largest = {dim: np.zeros(-(-size // group_size(size))) for dim, size in zip(dims, shape, strict=True)}
     different, worst = 0, None
-    for box in boxes:
-        weight = math.prod(aligned.sizes[dim] for dim in dims if dim not in box)
-        for slab in _slabs(variable.name, aligned, box):
+    for region in regions:
+        weight = math.prod(aligned.sizes[dim] for dim in dims if dim not in region)
+        for slab in _slabs(variable.name, aligned, region):
             where = {dim: slab.get(dim, slice(0, 1)) for dim in dims}
             a, b = aligned.new.read(variable.name, where), aligned.baseline.read(variable.name, where)
             if np.array_equal(a, b):
@@ -205,9 +205,9 @@ def group_size(size: int) -> int:
     return -(-size // MAX_RATIO_GROUPS)
 
 
-def _slabs(name: str, aligned: Aligned, box: Box) -> Iterator[dict[str, slice]]:
+def _slabs(name: str, aligned: Aligned, region: Region) -> Iterator[dict[str, slice]]:
     """A box in slabs; of a file with chunks, in slabs of whole chunks, so that each is read once."""
-    sizes: dict[Hashable, int] = {dim: part.stop - part.start for dim, part in box.items()}
+    sizes: dict[Hashable, int] = {dim: part.stop - part.start for dim, part in region.items()}
     variable = aligned.baseline.dataset.variables[name]
     chunks = dict(zip(variable.dims, variable.encoding.get("chunksizes") or (), strict=False))
     if is_lazy(variable) and chunks and math.prod(chunks.values()) <= SLAB_POINTS:
@@ -215,7 +215,9 @@ def _slabs(name: str, aligned: Aligned, box: Box) -> Iterator[dict[str, slice]]:
     else:
         parts = slabs(sizes)
     for slab in parts:
-        yield {dim: slice(part.start + slab[dim].start, part.start + slab[dim].stop) for dim, part in box.items()}
+        yield {
+            dim: slice(part.start + slab[dim].start, part.start + slab[dim].stop) for dim, part in region.items()
+        }
 
 
 def _ratio(

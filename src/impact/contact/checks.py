@@ -37,12 +37,12 @@ class Finding:
 def sample(model: ForceModel) -> Impacts:
     """Forty dissimilar impacts: a wall, heavy and light balls, slow and fast, soft and hard, e from 0.05 to 1."""
     count = 40
-    turn = np.arange(float(count))
+    index = np.arange(float(count))
     e = np.linspace(0.05, 1.0, count)
-    v1, v2 = np.power(10.0, turn % 7 - 3.0), -0.3 * np.power(10.0, turn % 5 - 3.0)
-    m1 = np.power(10.0, turn % 9 - 4.0)
-    m2 = np.where(turn % 6 == 5, np.inf, np.power(10.0, turn % 4 - 2.0))
-    E1, E2 = np.where(turn % 2 == 0, 56e9, 210e9), np.where(turn % 3 == 0, 2e6, 70e9)
+    v1, v2 = np.power(10.0, index % 7 - 3.0), -0.3 * np.power(10.0, index % 5 - 3.0)
+    m1 = np.power(10.0, index % 9 - 4.0)
+    m2 = np.where(index % 6 == 5, np.inf, np.power(10.0, index % 4 - 2.0))
+    E1, E2 = np.where(index % 2 == 0, 56e9, 210e9), np.where(index % 3 == 0, 2e6, 70e9)
     nu1, nu2, rho = np.full(count, 0.3), np.full(count, 0.49), np.full(count, 2712.0)
     R1, R2 = sphere_radius(m1, rho), sphere_radius(m2, rho)
     n = np.full(count, 1.5 if model.exponent is None else model.exponent)

@@ -350,11 +350,11 @@ def _draw_bands(axes: Axes, panel: Panel) -> None:
 
 def _label_axes(axes: Axes, panel: Panel, labels: Mapping[str, str], *, last: bool) -> None:
     """Write the labels of both axes, each with one prefix of its unit."""
-    for axis, words, name, unit, limits, log in (
+    for axis, meaning, name, unit, limits, log in (
         (axes.xaxis, panel.x_label, panel.x_name, panel.x_unit, axes.get_xlim(), panel.x_log),
         (axes.yaxis, panel.y_label, panel.y_name, panel.y_unit, axes.get_ylim(), panel.y_log),
     ):
-        label_axis(axis, words, name, unit, max(map(abs, limits)), labels, log=log)
+        label_axis(axis, meaning, name, unit, max(map(abs, limits)), labels, log=log)
     if not last:
         axes.set_xlabel("")
 

@@ -164,11 +164,11 @@ def _draw_panel(
     axes.set_xlabel(panel.label)
     if not panel.names and is_geometric(x):
         axes.set_xscale("log")
-        room = (x[-1] / x[0]) ** 0.03
-        axes.set_xlim(x[0] / room, x[-1] * room)
+        margin = (x[-1] / x[0]) ** 0.03
+        axes.set_xlim(x[0] / margin, x[-1] * margin)
     else:
-        room = 0.04 * (x[-1] - x[0]) or 0.5
-        axes.set_xlim(x[0] - room, x[-1] + room)
+        margin = 0.04 * (x[-1] - x[0]) or 0.5
+        axes.set_xlim(x[0] - margin, x[-1] + margin)
     if panel.names:
         _label_ticks(axes, panel, x)
     return entries

@@ -120,14 +120,14 @@ def checked_labels(labels: Mapping[str, str], shown: set[str]) -> dict[str, str]
     return dict(labels)
 
 
-def axis_text(words: str, name: str, unit: str, labels: Mapping[str, str]) -> str:
+def axis_text(meaning: str, name: str, unit: str, labels: Mapping[str, str]) -> str:
     """The label of an axis: words, symbol and unit, of which the last two stay together."""
     if name in labels:
-        words, letter = labels[name], ""
+        meaning, letter = labels[name], ""
     else:
-        words, letter = escape_mathtext(words[:1].upper() + words[1:]), symbol(name)
+        meaning, letter = escape_mathtext(meaning[:1].upper() + meaning[1:]), symbol(name)
     shown = f"({pretty(unit)})" if unit not in ("", "1") else ""
-    return " ".join(filter(None, (words, NO_BREAK.join(filter(None, (letter, shown))))))
+    return " ".join(filter(None, (meaning, NO_BREAK.join(filter(None, (letter, shown))))))
 
 
 def words_of(attributes: Mapping[object, object], name: str) -> str:
@@ -165,11 +165,11 @@ def law_text(title: str, year: int, equation: str, parameters: str, *, numbered:
 
 
 def label_axis(
-    axis: Axis, words: str, name: str, unit: str, largest: float, labels: Mapping[str, str], *, log: bool
+    axis: Axis, meaning: str, name: str, unit: str, largest: float, labels: Mapping[str, str], *, log: bool
 ) -> None:
     """Write the label of an axis, and its numbers with one prefix of the unit for all of them."""
     size, shown = (1.0, unit) if log else scaled_unit(unit, largest)
-    axis.set_label_text(axis_text(words, name, shown, labels))
+    axis.set_label_text(axis_text(meaning, name, shown, labels))
     number_axis(axis, size, log=log)
 
 

@@ -102,12 +102,12 @@ class Picture(Figure):
         return self.legend_height()
 
     def _place_legend(self) -> None:
-        room = self.bbox.width - GAP_INCHES * self.dpi
-        columns = max(1, int(room / self._legend(1).get_window_extent(self.renderer).width))
+        max_width = self.bbox.width - GAP_INCHES * self.dpi
+        columns = max(1, int(max_width / self._legend(1).get_window_extent(self.renderer).width))
         # columns of short names are narrower than a single column: another one may fit
         for number in range(min(columns + 1, len(self.entries)), 0, -1):
             self.legends[0].remove()
-            if self._legend(number).get_window_extent(self.renderer).width <= room:
+            if self._legend(number).get_window_extent(self.renderer).width <= max_width:
                 break
 
     @property
@@ -129,9 +129,9 @@ class Picture(Figure):
         legend = self.legend(
             handles, names, loc="lower center", ncols=columns, borderaxespad=0.3, columnspacing=1.2, **style
         )
-        room = self.bbox.width - 4.5 * float(legend.get_texts()[0].get_fontsize()) * self.dpi / 72.0
+        max_width = self.bbox.width - 4.5 * float(legend.get_texts()[0].get_fontsize()) * self.dpi / 72.0
         for text in legend.get_texts():
-            self.fit(text, room)
+            self.fit(text, max_width)
         return legend
 
     def share_labels(self, x_label: str, y_label: str) -> None:
@@ -189,8 +189,8 @@ class Picture(Figure):
                 labels.append(text.get_text())
         return labels
 
-    def fit(self, text: Text, room: float) -> None:
-        """Break a text at its spaces into lines no longer than `room` [px].
+    def fit(self, text: Text, max_width: float) -> None:
+        """Break a text at its spaces into lines no longer than `max_width` [px].
 
         A single word is broken only if it is longer than MAX_WORD_INCHES.
         """
@@ -204,16 +204,16 @@ class Picture(Figure):
             return float(box.height if text.get_rotation() == 90.0 else box.width)
 
         lines, renderer = [""], self.renderer
-        if length(whole) <= room:
+        if length(whole) <= max_width:
             return
         for word in whole.split(" "):
             longer = f"{lines[-1]} {word}" if lines[-1] else word
-            if length(longer) <= room:
+            if length(longer) <= max_width:
                 lines[-1] = longer
                 continue
             letters = len(word)
-            if "$" not in word and length(word) > max(room, MAX_WORD_INCHES * self.dpi):
-                letters = max(1, int(len(word) * room / length(word)))
+            if "$" not in word and length(word) > max(max_width, MAX_WORD_INCHES * self.dpi):
+                letters = max(1, int(len(word) * max_width / length(word)))
             lines += [word[start : start + letters] for start in range(0, len(word), letters)]
         text.set_text("\n".join(filter(None, lines)))
         self.fitted[text] = whole, text.get_text()

@@ -196,8 +196,8 @@ def _failures_section(dataset: xr.Dataset, summary: Summary) -> dict[str, Any]:
         sentences.append("No other point failed." if summary.not_counted else "No point failed.")
     axes = [dim for dim in dataset["status"].dims if dim != "model"]
     points = []
-    for status, model, places in summary.failed_at:
-        point = dataset.isel({"model": model, **dict(zip(axes, places, strict=True))})
+    for status, model, index in summary.failed_at:
+        point = dataset.isel({"model": model, **dict(zip(axes, index, strict=True))})
         key = str(point["model"].item())
         inputs = [name for name in varying(dataset) if owner_of(name) in ("", key)]
         points.append((key, at_text(point, inputs) or "–", status.meaning))

@@ -104,8 +104,8 @@ def estimate(plan: Plan, jobs: int = 1) -> Estimate:
         pickle.loads(back)
         write_block(io.BytesIO(), "", rebound)
     # the time of a slab does not depend on the values of its trajectories: repeat those of the range
-    places = np.arange(RANGE_TRAJECTORIES) % chosen.size
-    table = table_of(plan, maps, lambda _, start, stop: rebound.take(places[: stop - start]))
+    positions = np.arange(RANGE_TRAJECTORIES) % chosen.size
+    table = table_of(plan, maps, lambda _, start, stop: rebound.take(positions[: stop - start]))
     with _timed() as assembling:
         _, _, _, values = next(expanded_slabs(table, stored_variables(plan)))
         for array in values.values():

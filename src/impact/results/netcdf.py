@@ -151,11 +151,11 @@ def _storage_options(variable: xr.DataArray, output: Output) -> dict[str, Any]:
         chunks = tuple(min(lengths.get(str(dim), size), size) for dim, size in variable.sizes.items())
     else:
         # whole along the last axes, of length one along the first
-        chunks, room = (), CHUNK_VALUES
+        chunks, values_left = (), CHUNK_VALUES
         for dim, size in reversed(list(variable.sizes.items())):
-            length = 1 if dim == "model" else max(min(size, room), 1)
+            length = 1 if dim == "model" else max(min(size, values_left), 1)
             chunks = (length, *chunks)
-            room //= size
+            values_left //= size
     packed = (
         {"compression": "gzip", "compression_opts": 4, "shuffle": True} if output.compression == "gzip" else {}
     )

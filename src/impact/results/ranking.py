@@ -151,8 +151,8 @@ class Ranking:
         alone = "the only point" if first.points == 1 else ""
         if self.best:
             others = len(self.best) - 1
-            who = f"{key} and {others} more give" if others else f"{key} gives"
-            return f"{who} e within {tol} at {alone or f'all {points}'}"
+            subject = f"{key} and {others} more give" if others else f"{key} gives"
+            return f"{subject} e within {tol} at {alone or f'all {points}'}"
         if first.within:
             return f"no model gives e within {tol} everywhere; {key} is nearest: {first.percent} of {points}"
         return f"no model gives e within {tol} at {alone or f'any of {points}'}"

@@ -56,8 +56,8 @@ def replay_command(start: Sequence[str], at: Mapping[str, object]) -> str:
     >>> replay_command(("impact", "run", "new.h5"), {"model": "hertz", "e": 0.5, "material": "soft steel"})
     "impact run new.h5 --model hertz --at e=0.5 --at 'material=soft steel'"
     """
-    words = list(start)
+    command = list(start)
     for name, value in at.items():
         text = repr(value) if isinstance(value, float) else str(value)
-        words += ["--model", text] if name == "model" else ["--at", f"{name}={text}"]
-    return safe_text(shlex.join(words), 2000)
+        command += ["--model", text] if name == "model" else ["--at", f"{name}={text}"]
+    return safe_text(shlex.join(command), 2000)

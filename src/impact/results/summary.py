@@ -94,8 +94,8 @@ class Summary:
             self.counts[status_code] = self.counts.get(status_code, 0) + weight * int(times[number])
         if times[FIRST_FAILURE:].any() and len(self.failed_at) < self.max_failed_at:
             for at in np.argwhere(status >= FIRST_FAILURE)[: self.max_failed_at - len(self.failed_at)].tolist():
-                places = tuple(first + offset for first, offset in zip(start, at, strict=True))
-                self.failed_at.append((Status(int(status[tuple(at)])), model, places))
+                index = tuple(first + offset for first, offset in zip(start, at, strict=True))
+                self.failed_at.append((Status(int(status[tuple(at)])), model, index))
 
     def _judge(self, name: str, model: int, values: NDArray[Any]) -> None:
         largest = float(np.fmax.reduce(np.abs(values), axis=None, initial=np.nan))
