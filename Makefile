@@ -35,7 +35,7 @@ test-faults: $(VENV)/dev  ## run the tests of a thousand faults and the slow one
 
 test-fast: $(VENV)/dev  ## test the compiled core, which the extra "fast" brings
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[fast]'
-	$(BIN)/python -m pytest -n auto --dist worksteal tests/test_cores.py tests/test_collapse.py tests/test_catalogue.py
+	$(BIN)/python -m pytest -n auto --dist worksteal tests/test_compiled_core.py tests/test_deduplicate.py tests/test_catalogue.py
 
 # PyPI has some of the codes; on Debian `apt-get install liggghts yade` adds two. Each wheel is installed by itself,
 # so that one that is missing does not lose the others, and not in $(VENV), whose versions they might change

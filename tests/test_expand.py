@@ -22,7 +22,7 @@ from impact.results.schema import SCHEMA
 from impact.results.sweep import sweep_into
 
 from .problems import table1_impacts
-from .test_collapse import DASHPOT, MATERIALS, NEEDS, OWN, SPEED
+from .test_deduplicate import DASHPOT, MATERIALS, REQUIRED_PARAMETERS, OPTIONAL_PARAMETERS, SPEED
 
 # a rule of K of its own, which asks for the exponent, a speed and the masses
 STIFF = """
@@ -64,10 +64,10 @@ def configs(draw: st.DrawFn) -> dict[str, object]:
         for name in group:
             sweep[name] = draw(st.permutations(VALUES[name]))[:size]
         sweep["zip"] = [group]
-    known = [*sorted(impact.models()), *OWN]
+    known = [*sorted(impact.models()), *OPTIONAL_PARAMETERS]
     models = draw(st.lists(st.sampled_from(known), min_size=1, max_size=3, unique=True))
-    own = {key: OWN[key] for key in models if key in OWN and draw(st.booleans())}
-    own |= {key: NEEDS[key] for key in models if key in NEEDS}
+    own = {key: OPTIONAL_PARAMETERS[key] for key in models if key in OPTIONAL_PARAMETERS and draw(st.booleans())}
+    own |= {key: REQUIRED_PARAMETERS[key] for key in models if key in REQUIRED_PARAMETERS}
     # one K is of one exponent; a law with an exponent of its own has a K of its own
     exponents = {(impact.models().get(key) or OWN_LAWS[key]).exponent for key in models}
     if exponents <= {None, 1.5} and sweep.get("n", 1.5) == 1.5 and draw(st.booleans()):

@@ -34,11 +34,17 @@ SPEED = impact.ForceModel(
     coefficients={"a": lambda v_y, v0: 0.3 * v_y / (v_y + v0)},
     parameters=(impact.Parameter("v_y", "m/s", "a speed", default=1.0, least=0.1),),
 )  # fmt: skip
-OWN = {"dashpot": {"c": [0.0, 40.0]}, "speed": {"v_y": [0.5, 2.0]}}
+OPTIONAL_PARAMETERS = {"dashpot": {"c": [0.0, 40.0]}, "speed": {"v_y": [0.5, 2.0]}}
 # what laws have to be given, as a baseline has it; the unit of one depends on n
-EVERY = tomllib.loads((ROOT / "tests" / "data" / "every_model.toml").read_text(encoding="utf-8"))["model"]
-NEEDS = {key: EVERY[one.same_as or key] for key, one in impact.models().items() if (one.same_as or key) in EVERY}
-NEEDS["recurdyn"] = {"c": 1e4}
+BASELINE_PARAMETERS = tomllib.loads((ROOT / "tests" / "data" / "every_model.toml").read_text(encoding="utf-8"))[
+    "model"
+]
+REQUIRED_PARAMETERS = {
+    key: BASELINE_PARAMETERS[one.same_as or key]
+    for key, one in impact.models().items()
+    if (one.same_as or key) in BASELINE_PARAMETERS
+}
+REQUIRED_PARAMETERS["recurdyn"] = {"c": 1e4}
 
 # a few values of each, so that many points are the same: in scale only, in a material only, or altogether
 VALUES: dict[str, list[object]] = {
@@ -62,10 +68,10 @@ def sweeps(draw: st.DrawFn) -> dict[str, object]:
         )
         for name in draw(st.permutations(names))
     }
-    known = [*sorted(impact.models()), *OWN]
+    known = [*sorted(impact.models()), *OPTIONAL_PARAMETERS]
     models = draw(st.lists(st.sampled_from(known), min_size=1, max_size=3, unique=True))
-    own = {key: OWN[key] for key in models if key in OWN and draw(st.booleans())}
-    own |= {key: NEEDS[key] for key in models if key in NEEDS}
+    own = {key: OPTIONAL_PARAMETERS[key] for key in models if key in OPTIONAL_PARAMETERS and draw(st.booleans())}
+    own |= {key: REQUIRED_PARAMETERS[key] for key in models if key in REQUIRED_PARAMETERS}
     return {"models": models, "sweep": sweep, "materials": MATERIALS, "solver": {"rtol": 1e-6}, "model": own}
 
 
