@@ -22,7 +22,7 @@ from impact.results.schema import SCHEMA
 from impact.results.sweep import sweep_into
 
 from .problems import table1_impacts
-from .test_deduplicate import DASHPOT, MATERIALS, REQUIRED_PARAMETERS, OPTIONAL_PARAMETERS, SPEED
+from .test_deduplicate import DASHPOT, MATERIALS, OPTIONAL_PARAMETERS, REQUIRED_PARAMETERS, SPEED
 
 # a rule of K of its own, which asks for the exponent, a speed and the masses
 STIFF = """
