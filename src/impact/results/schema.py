@@ -176,13 +176,15 @@ def dataset_template(plan: Plan) -> xr.Dataset:
     dataset = xr.Dataset(
         coords=xr.Coordinates(_plan_coordinates(plan), indexes={}), attrs=_provenance_attributes(plan)
     )
+    variables = {}
     for variable in stored_variables(plan):
         dims, shape = (
             (axes, plan.shape) if variable.per == "axes" else (("model", *axes), (len(plan.models), *plan.shape))
         )
         zeros = np.broadcast_to(np.zeros((), variable.dtype), shape)
-        dataset[variable.name] = (dims, zeros, attributes_of(variable))
-    return dataset
+        variables[variable.name] = (dims, zeros, attributes_of(variable))
+    # in one call: xarray merges the whole dataset in each call
+    return dataset.assign(variables)
 
 
 def attributes_of(variable: SchemaVariable) -> dict[str, object]:
