@@ -173,9 +173,6 @@ def dataset_template(plan: Plan) -> xr.Dataset:
     It has no index: storing it needs none, and building one takes longer than everything else.
     """
     axes = tuple(axis.name for axis in plan.config.axes)
-    dataset = xr.Dataset(
-        coords=xr.Coordinates(_plan_coordinates(plan), indexes={}), attrs=_provenance_attributes(plan)
-    )
     variables = {}
     for variable in stored_variables(plan):
         dims, shape = (
@@ -183,8 +180,13 @@ def dataset_template(plan: Plan) -> xr.Dataset:
         )
         zeros = np.broadcast_to(np.zeros((), variable.dtype), shape)
         variables[variable.name] = (dims, zeros, attributes_of(variable))
-    # in one call: xarray merges the whole dataset in each call
-    return dataset.assign(variables)
+    # in one call: xarray merges the whole dataset in each call; the coordinates come first in a file
+    return xr.Dataset(coords=plan_coordinates(plan), attrs=_provenance_attributes(plan)).assign(variables)
+
+
+def plan_coordinates(plan: Plan) -> xr.Coordinates:
+    """The coordinates of the dataset of a plan, without an index."""
+    return xr.Coordinates(_coordinates_by_name(plan), indexes={})
 
 
 def attributes_of(variable: SchemaVariable) -> dict[str, object]:
@@ -202,7 +204,7 @@ def attributes_of(variable: SchemaVariable) -> dict[str, object]:
     return attributes
 
 
-def _plan_coordinates(plan: Plan) -> dict[str, object]:
+def _coordinates_by_name(plan: Plan) -> dict[str, object]:
     models = plan.models
 
     def texts(field: str) -> tuple[str, list[str], dict[str, str]]:

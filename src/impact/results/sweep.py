@@ -36,7 +36,7 @@ from .backend import MAX_LOADED_BYTES, check_output, check_readable, open_result
 from .expand import TrajectoryTable, expanded_slabs, in_memory, lazy_dataset, table_of
 from .factored import check_factored, factored_template, table_values
 from .netcdf import MAX_LABEL_BYTES, encode_text, is_text
-from .schema import SchemaVariable, dataset_template, stored_variables
+from .schema import SchemaVariable, dataset_template, plan_coordinates, stored_variables
 from .summary import Summary, SweepOutcome, summarize
 from .validation import is_name
 
@@ -263,7 +263,7 @@ def check_labels(plan: Plan) -> None:
         raise UsageError(
             f"{safe_text(odd[0])}: expected a material name without spaces and slashes, to be an axis"
         )
-    coordinates = dataset_template(plan).coords.values()
+    coordinates = plan_coordinates(plan).values()
     size = sum(encode_text(coordinate).size for coordinate in coordinates if is_text(coordinate))
     if size > MAX_LABEL_BYTES:
         raise UsageError(
