@@ -180,7 +180,7 @@ WARM_UP_COMMANDS = (
 WARM_UP_CONFIG = """models = ["hertz", "gharib-hurmuzlu-2012"]
 [sweep]
 e = [0.5, 1.0]
-v1 = [1.0, 2.0]
+v1 = ["1 m/s", "2 m/s"]
 m1 = 1.0
 m2 = 1.0
 K = 6e9
