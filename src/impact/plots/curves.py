@@ -307,6 +307,7 @@ def draw_curves(
         # the names of marks need room at the ends of the axes
         axes.margins(x=0.06 if panel.marks else 0.02, y=0.12 if panel.marks else None)
         axes.autoscale_view()
+        _label_bands(axes, panel)
         _label_axes(axes, panel, labels, last=axes is all_axes[-1] or len(all_axes) == 1)
         for mark in panel.marks:
             _draw_mark(axes, mark)
@@ -332,20 +333,32 @@ def _line_style(curve: Curve, panel: Panel, styles: Mapping[str, Mapping[str, An
 def _draw_bands(axes: Axes, panel: Panel) -> None:
     for band, colour in zip(panel.bands, BAND_COLOURS, strict=False):
         if panel.y_log:
-            axes.axhline(band, color="#5a9cc5", linewidth=0.8, zorder=0.5)
-            axes.annotate(
-                f"{band:g}",
-                (1, band),
-                (-2, 1),
-                xycoords=("axes fraction", "data"),
-                textcoords="offset points",
-                ha="right",
-                va="bottom",
-                fontsize="x-small",
-                color="#0072B2",
-            )
+            # above the line of the grid, which may be at the same value
+            axes.axhline(band, color="#5a9cc5", linewidth=0.8, zorder=0.6)
         else:
             axes.axhspan(-band, band, color=colour, linewidth=0, zorder=0.5)
+
+
+def _label_bands(axes: Axes, panel: Panel) -> None:
+    """Write the values of bands at their lines on a logarithmic axis.
+
+    The label of the widest band is above its line. Labels of narrower bands are below theirs, where no label can
+    overlap them, except near the lower end of the axis, where there is no room below but some between the lines.
+    """
+    low, high = axes.get_ylim()
+    for band in panel.bands if panel.y_log else ():
+        is_below = band != panel.bands[0] and band > (low * high) ** 0.5
+        axes.annotate(
+            f"{band:g}",
+            (1, band),
+            (-2, -1 if is_below else 1),
+            xycoords=("axes fraction", "data"),
+            textcoords="offset points",
+            ha="right",
+            va="top" if is_below else "bottom",
+            fontsize="x-small",
+            color="#0072B2",
+        )
 
 
 def _label_axes(axes: Axes, panel: Panel, labels: Mapping[str, str], *, last: bool) -> None:

@@ -22,7 +22,7 @@ from impact.plots.kinds import Choice, draw
 from impact.plots.maps import CONTOURS, NO_VALUE, MapData, edges_of
 from impact.plots.style import save_figure
 
-from .test_figures import check_layout, texts_of
+from .test_plots import check_layout, texts_of
 
 MODELS = ["flores-2011", "lankarani-nikravesh-1990", "gharib-hurmuzlu-2012"]
 MORE = [
