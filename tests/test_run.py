@@ -40,9 +40,9 @@ def test_the_three_restitutions_of_every_law_are_one_number() -> None:
 
 # m = 1/2 kg, K = 1 MN/m and v0 = 2 m/s: damping constants of 5 to 95 % of the critical one
 @pytest.mark.parametrize("damped", [0.05, 0.5, 0.95])
-def test_surfaces_part_after_the_force_of_a_dashpot_has_ended(damped: float) -> None:
+def test_surfaces_part_after_the_force_of_a_dashpot_has_ended(zeta: float) -> None:
     m, K = 0.5, 1e6
-    omega, c = math.sqrt(K / m), 2.0 * damped * math.sqrt(K * m)
+    omega, c = math.sqrt(K / m), 2.0 * zeta * math.sqrt(K * m)
     dashpot = impact.ForceModel(
         key="dashpot", title="", year=2026, equation="", reference="", exponent=1.0, release="force",
         force=lambda K, x, v, c: K * x + c * v, parameters=(impact.Parameter("c", "N s/m", "damping"),),
@@ -55,8 +55,8 @@ def test_surfaces_part_after_the_force_of_a_dashpot_has_ended(damped: float) -> 
     }
     result = impact.sweep(config, plugins=[dashpot])
     # the damped sine has no force at 2 acos(damped), where 2 (damped/omega) e v0 = (c/K) e v0 of it is left
-    phase, free = 2.0 * math.acos(damped), math.sqrt(1.0 - damped**2)
-    e = math.exp(-damped / free * phase)
+    phase, free = 2.0 * math.acos(zeta), math.sqrt(1.0 - zeta**2)
+    e = math.exp(-zeta / free * phase)
     assert result["e_out"].item() == pytest.approx(e, rel=0, abs=1e-9)
     assert result["e_energetic"].item() == pytest.approx(e, rel=0, abs=1e-9)
     assert result["contact_time"].item() == pytest.approx(phase / (omega * free), rel=1e-8)
@@ -65,17 +65,17 @@ def test_surfaces_part_after_the_force_of_a_dashpot_has_ended(damped: float) -> 
 
 def test_an_overdamped_law_leaves_an_indentation_that_takes_its_time() -> None:
     config = {"v1": 2.0, "m1": 1.0, "m2": 1.0, "K": 1e6, "n": 1.0}
-    shot = impact.run(
+    collision = impact.run(
         {"models": "kelvin-voigt-no-tension", "sweep": config, "model": {"kelvin-voigt-no-tension": {"C": 3e3}}}
     )
-    rest = shot.values["permanent_indentation"] / (shot.values["v2_post"] - shot.values["v1_post"])
-    assert shot.values["separation_time"] == pytest.approx(shot.values["contact_time"] + rest, rel=1e-14)
-    assert rest > 0.5 * shot.values["contact_time"]
+    rest = collision.values["permanent_indentation"] / (collision.values["v2_post"] - collision.values["v1_post"])
+    assert collision.values["separation_time"] == pytest.approx(collision.values["contact_time"] + rest, rel=1e-14)
+    assert rest > 0.5 * collision.values["contact_time"]
 
 
 def test_table_1_is_printed(cli: Run) -> None:
-    done = cli("run")
-    lines = {line.split()[0]: line.split(None, 1)[1].strip() for line in done.stdout.splitlines()}
+    process = cli("run")
+    lines = {line.split()[0]: line.split(None, 1)[1].strip() for line in process.stdout.splitlines()}
     assert lines["[materials.table1]"] == "E = 5.6e+10 Pa, nu = 0.3, rho = 2712 kg/m^3"
     assert lines["R1"] == lines["R2"].replace("ball 2", "ball 1") == "0.04448434857 m  radius of ball 1"
     assert lines["m"] == "0.5 kg  effective mass (17)"
@@ -96,58 +96,58 @@ def test_unloading_stiffness(key: str) -> None:
 
 @pytest.mark.parametrize("e", [0.1, 0.5, 1.0])
 def test_the_rebound_is_slower_than_its_bound(e: float) -> None:
-    shot = impact.run(model="gharib-hurmuzlu-2012", at={"e": e, "v1": 2.0})
+    collision = impact.run(model="gharib-hurmuzlu-2012", at={"e": e, "v1": 2.0})
     # (28) makes the bound (26) the rebound speed asked for
-    assert shot.derived["rebound_speed_bound"] == pytest.approx(e * 2.0, rel=1e-14)
-    assert shot.values["v2_post"] - shot.values["v1_post"] < e * 2.0
-    assert shot.damping == shot.values["lambda"] == pytest.approx(STIFFNESS / (e * 2.0), rel=1e-9)
+    assert collision.derived["rebound_speed_bound"] == pytest.approx(e * 2.0, rel=1e-14)
+    assert collision.values["v2_post"] - collision.values["v1_post"] < e * 2.0
+    assert collision.damping == collision.values["lambda"] == pytest.approx(STIFFNESS / (e * 2.0), rel=1e-9)
 
 
 def test_impulses_and_works_balance_momentum_and_energy() -> None:
     for key in ("hertz", "gharib-hurmuzlu-2012", "bilinear", "tsuji-1992"):
-        shot = impact.run(model=key, at={"e": 0.3, "m2": 3.0, "v1": 2.0})
-        derived, values, energy = shot.derived, shot.values, 0.5 * 0.75 * 2.0**2
+        collision = impact.run(model=key, at={"e": 0.3, "m2": 3.0, "v1": 2.0})
+        derived, values, energy = collision.derived, collision.values, 0.5 * 0.75 * 2.0**2
         assert derived["tau_c"] == pytest.approx(0.75 * 2.0, rel=1e-8)
         assert derived["tau_c"] + derived["tau_r"] == pytest.approx(2.0 - values["v1_post"], rel=1e-8)
         assert derived["W_c"] == pytest.approx(energy, rel=1e-8)
         # the integrator's own work, energy_loss + energy_residual, is that of the two phases together
         work = values["energy_loss"] + values["energy_residual"] * energy
         assert derived["W_c"] + derived["W_r"] == pytest.approx(work, rel=0, abs=1e-8 * energy)
-        assert shot.e_energetic**2 == pytest.approx(-derived["W_r"] / derived["W_c"], rel=1e-14)
-        assert shot.e_kinetic == pytest.approx(derived["tau_r"] / derived["tau_c"], rel=1e-14)
+        assert collision.e_energetic**2 == pytest.approx(-derived["W_r"] / derived["W_c"], rel=1e-14)
+        assert collision.e_kinetic == pytest.approx(derived["tau_r"] / derived["tau_c"], rel=1e-14)
 
 
 def test_a_history_conserves_momentum_at_each_moment() -> None:
-    shot = impact.run(model="hunt-crossley-1975", at={"e": 0.6, "v1": 2.0, "v2": -1.0, "m1": 1.0, "m2": 3.0})
-    history = shot.history
+    collision = impact.run(model="hunt-crossley-1975", at={"e": 0.6, "v1": 2.0, "v2": -1.0, "m1": 1.0, "m2": 3.0})
+    history = collision.history
     assert history is not None
     t, delta, v, x1, x2, v1, v2 = (history[name].values for name in ("t", "delta", "v", "x1", "x2", "v1", "v2"))
     assert v1 + 3.0 * v2 == pytest.approx(np.full_like(t, -1.0), abs=1e-12)
     assert x1 + 3.0 * x2 == pytest.approx(-t, abs=1e-15)
     assert v1 - v2 == pytest.approx(v, abs=1e-12)
     assert x1 - x2 == pytest.approx(delta, abs=1e-15)
-    assert (v1[-1], v2[-1]) == pytest.approx((shot.values["v1_post"], shot.values["v2_post"]), abs=1e-8)
+    assert (v1[-1], v2[-1]) == pytest.approx((collision.values["v1_post"], collision.values["v2_post"]), abs=1e-8)
 
 
 @pytest.mark.parametrize("key", ["exact-hysteresis", "gharib-hurmuzlu-2012", "lankarani-nikravesh-1994"])
 def test_limits_of_restitutions_impulses_and_works_at_e_0(key: str) -> None:
-    shot = impact.run(model=key, at={"e": 0.0})
-    assert shot.status == Status.LIMIT
-    assert (shot.e_kinematic, shot.e_kinetic, shot.e_energetic) == (0.0, 0.0, 0.0)
-    assert [shot.derived[name] for name in ("tau_c", "tau_r", "W_c", "W_r")] == [0.5, 0.0, 0.25, 0.0]
+    collision = impact.run(model=key, at={"e": 0.0})
+    assert collision.status == Status.LIMIT
+    assert (collision.e_kinematic, collision.e_kinetic, collision.e_energetic) == (0.0, 0.0, 0.0)
+    assert [collision.derived[name] for name in ("tau_c", "tau_r", "W_c", "W_r")] == [0.5, 0.0, 0.25, 0.0]
     if key in ("exact-hysteresis", "gharib-hurmuzlu-2012"):
-        assert shot.derived["rebound_speed_bound"] == 0.0
+        assert collision.derived["rebound_speed_bound"] == 0.0
 
 
 def test_text_and_json_have_the_same_names(cli: Run) -> None:
     words = ("run", "--model", "gharib-hurmuzlu-2012", "--at", "e=0.2")
     text = cli(*words).stdout
-    found = json.loads(cli(*words, "--json").stdout)
+    output = json.loads(cli(*words, "--json").stdout)
     shown = {line.split()[0] for line in text.splitlines()}
-    numbers = {name for name, value in {**found["outputs"], **found["derived"]}.items() if value is not None}
+    numbers = {name for name, value in {**output["outputs"], **output["derived"]}.items() if value is not None}
     assert numbers - {"in_domain"} <= shown
-    assert {"e_kinematic", "e_kinetic", "e_energetic", *found["inputs"]} <= shown
-    assert found["materials"]["table1"] == {"E": 56e9, "nu": 0.3, "rho": 2712.0, "yield_strength": None}
+    assert {"e_kinematic", "e_kinetic", "e_energetic", *output["inputs"]} <= shown
+    assert output["materials"]["table1"] == {"E": 56e9, "nu": 0.3, "rho": 2712.0, "yield_strength": None}
 
 
 def test_parameters_have_units(cli: Run) -> None:
@@ -165,9 +165,9 @@ def test_balls_that_miss_each_other_have_no_phases(cli: Run, key: str) -> None:
     derived = impact.run(model=key, at={"v1": -1.0}).derived
     assert derived["m"] == 0.5
     assert all(math.isnan(value) for name, value in derived.items() if name not in ("m1", "m2", "R1", "R2", "m"))
-    done = cli("run", "--model", key, "--at", "v1=-1")
-    assert done.returncode == 0, done.stderr
-    assert not {"tau_c", "W_c", "K_r"} & {line.split()[0] for line in done.stdout.splitlines()}
+    process = cli("run", "--model", key, "--at", "v1=-1")
+    assert process.returncode == 0, process.stderr
+    assert not {"tau_c", "W_c", "K_r"} & {line.split()[0] for line in process.stdout.splitlines()}
 
 
 # ---- a law's own n
@@ -175,9 +175,9 @@ def test_balls_that_miss_each_other_have_no_phases(cli: Run, key: str) -> None:
 
 @pytest.mark.parametrize("key", ["bilinear", "ismail-stronge-2008"])
 def test_a_linear_law_shows_its_own_exponent(cli: Run, key: str) -> None:
-    shot = impact.run(model=key)
-    assert shot.point["n"] == shot.exponent == 1.0
-    assert json.loads(shot.history.attrs["inputs"])["n"] == 1.0  # type: ignore[union-attr]
+    collision = impact.run(model=key)
+    assert collision.point["n"] == collision.exponent == 1.0
+    assert json.loads(collision.history.attrs["inputs"])["n"] == 1.0  # type: ignore[union-attr]
     lines = [line.split() for line in cli("run", "--model", key).stdout.splitlines()]
     assert ["n", "1"] in lines
     assert ["stiffness", "61445658.07", "N/m"] in lines
@@ -205,14 +205,14 @@ def test_a_parameter_of_one_of_several_models_chooses_its_loop() -> None:
 
 
 def test_alpha_takes_the_place_of_e_and_e_that_of_alpha(cli: Run) -> None:
-    done = cli("run", "--at", "alpha=0.3", "--at", "v1=2", "--json")
-    assert done.returncode == 0, done.stderr
-    found = json.loads(done.stdout)
-    assert (found["inputs"]["alpha"], found["inputs"]["e"]) == (0.3, 0.4)
+    process = cli("run", "--at", "alpha=0.3", "--at", "v1=2", "--json")
+    assert process.returncode == 0, process.stderr
+    output = json.loads(process.stdout)
+    assert (output["inputs"]["alpha"], output["inputs"]["e"]) == (0.3, 0.4)
     sweep = {"alpha": [0.1, 0.2], "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6e9}
-    shot = impact.run({"models": "bilinear", "sweep": {**sweep, "n": 1.0}}, at={"e": 0.7})
-    assert "alpha" not in shot.point
-    assert shot.values["e_out"] == pytest.approx(0.7, abs=1e-9)
+    collision = impact.run({"models": "bilinear", "sweep": {**sweep, "n": 1.0}}, at={"e": 0.7})
+    assert "alpha" not in collision.point
+    assert collision.values["e_out"] == pytest.approx(0.7, abs=1e-9)
     set_before = impact.run(model="bilinear", overrides=["sweep.e=0.9"], at={"alpha": 0.25})
     assert set_before.point["e"] == 0.75
 
@@ -227,8 +227,8 @@ def test_alpha_takes_the_place_of_the_e_of_a_stored_sweep(tmp_path: Path) -> Non
 
 
 def test_alpha_beside_e_is_refused(cli: Run) -> None:
-    done = cli("run", "--at", "alpha=0.3", "--at", "e=0.5")
-    assert (done.returncode, done.stderr) == (2, "--at alpha: got alpha beside e, expected one of the two\n")
+    process = cli("run", "--at", "alpha=0.3", "--at", "e=0.5")
+    assert (process.returncode, process.stderr) == (2, "--at alpha: got alpha beside e, expected one of the two\n")
 
 
 CASES = """models = ["gharib-hurmuzlu-2012"]
@@ -251,23 +251,23 @@ def test_a_case_is_run_by_its_number_and_a_material_by_its_property(cli: Run, tm
     stored = impact.load(tmp_path / "r.h5").squeeze("model")
     for source in ("c.toml", "r.h5"):
         words = ["run", source, "--at", "case=2", "--at", "materials.steel.E=210e9", "--json"]
-        shot = json.loads(cli(*words, cwd=tmp_path).stdout)
-        assert (shot["inputs"]["e"], shot["inputs"]["v1"], shot["first_value_of"]) == (0.9, 2.0, [])
-        assert shot["materials"]["steel"]["E"] == 210e9
+        collision = json.loads(cli(*words, cwd=tmp_path).stdout)
+        assert (collision["inputs"]["e"], collision["inputs"]["v1"], collision["first_value_of"]) == (0.9, 2.0, [])
+        assert collision["materials"]["steel"]["E"] == 210e9
         expected = float(stored["e_out"].sel({"case": 2, "materials.steel.E": 210e9}))
-        assert shot["outputs"]["e_out"] == expected
+        assert collision["outputs"]["e_out"] == expected
     # values that vary together choose a case as well, where one has them all
-    shot = json.loads(cli("run", "r.h5", "--at", "e=0.5", "--at", "v1=2.0", "--json", cwd=tmp_path).stdout)
-    assert shot["first_value_of"] == ["materials.steel.E"]
-    for words, said in (
+    collision = json.loads(cli("run", "r.h5", "--at", "e=0.5", "--at", "v1=2.0", "--json", cwd=tmp_path).stdout)
+    assert collision["first_value_of"] == ["materials.steel.E"]
+    for words, message in (
         (["--at", "case=3"], "case = 3.0: not on the zipped axis case; these values vary together"),
         (["--at", "case=1", "--at", "e=0.9"], "case = 1.0, e = 0.9: not on the zipped axis case"),
         (["--at", "materials.steel.E=-1"], "--at materials.steel.E=-1.0: materials.steel.E: got -1.0, expected"),
         (["--at", "materials.steel.G=1"], 'no input "materials.steel.G" here; did you mean'),
     ):
-        done = cli("run", "r.h5", *words, cwd=tmp_path)
-        assert done.returncode == 2
-        assert done.stderr.startswith(said), done.stderr
+        process = cli("run", "r.h5", *words, cwd=tmp_path)
+        assert process.returncode == 2
+        assert process.stderr.startswith(message), process.stderr
     # a part of the cases is run at the one that it holds
     part = impact.load(tmp_path / "r.h5").isel(case=1)
     assert impact.run(part).point["v1"] == 2.0
