@@ -8,7 +8,7 @@ import pytest
 from impact.contact.piecewise import _first_event
 from impact.ode.problem import Problem
 
-# the event function of the phase and its rate; the distance to a breakpoint, with the rate -1; which one it is
+# the event function of the phase and its rate; the distance to a breakpoint, with the rate -1; which is first
 CASES = {
     "the event is nearer": (0.5, -1.0, 1.0, "event"),
     "the breakpoint is nearer": (1.0, -1.0, 0.5, "breakpoint"),
@@ -16,14 +16,14 @@ CASES = {
     "the event is crossed, the breakpoint is ahead": (-0.5, -1.0, 1.0, "event"),
     "the event is crossed, the breakpoint is reached": (-0.5, -1.0, 0.0, "event"),
     "the breakpoint is crossed, the event is ahead": (1.0, -1.0, -0.5, "breakpoint"),
-    "the breakpoint is crossed, the event is left": (0.0, 1.0, -0.5, "breakpoint"),
+    "the breakpoint is crossed, the trajectory leaves the event": (0.0, 1.0, -0.5, "breakpoint"),
     "both are crossed, the event was first": (-0.5, -1.0, -0.2, "event"),
     "both are crossed, the breakpoint was first": (-0.2, -1.0, -0.5, "breakpoint"),
 }
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_which_comes_first(case: str) -> None:
+def test_the_first_of_event_and_breakpoint_ends_the_part(case: str) -> None:
     g, dg, distance, first = CASES[case]
     phase = Problem(
         rates=lambda y, params, out=None: y,

@@ -18,11 +18,11 @@ def forests(size: int, largest: int) -> tuple[tuple, ...]:
     """All multisets of rooted trees with `size` vertices together and at most `largest` each."""
     if size == 0:
         return ((),)
-    found = set()
+    multisets = set()
     for first in range(1, min(size, largest) + 1):
         for tree in trees(first):
-            found |= {tuple(sorted((tree, *rest))) for rest in forests(size - first, first)}
-    return tuple(sorted(found))
+            multisets |= {tuple(sorted((tree, *rest))) for rest in forests(size - first, first)}
+    return tuple(sorted(multisets))
 
 
 @cache
@@ -46,7 +46,8 @@ def weight(tree: tuple) -> tuple[Fraction, ...]:
     return tuple(prod((branch[i] for branch in below), start=Fraction(1)) for i in STAGES)
 
 
-def misses(weights: tuple[Fraction, ...], tree: tuple) -> Fraction:
+def residual(weights: tuple[Fraction, ...], tree: tuple) -> Fraction:
+    """By how much weights violate the order condition of a tree."""
     return sum(b * w for b, w in zip(weights, weight(tree), strict=True)) - Fraction(1, density(tree))
 
 
@@ -68,20 +69,20 @@ def test_stages_are_explicit():
 
 @pytest.mark.parametrize("tree", UP_TO_5, ids=str)
 def test_solution_fulfils_the_condition_of_order_5(tree):
-    assert misses(B, tree) == 0
+    assert residual(B, tree) == 0
 
 
 def test_solution_is_not_of_order_6():
-    assert any(misses(B, tree) for tree in trees(6))
+    assert any(residual(B, tree) for tree in trees(6))
 
 
 @pytest.mark.parametrize("tree", UP_TO_4, ids=str)
 def test_embedded_solution_fulfils_the_condition_of_order_4(tree):
-    assert misses(EMBEDDED, tree) == 0
+    assert residual(EMBEDDED, tree) == 0
 
 
 def test_embedded_solution_is_not_of_order_5():
-    assert any(misses(EMBEDDED, tree) for tree in trees(5))
+    assert any(residual(EMBEDDED, tree) for tree in trees(5))
 
 
 def test_last_stage_is_the_first_of_the_next_step():
@@ -108,11 +109,11 @@ def test_interpolant_has_the_rates_of_both_ends():
 
 def test_floats_are_the_fractions_with_the_zeros_left_out():
     for row, nested in zip((*A[1:], E), (*STAGE_WEIGHTS, ERROR_WEIGHTS), strict=True):
-        places = [place for place, _ in nested]
-        assert places == [i for i, a in enumerate(row) if a != 0]
+        stages = [stage for stage, _ in nested]
+        assert stages == [i for i, a in enumerate(row) if a != 0]
         # each weight is relative to the next: from the last backwards they are products
         product = 1.0
-        for place, ratio in reversed(nested):
+        for stage, ratio in reversed(nested):
             product *= float(ratio)
-            assert product == pytest.approx(float(row[place]), rel=1e-14)
+            assert product == pytest.approx(float(row[stage]), rel=1e-14)
     assert DENSE_WEIGHTS.tolist() == [[float(p) for p in row] for row in P]

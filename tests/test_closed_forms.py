@@ -1,4 +1,4 @@
-"""The closed forms keep their digits over the whole range, against 80-digit arithmetic."""
+"""The closed forms are accurate to rounding over their whole range, compared with 80-digit arithmetic."""
 
 import math
 
@@ -17,7 +17,7 @@ from impact.contact.closed_forms.hysteresis import SERIES_BELOW_CHI, SERIES_FROM
 
 DIGITS = 80
 EXPONENTS = (1.0, 1.3, 1.5, 2.0, 3.0)
-# dense where a series takes over from another form
+# dense where a series replaces another form
 CHI = np.unique(
     [
         *np.logspace(-10, 8, 181),
@@ -36,13 +36,13 @@ E = np.unique(
 )
 
 
-def restitution_of(chi: float) -> mp.mpf:
+def exact_restitution(chi: float) -> mp.mpf:
     with mp.workdps(DIGITS):
         a = 1 + mp.mpf(float(chi))
         return (1 + mp.lambertw(-a * mp.exp(-a)).real) / mp.mpf(float(chi))
 
 
-def damping_of(e: float) -> mp.mpf:
+def exact_damping(e: float) -> mp.mpf:
     with mp.workdps(DIGITS):
         if e == 1:
             return mp.mpf(0)
@@ -51,34 +51,36 @@ def damping_of(e: float) -> mp.mpf:
         for _ in range(12):
             decay = mp.exp(-(1 + e) * chi)
             chi -= (e * chi - 1 + (1 + chi) * decay) / (e - decay * (e + (1 + e) * chi))
-        # the relation as PHYSICS has it, where 1 - e chi has digits
+        # the logarithmic relation, where 1 - e chi is not cancelled
         if e > mp.mpf(0.1):
             assert abs(chi * (1 + e) - mp.log((1 + chi) / (1 - chi * e))) < mp.mpf(10) ** -50
         return chi
 
 
-def damped_peak_of(chi: float, n: float) -> mp.mpf:
+def exact_damped_peak(chi: float, n: float) -> mp.mpf:
     with mp.workdps(DIGITS):
         chi, n = mp.mpf(float(chi)), mp.mpf(n)
         return ((n + 1) * (chi - mp.log(1 + chi)) / chi**2) ** (1 / (n + 1))
 
 
-def relative(got: np.ndarray, wanted: list) -> float:
-    pairs = zip(got.tolist(), wanted, strict=True)
-    return max(float(abs(one - exact) / abs(exact)) if exact else abs(one) for one, exact in pairs)
+def largest_relative_error(values: np.ndarray, expected: list) -> float:
+    pairs = zip(values.tolist(), expected, strict=True)
+    return max(float(abs(value - exact) / abs(exact)) if exact else abs(value) for value, exact in pairs)
 
 
-def test_delivered_restitution_keeps_its_digits():
-    assert relative(delivered_restitution(CHI), [restitution_of(chi) for chi in CHI]) < 1e-13
+def test_delivered_restitution_is_accurate_to_rounding():
+    assert largest_relative_error(delivered_restitution(CHI), [exact_restitution(chi) for chi in CHI]) < 1e-13
 
 
-def test_exact_damping_ratio_keeps_its_digits():
-    assert relative(exact_damping_ratio(E), [damping_of(e) for e in E]) < 2e-13
+def test_exact_damping_ratio_is_accurate_to_rounding():
+    assert largest_relative_error(exact_damping_ratio(E), [exact_damping(e) for e in E]) < 2e-13
 
 
 @pytest.mark.parametrize("n", EXPONENTS)
-def test_damped_peak_keeps_its_digits(n):
-    assert relative(damped_peak_indentation(CHI, n), [damped_peak_of(chi, n) for chi in CHI]) < 2e-13
+def test_damped_peak_is_accurate_to_rounding(n):
+    assert (
+        largest_relative_error(damped_peak_indentation(CHI, n), [exact_damped_peak(chi, n) for chi in CHI]) < 2e-13
+    )
 
 
 def test_damping_and_restitution_are_inverse():
@@ -95,7 +97,7 @@ def test_damping_and_restitution_are_inverse():
     ],
     ids=["delivered_restitution", "exact_damping_ratio", "damped_peak_indentation"],
 )
-def test_series_takes_over_without_a_jump(formula, threshold):
+def test_series_and_other_form_agree_at_the_threshold(formula, threshold):
     below, at = formula(np.array([np.nextafter(threshold, 0.0), threshold]))
     assert below == pytest.approx(at, rel=2e-13)
 
@@ -125,15 +127,15 @@ def test_damping_of_a_small_restitution_is_its_reciprocal():
     assert np.all(np.abs(exact_damping_ratio(e) - 1.0 / e) <= np.spacing(1.0 / e))
 
 
-def test_damping_does_not_depend_on_its_neighbours():
-    assert [float(exact_damping_ratio(one)) for one in E] == exact_damping_ratio(E).tolist()
-    assert [float(delivered_restitution(one)) for one in CHI] == delivered_restitution(CHI).tolist()
+def test_values_of_arrays_and_of_single_numbers_have_the_same_bits():
+    assert [float(exact_damping_ratio(e)) for e in E] == exact_damping_ratio(E).tolist()
+    assert [float(delivered_restitution(chi)) for chi in CHI] == delivered_restitution(CHI).tolist()
 
 
 @pytest.mark.parametrize("n", EXPONENTS)
 def test_limits_of_the_damped_peak(n):
-    none, huge, infinite = damped_peak_indentation(np.array([0.0, 1e8, np.inf]), n)
-    assert none == pytest.approx(float(peak_indentation(1.0, 1.0, 1.0, n)), rel=1e-15)
+    undamped, huge, infinite = damped_peak_indentation(np.array([0.0, 1e8, np.inf]), n)
+    assert undamped == pytest.approx(float(peak_indentation(1.0, 1.0, 1.0, n)), rel=1e-15)
     assert huge == pytest.approx(((n + 1.0) / 1e8) ** (1.0 / (n + 1.0)), rel=1e-6)
     assert infinite == 0.0
 

@@ -1,4 +1,4 @@
-"""Models of one's own: docs/extending.md works as it stands, the contract is checked, packages bring theirs."""
+"""The examples of docs/extending.md work, user-defined laws are checked, and installed packages provide laws."""
 
 from __future__ import annotations
 
@@ -24,14 +24,15 @@ BROKEN = """
 from impact import ForceModel
 GAINS = ForceModel("gains", "", 2026, equation="", reference="", force=lambda elastic, v: elastic * (1 - 0.3 * v))
 """
-LAWS = """
+PACKAGE = """
 from impact import ForceModel, hysteresis
 from impact.contact.models.hysteresis import FLORES_2011
-open({mark!r}, "a").close()
+open({marker!r}, "a").close()
 OURS = hysteresis("ours-2026", title="Ours", year=2026, equation="χ = 1 − e", reference="", chi=lambda e: 1 - e)
 STIFF = ForceModel("stiff-2026", "Stiff", 2026, equation="", reference="", force=lambda elastic: 2 * elastic)
 """
 SWEEP = """models = ["ours-2026", "hertz"]
+solver.rtol = 1e-4
 [sweep]
 e = [0.2, 0.8]
 v1 = 1.0
@@ -48,8 +49,8 @@ def blocks(language: str) -> list[str]:
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """A folder with the files that the page says to save."""
-    mine, ramped = blocks("python")
-    files = {"my_model.py": mine, "ramped.py": ramped, "config.toml": blocks("toml")[0]}
+    my_model, ramped = blocks("python")
+    files = {"my_model.py": my_model, "ramped.py": ramped, "config.toml": blocks("toml")[0]}
     for name, text in files.items():
         assert f"`{name}`" in PAGE
         (tmp_path / name).write_text(text, encoding="utf-8")
@@ -68,18 +69,20 @@ def test_the_commands_of_the_page(cli: Run, folder: Path) -> None:
     assert (folder / "results.png").exists()
 
 
-def test_the_law_from_its_force(cli: Run, folder: Path) -> None:
+def test_the_law_of_a_ramped_dashpot_meets_the_contract(cli: Run, folder: Path) -> None:
     done = cli("models", "--check", "ramped.py", "--json", cwd=folder)
-    (told,) = json.loads(done.stdout)
-    assert (done.returncode, told["holds"]) == (0, True)
-    # full at once it is the law of Kelvin and Voigt
-    own = {"ramped-2026": {"C": 2e3, "d": 1e-9}, "kelvin-voigt-no-tension": {"C": 2e3}}
+    (report,) = json.loads(done.stdout)
+    assert (done.returncode, report["holds"]) == (0, True)
+    # with a ramp of no length it is the law of Kelvin and Voigt
+    parameters = {"ramped-2026": {"C": 2e3, "d": 1e-9}, "kelvin-voigt-no-tension": {"C": 2e3}}
     balls = {"v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 1e7, "n": 1.0}
-    both = impact.sweep({"models": list(own), "sweep": balls, "model": own}, plugins=[folder / "ramped.py"])
+    both = impact.sweep(
+        {"models": list(parameters), "sweep": balls, "model": parameters}, plugins=[folder / "ramped.py"]
+    )
     assert both["e_out"].values[0] == pytest.approx(both["e_out"].values[1], abs=1e-5)
 
 
-def test_a_broken_law_is_told_clause_by_clause(cli: Run, tmp_path: Path) -> None:
+def test_the_check_of_a_law_reports_each_clause(cli: Run, tmp_path: Path) -> None:
     (tmp_path / "broken.py").write_text(BROKEN, encoding="utf-8")
     done = cli("models", "--check", "broken.py", cwd=tmp_path)
     assert done.returncode == 1
@@ -88,18 +91,20 @@ def test_a_broken_law_is_told_clause_by_clause(cli: Run, tmp_path: Path) -> None
     assert "gains: has no oracle" in done.stderr
 
 
-def test_a_wish_that_cannot_be_met_is_told_when_the_file_is_loaded(cli: Run, tmp_path: Path) -> None:
-    (tmp_path / "wish.py").write_text(BROKEN.replace("lambda elastic, v:", "lambda elastc, v:"), encoding="utf-8")
-    for words in (["models", "--check", "wish.py"], ["models", "--plugin", "wish.py"]):
+def test_an_unknown_argument_of_a_formula_is_an_error_when_the_file_is_loaded(cli: Run, tmp_path: Path) -> None:
+    (tmp_path / "misspelt.py").write_text(
+        BROKEN.replace("lambda elastic, v:", "lambda elastc, v:"), encoding="utf-8"
+    )
+    for words in (["models", "--check", "misspelt.py"], ["models", "--plugin", "misspelt.py"]):
         done = cli(*words, cwd=tmp_path)
         assert done.returncode == 2
-        assert 'wish.py:3: model gains: its force asks for "elastc"; did you mean "elastic"?' in done.stderr
+        assert 'misspelt.py:3: model gains: its force asks for "elastc"; did you mean "elastic"?' in done.stderr
         assert "Traceback" not in done.stderr
 
 
-def test_one_family_is_listed(cli: Run) -> None:
-    keys = [one["key"] for one in json.loads(cli("models", "--family", "elastic-plastic", "--json").stdout)]
-    assert keys == [key for key, one in impact.models().items() if one.family == "elastic-plastic"]
+def test_models_lists_a_family(cli: Run) -> None:
+    keys = [model["key"] for model in json.loads(cli("models", "--family", "elastic-plastic", "--json").stdout)]
+    assert keys == [key for key, model in impact.models().items() if model.family == "elastic-plastic"]
     listed = cli("models", "--family", "elastic-plastic").stdout
     assert "thornton-1997" in listed
     assert "hertz " not in listed
@@ -111,21 +116,23 @@ def test_one_family_is_listed(cli: Run) -> None:
 
 
 def install(folder: Path, text: str, value: str = "our_package.laws") -> Path:
-    """A package as pip leaves it, in a folder of its own, with a mark that is made when it is imported."""
+    """A package as pip installs it, in a folder `site`; its import creates a file `imported`."""
     site = folder / "site"
     (site / "our_package").mkdir(parents=True)
     (site / "our_package" / "__init__.py").touch()
-    (site / "our_package" / "laws.py").write_text(text.format(mark=str(folder / "imported")), encoding="utf-8")
-    about = site / "our_package-1.2.dist-info"
-    about.mkdir()
-    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: our-package\nVersion: 1.2\n", encoding="utf-8")
-    (about / "entry_points.txt").write_text(f"[impact.models]\nour-laws = {value}\n", encoding="utf-8")
+    (site / "our_package" / "laws.py").write_text(text.format(marker=str(folder / "imported")), encoding="utf-8")
+    metadata = site / "our_package-1.2.dist-info"
+    metadata.mkdir()
+    (metadata / "METADATA").write_text(
+        "Metadata-Version: 2.1\nName: our-package\nVersion: 1.2\n", encoding="utf-8"
+    )
+    (metadata / "entry_points.txt").write_text(f"[impact.models]\nour-laws = {value}\n", encoding="utf-8")
     return site
 
 
 @pytest.fixture
 def with_package(forked: ForkServer) -> Callable[..., CompletedCommand]:
-    """Run a command line where a folder is one of installed packages, for its processes, too."""
+    """Run a command line with a folder of installed packages, which its worker processes see, too."""
 
     def run(*words: str, site: Path, cwd: Path = ROOT) -> CompletedCommand:
         code = f"import sys; sys.path.insert(0, {str(site)!r})\n"
@@ -138,16 +145,16 @@ def with_package(forked: ForkServer) -> Callable[..., CompletedCommand]:
 def test_the_laws_of_an_installed_package_are_in_the_catalogue(
     cli: Run, with_package: Callable[..., CompletedCommand], tmp_path: Path
 ) -> None:
-    site = install(tmp_path, LAWS)
+    site = install(tmp_path, PACKAGE)
     (tmp_path / "config.toml").write_text(SWEEP, encoding="utf-8")
     listed = json.loads(with_package("models", "--json", site=site).stdout)
-    # one that it imports is not its own
-    assert [one["key"] for one in listed if one["key"] not in impact.models()] == ["ours-2026", "stiff-2026"]
+    # a law that the package imports is not one of its laws
+    assert [model["key"] for model in listed if model["key"] not in impact.models()] == ["ours-2026", "stiff-2026"]
 
     done = with_package("sweep", "config.toml", "--jobs", "2", cwd=tmp_path, site=site)
     assert done.returncode == 0, done.stderr
     record = json.loads(impact.load(tmp_path / "results.h5").attrs["plugins"])
-    assert {key: (one["file"], one["package"]) for key, one in record.items()} == {
+    assert {key: (entry["file"], entry["package"]) for key, entry in record.items()} == {
         "ours-2026": (None, "our-package 1.2")
     }
     again = with_package("rerun", "results.h5", cwd=tmp_path, site=site)
@@ -157,10 +164,10 @@ def test_the_laws_of_an_installed_package_are_in_the_catalogue(
     assert "made with ours-2026 of our-package 1.2; give it again with the package installed" in without.stderr
 
 
-def test_all_is_what_is_built_in_whatever_is_installed(
+def test_all_selects_built_in_laws_only(
     cli: Run, with_package: Callable[..., CompletedCommand], tmp_path: Path
 ) -> None:
-    site = install(tmp_path, LAWS)
+    site = install(tmp_path, PACKAGE)
     text = SWEEP.replace(
         '["ours-2026", "hertz"]',
         '["all", "!*voigt*", "!family:rate-dependent", "!family:elastic-plastic", "!family:adhesive", '
@@ -175,9 +182,11 @@ def test_all_is_what_is_built_in_whatever_is_installed(
     assert keys[0] == keys[1]
 
 
-def test_no_data_file_brings_a_package_in(with_package: Callable[..., CompletedCommand], tmp_path: Path) -> None:
-    # what is not installed as a package is imported for no entry in a TOML
-    site = install(tmp_path, LAWS)
+def test_no_data_file_causes_the_import_of_a_package(
+    with_package: Callable[..., CompletedCommand], tmp_path: Path
+) -> None:
+    # a package without metadata is not installed
+    site = install(tmp_path, PACKAGE)
     for path in (site / "our_package-1.2.dist-info").iterdir():
         path.unlink()
     (tmp_path / "config.toml").write_text(SWEEP.replace('"hertz"', '"our_package.laws"'), encoding="utf-8")
@@ -186,7 +195,7 @@ def test_no_data_file_brings_a_package_in(with_package: Callable[..., CompletedC
 
 
 @pytest.mark.parametrize(
-    ("text", "value", "said"),
+    ("text", "value", "message"),
     [
         (
             "1 / 0",
@@ -198,15 +207,15 @@ def test_no_data_file_brings_a_package_in(with_package: Callable[..., CompletedC
         ("raise SystemExit", "our_package.laws", "SystemExit"),
     ],
 )
-def test_a_broken_package_is_named(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, text: str, value: str, said: str
+def test_an_error_in_a_package_is_reported_with_its_name(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, text: str, value: str, message: str
 ) -> None:
     monkeypatch.syspath_prepend(install(tmp_path, text, value))
     for name in ("our_package", "our_package.laws"):
         monkeypatch.delitem(sys.modules, name, raising=False)
     installed.cache_clear()
     try:
-        with pytest.raises(ModelError, match=re.escape(said)) as raised:
+        with pytest.raises(ModelError, match=re.escape(message)) as raised:
             read_plugins([])
     finally:
         installed.cache_clear()
