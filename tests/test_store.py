@@ -1,8 +1,9 @@
-"""A file that looks like a result is a whole result, and nothing that was there is lost."""
+"""A stored result is complete and reads back unchanged; a failed write or a refused file damages nothing."""
 
 from __future__ import annotations
 
 import errno
+import functools
 import json
 import os
 import re
@@ -11,6 +12,7 @@ import stat
 import subprocess
 import tomllib
 import tracemalloc
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +25,7 @@ import impact
 from impact.api import prepare
 from impact.engine.executors import choose_backend
 from impact.errors import ResultError, StoreError, UnfinishedError, UsageError
-from impact.results import sweep as sweeps_of
+from impact.results import sweep as sweep_module
 from impact.results.backend import open_result, write_file
 from impact.results.seal import write_seal
 from impact.results.sweep import sweep_into
@@ -43,16 +45,22 @@ def test_a_sweep_of_every_kind_of_axis_comes_back(wide: xr.Dataset, tmp_path: Pa
     xr.testing.assert_identical(impact.load(tmp_path / "wide.h5"), wide)
 
 
+def slow(value: object) -> Any:
+    """A parameter of a test that only `make test-faults` runs."""
+    return pytest.param(value, marks=pytest.mark.slow)
+
+
 FACTORED = ["output.layout=factored"]
 OPTIONS: dict[str, dict[str, object]] = {
     "plain": {}, "float32": {"dtype": "float32"}, "gzip": {"compression": "gzip"}, "chunks": {"chunks": {"e": 20}},
     "all": {"dtype": "float32", "compression": "gzip", "chunks": {"e": 33}},
 }  # fmt: skip
+QUICK_OPTIONS = ("plain", "all")
 
 
 @pytest.fixture(scope="module")
 def factored(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The result of configs/figure6.toml of the other layout."""
+    """The result of configs/figure6.toml in the factored layout."""
     path = tmp_path_factory.mktemp("factored") / "figure6.h5"
     sweep_into(path, prepare(ROOT / "configs" / "figure6.toml", FACTORED))
     return path
@@ -65,9 +73,9 @@ def test_xarray_opens_both_layouts(
     for path, layout in ((stored, "full"), (factored, "factored")):
         with xr.open_dataset(path, **engine) as opened:
             assert opened.encoding["layout"] == layout
-            # what the config was overridden with is an attribute
-            same = opened.assign_attrs({key: figure6.attrs[key] for key in ("config_set", "fingerprint")})
-            xr.testing.assert_identical(same.compute(), figure6)
+            # the overrides of the config are attributes
+            common = opened.assign_attrs({key: figure6.attrs[key] for key in ("config_set", "fingerprint")})
+            xr.testing.assert_identical(common.compute(), figure6)
         with xr.open_dataset(path, drop_variables=["steps", "e_out"], **engine) as opened:
             assert set(figure6.variables) - set(opened.variables) == {"steps", "e_out"}
 
@@ -76,21 +84,36 @@ def _text(values: np.ndarray) -> list[object]:
     return [value.decode() if isinstance(value, bytes) else value for value in np.ravel(values).tolist()]
 
 
-@pytest.mark.parametrize("option", OPTIONS)
+@pytest.fixture(scope="module")
+def files_with_option(
+    wide: xr.Dataset, figure6: xr.Dataset, tmp_path_factory: pytest.TempPathFactory
+) -> Callable[[str], dict[Path, xr.Dataset]]:
+    """Files of two sweeps that are stored with an option, and what `impact.load` reads from them."""
+    folder = tmp_path_factory.mktemp("options")
+
+    @functools.cache
+    def store(option: str) -> dict[Path, xr.Dataset]:
+        output = {**OPTIONS[option]}
+        if "chunks" in output:
+            output["chunks"] = {"e": 2}
+        results = {}
+        for name, result in (("figure6", figure6), ("wide", wide)):
+            path = folder / f"{option}-{name}.h5"
+            config = tomllib.loads(result.attrs["config"])
+            results[path] = impact.sweep(config | {"output": output, "solver": {"rtol": 1e-4}}, output=path)
+        return results
+
+    return store
+
+
+@pytest.mark.parametrize("option", [name if name in QUICK_OPTIONS else slow(name) for name in OPTIONS])
 @pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4"])
 def test_xarray_reads_it_as_any_netcdf_file(
-    wide: xr.Dataset, figure6: xr.Dataset, tmp_path: Path, engine: str, option: str
+    files_with_option: Callable[[str], dict[Path, xr.Dataset]], engine: str, option: str
 ) -> None:
     if engine == "netcdf4":
         pytest.importorskip("netCDF4")
-    options = {**OPTIONS[option]}
-    for result in (figure6, wide):
-        if "chunks" in options:
-            options["chunks"] = {"e": 2}
-        path = tmp_path / f"{len(result.dims)}.h5"
-        config = tomllib.loads(result.attrs["config"])
-        sweep_into(path, prepare(config | {"output": options}))
-        expected = impact.load(path)
+    for path, expected in files_with_option(option).items():
         with xr.open_dataset(path, engine=engine) as opened:
             assert dict(opened.sizes) == dict(expected.sizes)
             assert set(opened.variables) == set(expected.variables)
@@ -108,7 +131,7 @@ def test_xarray_reads_it_as_any_netcdf_file(
 
 
 @pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4"])
-def test_of_a_factored_file_they_read_the_table(factored: Path, engine: str) -> None:
+def test_xarray_reads_the_trajectory_table_of_a_factored_file_as_netcdf(factored: Path, engine: str) -> None:
     if engine == "netcdf4":
         pytest.importorskip("netCDF4")
     with xr.open_dataset(factored, engine=engine) as opened:
@@ -150,20 +173,18 @@ def test_h5ls_reads_it(stored: Path, factored: Path) -> None:
     assert re.search(r"trajectory_e_out +Dataset \{303\}", listed)
 
 
-@pytest.mark.parametrize("layout", ["full", "factored"])
-@pytest.mark.parametrize(
-    "option", ["all", *(pytest.param(name, marks=pytest.mark.slow) for name in OPTIONS if name != "all")]
-)
+@pytest.mark.parametrize("layout", ["full", slow("factored")])
+@pytest.mark.parametrize("option", ["all", *(slow(name) for name in OPTIONS if name != "all")])
 def test_two_processes_write_equal_bytes(cli: Run, tmp_path: Path, layout: str, option: str) -> None:
     if layout == "factored" and "chunks" in OPTIONS[option]:
         pytest.skip("a factored file has chunks of its own")
     config = (ROOT / "configs" / "figure6.toml").read_text(encoding="utf-8")
-    text = f'{config}\n[output]\nlayout = "{layout}"\n'
+    text = f'{config}\n[solver]\nrtol = 1e-4\n[output]\nlayout = "{layout}"\n'
     for name, value in OPTIONS[option].items():
         text += f"{name} = {json.dumps(value).replace(':', ' =')}\n"
     (tmp_path / "c.toml").write_text(text, encoding="utf-8")
     contents = set()
-    # the hash of a text differs in a new process
+    # the hash of a string differs in a new interpreter
     for name, environment in (("a", {"PYTHONHASHSEED": "1"}), ("b", {})):
         done = cli("sweep", "c.toml", "-o", f"{name}.h5", cwd=tmp_path, **environment)
         assert done.returncode == 0, done.stderr
@@ -171,24 +192,25 @@ def test_two_processes_write_equal_bytes(cli: Run, tmp_path: Path, layout: str, 
     assert len(contents) == 1
 
 
+# two ranges of trajectories
 MANY = {
-    "models": ["lankarani-nikravesh-1990", "gharib-hurmuzlu-2012"],
+    "models": ["gharib-hurmuzlu-2012"],
     "sweep": {"e": {"linspace": [0.01, 1.0, 33_000]}, "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6e9},
     "solver": {"rtol": 1e-4},
-}  # fmt: skip
+}
 
 
-@pytest.mark.parametrize("layout", ["full", "factored"])
+@pytest.mark.parametrize("layout", ["full", slow("factored")])
 def test_threads_processes_and_an_interruption_change_no_byte(tmp_path: Path, layout: str) -> None:
     plan = prepare(MANY | {"output": {"layout": layout}})
-    sweep_into(tmp_path / "alone.h5", plan)
+    sweep_into(tmp_path / "serial.h5", plan)
     sweep_into(tmp_path / "threads.h5", plan, backend=choose_backend(threads=2))
     sweep_into(tmp_path / "jobs.h5", plan, backend=choose_backend(jobs=2))
-    answers = iter([False] * 3 + [True] * 99)
-    with pytest.raises(UnfinishedError):
-        sweep_into(tmp_path / "again.h5", plan, should_stop=lambda: next(answers))
-    assert not (tmp_path / "again.h5").exists()
-    sweep_into(tmp_path / "again.h5", plan, resume=True)
+    resumed = tmp_path / "resumed.h5"
+    with pytest.raises(UnfinishedError, match=r"16,500 of 33,000 trajectories are kept"):
+        sweep_into(resumed, plan, should_stop=lambda: any(tmp_path.glob("resumed.h5.work/*.npz")))
+    assert not resumed.exists()
+    sweep_into(resumed, plan, resume=True)
     assert len({path.read_bytes() for path in tmp_path.glob("*.h5")}) == 1
     assert len(list(tmp_path.iterdir())) == 4
 
@@ -198,13 +220,13 @@ def test_equal_inputs_give_equal_bytes(figure6: xr.Dataset, stored: Path, tmp_pa
     assert (tmp_path / "again.h5").read_bytes() == stored.read_bytes()
 
 
-def test_a_sweep_whose_file_cannot_be_read_is_not_published(
+def test_a_sweep_whose_file_cannot_be_read_back_leaves_no_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(*arguments: object) -> None:
         raise StoreError("cannot be read")
 
-    monkeypatch.setattr(sweeps_of, "check_readable", refuse)
+    monkeypatch.setattr(sweep_module, "check_readable", refuse)
     with pytest.raises(StoreError, match="cannot be read"):
         sweep_into(tmp_path / "out.h5", prepare(ROOT / "configs" / "figure6.toml", ["sweep.e=0.5"]))
     assert not (tmp_path / "out.h5").exists()
@@ -220,7 +242,7 @@ def test_an_output_that_exists_is_kept(figure6: xr.Dataset, tmp_path: Path) -> N
     assert impact.load(path).sizes["e"] == 101
 
 
-def test_what_is_no_regular_file_is_left_alone(figure6: xr.Dataset, tmp_path: Path) -> None:
+def test_an_output_that_is_no_regular_file_is_refused(figure6: xr.Dataset, tmp_path: Path) -> None:
     target = tmp_path / "target"
     target.write_text("target")
     (tmp_path / "folder").mkdir()
@@ -235,18 +257,20 @@ def test_what_is_no_regular_file_is_left_alone(figure6: xr.Dataset, tmp_path: Pa
     assert sorted(p.name for p in tmp_path.iterdir()) == ["fifo", "folder", "link", "target"]
 
 
-def test_a_file_that_appears_meanwhile_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_output_that_another_program_writes_meanwhile_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = tmp_path / "out.h5"
     fsync = os.fsync
 
-    def somebody_else_writes(number: int) -> None:
+    def fsync_while_another_program_writes(number: int) -> None:
         fsync(number)
-        path.write_text("somebody else's")
+        path.write_text("another program's")
 
-    monkeypatch.setattr(os, "fsync", somebody_else_writes)
+    monkeypatch.setattr(os, "fsync", fsync_while_another_program_writes)
     with pytest.raises(UsageError, match="appeared"):
         write_file(path, b"ours", overwrite=False)
-    assert path.read_text() == "somebody else's"
+    assert path.read_text() == "another program's"
     assert [p.name for p in tmp_path.iterdir()] == ["out.h5"]
 
 
@@ -255,12 +279,12 @@ def test_a_folder_that_cannot_be_synced_is_a_note(
 ) -> None:
     fsync = os.fsync
 
-    def of_files(number: int) -> None:
+    def fsync_files_only(number: int) -> None:
         if stat.S_ISDIR(os.fstat(number).st_mode):
             raise OSError(errno.EINVAL, os.strerror(errno.EINVAL))
         fsync(number)
 
-    monkeypatch.setattr(os, "fsync", of_files)
+    monkeypatch.setattr(os, "fsync", fsync_files_only)
     with pytest.warns(UserWarning, match=r"folders cannot be synced here \(Invalid argument\)"):
         impact.save(figure6, tmp_path / "out.h5")
     assert impact.load(tmp_path / "out.h5").identical(figure6)
@@ -268,17 +292,17 @@ def test_a_folder_that_cannot_be_synced_is_a_note(
 
 UNREADABLE = """
 import ctypes
-# without its capabilities root may open no more than others; 0x20080522 is the version of the call
+# without its capabilities root has the permissions of other users; 0x20080522 is the version of the call
 ctypes.CDLL(None).capset((ctypes.c_uint32 * 2)(0x20080522, 0), (ctypes.c_uint32 * 6)())
 """
 
 
-def test_a_folder_that_may_be_written_to_and_not_read_holds_the_result(forked: ForkServer, tmp_path: Path) -> None:
+def test_a_result_is_written_to_a_folder_without_read_permission(forked: ForkServer, tmp_path: Path) -> None:
     folder = tmp_path / "folder"
     folder.mkdir()
     text = (ROOT / "configs" / "figure6.toml").read_text(encoding="utf-8")
-    # so many points are integrated beside a work folder
-    (folder / "c.toml").write_text(text.replace("101", "40000"), encoding="utf-8")
+    # more than one range of trajectories needs a work folder
+    (folder / "c.toml").write_text(text.replace("101", "33000"), encoding="utf-8")
     folder.chmod(0o300)
     words = ("--set", "models=['hunt-crossley-1975']", "--set", "solver.rtol=1e-4", "--quiet")
     done = forked("sweep", "c.toml", *words, cwd=folder, code=UNREADABLE)
@@ -287,11 +311,11 @@ def test_a_folder_that_may_be_written_to_and_not_read_holds_the_result(forked: F
     assert done.stderr == (
         "note: folders cannot be synced here (Permission denied): a power cut may undo what was just written\n"
     )
-    assert impact.load(folder / "results.h5").sizes["e"] == 40000
+    assert impact.load(folder / "results.h5").sizes["e"] == 33000
 
 
-def test_a_disk_that_fails_leaves_nothing_behind(tmp_path: Path) -> None:
-    # a limit of the system on the size of files stands for the full disk
+def test_a_write_to_a_full_disk_leaves_no_file(tmp_path: Path) -> None:
+    # the limit on the size of files stands for a full disk
     import resource
     import signal
 
@@ -307,7 +331,7 @@ def test_a_disk_that_fails_leaves_nothing_behind(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_what_is_no_result_is_refused(stored: Path, tmp_path: Path) -> None:
+def test_a_file_that_is_no_result_of_this_version_is_refused(stored: Path, tmp_path: Path) -> None:
     other = tmp_path / "other.h5"
     with h5py.File(other, "w") as file:
         file["x"] = [1.0]
@@ -332,7 +356,7 @@ def test_what_is_no_result_is_refused(stored: Path, tmp_path: Path) -> None:
             impact.load(tmp_path / name)
 
 
-def test_a_changed_number_is_noticed(stored: Path, tmp_path: Path) -> None:
+def test_a_changed_number_is_detected(stored: Path, tmp_path: Path) -> None:
     changed = tmp_path / "changed.h5"
     shutil.copy(stored, changed)
     with h5py.File(changed, "r+") as file:
@@ -355,7 +379,7 @@ def test_a_part_of_a_result_can_be_stored(figure6: xr.Dataset, tmp_path: Path) -
     (None, "config", b"models = []"), (None, "rtol", 1e-3), (None, "fingerprint", b"0"),
     ("v1_post", "units", b"km s-1"), ("e", "long_name", b"something else"),
 ])  # fmt: skip
-def test_a_changed_attribute_is_noticed(
+def test_a_changed_attribute_is_detected(
     stored: Path, tmp_path: Path, variable: str | None, name: str, value: object
 ) -> None:
     changed = tmp_path / "changed.h5"
@@ -366,8 +390,9 @@ def test_a_changed_attribute_is_noticed(
         impact.load(changed)
 
 
-def test_without_hard_links(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    # some file systems have none; the machine's own has
+def test_results_are_written_on_a_file_system_without_hard_links(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def no_links(*_: object) -> None:
         raise PermissionError(1, "Operation not permitted")
 
@@ -379,24 +404,31 @@ def test_without_hard_links(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert [p.name for p in tmp_path.iterdir()] == ["out.h5"]
 
 
-@pytest.mark.parametrize("schema_version", [1, None])
-def test_a_file_of_version_1_is_refused_with_how_to_make_it_again(
-    cli: Run, stored: Path, tmp_path: Path, schema_version: int | None
+# commands that read a result, and their options
+READERS = [["info"], ["plot", "-o", "x.png"], ["recommend"], ["rerun"]]
+
+
+@pytest.mark.parametrize(
+    ("schema_version", "commands"),
+    [(1, READERS), (None, READERS[:1]), pytest.param(None, READERS[1:], marks=pytest.mark.slow)],
+)
+def test_a_file_of_version_1_is_refused_and_the_command_that_replaces_it_is_named(
+    cli: Run, stored: Path, tmp_path: Path, schema_version: int | None, commands: list[list[str]]
 ) -> None:
-    # as they were: HDF5 from the first byte on
+    # files of version 1 had no seal before the HDF5 data
     with xr.open_dataset(stored, engine="h5netcdf") as opened:
         old = opened.drop_attrs(deep=False).load()
     if schema_version:
         old = old.assign_attrs(schema_version=schema_version, content_digest="0" * 64)
     old.to_netcdf(tmp_path / "old.h5", engine="h5netcdf")
     assert (tmp_path / "old.h5").read_bytes().startswith(b"\x89HDF\r\n\x1a\n")
-    told = (
+    message = (
         "old.h5: is of schema version 1, or no result of impact; expected version 2: sweep its config again: "
         "impact sweep CONFIG.toml -o RESULT --overwrite\n"
     )
-    for command in (["info"], ["plot", "-o", "x.png"], ["recommend"], ["rerun"]):
+    for command in commands:
         done = cli(command[0], "old.h5", *command[1:], cwd=tmp_path)
-        assert (done.returncode, done.stdout, done.stderr) == (2, "", told), command
+        assert (done.returncode, done.stdout, done.stderr) == (2, "", message), command
     assert [path.name for path in tmp_path.iterdir()] == ["old.h5"]
 
 
@@ -424,7 +456,7 @@ LARGE = {
 }  # fmt: skip
 
 
-def test_what_no_memory_holds_is_refused_before_it_is_computed(tmp_path: Path) -> None:
+def test_values_that_exceed_the_memory_are_refused_before_they_are_computed(tmp_path: Path) -> None:
     sweep_into(tmp_path / "large.h5", prepare(LARGE, max_points=10**13))
     with open_result(tmp_path / "large.h5") as opened:
         assert opened["e_out"].size == 10**12
@@ -437,7 +469,7 @@ def test_what_no_memory_holds_is_refused_before_it_is_computed(tmp_path: Path) -
         assert float(opened["e_out"].isel(v1=0, m1=slice(0, 50)).mean()) == pytest.approx(1.0, abs=1e-9)
 
 
-# what could be neither stored nor read is refused before anything is integrated, which leaves a file
+# a result that could not be stored or read is refused before integration, which the law below records in a file
 SWEEP = """
 models = ["mine-2026"]
 [solver]
@@ -447,7 +479,6 @@ v1 = [1.0, 2.0]
 m1 = 1.0
 m2 = 1.0
 """
-# a law of forty parameters
 LAW = """
 from pathlib import Path
 import impact
@@ -463,7 +494,7 @@ MINE = impact.ForceModel(
 """
 
 
-def test_a_sweep_that_is_not_refused_leaves_a_file(cli: Run, tmp_path: Path) -> None:
+def test_the_law_writes_a_file_when_it_is_integrated(cli: Run, tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(LAW, encoding="utf-8")
     (tmp_path / "c.toml").write_text(f"{SWEEP}K = 6e9\nn = 1.0\n", encoding="utf-8")
     assert cli("sweep", "c.toml", "--plugin", "mine.py", cwd=tmp_path).returncode == 0
@@ -493,7 +524,7 @@ def test_more_axes_than_a_file_can_have_are_refused(cli: Run, tmp_path: Path, la
 
 
 def test_longer_labels_than_a_file_can_have_are_refused(cli: Run, tmp_path: Path) -> None:
-    # each takes as many letters as the longest
+    # each label takes as many bytes as the longest
     names = ["x" * 400_000, *(f"y{number}" for number in range(19))]
     materials = "".join(f"[materials.{name}]\nE = 2e11\nnu = 0.3\nrho = 7800\n" for name in names)
     line = _refused(cli, tmp_path, f"{SWEEP}n = 1.0\nmaterial = {json.dumps(names)}\n{materials}", "out.h5")
