@@ -1,4 +1,4 @@
-"""Adhesive laws: the neck, the sticking speed, and LIGGGHTS' Edinburgh law step by step as its source has it."""
+"""Adhesive laws: the neck and sticking speed of JKR, and the Edinburgh law against the time steps of LIGGGHTS."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from impact.contact.status import Status
 from .problems import table1_impacts
 
 GAMMA = 0.2
-# balls of 10 µg, of which adhesion takes much at some centimetres a second
+# balls of 10 and 20 µg, which lose much energy by adhesion at some centimetres a second
 SMALL = {"m1": 1e-8, "m2": 2e-8, "E1": 2e9, "E2": 56e9}
 
 
-def struck(key: str, n: float = 1.5, **given) -> Outputs:
-    return collide(find(key), table1_impacts(n, **given), rtol=1e-10, max_steps=10_000)
+def struck(key: str, n: float = 1.5, **inputs) -> Outputs:
+    return collide(find(key), table1_impacts(n, **inputs), rtol=1e-10, max_steps=10_000)
 
 
-def sticking_speed(lanes: Impacts) -> float:
+def sticking_speed(impacts: Impacts) -> float:
     """Thornton and Ning (1998), equation (54)."""
-    R, E = 1 / (1 / lanes.R1[0] + 1 / lanes.R2[0]), 1 / (0.91 / lanes.E1[0] + 0.91 / lanes.E2[0])
-    return float(np.sqrt(14.18 / lanes.m[0]) * (GAMMA**5 * R**4 / E**2) ** (1 / 6))
+    R, E = 1 / (1 / impacts.R1[0] + 1 / impacts.R2[0]), 1 / (0.91 / impacts.E1[0] + 0.91 / impacts.E2[0])
+    return float(np.sqrt(14.18 / impacts.m[0]) * (GAMMA**5 * R**4 / E**2) ** (1 / 6))
 
 
 def test_balls_with_a_neck_rebound_by_thornton_and_ning_and_stick_below_a_speed():
@@ -41,16 +41,15 @@ def test_balls_with_a_neck_rebound_by_thornton_and_ning_and_stick_below_a_speed(
     assert np.isnan(contact["contact_time"]).tolist() == [True] * 3 + [False] * 5
 
 
-def test_a_neck_begins_with_eight_ninths_of_its_pull_and_breaks_at_five_ninths():
-    sweep = {"v1": 1.0, "m1": 1e-8, "m2": 2e-8, "E": 2e9}
+def test_the_pull_of_a_neck_is_eight_ninths_of_its_largest_at_first_and_five_ninths_at_last():
     config = {
         "models": "jkr-1971",
-        "sweep": {name: value for name, value in sweep.items() if name != "E"} | {"material": "soft"},
+        "sweep": {"v1": 1.0, "m1": 1e-8, "m2": 2e-8, "material": "soft"},
         "materials": {"soft": {"E": 2e9, "nu": 0.3, "rho": 2712.0}},
         "model": {"jkr-1971": {"gamma": GAMMA}},
     }
-    shot = impact.run(config)
-    force, delta = shot.history["F"].values, shot.history["delta"].values
+    single = impact.run(config)
+    force, delta = single.history["F"].values, single.history["delta"].values
     R1, R2 = ((3 * m / (4 * np.pi * 2712.0)) ** (1 / 3) for m in (1e-8, 2e-8))
     R, E = R1 * R2 / (R1 + R2), 2e9 / (2 * 0.91)
     pull = 1.5 * np.pi * GAMMA * R
@@ -58,10 +57,10 @@ def test_a_neck_begins_with_eight_ninths_of_its_pull_and_breaks_at_five_ninths()
     assert force[-1] == pytest.approx(-5 / 9 * pull, rel=1e-4)
     assert force.min() == pytest.approx(-pull, rel=1e-2)
     assert delta[-1] == pytest.approx(-0.75 * (np.pi**2 * GAMMA**2 * R / E**2) ** (1 / 3), rel=1e-9)
-    assert shot.values["permanent_indentation"] == pytest.approx(delta[-1], rel=1e-12)
+    assert single.values["permanent_indentation"] == pytest.approx(delta[-1], rel=1e-12)
 
 
-def test_without_adhesion_a_neck_is_hertz():
+def test_jkr_without_adhesion_is_hertz():
     neck = struck("jkr-1971", v1=[0.01, 1.0], parameters={"gamma": 0.0})
     hertz = struck("hertz", v1=[0.01, 1.0])
     assert neck["e_out"] == pytest.approx([1.0, 1.0], abs=1e-9)
@@ -107,29 +106,29 @@ def edinburgh(n: float, K: float, k2: float, gamma: float, chi: float, R1: float
 @pytest.mark.parametrize("n", [1.0, 1.5])
 @pytest.mark.parametrize(("k2", "chi"), [(2.0, 1.0), (5.0, 1.0), (3.0, 1.5)])
 @pytest.mark.parametrize("gamma", [0.0, 40.0])
-def test_the_edinburgh_law_is_the_one_that_liggghts_steps_through(n, k2, chi, gamma):
+def test_the_edinburgh_law_agrees_with_the_time_steps_of_liggghts(n, k2, chi, gamma):
     K, m1, m2, v0, R = 1e5 * 1e3 ** (n - 1), 0.01, 0.02, 0.5, 0.01
-    own = {"k2": k2, "gamma": gamma, "adhesion_exponent": chi}
-    contact = struck("liggghts-edinburgh", n, v1=v0, m1=m1, m2=m2, K=K, R1=R, R2=2 * R, parameters=own)
+    parameters = {"k2": k2, "gamma": gamma, "adhesion_exponent": chi}
+    contact = struck("liggghts-edinburgh", n, v1=v0, m1=m1, m2=m2, K=K, R1=R, R2=2 * R, parameters=parameters)
     m = m1 * m2 / (m1 + m2)
     assert contact["e_out"][0] == pytest.approx(edinburgh(n, K, k2, gamma, chi, R, 2 * R, m, v0), abs=2e-5)
     assert abs(contact["closed_form_error"][0]) < 1e-9
-    # without surface energy a linear one is the bilinear law
+    # with n = 1 and without surface energy it is the bilinear law
     if gamma == 0.0 and n == 1.0:
         assert contact["e_out"][0] == pytest.approx(np.sqrt(1 / k2), abs=1e-9)
 
 
-def test_the_edinburgh_law_sticks_and_ends_where_its_surface_energy_says():
-    lanes = table1_impacts(1.5, v1=np.geomspace(0.003, 1.0, 12), m1=0.01, m2=0.02, K=1e7)
-    own = {"k2": np.full(12, 3.0), "gamma": np.full(12, 40.0), "adhesion_exponent": np.ones(12)}
-    lanes = table1_impacts(1.5, v1=lanes.v1, m1=0.01, m2=0.02, K=1e7, parameters=own)
-    sticky = collide(find("liggghts-edinburgh"), lanes, rtol=1e-10, max_steps=10_000)
+def test_the_edinburgh_law_sticks_at_low_speed_and_releases_at_zero_indentation():
+    speeds = np.geomspace(0.003, 1.0, 12)
+    parameters = {"k2": 3.0, "gamma": 40.0, "adhesion_exponent": 1.0}
+    impacts = table1_impacts(1.5, v1=speeds, m1=0.01, m2=0.02, K=1e7, parameters=parameters)
+    sticky = collide(find("liggghts-edinburgh"), impacts, rtol=1e-10, max_steps=10_000)
     assert sticky["status"][0] == Status.LIMIT
     assert sticky["status"][-1] == Status.OK
     assert np.all(np.diff(sticky["e_out"]) >= 0.0)
     assert np.abs(sticky["closed_form_error"]).max() < 1e-9
-    parted = sticky["status"] == Status.OK
-    assert sticky["permanent_indentation"][parted] == pytest.approx(0.0, abs=1e-12)
+    released = sticky["status"] == Status.OK
+    assert sticky["permanent_indentation"][released] == pytest.approx(0.0, abs=1e-12)
     dry = struck(
         "liggghts-edinburgh", v1=0.5, K=1e7, parameters={"k2": 3.0, "gamma": 0.0, "adhesion_exponent": 1.0}
     )
@@ -142,6 +141,7 @@ def test_the_stiffness_of_the_edinburgh_law_depends_on_its_exponent():
         "sweep": {"v1": 0.1, "m1": 1.0, "m2": 1.0, "R1": 0.02, "R2": 0.06, "material": "soft", "n": [1.0, 1.5]},
         "materials": {"soft": {"E": 2e9, "nu": 0.3, "rho": 2712.0}},
         "model": {"liggghts-edinburgh": {"k2": 2.0, "gamma": 1.0}},
+        "solver": {"rtol": 1e-4},
     }
     R, E = 0.015, 2e9 / (2 * 0.91)
     assert impact.sweep(config)["stiffness"].values.ravel() == pytest.approx(
