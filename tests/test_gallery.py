@@ -1,4 +1,4 @@
-"""docs/gallery.md has every kind of picture, and the numbers behind them are those that its commands give now."""
+"""docs/gallery.md has a plot of every kind, and the plotted values are those that its commands give now."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+import impact
 from impact.plots.kinds import KINDS
 
 from .conftest import ROOT, Run
@@ -21,8 +22,6 @@ NUMBERS = FOLDER / "numbers.json"
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    import impact
-
     folder = tmp_path_factory.mktemp("gallery")
     for name, path in gallery.RESULTS.items():
         impact.save(impact.sweep(ROOT / path), folder / f"{name}.h5")
@@ -33,34 +32,34 @@ def test_the_page_is_fresh_and_has_every_kind() -> None:
     assert (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8") == gallery.gallery_page(), "run `make docs`"
     assert [entry.kind for entry in gallery.ENTRIES] == list(KINDS)
     assert {path.name for path in FOLDER.iterdir()} == {
-        NUMBERS.name, "speeds.toml", *(f"{kind}.svg" for kind in KINDS)
-    }  # fmt: skip
+        NUMBERS.name,
+        "speeds.toml",
+        *(f"{kind}.svg" for kind in KINDS),
+    }
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("entry", gallery.ENTRIES, ids=lambda entry: entry.kind)
-def test_the_numbers_of_a_picture_are_fresh(entry: gallery.Entry, results: Path, cli: Run, tmp_path: Path) -> None:
+def test_the_values_of_a_plot_are_fresh(entry: gallery.Entry, results: Path, cli: Run, tmp_path: Path) -> None:
     _, *words = entry.command
     words[1] = str(results / words[1])
     done = cli(*words, "--data", "fresh.csv", "--data-form", "long", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    now, kept = (
-        gallery.summary(tmp_path / "fresh.csv"),
-        json.loads(NUMBERS.read_text(encoding="utf-8"))[entry.kind],
-    )
-    assert now.keys() == kept.keys()
-    for name, column in kept.items():
+    now = gallery.summary(tmp_path / "fresh.csv")
+    stored = json.loads(NUMBERS.read_text(encoding="utf-8"))[entry.kind]
+    assert now.keys() == stored.keys()
+    for name, column in stored.items():
         if isinstance(column[0], str):
             assert now[name] == column, "run `make docs`"
         else:
             assert now[name] == pytest.approx(column, rel=1e-6, abs=1e-9), f"{name}: run `make docs`"
 
 
-def test_a_change_of_one_number_or_of_their_order_shows(tmp_path: Path) -> None:
+def test_a_changed_value_or_order_changes_the_summary(tmp_path: Path) -> None:
     table = tmp_path / "table.csv"
-    found = []
+    summaries = []
     for values in (("1.0", "2.0", "3.0"), ("1.0", "2.0", "3.001"), ("2.0", "1.0", "3.0")):
         rows = [f"{name},{value}" for name, value in zip("aab", values, strict=True)]
         table.write_text("\n".join(["curve,x", *rows]), encoding="utf-8")
-        found.append(gallery.summary(table))
-    assert all(one != found[0] for one in found[1:])
+        summaries.append(gallery.summary(table))
+    assert all(summary != summaries[0] for summary in summaries[1:])

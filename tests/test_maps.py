@@ -339,12 +339,12 @@ def slow(*values: object) -> Any:
     [
         ("map", 1, 7.1),
         ("map", 3, 3.3),
-        ("force", 7, 7.1),
         ("swapped", 12, 3.3),
         ("validity", 7, 3.3),
         slow("map", 1, 3.3),
         slow("map", 3, 7.1),
         slow("force", 7, 3.3),
+        slow("force", 7, 7.1),
         slow("swapped", 12, 7.1),
         slow("validity", 7, 7.1),
     ],
@@ -380,7 +380,7 @@ def test_text_from_a_file_is_text(over_speed: xr.Dataset, tmp_path: Path) -> Non
 
 def test_ticks_are_labelled_with_their_values(many: xr.Dataset) -> None:
     raised = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹−", "-0123456789-")
-    for map_data in (field_map(many, models=MODELS), validity(many, models=MODELS)):
+    for map_data in (field_map(many, models=MODELS[:1]), validity(many, models=MODELS)):
         figure = draw(map_data, 7.1)
         figure.draw_without_rendering()
         for axis in (figure.axes[0].xaxis, figure.axes[0].yaxis):
@@ -395,7 +395,6 @@ def test_ticks_are_labelled_with_their_values(many: xr.Dataset) -> None:
 
 def test_only_the_last_row_and_the_first_column_have_tick_labels(many: xr.Dataset) -> None:
     figure = draw(field_map(many, models=MORE[:7]), 7.1)
-    figure.draw_without_rendering()
 
     def is_named(axis: Axis) -> bool:
         return any(tick.label1.get_visible() for tick in axis.get_major_ticks())

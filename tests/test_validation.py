@@ -1,4 +1,4 @@
-"""What the commands could make no sense of is neither stored nor read, though its seal holds."""
+"""Datasets that are not valid results are neither stored nor read, even if their seal is valid."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from h5netcdf.utils import CompatibilityError
 import impact
 from impact.errors import ResultError, UsageError
 from impact.results import backend
+
+from .conftest import ROOT
 
 Change = Callable[[xr.Dataset], xr.Dataset]
 DEEP = "[" * 100_000
@@ -36,8 +38,10 @@ RESULTS: dict[str, tuple[Change, str]] = {
     "meaning of numbers": (_attribute("e_out", long_name=np.ones(3)), "e_out: units or long_name"),
     "one model": (lambda r: r.isel(model=0), "sel(model=[...])"),
     "a model twice": (lambda r: r.assign_coords(model=["a", "b", "a"]), "a model occurs twice"),
-    **{name: (lambda r, name=name: r.drop_vars(name), f"{name} of the models is missing")
-       for name in ("title", "equation", "reference", "doi", "year")},
+    **{
+        name: (lambda r, name=name: r.drop_vars(name), f"{name} of the models is missing")
+        for name in ("title", "equation", "reference", "doi", "year")
+    },
     "title of all": (lambda r: r.assign_coords(title="x"), "title of the models is missing"),
     "reference by model": (lambda r: r.assign(v1_reference=r["v1_post"]), "v1_reference: lies along model"),
     "unknown status": (lambda r: r.assign(status=r["status"] + 70), "status: got a number that is no status"),
@@ -49,7 +53,7 @@ RESULTS: dict[str, tuple[Change, str]] = {
     "no hash": (lambda r: r.assign_attrs(plugins='{"mine": {"file": "my.py"}}'), "plugins: not JSON of the"),
     "deep plugins": (lambda r: r.assign_attrs(plugins=DEEP), "plugins: not JSON of the expected type"),
     "materials": (lambda r: r.assign_attrs(materials=1.0), "materials: not JSON of the expected type"),
-}  # fmt: skip
+}
 HISTORIES: dict[str, tuple[Change, str]] = {
     "another axis": (lambda h: h.expand_dims(e=[1.0]), "expected t as its only axis"),
     "inputs": (lambda h: h.assign_attrs(inputs=DEEP), "inputs: not JSON of the expected type"),
@@ -57,22 +61,31 @@ HISTORIES: dict[str, tuple[Change, str]] = {
 
 
 @pytest.fixture(scope="module")
+def result() -> xr.Dataset:
+    """Three models at three restitutions."""
+    variables = '["v1_post", "v1_reference", "e_out", "status"]'
+    overrides = ["sweep.e=[0.2, 0.5, 0.8]", "solver.rtol=1e-4", f"output.variables={variables}"]
+    return impact.sweep(ROOT / "configs" / "figure6.toml", overrides=overrides)
+
+
+@pytest.fixture(scope="module")
 def history() -> xr.Dataset:
-    made = impact.run().history
-    assert made is not None
-    return made
+    history = impact.run(overrides=["solver.rtol=1e-4"]).history
+    assert history is not None
+    return history
 
 
-def check(made: xr.Dataset, words: str, path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def check(dataset: xr.Dataset, words: str, path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A dataset is not stored, and if it is stored without validation it is not read."""
     with pytest.raises(UsageError, match=re.escape(words)):
-        impact.save(made, path)
+        impact.save(dataset, path)
     assert not path.exists()
     with monkeypatch.context() as patch:
         patch.setattr(backend, "schema_violation", lambda _: None)
         try:
-            impact.save(made, path)
+            impact.save(dataset, path)
         except (UsageError, TypeError, CompatibilityError):
-            # the guard refuses it as well, or it cannot be stored at all
+            # another check refuses it, or netCDF cannot store it
             return
     with pytest.raises(ResultError) as refused:
         impact.load(path)
@@ -80,13 +93,17 @@ def check(made: xr.Dataset, words: str, path: Path, monkeypatch: pytest.MonkeyPa
 
 
 @pytest.mark.parametrize("name", RESULTS)
-def test_results(figure6: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+def test_an_invalid_result_is_neither_stored_nor_read(
+    result: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
     change, words = RESULTS[name]
-    check(change(figure6), words, tmp_path / "odd.h5", monkeypatch)
+    check(change(result), words, tmp_path / "odd.h5", monkeypatch)
 
 
 @pytest.mark.parametrize("name", HISTORIES)
-def test_histories(history: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+def test_an_invalid_history_is_neither_stored_nor_read(
+    history: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
     change, words = HISTORIES[name]
     check(change(history), words, tmp_path / "odd.h5", monkeypatch)
 
@@ -96,16 +113,16 @@ def test_a_history_is_stored_and_read(history: xr.Dataset, tmp_path: Path) -> No
     xr.testing.assert_identical(impact.load(tmp_path / "history.h5"), history)
 
 
-def test_what_no_file_could_hold_is_not_stored(figure6: xr.Dataset, tmp_path: Path) -> None:
+def test_variables_that_a_result_cannot_have_are_not_stored(result: xr.Dataset, tmp_path: Path) -> None:
     for odd, words in (
-        (figure6.assign(twice=figure6["e_out"]), r"twice: not a variable of a result; dataset\.to_netcdf\(path\)"),
-        (figure6.assign(e_out=figure6["e_out"] * 1j), f"e_out: {KIND}"),
+        (result.assign(twice=result["e_out"]), r"twice: not a variable of a result; dataset\.to_netcdf\(path\)"),
+        (result.assign(e_out=result["e_out"] * 1j), f"e_out: {KIND}"),
     ):
         with pytest.raises(UsageError, match=words):
             impact.save(odd, tmp_path / "odd.h5")
 
 
-def test_an_attribute_that_would_not_be_read_is_not_stored(figure6: xr.Dataset, tmp_path: Path) -> None:
+def test_an_attribute_that_could_not_be_read_is_not_stored(result: xr.Dataset, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="@x: an attribute of unexpected type or size"):
-        impact.save(figure6.assign_attrs(x=np.zeros(65)), tmp_path / "odd.h5")
+        impact.save(result.assign_attrs(x=np.zeros(65)), tmp_path / "odd.h5")
     assert list(tmp_path.iterdir()) == []
