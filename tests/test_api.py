@@ -140,7 +140,7 @@ def test_a_model_that_closes_over_values_is_never_taken_for_another(tmp_path: Pa
         with open_work_folder(tmp_path / "work", plan, resume=False, overwrite=True):
             pass
         with (
-            pytest.raises(UsageError, match="mine-2026 is in no file, so that it cannot be known to be the same"),
+            pytest.raises(UsageError, match="mine-2026 has no file, so it cannot be compared"),
             open_work_folder(tmp_path / "work", plan, resume=True, overwrite=False),
         ):
             pass

@@ -165,7 +165,7 @@ def problems_of_choice(choice: object) -> list[str]:
     return list(caught.value.problems)
 
 
-NOTHING_BEFORE = "expected models to leave out of those before it"
+NOTHING_BEFORE = "expected models to exclude from those before it"
 
 
 @pytest.mark.parametrize(

@@ -62,7 +62,7 @@ def test_the_same_sweep_twice(cli: Run, small: Path, tmp_path: Path) -> None:
     cli("sweep", small, cwd=tmp_path)
     before = (out.read_bytes(), out.stat().st_mtime_ns)
     again = cli("sweep", small, cwd=tmp_path)
-    assert (again.returncode, again.stderr) == (0, "results.h5: already holds this sweep; nothing to do\n")
+    assert (again.returncode, again.stderr) == (0, "results.h5: already contains this sweep; nothing to do\n")
     other = cli("sweep", small, "--set", "sweep.m2=3.0", cwd=tmp_path)
     assert (other.returncode, other.stderr) == (
         2, "results.h5: exists; give another name, or overwrite it (--overwrite)\n",
@@ -205,7 +205,7 @@ def test_run_one_impact(cli: Run, tmp_path: Path) -> None:
 def test_a_history_at_uniform_times(cli: Run, tmp_path: Path) -> None:
     words = ["run", "--model", "kelvin-voigt", "--set", "model.kelvin-voigt.C=2000", "--set", "sweep.n=1"]
     done = cli(*words, "--times", "200", cwd=tmp_path)
-    assert (done.returncode, done.stderr) == (2, "--times 200: expected --history FILE beside it\n")
+    assert (done.returncode, done.stderr) == (2, "--times 200: expected --history FILE as well\n")
     done = cli(*words, "--history", "h.h5", "--times", "1", cwd=tmp_path)
     assert (done.returncode, done.stderr) == (2, "times: got 1, expected a whole number >= 2\n")
     done = cli(*words, "--at", "K=1e8", "--history", "h.h5", "--times", "200", cwd=tmp_path)
@@ -585,7 +585,7 @@ def test_a_signal_while_storing_is_not_lost(
 ) -> None:
     done = forked("sweep", small.name, cwd=tmp_path, code=SAVING.replace("NAME", name))
     assert done.returncode == code
-    assert done.stderr.endswith("; results.h5 was stored whole\n")
+    assert done.stderr.endswith("; results.h5 is complete\n")
     assert impact.load(tmp_path / "results.h5").sizes["e"] == 3
 
 
@@ -616,7 +616,7 @@ def test_one_of_those_who_integrate_is_asked_for(cli: Run, small: Path, tmp_path
     ways = ("--jobs 2", "--threads 2", "--scheduler local", "--scheduler-file s.json")
     for one, other in itertools.combinations(ways, 2):
         done = cli("sweep", small, *one.split(), *other.split(), cwd=tmp_path)
-        assert (done.returncode, done.stderr) == (2, f"{one}: given beside {other}, expected one of the two\n")
+        assert (done.returncode, done.stderr) == (2, f"{one}: got {other} as well, expected one of the two\n")
 
 
 def test_help_of_a_command_and_the_version(cli: Run) -> None:

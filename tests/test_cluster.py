@@ -95,9 +95,10 @@ def test_the_scheduler_gone(two: Dask, tmp_path: Path, right: bytes, moment: int
     one.until_kept(moment)
     two.kill("scheduler")
     said = one.ends(4)
-    assert re.search(rf"{two.address}: the scheduler is gone; [\d,]+ of 400,000 trajectories are kept in", said), (
-        said
-    )
+    assert re.search(
+        rf"{two.address}: the connection to the scheduler was lost; [\d,]+ of 400,000 trajectories are kept in",
+        said,
+    ), said
     assert "--resume continues" in said
     assert "Traceback" not in said
     kept = {path: path.stat().st_mtime_ns for path in one.folder.glob("*.work/*.npz")}
@@ -243,7 +244,7 @@ def test_a_block_that_kills_every_worker_is_given_up(tmp_path: Path) -> None:
     )
     said = sweep(tmp_path, "--plugin", "mine.py", "--scheduler", "local", config=OWN).ends(4)
     assert said.splitlines()[-1].startswith(
-        "processes were killed 4 times at the same trajectories: memory is short"
+        "processes were killed 4 times at the same trajectories: too little memory"
     )
     assert "--resume continues" in said
 
@@ -277,4 +278,4 @@ def test_nobody_answers(tmp_path: Path) -> None:
     said = sweep(tmp_path / "sweep", "--scheduler", "localhorst").ends(2)
     assert said == "localhorst: expected the address of a scheduler of dask, such as tcp://host:8786; or local\n"
     said = sweep(tmp_path / "sweep", "--scheduler", "local", "--jobs", "2").ends(2)
-    assert "--jobs 2: given beside --scheduler local, expected one of the two" in said
+    assert "--jobs 2: got --scheduler local as well, expected one of the two" in said

@@ -174,9 +174,9 @@ BAD = [
     ("v1 = 1.0", "v1 = { linspace = [-1e308, 1e308, 3] }",
      ["x.toml:5: sweep.v1.linspace: got -1e+308 to 1e+308, expected a range that does not overflow"]),
     ("e = 0.5", "e = { geomspace = [0, 1, 3] }",
-     ["x.toml:4: sweep.e.geomspace: got 0 to 1, expected two ends of one sign, neither of them 0"]),
+     ["x.toml:4: sweep.e.geomspace: got 0 to 1, expected two ends of the same sign, neither of them 0"]),
     ("v1 = 1.0", "v1 = { geomspace = [-1, 1, 3] }",
-     ["x.toml:5: sweep.v1.geomspace: got -1 to 1, expected two ends of one sign, neither of them 0"]),
+     ["x.toml:5: sweep.v1.geomspace: got -1 to 1, expected two ends of the same sign, neither of them 0"]),
     ("e = 0.5", "e = { arange = [0, 1, 0] }",
      ["x.toml:4: sweep.e.arange[2]: got 0, expected a step other than 0"]),
     ("e = 0.5", "e = { arange = [0, 1, nan] }",
@@ -233,15 +233,15 @@ BAD = [
     ("rho = 7850", "rho = 7850\n[materials]\nsteal = 3",
      ["x.toml:14: materials.steal: got 3, expected a table"]),
     # rules between keys
-    ("e = 0.5", "e = 0.5\nalpha = 0.1", ["x.toml:5: sweep.alpha: given beside e, expected one of the two"]),
+    ("e = 0.5", "e = 0.5\nalpha = 0.1", ["x.toml:5: sweep.alpha: set together with e, expected one of the two"]),
     ("e = 0.5\n", "",
-     ["x.toml:3: sweep.e: missing, expected e or alpha (asked for by lankarani-nikravesh-1990), or other models"]),
+     ["x.toml:3: sweep.e: missing, expected e or alpha (used by lankarani-nikravesh-1990), or other models"]),
     ('material = "steel"\n', "",
      ["x.toml:3: sweep.material: missing, expected a material of [materials], or K"]),
     ("material =", "material1 =",
-     ["x.toml:3: sweep.material2: missing beside material1; material is for both balls"]),
+     ["x.toml:3: sweep.material2: missing, expected both, as material1 is set; or material for both balls"]),
     ('"steel"', '"steel"\nmaterial2 = "steel"',
-     ["x.toml:9: sweep.material2: given beside material, expected either material, or material1 and material2"]),
+     ["x.toml:9: sweep.material2: set together with material, expected either material, or material1 and material2"]),
     ('["lankarani-nikravesh-1990"]\n[sweep]', '["hertz", "test-linear"]\n[sweep]\nK = 1',
      ["x.toml:4: sweep.K: got a stiffness for n = 1.5, but test-linear has n = 1; "
       "expected n = 1 under [sweep], K under [model.test-linear], or no K"]),
@@ -252,7 +252,7 @@ BAD = [
      ["x.toml:4: sweep.K: its unit N/m^n depends on n, which is an axis; expected one K for each n, zipped with it",
       "x.toml:4: sweep.K: got a stiffness for an axis n, but test-linear has n = 1; " "expected K under [model.test-linear], or no K"]),
     ('["lankarani-nikravesh-1990"]', '["test-plastic"]',
-     ["x.toml:9: materials.steel.yield_strength: missing, expected a number > 0 Pa (asked for by test-plastic)"]),
+     ["x.toml:9: materials.steel.yield_strength: missing, expected a number > 0 Pa (used by test-plastic)"]),
     ('["lankarani-nikravesh-1990"]', '["test-driven"]',
      ["x.toml:2: model.test-driven.S: missing, expected a number >= 1 N/m^n: stiffness of the test"]),
     ("rho = 7850\n", "",
@@ -293,7 +293,7 @@ BAD = [
     ("e = 0.5", "e = " + "{e=" * 100_000, ["x.toml:4: nested too deeply, expected at most 8 levels"]),
     ("e = 0.5", "e = " + "[" * 9 + "]" * 9,
      ["x.toml:4: sweep.e[0][0][0][0][0][0]: nested too deeply, expected at most 8 levels"]),
-    ("e = 0.5", "e = 0.5\n#" + "x" * 1_000_000, ["x.toml: larger than any config"]),
+    ("e = 0.5", "e = 0.5\n#" + "x" * 1_000_000, ["x.toml: larger than 1,000,000 characters"]),
     # characters that steer a terminal, or that no file can store
     ('"Good"', '"a\\u0000"', ['x.toml:1: title: got "a\\x00", expected text without NUL and lone surrogates']),
     ('"steel"', '"\\u001b[31m\\u202e"',
@@ -594,7 +594,7 @@ def test_a_law_that_asks_for_the_material_wants_one_beside_K() -> None:
     assert read(text.replace("lankarani-nikravesh-1990", "hertz")).scalars["K"] == 1e9
     expected = "missing, expected a material of [materials]"
     for key in ("test-radius", "test-plastic"):
-        line = f"x.toml:3: sweep.material: {expected} (asked for by {key})"
+        line = f"x.toml:3: sweep.material: {expected} (used by {key})"
         assert problems(text.replace("lankarani-nikravesh-1990", key)) == [line]
     with_radii = text.replace("K = 1e9", "K = 1e9\nR1 = 0.1\nR2 = 0.1")
     assert read(with_radii.replace("lankarani-nikravesh-1990", "test-radius")).scalars["R1"] == 0.1
@@ -683,7 +683,7 @@ def test_a_mapping_of_anything_is_refused() -> None:
     [
         (None, ": cannot be read: No such file or directory"),
         (b"title = 1\n# \xff", ":2: not UTF-8: byte 0xff"),
-        (b"#" * 1_000_001, ": larger than 1,000,000 bytes, which no config needs"),
+        (b"#" * 1_000_001, ": larger than 1,000,000 bytes"),
     ],
 )
 def test_bad_file(tmp_path: Path, content: bytes | None, line: str) -> None:

@@ -294,7 +294,7 @@ def test_a_power_cut_while_another_sweep_begins_anew(sweeps: Sweeps) -> None:
         folder = laid_out(sweeps, state, text)
         done = sweeps("--resume", cwd=folder)
         # before the new plan is there, it is the other sweep's folder
-        assert done.returncode == 0 or "is of another sweep" in done.stderr, (at, done)
+        assert done.returncode == 0 or "belongs to another sweep" in done.stderr, (at, done)
         if done.returncode == 0:
             assert digest(folder / RESULT) == sweeps.right(folder), (at, done)
         shutil.rmtree(folder)

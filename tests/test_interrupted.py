@@ -316,7 +316,7 @@ def check_interrupted(done: Done, folder: Path, number: int, at: object) -> None
     """One line that says how to go on, or that there is no need to."""
     assert done.returncode == 128 + number, (at, done)
     assert (done.stderr.count("\n"), done.stdout) == (1, ""), (at, done)
-    told = f"{RESULT} was stored whole" if (folder / RESULT).exists() else f"{WORK}; --resume continues"
+    told = f"{RESULT} is complete" if (folder / RESULT).exists() else f"{WORK}; --resume continues"
     assert done.stderr.endswith(f"{told}\n"), (at, done)
     assert done.stderr.startswith("interrupted" if number == INT else "terminated"), (at, done)
 

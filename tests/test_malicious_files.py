@@ -178,7 +178,7 @@ def test_a_message_about_witnesses_names_the_version_of_the_file_and_of_the_prog
     with h5py.File(path, "r+") as file:
         file.attrs.create("impact_version", np.bytes_(b"0.0.7"))
     seal(path)
-    with pytest.raises(ResultError, match=re.escape(f"made by impact 0.0.7, this is {impact.__version__}")):
+    with pytest.raises(ResultError, match=re.escape(f"written by impact 0.0.7, this is {impact.__version__}")):
         impact.load(path)
 
 

@@ -321,12 +321,15 @@ def test_a_result_that_cannot_be_drawn_is_an_error_of_one_line(figure6: xr.Datas
     assert refused(twice, y="v1") == "map needs different values along each axis; v1 has a value twice"
     assert (
         refused(many.assign_coords(v1=np.arange(5.0)), y="v1", log="y")
-        == "--log y: v1 has values that are not above 0"
+        == "--log y: v1 got values <= 0, expected values > 0"
     )
     assert refused(many.drop_vars("e_error"), "validity").startswith('no variable "e_error" in this result')
     empty = many.assign(e_error=many["e_error"] * np.nan, kind=("model", ["a"] * 13))
-    assert refused(empty, "validity") == "no picture of e_error over e and v1: it has no value there"
-    assert refused(empty, variable="kind") == "no picture of kind over e and v1: it is not a number at each point"
+    assert refused(empty, "validity") == "cannot draw e_error over e and v1: it has no value there"
+    assert (
+        refused(empty, variable="kind")
+        == "cannot draw kind over e and v1: it does not have a number at each point"
+    )
 
 
 def slow(*values: object) -> Any:

@@ -496,5 +496,5 @@ def test_a_law_that_uses_an_effective_quantity_needs_the_materials():
         "sweep": {"v1": 1.0, "m1": 1.0, "m2": 1.0, "n": 1.5, "material": "soft"},
         "materials": {"soft": {"E": 2e9, "nu": 0.3, "rho": 2712.0}},
     }
-    with pytest.raises(ConfigError, match=r"materials.soft.yield_strength: missing.*asked for by user"):
+    with pytest.raises(ConfigError, match=r"materials.soft.yield_strength: missing.*used by user"):
         impact.sweep(config, plugins=[model])

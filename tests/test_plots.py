@@ -186,7 +186,7 @@ def test_restitution_and_its_error_are_the_stored_values(figure6: xr.Dataset) ->
 
 def test_an_error_needs_a_restitution_asked_for() -> None:
     result = impact.sweep({"models": "hertz", "sweep": {"v1": [1.0, 2.0], "m1": 1.0, "m2": 1.0, "K": 6e9}})
-    with pytest.raises(UsageError, match="needs an e that is asked for"):
+    with pytest.raises(UsageError, match="needs a requested e"):
         get_curve_data(result, "error")
     assert [curve.model for curve in single_panel(get_curve_data(result, "restitution")).curves] == ["hertz"]
 
@@ -577,7 +577,7 @@ def test_a_plot_is_drawn_into_axes_of_the_user(coarse: xr.Dataset) -> None:
     axes = figure.subplots(1, 2)
     assert impact.plot(coarse, kind="restitution", ax=axes[0]) is figure
     assert (len(axes[0].lines), len(axes[1].lines)) == (4, 0)
-    assert axes[0].get_legend().get_texts()[0].get_text() == "As asked for"
+    assert axes[0].get_legend().get_texts()[0].get_text() == "Requested"
     impact.plot(coarse, kind="error", ax=axes)
     assert isinstance(axes[1], Axes)
     with pytest.raises(UsageError, match="ax: got 1 axes, expected 3"):

@@ -200,9 +200,9 @@ def test_no_data_file_causes_the_import_of_a_package(
         (
             "1 / 0",
             "our_package.laws",
-            "ZeroDivisionError: division by zero; expected a package that works",
+            "ZeroDivisionError: division by zero; repair the package or uninstall it",
         ),
-        ("", "our_package.laws", "no model in it, expected a ForceModel, or a module that holds some"),
+        ("", "our_package.laws", "contains no model, expected a ForceModel or a module of them"),
         ("", "our_package.laws:GONE", "AttributeError"),
         ("raise SystemExit", "our_package.laws", "SystemExit"),
     ],

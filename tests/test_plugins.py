@@ -142,11 +142,11 @@ def test_a_sweep_is_repeated_only_if_its_plug_in_changed(forked: ForkServer, fol
     forked(*words, cwd=folder)
     before = (folder / "results.h5").read_bytes()
     again = forked(*words, cwd=folder)
-    assert (again.returncode, again.stderr) == (0, "results.h5: already holds this sweep; nothing to do\n")
+    assert (again.returncode, again.stderr) == (0, "results.h5: already contains this sweep; nothing to do\n")
     # the name of the file does not count, what is in it does
     (folder / "my_model.py").rename(folder / "renamed.py")
     again = forked("sweep", "config.toml", "--plugin", "renamed.py", cwd=folder)
-    assert (again.returncode, again.stderr) == (0, "results.h5: already holds this sweep; nothing to do\n")
+    assert (again.returncode, again.stderr) == (0, "results.h5: already contains this sweep; nothing to do\n")
     _write(folder / "my_model.py", "0.5 * (1 - e * e) / e")
     changed = forked(*words, cwd=folder)
     assert changed.returncode == 2
@@ -163,8 +163,8 @@ BAD = {
     "nesting": (f"X = {'(' * 1000}\n", "bad.py:1: not Python: too many nested parentheses"),
     "exception": ("def f():\n    return 1 / 0\n\nf()\n", "bad.py:2: ZeroDivisionError: division by zero"),
     "elsewhere": ("import json\n\njson.loads('[')\n", "bad.py:3: JSONDecodeError: Expecting value"),
-    "empty": ("", "bad.py: no model in it, expected a ForceModel at its top level"),
-    "in a list": (f"{PLUGIN.format(chi=CHI)}MINE = [MINE]\n", "bad.py: no model in it"),
+    "empty": ("", "bad.py: contains no model, expected a ForceModel at its top level"),
+    "in a list": (f"{PLUGIN.format(chi=CHI)}MINE = [MINE]\n", "bad.py: contains no model"),
     "wish": (PLUGIN.format(chi="e").replace("lambda e", "lambda delta"),
              'bad.py:3: model mine-2026: its coefficient chi asks for "delta"; known: E1'),
     "key": (PLUGIN.format(chi="e").replace("mine-2026", "Mine"),
@@ -175,7 +175,7 @@ BAD = {
              r'bad.py: model mine-2026: title: got "a\x00", expected text without NUL'),
     "year": (PLUGIN.format(chi="e").replace("=2026", "='x'"),
              'bad.py: model mine-2026: year: got "x", expected a year, such as 2026'),
-    "exit": ("import sys\nsys.exit(0)\n", "bad.py:2: SystemExit: 0; expected a file that declares"),
+    "exit": ("import sys\nsys.exit(0)\n", "bad.py:2: SystemExit: 0; expected a file that only declares"),
     "quit": ("raise SystemExit\n", "bad.py:1: SystemExit; expected"),
     "controls": ("raise ValueError('\\x1b[31m\\u202e\\n[red]')\n",
                  r"bad.py:1: ValueError: \x1b[31m\u202e\x0a[red]"),

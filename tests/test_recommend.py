@@ -1,4 +1,4 @@
-"""`impact recommend` ranks models by how well they give the restitution asked for, and leaves no point out."""
+"""`impact recommend` ranks models by how well they deliver the requested restitution, and leaves no point out."""
 
 from __future__ import annotations
 
@@ -299,11 +299,11 @@ def test_what_is_not_there_is_named(choice: dict[str, object], words: str) -> No
 
 
 def test_what_cannot_be_ranked_is_refused() -> None:
-    assert "has no target e" in refused(swept("hertz", e=None))
-    assert "has no target e" in refused(swept("hertz").assign_coords(e=("e", np.full(10, np.nan))))
+    assert "has no requested e" in refused(swept("hertz", e=None))
+    assert "has no requested e" in refused(swept("hertz").assign_coords(e=("e", np.full(10, np.nan))))
     history = impact.run(model="hertz").history
     assert history is not None
-    assert "this is a time history" in refused(history)
+    assert "got a time history" in refused(history)
     assert "model is not an axis" in refused(swept("hertz").sel(model="hertz"))
     both = swept("hertz").drop_vars(["e_error", "status"])
     assert refused(both) == ("this result has no e_error, status; sweep without [output] variables, or add them")
@@ -317,7 +317,7 @@ def test_what_cannot_be_ranked_is_refused() -> None:
 def test_the_command_refuses_in_one_line(cli: Run, tmp_path: Path) -> None:
     path = stored(tmp_path, swept("hertz", e=None))
     for words, line in (
-        ([path], "this sweep has no target e, by which models are ranked; add e or alpha\n"),
+        ([path], "this sweep has no requested e, which the ranking needs; add e or alpha\n"),
         ([path, "--tol", "-1"], "tol: got -1, expected a positive finite number\n"),
         (
             [path, "--sel", "m2"],

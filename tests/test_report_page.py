@@ -242,8 +242,11 @@ def test_a_sweep_without_e_says_so() -> None:
         "model": {"kelvin-voigt": {"C": [10.0, 20.0, 40.0]}},
     })  # fmt: skip
     text = build(free)
-    assert "The models are not ranked: this sweep has no target e" in text
-    assert "The figure error is left out: this result has no error of the restitution, which needs an e" in text
+    assert "The models are not ranked: this sweep has no requested e" in text
+    assert (
+        "The figure error is left out: this result has no error of the restitution, which needs a requested e"
+        in text
+    )
     assert figures(text) == [FIGURES[kind] for kind in ("final-velocities", "restitution", "loop")]
     assert "kelvin-voigt.C\xa0=\xa020" in text
 
@@ -340,7 +343,7 @@ def test_what_is_not_stored_leaves_a_figure_out() -> None:
 def test_a_part_of_a_result_is_a_page_too(wide: xr.Dataset) -> None:
     bare = build(wide.drop_vars(["status", "in_domain"]))
     assert "The models are not ranked: this result has no status" in bare
-    assert "The result does not tell which points failed." in bare
+    assert "The result does not contain the status of the points." in bare
     assert figures(bare) == figures(build(wide.transpose()))
 
 

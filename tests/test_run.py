@@ -248,7 +248,7 @@ def test_alpha_replaces_the_e_of_a_stored_sweep(tmp_path: Path) -> None:
 
 def test_alpha_beside_e_is_refused(cli: Run) -> None:
     process = cli("run", "--at", "alpha=0.3", "--at", "e=0.5")
-    assert (process.returncode, process.stderr) == (2, "--at alpha: got alpha beside e, expected one of the two\n")
+    assert (process.returncode, process.stderr) == (2, "--at alpha: got alpha and e, expected one of the two\n")
 
 
 CASES = """models = ["gharib-hurmuzlu-2012"]

@@ -35,8 +35,8 @@ KEYS = [
 # messages about what a schema cannot say
 BEYOND = re.compile(
     r"sweep\.cases\.|a unit of|a bare number|got \"\s*[-+.0-9]+[^\"]*[^\"0-9.]|\\x|a material of|on an axis|twice|overflow|two ends|a step other"
-    r"|got no value|got a value|an axis|a scalar|no axis|chunks of|no such input|one length|given beside|missing"
-    r"|as in the first|not read|cannot be read|not a regular|some model matches|models to leave out|left out again|NUL|64 characters"
+    r"|got no value|got a value|an axis|a scalar|no axis|chunks of|no such input|one length|set together with|missing"
+    r"|as in the first|not read|cannot be read|not a regular|some model matches|models to exclude|left out again|NUL|64 characters"
 )
 NUMBERS = st.integers(-3, 12) | st.floats(-2.0, 11.0) | st.floats(allow_nan=False, allow_infinity=False)
 ATOMS = (

@@ -100,7 +100,7 @@ def test_a_missing_shard_is_named_with_the_command_that_makes_it(cli: Run, folde
     done = cli("merge", *found, cwd=folder)
     assert done.returncode == 2
     command = "impact sweep c.toml -o results.h5 --set sweep.v1=2.0 --shard 2/3"
-    assert done.stderr.splitlines()[-1] == f"results.h5: shard 2/3 is missing; {command} makes it"
+    assert done.stderr.splitlines()[-1] == f"results.h5: shard 2/3 is missing; {command} computes it"
     assert not (folder / "results.h5").exists()
     assert cli(*shlex.split(command)[1:], cwd=folder).returncode == 0
     assert cli("merge", *folder.glob("results.h5.*-of-3.work"), cwd=folder).returncode == 0
@@ -157,12 +157,12 @@ def test_foreign_ones_are_told(cli: Run, folder: Path) -> None:
     other = shards(cli, folder, "2/2")
     done = cli("merge", *own, *other, cwd=folder)
     assert done.returncode == 2
-    assert f"{other[0]}: is of another sweep: scalars.v1: 2.0 there, 1.0 here; " in done.stderr
+    assert f"{other[0]}: belongs to another sweep: scalars.v1: 2.0 there, 1.0 here; " in done.stderr
     shutil.rmtree(other[0])
     (folder / "c.toml").write_text(CONFIG.replace("In parts", "Else"))
     shards(cli, folder, "2/2")
     done = cli("merge", *own, *other, cwd=folder)
-    assert f"{other[0]}: its title or output is not that of {own[0]}; expected" in done.stderr
+    assert f"{other[0]}: its title or output differs from that of {own[0]}; expected" in done.stderr
     for name, said in (("c.toml", "is not a shard"), ("nowhere.work", "is not a shard")):
         done = cli("merge", *own, name, cwd=folder)
         assert done.returncode == 2
@@ -208,7 +208,7 @@ def test_shards_that_overlap_are_one_where_their_bits_are(cli: Run, folder: Path
     done = cli("merge", *found, "--overwrite", cwd=folder)
     assert done.returncode == 2
     assert (
-        f"{path}: differs from {found[0] / path.name}; expected both to be of processors of one kind"
+        f"{path}: differs from {found[0] / path.name}; expected both to be computed on the same type of processor"
         in done.stderr
     )
 
@@ -237,7 +237,7 @@ def test_another_sweep_does_not_go_on_in_its_folder(cli: Run, folder: Path) -> N
     shards(cli, folder, "1/2")
     done = cli("sweep", "c.toml", "--shard", "1/2", "--set", "sweep.v1=2.0", cwd=folder)
     assert done.returncode == 2
-    assert "results.h5.1-of-2.work: is of another sweep: scalars.v1: 1.0 there, 2.0 here" in done.stderr
+    assert "results.h5.1-of-2.work: belongs to another sweep: scalars.v1: 1.0 there, 2.0 here" in done.stderr
     shards(cli, folder, "1/2", words=("--set", "sweep.v1=2.0", "--overwrite"))
 
 

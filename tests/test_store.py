@@ -268,7 +268,7 @@ def test_an_output_that_another_program_writes_meanwhile_is_kept(
         path.write_text("another program's")
 
     monkeypatch.setattr(os, "fsync", fsync_while_another_program_writes)
-    with pytest.raises(UsageError, match="appeared"):
+    with pytest.raises(UsageError, match="was created by another process"):
         write_file(path, b"ours", overwrite=False)
     assert path.read_text() == "another program's"
     assert [p.name for p in tmp_path.iterdir()] == ["out.h5"]
@@ -529,7 +529,7 @@ def test_longer_labels_than_a_file_can_have_are_refused(cli: Run, tmp_path: Path
     materials = "".join(f"[materials.{name}]\nE = 2e11\nnu = 0.3\nrho = 7800\n" for name in names)
     line = _refused(cli, tmp_path, f"{SWEEP}n = 1.0\nmaterial = {json.dumps(names)}\n{materials}", "out.h5")
     assert "labels take 8," in line
-    assert "expected at most 4,000,000: give materials shorter names" in line
+    assert "expected at most 4,000,000; use shorter names of materials" in line
 
 
 @pytest.mark.parametrize("length", [242, 255, 300])

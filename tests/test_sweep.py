@@ -129,7 +129,7 @@ def test_a_dry_run_reports_where_trajectories_are_not_deduplicated(cli: Run, blo
     printed = cli(*words, "pairs.toml", cwd=blocks.parent).stdout
     assert "4,410,000" in printed.splitlines()[1]
     assert printed.splitlines()[2].split()[:4] == ["hertz", "8,820,000", "1", "1"]
-    assert "too many cells to compare, equal ones are found within a block" in printed
+    assert "too many cells to compare all, equal points are searched for within a block" in printed
 
 
 def test_too_many_points_are_refused_before_memory_or_a_file_is_used(forked: ForkServer, blocks: Path) -> None:

@@ -166,7 +166,7 @@ def sweep(
     """
     if output is None:
         if resume or overwrite:
-            raise UsageError("resume and overwrite: expected an output beside them")
+            raise UsageError("resume and overwrite: got no output, expected one as well")
         return execute(prepare(source, overrides, plugins, max_points), choose_backend(jobs, threads, executor))
     sweep_to_file(
         source,
@@ -197,13 +197,13 @@ def sweep_to_file(
 ) -> SweepOutcome:
     """Run a sweep into a file and summarize it, without reading the file again.
 
-    A file that already holds this sweep is left as it is.
+    A file that already contains this sweep is not modified.
 
     Parameters
     ----------
     source, overrides, plugins, max_points : see `sweep`
     output : the file
-    backend : context manager of what integrates, entered when it is needed; by default this process
+    backend : context manager of the backend, entered when it is needed; by default this process
     resume : continue with the work folder of an interrupted sweep
     overwrite : replace the file if it exists
     on_progress : called from time to time with the progress
@@ -235,7 +235,7 @@ def sweep_to_file(
     if outcome is not None:
         remove_stale_work_folder(output, plan)
         if should_stop():
-            raise UnfinishedError(f"{shown} already holds this sweep")
+            raise UnfinishedError(f"{shown} already contains this sweep")
         return replace(outcome, is_new=False)
     for path in (source, *plugins):
         if isinstance(path, str | Path):
@@ -251,7 +251,7 @@ def sweep_to_file(
             should_stop=should_stop,
         )
     if should_stop():
-        raise UnfinishedError(f"{shown} was stored whole")
+        raise UnfinishedError(f"{shown} is complete")
     return outcome
 
 
@@ -274,13 +274,13 @@ def sweep_shard(
     Parameters
     ----------
     shard : "K/N", the part K of N, such as "3/16"
-    output : file of the whole result, beside which the work folder is
+    output : file of the whole result; the work folder is next to it
     overwrite : start the shard again
     source, overrides, plugins, max_points, backend, on_progress, on_note, should_stop : see `sweep_to_file`
 
     Returns
     -------
-    ShardProgress : the work folder, and what is finished in it
+    ShardProgress : the work folder, and its finished part
 
     Raises
     ------
@@ -293,7 +293,7 @@ def sweep_shard(
     """
     plan = _prepare_with_notes(source, overrides, plugins, max_points, on_note)
     part = Shard.parse(shard)
-    # the command of the whole sweep: `merge` names by it the command of a shard that is missing
+    # the command of the whole sweep: `merge` reports it for a missing shard
     config = str(source) if isinstance(source, str | Path) else "CONFIG.toml"
     command = ["impact", "sweep", config, "-o", str(output)]
     command += [word for change in overrides for word in ("--set", change)]
@@ -310,7 +310,7 @@ def sweep_shard(
             should_stop=should_stop,
         )
     if should_stop():
-        raise UnfinishedError(f"{safe_text(str(done.folder))} has the whole shard")
+        raise UnfinishedError(f"{safe_text(str(done.folder))} is complete")
     return done
 
 
@@ -323,7 +323,7 @@ def merge(
     on_progress: ProgressCallback = ignore_progress,
     should_stop: Callable[[], bool] = never_stop,
 ) -> SweepOutcome:
-    """Join the shards of a sweep into a file, and summarize it; the work folders stay.
+    """Join the shards of a sweep into a file, and summarize it; the work folders are kept.
 
     Parameters
     ----------
@@ -359,7 +359,7 @@ def merge(
         should_stop=should_stop,
     )
     if should_stop():
-        raise UnfinishedError(f"{safe_text(str(output))} was stored whole")
+        raise UnfinishedError(f"{safe_text(str(output))} is complete")
     return replace(outcome, repeated_blocks=repeated)
 
 
@@ -457,12 +457,12 @@ def extend(
     plugins: Sequence[ForceModel | str | Path] = (),
     max_points: int = MAX_POINTS,
 ) -> xr.Dataset:
-    """Add values to the axes of a stored result, or models to it, and integrate only what is new.
+    """Add values to the axes of a stored result, or models to it, and integrate only the new trajectories.
 
     Parameters
     ----------
     result : the file
-    overrides : changes to its config, such as `"sweep.m2=[1.0, 2.0]"`; existing values stay
+    overrides : changes to its config, such as `"sweep.m2=[1.0, 2.0]"`; existing values are kept
     output : file of the larger result; by default it replaces the smaller one
     overwrite : replace the output if it exists
     plugins : plug-in models, among them those that the result was computed with
@@ -541,7 +541,7 @@ def extend_to_file(
             should_stop=should_stop,
         )
     if should_stop():
-        raise UnfinishedError(f"{safe_text(str(target))} was stored whole")
+        raise UnfinishedError(f"{safe_text(str(target))} is complete")
     return replace(outcome, integrated=integrated)
 
 
@@ -561,7 +561,7 @@ def expand(
     ----------
     result : file of the result
     output : the file to write
-    sel : values of axes, such as `{"m2": 1.0}`; of an axis that is not named all values are written
+    sel : values of axes, such as `{"m2": 1.0}`; all values of other axes are written
     models : keys of the models to write; by default all
     overwrite : replace the output if it exists
     max_points : the largest number of points to write
@@ -706,7 +706,7 @@ def check_model(model: ForceModel) -> list[Finding]:
 
 
 def info(result: xr.Dataset | str | Path) -> dict[str, Any]:
-    """What is in a result or a time history of any size.
+    """The contents of a result or a time history of any size, as plain data.
 
     Returns
     -------

@@ -150,7 +150,7 @@ def atomic_write(path: Path, *, overwrite: bool, part: Path | None = None) -> It
                 part.unlink()
         sync_folder(path.parent)
     except FileExistsError:
-        raise UsageError(f"{shown}: appeared while this ran, and is not modified") from None
+        raise UsageError(f"{shown}: was created by another process, and is not modified") from None
     except OSError as error:
         raise StoreError(f"{shown}: not written: {error.strerror}") from error
 

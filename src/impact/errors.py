@@ -9,8 +9,8 @@
     ├── InUseError     another process writes the output
     └── UnfinishedError  a signal stopped a sweep; finished blocks are kept
 
-A message says what is wrong and where, the invalid value and what was expected. `impact.cli.exits` maps exceptions
-to exit codes.
+A message states the error and its location, the invalid value and the expected form. `impact.cli.exits` maps
+exceptions to exit codes.
 """
 
 from __future__ import annotations
@@ -62,11 +62,11 @@ class InUseError(ImpactError):
 
 
 class UnfinishedError(ImpactError):
-    """A sweep was stopped; the message says which finished work is kept."""
+    """A sweep was stopped; the message contains the finished work that is kept."""
 
 
 class Interruption(BaseException):
-    """A signal ends the program at once; the message says which finished work is kept."""
+    """A signal ends the program at once; the message contains the finished work that is kept."""
 
 
 # exceptions that a plug-in does not cause, even if they are raised while it runs

@@ -93,7 +93,9 @@ def bless(
             new, baseline, reason=reason, tol=dict(tol or ()) or None, allow_failed=allow_failed, show=show
         )
     except (BrokenPipeError, SystemExit):
-        raise UsageError(f"{safe_text(str(baseline))}: not replaced, nobody read the verdict to its end") from None
+        raise UsageError(
+            f"{safe_text(str(baseline))}: not replaced, the output was closed before the end of the verdict"
+        ) from None
     word = "made" if verdict is None else "replaced"
     exits.print_line(f"{safe_text(str(baseline))}: {word}, with the reason")
 
@@ -156,7 +158,7 @@ def _report_verdict(verdict: Verdict, format: Format, plot: Path | None) -> None
             _print_report(formats.report_of(verdict), format)
     if plot is not None and not verdict.worst_along:
         # a missing picture does not change the verdict
-        exits.print_line("no picture: there is no point to draw at")
+        exits.print_line("nothing to draw: the results have no point in common")
     elif plot is not None:
         from ..plots import differences, style
 
@@ -167,7 +169,7 @@ def _report_verdict(verdict: Verdict, format: Format, plot: Path | None) -> None
 
 
 def _print_report(printed: Report, format: Format) -> None:
-    """Print a report on stdout; for an error there is no table, its message is on stderr."""
+    """Print a report on stdout; an error has no table, its message is on stderr."""
     from ..comparison import formats
 
     match format:

@@ -28,7 +28,7 @@ def schema(
     output: Annotated[Path | None, typer.Option("-o", "--output", help="The file. \\[default: stdout]")] = None,
     overwrite: OverwriteOption = False,
 ) -> None:
-    """The JSON Schema of the config, from which editors complete and check it."""
+    """Print the JSON Schema of a config, for completion and validation in editors."""
     from .. import api
 
     json_schema = api.schema(output, overwrite=overwrite)

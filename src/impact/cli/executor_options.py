@@ -32,9 +32,9 @@ class ExecutorOptions:
 
     def __post_init__(self) -> None:
         options = {f"--{name.replace('_', '-')}": value for name, value in vars(self).items()}
-        asked = [f"{name} {safe_text(str(value))}" for name, value in options.items() if value not in (1, None)]
-        if len(asked) > 1:
-            raise UsageError(f"{asked[0]}: given beside {asked[1]}, expected one of the two")
+        selected = [f"{name} {safe_text(str(value))}" for name, value in options.items() if value not in (1, None)]
+        if len(selected) > 1:
+            raise UsageError(f"{selected[0]}: got {selected[1]} as well, expected one of the two")
 
     @contextmanager
     def backend(self, *, quiet: bool, should_stop: Callable[[], bool]) -> Iterator[Backend]:

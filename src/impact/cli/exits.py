@@ -32,7 +32,7 @@ WRITE_ERRNOS = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
 
 
 class Interrupted(Interruption):
-    """A signal came; the message says what was finished."""
+    """A signal was received; the message contains the finished work."""
 
     def __init__(self, number: int, done: str) -> None:
         by_user = number == signal.SIGINT
@@ -52,7 +52,7 @@ def catch_signals() -> Iterator[Callable[[], bool]]:
     def take(number: int, frame: FrameType | None) -> None:
         came.append(number)
         if len(came) > 2:
-            raise Interrupted(number, "given up at once")
+            raise Interrupted(number, "stopped immediately")
 
     before = {number: signal.signal(number, take) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
@@ -152,7 +152,7 @@ def _is_out_of_memory(error: BaseException) -> bool:
 
 
 def _out_of_memory(error: Exception) -> str:
-    """One line about a lack of memory; NumPy says how much it asked for."""
+    """One line about a lack of memory, with the size that NumPy tried to allocate."""
     what = safe_text(str(error)) if isinstance(error, MemoryError) else ""
     return "out of memory" + (f": {what}" if what else "")
 
@@ -203,7 +203,7 @@ def ignore_broken_pipe(stream: TextIO | None = None) -> Iterator[None]:
         yield
         stream.flush()
     except OSError as error:
-        # output to stderr is optional: the exit code says the same
+        # output to stderr is optional: the exit code has the same meaning
         if stream is not sys.stderr and not isinstance(error, BrokenPipeError):
             raise
         _discard_output(stream)

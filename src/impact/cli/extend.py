@@ -1,4 +1,4 @@
-"""The commands that change what a file stores of a sweep: expand and extend."""
+"""The commands that write a changed result: expand and extend."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def extend(
             "--set",
             metavar="PATH=VALUE",
             help="More values of an axis, such as sweep.m2=[1.0, 2.0], or more models; may be repeated. "
-            "Values that the result has stay.",
+            "Existing values are kept.",
         ),
     ],
     output: Annotated[
@@ -74,7 +74,7 @@ def extend(
     quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Add values to the axes of a result; only new trajectories are integrated. It equals a single sweep."""
+    """Add values to the axes of a result; only new trajectories are integrated."""
     with exits.catch_signals() as should_stop:
         from .. import api
         from . import summary

@@ -1,4 +1,4 @@
-"""The command `info`: what is in a file."""
+"""The command `info`: the contents of a file."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def info(
     file: Annotated[Path, typer.Argument(help="A result or a time history.")],
     as_json: JsonOption = False,
 ) -> None:
-    """What is in a file: axes, variables, worst errors, and where it came from."""
+    """Show the axes, variables, largest errors and provenance of a file."""
     from .. import api
 
     dataset = api.load(file)
@@ -42,7 +42,7 @@ def info(
 
 
 def print_info(dataset: xr.Dataset, path: Path) -> None:
-    """What is in a file, of any size; "–" where more would have to be evaluated than a summary is worth."""
+    """Print the contents of a file of any size; "–" where a summary would evaluate too many points."""
     from .. import api
     from ..results.attributes import read_attribute
     from ..results.schema import exponents_of, plain_unit

@@ -19,16 +19,20 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
     "merge": ("sweep", "Join the shards of a sweep.", "results.h5.*-of-16.work -o results.h5"),
     "expand": ("extend", "Write all values of a result, or of a part.", "results.h5 -o full.h5 --sel m2=1.0"),
     "extend": ("extend", "Add values to the axes of a result.", "results.h5 --set 'sweep.m2=[1.0, 2.0]'"),
-    "plot": ("plot", "Draw a result.", "results.h5 -k restitution -k loop --sel m2=1.0 -o results.svg"),
-    "recommend": ("recommend", "Rank models by the rebound they give.", "results.h5 --tol 2% --sel m2=1.0"),
-    "report": ("report", "Write a report, one page of HTML.", "results.h5 -o report.html"),
+    "plot": ("plot", "Plot a result.", "results.h5 -k restitution -k loop --sel m2=1.0 -o results.svg"),
+    "recommend": (
+        "recommend",
+        "Rank models by the error of their restitution.",
+        "results.h5 --tol 2% --sel m2=1.0",
+    ),
+    "report": ("report", "Write a report as one HTML page.", "results.h5 -o report.html"),
     "run": ("run", "Run one impact.", "--model gharib-hurmuzlu-2012 --at e=0.05 --at m2=2.0 --history out.h5"),
     "compare": ("compare", "Compare a result with a baseline.", "results.h5 baseline.h5 --plot differences.png"),
     "bless": ("compare", "Replace a baseline by a result.", 'results.h5 baseline.h5 --reason "finer tolerance"'),
     "rerun": ("compare", "Repeat the sweep of a result, and compare.", "baseline.h5"),
     "models": ("models", "Show the catalogue of models.", "gharib-hurmuzlu-2012"),
     "materials": ("materials", "Show common materials.", "steel"),
-    "info": ("info", "Show what is in a file.", "results.h5"),
+    "info": ("info", "Show the contents of a file.", "results.h5"),
     "init": ("config", "Write a starter config.", "my_sweep.toml"),
     "schema": ("config", "Print the JSON Schema of a config.", "-o impact.schema.json"),
     "help": ("main", "Show the help of a command.", "sweep"),
@@ -80,9 +84,9 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
-    help="Which contact force model, with which damping, gives the rebound you asked for, and how wrong is it "
-    "where it does not? Sweeps models over restitution, speeds, masses and materials against the "
-    "impulse-momentum solution.",
+    help="Sweep contact force models over restitution, speeds, masses and materials, and compare them with the "
+    "impulse-momentum solution: which model, with which damping, delivers the requested restitution, and how "
+    "large is the error otherwise?",
     epilog="Start with: impact init, impact sweep config.toml, impact plot results.h5",
 )
 

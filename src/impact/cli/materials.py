@@ -20,7 +20,7 @@ def materials(
     name: Annotated[str | None, typer.Argument(help="A material to show alone. \\[default: list them]")] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Common materials that a config may name without a table: E, nu, rho, yield strength, source."""
+    """List common materials, which need no table in a config: E, nu, rho, yield strength, source."""
     from .. import api
 
     catalogue = api.materials()

@@ -42,17 +42,17 @@ def models(
     family: Annotated[
         str | None,
         typer.Option(
-            "--family", metavar="NAME", autocompletion=complete_family, help="List the laws of a family only."
+            "--family", metavar="NAME", autocompletion=complete_family, help="List only the laws of this family."
         ),
     ] = None,
     check: Annotated[
         Path | None,
-        typer.Option("--check", metavar="FILE", help="Python file of whose models to check the contract."),
+        typer.Option("--check", metavar="FILE", help="Check the models of a Python file against the contract."),
     ] = None,
     plugins: PluginOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """The catalogue of contact force models: equations, references, domains, delivered restitution."""
+    """List the contact force models: equations, references, domains, delivered restitution."""
     from .. import api
     from ..contact.models import find
     from ..engine.plugins import read_plugins
@@ -174,7 +174,7 @@ def _model_cells(model: ForceModel, asked: Sequence[float], others: Sequence[str
 
 
 def _print_model(model: ForceModel) -> None:
-    """All about one model."""
+    """Print a model in full."""
     rows = {
         "model": model.key,
         "same law as": model.same_as,
@@ -211,7 +211,7 @@ def _release(model: ForceModel) -> str:
 
 
 def _cores(model: ForceModel) -> str:
-    """By what a law is integrated where numba is installed."""
+    """The core that integrates a law if numba is installed."""
     from ..contact.numba.dispatch import serves
 
     tried = [model.exponent] if model.exponent is not None else COMPILED_AT
@@ -225,7 +225,7 @@ def _cores(model: ForceModel) -> str:
 
 
 def _check_contract(models: Sequence[ForceModel], *, as_json: bool) -> None:
-    """Print what came of every clause of the contract; exit 1 if one does not hold."""
+    """Print the outcome of every clause of the contract; exit 1 if one fails."""
     from rich.text import Text
 
     from .. import api

@@ -23,14 +23,14 @@ OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Replace the 
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")]
 QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
 AllowFailedOption = Annotated[bool, typer.Option("--allow-failed", help="Exit 0 even if points failed.")]
-ResumeOption = Annotated[bool, typer.Option("--resume", help="Resume work that was interrupted.")]
+ResumeOption = Annotated[bool, typer.Option("--resume", help="Continue an interrupted sweep.")]
 SetOption = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="PATH=VALUE", help="Change the config, such as sweep.m2=2.0; may be repeated."),
 ]
 PluginOption = Annotated[
     list[Path] | None,
-    typer.Option("--plugin", metavar="FILE", help="Python file with models of your own; may be repeated."),
+    typer.Option("--plugin", metavar="FILE", help="Python file with user-defined models; may be repeated."),
 ]
 SelectOption = Annotated[
     list[Setting] | None,
@@ -49,12 +49,12 @@ ModelOption = Annotated[
     ),
 ]
 JobsOption = Annotated[
-    int, typer.Option("--jobs", "-j", metavar="N", parser=parse_whole_number, help="Processes that integrate.")
+    int, typer.Option("--jobs", "-j", metavar="N", parser=parse_whole_number, help="Number of processes.")
 ]
 ThreadsOption = Annotated[
     int,
     typer.Option(
-        "--threads", metavar="N", parser=parse_whole_number, help="Threads that integrate, in place of processes."
+        "--threads", metavar="N", parser=parse_whole_number, help="Number of threads, instead of processes."
     ),
 ]
 MaxPointsOption = Annotated[
@@ -63,7 +63,7 @@ MaxPointsOption = Annotated[
         "--max-points",
         metavar="N",
         parser=parse_whole_number,
-        help="Refuse more: points in layout full, else trajectories.",
+        help="Largest number of points in layout full, of trajectories otherwise.",
     ),
 ]
 ToleranceOption = Annotated[

@@ -104,7 +104,7 @@ def complete_family(incomplete: str) -> list[str]:
 
 
 def invalid_value(word: object, expected: str) -> typer.BadParameter:
-    """The error of a word that is not what is expected."""
+    """The error of an invalid word."""
     return typer.BadParameter(f'got "{safe_text(str(word))}", expected {expected}')
 
 

@@ -28,7 +28,7 @@ def plot(
         typer.Option(
             "-o",
             "--output",
-            help="The picture: .png, .svg, .pdf, .eps or .pgf; of several kinds each has its kind in its name. "
+            help="The picture: .png, .svg, .pdf, .eps or .pgf; several kinds: one file each. "
             "\\[default: RESULT.png]",
         ),
     ] = None,
@@ -42,21 +42,21 @@ def plot(
         ),
     ] = None,
     x: Annotated[
-        str | None, typer.Option("--x", help="What to draw over. \\[default: e, else the first axis]")
+        str | None, typer.Option("--x", help="Horizontal axis. \\[default: e, else the first axis]")
     ] = None,
     y: Annotated[
-        str | None, typer.Option("--y", help="Second axis of a map, or of validity. \\[default: the next axis]")
+        str | None, typer.Option("--y", help="Vertical axis of a map, or of validity. \\[default: the next axis]")
     ] = None,
-    variable: Annotated[str, typer.Option("--variable", help="What a map shows.")] = "e_error",
+    variable: Annotated[str, typer.Option("--variable", help="Variable shown by a map.")] = "e_error",
     sel: SelectOption = None,
     model: ModelOption = None,
-    log: Annotated[str, typer.Option("--log", metavar="AXES", help="Axes to make logarithmic: x, y or xy.")] = "",
+    log: Annotated[str, typer.Option("--log", metavar="AXES", help="Logarithmic axes: x, y or xy.")] = "",
     points: Annotated[
         Path | None,
         typer.Option(
             "--points",
             metavar="FILE",
-            help="Measured points over the curves: CSV with columns such as v1 \\[m/s], e_out and sigma.",
+            help="CSV file of measured points to plot, with columns such as v1 \\[m/s], e_out and sigma.",
         ),
     ] = None,
     width: Annotated[
@@ -64,20 +64,20 @@ def plot(
         typer.Option(
             "--width",
             metavar="LENGTH",
-            help=f"A length such as 84mm, or that of a journal's column: {', '.join(WIDTHS)}. \\[default: double]",
+            help=f"A length such as 84mm, or a journal column: {', '.join(WIDTHS)}. \\[default: double]",
         ),
     ] = None,
     height: Annotated[
         str | None,
-        typer.Option("--height", metavar="LENGTH", help="A length such as 60mm. \\[default: what suits the kind]"),
+        typer.Option("--height", metavar="LENGTH", help="A length such as 60mm. \\[default: depends on the kind]"),
     ] = None,
     style: Annotated[
         str | None,
         typer.Option(
-            "--style", metavar="FILE", help="Style sheet of matplotlib, or the name of one, such as grayscale."
+            "--style", metavar="FILE", help="Matplotlib style sheet: a file, or a name such as grayscale."
         ),
     ] = None,
-    no_title: Annotated[bool, typer.Option("--no-title", help="Leave out the title and the conditions.")] = False,
+    no_title: Annotated[bool, typer.Option("--no-title", help="Omit the title and the conditions.")] = False,
     label: Annotated[
         list[str] | None,
         typer.Option(
@@ -87,13 +87,12 @@ def plot(
         ),
     ] = None,
     equations: Annotated[
-        bool, typer.Option("--equations", help="Name the laws with the numbers of their equations in the paper.")
+        bool,
+        typer.Option("--equations", help="Show the equation numbers of the paper with the names of the laws."),
     ] = False,
     data: Annotated[
         Path | None,
-        typer.Option(
-            "--data", metavar="FILE", help="Write the numbers behind the picture: .csv, .tex or .parquet."
-        ),
+        typer.Option("--data", metavar="FILE", help="Write the plotted numbers: .csv, .tex or .parquet."),
     ] = None,
     data_form: Annotated[
         str,
@@ -105,10 +104,10 @@ def plot(
     plugin: PluginOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Draw a stored result: by default the final-velocity comparison, Figure 6 of the paper.
+    """Plot a stored result: by default the final-velocity comparison, Figure 6 of the paper.
 
-    loop, history and impulse follow a point of the result through time again; --sel chooses it.
-    Of several kinds those that apply are drawn, and the others are named with the reason.
+    loop, history and impulse integrate one point of the result again; --sel selects it.
+    With several kinds, those that do not apply are reported with the reason.
     """
     from .. import api
 

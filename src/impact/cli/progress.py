@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ..engine.progress import Progress
 
 # seconds after which something is printed, between two lines where there is no terminal, and from the beginning of
-# a phase until a rate says how long the rest takes
+# a phase until the remaining time can be estimated
 FIRST_S, INTERVAL_S, SETTLING_S = 1.0, 10.0, 5.0
 # seconds over which the rate is taken: a block may take minutes
 RATE_PERIOD_S = 3600.0
@@ -39,7 +39,7 @@ def remaining(task: Task) -> float | None:
 
 
 def update(bar: Bar, at: Progress) -> Task:
-    """Bring a bar to where a sweep is; its task is one for the trajectories, then another for the points."""
+    """Update a bar to the progress of a sweep, whose tasks are the trajectories and then the points."""
     integrating = at.trajectories < at.of_trajectories or not at.points
     phase = "trajectories" if integrating else "points"
     done, total = (at.trajectories, at.of_trajectories) if integrating else (at.points, at.of_points)
@@ -86,7 +86,7 @@ def new_bar(get_time: Callable[[], float] | None = None) -> Bar:
 
 @contextmanager
 def progress(*, quiet: bool) -> Iterator[Callable[[Progress], None]]:
-    """A function to report how far a sweep is."""
+    """A function that reports the progress of a sweep."""
     if quiet:
         yield lambda at: None
         return

@@ -1,4 +1,4 @@
-"""The command `recommend`: which model gives the restitution asked for, and how wrong the others are."""
+"""The command `recommend`: the models of a result, ranked by the error of their restitution."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ def recommend(
     tol: Annotated[
         float,
         typer.Option(
-            "--tol", metavar="VALUE", parser=parse_number, help="What |e_out − e| may be, such as 0.02 or 2%."
+            "--tol", metavar="VALUE", parser=parse_number, help="Largest accepted |e_out − e|, such as 0.02 or 2%."
         ),
     ] = 0.01,
     sel: SelectOption = None,
     model: ModelOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Which model gives the restitution asked for over the swept range, and how wrong is it where it does not?"""
+    """Rank the models of a result by the error of their restitution over the swept range."""
     from .. import api
 
     ranking = api.recommend(api.load(result), tol=tol, sel=dict(sel or ()), models=model)
@@ -51,7 +51,7 @@ def ranking_json(ranking: Ranking) -> dict[str, Any]:
 
 
 def _print_ranking(ranking: Ranking) -> None:
-    """The answer in a sentence, and the models, a line each, the best first."""
+    """Print a summary sentence and a table of the models, the best first."""
     from .console import cell, console, table
 
     out = console(sys.stdout)

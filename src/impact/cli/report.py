@@ -20,7 +20,7 @@ def report(
     overwrite: OverwriteOption = False,
     plugin: PluginOption = None,
 ) -> None:
-    """Write a report: one page of HTML with the swept inputs, the ranking, figures, failed points and the config.
+    """Write a report: one HTML page with the swept inputs, the ranking, figures, failed points and the config.
 
     The page is a single file. It needs no network and runs no scripts.
     """

@@ -46,7 +46,7 @@ def run(
     sets: SetOption = None,
     plugins: PluginOption = None,
     history: Annotated[
-        Path | None, typer.Option("--history", metavar="FILE", help="Keep the time history in this file.")
+        Path | None, typer.Option("--history", metavar="FILE", help="Write the time history to this file.")
     ] = None,
     times: Annotated[
         int | None,
@@ -54,19 +54,19 @@ def run(
             "--times",
             metavar="N",
             parser=parse_whole_number,
-            help="Points in time of the history, uniform from contact to release. \\[default: the integrator's]",
+            help="Number of uniform times of the history. \\[default: steps of the integrator]",
         ),
     ] = None,
     overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Run one impact: what goes in, what comes out, and how far it can be trusted."""
+    """Run one impact: inputs, outputs and estimated errors."""
     from .. import api
     from ..contact.status import FIRST_FAILURE
     from ..results import backend
 
     if times is not None and history is None:
-        raise UsageError(f"--times {times}: expected --history FILE beside it")
+        raise UsageError(f"--times {times}: expected --history FILE as well")
     if history is not None:
         for path in (source, *(plugins or ())):
             backend.check_output(history, overwrite=overwrite, source=path)
@@ -81,7 +81,7 @@ def run(
         raise typer.Exit(exits.EXIT_POINTS_FAILED)
     if history is not None:
         if impact.history is None:
-            raise UsageError(f"no history to keep: {impact.status.meaning}")
+            raise UsageError(f"no history to store: {impact.status.meaning}")
         api.save(impact.history, history, overwrite=overwrite)
         exits.print_line(f"{safe_text(str(history))}: {impact.history.sizes['t']} points in time")
 
@@ -105,7 +105,7 @@ def run_json(impact: Impact) -> dict[str, Any]:
 
 
 def print_run(impact: Impact) -> None:
-    """One impact: inputs, outputs, the three restitutions, and how far they can be trusted."""
+    """Print one impact: inputs, outputs, the three restitutions and estimated errors."""
     from ..config.tables import MATERIAL_QUANTITIES
     from ..results.schema import SCHEMA, plain_unit
     from ..results.single_impact import DERIVED_QUANTITIES

@@ -65,7 +65,7 @@ def conclude(outcome: SweepOutcome, output: Path, *, quiet: bool, as_json: bool,
             for note in result_notes(outcome.summary):
                 exits.print_line(f"note: {note}")
         else:
-            exits.print_line(f"{safe_text(str(output))}: already holds this sweep; nothing to do")
+            exits.print_line(f"{safe_text(str(output))}: already contains this sweep; nothing to do")
     if as_json:
         print(dump(fields))
     if fields["failed"] and not allow_failed:

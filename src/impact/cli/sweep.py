@@ -34,9 +34,9 @@ if TYPE_CHECKING:
     from ..results.estimate import Estimate
     from ..results.shards import ShardProgress
 
-# why equal points are not found over the whole grid
+# why equal points are not searched for in the whole grid
 COLLAPSE = {
-    "block": "too many cells to compare, equal ones are found within a block",
+    "block": "too many cells to compare all, equal points are searched for within a block",
     "not": "every point is integrated (solver.collapse = false)",
 }
 
@@ -95,7 +95,9 @@ def sweep(
         }
         if dry_run:
             if shard is not None:
-                raise UsageError(f"--shard {safe_text(shard)}: given beside --dry-run, which is of the whole")
+                raise UsageError(
+                    f"--shard {safe_text(shard)}: got --dry-run as well, which estimates the whole sweep"
+                )
             _print_estimate(api.estimate(config, jobs=max(jobs, threads), **inputs), as_json=as_json)
             if should_stop():
                 raise UnfinishedError("nothing was written")

@@ -57,7 +57,7 @@ def bless(
     'first'
     """
     if not reason.strip():
-        raise UsageError("--reason: got an empty text, expected why the numbers changed")
+        raise UsageError("--reason: got an empty text, expected the reason for the change")
     if re.search("[\0\ud800-\udfff]", reason):
         raise UsageError(f'--reason: got "{safe_text(reason, 60)}", expected UTF-8 text without NUL')
     new, baseline = Path(new), Path(baseline)
@@ -100,4 +100,4 @@ def _load_baseline(baseline: Path) -> xr.Dataset | None:
     try:
         return load(baseline)
     except ResultError as error:
-        raise ResultError(f"{error}; it is not modified, remove it to make a new baseline") from None
+        raise ResultError(f"{error}; it is not modified, remove it to create a new baseline") from None

@@ -77,7 +77,7 @@ def compare(
     notes = [*_attribute_notes(a, b), *_model_metadata_notes(aligned.new.coords, aligned.baseline.coords)]
     notes += [safe_text(f"not judged: {', '.join(strange)}")] if strange else []
     if any(fault.kind == "labels" for fault in faults) and not subset:
-        notes.append("--subset judges what both have")
+        notes.append("--subset compares only what both results contain")
     for name in (variable.name for variable in SCHEMA):
         sides = [side for side, dataset in (("NEW", a), ("BASELINE", b)) if name in dataset]
         if len(sides) == 1 and subset:
@@ -129,18 +129,18 @@ def check_comparable(dataset: xr.Dataset, name: str) -> None:
     is_current = _attributes_equal(dataset.attrs.get("schema_version"), SCHEMA_VERSION)
     if not is_current or "rtol" not in dataset.attrs:
         about = "a time history" if "t" in dataset.coords else "not a result"
-        raise UsageError(f"{shown}: is {about}; compare takes results of a sweep")
+        raise UsageError(f"{shown}: is {about}, expected the result of a sweep")
     for coordinate in ("model", "v1", "v2", "m1", "m2"):
         if coordinate not in dataset.coords:
-            raise UsageError(f"{shown}: has no coordinate {coordinate}; compare takes whole results")
+            raise UsageError(f"{shown}: has no coordinate {coordinate}, expected a whole result")
         if coordinate != "model" and dataset[coordinate].dtype.kind not in "fiu":
-            raise UsageError(f"{shown}: {coordinate} holds {dataset[coordinate].dtype}, expected numbers")
+            raise UsageError(f"{shown}: {coordinate}: got {dataset[coordinate].dtype}, expected numbers")
     axes = {dim for name, v in dataset.variables.items() if is_input(str(name)) for dim in v.dims}
     for name in (variable.name for variable in SCHEMA):
         if name in dataset and dataset[name].dtype.kind not in "fiu":
-            raise UsageError(f"{shown}: {name} holds {dataset[name].dtype}, expected numbers")
+            raise UsageError(f"{shown}: {name}: got {dataset[name].dtype}, expected numbers")
         if name in dataset and not axes <= set(dataset[name].dims):
-            raise UsageError(f"{shown}: {name} does not vary along all axes; compare takes whole results")
+            raise UsageError(f"{shown}: {name} does not vary along all axes, expected a whole result")
 
 
 def _unknown_variables(dataset: xr.Dataset) -> list[str]:

@@ -151,7 +151,7 @@ def inline_files(
 
     def open_csv(file: str) -> CsvTable:
         if folder is None:
-            raise ConfigError([f"{safe_text(file)}: not read; a stored config has the values, not the file"])
+            raise ConfigError([f"{safe_text(file)}: not read; a stored config contains values, not file names"])
         if file not in files:
             files[file] = read_csv(folder / file)
         return files[file]
@@ -159,7 +159,7 @@ def inline_files(
     def store_values(path: KeyPath, value: object) -> None:
         text = f"{'.'.join(toml_key(str(part)) for part in path)}={toml_text(value)}"
         if len(text) > MAX_OVERRIDE_LENGTH:
-            limit = f"{MAX_OVERRIDE_LENGTH:,} characters, which no config needs"
+            limit = f"{MAX_OVERRIDE_LENGTH:,} characters"
             raise ConfigError([f"{path[-1]}: larger than {limit}"])
         nonlocal data
         data, _ = set_value(data, path, value)
@@ -263,7 +263,7 @@ def expand_cases(
             new["sweep"].pop(name, None)
             continue
         if _contains_path(data, path):
-            problems.append((cases_path, f"given beside {'.'.join(map(str, path))}, expected one of the two"))
+            problems.append((cases_path, f"set together with {'.'.join(map(str, path))}, expected one of the two"))
         if len(values) != n_cases or not values:
             problems.append(
                 (

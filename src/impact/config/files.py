@@ -42,7 +42,7 @@ def read_text(path: Path, kind: str = "TOML", most: int = MAX_CONFIG_BYTES) -> s
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise ConfigError([f"{name}: cannot be read: {safe_text(reason)}"]) from None
     if len(content) > most:
-        raise ConfigError([f"{name}: larger than {most:,} bytes, which no config needs"])
+        raise ConfigError([f"{name}: larger than {most:,} bytes"])
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -59,8 +59,9 @@ def parse_document(text: str, name: str) -> Any:
     """
     name = safe_text(name)
     is_json = text.lstrip().startswith("{")
-    if len(text) > (MAX_JSON_LENGTH if is_json else MAX_CONFIG_BYTES):
-        raise ConfigError([f"{name}: larger than any config"])
+    limit = MAX_JSON_LENGTH if is_json else MAX_CONFIG_BYTES
+    if len(text) > limit:
+        raise ConfigError([f"{name}: larger than {limit:,} characters"])
     return _parse(text, json.loads if is_json else tomllib.loads, "JSON" if is_json else "TOML", name)
 
 

@@ -364,7 +364,7 @@ def _settings_problems(document: Document, axes: Sequence[Axis], n_models: int) 
     n_variables = len({"status", *(output.variables or BY_DEFAULT)})
     problems += chunk_problems(output.chunks, axes, n_models, n_variables)
     if output.chunks and output.layout == "factored":
-        message = 'got chunks beside layout = "factored", expected layout = "full"'
+        message = 'set together with layout = "factored", expected layout = "full"'
         problems.append((("output", "chunks"), message))
     return problems
 

@@ -263,7 +263,9 @@ class Range(Table):
             raise value_error(f"got {got}, expected one of {choices}")
         first, last, step_or_count = self.numbers
         if self.kind == "geomspace" and min(first, last) <= 0 <= max(first, last):
-            raise self._range_error(f"got {first:g} to {last:g}, expected two ends of one sign, neither of them 0")
+            raise self._range_error(
+                f"got {first:g} to {last:g}, expected two ends of the same sign, neither of them 0"
+            )
         if self.kind == "arange" and step_or_count == 0:
             raise located_errors([(("arange", 2), "got 0, expected a step other than 0")])
         if self.size < 1:

@@ -101,10 +101,10 @@ def _velocity_problems(raw: RawConfig) -> Iterable[ConfigProblem]:
 
 def _restitution_problems(raw: RawConfig) -> Iterable[ConfigProblem]:
     if "e" in raw.sweep and "alpha" in raw.sweep:
-        yield ("sweep", "alpha"), "given beside e, expected one of the two"
+        yield ("sweep", "alpha"), "set together with e, expected one of the two"
     users = raw.models_using("e")
     if users and "e" not in raw.sweep and "alpha" not in raw.sweep:
-        yield ("sweep", "e"), f"missing, expected e or alpha (asked for by {users}), or other models"
+        yield ("sweep", "e"), f"missing, expected e or alpha (used by {users}), or other models"
 
 
 def _stiffness_problems(raw: RawConfig) -> Iterable[ConfigProblem]:
@@ -136,10 +136,13 @@ def _material_problems(raw: RawConfig) -> Iterable[ConfigProblem]:
     single = [name for name in ("material1", "material2") if name in raw.sweep]
     if "material" in raw.sweep:
         for name in single:
-            yield ("sweep", name), "given beside material, expected either material, or material1 and material2"
+            yield (
+                ("sweep", name),
+                "set together with material, expected either material, or material1 and material2",
+            )
     elif len(single) == 1:
         other = "material2" if single == ["material1"] else "material1"
-        yield ("sweep", other), f"missing beside {single[0]}; material is for both balls"
+        yield ("sweep", other), f"missing, expected both, as {single[0]} is set; or material for both balls"
     elif not single:
         of_material = {"E1", "E2", "nu1", "nu2", "yield_strength1", "yield_strength2"}
         of_material |= {name for name in ("R1", "R2") if name not in raw.sweep}
@@ -150,7 +153,7 @@ def _material_problems(raw: RawConfig) -> Iterable[ConfigProblem]:
         if "K" not in raw.sweep and not has_stiffness:
             yield ("sweep", "material"), "missing, expected a material of [materials], or K"
         elif users:
-            yield ("sweep", "material"), f"missing, expected a material of [materials] (asked for by {users})"
+            yield ("sweep", "material"), f"missing, expected a material of [materials] (used by {users})"
 
 
 def _yield_strength_problems(raw: RawConfig) -> Iterable[ConfigProblem]:
@@ -163,7 +166,7 @@ def _yield_strength_problems(raw: RawConfig) -> Iterable[ConfigProblem]:
                 expected = MATERIAL_QUANTITIES["yield_strength"].expected
                 yield (
                     ("materials", name, "yield_strength"),
-                    f"missing, expected {expected} (asked for by {users})",
+                    f"missing, expected {expected} (used by {users})",
                 )
 
 
@@ -174,13 +177,11 @@ def _mass_problems(raw: RawConfig) -> Iterable[ConfigProblem]:
         if mass in raw.sweep:
             continue
         about = f"missing, expected {SWEEP_QUANTITIES[mass].expected}: {SWEEP_QUANTITIES[mass].meaning}"
-        if radius not in raw.sweep:
+        if radius not in raw.sweep or not {"material", f"material{ball}"} & raw.sweep.keys():
             yield ("sweep", mass), f"{about}; or {radius} and a material with rho"
-        elif not {"material", f"material{ball}"} & raw.sweep.keys():
-            yield ("sweep", mass), f"{about}; or a material with rho beside {radius}"
         for name in raw.materials_without(ball, "rho") if radius in raw.sweep else ():
             expected = f"{MATERIAL_QUANTITIES['rho'].expected}, or {mass} under [sweep]"
-            yield ("materials", name, "rho"), f"missing, expected {expected}: the mass of ball {ball} is not given"
+            yield ("materials", name, "rho"), f"missing, expected {expected}: the mass of ball {ball} is not set"
 
 
 def _radius_problems(raw: RawConfig) -> Iterable[ConfigProblem]:

@@ -144,7 +144,7 @@ class Solver:
     rtol : relative tolerance
     max_steps : steps that one impact may take
     collapse : integrate impacts that are the same in the contact's own units once; changes no bit
-    core : "numpy"; "numba", which compiles what it can; or "auto", whichever is faster
+    core : "numpy"; "numba", which compiles what it can; or "auto", depending on the number of trajectories
     """
 
     rtol: Annotated[float, Quantity("1", "relative tolerance of the integration", 1e-13, 1e-4)] = DEFAULT_RTOL
@@ -354,7 +354,7 @@ def _leave_out(selected: dict[str, ForceModel], word: str, models: Mapping[str, 
     except PydanticCustomError as error:
         raise value_error(f"after !: {error.message()}") from None
     if selected.keys().isdisjoint(excluded):
-        raise mismatch_error(word, "models to leave out of those before it")
+        raise mismatch_error(word, "models to exclude from those before it")
     for key in excluded:
         selected.pop(key, None)
 

@@ -218,7 +218,7 @@ class ForceModel:
         if self.residual is not None and self.recovered is not None:
             raise ModelError(f"model {self.key}: recovered: set together with residual, expected one of the two")
         if self.unloading_breakpoints and self.unloading is None:
-            raise ModelError(f"model {self.key}: unloading_breakpoints: expected an unloading")
+            raise ModelError(f"model {self.key}: unloading_breakpoints: set without unloading, expected both")
         self._check_fields()
         self._check_velocity_coordinate()
         names = {*QUANTITIES, *(parameter.name for parameter in self.parameters)}

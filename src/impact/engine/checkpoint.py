@@ -91,7 +91,7 @@ def open_work_folder(
     Raises
     ------
     InUseError : another process has locked the folder
-    UsageError : the folder exists, and neither `resume` nor `overwrite` is set, or it is of another sweep
+    UsageError : the folder exists, and neither `resume` nor `overwrite` is set, or it belongs to another sweep
     StoreError : the disk is full or failed
     """
     _check_is_work_folder(folder)
@@ -112,7 +112,7 @@ def lock_work_folder(folder: Path, plan: Plan) -> Iterator[WorkFolder]:
     Raises
     ------
     InUseError, StoreError : see `open_work_folder`
-    UsageError : the folder is of another sweep
+    UsageError : the folder belongs to another sweep
     """
     record = _sweep_record(plan)
     difference = _difference_from(folder, record)
@@ -149,7 +149,7 @@ def _check_is_work_folder(folder: Path) -> None:
         names = [path.name for path in folder.iterdir()]
         foreign = [name for name in names if name != LOCK_FILE and not name.endswith(".part")]
         if foreign:
-            raise UsageError(f"{shown}: holds {safe_text(foreign[0])}, and no {PLAN_FILE}; it is not modified")
+            raise UsageError(f"{shown}: contains {safe_text(foreign[0])} and no {PLAN_FILE}, and is not modified")
 
 
 def remove_work_folder(folder: Path) -> None:
@@ -221,7 +221,7 @@ def _can_resume(folder: Path, record: Mapping[str, Any], *, resume: bool) -> boo
 
     Raises
     ------
-    UsageError : `resume` is set, and the folder is of another sweep
+    UsageError : `resume` is set, and the folder belongs to another sweep
     """
     if not resume or not os.path.lexists(folder / PLAN_FILE):
         # without a plan, the sweep was interrupted before its first block
@@ -236,7 +236,7 @@ def _difference_from(folder: Path, record: Mapping[str, Any]) -> str | None:
     """How the sweep of a folder differs from the one of a record; None if they are the same."""
     unknown = [key for key, digest in record["physics"]["plugins"].items() if digest is None]
     if unknown:
-        return f"the model {safe_text(unknown[0])} is in no file, so that it cannot be known to be the same"
+        return f"the model {safe_text(unknown[0])} has no file, so it cannot be compared"
     try:
         if not (folder / PLAN_FILE).is_file():
             raise ValueError
@@ -245,7 +245,7 @@ def _difference_from(folder: Path, record: Mapping[str, Any]) -> str | None:
         return f"its {PLAN_FILE} cannot be read"
     differences = list(record_differences(stored, json.loads(json.dumps(record))))
     more = f" and {len(differences) - MAX_DIFFERENCES} more" if len(differences) > MAX_DIFFERENCES else ""
-    return f"is of another sweep: {'; '.join(differences[:MAX_DIFFERENCES])}{more}" if differences else None
+    return f"belongs to another sweep: {'; '.join(differences[:MAX_DIFFERENCES])}{more}" if differences else None
 
 
 def write_block(file: Any, header: str, collisions: CollisionResult) -> None:

@@ -193,7 +193,7 @@ def _wait_for_file(file: Path, scheduler_name: str) -> None:
         if time.monotonic() - start > CONNECT_TIMEOUT_S:
             expected = "the file that dask scheduler --scheduler-file makes"
             raise UsageError(
-                f"{scheduler_name}: is not there after {CONNECT_TIMEOUT_S:.0f} s, expected {expected}"
+                f"{scheduler_name}: does not exist after {CONNECT_TIMEOUT_S:.0f} s, expected {expected}"
             )
         time.sleep(0.1)
 
@@ -244,7 +244,7 @@ def _capacity(client: Client, scheduler_name: str) -> Callable[[], int]:
         if silence_s > limit:
             raise StoreError(f"{scheduler_name}: the scheduler has not answered for {limit:g} s")
         if scheduler_name == LOCAL and without_workers_s > NO_WORKERS_LIMIT_S:
-            raise StoreError(f"{scheduler_name}: all workers are gone")
+            raise StoreError(f"{scheduler_name}: all workers were lost")
         return 0 if silence_s > SILENCE_LIMIT_S else min(BLOCKS_IN_FLIGHT * n_workers, MAX_BLOCKS_IN_FLIGHT)
 
     return current_capacity
@@ -287,7 +287,7 @@ def _open_executor(client: Client, scheduler_name: str) -> Iterator[Executor]:
             _run_with_timeout(CLOSE_TIMEOUT_S, partial(dask_executor.shutdown, wait=False))
         raise BrokenExecutor from error
     except (CancelledError, ClosedClientError, OSError) as error:
-        raise StoreError(f"{scheduler_name}: the scheduler is gone") from error
+        raise StoreError(f"{scheduler_name}: the connection to the scheduler was lost") from error
     except ImpactError:
         raise
     except Exception:

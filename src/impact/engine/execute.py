@@ -112,7 +112,7 @@ def _models_of_context(context: WorkerContext) -> Mapping[str, ForceModel]:
     missing_models = [key for key, sha256 in context.hashes if plugins.hashes.get(key) != sha256]
     if missing_models:
         raise UsageError(
-            f"{host}: {safe_text(', '.join(missing_models))}: expected the package that has it, in this version"
+            f"{host}: {safe_text(', '.join(missing_models))}: expected their package in the same version"
         )
     return catalogue(plugins.models)
 
@@ -209,8 +209,8 @@ def integrate_ranges(
             attempts.update(trajectory_range.number for trajectory_range in interrupted or remaining)
             if max(attempts.values()) > MAX_RETRIES:
                 raise StoreError(
-                    f"processes were killed {MAX_RETRIES + 1} times at the same trajectories: memory is short; "
-                    'or, of a program of your own, it lacks its if __name__ == "__main__":'
+                    f"processes were killed {MAX_RETRIES + 1} times at the same trajectories: too little memory, "
+                    'or a script without if __name__ == "__main__":'
                 ) from None
 
 

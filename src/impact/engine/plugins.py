@@ -180,10 +180,10 @@ def _plugins_of_entry_point(point: EntryPoint) -> list[Plugin]:
         raise
     except BaseException as error:
         message = safe_text(f"{type(error).__name__}: {error}", 300)
-        raise ModelError(f"{location}: {message}; expected a package that works, or none") from None
+        raise ModelError(f"{location}: {message}; repair the package or uninstall it") from None
     models = _models_among(vars(loaded).values() if isinstance(loaded, ModuleType) else [loaded])
     if not models:
-        raise ModelError(f"{location}: no model in it, expected a ForceModel, or a module that holds some")
+        raise ModelError(f"{location}: contains no model, expected a ForceModel or a module of them")
     file = getattr(sys.modules.get(point.module), "__file__", None)
     sha256 = hashlib.sha256(Path(file).read_bytes()).hexdigest() if file else None
     return [Plugin(model, sha256, package=package) for model in models]
@@ -216,7 +216,7 @@ def _plugins_of_file(source: PythonFile) -> list[Plugin]:
     sha256 = hashlib.sha256(source.content).hexdigest()
     models = _models_among(vars(_execute_module(source, name, sha256)).values())
     if not models:
-        raise ModelError(f"{name}: no model in it, expected a ForceModel at its top level")
+        raise ModelError(f"{name}: contains no model, expected a ForceModel at its top level")
     return [Plugin(model, sha256, source) for model in models]
 
 
@@ -271,7 +271,7 @@ def _error_message(error: BaseException) -> str:
     if isinstance(error, ImpactError):
         return text
     kind = type(error).__name__ + (f": {text}" if text else "")
-    return f"{kind}; expected a file that declares models and ends" if isinstance(error, SystemExit) else kind
+    return f"{kind}; expected a file that only declares models" if isinstance(error, SystemExit) else kind
 
 
 def value_hash(model: ForceModel) -> str | None:

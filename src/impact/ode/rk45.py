@@ -22,7 +22,7 @@ from .tableau import A, E
 
 # the controller: a step is multiplied by SAFETY/error^CONTROLLER_EXPONENT, within
 # bounds; exponents are in parts of 256. The order of the method suggests 1/5 (51/256), but with a smaller exponent
-# steps vary less, and hardly any is rejected
+# steps vary less, and few are rejected
 SAFETY, MIN_FACTOR, MAX_FACTOR, CONTROLLER_EXPONENT, FIRST_STEP_EXPONENT = 0.87, 0.2, 3.0, 36, 51
 MIN_STEP = 1e-16
 # halvings of steps with a rate that is not finite, after which a trajectory fails; they are counted over the whole

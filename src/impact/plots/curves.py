@@ -173,7 +173,7 @@ def velocity_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
 def restitution_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     """The delivered restitution of every model beside the requested one; see `velocity_curves`."""
     line = _take_line(dataset, choice, "e_out")
-    requested = [_curve("As asked for", None, line, line.data["e"], "e")] if "e" in line.data.coords else []
+    requested = [_curve("Requested", None, line, line.data["e"], "e")] if "e" in line.data.coords else []
     curves = [
         _curve(label, key, line, of_model["e_out"], "e_out")
         for label, key, of_model in _split_by_model(line, choice)
@@ -187,9 +187,7 @@ def error_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     line = _take_line(dataset, choice, "e_error")
     errors = [(label, key, of_model["e_error"].values) for label, key, of_model in _split_by_model(line, choice)]
     if not any(np.isfinite(values).any() for _, _, values in errors):
-        raise UsageError(
-            "this result has no error of the restitution, which needs an e that is asked for; sweep e"
-        )
+        raise UsageError("this result has no error of the restitution, which needs a requested e; sweep e")
     signed = [_curve(label, key, line, values, "e_error") for label, key, values in errors]
     absolute = [
         _curve(label, key, line, np.maximum(np.abs(values), MIN_DRAWN_ERROR), "abs_e_error")

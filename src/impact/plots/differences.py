@@ -63,7 +63,7 @@ def difference_data(verdict: Verdict) -> DifferenceData:
     UsageError : the two have no point in common
     """
     if not verdict.worst_along:
-        raise UsageError("no picture: there is no point to draw at")
+        raise UsageError("nothing to draw: the results have no point in common")
     judged = [variable for variable in verdict.variables if variable.judged != "reported"]
     wanted = verdict.differing or tuple(sorted((v for v in judged if v.times), key=_sort_key))
     shown = [variable.name for variable in wanted[: len(COLOURS)]]
@@ -96,7 +96,7 @@ def _sort_key(variable: Judged) -> float:
 
 
 def draw_differences(plot_data: DifferenceData) -> Figure:
-    """Draw where two results differ: points above the line exceed the tolerance; equal values are not drawn."""
+    """Plot where two results differ: points above the line exceed the tolerance; equal values are not drawn."""
     with styled():
         rows = _arrange_panels(plot_data.panels)
         width, height = default_size()

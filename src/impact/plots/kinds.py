@@ -26,16 +26,16 @@ if TYPE_CHECKING:
     PlotData: TypeAlias = CurveData | MapData
 
 KINDS = {
-    "final-velocities": "velocities after the impact beside the impulse-momentum solution, Figure 6 of the paper",
-    "restitution": "restitution delivered over what was asked for",
+    "final-velocities": "velocities after the impact and the impulse-momentum solution, Figure 6 of the paper",
+    "restitution": "delivered over requested restitution",
     "error": "error of the restitution, signed and absolute",
     "map": "a variable over two axes, a panel for each model",
-    "validity": "over two axes, which model is closest to what was asked for, and how close",
+    "validity": "model with the smallest error over two axes, and that error",
     "loop": "force over indentation",
     "history": "indentation, its rate and the force over time",
-    "impulse": "velocities over the impulse that has passed",
+    "impulse": "velocities over the impulse",
 }
-# those that show the motion at one point, which --sel chooses
+# kinds that show the motion at one point, which --sel selects
 MOTION_KINDS = ("loop", "history", "impulse")
 # width of one and of two columns of a journal [in]
 WIDTHS = {"single": 3.5, "double": 7.1}

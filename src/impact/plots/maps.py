@@ -199,17 +199,17 @@ def _map_data(
         field = field.isel(model=slice(max_panels))
     what = safe_text(f"{variable} over {x} and {y}")
     if field.dtype.kind not in "iuf" or not set(plane) <= set(field.dims):
-        raise UsageError(f"no picture of {what}: it is not a number at each point")
+        raise UsageError(f"cannot draw {what}: it does not have a number at each point")
     # of shape (models, y, x); the reference has no models
     in_memory = read(field.to_dataset(name=variable), [variable])[variable]
     values = np.asarray(in_memory.transpose(..., *plane).values, float)
     values = values.reshape(-1, *values.shape[-2:])
     finite = values[np.isfinite(values)]
     if not finite.size:
-        raise UsageError(f"no picture of {what}: it has no value there")
+        raise UsageError(f"cannot draw {what}: it has no value there")
     for letter, name in (("x", x), ("y", y)):
         if letter in choice.log and data[name].values[0] <= 0.0:
-            raise UsageError(f"--log {letter}: {safe_text(name)} has values that are not above 0")
+            raise UsageError(f"--log {letter}: {safe_text(name)} got values <= 0, expected values > 0")
     names: list[tuple[str, str | None]] = [(f"{REFERENCE} (6), (7)" if choice.equations else REFERENCE, None)]
     if "model" in field.dims:
         by_model = (data.isel(model=index) for index in range(field.sizes["model"]))

@@ -28,7 +28,7 @@ FORCE_RTOL = 1e-6
 
 
 def loop(histories: Sequence[xr.Dataset], *, equations: bool = False) -> CurveData:
-    """Force over indentation, Figures 3 and 5 of the paper: the area of a loop is the energy that is lost.
+    """Force over indentation, Figures 3 and 5 of the paper: the area of a loop is the energy loss.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def _curves_over(
     title: str, histories: Sequence[xr.Dataset], pairs: Sequence[tuple[str, str, str]], equations: bool
 ) -> CurveData:
     if not histories:
-        raise UsageError("there is no motion to draw: no model has an impact here")
+        raise UsageError("no motion to draw: no model has an impact at this point")
     first = histories[0]
     panels = []
     for x, y, end in pairs:

@@ -28,12 +28,12 @@ if TYPE_CHECKING:
 
 # kinds of figure, and what each shows
 FIGURES = {
-    "final-velocities": "Velocities after the impact, beside the impulse-momentum solution.",
-    "restitution": "Restitution delivered, beside what was asked for.",
+    "final-velocities": "Velocities after the impact, and the impulse-momentum solution.",
+    "restitution": "Delivered over requested restitution.",
     "error": "Error of the restitution: signed above, absolute below.",
     "map": "Error of the restitution over two axes, a panel for each model.",
-    "validity": "Which model is closest to what was asked for, and how close it is.",
-    "loop": "Force over indentation at one point: the area of a loop is the energy that is lost.",
+    "validity": "Model with the smallest error, and that error.",
+    "loop": "Force over indentation at one point: the area of a loop is the energy loss.",
 }
 MAP_KINDS = ("map", "validity")
 # points that are searched for the first one with an answer, at which the figures are drawn

@@ -56,7 +56,7 @@ def page(dataset: xr.Dataset, get_plot_data: Callable[[str, Choice], PlotData]) 
     ResultError : its attributes are not those of a result
     """
     if "model" not in dataset.dims:
-        raise UsageError("this is a time history; a report is made of the result of a sweep")
+        raise UsageError("got a time history, expected the result of a sweep")
     summary = summarize(dataset, MAX_FAILED)
     ranked, headline = _rank_models(dataset)
     keys = [str(key) for key in dataset["model"].values]
@@ -190,7 +190,7 @@ def _rank_models(dataset: xr.Dataset) -> tuple[Ranking | None, str]:
 def _failures_section(dataset: xr.Dataset, summary: Summary) -> dict[str, Any]:
     """Sentences about failed points, the first failed points, and the number of the others."""
     if "status" not in dataset:
-        return {"sentences": ["The result does not tell which points failed."], "points": [], "more": ""}
+        return {"sentences": ["The result does not contain the status of the points."], "points": [], "more": ""}
     sentences = [f"The status of {summary.not_counted:,} points was not evaluated."] if summary.not_counted else []
     if not summary.failed:
         sentences.append("No other point failed." if summary.not_counted else "No point failed.")

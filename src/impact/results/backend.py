@@ -196,7 +196,7 @@ def check_readable(sink: Sink, path: Path) -> None:
         with h5py.File(sink, "r") as file:
             read_variables(file)
     except ResultError as error:
-        raise UsageError(f"{safe_text(str(path))}: would not be read again: {error}") from None
+        raise UsageError(f"{safe_text(str(path))}: could not be read again: {error}") from None
 
 
 def open_result(path: str | Path) -> xr.Dataset:

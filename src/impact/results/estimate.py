@@ -40,7 +40,7 @@ class ModelCounts:
     cells : number of cells of the axes that the trajectories depend on
     trajectories : number of distinct trajectories, which are integrated
     axes : the axes that the trajectories depend on
-    within : scope of deduplication: the whole "plan", each "block", or "not" at all
+    within : scope of deduplication: "plan", "block", or "not" without deduplication
     """
 
     model: str

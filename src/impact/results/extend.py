@@ -122,10 +122,10 @@ def _check_whole(before: xr.Dataset, old: Plan, name: str) -> None:
     """Refuse a result that is incomplete or was written by another version."""
     version = safe_text(str(before.attrs.get("impact_version")), 40)
     if version != __version__:
-        raise ResultError(f"{name}: was made by impact {version}, this is {__version__}; sweep its config again")
+        raise ResultError(f"{name}: was written by impact {version}, this is {__version__}; run its sweep again")
     sizes = {"model": len(old.models), **{axis.name: axis.size for axis in old.config.axes}}
     if before.attrs.get("fingerprint") != old.fingerprint or dict(before.sizes) != sizes:
-        raise UsageError(f"{name}: got a part of the result of its config, expected the whole")
+        raise UsageError(f"{name}: got a part of a result, expected the whole result")
 
 
 def _extended_plan(

@@ -412,8 +412,8 @@ def check_witnesses(table: TrajectoryTable, variables: Sequence[SchemaVariable],
             at = int(np.argmin(same))
             version = safe_text(str(stored.attrs.get("impact_version", "unknown")), 40)
             raise ResultError(
-                f"its witnesses expand to other numbers: {variable.name} is {number(got[at], 12)}, the file has "
-                f"{number(expected[at], 12)}; it was made by impact {version}, this is {__version__}: sweep "
+                f"its witnesses have other values: {variable.name} is {number(got[at], 12)}, the file has "
+                f"{number(expected[at], 12)}; it was written by impact {version}, this is {__version__}: sweep "
                 "its config again, or expand it with that version (impact expand)"
             )
 

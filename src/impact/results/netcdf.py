@@ -237,7 +237,7 @@ def read_variables(file: h5py.File) -> tuple[dict[str, xr.Variable], dict[str, o
     variables = {}
     for name, dataset in accepted.items():
         if not dataset.id.get_storage_size():
-            raise _unreadable("declares data that the file does not hold", name)
+            raise _unreadable("declares data that the file does not contain", name)
         attributes = _read_attributes(dataset)
         if dataset.dtype.kind == "S":
             values = StoredArray(name, dataset).read((slice(None),) * dataset.ndim)
@@ -300,7 +300,7 @@ def _check_sizes(file: h5py.File, datasets: Mapping[str, h5py.Dataset]) -> dict[
             plain += declared
         text += declared if dataset.dtype.kind == "S" else 0
     if plain > size or compressed > max(ALWAYS_ALLOWED_BYTES, MAX_COMPRESSION_RATIO * size):
-        raise _unreadable("declares more data than a file of this size may hold")
+        raise _unreadable("declares more data than a file of this size can contain")
     if chunks > MAX_CHUNKS_OF_FILE:
         raise _unreadable(f"more than {MAX_CHUNKS_OF_FILE:,} chunks")
     # missing chunks would be read as zeros, at no cost in the file
@@ -310,7 +310,7 @@ def _check_sizes(file: h5py.File, datasets: Mapping[str, h5py.Dataset]) -> dict[
         if dataset.chunks and dataset.id.get_num_chunks() != _count_chunks(dataset)
     ]
     if missing:
-        raise _unreadable("declares data that the file does not hold", missing[0])
+        raise _unreadable("declares data that the file does not contain", missing[0])
     if text > MAX_LABEL_BYTES:
         raise _unreadable(f"more than {MAX_LABEL_BYTES:,} bytes of labels")
     return _dims_by_dataset(datasets)

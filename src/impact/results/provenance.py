@@ -44,7 +44,7 @@ def stored_config(
     """
     text = attributes.get("config")
     if text is None:
-        raise UsageError(f"{safe_text(name)}: holds no config; it is a time history")
+        raise UsageError(f"{safe_text(name)}: contains no config, it is a time history")
     if not isinstance(text, str):
         raise ResultError(f"{safe_text(name)}: its attribute config is not text")
     check_plugins(attributes, plugins, name)

@@ -1,4 +1,4 @@
-"""Rank the models of a result by how closely they deliver the restitution asked for."""
+"""Rank the models of a result by how closely they deliver the requested restitution."""
 
 from __future__ import annotations
 
@@ -145,7 +145,7 @@ class Ranking:
 
     @property
     def headline(self) -> str:
-        """The answer in a sentence."""
+        """The result in a sentence."""
         first = self.models[0]
         key, tol, points = safe_text(first.name, 120), number(self.tol), f"{first.points:,} points"
         alone = "the only point" if first.points == 1 else ""
@@ -198,7 +198,7 @@ def ranking(
         )
     ranked = [_rank_model(of_model, tol) for of_model in by_model]
     if not any(model.points for model in ranked):
-        raise UsageError("nothing to rank: no point has both a target e and an impact")
+        raise UsageError("nothing to rank: no point has both a requested e and an impact")
     return Ranking(tol, tuple(sorted(ranked, key=_rank_key)))
 
 
@@ -207,14 +207,14 @@ def _check_rankable(dataset: xr.Dataset, tol: float) -> None:
     if not 0.0 < tol < math.inf:
         raise UsageError(f"tol: got {tol:g}, expected a positive finite number")
     if "t" in dataset.dims:
-        raise UsageError("this is a time history; models are ranked by the result of a sweep")
+        raise UsageError("got a time history, expected the result of a sweep")
     if "model" not in dataset.dims:
         raise UsageError("model is not an axis of this result; select models as a list, sel(model=[...])")
     missing = [name for name in RANKED_VARIABLES if name not in dataset]
     if missing:
         raise UsageError(f"this result has no {', '.join(missing)}; sweep without [output] variables, or add them")
     if "e" not in dataset.coords or not _asks_for_e(dataset):
-        raise UsageError("this sweep has no target e, by which models are ranked; add e or alpha")
+        raise UsageError("this sweep has no requested e, which the ranking needs; add e or alpha")
     dims = set(dataset["e_error"].dims)
     if "model" not in dims or dims != set(dataset["status"].dims) or not dims.issuperset(dataset["e"].dims):
         raise UsageError("e_error, status and e of this result do not lie along the axes of a sweep")

@@ -78,7 +78,7 @@ SCHEMA = (
              "v2_post - v2_reference"),
     SchemaVariable("e_out", "1", "model", "scaled by 1", "restitution that the model delivers",
              "(v2+ - v1+)/(v1 - v2)  (5)"),
-    SchemaVariable("e_error", "1", "model", "scaled by 1", "delivered minus asked restitution", "e_out - e"),
+    SchemaVariable("e_error", "1", "model", "scaled by 1", "delivered minus requested restitution", "e_out - e"),
     SchemaVariable("peak_indentation", "m", "model", "scaled by the peak", "largest indentation", "δₘ at v = 0"),
     SchemaVariable("permanent_indentation", "m", "model", "scaled by the peak", "indentation at the release",
              "δₚ at the end of the contact"),
@@ -89,8 +89,8 @@ SCHEMA = (
     SchemaVariable("energy_loss", "J", "model", "scaled by m v0^2/2", "kinetic energy lost",
              "m v0²(1 - e_out²)/2"),
     SchemaVariable("stiffness", "N m-n", "model", "scaled by itself",
-             "contact stiffness used; n is the coordinate exponent; where n is not 1.5 and no K is given it is "
-             "F_m/delta_m^n of the Hertz peak", "K  (12)"),
+             "contact stiffness used; n is the coordinate exponent; without K and with n other than 1.5 it is "
+             "F_m/delta_m^n at the Hertz peak", "K  (12)"),
     SchemaVariable("damping_ratio", "1", "model", "scaled by itself",
              "dimensionless damping, where the law has one",
              "χ = λ v0/K"),
@@ -98,8 +98,8 @@ SCHEMA = (
              "[work of the force - m v0²(1 - e_out²)/2]/(m v0²/2)"),
     SchemaVariable("closed_form_error", "1", "model", "bounded by 10 rtol",
              "distance from the closed form, where one exists", "e_out - exact e_out"),
-    SchemaVariable("status", "1", "model", "exact", "how the point ended", "see flag_meanings", "i1"),
-    SchemaVariable("in_domain", "1", "model", "exact", "1 where the law is said to hold",
+    SchemaVariable("status", "1", "model", "exact", "outcome of the point", "see flag_meanings", "i1"),
+    SchemaVariable("in_domain", "1", "model", "exact", "1 if the inputs are in the stated domain of the law",
              "1 inside every stated interval", "i1"),
     SchemaVariable("steps", "1", "model", "reported", "accepted steps of the integrator",
              "approach + restitution", "i4"),
@@ -110,7 +110,7 @@ SCHEMA = (
              "energetic restitution, from the integrated works of the two phases", "√(-W_r/W_c)  (3)"),
     SchemaVariable("lambda", "N s m-(n+1)", "model", "scaled by itself",
              "damping factor, where the law has one; n is the coordinate exponent", "λ = χ K/v0  (18)"),
-    SchemaVariable("separation_time", "s", "model", "scaled by itself", "time until the surfaces part",
+    SchemaVariable("separation_time", "s", "model", "scaled by itself", "time until the surfaces separate",
              "contact_time + remaining indentation/(e_out v0)"),
 )  # fmt: skip
 
@@ -354,7 +354,7 @@ def _exponent_coordinate(plan: Plan) -> tuple[tuple[str, ...], object, dict[str,
 
 
 def _restitution_coordinate(plan: Plan) -> tuple[tuple[str, ...], object, dict[str, str]]:
-    about = {"units": "1", "long_name": "restitution asked for", "equation": "e = 1 - alpha (v1 - v2)  (24)"}
+    about = {"units": "1", "long_name": "requested restitution", "equation": "e = 1 - alpha (v1 - v2)  (24)"}
     return *_derived_values(plan, ("alpha", "v1", "v2"), restitution_at), about
 
 

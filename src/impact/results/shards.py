@@ -190,7 +190,7 @@ def merge(
             # a difference in the trajectories is reported first, by its name
             with lock_work_folder(folder, plan):
                 raise UsageError(
-                    f"{safe_text(str(folder))}: its title or output is not that of {safe_text(str(first))}; "
+                    f"{safe_text(str(folder))}: its title or output differs from that of {safe_text(str(first))}; "
                     "expected the folders of one sweep"
                 )
     # folders are locked one after the other: there may be more of them than the limit of open files
@@ -267,8 +267,8 @@ def _locate_ranges(
                 ):
                     raise ResultError(
                         f"{safe_text(str(work_folder.path(part.number)))}: differs from "
-                        f"{safe_text(str(where[part.number].path(part.number)))}; expected both to be of "
-                        "processors of one kind"
+                        f"{safe_text(str(where[part.number].path(part.number)))}; expected both to "
+                        "be computed on the same type of processor"
                     )
     return where, len(repeated)
 
@@ -290,7 +290,7 @@ def _missing_shards(
         if shard in folders:
             lines.append(f"{safe_text(str(folders[shard]))}: shard {shard} {lacks}; {again} finishes it")
         else:
-            lines.append(f"{safe_text(str(output))}: shard {shard} is missing; {again} makes it")
+            lines.append(f"{safe_text(str(output))}: shard {shard} is missing; {again} computes it")
     return (
         [*lines, f"and {len(blocks) - MAX_LISTED_SHARDS:,} more shards"]
         if len(blocks) > MAX_LISTED_SHARDS

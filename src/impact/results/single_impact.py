@@ -272,7 +272,7 @@ def single_point(
     columns = [_selectable_columns(axis) for axis in config.axes]
     varied = {name for names in columns for name in names}
     if at and {"e", "alpha"} <= at.keys():
-        raise UsageError("--at alpha: got alpha beside e, expected one of the two")
+        raise UsageError("--at alpha: got alpha and e, expected one of the two")
     at = {**{name: value for name, value in parted.items() if name in varied}, **(at or {})}
     together = {name for names in columns if len(names) > 1 for name in names}
     inputs = [*(name for names in columns for name in names), *config.scalars]

@@ -188,7 +188,7 @@ class SweepOutcome:
 
 
 def describe(dataset: xr.Dataset) -> dict[str, Any]:
-    """What is in a result or a time history, as plain data; see `impact.info`."""
+    """The contents of a result or a time history, as plain data; see `impact.info`."""
     summary = summarize(dataset) if "model" in dataset.dims else Summary()
     variables: dict[str, Any] = {}
     for name, variable in dataset.items():

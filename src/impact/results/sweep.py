@@ -234,7 +234,7 @@ def reload_range(work_folder: WorkFolder, part: TrajectoryRange) -> CollisionRes
     """
     rebound = work_folder.load(part)
     if rebound is None:
-        raise StoreError(f"{safe_text(str(work_folder.path(part.number)))}: cannot be read any more")
+        raise StoreError(f"{safe_text(str(work_folder.path(part.number)))}: can no longer be read")
     return rebound
 
 
@@ -267,7 +267,7 @@ def check_labels(plan: Plan) -> None:
     size = sum(encode_text(coordinate).size for coordinate in coordinates if is_text(coordinate))
     if size > MAX_LABEL_BYTES:
         raise UsageError(
-            f"its labels take {size:,} bytes, expected at most {MAX_LABEL_BYTES:,}: give materials shorter names"
+            f"its labels take {size:,} bytes, expected at most {MAX_LABEL_BYTES:,}; use shorter names of materials"
         )
 
 

@@ -15,7 +15,7 @@ DIGEST_BYTES = hashlib.sha256().digest_size
 
 
 class DamagedError(Exception):
-    """A file of the cache does not hold what was written to it."""
+    """The content of a cache file differs from what was written."""
 
 
 class CheckedFile(IndexDataCacheFile):
