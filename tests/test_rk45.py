@@ -1,4 +1,4 @@
-"""The integrator has the order of its tableau, and computes each trajectory to its end as if it were alone."""
+"""The integrator has the order of its tableau, locates events, and integrates a trajectory as if it were alone."""
 
 from dataclasses import replace
 from functools import partial
@@ -20,196 +20,201 @@ from .problems import OSCILLATOR, PROBLEMS, SPRINGS, TANH, SolvedProblem
 RTOLS = 10.0 ** -np.arange(4, 13)
 
 
-def solve(known: SolvedProblem, rtol: float, record: bool = False) -> Solution:
-    start = np.array(known.initial_state).reshape(2, 1)
-    return integrate(known.problem, start, (), rtol=rtol, max_steps=1000, record=record)
+def solve_problem(solved: SolvedProblem, rtol: float, record: bool = False) -> Solution:
+    start = np.array(solved.initial_state).reshape(2, 1)
+    return integrate(solved.problem, start, (), rtol=rtol, max_steps=1000, record=record)
 
 
-def springs(rows: np.ndarray, max_steps: int = 1000) -> Solution:
+def solve_springs(rows: np.ndarray, max_steps: int = 1000, rtol: float = 1e-9) -> Solution:
     """Trajectories of `SPRINGS` from (0, 1), each a row (k, c, q)."""
-    columns = tuple(np.ascontiguousarray(np.array(rows, float).reshape(-1, 3).T))
-    start = np.array([np.zeros(columns[0].size), np.ones(columns[0].size)])
-    return integrate(SPRINGS, start, columns, rtol=1e-9, max_steps=max_steps)
+    params = tuple(np.ascontiguousarray(np.array(rows, float).reshape(-1, 3).T))
+    start = np.array([np.zeros(params[0].size), np.ones(params[0].size)])
+    return integrate(SPRINGS, start, params, rtol=rtol, max_steps=max_steps)
 
 
-def bits(solution: Solution, index: int) -> bytes:
+def bits_of(solution: Solution, index: int) -> bytes:
     arrays = (solution.state, solution.maximum, solution.steps, solution.termination)
     return b"".join(array[..., index].tobytes() for array in arrays)
 
 
-def fixed_step_error(known: SolvedProblem, count: int, embedded: bool) -> float:
-    """The error at the end after equal steps, advanced by the solution or by the embedded one."""
-    rates, h = known.problem.rates, np.array([known.event_time / count])
+def fixed_step_error(solved: SolvedProblem, count: int, embedded: bool) -> float:
+    """The error at the end after equal steps with the solution of order 5, or with the embedded one of order 4."""
+    rates, h = solved.problem.rates, np.array([solved.event_time / count])
     y = np.zeros((4, 1))
-    y[:2, 0] = known.initial_state
+    y[:2, 0] = solved.initial_state
     k = rates(y[:2], ())
     for _ in range(count):
-        y, stages = rk_step(known.problem, y, k, h, (), Workspace.of(h.size))
+        y, stages = rk_step(solved.problem, y, k, h, (), Workspace.of(h.size))
         k = stages[-1]
         if embedded:
             y = y - h * sum(float(e) * stage[:4] for e, stage in zip(tableau.E, stages, strict=True))
             k = rates(y[:2], ())
-    return np.abs(y[:2, 0] - known.exact(known.event_time)).max()
+    return np.abs(y[:2, 0] - solved.exact(solved.event_time)).max()
 
 
-@pytest.mark.parametrize("known", [OSCILLATOR, TANH], ids=str)
+@pytest.mark.parametrize("solved", [OSCILLATOR, TANH], ids=str)
 @pytest.mark.parametrize(("embedded", "order"), [(False, 5), (True, 4)])
-def test_halved_steps_have_the_slope_of_the_order(known, embedded, order):
-    errors = [fixed_step_error(known, count, embedded) for count in (16, 32, 64)]
+def test_the_error_converges_with_the_order_of_the_method(solved, embedded, order):
+    errors = [fixed_step_error(solved, count, embedded) for count in (16, 32, 64)]
     slopes = -np.diff(np.log2(errors))
     assert np.all(np.abs(slopes - order) < 0.35), slopes
 
 
-@pytest.mark.parametrize("known", PROBLEMS, ids=str)
-def test_tighter_tolerance_lowers_the_error_in_proportion(known):
-    errors = [abs(solve(known, rtol).state[0, 0] - known.exact(known.event_time)[0]) for rtol in RTOLS]
+@pytest.mark.parametrize("solved", PROBLEMS, ids=str)
+def test_the_error_is_proportional_to_the_tolerance(solved):
+    errors = [abs(solve_problem(solved, rtol).state[0, 0] - solved.exact(solved.event_time)[0]) for rtol in RTOLS]
     assert np.all(np.diff(errors) < 0.0)
     assert np.all(errors < 3.0 * RTOLS)
     assert np.all(errors > 0.03 * RTOLS)
 
 
-@pytest.mark.parametrize("known", PROBLEMS, ids=str)
-def test_ends_with_its_quadratures_and_maximum_at_the_event(known):
-    solution = solve(known, 1e-11)
+@pytest.mark.parametrize("solved", PROBLEMS, ids=str)
+def test_state_quadratures_and_maximum_at_the_event_are_accurate(solved):
+    solution = solve_problem(solved, 1e-11)
     assert solution.termination[0] == Termination.EVENT_REACHED
     assert solution.state[:, 0] == pytest.approx(
-        [*known.exact(known.event_time), known.event_time, known.quadrature], rel=0, abs=1e-10
+        [*solved.exact(solved.event_time), solved.event_time, solved.quadrature], rel=0, abs=1e-10
     )
-    assert solution.maximum[0] == pytest.approx(known.maximum, rel=1e-10)
+    assert solution.maximum[0] == pytest.approx(solved.maximum, rel=1e-10)
 
 
-@pytest.mark.parametrize("known", PROBLEMS, ids=str)
-def test_event_is_met_to_rounding(known):
-    assert solve(known, 1e-6).state[1, 0] == pytest.approx(known.exact(known.event_time)[1], rel=0, abs=1e-15)
+@pytest.mark.parametrize("solved", PROBLEMS, ids=str)
+def test_the_event_is_located_to_rounding(solved):
+    assert solve_problem(solved, 1e-6).state[1, 0] == pytest.approx(
+        solved.exact(solved.event_time)[1], rel=0, abs=1e-15
+    )
 
 
-@pytest.mark.parametrize("known", PROBLEMS, ids=str)
-def test_recorded_interpolant_matches_the_solution_between_steps(known):
-    solution = solve(known, 1e-10, record=True)
+@pytest.mark.parametrize("solved", PROBLEMS, ids=str)
+def test_recorded_interpolant_matches_the_solution_between_steps(solved):
+    solution = solve_problem(solved, 1e-10, record=True)
     assert len(solution.recorded) == solution.steps[0]
     for step in solution.recorded:
         for part in (0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0):
             y0, y1, t, _ = step.at(step.end * part)[:, 0]
-            assert (y0, y1) == pytest.approx(known.exact(t), rel=0, abs=1e-9)
+            assert (y0, y1) == pytest.approx(solved.exact(t), rel=0, abs=1e-9)
     assert step.at(step.end)[:, 0] == pytest.approx(solution.state[:, 0], rel=0, abs=1e-12)
 
 
-@pytest.mark.parametrize("known", PROBLEMS, ids=str)
-def test_recording_changes_no_bit(known):
-    assert bits(solve(known, 1e-8, record=True), 0) == bits(solve(known, 1e-8), 0)
+@pytest.mark.parametrize("solved", PROBLEMS, ids=str)
+def test_recording_changes_no_bit(solved):
+    assert bits_of(solve_problem(solved, 1e-8, record=True), 0) == bits_of(solve_problem(solved, 1e-8), 0)
 
 
-# a trajectory that ends at once, a trajectory that ends after a thousand times as long, and everything between
+# trajectories whose durations differ by factors of up to 100000
 trajectories = st.tuples(st.floats(-6.0, 4.0).map(lambda x: 10.0**x), st.floats(0.0, 0.5), st.floats(-1.0, 0.5))
 
 
 @settings(max_examples=10, deadline=None)
 @given(rows=st.lists(trajectories, min_size=1, max_size=8), seed=st.integers(0, 999))
-def test_trajectory_has_the_same_bits_alone_and_in_any_batch(rows, seed):
-    batch = springs(rows)
+def test_a_trajectory_has_the_same_bits_alone_and_in_any_batch(rows, seed):
+    # the bits are compared, not the accuracy
+    solve = partial(solve_springs, rtol=1e-6)
+    batch = solve(rows)
     order = np.random.default_rng(seed).permutation(len(rows))
-    permuted = springs([rows[index] for index in order])
+    permuted = solve([rows[index] for index in order])
     for index, row in enumerate(rows):
-        alone = bits(springs([row]), 0)
-        assert bits(batch, index) == alone
-        assert bits(permuted, int(np.flatnonzero(order == index)[0])) == alone
+        alone = bits_of(solve([row]), 0)
+        assert bits_of(batch, index) == alone
+        assert bits_of(permuted, int(np.flatnonzero(order == index)[0])) == alone
 
 
-def test_trajectory_has_the_same_bits_among_others_that_end_much_later():
-    solution = springs([(1.0, 0.1, 0.0), *[(1e-11, 0.0, -1e-3)] * 40])
+def test_a_trajectory_has_the_same_bits_among_others_that_end_much_later():
+    solution = solve_springs([(1.0, 0.1, 0.0), *[(1e-11, 0.0, -1e-3)] * 40])
     assert solution.steps[0] * 3 < solution.steps[1]
-    assert bits(solution, 0) == bits(springs([(1.0, 0.1, 0.0)]), 0)
+    assert bits_of(solution, 0) == bits_of(solve_springs([(1.0, 0.1, 0.0)]), 0)
 
 
 FAILURES = {
     "a rate is not a number": ((np.nan, 0.0, 0.0), Termination.NOT_FINITE),
     "a rate is infinite": ((1.0, np.inf, 0.0), Termination.NOT_FINITE),
-    "it never ends": ((1.0, 1e6, 0.0), Termination.MAX_STEPS),
-    "it runs away": ((-1.0, 0.0, 0.0), Termination.EVENT_UNREACHABLE),
-    "it blows up": ((0.0, 0.0, 1.0), Termination.STEP_UNDERFLOW),
+    "the event is never reached": ((1.0, 1e6, 0.0), Termination.MAX_STEPS),
+    "the event cannot be reached": ((-1.0, 0.0, 0.0), Termination.EVENT_UNREACHABLE),
+    "the solution diverges": ((0.0, 0.0, 1.0), Termination.STEP_UNDERFLOW),
 }
 
 
 @pytest.mark.parametrize(("row", "end"), FAILURES.values(), ids=FAILURES)
-def test_failure_is_reported_and_changes_no_other_trajectory(row, end):
-    others = [(0.5 + 0.1 * index, 0.1, 0.0) for index in range(9)]
-    whole, batch = springs(others), springs([*others[:4], row, *others[4:]])
+def test_a_failure_is_reported_and_changes_no_other_trajectory(row, end):
+    other_rows = [(0.5 + 0.1 * index, 0.1, 0.0) for index in range(9)]
+    alone, batch = solve_springs(other_rows), solve_springs([*other_rows[:4], row, *other_rows[4:]])
     assert batch.termination[4] == end
     assert np.isnan(batch.state[:, 4]).all()
     assert np.isnan(batch.maximum[4])
     for index in range(9):
         assert batch.termination[index + (index >= 4)] == Termination.EVENT_REACHED
-        assert bits(batch, index + (index >= 4)) == bits(whole, index)
+        assert bits_of(batch, index + (index >= 4)) == bits_of(alone, index)
 
 
-@pytest.mark.parametrize("wall", [0.1, 0.3, 0.5, 0.777, 0.99])
-def test_rate_that_becomes_nan_on_the_way_is_not_finite(wall):
-    def rates(y, columns, out=None):
-        return OSCILLATOR.problem.rates(y, columns) * np.where(y[0] > wall, np.nan, 1.0)
+@pytest.mark.parametrize("limit", [0.1, 0.3, 0.5, 0.777, 0.99])
+def test_a_rate_that_becomes_nan_during_the_integration_is_reported_as_not_finite(limit):
+    def rates(y, params, out=None):
+        return OSCILLATOR.problem.rates(y, params) * np.where(y[0] > limit, np.nan, 1.0)
 
-    other = OSCILLATOR.problem
-    problem = Problem(rates, other.event, other.unreachable, other.floor)
+    oscillator = OSCILLATOR.problem
+    problem = Problem(rates, oscillator.event, oscillator.unreachable, oscillator.floor)
     solution = integrate(problem, np.array([[0.0], [1.0]]), (), rtol=1e-9, max_steps=1000)
     assert solution.termination[0] == Termination.NOT_FINITE
 
 
-def test_given_up_after_max_steps_attempts():
-    # attempts are accepted steps and those tried again, so that the number that suffices is searched for
-    enough = next(
+def test_the_integration_stops_after_max_steps_attempts():
+    # attempts include rejected steps, so that the sufficient number is searched for
+    sufficient = next(
         count
         for count in range(1, 200)
-        if springs([(1.0, 0.0, 0.0)], count).termination[0] == Termination.EVENT_REACHED
+        if solve_springs([(1.0, 0.0, 0.0)], count).termination[0] == Termination.EVENT_REACHED
     )
-    reference = springs([(1.0, 0.0, 0.0)])
-    assert enough >= reference.steps[0]
-    assert bits(springs([(1.0, 0.0, 0.0)], enough), 0) == bits(reference, 0)
-    assert springs([(1.0, 0.0, 0.0)], enough - 1).termination[0] == Termination.MAX_STEPS
+    reference = solve_springs([(1.0, 0.0, 0.0)])
+    assert sufficient >= reference.steps[0]
+    assert bits_of(solve_springs([(1.0, 0.0, 0.0)], sufficient), 0) == bits_of(reference, 0)
+    assert solve_springs([(1.0, 0.0, 0.0)], sufficient - 1).termination[0] == Termination.MAX_STEPS
 
 
 @pytest.mark.parametrize("rtol", [1e-7, 1e-8])
-def test_hardly_a_step_of_an_impact_is_tried_again(rtol):
+def test_at_most_one_step_of_an_approach_is_rejected(rtol):
     law = motion.MotionLaw.of(find("hunt-crossley-1975"), 1.5, strong=False)
     for chi in np.linspace(0.0, 2.0, 9):
         start = motion.start_of_approach(law, (), 1)
-        into = partial(integrate, motion.approach_problem(law), start, (np.array([chi]),), rtol=rtol)
-        assert into(max_steps=int(into(max_steps=1000).steps[0]) + 1).termination[0] == Termination.EVENT_REACHED
+        integrate_approach = partial(integrate, motion.approach_problem(law), start, (np.array([chi]),), rtol=rtol)
+        steps = int(integrate_approach(max_steps=1000).steps[0])
+        assert integrate_approach(max_steps=steps + 1).termination[0] == Termination.EVENT_REACHED
 
 
-def test_no_trajectories_give_no_solution():
-    assert springs(np.empty((0, 3))).state.shape == (4, 0)
+def test_an_empty_batch_gives_an_empty_solution():
+    assert solve_springs(np.empty((0, 3))).state.shape == (4, 0)
 
 
-# ---- the formulas that the NumPy and the compiled back end share, by themselves
+# ---- formulas that the NumPy and the compiled core share
 
 
 @pytest.mark.parametrize("root", [-0.8, -0.2, -1e-4, 1e-4, 0.3, 0.6])
-def test_the_event_of_a_parabola_is_met_exactly(root):
+def test_the_event_of_a_parabola_is_located_exactly(root):
     # g = (root − t)(2 + t)/3 over a step of length 1 that ends at t = 0
     def g(t):
         return (root - t) * (2.0 + t) / 3.0, (root - 2.0 - 2.0 * t) / 3.0
 
-    offset, sure = events.event_offset(*map(np.asarray, (*g(0.0), *g(-1.0), 1.0)))
+    offset, is_certain = events.event_offset(*map(np.asarray, (*g(0.0), *g(-1.0), 1.0)))
     assert offset == pytest.approx(root, rel=1e-12)
-    assert sure
+    assert is_certain
 
 
-def test_the_event_of_a_cubic_is_met_better_than_by_its_parabola():
+def test_the_event_of_a_cubic_is_located_more_accurately_than_by_its_parabola():
     # g = −t − t³/2 + c over a step of length 1 that ends at t = 0, with its roots to 17 digits
-    for c, root, rest in ((0.3, 0.28804985959466517, 1e-4), (0.1, 0.09950735335435984, 1e-7)):
+    for c, root, tolerance in ((0.3, 0.28804985959466517, 1e-4), (0.1, 0.09950735335435984, 1e-7)):
         g = (np.asarray(c), np.asarray(-1.0), np.asarray(c + 1.5), np.asarray(-2.5), np.asarray(1.0))
-        assert events.event_offset(*g)[0] == pytest.approx(root, abs=rest)
+        assert events.event_offset(*g)[0] == pytest.approx(root, abs=tolerance)
 
 
-def test_an_event_that_rises_is_nowhere_and_one_that_fades_away_is_not_sure():
+def test_a_rising_event_function_has_no_event_and_a_decaying_one_no_certain_event():
     with np.errstate(all="ignore"):
         rising = events.event_offset(*map(np.asarray, (1.0, 0.5, 0.5, 0.5, 1.0)))
         # exp(−t) has no zero
-        fading = events.event_offset(*map(np.asarray, (1.0, -1.0, np.e, -np.e, 1.0)))
+        decaying = events.event_offset(*map(np.asarray, (1.0, -1.0, np.e, -np.e, 1.0)))
     assert rising[0] == np.inf
-    assert not fading[1]
+    assert not decaying[1]
 
 
-def test_a_step_is_shortened_to_an_event_that_is_sure_and_near_it_is_not():
+def test_a_step_is_shortened_to_a_certain_event_unless_it_is_near():
     h = 2.0
     at_bound = events.NEAR_EVENT * h + events.EVENT_ATOL
     offset = np.array([at_bound, np.nextafter(at_bound, 1.0), -at_bound, 5.0])
@@ -218,17 +223,17 @@ def test_a_step_is_shortened_to_an_event_that_is_sure_and_near_it_is_not():
     assert h_next.tolist() == [offset[0], offset[1], 3.0, 3.0]
 
 
-def test_a_step_across_the_event_is_tried_again_up_to_it():
+def test_a_step_across_the_event_is_repeated_up_to_it():
     near, remaining = np.array([True, False, False, False]), np.zeros(4)
     g, offset = np.array([-1.0, -1.0, -1.0, 1.0]), np.array([-1e-4, -0.5, -3.0, 0.5])
     located, crossed, h_next = events.at_event(near, remaining, g, offset, 2.0, 7.0)
     assert located.tolist() == [True, False, False, False]
     assert crossed.tolist() == [False, True, True, False]
-    # by half where the event is not within the step
+    # it is halved if the event is not within the step
     assert h_next.tolist() == [7.0, 1.5, 1.0, 7.0]
 
 
-def test_an_event_is_located_at_the_bound_of_the_remaining_offset_and_not_above():
+def test_an_event_is_located_if_the_remaining_offset_is_at_most_its_bound():
     h, g = 2.0, np.ones(3)
     bound = events.EVENT_RTOL * h + events.EVENT_ATOL
     remaining = np.array([bound, -bound, np.nextafter(bound, 1.0)])
@@ -238,8 +243,8 @@ def test_an_event_is_located_at_the_bound_of_the_remaining_offset_and_not_above(
 
 
 @pytest.mark.parametrize(("ended", "is_compacted"), [(2, False), (3, True)])
-def test_trajectories_that_have_ended_are_removed_above_a_fraction(monkeypatch, ended, is_compacted):
-    # two of sixteen are the fraction
+def test_ended_trajectories_are_removed_if_they_exceed_a_fraction(monkeypatch, ended, is_compacted):
+    # two of sixteen do not exceed the fraction
     assert rk45.COMPACT_ABOVE == 2 / 16
     sizes = []
     advance = rk45._advance
@@ -249,12 +254,12 @@ def test_trajectories_that_have_ended_are_removed_above_a_fraction(monkeypatch, 
         return advance(problem, state, *arguments)
 
     monkeypatch.setattr(rk45, "_advance", recorded)
-    solution = springs([(1.0, 0.1, 0.0)] * ended + [(1e-6, 0.0, 0.0)] * (16 - ended))
+    solution = solve_springs([(1.0, 0.1, 0.0)] * ended + [(1e-6, 0.0, 0.0)] * (16 - ended))
     assert np.all(solution.termination == Termination.EVENT_REACHED)
     assert set(sizes) == ({16, 16 - ended} if is_compacted else {16})
 
 
-def test_the_step_follows_the_error_within_bounds():
+def test_the_step_size_follows_the_error_within_bounds():
     rtol = 1e-9
     grow, stay, shrink = rk45.next_step(np.array([2.0, 2.0, 2.0]), rtol * np.array([1e-30, 1.0, 1e30]), rtol)
     assert (grow, shrink) == (2.0 * rk45.MAX_FACTOR, 2.0 * rk45.MIN_FACTOR)
@@ -264,7 +269,7 @@ def test_the_step_follows_the_error_within_bounds():
     assert rk45.next_step(np.ones(50), errors, rtol) == pytest.approx(exact, rel=0.05)
 
 
-def test_the_norm_is_the_larger_error_and_keeps_what_is_not_a_number():
+def test_the_norm_is_the_larger_relative_error_and_propagates_nan():
     def norm(first, second):
         y = np.array([0.5, -2.0, 1.0, -3.0])
         return rk45.error_norm(*map(np.asarray, (first, second, *y)), (1e-200, 1e-200))
@@ -276,21 +281,21 @@ def test_the_norm_is_the_larger_error_and_keeps_what_is_not_a_number():
     assert np.isnan(norm(1.0, np.nan))
 
 
-def test_a_secant_leads_to_the_root_of_a_line_but_not_out_of_the_step():
+def test_the_secant_method_finds_the_root_of_a_line_but_stays_within_the_step():
     left, right = np.zeros(3), np.ones(3)
     slopes = np.array([1.0, 1.0, 3.0]), np.array([-1.0, -3.0, 1.0])
     assert maximum.secant_update(left, slopes[0], right, slopes[1]).tolist() == [0.5, 0.25, 1.0]
 
 
-@pytest.mark.parametrize("known", PROBLEMS, ids=str)
-def test_every_recorded_step_begins_where_the_one_before_ended(known):
-    # at this tolerance each problem has a step across its event, which is tried again and not recorded
-    steps = solve(known, 1e-3, record=True).recorded
+@pytest.mark.parametrize("solved", PROBLEMS, ids=str)
+def test_every_recorded_step_begins_at_the_end_of_the_previous_step(solved):
+    # at this tolerance each problem has a step across its event, which is rejected and not recorded
+    steps = solve_problem(solved, 1e-3, record=True).recorded
     for before, step in pairwise(steps):
         assert step.start == pytest.approx(before.at(1.0), abs=1e-14)
 
 
-def test_the_maximum_is_located_where_it_is_asked_for_only():
+def test_the_maximum_is_located_only_if_it_is_watched():
     unwatched = replace(OSCILLATOR.problem, watch=False)
     start = np.array(OSCILLATOR.initial_state).reshape(2, 1)
     assert integrate(unwatched, start, (), rtol=1e-9, max_steps=1000).maximum.tolist() == [-np.inf]
