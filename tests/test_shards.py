@@ -1,31 +1,34 @@
-"""`impact sweep --shard` and `impact merge`: the parts make what the sweep makes, or it is said what they lack."""
+"""Merged shards give the file of the whole sweep; missing, unfinished and foreign shards are reported."""
 
 from __future__ import annotations
 
+import contextlib
 import json
+import re
 import shlex
 import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from filelock import FileLock
 
 import impact
-from impact.api import prepare
-from impact.results.sweep import sweep_into
+from impact import ImpactError
+from impact.errors import UsageError
 
 from .clusters import content, sweep
 from .conftest import Run
 from .fork_server import ForkServer
 
-# a block of each law
+# one block for each law
 CONFIG = """title = "In parts"
 models = ["hertz", "lankarani-nikravesh-1990", "hunt-crossley-1975", "lee-wang-1983", "exact-hysteresis"]
 [solver]
-rtol = 1e-6
+rtol = 1e-4
 [sweep]
 e = { linspace = [0.0, 1.0, 30] }
 v1 = 1.0
@@ -34,7 +37,7 @@ m2 = [1.0, 2.0]
 K = 1e9
 """
 BLOCKS = 5
-MINE = """import impact
+PLUGIN = """import impact
 
 MODEL = impact.hysteresis("mine", title="", year=2026, equation="", reference="", chi=lambda e: 1 - e)
 """
@@ -46,236 +49,258 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def shards(cli: Run, folder: Path, *parts: str, words: tuple[str, ...] = ()) -> list[Path]:
-    """Do some shards; their folders."""
-    for part in parts:
-        done = cli("sweep", "c.toml", "--shard", part, "--quiet", *words, cwd=folder)
-        assert (done.returncode, done.stderr) == (0, "")
-    return [folder / f"results.h5.{part.replace('/', '-of-')}.work" for part in parts]
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """The file of the sweep without shards."""
+    folder = tmp_path_factory.mktemp("whole")
+    (folder / "c.toml").write_text(CONFIG)
+    impact.sweep_to_file(folder / "c.toml", folder / "results.h5")
+    return content(folder)
 
 
-def right(folder: Path) -> bytes:
-    """The file of the sweep in one piece."""
-    sweep_into(folder / "right.h5", prepare(folder / "c.toml"), overwrite=True)
-    return (folder / "right.h5").read_bytes()
+def run_shards(folder: Path, *shards: str, **options: Any) -> list[Path]:
+    """Integrate shards in this process; return their work folders."""
+    with contextlib.chdir(folder):
+        return [folder / impact.sweep_shard("c.toml", shard, "results.h5", **options).folder for shard in shards]
 
 
-def merged(cli: Run, folder: Path, *folders: Path) -> str:
-    """What it said."""
-    done = cli("merge", *folders, cwd=folder)
-    assert done.returncode == 0, done.stderr
-    assert content(folder) == right(folder)
-    return done.stderr
+def change_last_bits(path: Path) -> None:
+    """Change the last bits of an array of a block."""
+    with np.load(path) as stored:
+        arrays = {name: stored[name] for name in stored.files}
+    arrays["contact_time"] = np.nextafter(arrays["contact_time"], 1.0)
+    np.savez(path, **arrays)
 
 
-@pytest.mark.parametrize("of", [1, 3, pytest.param(7, marks=pytest.mark.slow)])
-def test_the_parts_in_any_order_make_the_whole(cli: Run, folder: Path, of: int) -> None:
-    found = shards(cli, folder, *(f"{number}/{of}" for number in range(of, 0, -1)))
-    counts = [len(list(one.glob("*.npz"))) for one in found]
-    assert sum(counts) == BLOCKS
-    assert max(counts) - min(counts) <= 1
-    said = merged(cli, folder, *found)
-    assert "results.h5: 300 points from" in said
-    assert all(one.is_dir() for one in found)
+@pytest.mark.parametrize("count", [1, 3, pytest.param(7, marks=pytest.mark.slow)])
+def test_shards_in_any_order_merge_to_the_file_of_the_whole_sweep(
+    cli: Run, folder: Path, whole: bytes, count: int
+) -> None:
+    folders = run_shards(folder, *(f"{number}/{count}" for number in range(count, 0, -1)))
+    blocks = [len(list(path.glob("*.npz"))) for path in folders]
+    assert sum(blocks) == BLOCKS
+    assert max(blocks) - min(blocks) <= 1
+    completed = cli("merge", *folders, cwd=folder)
+    assert completed.returncode == 0, completed.stderr
+    assert content(folder) == whole
+    assert "results.h5: 300 points from" in completed.stderr
+    assert all(path.is_dir() for path in folders)
 
 
-def test_a_shard_says_what_it_did_and_what_comes_next(cli: Run, folder: Path) -> None:
-    done = cli("sweep", "c.toml", "--shard", "2/2", "-o", "out.h5", cwd=folder)
-    assert done.returncode == 0
-    assert "out.h5.2-of-2.work: 2 of 5 blocks, " in done.stderr
-    assert "with all 2 shards: impact merge out.h5.*-of-2.work -o out.h5" in done.stderr
-    told = json.loads(cli("sweep", "c.toml", "--shard", "2/2", "-o", "out.h5", "--json", cwd=folder).stdout)
-    assert told == {
-        "folder": "out.h5.2-of-2.work", "shard": "2/2", "blocks": 2, "of_blocks": 5, "trajectories": 60,
-        "failed": 0,
-    }  # fmt: skip
-    # again, there is nothing left to do
+def test_a_shard_reports_its_blocks_and_the_merge_command_and_is_not_integrated_twice(
+    cli: Run, folder: Path
+) -> None:
+    words = ("sweep", "c.toml", "--shard", "2/2", "-o", "out.h5")
+    completed = cli(*words, cwd=folder)
+    assert completed.returncode == 0
+    assert "out.h5.2-of-2.work: 2 of 5 blocks, " in completed.stderr
+    assert "with all 2 shards: impact merge out.h5.*-of-2.work -o out.h5" in completed.stderr
     before = {path: path.stat().st_mtime_ns for path in folder.glob("*.work/*.npz")}
-    assert cli("sweep", "c.toml", "--shard", "2/2", "-o", "out.h5", cwd=folder).returncode == 0
+    repeated = cli(*words, "--json", cwd=folder)
+    assert json.loads(repeated.stdout) == {
+        "folder": "out.h5.2-of-2.work",
+        "shard": "2/2",
+        "blocks": 2,
+        "of_blocks": 5,
+        "trajectories": 60,
+        "failed": 0,
+    }
     assert {path: path.stat().st_mtime_ns for path in folder.glob("*.work/*.npz")} == before
 
 
-def test_a_missing_shard_is_named_with_the_command_that_makes_it(cli: Run, folder: Path) -> None:
-    found = shards(cli, folder, "1/3", "3/3", words=("--set", "sweep.v1=2.0"))
-    done = cli("merge", *found, cwd=folder)
-    assert done.returncode == 2
+def test_a_missing_shard_is_reported_with_the_command_that_integrates_it(cli: Run, folder: Path) -> None:
+    folders = run_shards(folder, "1/3", "3/3", overrides=["sweep.v1=2.0"])
+    completed = cli("merge", *folders, cwd=folder)
+    assert completed.returncode == 2
     command = "impact sweep c.toml -o results.h5 --set sweep.v1=2.0 --shard 2/3"
-    assert done.stderr.splitlines()[-1] == f"results.h5: shard 2/3 is missing; {command} computes it"
+    assert completed.stderr.splitlines()[-1] == f"results.h5: shard 2/3 is missing; {command} computes it"
     assert not (folder / "results.h5").exists()
     assert cli(*shlex.split(command)[1:], cwd=folder).returncode == 0
-    assert cli("merge", *folder.glob("results.h5.*-of-3.work"), cwd=folder).returncode == 0
-    whole = impact.sweep(folder / "c.toml", overrides=["sweep.v1=2.0"])
-    assert impact.load(folder / "results.h5").identical(whole)
+    impact.merge(list(folder.glob("results.h5.*-of-3.work")), folder / "results.h5")
+    expected = impact.sweep(folder / "c.toml", overrides=["sweep.v1=2.0"])
+    assert impact.load(folder / "results.h5").identical(expected)
 
 
-def test_an_unfinished_shard_is_told_from_a_missing_one(cli: Run, folder: Path) -> None:
-    found = shards(cli, folder, "1/2", "2/2")
-    (found[1] / "00000003.npz").write_bytes(b"half of it")
-    done = cli("merge", *found, cwd=folder)
-    assert done.returncode == 2
+def test_an_unfinished_shard_is_reported_with_the_command_that_finishes_it(
+    cli: Run, folder: Path, whole: bytes
+) -> None:
+    folders = run_shards(folder, "1/2", "2/2")
+    (folders[1] / "00000003.npz").write_bytes(b"half of it")
+    completed = cli("merge", *folders, cwd=folder)
+    assert completed.returncode == 2
     command = "impact sweep c.toml -o results.h5 --shard 2/2"
-    assert done.stderr.splitlines()[-1] == f"{found[1]}: shard 2/2 lacks 1 block; {command} finishes it"
+    assert completed.stderr.splitlines()[-1] == f"{folders[1]}: shard 2/2 lacks 1 block; {command} finishes it"
     assert cli(*shlex.split(command)[1:], cwd=folder).returncode == 0
-    merged(cli, folder, *found)
+    impact.merge(folders, folder / "results.h5")
+    assert content(folder) == whole
 
 
-LIMITED = """import resource
+FEW_OPEN_FILES = """import resource
 resource.setrlimit(resource.RLIMIT_NOFILE, (40, 40))
 """
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a limit of open files")
-def test_more_shards_than_open_files_are_merged(cli: Run, forked: ForkServer, folder: Path) -> None:
-    # of the 60 only five have a range, and each is a folder with a lock
-    found = shards(cli, folder, "1/60", "2/60", "3/60", "4/60", "5/60")
+def test_more_shards_than_the_limit_of_open_files_are_merged(
+    forked: ForkServer, folder: Path, whole: bytes
+) -> None:
+    # only five of the 60 shards have a block, and each is a folder with a lock
+    folders = run_shards(folder, *(f"{number}/60" for number in range(1, 6)))
     for number in range(6, 61):
-        found.append(folder / f"results.h5.{number}-of-60.work")
-        shutil.copytree(found[0], found[-1])
-        told = json.loads((found[-1] / "shard.json").read_text()) | {"shard": [number, 60]}
-        (found[-1] / "shard.json").write_text(json.dumps(told))
-        (found[-1] / "00000000.npz").unlink()
-    done = forked("merge", *reversed(found), cwd=folder, code=LIMITED)
-    assert done.returncode == 0, done.stderr
-    assert content(folder) == right(folder)
+        folders.append(folder / f"results.h5.{number}-of-60.work")
+        shutil.copytree(folders[0], folders[-1])
+        record = json.loads((folders[-1] / "shard.json").read_text()) | {"shard": [number, 60]}
+        (folders[-1] / "shard.json").write_text(json.dumps(record))
+        (folders[-1] / "00000000.npz").unlink()
+    completed = forked("merge", *reversed(folders), cwd=folder, code=FEW_OPEN_FILES)
+    assert completed.returncode == 0, completed.stderr
+    assert content(folder) == whole
 
 
 @pytest.mark.slow
-def test_many_missing_ones_are_counted(cli: Run, folder: Path) -> None:
+def test_five_missing_shards_are_listed_and_more_are_counted(cli: Run, folder: Path) -> None:
     more = '"gharib-hurmuzlu-2012", "herbert-mcwhannell-1977", "lankarani-nikravesh-1994"]'
     (folder / "c.toml").write_text(CONFIG.replace('hysteresis"]', f'hysteresis", {more}'))
-    done = cli("merge", *shards(cli, folder, "9/9"), cwd=folder)
-    lines = done.stderr.splitlines()
+    completed = cli("merge", *run_shards(folder, "9/9"), cwd=folder)
+    lines = completed.stderr.splitlines()
     assert [line.split(":")[1].split(";")[0] for line in lines[:-1]] == [
         f" shard {number}/9 is missing" for number in range(1, 6)
     ]
     assert lines[-1] == "and 3 more shards"
 
 
-def test_foreign_ones_are_told(cli: Run, folder: Path) -> None:
-    own = shards(cli, folder, "1/2")
+def test_a_folder_of_another_sweep_or_of_no_shard_is_refused(cli: Run, folder: Path) -> None:
+    first = run_shards(folder, "1/2")
     (folder / "c.toml").write_text(CONFIG.replace("v1 = 1.0", "v1 = 2.0"))
-    other = shards(cli, folder, "2/2")
-    done = cli("merge", *own, *other, cwd=folder)
-    assert done.returncode == 2
-    assert f"{other[0]}: belongs to another sweep: scalars.v1: 2.0 there, 1.0 here; " in done.stderr
-    shutil.rmtree(other[0])
+    (second,) = run_shards(folder, "2/2")
+
+    def refused(*folders: str | Path) -> str:
+        with pytest.raises(ImpactError) as error:
+            impact.merge([*first, *folders], folder / "results.h5")
+        return str(error.value)
+
+    completed = cli("merge", *first, second, cwd=folder)
+    assert completed.returncode == 2
+    assert f"{second}: belongs to another sweep: scalars.v1: 2.0 there, 1.0 here; " in completed.stderr
+    shutil.rmtree(second)
     (folder / "c.toml").write_text(CONFIG.replace("In parts", "Else"))
-    shards(cli, folder, "2/2")
-    done = cli("merge", *own, *other, cwd=folder)
-    assert f"{other[0]}: its title or output differs from that of {own[0]}; expected" in done.stderr
-    for name, said in (("c.toml", "is not a shard"), ("nowhere.work", "is not a shard")):
-        done = cli("merge", *own, name, cwd=folder)
-        assert done.returncode == 2
-        assert f"{name}: {said}; expected a work folder of impact sweep --shard K/N" in done.stderr
-    (other[0] / "plan.json").write_text("[")
-    assert "its plan.json cannot be read" in cli("merge", *own, *other, cwd=folder).stderr
+    run_shards(folder, "2/2")
+    assert f"{second}: its title or output differs from that of {first[0]}; expected" in refused(second)
+    for path in (folder / "c.toml", folder / "nowhere.work"):
+        message = f"{path}: is not a shard; expected a work folder of impact sweep --shard K/N"
+        assert message in refused(path)
+    (second / "plan.json").write_text("[")
+    assert "its plan.json cannot be read" in refused(second)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "text", ["[]", "{}", '{"shard": [1, 0]}', '{"shard": [true, "x"], "command": 1}', "[" * 9000]
 )
-def test_what_a_folder_says_may_be_anything(cli: Run, folder: Path, text: str) -> None:
-    (found,) = shards(cli, folder, "1/1")
-    (found / "shard.json").write_text(text)
-    done = cli("merge", found, cwd=folder)
-    assert done.returncode == 2
-    assert "is not a shard; expected a work folder of impact sweep --shard K/N" in done.stderr
+def test_an_invalid_shard_record_is_refused(cli: Run, folder: Path, text: str) -> None:
+    (shard,) = run_shards(folder, "1/1")
+    (shard / "shard.json").write_text(text)
+    completed = cli("merge", shard, cwd=folder)
+    assert completed.returncode == 2
+    assert "is not a shard; expected a work folder of impact sweep --shard K/N" in completed.stderr
 
 
-def test_blocks_in_two_shards_have_to_be_equal(cli: Run, folder: Path) -> None:
-    whole, part = shards(cli, folder, "1/1", "1/5")
-    assert "in more than one folder, with the same bits" in merged(cli, folder, whole, part)
-    (path,) = part.glob("0*.npz")
-    with np.load(path) as stored:
-        arrays = {name: stored[name] for name in stored.files}
-    np.savez(path, **{**arrays, "contact_time": np.nextafter(arrays["contact_time"], 1.0)})
-    done = cli("merge", whole, part, "--overwrite", cwd=folder)
-    assert done.returncode == 2
-    assert f"{path}: differs from {whole / path.name}; expected both" in done.stderr
+def test_blocks_of_overlapping_shards_have_to_be_equal(cli: Run, folder: Path, whole: bytes) -> None:
+    all_blocks, first_block = run_shards(folder, "1/1", "1/5")
+    completed = cli("merge", all_blocks, first_block, cwd=folder)
+    assert "in more than one folder, with the same bits" in completed.stderr
+    assert content(folder) == whole
+    (path,) = first_block.glob("0*.npz")
+    change_last_bits(path)
+    with pytest.raises(ImpactError, match=re.escape(f"{path}: differs from {all_blocks / path.name}; ")):
+        impact.merge([all_blocks, first_block], folder / "results.h5", overwrite=True)
 
 
 @pytest.mark.slow
-def test_shards_that_overlap_are_one_where_their_bits_are(cli: Run, folder: Path) -> None:
-    found = shards(cli, folder, "1/2", "2/2", "1/3")
-    said = merged(cli, folder, *found, found[0])
-    assert "2 blocks were in more than one folder, with the same bits" in said
-    path = found[2] / "00000000.npz"
-    with np.load(path) as stored:
-        arrays = {name: stored[name] for name in stored.files}
-    arrays["contact_time"] = np.nextafter(arrays["contact_time"], 1.0)
-    np.savez(path, **arrays)
-    done = cli("merge", *found, "--overwrite", cwd=folder)
-    assert done.returncode == 2
-    assert (
-        f"{path}: differs from {found[0] / path.name}; expected both to be computed on the same type of processor"
-        in done.stderr
-    )
+def test_repeated_blocks_are_counted_and_differing_ones_are_refused(cli: Run, folder: Path, whole: bytes) -> None:
+    folders = run_shards(folder, "1/2", "2/2", "1/3")
+    completed = cli("merge", *folders, folders[0], cwd=folder)
+    assert "2 blocks were in more than one folder, with the same bits" in completed.stderr
+    assert content(folder) == whole
+    path = folders[2] / "00000000.npz"
+    change_last_bits(path)
+    completed = cli("merge", *folders, "--overwrite", cwd=folder)
+    assert completed.returncode == 2
+    message = f"{path}: differs from {folders[0] / path.name}; expected both to be computed on the same type of processor"
+    assert message in completed.stderr
 
 
-def test_a_shard_that_is_being_made_is_told(cli: Run, folder: Path) -> None:
-    found = shards(cli, folder, "1/2", "2/2")
-    with FileLock(found[1] / "lock"):
-        done = cli("merge", *found, cwd=folder)
-        assert done.returncode == 5
-        assert "results.h5.2-of-2: is being written by another process" in done.stderr
+def test_a_shard_that_another_process_writes_is_not_merged(cli: Run, folder: Path) -> None:
+    folders = run_shards(folder, "1/2", "2/2")
+    with FileLock(folders[1] / "lock"):
+        completed = cli("merge", *folders, cwd=folder)
+        assert completed.returncode == 5
+        assert "results.h5.2-of-2: is being written by another process" in completed.stderr
         assert cli("sweep", "c.toml", "--shard", "2/2", cwd=folder).returncode == 5
 
 
 @pytest.mark.slow
-def test_a_model_of_ones_own_is_wanted_again(cli: Run, folder: Path) -> None:
-    (folder / "mine.py").write_text(MINE)
+def test_a_merge_needs_the_plug_in_of_the_shards(cli: Run, folder: Path) -> None:
+    (folder / "mine.py").write_text(PLUGIN)
     (folder / "c.toml").write_text(CONFIG.replace('"hertz"', '"mine"'))
-    found = shards(cli, folder, "1/2", "2/2", words=("--plugin", "mine.py"))
-    done = cli("merge", *found, cwd=folder)
-    assert done.returncode == 2
-    assert "made with mine of mine.py; give it again with --plugin FILE" in done.stderr
-    assert cli("merge", *found, "--plugin", "mine.py", cwd=folder).returncode == 0
+    folders = run_shards(folder, "1/2", "2/2", plugins=["mine.py"])
+    completed = cli("merge", *folders, cwd=folder)
+    assert completed.returncode == 2
+    assert "made with mine of mine.py; give it again with --plugin FILE" in completed.stderr
+    assert cli("merge", *folders, "--plugin", "mine.py", cwd=folder).returncode == 0
 
 
-def test_another_sweep_does_not_go_on_in_its_folder(cli: Run, folder: Path) -> None:
-    shards(cli, folder, "1/2")
-    done = cli("sweep", "c.toml", "--shard", "1/2", "--set", "sweep.v1=2.0", cwd=folder)
-    assert done.returncode == 2
-    assert "results.h5.1-of-2.work: belongs to another sweep: scalars.v1: 1.0 there, 2.0 here" in done.stderr
-    shards(cli, folder, "1/2", words=("--set", "sweep.v1=2.0", "--overwrite"))
+def test_a_shard_of_another_sweep_is_not_continued_but_can_be_overwritten(cli: Run, folder: Path) -> None:
+    run_shards(folder, "1/2")
+    words = ("sweep", "c.toml", "--shard", "1/2", "--set", "sweep.v1=2.0", "--quiet")
+    completed = cli(*words, cwd=folder)
+    assert completed.returncode == 2
+    assert "results.h5.1-of-2.work: belongs to another sweep: scalars.v1: 1.0 there, 2.0 here" in completed.stderr
+    completed = cli(*words, "--overwrite", cwd=folder)
+    assert (completed.returncode, completed.stderr) == (0, "")
 
 
 @pytest.mark.parametrize("text", ["3", "0/4", "5/4", "1/0", "-1/2", "1/2/3", "a/b", ""])
-def test_what_is_no_shard_is_told(cli: Run, folder: Path, text: str) -> None:
-    done = cli("sweep", "c.toml", f"--shard={text}", cwd=folder)
-    assert done.returncode == 2
-    assert f"--shard {text}: expected K/N with K from 1 to N, such as 3/16" in done.stderr
+def test_an_invalid_number_of_a_shard_is_refused(folder: Path, text: str) -> None:
+    message = f"--shard {text}: expected K/N with K from 1 to N, such as 3/16"
+    with pytest.raises(UsageError, match=re.escape(message)):
+        run_shards(folder, text)
+
+
+def test_an_invalid_number_of_a_shard_is_refused_on_the_command_line(cli: Run, folder: Path) -> None:
+    completed = cli("sweep", "c.toml", "--shard=-1/2", cwd=folder)
+    assert completed.returncode == 2
+    assert "--shard -1/2: expected K/N with K from 1 to N, such as 3/16" in completed.stderr
 
 
 @pytest.mark.slow
-def test_failed_points_are_told_by_the_shard_and_end_the_merge_with_three(cli: Run, folder: Path) -> None:
-    few = ("--set", "solver.max_steps=1")
-    done = cli("sweep", "c.toml", "--shard", "1/2", *few, cwd=folder)
-    assert done.returncode == 0
-    # one of the elastic law and thirty of each other; a plastic limit takes no step
-    assert ": 3 of 5 blocks, 61 trajectories, 60 failed; " in done.stderr
-    shards(cli, folder, "2/2", words=few)
-    found = sorted(folder.glob("*.work"))
-    done = cli("merge", *found, "--json", cwd=folder)
-    assert done.returncode == 3
-    assert json.loads(done.stdout)["status"]["max_steps"] > 0
-    assert cli("merge", *found, "--overwrite", "--allow-failed", cwd=folder).returncode == 0
+def test_a_shard_counts_failed_points_and_a_merge_with_failed_points_exits_with_3(cli: Run, folder: Path) -> None:
+    few_steps = ("--set", "solver.max_steps=1")
+    completed = cli("sweep", "c.toml", "--shard", "1/2", *few_steps, cwd=folder)
+    assert completed.returncode == 0
+    # a trajectory of the elastic law and thirty of each other; a plastic limit takes no step
+    assert ": 3 of 5 blocks, 61 trajectories, 60 failed; " in completed.stderr
+    run_shards(folder, "2/2", overrides=few_steps[1:])
+    folders = sorted(folder.glob("*.work"))
+    completed = cli("merge", *folders, "--json", cwd=folder)
+    assert completed.returncode == 3
+    assert json.loads(completed.stdout)["status"]["max_steps"] > 0
+    assert cli("merge", *folders, "--overwrite", "--allow-failed", cwd=folder).returncode == 0
 
 
 @pytest.mark.slow
-def test_shards_that_are_killed_go_on_and_make_the_whole(tmp_path: Path) -> None:
-    sweep(tmp_path / "one").ends()
+def test_killed_shards_are_continued_and_merge_to_the_whole(tmp_path: Path) -> None:
+    sweep(tmp_path / "whole").ends()
     kept: dict[Path, int] = {}
     for number, count in ((1, 1), (1, 4), (2, 9)):
-        part = sweep(tmp_path / "two", "--shard", f"{number}/2")
-        part.until_kept(count)
-        part.process.kill()
-        part.process.communicate()
-        kept = {path: path.stat().st_mtime_ns for path in part.folder.glob("*.work/*.npz")}
+        running = sweep(tmp_path / "shards", "--shard", f"{number}/2")
+        running.until_kept(count)
+        running.process.kill()
+        running.process.communicate()
+        kept = {path: path.stat().st_mtime_ns for path in running.folder.glob("*.work/*.npz")}
     for number in (1, 2):
-        sweep(tmp_path / "two", "--shard", f"{number}/2").ends()
-    assert all(path.stat().st_mtime_ns == then for path, then in kept.items())
-    folders = list((tmp_path / "two").glob("*.work"))
-    subprocess.run([sys.executable, "-m", "impact", "merge", *folders], cwd=tmp_path / "two", check=True)
-    assert content(tmp_path / "two") == content(tmp_path / "one")
+        sweep(tmp_path / "shards", "--shard", f"{number}/2").ends()
+    assert all(path.stat().st_mtime_ns == modified for path, modified in kept.items())
+    folders = list((tmp_path / "shards").glob("*.work"))
+    subprocess.run([sys.executable, "-m", "impact", "merge", *folders], cwd=tmp_path / "shards", check=True)
+    assert content(tmp_path / "shards") == content(tmp_path / "whole")
