@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 import xarray as xr
@@ -15,6 +16,9 @@ from hypothesis import settings
 import impact
 
 from .fork_server import CompletedCommand, ForkServer, start_fork_server
+
+if TYPE_CHECKING:
+    from .faults import SweepServer
 
 # no test is about time
 settings.register_profile("untimed", deadline=None)
@@ -53,6 +57,16 @@ def forked() -> Iterator[ForkServer]:
     """Run the program hundreds of times: processes of a server that has imported what they need."""
     with start_fork_server() as run:
         yield run
+
+
+@pytest.fixture(scope="session")
+def sweeps(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SweepServer]:
+    """Run sweeps with faults: processes of a server that makes blocks and slabs small."""
+    # this module needs Linux
+    from .faults import start_sweep_server
+
+    with start_sweep_server(tmp_path_factory.mktemp("sweeps")) as server:
+        yield server
 
 
 @pytest.fixture(scope="session")

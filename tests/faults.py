@@ -1,8 +1,8 @@
-"""Sweeps that meet a fault: the command line in real processes, in which a call of the system kills or fails.
+"""Inject faults into sweeps: the command line in real processes, in which a system call is interrupted or fails.
 
-A server imports what a sweep needs once, makes ranges and slabs small, and forks. Its standard input has a request
-a line, what to start or whom to wait for; its standard output a reply a line, a process id or how the process
-ended.
+A server imports the modules of a sweep once, makes blocks and slabs small, and forks. It reads requests from
+standard input, one per line: a command to start or a process to wait for. It writes one reply per line to standard
+output: a process id or an exit status.
 """
 
 from __future__ import annotations
@@ -30,9 +30,10 @@ from typing import Any, NoReturn
 
 from .fork_server import POLL_INTERVAL_S, ROOT, run_command
 
-RANGE, SLAB = 64, 128  # trajectories of a range, and points of a slab: many of each in little time
+# small, for many blocks and slabs in a short time
+BLOCK_TRAJECTORIES, SLAB_POINTS = 64, 128
 CONFIG, RESULT, WORK = "c.toml", "results.h5", "results.h5.work"
-TEXT = """title = "Small"
+CONFIG_TEXT = """title = "Small"
 models = ["hertz", "lankarani-nikravesh-1990"]
 [solver]
 rtol = 1e-4
@@ -45,10 +46,10 @@ m1 = 1.0
 m2 = [1.0, 2.0]
 K = 1e9
 """
-# the same, with the trajectory table in the file
-FACTORED = TEXT.replace("[output]", '[output]\nlayout = "factored"')
-BLOCKS = 3  # one of the first model, to which e is nothing, and two of the second
-PATIENCE = 60.0  # s after which what should have happened is not waited for any more
+# the same sweep, stored as a trajectory table
+FACTORED_CONFIG = CONFIG_TEXT.replace("[output]", '[output]\nlayout = "factored"')
+BLOCKS = 3  # one for the first model, which does not depend on e, and two for the second
+TIMEOUT_S = 60.0  # limit of every wait
 Log = list[list[Any]]
 
 
@@ -56,57 +57,57 @@ Log = list[list[Any]]
 
 
 def tap(visit: Callable[..., Any]) -> None:
-    """Have `visit(do, kind, path, ...)` in the place of each call that changes a folder; `do()` does it.
+    """Call `visit(do, kind, path, ...)` instead of each system call that changes a folder; `do()` performs it.
 
-    The paths are relative to the folder that we are in. What is written is given as its place and its bytes, and
-    `do(part)` writes a part of it.
+    Paths are relative to the working directory. For a write `visit` also gets the offset and the bytes, and
+    `do(part)` writes a part of them.
     """
 
-    def own(path: Any) -> str:
-        found = os.readlink(f"/proc/self/fd/{path}") if isinstance(path, int) else os.path.abspath(path)
-        return os.path.relpath(found)
+    def relative_path(path: Any) -> str:
+        absolute = os.readlink(f"/proc/self/fd/{path}") if isinstance(path, int) else os.path.abspath(path)
+        return os.path.relpath(absolute)
 
-    def tapped(name: str, wanted: Callable[..., bool]) -> None:
+    def wrap(name: str, is_selected: Callable[..., bool]) -> None:
         real = getattr(os, name)
         kind = {"open": "create", "replace": "rename"}.get(name, name)
 
-        def instead(*words: Any, **more: Any) -> Any:
-            if not wanted(*words) or own(words[0]).startswith(".."):
-                return real(*words, **more)
-            paths = [own(one) for one in words[: 2 if kind in ("link", "rename") else 1]]
-            return visit(lambda: real(*words, **more), kind, *paths)
+        def wrapper(*args: Any, **options: Any) -> Any:
+            if not is_selected(*args) or relative_path(args[0]).startswith(".."):
+                return real(*args, **options)
+            paths = [relative_path(path) for path in args[: 2 if kind in ("link", "rename") else 1]]
+            return visit(lambda: real(*args, **options), kind, *paths)
 
-        setattr(os, name, instead)
+        setattr(os, name, wrapper)
 
     for name in ("fsync", "link", "rename", "replace", "unlink", "mkdir", "rmdir"):
-        tapped(name, lambda *words: True)
-    tapped("open", lambda path, flags=0, *words: bool(flags & os.O_CREAT))
+        wrap(name, lambda *args: True)
+    wrap("open", lambda path, flags=0, *args: bool(flags & os.O_CREAT))
 
-    class Tapped(io.FileIO):
+    class RecordedFileIO(io.FileIO):
         def __init__(self, path: Any, mode: str) -> None:
-            visit(lambda: io_file.__init__(self, path, mode), "create", own(path))
+            visit(lambda: io_file.__init__(self, path, mode), "create", relative_path(path))
 
         def write(self, content: Any, /) -> int:
-            held = bytes(content)
-            do = lambda part=held: io_file.write(self, part)  # noqa: E731
-            return int(visit(do, "write", own(self.fileno()), self.tell(), held))
+            content_bytes = bytes(content)
+            do = lambda part=content_bytes: io_file.write(self, part)  # noqa: E731
+            return int(visit(do, "write", relative_path(self.fileno()), self.tell(), content_bytes))
 
         def truncate(self, size: int | None = None, /) -> int:
             size = self.tell() if size is None else size
-            return int(visit(lambda: io_file.truncate(self, size), "truncate", own(self.fileno()), size))
+            return int(visit(lambda: io_file.truncate(self, size), "truncate", relative_path(self.fileno()), size))
 
     io_file = io.FileIO
-    io.FileIO = Tapped  # type: ignore[misc]
+    io.FileIO = RecordedFileIO  # type: ignore[misc]
 
 
-def signalled(note: int, place: int | list[str], *numbers: int) -> None:
-    """Signals to itself right before an operation, of a number or the first that begins so."""
+def send_signals(log_fd: int, operation: int | list[str], *numbers: int) -> None:
+    """Send signals to this process right before an operation: its number, or the start of its log entry."""
     count = itertools.count()
 
     def visit(do: Callable[[], Any], *what: Any) -> Any:
-        nonlocal place
-        if place in (next(count), [*what[:2]]):
-            place = -1
+        nonlocal operation
+        if operation in (next(count), [*what[:2]]):
+            operation = -1
             for number in numbers:
                 os.kill(os.getpid(), number)
         return do()
@@ -114,77 +115,77 @@ def signalled(note: int, place: int | list[str], *numbers: int) -> None:
     tap(visit)
 
 
-def failing(note: int, place: int, number: int) -> None:
-    """From the operation of a number on the disk is full, and takes half of what is written; or one call fails."""
+def fail_disk(log_fd: int, operation: int, number: int) -> None:
+    """Let the disk be full from an operation on, which writes half of its bytes; or let one operation fail."""
     count = itertools.count()
 
     def visit(do: Callable[..., Any], kind: str, *what: Any) -> Any:
         at = next(count)
-        if number == errno.ENOSPC and at >= place and kind in ("write", "create", "mkdir"):
-            if at == place and kind == "write" and len(what[2]) > 1:
+        if number == errno.ENOSPC and at >= operation and kind in ("write", "create", "mkdir"):
+            if at == operation and kind == "write" and len(what[2]) > 1:
                 return do(what[2][: len(what[2]) // 2])
             raise OSError(number, os.strerror(number))
-        if number != errno.ENOSPC and at == place:
+        if number != errno.ENOSPC and at == operation:
             raise OSError(number, os.strerror(number))
         return do()
 
     tap(visit)
 
 
-def recorded(note: int, synced: bool = True) -> None:
-    """Keep a log of what is done; without fsync, if so wanted."""
+def record_operations(log_fd: int, synced: bool = True) -> None:
+    """Log all operations; without `synced`, fsync does nothing."""
 
     def visit(do: Callable[[], Any], kind: str, *what: Any) -> Any:
         if kind == "fsync" and not synced:
             return None
         try:
-            done = do()
+            returned = do()
         except OSError:
-            _tell(note, "none")
+            _log(log_fd, "none")
             raise
-        _tell(note, kind, *(one.hex() if isinstance(one, bytes) else one for one in what))
-        return done
+        _log(log_fd, kind, *(value.hex() if isinstance(value, bytes) else value for value in what))
+        return returned
 
     tap(visit)
 
 
-def limited(note: int, size: int) -> None:
-    """Files of no more than so many bytes, by a limit of the system."""
+def limit_file_size(log_fd: int, size: int) -> None:
+    """Limit the size of files [bytes] by a resource limit."""
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
 
 
-def _tell(note: int, *words: Any) -> None:
-    os.write(note, json.dumps(words).encode() + b"\n")
+def _log(log_fd: int, *words: Any) -> None:
+    os.write(log_fd, json.dumps(words).encode() + b"\n")
 
 
-def _watched(note: int) -> None:
-    """Tell when the sweep begins and ends, and each block that is kept."""
-    from impact.engine import checkpoint as work
-    from impact.results import sweep as sweeping
+def _log_progress(log_fd: int) -> None:
+    """Log the start and the end of the sweep, and each block that is stored."""
+    from impact.engine import checkpoint
+    from impact.results import sweep
 
-    sweep_into, store = sweeping.sweep_into, work.WorkFolder.store
+    sweep_into, store = sweep.sweep_into, checkpoint.WorkFolder.store
 
-    def noted_sweep(*words: Any, **more: Any) -> Any:
-        _tell(note, "begun")
+    def logged_sweep(*args: Any, **options: Any) -> Any:
+        _log(log_fd, "begun")
         try:
-            return sweep_into(*words, **more)
+            return sweep_into(*args, **options)
         finally:
-            _tell(note, "ended")
+            _log(log_fd, "ended")
 
-    def noted_store(folder: Any, part: Any, collisions: Any) -> None:
+    def logged_store(folder: Any, part: Any, collisions: Any) -> None:
         store(folder, part, collisions)
-        _tell(note, "kept", part.number)
+        _log(log_fd, "kept", part.number)
 
-    sweeping.sweep_into, work.WorkFolder.store = noted_sweep, noted_store  # type: ignore[method-assign]
+    sweep.sweep_into, checkpoint.WorkFolder.store = logged_sweep, logged_store  # type: ignore[method-assign]
 
 
 # ---- the server
 
 
 def serve() -> None:
-    """Answer requests until there are no more."""
+    """Answer requests until standard input is closed."""
     _warm_up()
-    # what is there to stay is not looked through again in each child
+    # the garbage collector of a child need not visit the shared objects
     gc.freeze()
     for line in sys.stdin:
         request = json.loads(line)
@@ -193,60 +194,62 @@ def serve() -> None:
 
 
 def _warm_up() -> None:
-    """Make ranges and slabs small before anything takes their sizes, and import what a sweep imports."""
+    """Make blocks and slabs small before other modules import their sizes, and import the modules of a sweep."""
     from impact.engine import trajectories
 
-    trajectories.RANGE_TRAJECTORIES, trajectories.trajectory_ranges.__defaults__ = RANGE, (RANGE,)
+    trajectories.RANGE_TRAJECTORIES = BLOCK_TRAJECTORIES
+    trajectories.trajectory_ranges.__defaults__ = (BLOCK_TRAJECTORIES,)
     from impact.results import factored, slabs
 
-    slabs.slabs.__defaults__, factored.SLAB_ROWS = (SLAB,), RANGE
+    slabs.slabs.__defaults__, factored.SLAB_ROWS = (SLAB_POINTS,), BLOCK_TRAJECTORIES
     import impact.cli.sweep
 
     with tempfile.TemporaryDirectory() as folder:
         config, result = Path(folder, CONFIG), Path(folder, RESULT)
-        for text in (TEXT, FACTORED, TEXT):
+        for text in (CONFIG_TEXT, FACTORED_CONFIG, CONFIG_TEXT):
             config.write_text(text)
             impact.cli.sweep.sweep(config, result, quiet=True, overwrite=True)
 
 
-def _start(argv: list[str], cwd: str, told: str, fault: list[Any]) -> int:
+def _start(argv: list[str], cwd: str, output: str, fault: list[Any]) -> int:
     child = os.fork()
     if child == 0:
-        _become(argv, cwd, told, fault)
+        _become(argv, cwd, output, fault)
     return child
 
 
-def _become(argv: list[str], cwd: str, told: str, fault: list[Any]) -> NoReturn:
-    """In the child: have the fault, and become the command, in a group of its own."""
+def _become(argv: list[str], cwd: str, output: str, fault: list[Any]) -> NoReturn:
+    """In the child: install the fault and execute the command, in a separate process group."""
     os.setpgid(0, 0)
-    note = os.open(f"{told}.log", os.O_WRONLY | os.O_CREAT | os.O_APPEND)
-    _watched(note)
+    log_fd = os.open(f"{output}.log", os.O_WRONLY | os.O_CREAT | os.O_APPEND)
+    _log_progress(log_fd)
     if fault:
-        {one.__name__: one for one in (signalled, failing, recorded, limited)}[fault[0]](note, *fault[1:])
-    with open(f"{told}.out", "wb") as out, open(f"{told}.err", "wb") as err:
+        faults = (send_signals, fail_disk, record_operations, limit_file_size)
+        {install.__name__: install for install in faults}[fault[0]](log_fd, *fault[1:])
+    with open(f"{output}.out", "wb") as out, open(f"{output}.err", "wb") as err:
         run_command(argv, cwd, "", out.fileno(), err.fileno())
 
 
 def _wait(pid: int, limit: float) -> int | None:
-    """How a child ended; None if it takes too long, and is killed."""
-    begun = time.monotonic()
+    """Wait for a child; return its exit status, or None if it was killed after the time limit [s]."""
+    start_time = time.monotonic()
     while True:
-        ended, status = os.waitpid(pid, os.WNOHANG)
-        if ended:
+        ended_pid, status = os.waitpid(pid, os.WNOHANG)
+        if ended_pid:
             return os.waitstatus_to_exitcode(status)
-        if time.monotonic() - begun > limit:
+        if time.monotonic() - start_time > limit:
             os.kill(pid, signal.SIGKILL)
             os.waitpid(pid, 0)
             return None
         time.sleep(POLL_INTERVAL_S)
 
 
-# ---- the client's side
+# ---- the client
 
 
 @dataclass(frozen=True)
-class Done:
-    """How a command line ended: a negative returncode is a signal; what it said, and the log of what it did."""
+class FinishedSweep:
+    """Result of a command line, and the log of its operations; a negative returncode is a signal."""
 
     returncode: int
     stdout: str
@@ -255,34 +258,34 @@ class Done:
 
     @property
     def kept(self) -> set[int]:
-        """The blocks that were integrated and kept."""
-        return {one[1] for one in self.log if one[0] == "kept"}
+        """The blocks that were integrated and stored."""
+        return {entry[1] for entry in self.log if entry[0] == "kept"}
 
 
 @dataclass(frozen=True)
-class Running:
-    """A command line that has been started; its id is not another's before it was waited for."""
+class RunningSweep:
+    """A command line that has been started; its process id stays reserved until `wait`."""
 
-    sweeps: Sweeps
+    sweeps: SweepServer
     pid: int
-    told: Path
+    output: Path
 
     def log(self) -> Log:
-        path = self.told.with_suffix(".log")
+        path = self.output.with_suffix(".log")
         return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
 
-    def until(self, *words: Any) -> None:
-        """Wait until the log has a line that begins so."""
-        until(lambda: any(one[: len(words)] == list(words) for one in self.log()) or self.state in "ZX")
+    def wait_until(self, *words: Any) -> None:
+        """Wait until the log has an entry that starts with these words, or the process has ended."""
+        wait_until(lambda: any(entry[: len(words)] == list(words) for entry in self.log()) or self.state in "ZX")
 
     @property
     def state(self) -> str:
-        return state_of(self.pid)
+        return process_state(self.pid)
 
     def signal(self, *numbers: int, group: bool = False) -> bool:
-        """Send signals, to it or to its group; not if the sweep has ended; give whether they were."""
+        """Send signals to the process or its group, unless the sweep has ended; return whether they were sent."""
         os.kill(self.pid, signal.SIGSTOP)
-        until(lambda: self.state in "TZX")
+        wait_until(lambda: self.state in "TZX")
         in_time = self.state == "T" and ["ended"] not in self.log()
         for number in numbers if in_time else ():
             (os.killpg if group else os.kill)(self.pid, number)
@@ -291,52 +294,52 @@ class Running:
 
     def children(self) -> list[int]:
         """The processes that it started."""
-        found = (int(path.name) for path in Path("/proc").glob("[0-9]*"))
-        return [pid for pid in found if parent_of(pid) == self.pid]
+        pids = (int(path.name) for path in Path("/proc").glob("[0-9]*"))
+        return [pid for pid in pids if parent_process(pid) == self.pid]
 
     def workers(self) -> list[int]:
-        """Those of them that integrate."""
+        """The child processes that integrate."""
         return [pid for pid in self.children() if "spawn_main" in _of_process(pid, "cmdline")]
 
-    def wait(self, limit: float = PATIENCE) -> Done:
-        """How it ended; it is a mistake if that takes so long [s]."""
+    def wait(self, limit: float = TIMEOUT_S) -> FinishedSweep:
+        """Wait for the end; fail after the time limit [s]."""
         code = self.sweeps.ask({"wait": {"pid": self.pid, "limit": limit}})
-        texts = [self.told.with_suffix(end).read_text() for end in (".out", ".err")]
-        assert code is not None, ("it hangs", *texts)
-        return Done(code, *texts, self.log())
+        texts = [self.output.with_suffix(end).read_text() for end in (".out", ".err")]
+        assert code is not None, ("the process hangs", *texts)
+        return FinishedSweep(code, *texts, self.log())
 
 
-def until(condition: Callable[[], bool]) -> None:
-    begun = time.monotonic()
+def wait_until(condition: Callable[[], bool]) -> None:
+    start_time = time.monotonic()
     while not condition():
-        assert time.monotonic() - begun < PATIENCE
+        assert time.monotonic() - start_time < TIMEOUT_S
         time.sleep(POLL_INTERVAL_S)
 
 
 def _of_process(pid: int, name: str) -> str:
-    """What the system tells of a process; nothing if it is gone."""
+    """The content of a file in /proc/PID; empty if the process does not exist."""
     try:
         return Path(f"/proc/{pid}/{name}").read_text()
     except OSError:
         return ""
 
 
-def state_of(pid: int) -> str:
-    """The state of a process as the system has it: T is stopped, Z has ended, X is not there."""
+def process_state(pid: int) -> str:
+    """The state of a process in /proc: T is stopped, Z has ended; X if it does not exist."""
     return (_of_process(pid, "stat").rpartition(")")[2].split() or ["X"])[0]
 
 
-def parent_of(pid: int) -> int:
+def parent_process(pid: int) -> int:
     return int((_of_process(pid, "stat").rpartition(")")[2].split() or ["X", "0"])[1])
 
 
 @dataclass(frozen=True)
-class Sweeps:
-    """A server, and a folder for what its processes tell; `sweeps(...)` runs a command line to its end."""
+class SweepServer:
+    """The client of a server, and a folder for logs and outputs; `sweeps(...)` runs a command line to its end."""
 
     server: subprocess.Popen[str]
-    told: Path
-    text: str = TEXT
+    base: Path
+    text: str = CONFIG_TEXT
     count: Iterator[int] = field(default_factory=itertools.count)
     digests: dict[str, str] = field(default_factory=dict)
 
@@ -347,33 +350,33 @@ class Sweeps:
         reply: int | None = json.loads(self.server.stdout.readline())
         return reply
 
-    def start(self, *words: str | Path | int, cwd: Path, fault: Sequence[Any] = ()) -> Running:
-        """Start `impact sweep c.toml -o results.h5` with more words, in a folder that has the config."""
-        told = self.told / str(next(self.count))
+    def start(self, *words: str | Path | int, cwd: Path, fault: Sequence[Any] = ()) -> RunningSweep:
+        """Start `impact sweep c.toml -o results.h5` with more words, in a folder with the config."""
+        output = self.base / str(next(self.count))
         argv = ["sweep", CONFIG, "-o", RESULT, "--quiet", *map(str, words)]
-        start = {"argv": argv, "cwd": str(cwd), "told": str(told), "fault": [*fault]}
+        start = {"argv": argv, "cwd": str(cwd), "output": str(output), "fault": [*fault]}
         pid = self.ask({"start": start})
         assert pid is not None
-        return Running(self, pid, told)
+        return RunningSweep(self, pid, output)
 
     def __call__(
-        self, *words: str | Path | int, cwd: Path, fault: Sequence[Any] = (), limit: float = PATIENCE
-    ) -> Done:
+        self, *words: str | Path | int, cwd: Path, fault: Sequence[Any] = (), limit: float = TIMEOUT_S
+    ) -> FinishedSweep:
         return self.start(*words, cwd=cwd, fault=fault).wait(limit)
 
-    def of(self, text: str) -> Sweeps:
-        """The same server, of another config."""
+    def with_config(self, text: str) -> SweepServer:
+        """The same server with another config."""
         return replace(self, text=text)
 
     def folder(self, text: str = "") -> Path:
         """A new folder with a config."""
-        path = self.told / f"folder{next(self.count)}"
+        path = self.base / f"folder{next(self.count)}"
         path.mkdir()
         (path / CONFIG).write_text(text or self.text)
         return path
 
-    def right(self, folder: Path) -> str:
-        """The SHA-256 of the file of the sweep of a folder, run here in one piece."""
+    def expected_digest(self, folder: Path) -> str:
+        """The SHA-256 of the result of a folder's config, computed in this process without a fault."""
         from impact.api import prepare
         from impact.results.sweep import sweep_into
 
@@ -386,70 +389,71 @@ class Sweeps:
 
     @cached_property
     def operations(self) -> Log:
-        """What an undisturbed sweep does with files, in order."""
-        log = self(cwd=self.folder(), fault=("recorded",)).log
-        return [one for one in log if one[0] not in ("begun", "kept", "ended")]
+        """The operations of a sweep without a fault, in order."""
+        log = self(cwd=self.folder(), fault=("record_operations",)).log
+        return [entry for entry in log if entry[0] not in ("begun", "kept", "ended")]
 
-    def place(self, *words: str) -> int:
-        """The first of these operations that begins so."""
-        return next(at for at, one in enumerate(self.operations) if one[: len(words)] == [*words])
+    def find_operation(self, *words: str) -> int:
+        """The number of the first of these operations that starts with these words."""
+        return next(at for at, entry in enumerate(self.operations) if entry[: len(words)] == [*words])
 
     @property
-    def renames(self) -> list[int]:
-        """Where the blocks get their names."""
-        return [at for at, one in enumerate(self.operations) if one[:2] == ["rename", f"{WORK}/block.part"]]
+    def block_renames(self) -> list[int]:
+        """The operations that give the blocks their names."""
+        return [at for at, entry in enumerate(self.operations) if entry[:2] == ["rename", f"{WORK}/block.part"]]
 
-    def places(self, count: int | None, first: int = 0, last: int | None = None) -> list[int]:
-        """So many of the operations from one to before another, half of them writes; all if no number is given."""
-        every = range(first, last or len(self.operations))
+    def choose_operations(self, count: int | None, first: int = 0, last: int | None = None) -> list[int]:
+        """Some operations from `first` to before `last`, half of them writes; without a count all of them."""
+        numbers = range(first, last or len(self.operations))
         if count is None:
-            return list(every)
-        writes = [at for at in every if self.operations[at][0] == "write"]
-        return sorted((*evenly(writes, count // 2), *evenly(sorted({*every} - {*writes}), count - count // 2)))
+            return list(numbers)
+        writes = [at for at in numbers if self.operations[at][0] == "write"]
+        others = sorted({*numbers} - {*writes})
+        return sorted((*pick_evenly(writes, count // 2), *pick_evenly(others, count - count // 2)))
 
-    def left(self, place: int) -> Path:
-        """A folder with what a sweep leaves that is killed at an operation."""
+    def run_killed_at(self, operation: int) -> Path:
+        """A folder that a sweep killed at an operation leaves."""
         folder = self.folder()
-        killed = self(cwd=folder, fault=("signalled", place, signal.SIGKILL))
+        killed = self(cwd=folder, fault=("send_signals", operation, signal.SIGKILL))
         assert killed.returncode == -signal.SIGKILL
         return folder
 
     @cached_property
     def finished(self) -> Path:
-        """What is left by one that had finished all blocks."""
-        return self.left(self.place("create", f"{RESULT}.part"))
+        """A folder that a sweep leaves that is killed after its last block."""
+        return self.run_killed_at(self.find_operation("create", f"{RESULT}.part"))
 
-    def copied(self, text: str = "") -> Path:
-        """A copy of that, with this config."""
+    def copy_finished(self, text: str = "") -> Path:
+        """A copy of `finished` with this config."""
         folder = self.folder(text)
         shutil.copytree(self.finished / WORK, folder / WORK)
         return folder
 
 
 @dataclass
-class Tally:
-    """What became of a fault: trials in which something finished was lost, or something wrong came out."""
+class FaultReport:
+    """The trials of a fault, and those that lost a finished block or gave a wrong result."""
 
     fault: str
-    sweeps: Sweeps
+    sweeps: SweepServer
     trials: int = 0
     lost: list[str] = field(default_factory=list)
     wrong: list[str] = field(default_factory=list)
 
-    def resumed(self, folder: Path, kept: set[int], at: object, *words: str | int) -> Done:
-        """Resume what a fault has left; the blocks that are kept are not to be done again."""
+    def resume(self, folder: Path, kept: set[int], at: object, *words: str | int) -> FinishedSweep:
+        """Resume the sweep after a fault; blocks that were kept must not be integrated again."""
         self.trials += 1
-        right = self.sweeps.right(folder)
-        if os.path.lexists(folder / RESULT) and digest(folder / RESULT) != right:
-            self.wrong.append(f"{at}: half a result")
-        done = self.sweeps("--resume", *words, cwd=folder)
-        if done.returncode != 0 or done.kept & kept:
-            self.lost.append(f"{at}: {done}, had kept {kept}")
-        if digest(folder / RESULT) != right:
-            self.wrong.append(f"{at}: {done}, {digest(folder / RESULT)}")
-        return done
+        expected = self.sweeps.expected_digest(folder)
+        if os.path.lexists(folder / RESULT) and digest(folder / RESULT) != expected:
+            self.wrong.append(f"{at}: incomplete result")
+        completed = self.sweeps("--resume", *words, cwd=folder)
+        if completed.returncode != 0 or completed.kept & kept:
+            self.lost.append(f"{at}: {completed}, had kept {kept}")
+        if digest(folder / RESULT) != expected:
+            self.wrong.append(f"{at}: {completed}, {digest(folder / RESULT)}")
+        return completed
 
-    def end(self) -> None:
+    def check(self) -> None:
         print(f"{self.fault} | {self.trials} | {len(self.lost)} | {len(self.wrong)}")
         assert self.trials
         assert not self.wrong, "\n".join(self.wrong)
@@ -457,40 +461,40 @@ class Tally:
 
 
 def digest(path: Path) -> str:
-    """The SHA-256 of all bytes of a file, or that it is none."""
-    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else "is no file"
+    """The SHA-256 of a file; "no file" if there is none."""
+    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else "no file"
 
 
-def kept_in(folder: Path) -> set[int]:
-    """The blocks that stand in a work folder."""
+def finished_blocks(folder: Path) -> set[int]:
+    """The blocks in a work folder."""
     return {int(path.stem) for path in (folder / WORK).glob("*.npz")}
 
 
-def duration(sweeps: Sweeps) -> float:
-    """How long a sweep takes from its begin [s]."""
+def sweep_duration(sweeps: SweepServer) -> float:
+    """The time that a sweep takes [s]."""
     running = sweeps.start(cwd=sweeps.folder())
-    running.until("begun")
-    begun = time.monotonic()
+    running.wait_until("begun")
+    start_time = time.monotonic()
     running.wait()
-    return time.monotonic() - begun
+    return time.monotonic() - start_time
 
 
-def evenly(items: Sequence[Any], count: int) -> list[Any]:
-    """So many of them, the first and the last among them."""
+def pick_evenly(items: Sequence[Any], count: int) -> list[Any]:
+    """Evenly spaced items, including the first and the last."""
     steps = max(min(count, len(items)) - 1, 1)
     return [items[at * (len(items) - 1) // steps] for at in range(min(count, len(items)))]
 
 
 @contextmanager
-def mounted(folder: Path, options: str) -> Iterator[None]:
-    """A small file system of its own in a folder."""
-    # the processes that integrate load this module, and have no need of it
+def mount_tmpfs(folder: Path, options: str) -> Iterator[None]:
+    """Mount a small file system in a folder; skip the test if that is not permitted."""
+    # processes that integrate import this module, and do not need pytest
     import pytest
 
     folder.mkdir(exist_ok=True)
-    words = ["mount", "-t", "tmpfs", "-o", options, "tmpfs", str(folder)]
-    if os.geteuid() != 0 or subprocess.run(words, capture_output=True, check=False).returncode != 0:
-        pytest.skip("may not mount a file system")
+    command = ["mount", "-t", "tmpfs", "-o", options, "tmpfs", str(folder)]
+    if os.geteuid() != 0 or subprocess.run(command, capture_output=True, check=False).returncode != 0:
+        pytest.skip("needs permission to mount a file system")
     try:
         yield
     finally:
@@ -498,15 +502,20 @@ def mounted(folder: Path, options: str) -> Iterator[None]:
 
 
 @contextmanager
-def sweeping(told: Path) -> Iterator[Sweeps]:
-    """A server for as long as it is needed."""
-    alone = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+def start_sweep_server(base: Path) -> Iterator[SweepServer]:
+    """Start a server; it ends with the context."""
+    single_thread = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     command = [sys.executable, "-m", "tests.faults"]
     with subprocess.Popen(
-        command, cwd=ROOT, env={**os.environ, **alone}, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+        command,
+        cwd=ROOT,
+        env={**os.environ, **single_thread},
+        text=True,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
     ) as server:
         try:
-            yield Sweeps(server, told)
+            yield SweepServer(server, base)
         finally:
             assert server.stdin is not None
             server.stdin.close()

@@ -1,4 +1,4 @@
-"""No completed work is ever lost, and what looks like a result is whole: kills, power cuts and disks that fail."""
+"""Kills, power failures and failing disks never lose a finished block nor leave an incomplete result."""
 
 from __future__ import annotations
 
@@ -21,131 +21,132 @@ import pytest
 from .faults import (
     BLOCKS,
     CONFIG,
-    FACTORED,
+    CONFIG_TEXT,
+    FACTORED_CONFIG,
     RESULT,
-    TEXT,
     WORK,
-    Done,
+    FaultReport,
+    FinishedSweep,
     Log,
-    Sweeps,
-    Tally,
+    SweepServer,
     digest,
-    duration,
-    evenly,
-    kept_in,
-    mounted,
-    sweeping,
-)  # fmt: skip
+    finished_blocks,
+    mount_tmpfs,
+    pick_evenly,
+    sweep_duration,
+)
 
-# processes and their open files are looked up in /proc
+# reads the states of processes in /proc
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="needs /proc")
-ROOM = re.compile(r"; it takes ([\d,]+) bytes more, ([\d,]+) are free; ")
-# changes of names in one stroke, and what stands on a disk; None is a name that goes, and a folder
+MISSING_SPACE = re.compile(r"; it takes ([\d,]+) bytes more, ([\d,]+) are free; ")
+# an atomic change of names, where None removes a name; and the content of a disk, where None is a folder
 Change = dict[str, int | None]
 State = dict[str, bytes | None]
 
 
-@pytest.fixture(scope="module")
-def sweeps(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Sweeps]:
-    with sweeping(tmp_path_factory.mktemp("faults")) as server:
-        yield server
-
-
-def test_the_faults_meet_all_that_a_sweep_does_with_files(sweeps: Sweeps) -> None:
-    kinds = [one[0] for one in sweeps.operations]
+def test_all_file_operations_of_a_sweep_are_recorded(sweeps: SweepServer) -> None:
+    kinds = [entry[0] for entry in sweeps.operations]
     assert kinds.count("fsync") >= 2 * BLOCKS + 4
     assert kinds.count("rename") == BLOCKS + 1
     assert kinds.count("write") > 200
-    assert [one for one in sweeps.operations if one[-1] == RESULT] == [["link", f"{RESULT}.part", RESULT]]
+    assert [entry for entry in sweeps.operations if entry[-1] == RESULT] == [["link", f"{RESULT}.part", RESULT]]
 
 
 # ---- kill -9
 
 
-def check_kills(sweeps: Sweeps, count: int | None) -> None:
-    tally = Tally("kill -9 at an operation on files", sweeps)
-    # right after an operation is right before the next
-    for place in sweeps.places(count):
-        folder = sweeps.left(place)
-        tally.resumed(folder, kept_in(folder), (place, sweeps.operations[place][:2]))
+def check_kills(sweeps: SweepServer, count: int | None) -> None:
+    report = FaultReport("kill -9 at an operation on files", sweeps)
+    # a kill after an operation is a kill before the next
+    for operation in sweeps.choose_operations(count):
+        folder = sweeps.run_killed_at(operation)
+        report.resume(folder, finished_blocks(folder), (operation, sweeps.operations[operation][:2]))
         shutil.rmtree(folder)
-    tally.end()
+    report.check()
 
 
-@pytest.mark.parametrize(("text", "count"), [(TEXT, 10), (FACTORED, 4)])
-def test_killed_at_an_operation(sweeps: Sweeps, text: str, count: int) -> None:
-    check_kills(sweeps.of(text), count)
+@pytest.mark.parametrize(
+    ("text", "count"), [(CONFIG_TEXT, 6), pytest.param(FACTORED_CONFIG, 4, marks=pytest.mark.slow)]
+)
+def test_a_sweep_killed_at_a_file_operation_is_resumed(sweeps: SweepServer, text: str, count: int) -> None:
+    check_kills(sweeps.with_config(text), count)
 
 
 @pytest.mark.faults
-@pytest.mark.parametrize("text", [TEXT, FACTORED])
-def test_killed_at_every_operation(sweeps: Sweeps, text: str) -> None:
-    check_kills(sweeps.of(text), None)
+@pytest.mark.parametrize("text", [CONFIG_TEXT, FACTORED_CONFIG])
+def test_a_sweep_killed_at_any_file_operation_is_resumed(sweeps: SweepServer, text: str) -> None:
+    check_kills(sweeps.with_config(text), None)
 
 
-def check_random_kills(sweeps: Sweeps, count: int) -> None:
-    tally, draw, longest = Tally("kill -9 at a random moment", sweeps), random.Random(9), duration(sweeps)
+def check_random_kills(sweeps: SweepServer, count: int) -> None:
+    report, generator, longest = (
+        FaultReport("kill -9 at a random time", sweeps),
+        random.Random(9),
+        sweep_duration(sweeps),
+    )
     for _ in range(count):
         folder = sweeps.folder()
         running = sweeps.start(cwd=folder)
-        running.until("begun")
-        time.sleep(draw.uniform(0.0, longest))
+        running.wait_until("begun")
+        time.sleep(generator.uniform(0.0, longest))
         os.kill(running.pid, signal.SIGKILL)
         assert running.wait().returncode in (-signal.SIGKILL, 0)
-        tally.resumed(folder, kept_in(folder), "random")
+        report.resume(folder, finished_blocks(folder), "random")
         shutil.rmtree(folder)
-    tally.end()
+    report.check()
 
 
-def test_killed_at_a_random_moment(sweeps: Sweeps) -> None:
-    check_random_kills(sweeps, 3)
+def test_a_sweep_killed_at_a_random_time_is_resumed(sweeps: SweepServer) -> None:
+    check_random_kills(sweeps, 2)
 
 
 @pytest.mark.faults
-def test_killed_at_many_random_moments(sweeps: Sweeps) -> None:
+def test_a_sweep_killed_at_many_random_times_is_resumed(sweeps: SweepServer) -> None:
     check_random_kills(sweeps, 60)
 
 
-def test_a_resumed_sweep_leaves_nothing_behind(sweeps: Sweeps) -> None:
+def test_a_resumed_sweep_removes_all_temporary_files(sweeps: SweepServer) -> None:
     for words in (("link",), ("unlink", f"{RESULT}.part"), ("unlink", f"{WORK}/plan.json"), ("rmdir",)):
-        folder = sweeps.left(sweeps.place(*words))
+        folder = sweeps.run_killed_at(sweeps.find_operation(*words))
         assert sweeps("--resume", cwd=folder).returncode == 0
         assert sorted(path.name for path in folder.iterdir()) == [CONFIG, RESULT], words
 
 
-def test_a_result_that_is_to_be_replaced_stays_until_the_other_is_whole(sweeps: Sweeps) -> None:
+def test_a_result_is_replaced_only_by_a_complete_result(sweeps: SweepServer) -> None:
     old = sweeps.folder()
     assert sweeps(cwd=old).returncode == 0
-    text = TEXT.replace("1e-4", "1e-5")
-    for place in sweeps.places(4, first=sweeps.place("fsync", f"{RESULT}.part") - 1, last=sweeps.place("rmdir")):
+    text = CONFIG_TEXT.replace("1e-4", "1e-5")
+    for operation in sweeps.choose_operations(
+        4, first=sweeps.find_operation("fsync", f"{RESULT}.part") - 1, last=sweeps.find_operation("rmdir")
+    ):
         folder = sweeps.folder(text)
         shutil.copy(old / RESULT, folder)
-        assert sweeps("--overwrite", cwd=folder, fault=("signalled", place, signal.SIGKILL)).returncode < 0
-        assert digest(folder / RESULT) in (sweeps.right(old), sweeps.right(folder))
+        assert sweeps("--overwrite", cwd=folder, fault=("send_signals", operation, signal.SIGKILL)).returncode < 0
+        assert digest(folder / RESULT) in (sweeps.expected_digest(old), sweeps.expected_digest(folder))
         assert sweeps("--resume", "--overwrite", cwd=folder).returncode == 0
-        assert digest(folder / RESULT) == sweeps.right(folder)
+        assert digest(folder / RESULT) == sweeps.expected_digest(folder)
 
 
-def test_a_result_is_no_part_of_the_next(sweeps: Sweeps) -> None:
-    # killed between the link and the unlink of the other name
-    folder = sweeps.left(sweeps.place("unlink", f"{RESULT}.part"))
-    right = sweeps.right(folder)
-    assert digest(folder / RESULT) == right
-    (folder / CONFIG).write_text(TEXT.replace("1e-4", "1e-5"))
+def test_a_second_name_of_a_result_is_not_overwritten(sweeps: SweepServer) -> None:
+    # killed between the link and the removal of the temporary name: both names are the same file
+    folder = sweeps.run_killed_at(sweeps.find_operation("unlink", f"{RESULT}.part"))
+    expected_digest = sweeps.expected_digest(folder)
+    assert digest(folder / RESULT) == expected_digest
+    (folder / CONFIG).write_text(CONFIG_TEXT.replace("1e-4", "1e-5"))
     at = ["write", f"{RESULT}.part"]
-    assert sweeps("--overwrite", cwd=folder, fault=("signalled", at, signal.SIGKILL)).returncode < 0
-    assert digest(folder / RESULT) in (right, sweeps.right(folder))
+    assert sweeps("--overwrite", cwd=folder, fault=("send_signals", at, signal.SIGKILL)).returncode < 0
+    assert digest(folder / RESULT) in (expected_digest, sweeps.expected_digest(folder))
 
 
-# ---- power cuts
+# ---- power failures
 
 
 @dataclass
 class Disk:
-    """What a disk may hold after a power cut: what was synced for certain, and of the rest any part.
+    """What a disk may contain after a power failure: everything that was synced, and any part of the rest.
 
-    A file is a number, a folder is 0. Of the names there are those that were synced, their changes since, and all
-    as a program sees them; of the contents what was synced, and the writes since.
+    A file is identified by a number, a folder by 0. `names` are the synced names, `changes` their later changes
+    and `seen` the names that a program sees; `contents` are the synced contents, `writes` the later writes.
     """
 
     names: dict[str, int] = field(default_factory=dict)
@@ -156,20 +157,20 @@ class Disk:
 
     @classmethod
     def of(cls, folder: Path) -> Disk:
-        """A work folder that was synced long ago."""
+        """A disk with a work folder that is synced."""
         disk = cls({WORK: 0})
         for number, path in enumerate((folder / WORK).iterdir(), 1):
             disk.names[f"{WORK}/{path.name}"], disk.contents[number] = number, path.read_bytes()
         disk.seen = disk.names
         return disk
 
-    def play(self, kind: str, path: str, *more: Any) -> None:
-        """What an operation does."""
+    def apply(self, kind: str, path: str, *more: Any) -> None:
+        """Apply an operation."""
         number = self.seen.get(path, 0)
         if kind == "fsync" and not number:
-            here = [one for one in self.changes if parent(next(iter(one))) == path]
-            self.names = changed(self.names, here)
-            self.changes = [one for one in self.changes if one not in here]
+            synced = [entry for entry in self.changes if parent_folder(next(iter(entry))) == path]
+            self.names = apply_changes(self.names, synced)
+            self.changes = [entry for entry in self.changes if entry not in synced]
         elif kind == "fsync":
             self.contents[number] = self.content(number, len(self.writes.get(number, ())))
             self.writes[number] = []
@@ -183,61 +184,63 @@ class Disk:
                 self.contents[number] = b""
             gone: Change = {path: None} if kind in ("rename", "unlink", "rmdir") else {}
             change = gone | ({more[0]: number} if more else {} if gone else {path: number})
-            self.seen = changed(self.seen, [change])
+            self.seen = apply_changes(self.seen, [change])
             self.changes.append(change)
 
     def content(self, number: int, count: int, blank: bool = False) -> bytes:
-        """A file as it was synced with so many of the later writes; or with no more than the room for them."""
-        held = bytearray(self.contents[number])
+        """The synced content of a file with some later writes; if `blank`, only their space is allocated."""
+        content_bytes = bytearray(self.contents[number])
         for offset, content in self.writes.get(number, [])[:count]:
             end = offset + len(content or b"")
-            held.extend(bytes(max(0, end - len(held))))
-            held[offset : None if content is None else end] = bytes(end - offset) if blank else content or b""
-        return bytes(held)
+            content_bytes.extend(bytes(max(0, end - len(content_bytes))))
+            content_bytes[offset : None if content is None else end] = (
+                bytes(end - offset) if blank else content or b""
+            )
+        return bytes(content_bytes)
 
-    def states(self, draw: random.Random) -> Iterator[State]:
-        """What may be there: any of the changes of names, and any part of the writes."""
-        some = [one for one in self.changes if draw.random() < 0.5]
+    def states(self, generator: random.Random) -> Iterator[State]:
+        """Possible contents: any of the changes of names, and any part of the writes."""
+        some = [entry for entry in self.changes if generator.random() < 0.5]
         for changes in (self.changes, [], self.changes[-1:], self.changes[1:], some):
-            names = changed(self.names, changes)
+            names = apply_changes(self.names, changes)
             for part in ("all", "none", "half", "blank", "some"):
                 state: State = {}
-                # what stands in a folder that is not there is not there
+                # without its folder a file does not exist
                 for path, number in names.items():
-                    if parent(path) == "." or parent(path) in names:
+                    if parent_folder(path) == "." or parent_folder(path) in names:
                         most = len(self.writes.get(number, ()))
-                        count = {"none": 0, "half": most // 2, "some": draw.randint(0, most)}.get(part, most)
+                        count = {"none": 0, "half": most // 2, "some": generator.randint(0, most)}.get(part, most)
                         state[path] = self.content(number, count, part == "blank") if number else None
                 yield state
 
 
-def parent(path: str) -> str:
+def parent_folder(path: str) -> str:
     return os.path.dirname(path) or "."
 
 
-def changed(names: dict[str, int], changes: list[Change]) -> dict[str, int]:
+def apply_changes(names: dict[str, int], changes: list[Change]) -> dict[str, int]:
     for change in changes:
         names = {path: number for path, number in (names | change).items() if number is not None}
     return names
 
 
-def after_cuts(disk: Disk, log: Log, cuts: list[int]) -> Iterator[tuple[State, set[int], str]]:
-    """What may be on a disk after a cut at some places of a log, each once, and the blocks kept by then."""
-    draw, kept, known = random.Random(1), set(), set()
+def states_after_cuts(disk: Disk, log: Log, cuts: list[int]) -> Iterator[tuple[State, set[int], str]]:
+    """Distinct possible contents after power failures at entries of a log, and the blocks kept by then."""
+    generator, kept, known = random.Random(1), set(), set()
     for at, (kind, *what) in enumerate(log):
         if kind == "kept":
             kept.add(what[0])
         elif kind not in ("begun", "ended", "none"):
-            disk.play(kind, *what)
-        for state in disk.states(draw) if at in cuts else ():
+            disk.apply(kind, *what)
+        for state in disk.states(generator) if at in cuts else ():
             key = hash((*sorted((path, content or b"") for path, content in state.items()), *kept))
             if key not in known:
                 known.add(key)
                 yield state, set(kept), f"after {at}, {kind} {what[:1]}"
 
 
-def laid_out(sweeps: Sweeps, state: State, text: str = "") -> Path:
-    """A folder in such a state."""
+def create_folder(sweeps: SweepServer, state: State, text: str = "") -> Path:
+    """Create a folder with this content."""
     folder = sweeps.folder(text)
     for path, content in sorted(state.items()):
         if content is None:
@@ -247,142 +250,163 @@ def laid_out(sweeps: Sweeps, state: State, text: str = "") -> Path:
     return folder
 
 
-def check_power_cuts(sweeps: Sweeps, kinds: set[str], writes: int) -> None:
-    tally = Tally("power cut", sweeps)
-    log = sweeps(cwd=sweeps.folder(), fault=("recorded",)).log
-    cuts = [at for at, one in enumerate(log) if one[0] in kinds]
-    cuts += evenly([at for at, one in enumerate(log) if one[0] == "write"], writes)
-    for state, kept, at in after_cuts(Disk(), log, cuts):
-        folder = laid_out(sweeps, state)
-        tally.resumed(folder, kept, at)
+def check_power_failures(sweeps: SweepServer, kinds: set[str], writes: int) -> None:
+    report = FaultReport("power failure", sweeps)
+    log = sweeps(cwd=sweeps.folder(), fault=("record_operations",)).log
+    cuts = [at for at, entry in enumerate(log) if entry[0] in kinds]
+    cuts += pick_evenly([at for at, entry in enumerate(log) if entry[0] == "write"], writes)
+    for state, kept, at in states_after_cuts(Disk(), log, cuts):
+        folder = create_folder(sweeps, state)
+        report.resume(folder, kept, at)
         shutil.rmtree(folder)
-    tally.end()
+    report.check()
 
 
-@pytest.mark.parametrize(("text", "kinds"), [(TEXT, {"link", "rename", "rmdir"}), (FACTORED, {"link"})])
-def test_power_cuts(sweeps: Sweeps, text: str, kinds: set[str]) -> None:
-    # where a name appears, and when all is done
-    check_power_cuts(sweeps.of(text), kinds, 0)
+@pytest.mark.parametrize(
+    ("text", "kinds"),
+    [
+        (CONFIG_TEXT, {"link"}),
+        pytest.param(CONFIG_TEXT, {"rename", "rmdir"}, marks=pytest.mark.slow),
+        pytest.param(FACTORED_CONFIG, {"link"}, marks=pytest.mark.slow),
+    ],
+)
+def test_a_sweep_is_resumed_after_a_power_failure(sweeps: SweepServer, text: str, kinds: set[str]) -> None:
+    # when the result or a block gets its name, and at the end
+    check_power_failures(sweeps.with_config(text), kinds, 0)
 
 
 @pytest.mark.faults
-def test_many_power_cuts(sweeps: Sweeps) -> None:
-    kinds = {one[0] for one in sweeps.operations} | {"kept"}
-    check_power_cuts(sweeps, kinds - {"write"}, 60)
+def test_a_sweep_is_resumed_after_a_power_failure_at_any_operation(sweeps: SweepServer) -> None:
+    kinds = {entry[0] for entry in sweeps.operations} | {"kept"}
+    check_power_failures(sweeps, kinds - {"write"}, 60)
 
 
-def test_without_fsync_a_power_cut_shows_half_a_result_and_loses_blocks(sweeps: Sweeps) -> None:
-    tally = Tally("power cut without fsync", sweeps)
-    log = sweeps(cwd=sweeps.folder(), fault=("recorded", False)).log
-    cuts = [[one[0] for one in log].index("link"), max(at for at, one in enumerate(log) if one[0] == "kept")]
-    for state, kept, at in after_cuts(Disk(), log, cuts):
+def test_without_fsync_a_power_failure_leaves_an_incomplete_result_and_loses_blocks(sweeps: SweepServer) -> None:
+    report = FaultReport("power failure without fsync", sweeps)
+    log = sweeps(cwd=sweeps.folder(), fault=("record_operations", False)).log
+    cuts = [
+        [entry[0] for entry in log].index("link"),
+        max(at for at, entry in enumerate(log) if entry[0] == "kept"),
+    ]
+    for state, kept, at in states_after_cuts(Disk(), log, cuts):
         if RESULT in state or len(state) > BLOCKS + 1:
-            tally.resumed(laid_out(sweeps, state), kept, at)
-        if tally.lost and tally.wrong:
+            report.resume(create_folder(sweeps, state), kept, at)
+        if report.lost and report.wrong:
             return
-    pytest.fail("neither lost nor half")
+    pytest.fail("no block was lost, or no result was incomplete")
 
 
-def test_a_power_cut_while_another_sweep_begins_anew(sweeps: Sweeps) -> None:
-    # what is left of a sweep, and another that throws it away
-    old, text = sweeps.copied(), TEXT.replace("1e-4", "1e-5")
+def test_a_power_failure_while_another_sweep_replaces_the_work_folder(sweeps: SweepServer) -> None:
+    # the work folder of a sweep, which another sweep overwrites
+    old, text = sweeps.copy_finished(), CONFIG_TEXT.replace("1e-4", "1e-5")
     before = Disk.of(old)
     (old / CONFIG).write_text(text)
-    log = sweeps("--overwrite", cwd=old, fault=("recorded",)).log
-    last = [one[0] for one in log].index("write")
-    for state, _, at in after_cuts(before, log, list(range(last + 5))):
-        folder = laid_out(sweeps, state, text)
-        done = sweeps("--resume", cwd=folder)
-        # before the new plan is there, it is the other sweep's folder
-        assert done.returncode == 0 or "belongs to another sweep" in done.stderr, (at, done)
-        if done.returncode == 0:
-            assert digest(folder / RESULT) == sweeps.right(folder), (at, done)
+    log = sweeps("--overwrite", cwd=old, fault=("record_operations",)).log
+    last = [entry[0] for entry in log].index("write")
+    for state, _, at in states_after_cuts(before, log, list(range(last + 5))):
+        folder = create_folder(sweeps, state, text)
+        completed = sweeps("--resume", cwd=folder)
+        # until the new plan is written, the folder belongs to the other sweep
+        assert completed.returncode == 0 or "belongs to another sweep" in completed.stderr, (at, completed)
+        if completed.returncode == 0:
+            assert digest(folder / RESULT) == sweeps.expected_digest(folder), (at, completed)
         shutil.rmtree(folder)
 
 
-# ---- disks that are full or fail
+# ---- full and failing disks
 
 
-def check_kept(done: Done, folder: Path) -> set[int]:
-    """A storage error is one line that says how to go on, and what was finished stands there."""
-    assert done.returncode == 4, done
-    assert (done.stderr.count("\n"), done.stdout) == (1, "")
-    assert done.stderr.endswith("; --resume continues\n"), done
+def check_storage_error(completed: FinishedSweep, folder: Path) -> set[int]:
+    """Check that a storage error prints one line with the flag to continue, and that finished blocks are kept."""
+    assert completed.returncode == 4, completed
+    assert (completed.stderr.count("\n"), completed.stdout) == (1, "")
+    assert completed.stderr.endswith("; --resume continues\n"), completed
     assert not (folder / RESULT).exists()
-    assert done.kept <= kept_in(folder)
-    return kept_in(folder)
+    assert completed.kept <= finished_blocks(folder)
+    return finished_blocks(folder)
 
 
-def check_failures(sweeps: Sweeps, count: int | None) -> None:
-    first, last = sweeps.place("create", f"{WORK}/block.part"), sweeps.place("link")
+def check_failures(sweeps: SweepServer, count: int | None) -> None:
+    first, last = sweeps.find_operation("create", f"{WORK}/block.part"), sweeps.find_operation("link")
     for number, name in ((errno.ENOSPC, "full disk"), (errno.EIO, "input/output error")):
-        tally = Tally(f"{name} at an operation on files", sweeps)
-        for place in sweeps.places(count, first, last):
-            if number == errno.ENOSPC and sweeps.operations[place][0] not in ("write", "create"):
+        report = FaultReport(f"{name} at an operation on files", sweeps)
+        for operation in sweeps.choose_operations(count, first, last):
+            if number == errno.ENOSPC and sweeps.operations[operation][0] not in ("write", "create"):
                 continue
             folder = sweeps.folder()
-            done = sweeps(cwd=folder, fault=("failing", place, number))
-            kept = check_kept(done, folder)
-            assert number != errno.ENOSPC or ROOM.search(done.stderr)
-            tally.resumed(folder, kept, place)
+            completed = sweeps(cwd=folder, fault=("fail_disk", operation, number))
+            kept = check_storage_error(completed, folder)
+            assert number != errno.ENOSPC or MISSING_SPACE.search(completed.stderr)
+            report.resume(folder, kept, operation)
             shutil.rmtree(folder)
-        tally.end()
+        report.check()
 
 
-@pytest.mark.parametrize(("text", "count"), [(TEXT, 5), (FACTORED, 3)])
-def test_a_disk_that_fails(sweeps: Sweeps, text: str, count: int) -> None:
-    check_failures(sweeps.of(text), count)
+@pytest.mark.parametrize(
+    ("text", "count"), [(CONFIG_TEXT, 4), pytest.param(FACTORED_CONFIG, 3, marks=pytest.mark.slow)]
+)
+def test_a_sweep_is_resumed_after_a_disk_error(sweeps: SweepServer, text: str, count: int) -> None:
+    check_failures(sweeps.with_config(text), count)
 
 
 @pytest.mark.faults
-@pytest.mark.parametrize(("text", "count"), [(TEXT, 120), (FACTORED, 40)])
-def test_a_disk_that_fails_at_any_operation(sweeps: Sweeps, text: str, count: int) -> None:
-    check_failures(sweeps.of(text), count)
+@pytest.mark.parametrize(("text", "count"), [(CONFIG_TEXT, 120), (FACTORED_CONFIG, 40)])
+def test_a_sweep_is_resumed_after_a_disk_error_at_any_operation(
+    sweeps: SweepServer, text: str, count: int
+) -> None:
+    check_failures(sweeps.with_config(text), count)
 
 
-def test_a_disk_that_fails_before_the_first_block_says_how_to_go_on(sweeps: Sweeps) -> None:
-    for place in (sweeps.place("create", f"{WORK}/lock"), sweeps.place("write")):
+def test_a_disk_error_before_the_first_block_leaves_no_trace_or_prints_how_to_continue(
+    sweeps: SweepServer,
+) -> None:
+    for operation in (sweeps.find_operation("create", f"{WORK}/lock"), sweeps.find_operation("write")):
         for number in (errno.ENOSPC, errno.EIO):
             folder = sweeps.folder()
-            done = sweeps(cwd=folder, fault=("failing", place, number))
-            assert not sweeps(cwd=folder).returncode or "--resume" in done.stderr, done
+            completed = sweeps(cwd=folder, fault=("fail_disk", operation, number))
+            assert not sweeps(cwd=folder).returncode or "--resume" in completed.stderr, completed
 
 
-def test_a_disk_that_fails_when_the_result_is_there(sweeps: Sweeps) -> None:
-    for place in range(sweeps.place("unlink", f"{RESULT}.part"), len(sweeps.operations), 2):
+def test_a_disk_error_after_the_result_is_stored_does_not_damage_it(sweeps: SweepServer) -> None:
+    for operation in range(sweeps.find_operation("unlink", f"{RESULT}.part"), len(sweeps.operations), 2):
         folder = sweeps.folder()
-        done = sweeps(cwd=folder, fault=("failing", place, errno.EIO))
-        assert digest(folder / RESULT) == sweeps.right(folder)
-        assert done.returncode in (0, 4), (place, sweeps.operations[place], done)
+        completed = sweeps(cwd=folder, fault=("fail_disk", operation, errno.EIO))
+        assert digest(folder / RESULT) == sweeps.expected_digest(folder)
+        assert completed.returncode in (0, 4), (operation, sweeps.operations[operation], completed)
 
 
-@pytest.mark.parametrize("size", [4_000, 8_000, 20_000])
-def test_files_of_a_limited_size(sweeps: Sweeps, size: int) -> None:
-    tally, folder = Tally(f"files of no more than {size} bytes", sweeps), sweeps.folder()
-    kept = check_kept(sweeps(cwd=folder, fault=("limited", size)), folder)
-    tally.resumed(folder, kept, size)
-    tally.end()
+@pytest.mark.parametrize(
+    "size", [*(pytest.param(size, marks=pytest.mark.slow) for size in (4_000, 20_000)), 8_000]
+)
+def test_a_sweep_is_resumed_after_the_limit_of_file_sizes_was_reached(sweeps: SweepServer, size: int) -> None:
+    report, folder = FaultReport(f"file size limit of {size} bytes", sweeps), sweeps.folder()
+    kept = check_storage_error(sweeps(cwd=folder, fault=("limit_file_size", size)), folder)
+    report.resume(folder, kept, size)
+    report.check()
 
 
-def check_full_disks(sweeps: Sweeps, folder: Path, sizes: Iterable[int]) -> None:
-    tally = Tally("a file system that is full", sweeps)
+def check_full_disks(sweeps: SweepServer, folder: Path, sizes: Iterable[int]) -> None:
+    report = FaultReport("full file system", sweeps)
     for size in sizes:
-        with mounted(folder, f"size={size}k"):
-            (folder / CONFIG).write_text(TEXT)
-            done = sweeps(cwd=folder)
-            kept = check_kept(done, folder)
-            found = ROOM.search(done.stderr)
-            assert found, done
-            wanted, free = (int(one.replace(",", "")) for one in found.groups())
-            assert wanted > free, (size, done.stderr)
+        with mount_tmpfs(folder, f"size={size}k"):
+            (folder / CONFIG).write_text(CONFIG_TEXT)
+            completed = sweeps(cwd=folder)
+            kept = check_storage_error(completed, folder)
+            match = MISSING_SPACE.search(completed.stderr)
+            assert match, completed
+            needed, free = (int(size_text.replace(",", "")) for size_text in match.groups())
+            assert needed > free, (size, completed.stderr)
             subprocess.run(["mount", "-o", "remount,size=1M", folder], check=True)
-            tally.resumed(folder, kept, size)
-    tally.end()
+            report.resume(folder, kept, size)
+    report.check()
 
 
-def test_a_full_file_system(sweeps: Sweeps, tmp_path: Path) -> None:
-    check_full_disks(sweeps, tmp_path / "small", (8, 24, 44))
+@pytest.mark.parametrize("size", [24, *(pytest.param(size, marks=pytest.mark.slow) for size in (8, 44))])
+def test_a_full_file_system_is_reported_with_the_missing_space(
+    sweeps: SweepServer, tmp_path: Path, size: int
+) -> None:
+    check_full_disks(sweeps, tmp_path / "small", (size,))
 
 
-def test_a_file_system_that_is_full_at_the_end(sweeps: Sweeps, tmp_path: Path) -> None:
+def test_a_file_system_that_is_full_when_the_result_is_assembled(sweeps: SweepServer, tmp_path: Path) -> None:
     check_full_disks(sweeps, tmp_path / "small", (52,))
