@@ -1,4 +1,4 @@
-"""Impacts that are the same physics are integrated once, over the whole plan, and no bit of a result shows it."""
+"""Impacts with the same dimensionless parameters are integrated once, with the bits of separate integrations."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import impact
 from impact.api import prepare
 from impact.config.load import read_config
 from impact.contact.impacts import Impacts
-from impact.engine import trajectories as module
+from impact.engine import trajectories as trajectories_module
 from impact.engine.build_impacts import build_impacts
 from impact.engine.plan import Plan
 from impact.engine.trajectories import trajectory_maps
@@ -24,34 +24,50 @@ from impact.results.schema import SCHEMA
 from .conftest import ROOT
 
 DASHPOT = impact.ForceModel(
-    "dashpot", "Spring and dashpot", 2026, equation="F = K x + c v", reference="", exponent=1.0,
-    force=lambda K, x, v, c: K * x + c * v, release="force",
+    "dashpot",
+    "Spring and dashpot",
+    2026,
+    equation="F = K x + c v",
+    reference="",
+    exponent=1.0,
+    force=lambda K, x, v, c: K * x + c * v,
+    release="force",
     parameters=(impact.Parameter("c", "N s/m", "damping constant", default=30.0, least=0.0),),
-)  # fmt: skip
+)
 SPEED = impact.ForceModel(
-    "speed", "A speed of its own", 2026, equation="", reference="",
+    "speed",
+    "Damping with a reference speed",
+    2026,
+    equation="",
+    reference="",
     force=lambda elastic, v, a: elastic * (1.0 + a * v),
     coefficients={"a": lambda v_y, v0: 0.3 * v_y / (v_y + v0)},
     parameters=(impact.Parameter("v_y", "m/s", "a speed", default=1.0, least=0.1),),
-)  # fmt: skip
+)
 OPTIONAL_PARAMETERS = {"dashpot": {"c": [0.0, 40.0]}, "speed": {"v_y": [0.5, 2.0]}}
-# what laws have to be given, as a baseline has it; the unit of one depends on n
+# parameters without a default, with the values of a baseline; the unit of c of recurdyn depends on n
 BASELINE_PARAMETERS = tomllib.loads((ROOT / "tests" / "data" / "every_model.toml").read_text(encoding="utf-8"))[
     "model"
 ]
 REQUIRED_PARAMETERS = {
-    key: BASELINE_PARAMETERS[one.same_as or key]
-    for key, one in impact.models().items()
-    if (one.same_as or key) in BASELINE_PARAMETERS
+    key: BASELINE_PARAMETERS[model.same_as or key]
+    for key, model in impact.models().items()
+    if (model.same_as or key) in BASELINE_PARAMETERS
 }
 REQUIRED_PARAMETERS["recurdyn"] = {"c": 1e4}
 
-# a few values of each, so that many points are the same: in scale only, in a material only, or altogether
+# a few values of each, so that many points are equal, or differ only in scale or in a material
 VALUES: dict[str, list[object]] = {
-    "e": [0.0, 0.1, 0.5, 1.0], "v1": [-1.0, 0.5, 1.0, 2.0], "v2": [0.0, -1.0], "m1": [1.0, 2.0, float("inf")],
-    "m2": [0.5, 1.0, float("inf")], "material": ["soft", "hard"], "n": [1.0, 1.5, 2.0], "R1": [0.05, float("inf")],
+    "e": [0.0, 0.1, 0.5, 1.0],
+    "v1": [-1.0, 0.5, 1.0, 2.0],
+    "v2": [0.0, -1.0],
+    "m1": [1.0, 2.0, float("inf")],
+    "m2": [0.5, 1.0, float("inf")],
+    "material": ["soft", "hard"],
+    "n": [1.0, 1.5, 2.0],
+    "R1": [0.05, float("inf")],
     "alpha": [0.0, 0.4, 2.0],
-}  # fmt: skip
+}
 MATERIALS = {
     "soft": {"E": 2e9, "nu": 0.4, "rho": 1000.0, "yield_strength": 1e7},
     "hard": {"E": 2.1e11, "nu": 0.3, "rho": 7850.0, "yield_strength": 3e8},
@@ -59,7 +75,7 @@ MATERIALS = {
 
 
 @st.composite
-def sweeps(draw: st.DrawFn) -> dict[str, object]:
+def configs(draw: st.DrawFn) -> dict[str, object]:
     driver = draw(st.sampled_from(["e", "alpha"]))
     names = [driver, "v1", "m1", "m2", "material", *draw(st.sets(st.sampled_from(["v2", "n", "R1"])))]
     sweep = {
@@ -70,38 +86,46 @@ def sweeps(draw: st.DrawFn) -> dict[str, object]:
     }
     known = [*sorted(impact.models()), *OPTIONAL_PARAMETERS]
     models = draw(st.lists(st.sampled_from(known), min_size=1, max_size=3, unique=True))
-    own = {key: OPTIONAL_PARAMETERS[key] for key in models if key in OPTIONAL_PARAMETERS and draw(st.booleans())}
-    own |= {key: REQUIRED_PARAMETERS[key] for key in models if key in REQUIRED_PARAMETERS}
-    return {"models": models, "sweep": sweep, "materials": MATERIALS, "solver": {"rtol": 1e-6}, "model": own}
+    parameters = {
+        key: OPTIONAL_PARAMETERS[key] for key in models if key in OPTIONAL_PARAMETERS and draw(st.booleans())
+    }
+    parameters |= {key: REQUIRED_PARAMETERS[key] for key in models if key in REQUIRED_PARAMETERS}
+    return {
+        "models": models,
+        "sweep": sweep,
+        "materials": MATERIALS,
+        "solver": {"rtol": 1e-4},
+        "model": parameters,
+    }
 
 
-def swept(config: dict[str, object], *overrides: str) -> xr.Dataset:
+def sweep_with_plugins(config: dict[str, object], *overrides: str) -> xr.Dataset:
     return impact.sweep(config, overrides=overrides, plugins=[DASHPOT, SPEED])
 
 
-def same_bits(one: xr.Dataset, other: xr.Dataset) -> None:
-    for variable in (one for one in SCHEMA if one.by_default):
-        assert one[variable.name].values.tobytes() == other[variable.name].values.tobytes(), variable.name
+def assert_same_bits(first: xr.Dataset, second: xr.Dataset) -> None:
+    for name in (variable.name for variable in SCHEMA if variable.by_default):
+        assert first[name].values.tobytes() == second[name].values.tobytes(), name
 
 
 @settings(max_examples=15)
-@given(sweeps())
-def test_both_give_the_same_bits(config: dict[str, object]) -> None:
-    same_bits(swept(config), swept(config, "solver.collapse=false"))
+@given(configs())
+def test_deduplication_changes_no_bit_of_a_result(config: dict[str, object]) -> None:
+    assert_same_bits(sweep_with_plugins(config), sweep_with_plugins(config, "solver.collapse=false"))
 
 
 @settings(max_examples=10)
-@given(sweeps())
-def test_within_blocks_too_where_there_are_too_many_cells(config: dict[str, object]) -> None:
-    once = swept(config)
+@given(configs())
+def test_deduplication_within_blocks_changes_no_bit_of_a_result(config: dict[str, object]) -> None:
+    deduplicated = sweep_with_plugins(config)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "MAX_CELLS", 0)
-        same_bits(once, swept(config))
+        patch.setattr(trajectories_module, "MAX_CELLS", 0)
+        assert_same_bits(deduplicated, sweep_with_plugins(config))
 
 
 @settings(max_examples=15)
-@given(sweeps())
-def test_a_grid_by_its_axes_is_its_points_one_by_one(config: dict[str, object]) -> None:
+@given(configs())
+def test_the_impacts_of_a_grid_are_those_of_its_points(config: dict[str, object]) -> None:
     plan = prepare(config, plugins=[DASHPOT, SPEED])
     at = np.ix_(*map(np.arange, plan.shape)) if plan.shape else ()
     flat = tuple(np.unravel_index(np.arange(plan.inputs.cells), plan.shape)) if plan.shape else ()
@@ -109,35 +133,36 @@ def test_a_grid_by_its_axes_is_its_points_one_by_one(config: dict[str, object]) 
         grid, points = (build_impacts(plan.inputs, model, index) for index in (at, flat))
         for name in ("e", "v0", "m", "K", "n", "length", "R1", "E2"):
             with np.errstate(all="ignore"):
-                one, other = getattr(grid, name), getattr(points, name)
-            own = np.broadcast_to(one, plan.shape or (1,)).reshape(-1)
-            assert own.tobytes() == np.broadcast_to(other, own.shape).tobytes(), name
+                on_grid, at_points = getattr(grid, name), getattr(points, name)
+            flattened = np.broadcast_to(on_grid, plan.shape or (1,)).reshape(-1)
+            assert flattened.tobytes() == np.broadcast_to(at_points, flattened.shape).tobytes(), name
 
 
-def counts(sweep: dict[str, object], *models: str, **more: object) -> list[int]:
+def trajectory_counts(sweep: dict[str, object], *models: str, **more: object) -> list[int]:
     """The trajectories of each model."""
     config = {"models": list(models), "sweep": sweep, "materials": MATERIALS, **more}
-    return [one.count for one in trajectory_maps(prepare(config, plugins=[DASHPOT, SPEED]))]
+    return [model_map.count for model_map in trajectory_maps(prepare(config, plugins=[DASHPOT, SPEED]))]
 
 
 GRID = {"e": [0.1, 0.5, 0.9], "v1": [1.0, 2.0], "m1": [1.0, 4.0], "m2": [1.0, 4.0], "material": ["soft", "hard"]}
 
 
-def test_how_many_trajectories_there_are() -> None:
-    # a law that e drives has as many as there are e, one without e has one
-    assert counts(GRID, "gharib-hurmuzlu-2012", "bilinear", "hertz") == [3, 3, 1]
-    assert counts({**GRID, "n": [1.5, 2.0]}, "gharib-hurmuzlu-2012", "bilinear", "hertz") == [6, 3, 2]
-    # a speed of the law's own: v_y over v0, which two of four pairs share, whatever the balls are
-    own = {"model": {"speed": {"v_y": [0.5, 1.0]}}}
-    assert counts(GRID, "speed", **own) == [3]
-    # a damping constant: c over the root of K m, in every other scale another
-    assert counts({**GRID, "e": 0.5, "K": 1e6, "n": 1.0}, "dashpot", model={"dashpot": {"K": 1e6}}) == [3]
+def test_the_number_of_trajectories() -> None:
+    # a law that depends on e has one for each e, a law without e has one
+    assert trajectory_counts(GRID, "gharib-hurmuzlu-2012", "bilinear", "hertz") == [3, 3, 1]
+    assert trajectory_counts({**GRID, "n": [1.5, 2.0]}, "gharib-hurmuzlu-2012", "bilinear", "hertz") == [6, 3, 2]
+    # the law depends on v_y over v0, which is equal in two of four pairs, whatever the balls are
+    parameters = {"model": {"speed": {"v_y": [0.5, 1.0]}}}
+    assert trajectory_counts(GRID, "speed", **parameters) == [3]
+    # the law depends on c over the root of K m
+    linear = {**GRID, "e": 0.5, "K": 1e6, "n": 1.0}
+    assert trajectory_counts(linear, "dashpot", model={"dashpot": {"K": 1e6}}) == [3]
     # e = 1 - alpha v0
     alpha = {name: GRID[name] for name in ("v1", "m1", "m2", "material")} | {"alpha": [0.1, 0.2]}
-    assert counts(alpha, "gharib-hurmuzlu-2012") == [3]
+    assert trajectory_counts(alpha, "gharib-hurmuzlu-2012") == [3]
     zipped = {**GRID, "v1": [1.0, 2.0, 3.0], "zip": [["e", "v1"]]}
-    assert counts(zipped, "gharib-hurmuzlu-2012", "hertz") == [3, 1]
-    assert counts(GRID, "gharib-hurmuzlu-2012", "hertz", solver={"collapse": False}) == [48, 48]
+    assert trajectory_counts(zipped, "gharib-hurmuzlu-2012", "hertz") == [3, 1]
+    assert trajectory_counts(GRID, "gharib-hurmuzlu-2012", "hertz", solver={"collapse": False}) == [48, 48]
 
 
 @pytest.mark.parametrize(
@@ -149,65 +174,88 @@ def test_how_many_trajectories_there_are() -> None:
         ("s^(p-1)", [1.0, 1.0, 1.0], 1.0, (0,)),
     ],
 )
-def test_an_exponent_that_is_zero_at_the_first_values_hides_no_axis(
+def test_a_unit_whose_exponent_is_zero_at_the_first_values_hides_no_axis(
     unit: str, n: list[float], p: object, axes: tuple[int, ...]
 ) -> None:
-    powers = impact.ForceModel(
-        "powers", "Powers", 2026, equation="", reference="",
+    power_law = impact.ForceModel(
+        "powers",
+        "Powers",
+        2026,
+        equation="",
+        reference="",
         force=lambda elastic, v, c: elastic * (1.0 + v * c / (1.0 + c)),
         parameters=(impact.Parameter("c", unit, "", least=0.0), impact.Parameter("p", "1", "an exponent")),
-    )  # fmt: skip
-    config = {
-        "models": ["powers"], "materials": MATERIALS, "solver": {"rtol": 1e-4},
-        "sweep": {"e": [0.1, 0.5, 0.9], "n": n, "v1": [1.0, 2.0, 3.0], "m1": 1.0, "m2": 1.0, "material": "hard",
-                  "zip": [["e", "n"]]},
-        "model": {"powers": {"c": 0.3, "p": p}},
-    }  # fmt: skip
-    (found,) = trajectory_maps(prepare(config, plugins=[powers]))
-    assert found.axes == axes
-    once, each = (
-        impact.sweep(config, overrides=[f"solver.collapse={word}"], plugins=[powers]) for word in ("true", "false")
     )
-    same_bits(once, each)
+    config = {
+        "models": ["powers"],
+        "materials": MATERIALS,
+        "solver": {"rtol": 1e-4},
+        "sweep": {
+            "e": [0.1, 0.5, 0.9],
+            "n": n,
+            "v1": [1.0, 2.0, 3.0],
+            "m1": 1.0,
+            "m2": 1.0,
+            "material": "hard",
+            "zip": [["e", "n"]],
+        },
+        "model": {"powers": {"c": 0.3, "p": p}},
+    }
+    (model_map,) = trajectory_maps(prepare(config, plugins=[power_law]))
+    assert model_map.axes == axes
+    deduplicated, separate = (
+        impact.sweep(config, overrides=[f"solver.collapse={word}"], plugins=[power_law])
+        for word in ("true", "false")
+    )
+    assert_same_bits(deduplicated, separate)
 
 
-def test_a_plan_of_any_size_is_counted_without_its_points() -> None:
+def test_the_trajectories_of_a_plan_of_any_size_are_counted() -> None:
     long = {"geomspace": [0.1, 10.0, 10_000]}
     sweep = {"e": {"linspace": [0.01, 1.0, 100]}, "v1": long, "m1": long, "m2": long, "material": ["soft", "hard"]}
     config = {"models": ["gharib-hurmuzlu-2012", "speed"], "sweep": sweep, "materials": MATERIALS}
     plan = prepare(config, plugins=[SPEED], max_points=10**15)
     assert plan.points == 4 * 10**14
-    assert [one.count for one in trajectory_maps(plan)] == [100, 10_000]
-    found = estimate(plan)
-    assert (found.points, found.trajectories) == (plan.points, 10_100)
-    # a row of the table for each trajectory, and the number of the trajectory for each of as many cells
-    assert 50 * 10_100 < found.bytes < 100 * 10_100 + 500_000
+    assert [model_map.count for model_map in trajectory_maps(plan)] == [100, 10_000]
+    estimated = estimate(plan)
+    assert (estimated.points, estimated.trajectories) == (plan.points, 10_100)
+    # a row of the table for each trajectory, and an index of the same length
+    assert 50 * 10_100 < estimated.bytes < 100 * 10_100 + 500_000
     full = estimate(prepare({**config, "output": {"layout": "full"}}, plugins=[SPEED], max_points=10**15))
     assert full.bytes > 100 * plan.points
-    assert [one.axes for one in found.models] == [("e",), ("v1",)]
+    assert [model.axes for model in estimated.models] == [("e",), ("v1",)]
 
 
-def test_one_exponent_has_the_same_bits_in_any_company() -> None:
-    # numpy takes a short way for the powers 1/2, 2 and -1 of a whole array, with other last bits
+def test_an_exponent_gives_the_same_bits_beside_other_exponents() -> None:
+    # numpy computes the powers 1/2, 2 and -1 of a whole array by other functions, with different last bits
     rng = np.random.default_rng(7)
 
-    def lanes(n: list[float]) -> Impacts:
+    def impacts_of(n: list[float]) -> Impacts:
         count = len(n)
         sizes = {name: rng_values[:count] for name, rng_values in columns.items()}
         unknown = np.full(count, np.nan)
         return Impacts(
-            e=unknown, **sizes, n=np.array(n), R1=unknown, R2=unknown, E1=unknown, nu1=unknown, E2=unknown,
-            nu2=unknown, yield_strength1=unknown, yield_strength2=unknown,
-        )  # fmt: skip
+            e=unknown,
+            **sizes,
+            n=np.array(n),
+            R1=unknown,
+            R2=unknown,
+            E1=unknown,
+            nu1=unknown,
+            E2=unknown,
+            nu2=unknown,
+            yield_strength1=unknown,
+            yield_strength2=unknown,
+        )
 
     columns = {name: rng.uniform(0.1, 9.0, 400) for name in ("v1", "m1", "m2", "K")} | {"v2": np.zeros(400)}
     for n in (1.0, 1.5, 2.0, 3.0):
-        alone, mixed = lanes([n] * 400).length, lanes([n] * 399 + [2.5]).length
+        alone, mixed = impacts_of([n] * 400).length, impacts_of([n] * 399 + [2.5]).length
         assert alone[:399].tobytes() == mixed[:399].tobytes()
 
 
-def test_it_is_no_other_result() -> None:
+def test_deduplication_is_no_part_of_the_fingerprint() -> None:
     config = {"models": "hertz", "sweep": {"e": 0.5, "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6e9}}
-    once, each = (Plan(read_config(config, [f"solver.collapse={word}"])) for word in ("true", "false"))
-    assert (once.config.solver.collapse, each.config.solver.collapse) == (True, False)
-    assert once.fingerprint == each.fingerprint
+    deduplicated, separate = (Plan(read_config(config, [f"solver.collapse={word}"])) for word in ("true", "false"))
+    assert (deduplicated.config.solver.collapse, separate.config.solver.collapse) == (True, False)
+    assert deduplicated.fingerprint == separate.fingerprint
