@@ -1,4 +1,4 @@
-"""Each command does what its help says, from a process of its own: output, exit code, and nothing lost."""
+"""Each command, run as a process, writes what its help says, exits with the right code and loses no data."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from rich.cells import cell_len
 import impact
 
 from .conftest import ROOT, WIDE, Run
-from .fork_server import ForkServer, printed_on_terminal
+from .fork_server import ForkServer, abandoned_pipe, printed_on_terminal
 
 SMALL = """models = ["hertz", "gharib-hurmuzlu-2012"]
 [sweep]
@@ -50,14 +50,16 @@ def test_from_toml_to_picture(cli: Run, small: Path, tmp_path: Path) -> None:
     assert sorted(p.name for p in tmp_path.iterdir()) == ["results.h5", "results.png", "small.toml"]
 
 
-def test_the_command_and_python_give_the_same(cli: Run, small: Path, tmp_path: Path) -> None:
+def test_the_command_and_python_give_the_same_result(cli: Run, small: Path, tmp_path: Path) -> None:
     cli("sweep", small, "-o", "out.h5", "--set", "sweep.m2=3.0", cwd=tmp_path)
     ours = impact.load(tmp_path / "out.h5")
     assert ours.attrs["config_set"] == '["sweep.m2=3.0"]'
     xr.testing.assert_identical(ours, impact.sweep(small, overrides=["sweep.m2=3.0"]))
 
 
-def test_the_same_sweep_twice(cli: Run, small: Path, tmp_path: Path) -> None:
+def test_a_finished_sweep_is_not_repeated_and_another_needs_overwrite(
+    cli: Run, small: Path, tmp_path: Path
+) -> None:
     out = tmp_path / "results.h5"
     cli("sweep", small, cwd=tmp_path)
     before = (out.read_bytes(), out.stat().st_mtime_ns)
@@ -84,7 +86,7 @@ def test_a_bad_config_writes_nothing(cli: Run, small: Path, tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("output", ["missing/out.h5", ".", "fifo", "link"])
-def test_an_impossible_output_is_refused_before_the_work(
+def test_an_output_that_cannot_be_written_is_refused_before_integration(
     cli: Run, small: Path, tmp_path: Path, output: str
 ) -> None:
     os.mkfifo(tmp_path / "fifo")
@@ -95,7 +97,7 @@ def test_an_impossible_output_is_refused_before_the_work(
     assert small.read_text(encoding="utf-8") == SMALL
 
 
-def test_an_output_is_never_its_own_source(cli: Run, small: Path, tmp_path: Path) -> None:
+def test_an_output_never_replaces_its_source(cli: Run, small: Path, tmp_path: Path) -> None:
     for words in (["sweep", small, "-o", small], ["run", small, "--history", small]):
         refused = cli(*words, "--overwrite", cwd=tmp_path)
         assert (refused.returncode, len(refused.stderr.splitlines())) == (2, 1)
@@ -103,20 +105,20 @@ def test_an_output_is_never_its_own_source(cli: Run, small: Path, tmp_path: Path
     assert small.read_text(encoding="utf-8") == SMALL
 
 
-def test_failed_points_are_told_and_change_the_exit_code(cli: Run, small: Path, tmp_path: Path) -> None:
+def test_failed_points_are_printed_and_change_the_exit_code(cli: Run, small: Path, tmp_path: Path) -> None:
     text = SMALL.replace("e = [0.0, 0.5, 1.0]", "alpha = [0.1, 2.0]")
     small.write_text(text, encoding="utf-8")
     failed = cli("sweep", small, "-o", "a.h5", "--json", cwd=tmp_path)
     assert failed.returncode == 3
-    found = json.loads(failed.stdout)
-    assert found["status"] == {"ok": 6, "invalid_parameter": 2}
-    assert found["failed"] == 2
-    assert found["first_failed"][0] == {
+    summary = json.loads(failed.stdout)
+    assert summary["status"] == {"ok": 6, "invalid_parameter": 2}
+    assert summary["failed"] == 2
+    assert summary["first_failed"][0] == {
         "status": "invalid_parameter", "at": {"model": "gharib-hurmuzlu-2012", "alpha": 2.0, "m2": 1.0},
         "replay": "impact run a.h5 --model gharib-hurmuzlu-2012 --at alpha=2.0 --at m2=1.0",
     }  # fmt: skip
     assert "failed: model=gharib-hurmuzlu-2012, alpha=2, m2=1: a value that arises here" in failed.stderr
-    # the same sweep again is not done again, but fails again, and tells the same
+    # the same sweep is not repeated, but has the same exit code and output
     again = cli("sweep", small, "-o", "a.h5", "--json", cwd=tmp_path)
     assert (again.returncode, again.stdout) == (3, failed.stdout)
     assert "2 of 8 points failed (2 invalid_parameter)" in again.stderr
@@ -150,8 +152,8 @@ def test_several_kinds_in_one_call_and_the_numbers_behind_them(cli: Run, stored:
 
 def test_a_report_is_one_page(cli: Run, stored: Path, tmp_path: Path) -> None:
     # tests/test_report_page.py has the rest
-    told = cli("report", stored, "-o", "page.html", cwd=tmp_path)
-    assert told.returncode == 0, told.stderr
+    written = cli("report", stored, "-o", "page.html", cwd=tmp_path)
+    assert written.returncode == 0, written.stderr
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert "<h1>Final velocities comparison</h1>" in page
     assert page.count("<figure>") == 4
@@ -171,7 +173,7 @@ def test_a_report_is_one_page(cli: Run, stored: Path, tmp_path: Path) -> None:
         (["--data", "a.txt"], "--data a.txt: expected a name that ends in .csv, .tex or .parquet"),
     ],
 )
-def test_what_plot_does_not_know_is_told_and_nothing_written(
+def test_invalid_options_of_plot_are_one_line_and_write_nothing(
     cli: Run, stored: Path, tmp_path: Path, words: list[str], said: str
 ) -> None:
     refused = cli("plot", stored, "-o", "a.png", *words, cwd=tmp_path)
@@ -179,20 +181,20 @@ def test_what_plot_does_not_know_is_told_and_nothing_written(
     assert not list(tmp_path.glob("a.*"))
 
 
-def test_run_one_impact(cli: Run, tmp_path: Path) -> None:
-    shot = cli("run", "--model", "gharib-hurmuzlu-2012", "--at", "e=0.05", "--at", "m2=inf",
+def test_run_prints_an_impact_and_stores_its_history(cli: Run, tmp_path: Path) -> None:
+    done = cli("run", "--model", "gharib-hurmuzlu-2012", "--at", "e=0.05", "--at", "m2=inf",
                "--history", "out.h5", "--json", cwd=tmp_path)  # fmt: skip
-    assert shot.returncode == 0, shot.stderr
-    found = json.loads(shot.stdout)
-    assert found["outputs"]["status"] == "ok"
-    assert found["outputs"]["damping_ratio"] == 20.0
-    assert found["damping"] == pytest.approx(20.0 * found["outputs"]["stiffness"])
-    three = [found[name] for name in ("e_kinematic", "e_kinetic", "e_energetic")]
-    assert max(three) - min(three) < 1e-9
+    assert done.returncode == 0, done.stderr
+    printed = json.loads(done.stdout)
+    assert printed["outputs"]["status"] == "ok"
+    assert printed["outputs"]["damping_ratio"] == 20.0
+    assert printed["damping"] == pytest.approx(20.0 * printed["outputs"]["stiffness"])
+    restitutions = [printed[name] for name in ("e_kinematic", "e_kinetic", "e_energetic")]
+    assert max(restitutions) - min(restitutions) < 1e-9
     history = impact.load(tmp_path / "out.h5")
     assert list(history.data_vars) == ["delta", "v", "F", "x1", "x2", "v1", "v2"]
-    assert float(history["t"][-1]) == pytest.approx(found["outputs"]["contact_time"], rel=1e-12)
-    assert float(history["v1"][-1]) == pytest.approx(found["outputs"]["v1_post"], abs=1e-9)
+    assert float(history["t"][-1]) == pytest.approx(printed["outputs"]["contact_time"], rel=1e-12)
+    assert float(history["v1"][-1]) == pytest.approx(printed["outputs"]["v1_post"], abs=1e-9)
     assert np.all(np.diff(history["t"].values) > 0.0)
     assert float(history["delta"].sel(t=1e-5, method="nearest")) > 0.0
     again = cli("run", "--history", "out.h5", cwd=tmp_path)
@@ -224,19 +226,19 @@ def test_a_history_at_uniform_times(cli: Run, tmp_path: Path) -> None:
     np.testing.assert_allclose(history["delta"], exact, rtol=0, atol=1e-8 * exact.max())
 
 
-def test_run_reads_a_result(cli: Run, tmp_path: Path) -> None:
+def test_run_repeats_a_point_of_a_result(cli: Run, tmp_path: Path) -> None:
     (tmp_path / "wide.toml").write_text(WIDE, encoding="utf-8")
-    cli("sweep", "wide.toml", "--set", "sweep.v2=-2.0", cwd=tmp_path)
+    cli("sweep", "wide.toml", "--set", "sweep.v2=-2.0", "--set", "solver.rtol=1e-4", cwd=tmp_path)
     stored = impact.load(tmp_path / "results.h5")
     words = ["run", "results.h5", "--model", "bilinear", "--at", "e=0.6", "--at", "m2=inf", "--json"]
-    found = json.loads(cli(*words, cwd=tmp_path).stdout)
+    printed = json.loads(cli(*words, cwd=tmp_path).stdout)
     cell = stored.sel(model="bilinear", e=0.6, m1=3.0).isel(
         {"v1": 0, "material2": 0, "ismail-stronge-2008.gamma": 0}
     )
-    assert found["outputs"]["v1_post"] == float(cell["v1_post"])
-    assert found["inputs"]["m1"] == 3.0
-    assert found["inputs"]["v2"] == -2.0
-    assert found["first_value_of"] == ["v1", "material2"]
+    assert printed["outputs"]["v1_post"] == float(cell["v1_post"])
+    assert printed["inputs"]["m1"] == 3.0
+    assert printed["inputs"]["v2"] == -2.0
+    assert printed["first_value_of"] == ["v1", "material2"]
 
 
 @pytest.mark.parametrize(
@@ -277,7 +279,7 @@ def test_run_reads_a_result(cli: Run, tmp_path: Path) -> None:
         ),
     ],
 )
-def test_a_mistake_is_one_line(cli: Run, words: list[str], line: str) -> None:
+def test_an_invalid_command_line_is_one_line(cli: Run, words: list[str], line: str) -> None:
     refused = cli(*words)
     assert refused.returncode == 2
     assert refused.stdout == ""
@@ -319,7 +321,7 @@ def test_a_full_standard_error_does_not_change_the_exit_code(
     (tmp_path / "c.toml").write_text(NO_REBOUND, encoding="utf-8")
     assert forked(*words, cwd=tmp_path, stderr="/dev/full").returncode == code
     if code == 2:
-        # where the report itself was to go there, that is what went wrong
+        # with --format json the output itself goes to the full stream
         done = forked(*words, cwd=tmp_path, stdout="/dev/full")
         assert done.returncode == (4 if "json" in words else code)
         assert "Traceback" not in done.stderr
@@ -336,7 +338,7 @@ def test_a_full_stream_does_not_change_the_exit_code_of_an_interpreter(
         done = subprocess.run(command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=full, check=False)
         assert done.returncode == code
         if code == 2:
-            # where the report itself was to go there, that is what went wrong, at once or at the end
+            # the output itself goes to the full stream, which fails at once or at the end
             for unbuffered in ("", "1"):
                 done = subprocess.run(
                     command, cwd=tmp_path, stdout=full, stderr=subprocess.PIPE, text=True, check=False,
@@ -347,7 +349,7 @@ def test_a_full_stream_does_not_change_the_exit_code_of_an_interpreter(
                 assert "Exception ignored" not in done.stderr
 
 
-LACKS_MEMORY = """
+OUT_OF_MEMORY_LAW = """
 import numpy as np
 from impact import ForceModel
 
@@ -361,7 +363,7 @@ LAW = ForceModel("lacks", title="", year=2026, equation="", reference="", force=
 
 
 def test_lack_of_memory_keeps_what_is_finished_and_is_a_storage_error(cli: Run, tmp_path: Path) -> None:
-    (tmp_path / "law.py").write_text(LACKS_MEMORY, encoding="utf-8")
+    (tmp_path / "law.py").write_text(OUT_OF_MEMORY_LAW, encoding="utf-8")
     (tmp_path / "c.toml").write_text(
         'models = ["lacks"]\n[sweep]\ne = { linspace = [0.5, 1.0, 40000] }\nv1 = 1.0\nm1 = 1.0\nm2 = 1.0\n'
         "K = 6e9\n[solver]\nrtol = 1e-4\n",
@@ -401,21 +403,21 @@ def test_the_catalogue(cli: Run) -> None:
     listed = cli("models").stdout
     for key in impact.models():
         assert key in listed
-    one = json.loads(cli("models", "lankarani-nikravesh-1990", "--json").stdout)[0]
-    assert one["domain"] == {"e": [0.9, 1.0]}
-    assert one["delivered_restitution"]["0.5"] == pytest.approx(0.725241, abs=1e-6)
-    told = cli("models", "ismail-stronge-2008").stdout
-    assert "plastic loss factor" in told
-    assert "seen in Gharib and Hurmuzlu (2012), equation (43)" in told
+    record = json.loads(cli("models", "lankarani-nikravesh-1990", "--json").stdout)[0]
+    assert record["domain"] == {"e": [0.9, 1.0]}
+    assert record["delivered_restitution"]["0.5"] == pytest.approx(0.725241, abs=1e-6)
+    page = cli("models", "ismail-stronge-2008").stdout
+    assert "plastic loss factor" in page
+    assert "seen in Gharib and Hurmuzlu (2012), equation (43)" in page
 
 
 def test_info(cli: Run, stored: Path) -> None:
-    told = cli("info", stored).stdout
+    page = cli("info", stored).stdout
     for words in ("model 3 × e 101", "closed_form_error", "301 ok, 2 limit", "0 … 1, 101 values"):
-        assert words in told
-    found = json.loads(cli("info", stored, "--json").stdout)
-    assert found["dimensions"] == {"model": 3, "e": 101}
-    assert found["attributes"]["config"].startswith("#:schema")
+        assert words in page
+    printed = json.loads(cli("info", stored, "--json").stdout)
+    assert printed["dimensions"] == {"model": 3, "e": 101}
+    assert printed["attributes"]["config"].startswith("#:schema")
 
 
 def test_init_and_schema(cli: Run, tmp_path: Path) -> None:
@@ -423,8 +425,8 @@ def test_init_and_schema(cli: Run, tmp_path: Path) -> None:
 
     assert cli("init", cwd=tmp_path).returncode == 0
     assert cli("sweep", "config.toml", "--set", "sweep.e=0.5", cwd=tmp_path).returncode == 0
-    printed = json.loads(cli("schema").stdout)
     assert cli("schema", "-o", "impact.schema.json", cwd=tmp_path).returncode == 0
+    printed = json.loads(cli("schema").stdout)
     assert json.loads((tmp_path / "impact.schema.json").read_text(encoding="utf-8")) == printed
     import tomllib
 
@@ -435,9 +437,9 @@ def test_init_and_schema(cli: Run, tmp_path: Path) -> None:
     "command", ["sweep", "plot", "recommend", "report", "run", "models", "info", "init", "schema"]
 )
 def test_every_command_has_help_with_an_example(cli: Run, command: str) -> None:
-    told = cli(command, "--help")
-    assert told.returncode == 0
-    assert f"Example: impact {command}" in told.stdout
+    done = cli(command, "--help")
+    assert done.returncode == 0
+    assert f"Example: impact {command}" in done.stdout
 
 
 @pytest.mark.parametrize("words", [["--help"], ["sweep", "--help"], ["--version"]])
@@ -526,7 +528,16 @@ def test_closed_streams_are_no_error(stored: Path) -> None:
         assert (done.returncode, done.stderr) == (0, ""), line
 
 
-def test_a_reader_that_leaves_early_is_no_error(stored: Path, tmp_path: Path) -> None:
+def test_a_closed_pipe_is_no_error(forked: ForkServer, stored: Path, tmp_path: Path) -> None:
+    with abandoned_pipe(tmp_path) as pipe:
+        done = forked("plot", stored, "-o", tmp_path / "x.png", "--json", stdout=pipe)
+    assert done.returncode == 0, done.stderr
+    assert "Traceback" not in done.stderr
+    assert "Broken" not in done.stderr
+
+
+@pytest.mark.slow
+def test_a_closed_pipe_is_no_error_of_an_interpreter(stored: Path, tmp_path: Path) -> None:
     line = f'"{sys.executable}" -m impact plot "{stored}" -o "{tmp_path}/x.svg" --json | head -c 10'
     done = subprocess.run(
         ["bash", "-o", "pipefail", "-c", line], cwd=ROOT, capture_output=True, text=True, check=False
@@ -559,14 +570,14 @@ def test_a_signal_leaves_nothing_half_written(tmp_path: Path, number: signal.Sig
         assert child.poll() is None
         time.sleep(0.01)
     child.send_signal(number)
-    _, told = child.communicate(timeout=60)
+    _, stderr = child.communicate(timeout=60)
     assert child.returncode == code
-    assert told.endswith(" of 300,000 trajectories are kept in results.h5.work; --resume continues\n")
-    assert "Traceback" not in told
+    assert stderr.endswith(" of 300,000 trajectories are kept in results.h5.work; --resume continues\n")
+    assert "Traceback" not in stderr
     assert sorted(p.name for p in tmp_path.iterdir()) == ["long.toml", "results.h5.work"]
 
 
-SAVING = """
+KILLED_WHILE_STORING = """
 import os, signal
 from impact import atomic as sink
 whole = sink._publish
@@ -583,14 +594,14 @@ sink._publish = signalled
 def test_a_signal_while_storing_is_not_lost(
     forked: ForkServer, small: Path, tmp_path: Path, name: str, code: int
 ) -> None:
-    done = forked("sweep", small.name, cwd=tmp_path, code=SAVING.replace("NAME", name))
+    done = forked("sweep", small.name, cwd=tmp_path, code=KILLED_WHILE_STORING.replace("NAME", name))
     assert done.returncode == code
     assert done.stderr.endswith("; results.h5 is complete\n")
     assert impact.load(tmp_path / "results.h5").sizes["e"] == 3
 
 
 def test_an_internal_error_is_one_line_and_a_report(forked: ForkServer, tmp_path: Path, stored: Path) -> None:
-    # a function of the program replaced by one that fails stands for a mistake of its own
+    # a function that is replaced by a failing one stands for a bug
     code = (
         "import tempfile, impact.api as api\n"
         "def broken(*a, **k): raise ZeroDivisionError('of our own')\n"
@@ -612,11 +623,11 @@ def test_a_cluster_without_dask_names_the_extra(forked: ForkServer, small: Path,
     assert (done.returncode, done.stderr) == (2, f"--scheduler local: {expected}\n")
 
 
-def test_one_of_those_who_integrate_is_asked_for(cli: Run, small: Path, tmp_path: Path) -> None:
-    ways = ("--jobs 2", "--threads 2", "--scheduler local", "--scheduler-file s.json")
-    for one, other in itertools.combinations(ways, 2):
-        done = cli("sweep", small, *one.split(), *other.split(), cwd=tmp_path)
-        assert (done.returncode, done.stderr) == (2, f"{one}: got {other} as well, expected one of the two\n")
+def test_executors_exclude_each_other(cli: Run, small: Path, tmp_path: Path) -> None:
+    executors = ("--jobs 2", "--threads 2", "--scheduler local", "--scheduler-file s.json")
+    for first, second in itertools.combinations(executors, 2):
+        done = cli("sweep", small, *first.split(), *second.split(), cwd=tmp_path)
+        assert (done.returncode, done.stderr) == (2, f"{first}: got {second} as well, expected one of the two\n")
 
 
 def test_help_of_a_command_and_the_version(cli: Run) -> None:
@@ -633,7 +644,7 @@ def test_flags_are_shown_without_a_type(cli: Run) -> None:
 
 
 def test_models_by_a_pattern(cli: Run) -> None:
-    keys = [one["key"] for one in json.loads(cli("models", "lammps-t*", "--json").stdout)]
+    keys = [record["key"] for record in json.loads(cli("models", "lammps-t*", "--json").stdout)]
     assert keys == [key for key in impact.models() if key.startswith("lammps-t")]
     # the second column is that of e = 0.1
     assert re.search(r"^lammps-tsuji +0\.0995 ", cli("models", "lammps-t*").stdout, re.MULTILINE)
