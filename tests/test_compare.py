@@ -1,4 +1,4 @@
-"""A verdict is equal where it should be, and says in what it is not."""
+"""`impact.compare` finds two results equal exactly if they are, and otherwise names each difference."""
 
 from __future__ import annotations
 
@@ -22,14 +22,16 @@ from .fork_server import ForkServer
 GEOMETRIC = {
     "models": ["hertz", "lankarani-nikravesh-1990"],
     "sweep": {"e": [0.5, 1.0], "v1": {"geomspace": [0.1, 10.0, 7]}, "m1": 1.0, "m2": 1.0, "K": 6e9},
+    "solver": {"rtol": 1e-4},
 }
 # v0 = 3 m/s, m = 0.75 kg, m v0^2/2 = 3.375 J
 BY_HAND = {
     "models": ["hertz"],
     "sweep": {"e": [0.5, 1.0], "v1": 2.0, "v2": -1.0, "m1": 1.0, "m2": 3.0, "K": 6e9},
-    "output": {"variables": [one.name for one in SCHEMA]},
+    "output": {"variables": [variable.name for variable in SCHEMA]},
+    "solver": {"rtol": 1e-4},
 }
-BY_DEFAULT = [one.name for one in SCHEMA if one.by_default]
+BY_DEFAULT = [variable.name for variable in SCHEMA if variable.by_default]
 GAMMA = "ismail-stronge-2008.gamma"
 
 
@@ -38,25 +40,37 @@ def geometric() -> xr.Dataset:
     return impact.sweep(GEOMETRIC)
 
 
-@pytest.fixture
-def by_hand() -> xr.Dataset:
-    """A result whose values are set in the test."""
+@pytest.fixture(scope="module")
+def two_points() -> xr.Dataset:
+    """A result of two points with all variables."""
     result = impact.sweep(BY_HAND)
     result["in_domain"][:] = 1
     return result
 
 
+@pytest.fixture
+def by_hand(two_points: xr.Dataset) -> xr.Dataset:
+    """A copy of it, whose values the test sets."""
+    return two_points.copy(deep=True)
+
+
 def _with(dataset: xr.Dataset, name: str, value: float, **at: int) -> xr.Dataset:
-    """A copy in which one value is another."""
+    """A copy with a different value at one position."""
     copy = dataset.copy(deep=True)
     copy[name][at or dict.fromkeys(copy[name].dims, 0)] = value
     return copy
 
 
 def _relabelled(dataset: xr.Dataset, name: str, values: Any) -> xr.Dataset:
-    """A copy in which a coordinate has other values."""
-    one = dataset[name]
-    return dataset.assign_coords({name: (one.dims, np.asarray(values, one.dtype).reshape(one.shape), one.attrs)})
+    """A copy with other values of a coordinate."""
+    coordinate = dataset[name]
+    values = np.asarray(values, coordinate.dtype).reshape(coordinate.shape)
+    return dataset.assign_coords({name: (coordinate.dims, values, coordinate.attrs)})
+
+
+def _around(dataset: xr.Dataset, name: str) -> xr.Dataset:
+    """One variable, its scale, what the scale might affect, and the status."""
+    return dataset[[*dict.fromkeys((name, "peak_indentation", "permanent_indentation", "status"))]]
 
 
 def _faults(verdict: Verdict) -> list[tuple[str, str]]:
@@ -65,12 +79,12 @@ def _faults(verdict: Verdict) -> list[tuple[str, str]]:
     return [(fault.kind, fault.name) for fault in verdict.faults]
 
 
-# what is equal
+# equal results
 
 
 def test_a_result_is_equal_to_itself(figure6: xr.Dataset, wide: xr.Dataset, stored: Path) -> None:
-    for one in (figure6, wide):
-        verdict = impact.compare(one, one)
+    for result in (figure6, wide):
+        verdict = impact.compare(result, result)
         assert verdict.equal, verdict
         assert verdict.headline.endswith("none differs")
         assert (verdict.faults, verdict.notes, verdict.lines) == ((), (), ())
@@ -80,7 +94,7 @@ def test_a_result_is_equal_to_itself(figure6: xr.Dataset, wide: xr.Dataset, stor
 
 
 @pytest.mark.parametrize("axis", ["model", "e", "v1", "m1", "material2", GAMMA])
-def test_the_order_of_labels_does_not_count(wide: xr.Dataset, axis: str) -> None:
+def test_the_order_of_labels_does_not_matter(wide: xr.Dataset, axis: str) -> None:
     backwards = wide.isel({axis: slice(None, None, -1)})
     assert any((backwards[name].values != wide[name].values).any() for name in ("v1_post", "contact_time"))
     for new, baseline in ((backwards, wide), (wide, backwards)):
@@ -89,17 +103,18 @@ def test_the_order_of_labels_does_not_count(wide: xr.Dataset, axis: str) -> None
         assert verdict.headline.endswith("none differs")
 
 
-def test_the_order_of_dimensions_does_not_count(wide: xr.Dataset) -> None:
+def test_the_order_of_dimensions_does_not_matter(wide: xr.Dataset) -> None:
     turned = wide.transpose(*reversed(list(wide.dims)))
     turned["e_out"] = turned["e_out"].transpose("m1", "model", ...)
     for new, baseline in ((turned, wide), (wide, turned)):
         assert impact.compare(new, baseline).equal
-    # and each value is compared with its own: one that differs is found where it is
-    place = {"model": 2, "e": 1, "v1": 0, "m1": 1, "material2": 1, GAMMA: 0}
-    moved = _with(wide, "e_out", 0.123, **place)
-    found = next(iter(impact.compare(turned, moved).differing))
-    assert found.at == {"model": "bilinear", "e": 0.6, "v1": 1.0, "m1": 3.0, "m2": math.inf, "material2": "hard"}
-    assert (found.different, found.baseline) == (1, 0.123)
+    # each value is compared with the value at the same labels: a different one is found at its labels
+    position = {"model": 2, "e": 1, "v1": 0, "m1": 1, "material2": 1, GAMMA: 0}
+    moved = _with(wide, "e_out", 0.123, **position)
+    difference = next(iter(impact.compare(turned, moved).differing))
+    labels = {"model": "bilinear", "e": 0.6, "v1": 1.0, "m1": 3.0, "m2": math.inf, "material2": "hard"}
+    assert difference.at == labels
+    assert (difference.different, difference.baseline) == (1, 0.123)
 
 
 def test_labels_may_differ_by_rounding_only(geometric: xr.Dataset) -> None:
@@ -119,15 +134,16 @@ def test_labels_may_differ_by_rounding_only(geometric: xr.Dataset) -> None:
     assert _faults(impact.compare(far, geometric)) == [("nothing in common", "v1")]
 
 
-def test_labels_that_differ_by_rounding_within_a_file_are_told_apart() -> None:
+def test_labels_that_differ_by_rounding_within_a_file_are_distinct() -> None:
     near = math.nextafter(1.0, 2.0)
     two = impact.sweep(
-        {"models": "lankarani-nikravesh-1990", "sweep": GEOMETRIC["sweep"] | {"e": 0.5, "v1": [1.0, near]}}
+        GEOMETRIC
+        | {"models": "lankarani-nikravesh-1990", "sweep": GEOMETRIC["sweep"] | {"e": 0.5, "v1": [1.0, near]}}
     )
     assert impact.compare(two, two).equal
     moved = _with(two, "e_out", 0.7, model=0, v1=1)
-    (found,) = impact.compare(moved, two).differing
-    assert (found.at["v1"], found.different) == (near, 1)
+    (difference,) = impact.compare(moved, two).differing
+    assert (difference.at["v1"], difference.different) == (near, 1)
     swapped = two.isel(v1=[1, 0])
     assert impact.compare(swapped, two).equal
     assert impact.compare(moved.isel(v1=[1, 0]), two).differing[0].at["v1"] == near
@@ -139,62 +155,64 @@ def test_a_zip_group_is_matched_by_all_its_columns(wide: xr.Dataset) -> None:
     verdict = impact.compare(other, wide)
     assert _faults(verdict) == [("labels", "m1")]
     assert "1 of 2 in NEW only: 3 with m2=7; 1 of 2 in BASELINE only: 3 with m2=inf" in str(verdict)
-    assert {one.points for one in verdict.variables} == {3 * 2 * 1 * 2 * 2, 4 * 3 * 2 * 1 * 2 * 2}
+    assert {variable.points for variable in verdict.variables} == {3 * 2 * 1 * 2 * 2, 4 * 3 * 2 * 1 * 2 * 2}
     crossed = _relabelled(wide, "m2", [math.inf, 1.0])
     assert _faults(impact.compare(crossed, wide)) == [("nothing in common", "m1")]
-    # what was zipped and no longer is: the point that both have is compared
-    loose = wide.isel(m1=[0]).drop_vars("m2").assign_coords(m2=((), 1.0, wide["m2"].attrs))
-    assert _faults(impact.compare(loose, wide)) == [("labels", "m1")]
-    assert impact.compare(loose, wide, subset=True).equal
+    # a zip group against single values: the common point is compared
+    unzipped = wide.isel(m1=[0]).drop_vars("m2").assign_coords(m2=((), 1.0, wide["m2"].attrs))
+    assert _faults(impact.compare(unzipped, wide)) == [("labels", "m1")]
+    assert impact.compare(unzipped, wide, subset=True).equal
 
 
-def test_an_axis_of_length_one_is_a_single_value(wide: xr.Dataset) -> None:
-    for name, place in (("v1", 1), ("material2", 0), ("m1", 1), ("e", 2), ("model", 3)):
-        axis, single = wide.isel({name: [place]}), wide.isel({name: place})
+def test_an_axis_of_length_one_equals_a_single_value(wide: xr.Dataset) -> None:
+    for name, index in (("v1", 1), ("material2", 0), ("m1", 1), ("e", 2), ("model", 3)):
+        axis, single = wide.isel({name: [index]}), wide.isel({name: index})
         for new, baseline in ((axis, single), (single, axis)):
             verdict = impact.compare(new, baseline)
             assert verdict.equal, verdict
-        # in strict mode the labels that only one of the two has are told
+        # without subset, labels of only one result are a difference
         verdict = impact.compare(single, wide)
         assert _faults(verdict) == [("labels", name)]
-        assert {one.different for one in verdict.variables} == {0}
+        assert {variable.different for variable in verdict.variables} == {0}
         assert impact.compare(single, wide, subset=True).equal
-        verdict = impact.compare(single, wide.isel({name: [place - 1]}))
+        verdict = impact.compare(single, wide.isel({name: [index - 1]}))
         assert ("nothing in common", name) in _faults(verdict)
 
 
-def test_a_model_that_was_picked_out_is_still_a_label(figure6: xr.Dataset) -> None:
-    picked = [figure6.isel(model=place) for place in range(3)]
-    assert impact.compare(picked[1], picked[1]).equal
-    assert impact.compare(picked[1], figure6, subset=True).equal
-    same = picked[1].assign_coords(model=picked[2]["model"])
-    assert _faults(impact.compare(same, picked[1])) == [("nothing in common", "model")]
-    # and its NaNs are judged by its status
-    verdict = impact.compare(_with(picked[0], "status", 10, e=5), picked[0])
+def test_a_single_selected_model_is_still_a_label(figure6: xr.Dataset) -> None:
+    single_models = [figure6.isel(model=index) for index in range(3)]
+    assert impact.compare(single_models[1], single_models[1]).equal
+    assert impact.compare(single_models[1], figure6, subset=True).equal
+    same = single_models[1].assign_coords(model=single_models[2]["model"])
+    assert _faults(impact.compare(same, single_models[1])) == [("nothing in common", "model")]
+    # its NaNs are judged by its status
+    verdict = impact.compare(_with(single_models[0], "status", 10, e=5), single_models[0])
     assert verdict.differing[0].name == "status"
-    assert "damping_ratio" in [one.name for one in verdict.differing]
+    assert "damping_ratio" in [variable.name for variable in verdict.differing]
     assert verdict.differing[0].at == {"model": "lankarani-nikravesh-1994", "e": 0.05}
 
 
-# in what two results differ
+# kinds of differences
 
 
-def test_another_scalar_is_another_physics(figure6: xr.Dataset) -> None:
-    for name, value, told in (
-        ("v1", 1.5, "v1 is 1.5, in BASELINE 1"), ("m2", math.inf, "m2 is inf, in BASELINE 1"),
-        ("v2", 1e-9, "v2 is 1e-09, in BASELINE 0"), ("n", 1.5 + 1e-9, "n is 1.500000001, in BASELINE 1.5"),
-    ):  # fmt: skip
+def test_a_different_scalar_input_is_a_difference_of_the_physics_config(figure6: xr.Dataset) -> None:
+    for name, value, message in (
+        ("v1", 1.5, "v1 is 1.5, in BASELINE 1"),
+        ("m2", math.inf, "m2 is inf, in BASELINE 1"),
+        ("v2", 1e-9, "v2 is 1e-09, in BASELINE 0"),
+        ("n", 1.5 + 1e-9, "n is 1.500000001, in BASELINE 1.5"),
+    ):
         verdict = impact.compare(_relabelled(figure6, name, value), figure6)
         assert ("physics config", name) in _faults(verdict)
         assert verdict.headline.startswith(f"not equal: physics config ({name})")
-        assert f"\nphysics config: {told}\n" in f"{verdict}\n"
+        assert f"\nphysics config: {message}\n" in f"{verdict}\n"
     other = figure6.assign_coords(material=((), "steel", figure6["material"].attrs))
     assert _faults(impact.compare(other, figure6)) == [("physics config", "material")]
     rounded = _relabelled(figure6, "m1", math.nextafter(1.0, 2.0))
     assert impact.compare(rounded, figure6).equal
 
 
-def test_another_property_of_a_material_is_another_physics(wide: xr.Dataset) -> None:
+def test_a_different_material_property_is_a_difference_of_the_physics_config(wide: xr.Dataset) -> None:
     table = json.loads(wide.attrs["materials"])
     for field, value in (("E", 2.1e9), ("nu", 0.41), ("rho", 1001.0), ("yield_strength", 3e8)):
         changed = table | {"soft": table["soft"] | {field: value}}
@@ -203,21 +221,21 @@ def test_another_property_of_a_material_is_another_physics(wide: xr.Dataset) -> 
         before = table["soft"][field]
         shown = before if before is None else f"{before:.12g}"
         assert f"materials.soft.{field} is {value:.12g}, in BASELINE {shown}" in str(verdict)
-    # one that only one side has is told by the labels
+    # a material that no label uses does not matter
     more = wide.assign_attrs(materials=json.dumps(table | {"unused": table["soft"]}))
     assert impact.compare(more, wide).equal
 
 
-def test_an_input_given_on_one_side_only(figure6: xr.Dataset) -> None:
-    given = figure6.assign_coords(R1=((), 0.05, {"units": "m"}))
-    for new, baseline, side in ((given, figure6, "NEW"), (figure6, given, "BASELINE")):
+def test_an_input_on_one_side_only_is_a_difference(figure6: xr.Dataset) -> None:
+    with_radius = figure6.assign_coords(R1=((), 0.05, {"units": "m"}))
+    for new, baseline, side in ((with_radius, figure6, "NEW"), (figure6, with_radius, "BASELINE")):
         verdict = impact.compare(new, baseline)
         assert _faults(verdict) == [("physics config", "R1")]
         assert f"R1 is given in {side} only" in str(verdict)
         assert not impact.compare(new, baseline, subset=True).equal
 
 
-def test_e_by_alpha_is_not_e(by_hand: xr.Dataset) -> None:
+def test_an_e_computed_from_alpha_does_not_match_an_axis_e(by_hand: xr.Dataset) -> None:
     sweep = {name: value for name, value in BY_HAND["sweep"].items() if name != "e"}
     alpha = impact.sweep(BY_HAND | {"sweep": sweep | {"alpha": [0.5 / 3.0, 0.0]}})
     np.testing.assert_allclose(alpha["e"], by_hand["e"], rtol=1e-15)
@@ -229,7 +247,7 @@ def test_e_by_alpha_is_not_e(by_hand: xr.Dataset) -> None:
     assert _faults(impact.compare(other, alpha)) == [("labels", "e")]
 
 
-def test_other_units(figure6: xr.Dataset) -> None:
+def test_different_units_are_a_difference(figure6: xr.Dataset) -> None:
     for name in ("peak_force", "e", "m2", "status"):
         other = figure6.copy(deep=True)
         other[name].attrs["units"] = "kN"
@@ -243,19 +261,20 @@ def test_other_units(figure6: xr.Dataset) -> None:
 
 
 @pytest.mark.parametrize("name", BY_DEFAULT)
-def test_a_missing_variable(figure6: xr.Dataset, name: str) -> None:
-    without = figure6.drop_vars(name)
-    for new, baseline, side in ((without, figure6, "BASELINE"), (figure6, without, "NEW")):
+def test_a_missing_variable_is_a_difference_and_with_subset_a_note(figure6: xr.Dataset, name: str) -> None:
+    both = figure6[["status", name] if name != "status" else ["status", "e_out"]]
+    without = both.drop_vars(name)
+    for new, baseline, side in ((without, both, "BASELINE"), (both, without, "NEW")):
         verdict = impact.compare(new, baseline)
         assert _faults(verdict) == [("missing variable", name)]
         assert verdict.headline == f"not equal: missing variable ({name})"
         assert f"{name} is in {side} only" in str(verdict)
-        part = impact.compare(new, baseline, subset=True)
-        assert part.equal
-        assert part.notes == (f"{name} is in {side} only",)
+        verdict = impact.compare(new, baseline, subset=True)
+        assert verdict.equal
+        assert verdict.notes == (f"{name} is in {side} only",)
 
 
-def test_a_variable_that_no_result_has_is_not_judged(figure6: xr.Dataset) -> None:
+def test_a_variable_outside_the_schema_is_noted_and_not_judged(figure6: xr.Dataset) -> None:
     more = figure6.assign(twice=("k", [1.0, 2.0])).assign_coords(note=("e", np.arange(101.0)))
     verdict = impact.compare(more, figure6)
     assert verdict.equal
@@ -264,16 +283,20 @@ def test_a_variable_that_no_result_has_is_not_judged(figure6: xr.Dataset) -> Non
     assert impact.compare(moved, more).differing[0].at == {"model": "lankarani-nikravesh-1990", "e": 0.05}
 
 
-def test_nothing_in_common(figure6: xr.Dataset, wide: xr.Dataset, geometric: xr.Dataset) -> None:
+def test_results_without_common_labels_or_variables_are_not_equal(
+    figure6: xr.Dataset, wide: xr.Dataset, geometric: xr.Dataset
+) -> None:
     for new, baseline in (
-        (figure6.isel(e=slice(50)), figure6.isel(e=slice(50, None))), (figure6, wide),
+        (figure6.isel(e=slice(50)), figure6.isel(e=slice(50, None))),
+        (figure6, wide),
         (geometric.isel(v1=slice(3)), figure6),
         (figure6.sel(model=["gharib-hurmuzlu-2012"]), geometric),
-    ):  # fmt: skip
+    ):
         for subset in (False, True):
             for verdict in (
-                impact.compare(new, baseline, subset=subset), impact.compare(baseline, new, subset=subset),
-            ):  # fmt: skip
+                impact.compare(new, baseline, subset=subset),
+                impact.compare(baseline, new, subset=subset),
+            ):
                 assert ("nothing in common") in {kind for kind, _ in _faults(verdict)}
                 assert verdict.headline.startswith("not equal: nothing in common (")
                 assert verdict.variables == ()
@@ -284,23 +307,23 @@ def test_nothing_in_common(figure6: xr.Dataset, wide: xr.Dataset, geometric: xr.
     ]
 
 
-# the intersection
+# the common part of two results
 
 
-def test_subset_judges_what_both_have(figure6: xr.Dataset) -> None:
+def test_subset_judges_the_common_points(figure6: xr.Dataset) -> None:
     new, baseline = figure6.isel(e=slice(0, 60), model=[0, 1]), figure6.isel(e=slice(40, None), model=[2, 1])
     assert _faults(impact.compare(new, baseline)) == [("labels", "model"), ("labels", "e")]
     verdict = impact.compare(new, baseline, subset=True)
     assert verdict.equal, verdict
-    assert {one.points for one in verdict.variables} == {20}
-    inside, outside = (_with(new, "e_out", 0.123, model=1, e=place) for place in (50, 10))
+    assert {variable.points for variable in verdict.variables} == {20}
+    inside, outside = (_with(new, "e_out", 0.123, model=1, e=index) for index in (50, 10))
     assert impact.compare(outside, baseline, subset=True).equal
-    found = impact.compare(inside, baseline, subset=True)
-    assert found.headline == "not equal: values (e_out)"
-    assert found.differing[0].at == {"model": "lankarani-nikravesh-1990", "e": 0.5}
+    verdict = impact.compare(inside, baseline, subset=True)
+    assert verdict.headline == "not equal: values (e_out)"
+    assert verdict.differing[0].at == {"model": "lankarani-nikravesh-1990", "e": 0.5}
 
 
-def test_a_single_value_is_judged_where_the_other_has_it_on_an_axis(wide: xr.Dataset) -> None:
+def test_with_subset_a_single_value_is_matched_with_a_label_of_an_axis(wide: xr.Dataset) -> None:
     single = wide.isel(v1=1, material2=0)
     assert single["v1"].ndim == 0
     for new, baseline in ((single, wide), (wide, single)):
@@ -308,15 +331,15 @@ def test_a_single_value_is_judged_where_the_other_has_it_on_an_axis(wide: xr.Dat
         assert verdict.equal, verdict
         assert verdict.variables[0].points == wide["v1_post"].size / 4
     moved = _with(single, "v1_post", 9.0)
-    (found,) = impact.compare(moved, wide, subset=True).differing
-    assert (found.at["v1"], found.at["material2"]) == (2.0, "soft")
-    # one that is not on the axis leaves nothing
+    (difference,) = impact.compare(moved, wide, subset=True).differing
+    assert (difference.at["v1"], difference.at["material2"]) == (2.0, "soft")
+    # a value that is not on the axis leaves no common point
     elsewhere = _relabelled(single, "v1", 7.0)
     assert ("nothing in common", "v1") in _faults(impact.compare(elsewhere, wide, subset=True))
     assert ("nothing in common", "v1") in _faults(impact.compare(elsewhere, single, subset=True))
 
 
-def test_parameters_of_models_that_only_one_has(wide: xr.Dataset) -> None:
+def test_with_subset_a_parameter_axis_of_a_model_outside_the_subset_is_ignored(wide: xr.Dataset) -> None:
     other = wide.sel(model=["bilinear", "hertz"]).isel({GAMMA: 0}).drop_vars(GAMMA)
     for new, baseline in ((other, wide), (wide, other)):
         assert _faults(impact.compare(new, baseline)) == [("labels", "model")]
@@ -329,7 +352,7 @@ def test_parameters_of_models_that_only_one_has(wide: xr.Dataset) -> None:
     assert ("physics config", GAMMA) in _faults(impact.compare(both, wide.isel({GAMMA: 0}), subset=True))
 
 
-# values, judged by hand
+# values and their tolerances, computed by hand
 
 SCALES = {
     "v1_post": 3.0, "v2_post": 3.0, "v1_reference": 3.0, "v2_reference": 3.0, "v1_error": 3.0, "v2_error": 3.0,
@@ -338,56 +361,62 @@ SCALES = {
     "energy_residual": 1.0, "closed_form_error": 1.0, "e_kinetic": 1.0, "e_energetic": 1.0, "lambda": 4.5e9,
     "separation_time": 2e-4,
 }  # fmt: skip
-ITSELF = {
-    "peak_indentation", "peak_force", "contact_time", "stiffness", "damping_ratio", "lambda", "separation_time",
-}  # fmt: skip
+# variables whose scale is their value
+RELATIVE = {"peak_indentation", "peak_force", "contact_time", "stiffness", "damping_ratio", "lambda"}
+RELATIVE |= {"separation_time"}
 
 
-def test_every_variable_is_judged_by_hand_here() -> None:
-    assert {one.name for one in SCHEMA if one.judged not in ("exact", "reported")} == SCALES.keys()
+def test_the_scales_of_this_file_cover_every_variable_with_a_tolerance() -> None:
+    assert {variable.name for variable in SCHEMA if variable.judged not in ("exact", "reported")} == SCALES.keys()
 
 
 @pytest.mark.parametrize("name", SCALES)
 def test_just_below_the_tolerance_is_equal_and_just_above_is_not(by_hand: xr.Dataset, name: str) -> None:
     tol, scale = 1e-4, SCALES[name]
+    by_hand = _around(by_hand, name)
     by_hand["peak_indentation"][:] = 0.004
     bounded = name in ("energy_residual", "closed_form_error")
-    value = scale if name in ITSELF else 0.0 if bounded else 0.25
+    value = scale if name in RELATIVE else 0.0 if bounded else 0.25
     by_hand[name][..., 0] = value
-    # the other point has another scale, which must not matter
+    # the second point has another scale, which must not matter
     by_hand[name][..., 1] = 1e3 * value
-    place = {"e": 0} if by_hand[name].ndim == 1 else {"model": 0, "e": 0}
+    position = {"e": 0} if by_hand[name].ndim == 1 else {"model": 0, "e": 0}
     for sign in (1, -1):
         below, above = (
-            _with(by_hand, name, value + sign * part * tol * scale, **place) for part in (0.999, 1.001)
+            _with(by_hand, name, value + sign * part * tol * scale, **position) for part in (0.999, 1.001)
         )
         equal, different = impact.compare(below, by_hand, tol=tol), impact.compare(above, by_hand, tol=tol)
         assert equal.equal, equal
         assert f"largest difference 1 x tolerance: {name} at " in equal.headline
-        (found,) = different.differing
-        assert (found.name, found.different, found.at["e"], found.tolerance) == (name, 1, 0.5, tol)
-        assert found.points == by_hand[name].size
-        assert found.times == pytest.approx(1.001, rel=1e-6)
-        assert found.worst == pytest.approx(1.001 * tol * scale, rel=1e-6)
+        (difference,) = different.differing
+        assert (difference.name, difference.tolerance, difference.at["e"]) == (name, tol, 0.5)
+        assert (difference.different, difference.points) == (1, by_hand[name].size)
+        assert difference.times == pytest.approx(1.001, rel=1e-6)
+        assert difference.worst == pytest.approx(1.001 * tol * scale, rel=1e-6)
         assert different.headline == f"not equal: values ({name})"
-        # nothing is allowed
-        tiny = _with(by_hand, name, np.nextafter(value, math.inf), **place)
+        # at tolerance 0 the next number is a difference
+        tiny = _with(by_hand, name, np.nextafter(value, math.inf), **position)
         assert impact.compare(tiny, by_hand, tol=0.0).headline == f"not equal: values ({name})"
     assert impact.compare(by_hand, by_hand, tol=0.0).equal
     assert "where none is allowed" in str(impact.compare(tiny, by_hand, tol=0.0))
 
 
-def test_the_scale_is_that_of_each_point() -> None:
+def test_each_point_has_its_scale() -> None:
     fast = impact.sweep(
-        {"models": "hertz", "sweep": BY_HAND["sweep"] | {"v1": [0.0, 9.0], "e": 1.0, "m2": [1.0, 3.0]}}
+        {
+            "models": "hertz",
+            "solver": {"rtol": 1e-4},
+            "sweep": BY_HAND["sweep"] | {"v1": [0.0, 9.0], "e": 1.0, "m2": [1.0, 3.0]},
+        }
     )
     tol = 1e-6
-    for place, speed, mass in ((0, 1.0, 0.5), (1, 10.0, 0.75)):
+    for index, speed, mass in ((0, 1.0, 0.5), (1, 10.0, 0.75)):
         for name, scale in (("v1_post", speed), ("energy_loss", mass * speed**2 / 2)):
-            at = {"model": 0, "v1": place, "m2": place}
-            value = float(fast[name][at])
-            assert impact.compare(_with(fast, name, value + 0.999 * tol * scale, **at), fast, tol=tol).equal
-            assert not impact.compare(_with(fast, name, value + 1.001 * tol * scale, **at), fast, tol=tol).equal
+            position = {"model": 0, "v1": index, "m2": index}
+            value = float(fast[name][position])
+            for part, equal in ((0.999, True), (1.001, False)):
+                changed = _with(fast, name, value + part * tol * scale, **position)
+                assert impact.compare(changed, fast, tol=tol).equal == equal
 
 
 def test_residuals_are_judged_by_their_bound(by_hand: xr.Dataset) -> None:
@@ -396,7 +425,7 @@ def test_residuals_are_judged_by_their_bound(by_hand: xr.Dataset) -> None:
         a, b = _with(by_hand, name, 0.9e-6), _with(by_hand, name, -0.9e-6)
         assert impact.compare(a, b, tol=1e-6).equal
         assert impact.compare(b, a, tol=1e-6).equal
-        # one above it is a difference, both of which are not
+        # one residual above the bound is a difference, two close ones are not
         above = _with(by_hand, name, -1.1e-6)
         assert not impact.compare(a, above, tol=1e-6).equal
         assert not impact.compare(above, a, tol=1e-6).equal
@@ -404,7 +433,7 @@ def test_residuals_are_judged_by_their_bound(by_hand: xr.Dataset) -> None:
         assert not impact.compare(_with(by_hand, name, -2.2e-6), above, tol=1e-6).equal
 
 
-def test_flags_are_exact_and_steps_are_reported(by_hand: xr.Dataset) -> None:
+def test_flags_are_compared_exactly_and_steps_are_reported_only(by_hand: xr.Dataset) -> None:
     flipped = _with(by_hand, "in_domain", 0)
     verdict = impact.compare(flipped, by_hand, tol=1e6)
     assert verdict.headline == "not equal: values (in_domain)"
@@ -415,13 +444,13 @@ def test_flags_are_exact_and_steps_are_reported(by_hand: xr.Dataset) -> None:
     more = _with(by_hand, "steps", 10_000)
     verdict = impact.compare(more, by_hand)
     assert verdict.equal
-    (steps,) = (one for one in verdict.variables if one.name == "steps")
+    (steps,) = (variable for variable in verdict.variables if variable.name == "steps")
     assert (steps.different, steps.is_equal, steps.at) == (1, True, {"model": "hertz", "e": 0.5})
     assert "steps: 1 of 2 differ, by 9" in steps.text
     assert steps.text.endswith("at model=hertz, e=0.5 (not judged)")
 
 
-def test_the_first_of_flags_is_named_not_the_largest(figure6: xr.Dataset) -> None:
+def test_of_several_different_flags_the_first_is_named(figure6: xr.Dataset) -> None:
     two = _with(_with(figure6, "status", 2, model=1, e=5), "status", 16, model=1, e=7)
     verdict = impact.compare(two, figure6)
     assert verdict.headline.startswith("not equal: values (status")
@@ -430,61 +459,63 @@ def test_the_first_of_flags_is_named_not_the_largest(figure6: xr.Dataset) -> Non
     )
 
 
-@pytest.mark.parametrize(("new", "baseline"), [(math.inf, 1.0), (1.0, math.inf), (math.inf, -math.inf)])
 @pytest.mark.parametrize("name", SCALES)
-def test_infinity_is_equal_to_itself_only(by_hand: xr.Dataset, name: str, new: float, baseline: float) -> None:
-    a, b = _with(by_hand, name, new), _with(by_hand, name, baseline)
-    assert impact.compare(a, a).equal
-    verdict = impact.compare(a, b, tol=1e300)
-    assert name in [one.name for one in verdict.differing]
-    assert not impact.compare(b, a, tol=1e300).equal
+def test_infinity_equals_only_itself(by_hand: xr.Dataset, name: str) -> None:
+    infinite, finite, negative = (
+        _with(_around(by_hand, name), name, value) for value in (math.inf, 1.0, -math.inf)
+    )
+    assert impact.compare(infinite, infinite).equal
+    for new, baseline in ((infinite, finite), (finite, infinite), (infinite, negative), (negative, infinite)):
+        verdict = impact.compare(new, baseline, tol=1e300)
+        assert name in [variable.name for variable in verdict.differing]
 
 
-def test_an_infinite_scale_allows_nothing(by_hand: xr.Dataset) -> None:
+def test_an_infinite_scale_allows_no_difference(by_hand: xr.Dataset) -> None:
     walls = _relabelled(_relabelled(by_hand, "m1", math.inf), "m2", math.inf)
     walls["energy_loss"][:] = 1.0
     verdict = impact.compare(_with(walls, "energy_loss", 2.0), walls)
     assert verdict.headline == "not equal: values (energy_loss)"
-    endless = _with(by_hand, "peak_indentation", math.inf)
-    assert not impact.compare(_with(endless, "permanent_indentation", 0.1), endless).equal
+    infinite = _with(by_hand, "peak_indentation", math.inf)
+    assert not impact.compare(_with(infinite, "permanent_indentation", 0.1), infinite).equal
 
 
-def test_nan_in_one_differs(figure6: xr.Dataset) -> None:
+def test_a_nan_in_one_result_is_a_difference(figure6: xr.Dataset) -> None:
     for name in SCALES.keys() & BY_DEFAULT:
-        at = {"e": 50} if figure6[name].ndim == 1 else {"model": 1, "e": 50}
-        absent = _with(figure6, name, math.nan, **at)
+        position = {"e": 50} if figure6[name].ndim == 1 else {"model": 1, "e": 50}
+        absent = _with(figure6, name, math.nan, **position)
         for new, baseline in ((absent, figure6), (figure6, absent)):
             verdict = impact.compare(new, baseline, tol=1e300)
-            (found,) = verdict.differing
-            assert (found.name, found.different, found.times, found.at["e"]) == (name, 1, math.inf, 0.5)
-    told = (
+            (difference,) = verdict.differing
+            assert (difference.name, difference.different, difference.at["e"]) == (name, 1, 0.5)
+            assert difference.times == math.inf
+    sentence = (
         "damping_ratio: 1 of 303 differ, the worst at model=lankarani-nikravesh-1990, e=0.5: NaN, baseline 0.5625"
     )
     absent = _with(figure6, "damping_ratio", math.nan, model=1, e=50)
-    assert told in str(impact.compare(absent, figure6))
+    assert sentence in str(impact.compare(absent, figure6))
     # a NaN is worse than any number
     both = _with(absent, "damping_ratio", 1e9, model=1, e=20)
-    (found,) = impact.compare(both, figure6).differing
-    assert (found.different, found.at["e"]) == (2, 0.5)
+    (difference,) = impact.compare(both, figure6).differing
+    assert (difference.different, difference.at["e"]) == (2, 0.5)
 
 
-def test_nan_in_both_is_equal_where_the_status_is(figure6: xr.Dataset) -> None:
+def test_nans_in_both_results_are_equal_if_the_statuses_are(figure6: xr.Dataset) -> None:
     def failed(status: int) -> xr.Dataset:
-        found = _with(figure6, "status", status, model=1, e=50)
+        result = _with(figure6, "status", status, model=1, e=50)
         for name in SCALES.keys() & BY_DEFAULT:
-            if found[name].ndim == 2:
-                found[name][1, 50] = math.nan
-        return found
+            if result[name].ndim == 2:
+                result[name][1, 50] = math.nan
+        return result
 
     assert impact.compare(failed(10), failed(10)).equal
     verdict = impact.compare(failed(10), failed(11))
-    names = [one.name for one in verdict.differing]
+    names = [variable.name for variable in verdict.differing]
     assert names[0] == "status"
     assert set(names) == {"status", *(name for name in SCALES.keys() & BY_DEFAULT if figure6[name].ndim == 2)}
     assert "NaN, baseline NaN, which their statuses do not explain" in str(verdict)
     assert "status: 1 of 303 differ, the first at model=lankarani-nikravesh-1990, e=0.5: " in str(verdict)
     assert "not_separated, baseline max_steps" in str(verdict)
-    # a quantity that the law has not got is NaN at status ok
+    # a quantity that a law lacks is NaN at status ok
     assert np.isnan(figure6["damping_ratio"].sel(model="lankarani-nikravesh-1994")).any()
     assert (figure6["status"].sel(model="lankarani-nikravesh-1994", e=0.5) == 1).all()
 
@@ -492,18 +523,18 @@ def test_nan_in_both_is_equal_where_the_status_is(figure6: xr.Dataset) -> None:
 # tolerances
 
 
-def test_the_tolerance_is_the_one_asked_for_else_the_baselines_else_the_solvers(figure6: xr.Dataset) -> None:
+def test_the_tolerance_is_that_of_the_caller_else_of_the_baseline_else_10_rtol(figure6: xr.Dataset) -> None:
     def tolerance(name: str, tol: Any = None, **attributes: Any) -> float:
         verdict = impact.compare(figure6, figure6.assign_attrs(attributes), tol=tol)
-        return next(one.tolerance for one in verdict.variables if one.name == name)
+        return next(variable.tolerance for variable in verdict.variables if variable.name == name)
 
     kept = json.dumps({"all": 1e-5, "v1_post": 1e-4})
     assert figure6.attrs["rtol"] == 1e-10
     assert tolerance("e_out") == 10 * 1e-10
     assert tolerance("e_out", rtol=1e-7) == 10 * 1e-7
-    # only the baseline's count
+    # the attributes of NEW do not matter
     new = figure6.assign_attrs(rtol=1e-3, tolerances=kept)
-    assert {one.tolerance for one in impact.compare(new, figure6).variables[:5]} == {10 * 1e-10}
+    assert {variable.tolerance for variable in impact.compare(new, figure6).variables[:5]} == {10 * 1e-10}
     assert tolerance("e_out", tolerances=kept) == 1e-5
     assert tolerance("v1_post", tolerances=kept) == 1e-4
     assert tolerance("v2_post", tolerances=json.dumps({"v1_post": 1e-4})) == 10 * 1e-10
@@ -511,78 +542,104 @@ def test_the_tolerance_is_the_one_asked_for_else_the_baselines_else_the_solvers(
     assert tolerance("v2_post", {"e_out": 1e-3}, tolerances=kept) == 1e-5
     assert tolerance("v1_post", {"e_out": 1e-3}, tolerances=kept) == 1e-4
     assert tolerance("v1_post", {"v1_post": 1e-3}, tolerances=kept) == 1e-3
-    # one for all takes the place of all that the baseline carries
+    # a tolerance for all variables replaces all tolerances of the baseline
     assert tolerance("v1_post", 1e-2, tolerances=kept) == 1e-2
     assert tolerance("v1_post", {"all": 1e-2, "e_out": 1e-3}, tolerances=kept) == 1e-2
     assert tolerance("e_out", {"all": 1e-2, "e_out": 1e-3}, tolerances=kept) == 1e-3
     assert math.isnan(tolerance("status", 1e-2))
 
 
-@pytest.mark.parametrize(("tol", "told"), [
-    (-1.0, "--tol -1.0: expected a number >= 0"), (math.nan, "--tol nan: expected a number >= 0"),
-    (math.inf, "--tol inf: expected a number >= 0"), (True, "--tol True: expected a number >= 0"),
-    ("1e-8", "--tol 1e-8: expected a number >= 0"), ({"e_out": "1e-8"}, "--tol e_out=1e-8: expected a number"),
-    ({"e_out": -1e-8}, "--tol e_out=-1e-08: expected a number"), ({"e_out": None}, "--tol e_out=None: expected"),
-    ({"e_oot": 1e-8}, '--tol e_oot: not a variable of a result; did you mean "e_out"?'),
-    ({"status": 1e-8}, "--tol status: has no tolerance, it is judged exactly"),
-    ({"steps": 1}, "--tol steps: has no tolerance, it is not judged"),
-    ({"\x1b[31m": 1e-8}, r"--tol \x1b[31m: not a variable of a result; known: "),
-    ({3: 1e-8}, "--tol 3: not a variable"),
-])  # fmt: skip
-def test_a_wrong_tolerance_is_one_clear_line(figure6: xr.Dataset, tol: Any, told: str) -> None:
+@pytest.mark.parametrize(
+    ("tol", "message"),
+    [
+        (-1.0, "--tol -1.0: expected a number >= 0"),
+        (math.nan, "--tol nan: expected a number >= 0"),
+        (math.inf, "--tol inf: expected a number >= 0"),
+        (True, "--tol True: expected a number >= 0"),
+        ("1e-8", "--tol 1e-8: expected a number >= 0"),
+        ({"e_out": "1e-8"}, "--tol e_out=1e-8: expected a number"),
+        ({"e_out": -1e-8}, "--tol e_out=-1e-08: expected a number"),
+        ({"e_out": None}, "--tol e_out=None: expected"),
+        ({"e_oot": 1e-8}, '--tol e_oot: not a variable of a result; did you mean "e_out"?'),
+        ({"status": 1e-8}, "--tol status: has no tolerance, it is judged exactly"),
+        ({"steps": 1}, "--tol steps: has no tolerance, it is not judged"),
+        ({"\x1b[31m": 1e-8}, r"--tol \x1b[31m: not a variable of a result; known: "),
+        ({3: 1e-8}, "--tol 3: not a variable"),
+    ],
+)
+def test_an_invalid_tolerance_is_one_line(figure6: xr.Dataset, tol: Any, message: str) -> None:
     with pytest.raises(UsageError) as raised:
         impact.compare(figure6, figure6, tol=tol)
-    assert str(raised.value).startswith(told)
+    assert str(raised.value).startswith(message)
     assert len(str(raised.value).splitlines()) == 1
 
 
-@pytest.mark.parametrize("attributes", [
-    {"tolerances": "no JSON"}, {"tolerances": "[1]"}, {"tolerances": "null"}, {"tolerances": '{"all": -1}'},
-    {"tolerances": '{"all": NaN}'}, {"tolerances": '{"e_oot": 1}'}, {"tolerances": "[" * 100_000},
-    {"tolerances": '{"all": 1' + "0" * 400 + "}"}, {"rtol": "abc"}, {"rtol": math.nan}, {"rtol": 0.0},
-    {"rtol": math.inf}, {"rtol": np.array([1e-10, 1e-10])}, {"materials": "[" * 100_000}, {"materials": "[3]"},
-    {"materials": '{"table1": 3}'},
-], ids=range(16))  # fmt: skip
-def test_attributes_that_are_not_those_of_a_result(figure6: xr.Dataset, attributes: dict[str, Any]) -> None:
+@pytest.mark.parametrize(
+    "attributes",
+    [
+        {"tolerances": "no JSON"},
+        {"tolerances": "[1]"},
+        {"tolerances": "null"},
+        {"tolerances": '{"all": -1}'},
+        {"tolerances": '{"all": NaN}'},
+        {"tolerances": '{"e_oot": 1}'},
+        {"tolerances": "[" * 100_000},
+        {"tolerances": '{"all": 1' + "0" * 400 + "}"},
+        {"rtol": "abc"},
+        {"rtol": math.nan},
+        {"rtol": 0.0},
+        {"rtol": math.inf},
+        {"rtol": np.array([1e-10, 1e-10])},
+        {"materials": "[" * 100_000},
+        {"materials": "[3]"},
+        {"materials": '{"table1": 3}'},
+    ],
+    ids=range(16),
+)
+def test_an_invalid_attribute_is_named_in_one_line(figure6: xr.Dataset, attributes: dict[str, Any]) -> None:
     with pytest.raises(ResultError, match=r"^(the )?attribute \w+:? [^\n]*$"):
         impact.compare(figure6, figure6.assign_attrs(attributes))
 
 
-def test_what_may_explain_a_difference_is_noted_not_judged(figure6: xr.Dataset) -> None:
+def test_attributes_that_may_explain_a_difference_are_notes(figure6: xr.Dataset) -> None:
     other = figure6.assign_attrs(rtol=1e-9, impact_version="0.0.1", max_steps=np.array([1, 2]))
     other["equation"] = other["equation"].astype(object)
     other["equation"][1] = "F = K\x1b[31m"
     verdict = impact.compare(other, figure6)
     assert verdict.equal
-    for told in (
-        "rtol is 1e-09, in BASELINE 1e-10", "impact_version is 0.0.1, in BASELINE ", "max_steps is [1 2], in ",
+    for note in (
+        "rtol is 1e-09, in BASELINE 1e-10",
+        "impact_version is 0.0.1, in BASELINE ",
+        "max_steps is [1 2], in ",
         r"the equation of lankarani-nikravesh-1990 reads F = K\x1b[31m, in BASELINE F = K",
-    ):  # fmt: skip
-        assert f"\nnote: {told}" in str(verdict)
+    ):
+        assert f"\nnote: {note}" in str(verdict)
 
 
-def test_a_dataset_that_is_no_result(figure6: xr.Dataset) -> None:
+def test_a_dataset_that_is_not_a_result_is_refused(figure6: xr.Dataset) -> None:
     history = impact.run(at={"e": 0.5}).history
     assert history is not None
     for dataset, words in (
-        (history, "is a time history"), (figure6.drop_attrs(), "is not a result"),
-        (figure6.drop_vars("m1"), "has no coordinate m1"), (figure6.drop_vars("model"), "has no coordinate model"),
+        (history, "is a time history"),
+        (figure6.drop_attrs(), "is not a result"),
+        (figure6.drop_vars("m1"), "has no coordinate m1"),
+        (figure6.drop_vars("model"), "has no coordinate model"),
         (figure6.assign(e_out=figure6["e_out"].astype(str)), "e_out holds"),
         (figure6.assign_coords(v1=((), "fast")), "v1 holds"),
         (figure6.assign(e_out=("model", [0.1, 0.2, 0.3])), "e_out does not vary along all axes"),
         (figure6.assign_attrs(schema_version=1), "is not a result"),
         (figure6.assign_attrs(schema_version=np.array([2, 2])), "is not a result"),
-    ):  # fmt: skip
+    ):
         with pytest.raises(UsageError, match=f"^NEW: {words}"):
             impact.compare(dataset, figure6)
         with pytest.raises(UsageError, match=f"^BASELINE: {words}"):
             impact.compare(figure6, dataset)
 
 
-# the words
+# the text of a verdict
 
 
-def test_counts_and_the_worst_point(figure6: xr.Dataset) -> None:
+def test_a_line_has_the_counts_and_the_worst_point(figure6: xr.Dataset) -> None:
     moved = figure6.copy(deep=True)
     key = "lankarani-nikravesh-1990"
     # tolerance 1e-9 x v0 = 1 m/s
@@ -592,19 +649,19 @@ def test_counts_and_the_worst_point(figure6: xr.Dataset) -> None:
     assert verdict.headline == "not equal: values (v1_post)"
     assert verdict.lines == (f"v1_post: 3 of 303 differ, worst 1.6e-07 = 160 x tolerance at model={key}, e=0.05",)
     assert str(verdict) == f"{verdict.headline}\n{verdict.lines[0]}"
-    (found,) = verdict.differing
-    assert found.new == float(moved["v1_post"].sel(model=key, e=0.05))
-    assert found.baseline == float(figure6["v1_post"].sel(model=key, e=0.05))
+    (difference,) = verdict.differing
+    assert difference.new == float(moved["v1_post"].sel(model=key, e=0.05))
+    assert difference.baseline == float(figure6["v1_post"].sel(model=key, e=0.05))
     along_e, along_model = (verdict.worst_along[axis]["v1_post"] for axis in ("e", "model"))
     assert along_e.sel(e=[0.05, 0.5, 0.9, 0.96]).values == pytest.approx([160, 40, 2, 0.5], rel=1e-5)
     assert float(along_e.sum()) == pytest.approx(202.5, rel=1e-5)
     assert float(along_model.sel(model=key)) == float(along_model.sum()) == float(along_e.max())
-    # the worst variable is told first
+    # the variable with the largest difference comes first
     moved["contact_time"].loc[{"model": key, "e": 0.3}] *= 2
-    assert [one.name for one in impact.compare(moved, figure6).differing] == ["contact_time", "v1_post"]
+    assert [variable.name for variable in impact.compare(moved, figure6).differing] == ["contact_time", "v1_post"]
 
 
-def test_the_first_line_tells_every_kind_and_a_few_names(figure6: xr.Dataset) -> None:
+def test_the_first_line_has_every_kind_of_difference_and_a_few_names(figure6: xr.Dataset) -> None:
     other = figure6.isel(e=slice(1, None)).drop_vars(["steps", "energy_residual"])
     other = _relabelled(other, "m1", 2.0) * 1.01
     other.attrs = figure6.attrs
@@ -620,10 +677,10 @@ def test_the_first_line_tells_every_kind_and_a_few_names(figure6: xr.Dataset) ->
 
 
 def test_names_from_files_are_escaped_in_every_line(figure6: xr.Dataset) -> None:
-    bad = "a\x1b[31m\u202e\n[red]"
-    table = json.dumps({bad: {"E": 1.0, "nu": "\x1b"}})
-    new = figure6.assign_attrs(materials=table).rename({"material": f"{bad}.x"})
-    other = figure6.assign_attrs(materials=json.dumps({bad: {"E": 2.0, "nu": 0.3}}))
+    malicious = "a\x1b[31m\u202e\n[red]"
+    table = json.dumps({malicious: {"E": 1.0, "nu": "\x1b"}})
+    new = figure6.assign_attrs(materials=table).rename({"material": f"{malicious}.x"})
+    other = figure6.assign_attrs(materials=json.dumps({malicious: {"E": 2.0, "nu": 0.3}}))
     for verdict in (impact.compare(new, other), impact.compare(other, new, subset=True)):
         assert not set("\x1b\u202e") & set(str(verdict))
         assert len(str(verdict).splitlines()) == 1 + len(verdict.faults) + len(verdict.notes)
@@ -632,13 +689,12 @@ def test_names_from_files_are_escaped_in_every_line(figure6: xr.Dataset) -> None
 
 # the command that repeats the worst point
 
-
 REPLAYED = {
     "zip": """
 models = ["hertz", "bilinear"]
 [sweep]
 e = [0.25, 0.75]
-v1 = { geomspace = [0.1, 10.0, 7] }
+v1 = { geomspace = [0.1, 10.0, 4] }
 v2 = [-1.0, 0.0]
 m1 = [1.0, 3.0]
 m2 = [2.0, inf]
@@ -667,7 +723,7 @@ m1 = 1.0
 m2 = [1.0, inf]
 K = 6e9
 """,
-    "own": """
+    "parameter": """
 models = ["hertz", "ismail-stronge-2008"]
 [sweep]
 e = [0.2, 0.6]
@@ -685,57 +741,58 @@ gamma = [1.5, 4.0]
 }
 
 
-@pytest.mark.parametrize("name", REPLAYED)
-def test_the_command_runs_the_worst_point_again(forked: ForkServer, tmp_path: Path, name: str) -> None:
-    (tmp_path / "a config.toml").write_text(REPLAYED[name], encoding="utf-8")
-    result = impact.sweep(tmp_path / "a config.toml")
+@pytest.mark.parametrize("config", REPLAYED)
+def test_the_printed_command_repeats_the_worst_point(forked: ForkServer, tmp_path: Path, config: str) -> None:
+    (tmp_path / "a config.toml").write_text(REPLAYED[config], encoding="utf-8")
+    result = impact.sweep(tmp_path / "a config.toml", overrides=["solver.rtol=1e-4"])
     impact.save(result, tmp_path / "base line.h5")
     random = np.random.default_rng(1)
-    for variable in ("v1_post", "v1_reference", "contact_time"):
-        flat = int(random.integers(result[variable].size))
-        place = dict(zip(result[variable].dims, np.unravel_index(flat, result[variable].shape), strict=True))
-        if variable == "contact_time":
-            # the last of everything: what is first by default is not
-            place = {dim: size - 1 for dim, size in result[variable].sizes.items()}
-        value = float(result[variable][place])
-        new = tmp_path / f"new {variable}.h5"
-        impact.save(_with(result, variable, 2 * value + 1, **place), new)
-        verdict = impact.compare(new, tmp_path / "base line.h5")
-        (found,) = verdict.differing
-        command = verdict.lines[1].strip()
-        assert command == verdict.replay(found)
+    changed, positions = result.copy(deep=True), {}
+    for name in ("v1_post", "v1_reference", "contact_time"):
+        position = np.unravel_index(random.integers(result[name].size), result[name].shape)
+        if name == "contact_time":
+            # the last position: `impact run` selects the first by default
+            position = [size - 1 for size in result[name].shape]
+        positions[name] = dict(zip(result[name].dims, map(int, position), strict=True))
+        changed[name][positions[name]] = 2 * result[name][positions[name]] + 1
+    impact.save(changed, tmp_path / "a new.h5")
+    verdict = impact.compare(tmp_path / "a new.h5", tmp_path / "base line.h5")
+    assert {difference.name for difference in verdict.differing} == positions.keys()
+    for difference in verdict.differing:
+        point = result[difference.name][positions[difference.name]]
+        command = verdict.replay(difference)
+        assert f"  {command}" in verdict.lines
         words = shlex.split(command)
-        assert words[:3] == ["impact", "run", str(new)]
-        done = forked(*words[1:], "--json")
-        assert (done.returncode, done.stderr) == (0, ""), command
-        told = json.loads(done.stdout)
-        if variable in told["outputs"]:
-            assert told["outputs"][variable] == value
-        for one in result[variable][place].coords:
-            # a law with an n of its own is run at that
-            wanted = result[variable][place]["exponent" if one == "n" and "model" in place else one].item()
-            if one in told.get("inputs", {}) and "." not in str(one):
-                assert told["inputs"][one] == ("inf" if wanted == math.inf else wanted), one
-        if "model" in place:
-            assert told["model"] == found.at["model"]
+        assert words[:3] == ["impact", "run", str(tmp_path / "a new.h5")]
+        completed = forked(*words[1:], "--json")
+        assert (completed.returncode, completed.stderr) == (0, ""), command
+        printed = json.loads(completed.stdout)
+        if difference.name in printed["outputs"]:
+            assert printed["outputs"][difference.name] == point.item()
+        for name in point.coords:
+            # a law with a fixed n runs at that n
+            expected = point["exponent" if name == "n" and "exponent" in point.coords else name].item()
+            if name in printed.get("inputs", {}) and "." not in str(name):
+                assert printed["inputs"][name] == ("inf" if expected == math.inf else expected), name
+        if "model" in point.coords:
+            assert printed["model"] == difference.at["model"]
 
 
-def test_a_label_that_rounds_differently_elsewhere_is_replayed_by_this_ones(
-    tmp_path: Path, forked: ForkServer
-) -> None:
-    # zipped values are looked up: the new file's own are the ones that are there
+def test_the_printed_command_has_the_labels_of_the_new_file(tmp_path: Path, forked: ForkServer) -> None:
+    # `impact run` looks up zipped values, so that those of the baseline would not be found
     config = {
         "models": "lankarani-nikravesh-1990",
+        "solver": {"rtol": 1e-4},
         "sweep": BY_HAND["sweep"]
         | {"m1": {"geomspace": [0.1, 1, 4]}, "m2": [1.0, 2.0, 3.0, 4.0], "zip": [["m1", "m2"]]},
     }
-    here = impact.sweep(config)
-    elsewhere = _relabelled(here, "m1", np.nextafter(here["m1"].values, 9.0))
-    impact.save(_with(here, "e_out", 0.1, model=0, e=1, m1=2), tmp_path / "here.h5")
-    impact.save(elsewhere, tmp_path / "elsewhere.h5")
-    verdict = impact.compare(tmp_path / "here.h5", tmp_path / "elsewhere.h5")
-    (found,) = verdict.differing
-    assert forked(*shlex.split(verdict.replay(found))[1:]).returncode == 0
+    result = impact.sweep(config)
+    rounded = _relabelled(result, "m1", np.nextafter(result["m1"].values, 9.0))
+    impact.save(_with(result, "e_out", 0.1, model=0, e=1, m1=2), tmp_path / "new.h5")
+    impact.save(rounded, tmp_path / "baseline.h5")
+    verdict = impact.compare(tmp_path / "new.h5", tmp_path / "baseline.h5")
+    (difference,) = verdict.differing
+    assert forked(*shlex.split(verdict.replay(difference))[1:]).returncode == 0
 
 
 def test_without_a_file_there_is_no_command(figure6: xr.Dataset, stored: Path) -> None:
@@ -743,12 +800,12 @@ def test_without_a_file_there_is_no_command(figure6: xr.Dataset, stored: Path) -
     assert len(impact.compare(moved, figure6).lines) == 1
     lines = impact.compare(moved, stored).lines
     assert lines[1] == f"  impact run {stored} --model lankarani-nikravesh-1990 --at e=0.05"
-    # one point that several variables share is told once
+    # a point that several variables share has one command
     moved["e_error"][1, 5] = 0.5
     assert len(impact.compare(moved, stored).lines) == 3
 
 
-def test_points_of_the_same_labels_are_refused(figure6: xr.Dataset) -> None:
+def test_two_points_with_the_same_labels_are_refused(figure6: xr.Dataset) -> None:
     twice = xr.concat([figure6, figure6.isel(e=[1])], "e", data_vars="minimal")
     for pair in ((twice, figure6), (figure6, twice), (twice, twice)):
         with pytest.raises(UsageError, match="two points with the same labels"):
@@ -765,27 +822,26 @@ def test_an_input_along_two_axes_is_compared(wide: xr.Dataset) -> None:
     assert _faults(impact.compare(with_mass(7.0), with_mass(2.0))) == [("labels", "R1")]
 
 
-def test_a_restitution_from_alpha_is_as_exact_as_one_is() -> None:
-    # e = 1 - alpha v0 is small where the product is near 1, and its rounding is that of 1
+def test_an_e_computed_from_alpha_is_compared_with_the_rounding_of_its_formula() -> None:
+    # e = 1 - alpha v0 is small if the product is near 1, and its rounding error is that of 1
     sweep = {"alpha": 0.1, "v1": [1.0, 9.9999], "m1": 1.0, "m2": 2.0, "K": 6e9}
     result = impact.sweep({"models": "hertz", "sweep": sweep})
     near = impact.sweep({"models": "hertz", "sweep": sweep | {"v1": [1.0, np.nextafter(9.9999, 10.0)]}})
     assert impact.compare(near, result).equal
 
 
-def test_whole_numbers_are_numbers(wide: xr.Dataset) -> None:
+def test_integer_labels_equal_floating_point_labels(wide: xr.Dataset) -> None:
     assert impact.compare(wide.assign_coords(v1=("v1", [1, 2], wide["v1"].attrs)), wide).equal
 
 
-def test_a_missing_answer_of_a_point_that_went_well_is_no_equality(figure6: xr.Dataset) -> None:
-    gone = figure6.assign(v1_post=figure6["v1_post"] * np.nan)
-    verdict = impact.compare(gone, gone)
-    assert [one.name for one in verdict.differing] == ["v1_post"]
-    (judged,) = verdict.differing
-    assert judged.different == int((figure6["status"] == 1).sum())
+def test_nans_at_points_with_status_ok_are_not_equal(figure6: xr.Dataset) -> None:
+    missing = figure6.assign(v1_post=figure6["v1_post"] * np.nan)
+    verdict = impact.compare(missing, missing)
+    assert [variable.name for variable in verdict.differing] == ["v1_post"]
+    assert verdict.differing[0].different == int((figure6["status"] == 1).sum())
 
 
-def test_faults_are_told_in_the_order_of_the_headline(figure6: xr.Dataset) -> None:
+def test_the_lines_are_in_the_order_of_the_headline(figure6: xr.Dataset) -> None:
     other = figure6.assign_coords(e=figure6["e"] + 5.0, v1=2.0)
     other["e_out"].attrs["units"] = "%"
     verdict = impact.compare(other, figure6)
@@ -794,7 +850,7 @@ def test_faults_are_told_in_the_order_of_the_headline(figure6: xr.Dataset) -> No
     assert verdict.headline.index(kinds[0]) < verdict.headline.index(kinds[1]) < verdict.headline.index(kinds[2])
 
 
-def test_a_point_of_a_zip_group_is_that_of_an_axis() -> None:
+def test_a_point_of_a_zip_group_is_matched_with_a_point_of_an_axis() -> None:
     sweep = {"e": 0.5, "v1": 1.0, "m1": [1.0, 3.0], "K": 6e9}
     zipped = impact.sweep({"models": "hertz", "sweep": sweep | {"m2": [1.0, 7.0], "zip": [["m1", "m2"]]}})
     plain = impact.sweep({"models": "hertz", "sweep": sweep | {"m2": 1.0}})
@@ -802,25 +858,25 @@ def test_a_point_of_a_zip_group_is_that_of_an_axis() -> None:
         assert _faults(impact.compare(*pair)) == [("labels", "m1")]
         verdict = impact.compare(*pair, subset=True)
         assert verdict.equal
-        assert {one.points for one in verdict.variables} == {1}
+        assert {variable.points for variable in verdict.variables} == {1}
 
 
-def test_a_single_point_has_no_coordinates_to_tell() -> None:
+def test_the_line_of_a_single_point_has_no_coordinates() -> None:
     point = impact.sweep({"models": "hertz", "sweep": {"e": 0.5, "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6e9}})
     moved = point.assign(v1_reference=point["v1_reference"] + 1.0)
     assert "v1_reference: 1 of 1 differ, worst 1 = 1e+09 x tolerance\n" in f"{impact.compare(moved, point)}\n"
 
 
-def test_the_worst_point_of_a_part_is_run_again_where_the_part_is(
+def test_the_printed_command_of_a_part_of_a_result_has_the_values_of_that_part(
     forked: ForkServer, figure6: xr.Dataset, wide: xr.Dataset, tmp_path: Path
 ) -> None:
-    for whole, place, point in (
+    for whole, position, inputs in (
         (figure6, {"e": 5}, {"e": 0.05}),
         (wide, {"m1": 1, "v1": 1}, {"m1": 3.0, "m2": "inf", "v1": 2.0}),
     ):
-        part = whole.isel(place)
+        part = whole.isel(position)
         impact.save(part.assign(e_out=part["e_out"] + 1.0), tmp_path / "part.h5", overwrite=True)
         verdict = impact.compare(tmp_path / "part.h5", part)
         command = shlex.split(verdict.replay(verdict.differing[0]))
-        told = json.loads(forked(*command[1:], "--json").stdout)
-        assert point.items() <= told["inputs"].items()
+        printed = json.loads(forked(*command[1:], "--json").stdout)
+        assert inputs.items() <= printed["inputs"].items()
