@@ -1,4 +1,4 @@
-"""A result is what the SCHEMA says: variables, dimensions, units, attributes, and the right number everywhere."""
+"""A result has the variables, dimensions, units and attributes of the SCHEMA, and the correct numbers."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ from .conftest import WIDE
 TABLE1 = {"v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6.118486349e9}
 
 
-def test_the_schema_names_what_a_collision_gives() -> None:
-    assert [one.name for one in SCHEMA] == list(OUTPUTS)
+def test_the_schema_lists_the_outputs_of_a_collision() -> None:
+    assert [variable.name for variable in SCHEMA] == list(OUTPUTS)
 
 
 def test_variables_dimensions_and_units(wide: xr.Dataset) -> None:
     axes = ("e", "v1", "m1", "material2", "ismail-stronge-2008.gamma")
     assert dict(wide.sizes) == {"model": 4, "e": 3, "v1": 2, "m1": 2, "material2": 2, axes[-1]: 2}
-    by_default = [one for one in SCHEMA if one.by_default]
-    assert list(wide.data_vars) == [one.name for one in by_default]
-    for one in by_default:
-        variable = wide[one.name]
-        assert variable.dims == (("model", *axes) if one.per == "model" else axes)
-        assert variable.dtype == np.dtype(one.dtype)
-        assert variable.attrs["units"] == one.unit
+    by_default = [entry for entry in SCHEMA if entry.by_default]
+    assert list(wide.data_vars) == [entry.name for entry in by_default]
+    for entry in by_default:
+        variable = wide[entry.name]
+        assert variable.dims == (("model", *axes) if entry.per == "model" else axes)
+        assert variable.dtype == np.dtype(entry.dtype)
+        assert variable.attrs["units"] == entry.unit
         assert variable.attrs["long_name"]
         assert variable.attrs["equation"]
 
@@ -46,7 +46,7 @@ ON_REQUEST = {"e_kinetic": "1", "e_energetic": "1", "lambda": "N s m-(n+1)", "se
 
 
 def test_variables_stored_on_request_only() -> None:
-    assert [one.name for one in SCHEMA if not one.by_default] == list(ON_REQUEST)
+    assert [entry.name for entry in SCHEMA if not entry.by_default] == list(ON_REQUEST)
     sweep = {"e": [0.0, 0.25, 0.8], "v1": 2.0, "m1": 1.0, "m2": 3.0, "K": 6e9}
     config = {"models": ["gharib-hurmuzlu-2012", "gharib-hurmuzlu-2012-energetic"], "sweep": sweep}
     assert not ON_REQUEST.keys() & set(impact.sweep(config).data_vars)
@@ -59,12 +59,12 @@ def test_variables_stored_on_request_only() -> None:
     # lambda = chi K/v0 = K/(e v0), in N s/m^2.5
     np.testing.assert_allclose(damped["lambda"], [np.nan, 6e9 / 0.5, 6e9 / 1.6], rtol=1e-14)
     assert np.isnan(permanent["lambda"]).all()
-    # a permanent indentation, or none at all, is left when the force ends
-    for one in (damped, permanent):
-        np.testing.assert_array_equal(one["separation_time"], one["contact_time"])
+    # without a later contact, the balls separate when the force ends
+    for result in (damped, permanent):
+        np.testing.assert_array_equal(result["separation_time"], result["contact_time"])
 
 
-def test_variables_stored_on_request_are_in_the_json_schema_and_in_messages() -> None:
+def test_variables_stored_on_request_are_in_the_json_schema_and_in_suggestions() -> None:
     from impact.config.load import json_schema
 
     known = json_schema()["$defs"]["Output"]["properties"]["variables"]["items"]["enum"]  # type: ignore[index]
@@ -84,22 +84,22 @@ def test_coordinates(wide: xr.Dataset) -> None:
     assert wide["v1"].attrs["units"] == "m s-1"
 
 
-def test_cells_are_the_impacts_of_their_coordinates(wide: xr.Dataset) -> None:
+def test_each_cell_is_the_impact_of_its_coordinates(wide: xr.Dataset) -> None:
     # impulse and momentum by hand: a wall, v0 = 3 m/s, e = 0.6
     cell = {"e": 0.6, "v1": 2.0, "m1": 3.0, "material2": "hard"}
-    one = wide.sel(cell).isel({"ismail-stronge-2008.gamma": 0})
-    assert float(one["v1_reference"]) == pytest.approx(-1.0 - 0.6 * 3.0, abs=1e-15)
-    assert float(one["v2_reference"]) == -1.0
-    assert float(one["v1_post"].sel(model="hertz")) == pytest.approx(-4.0, abs=1e-9)
-    assert float(one["e_out"].sel(model="bilinear")) == pytest.approx(0.6, abs=1e-9)
-    # gamma drives one model, e does not; the others are constant along it
+    point = wide.sel(cell).isel({"ismail-stronge-2008.gamma": 0})
+    assert float(point["v1_reference"]) == pytest.approx(-1.0 - 0.6 * 3.0, abs=1e-15)
+    assert float(point["v2_reference"]) == -1.0
+    assert float(point["v1_post"].sel(model="hertz")) == pytest.approx(-4.0, abs=1e-9)
+    assert float(point["e_out"].sel(model="bilinear")) == pytest.approx(0.6, abs=1e-9)
+    # one model depends on gamma and not on e; the others are constant along gamma
     gamma = wide["e_out"].isel(e=0, v1=0, m1=0, material2=0)
     assert gamma.sel(model="ismail-stronge-2008").values == pytest.approx([1 / 1.5, 1 / 4.0], abs=1e-9)
     bilinear = gamma.sel(model="bilinear").values
     assert bilinear[0] == bilinear[1]
-    # a cell alone is the same impact
+    # a single run is the same impact
     alone = impact.run(_config(wide), model="lankarani-nikravesh-1990", at=cell)
-    assert alone.values["e_out"] == float(one["e_out"].sel(model="lankarani-nikravesh-1990"))
+    assert alone.values["e_out"] == float(point["e_out"].sel(model="lankarani-nikravesh-1990"))
 
 
 def _config(dataset: xr.Dataset) -> dict[str, object]:
@@ -108,14 +108,14 @@ def _config(dataset: xr.Dataset) -> dict[str, object]:
     return tomllib.loads(dataset.attrs["config"])
 
 
-def test_where_n_is_not_hertzian_the_stiffness_is_the_secant_of_the_hertz_peak(wide: xr.Dataset) -> None:
+def test_the_stiffness_of_a_non_hertzian_law_is_the_secant_at_the_hertz_peak(wide: xr.Dataset) -> None:
     cell = wide.isel(e=0, v1=0, m1=0, material2=0).isel({"ismail-stronge-2008.gamma": 0})
     hertz, linear = cell.sel(model="hertz"), cell.sel(model="bilinear")
     peak = float(hertz["peak_indentation"])
     assert float(linear["stiffness"]) == pytest.approx(float(hertz["stiffness"]) * peak**0.5, rel=1e-9)
 
 
-def test_alpha_gives_e_from_the_speed() -> None:
+def test_e_is_computed_from_alpha_and_the_speed() -> None:
     result = impact.sweep(
         {
             "models": ["bilinear", "gharib-hurmuzlu-2012"],
@@ -156,13 +156,13 @@ def test_without_e_there_is_no_reference() -> None:
 
 def test_balls_that_do_not_approach_keep_their_velocities() -> None:
     result = impact.sweep({"models": "hertz", "sweep": {"e": 1.0, **TABLE1, "v1": [1.0, 2.0, 3.0], "v2": 2.0}})
-    one = result.isel(model=0)
-    assert one["status"].values.tolist() == [Status.NO_IMPACT, Status.NO_IMPACT, Status.OK]
-    assert one["v1_post"].values[:2].tolist() == [1.0, 2.0]
-    assert one["v2_post"].values[:2].tolist() == [2.0, 2.0]
+    hertz = result.isel(model=0)
+    assert hertz["status"].values.tolist() == [Status.NO_IMPACT, Status.NO_IMPACT, Status.OK]
+    assert hertz["v1_post"].values[:2].tolist() == [1.0, 2.0]
+    assert hertz["v2_post"].values[:2].tolist() == [2.0, 2.0]
     for name in ("peak_indentation", "peak_force", "contact_time", "energy_loss", "v1_error"):
-        assert one[name].values[:2].tolist() == [0.0, 0.0], name
-    assert np.isnan(one["e_out"].values[:2]).all()
+        assert hertz[name].values[:2].tolist() == [0.0, 0.0], name
+    assert np.isnan(hertz["e_out"].values[:2]).all()
 
 
 def test_an_axis_of_exponents() -> None:
@@ -172,29 +172,36 @@ def test_an_axis_of_exponents() -> None:
     assert result["e_out"].values == pytest.approx(np.ones((1, 2)), abs=1e-9)
 
 
-@pytest.mark.parametrize("collapse", ["true", "false"])
-@pytest.mark.parametrize("size", [7, 1000, pytest.param(1, marks=pytest.mark.slow)])
-def test_sizes_and_order_change_no_bit(wide: xr.Dataset, size: int, collapse: str) -> None:
-    # ranges of a size, in an order of their own
+@pytest.mark.parametrize(
+    ("size", "collapse"),
+    [
+        (7, "true"),
+        (1000, "true"),
+        (1000, "false"),
+        *(pytest.param(*case, marks=pytest.mark.slow) for case in ((7, "false"), (1, "true"), (1, "false"))),
+    ],
+)
+def test_the_size_and_order_of_ranges_change_no_bit(wide: xr.Dataset, size: int, collapse: str) -> None:
+    # ranges of this size, shuffled
     plan = Plan(parse_config(WIDE, [f"solver.collapse={collapse}"]))
     maps = trajectory_maps(plan)
     plan = with_core(plan, maps)
-    todo = sorted(trajectory_ranges(maps, size), key=lambda part: hash((part.number, "shuffled")))
-    finished = {(part.model, part.start): rebound for part, rebound in integrate_ranges(plan, maps, todo)}
+    ranges = sorted(trajectory_ranges(maps, size), key=lambda part: hash((part.number, "shuffled")))
+    finished = {(part.model, part.start): columns for part, columns in integrate_ranges(plan, maps, ranges)}
     rows = TrajectoryRows(maps, lambda model, start, stop: finished[model, start], size)
     table = TrajectoryTable(plan.inputs, plan.models, maps, rows, (None,) * len(plan.models))
-    # what the config was overridden with is an attribute
-    about = dataset_template(plan).assign_attrs(config_set=wide.attrs["config_set"])
-    dataset = lazy_dataset(about, table, stored_variables(plan))
+    # the overrides of the config are an attribute
+    template = dataset_template(plan).assign_attrs(config_set=wide.attrs["config_set"])
+    dataset = lazy_dataset(template, table, stored_variables(plan))
     assert in_memory(dataset, table, stored_variables(plan)).identical(wide)
-    # of any part the numbers are those of the whole
+    # a part has the numbers of the whole
     part = {"e": [2, 0], "v1": slice(None, None, -1), "material2": 1}
     assert dataset.isel(part).load().identical(wide.isel(part))
     points = {"model": xr.DataArray([0, 3, 2], dims="point"), "e": xr.DataArray([1, 1, 0], dims="point")}
     assert dataset.isel(points).load().identical(wide.isel(points))
 
 
-def test_chosen_variables_and_always_the_status() -> None:
+def test_the_chosen_variables_and_the_status_are_stored() -> None:
     config = {"models": "hertz", "sweep": {"e": 1.0, **TABLE1}, "output": {"variables": ["contact_time", "e_out"]}}
     assert list(impact.sweep(config).data_vars) == ["e_out", "contact_time", "status"]
 
@@ -210,19 +217,19 @@ def test_attributes(figure6: xr.Dataset) -> None:
     assert figure6.attrs["plugins"] == "{}"
 
 
-def test_the_materials_that_a_ball_has_are_attributes(wide: xr.Dataset, figure6: xr.Dataset) -> None:
+def test_the_materials_of_the_balls_are_an_attribute(wide: xr.Dataset, figure6: xr.Dataset) -> None:
     soft = {"E": 2e9, "nu": 0.4, "rho": 1000.0, "yield_strength": None}
     hard = {"E": 210e9, "nu": 0.3, "rho": 7850.0, "yield_strength": None}
     assert json.loads(wide.attrs["materials"]) == {"hard": hard, "soft": soft}
     more = ["materials.idle={E=1e9, nu=0.3, rho=1}", 'materials.hard.yield_strength="250 MPa"']
-    found = json.loads(dataset_template(Plan(parse_config(WIDE, more))).attrs["materials"])
-    assert found == {"hard": {**hard, "yield_strength": 250e6}, "soft": soft}
+    materials = json.loads(dataset_template(Plan(parse_config(WIDE, more))).attrs["materials"])
+    assert materials == {"hard": {**hard, "yield_strength": 250e6}, "soft": soft}
     assert list(json.loads(figure6.attrs["materials"])) == ["table1"]
     without = impact.sweep({"models": "hertz", "sweep": {"e": 1.0, **TABLE1}})
     assert without.attrs["materials"] == "{}"
 
 
-def test_the_fingerprint_is_blind_to_order_and_to_what_is_not_used() -> None:
+def test_the_fingerprint_does_not_depend_on_order_and_unused_materials() -> None:
     base = Plan(parse_config(WIDE)).fingerprint
     reordered = WIDE.replace("v2 = -1.0\n", "").replace('material1 = "soft"', 'material1 = "soft"\nv2 = -1.0')
     assert reordered != WIDE
@@ -230,14 +237,14 @@ def test_the_fingerprint_is_blind_to_order_and_to_what_is_not_used() -> None:
     assert Plan(parse_config(WIDE, ["materials.new={E=1e9, nu=0.3, rho=1}"])).fingerprint == base
 
 
-def test_the_fingerprint_is_over_what_takes_effect() -> None:
+def test_the_fingerprint_depends_on_values_and_not_on_comments() -> None:
     base = Plan(parse_config(WIDE)).fingerprint
     assert Plan(parse_config("# a comment\n" + WIDE)).fingerprint == base
     assert Plan(parse_config(WIDE, ["sweep.v2=-1.5"])).fingerprint != base
     assert Plan(parse_config(WIDE, ["solver.rtol=1e-9"])).fingerprint != base
 
 
-def test_chunks_are_counted_by_the_variables_that_are_stored() -> None:
+def test_the_chunks_of_all_stored_variables_are_counted() -> None:
     from impact.config.load import read_config
 
     def read(*variables: str) -> None:

@@ -1,4 +1,4 @@
-"""Results of any size whose values are computed when they are indexed, and a record of what was asked of them."""
+"""Lazy results of any size whose values are computed when they are read, and a record of the reads."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from xarray.backends import BackendArray
 from xarray.core import indexing
 
 Values = NDArray[Any]
-# numbers that a read may have: many times a slab, and no burden
+# numbers in a read: many times a slab, and little memory
 MAX_READ = 2**22
 
 
 @dataclass
 class Reads:
-    """How many numbers were read, of each variable: all together, and at once."""
+    """Numbers read of each variable: in total and in the largest read."""
 
     total: dict[str, int] = field(default_factory=dict)
     largest: dict[str, int] = field(default_factory=dict)
 
     def add(self, name: str, size: int) -> None:
-        assert size <= MAX_READ, f"{size:,} numbers of {name} are read at once"
+        assert size <= MAX_READ, f"got a read of {size:,} numbers of {name}, expected at most {MAX_READ:,}"
         self.total[name] = self.total.get(name, 0) + size
         self.largest[name] = max(self.largest.get(name, 0), size)
 
@@ -36,7 +36,7 @@ class Reads:
 
 
 class Computed(BackendArray):
-    """A function of the places along each axis, given as arrays that broadcast."""
+    """A function of the indices along each axis, passed as arrays that broadcast."""
 
     def __init__(
         self, name: str, shape: tuple[int, ...], dtype: np.dtype[Any], values: Callable[..., Values], reads: Reads
@@ -47,11 +47,11 @@ class Computed(BackendArray):
         return indexing.explicit_indexing_adapter(key, self.shape, indexing.IndexingSupport.OUTER, self._read)
 
     def _read(self, key: tuple[int | slice | Values, ...]) -> Values:
-        places = [np.arange(size)[one] for size, one in zip(self.shape, key, strict=True)]
-        shape = tuple(one.size for one in places)
+        indices = [np.arange(size)[part] for size, part in zip(self.shape, key, strict=True)]
+        shape = tuple(part.size for part in indices)
         self.reads.add(self.name, prod(shape))
-        values = np.broadcast_to(self.values(*np.ix_(*map(np.atleast_1d, places))), shape)
-        return np.array(values.reshape([one.size for one in places if one.ndim]), self.dtype)
+        values = np.broadcast_to(self.values(*np.ix_(*map(np.atleast_1d, indices))), shape)
+        return np.array(values.reshape([part.size for part in indices if part.ndim]), self.dtype)
 
 
 def computed(
@@ -64,7 +64,7 @@ def computed(
     varies_along: Mapping[str, Sequence[str]] | None,
     attrs: Mapping[str, Any],
 ) -> xr.Variable:
-    """A variable that is computed; without `varies_along` it is like one that is read from a file."""
+    """A computed variable; without `varies_along` it is like a variable read from a file."""
     array = Computed(name, tuple(sizes.values()), dtype, values, reads)
     variable = xr.Variable(tuple(sizes), indexing.LazilyIndexedArray(array), attrs)
     if varies_along is not None:
@@ -80,19 +80,19 @@ def stretched(
     added: Mapping[str, Sequence[str]] | None = None,
     order: Sequence[str] | None = None,
 ) -> tuple[xr.Dataset, Reads]:
-    """A small result over more axes, along which nothing varies, with its values computed when they are indexed.
+    """A small result over additional axes, along which nothing varies, with values computed when they are read.
 
     Parameters
     ----------
     small : a result, whose inputs of these names have a single value
     axes : name and values of each axis that is added
-    known : whether each variable says along which axes it varies
+    known : whether the axes along which each variable varies are known
     added : for some variables, the added axes along which they vary: by 0.25 at the second half of each
-    order : of all axes but the model; by default those that are added come first
+    order : of all axes but the model; by default the added axes come first
     """
     reads, added = Reads(), added or {}
-    own_axes = [str(dim) for dim in small.sizes if dim != "model"]
-    dims = ["model", *(order or [*axes, *own_axes])]
+    small_axes = [str(dim) for dim in small.sizes if dim != "model"]
+    dims = ["model", *(order or [*axes, *small_axes])]
     sizes = {
         **{str(dim): size for dim, size in small.sizes.items()},
         **{name: len(of) for name, of in axes.items()},
@@ -105,18 +105,18 @@ def stretched(
         extras = added.get(str(name), ())
 
         def values(
-            *places: Values,
+            *indices: Values,
             along: list[str] = along,
             variable: xr.DataArray = variable,
             extras: Sequence[str] = extras,
         ) -> Values:
-            at = dict(zip(along, places, strict=True))
-            found = variable.values[tuple(at[str(dim)] for dim in variable.dims)]
+            at = dict(zip(along, indices, strict=True))
+            result = variable.values[tuple(at[str(dim)] for dim in variable.dims)]
             for extra in extras:
-                found = found + 0.25 * (at[extra] >= sizes[extra] // 2)
-            return found
+                result = result + 0.25 * (at[extra] >= sizes[extra] // 2)
+            return result
 
-        varies = [*own_axes, *extras]
+        varies = [*small_axes, *extras]
         variables[str(name)] = computed(
             str(name), {dim: sizes[dim] for dim in along}, values, reads, dtype=variable.dtype,
             varies_along={str(key): varies for key in small["model"].values} if known else None,
