@@ -204,7 +204,8 @@ def test_info_reads_only_the_different_points(
     assert "content_digest" not in rows
     assert max(reads.total.values()) <= 4 * SMALL_POINTS
     described = impact.info(sealed)
-    assert (described["points"], described["layout"], described["seal"]) == (SMALL_POINTS * WEIGHT, "factored", "5ea1")
+    assert described["points"] == SMALL_POINTS * WEIGHT
+    assert (described["layout"], described["seal"]) == ("factored", "5ea1")
     assert described["variables"]["e_out"]["largest"] == float(small["e_out"].max())
     in_memory = impact.info(small)
     assert (in_memory["layout"], in_memory["seal"]) == (None, None)
