@@ -24,6 +24,7 @@ PACKAGES = (
     "api",
     "reporting",
     "plots",
+    "inverse",
     "comparison",
     "results",
     "engine",
@@ -37,6 +38,7 @@ PACKAGES = (
     "text",
     "errors",
     "atomic",
+    "array_types",
     "_version",
 )
 # the figures of the paper that show a single impact, and their kinds

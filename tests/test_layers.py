@@ -18,6 +18,7 @@ LAYERS = (
     {"engine"},
     {"results"},
     {"comparison"},
+    {"inverse"},
     {"plots"},
     {"reporting"},
     # the package itself, "", hands out the functions of api
@@ -33,6 +34,7 @@ LIBRARIES = {
     "h5py": {"results"}, "h5netcdf": {"results"}, "tomllib": {"config"}, "pydantic": {"config", "results"},
     "pydantic_core": {"config"},
     "pint": {"config"}, "filelock": {"engine"}, "numba": {"contact"},
+    "scipy": {"inverse"},
     "dask": {"engine"}, "distributed": {"engine"},
 }  # fmt: skip
 MODULES = sorted(SOURCE.rglob("*.py"))

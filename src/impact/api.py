@@ -24,7 +24,7 @@ from .config.load import json_schema, read_config
 from .contact.evidence import Evidence as Evidence
 from .contact.model import ForceModel as ForceModel
 from .contact.model import Parameter as Parameter
-from .contact.models import catalogue
+from .contact.models import catalogue, find
 from .contact.models.hysteresis import hysteresis as hysteresis
 from .contact.powers import power as power
 from .engine.checkpoint import remove_stale_work_folder
@@ -61,6 +61,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from .contact.checks import Finding
+    from .inverse.solve import SolveResult
     from .plots.kinds import Choice, PlotData
     from .results.estimate import Estimate
 
@@ -446,6 +447,61 @@ def run(
     plugin_set = read_plugins(plugins)
     config, first = single_point(source, overrides, plugin_set, model, at)
     return run_single_impact(Plan(config, plugin_set.of(config.models)), first, times)
+
+
+def solve(
+    model: str,
+    name: str,
+    target: Mapping[str, float],
+    *,
+    source: str | Path | Mapping[str, object] | None = None,
+    at: Mapping[str, float | str] | None = None,
+    over: Mapping[str, object] | None = None,
+    overrides: Sequence[str] = (),
+    plugins: Sequence[ForceModel | str | Path] = (),
+) -> SolveResult:
+    """Find the value of an input of a law that gives a wanted output: which coefficient gives the rebound I want?
+
+    Parameters
+    ----------
+    model : key of the law
+    name : what to solve for: a parameter of the law, the restitution "e" to ask it for, or the stiffness "K"
+    target : the wanted value of one output, such as `{"e_out": 0.6}`
+    source : a TOML file, a mapping, or a result; by default the two balls of Table 1 of the paper
+    at : values of the other inputs by config name, such as `{"v1": 1.0}`
+    over : values of one input, such as `{"v1": {"linspace": [0.1, 3, 30]}}`, for which one value is found, with
+        the least largest distance from the target
+    overrides, plugins : see `sweep`
+
+    Returns
+    -------
+    SolveResult : the status, the roots with the e_out of each, the range of the target that was found, and the
+        outputs over the range of inputs
+
+    Raises
+    ------
+    UsageError : the law has no such parameter, or the target is no output
+    ConfigError, ModelError : see `sweep`
+
+    The law of Gharib and Hurmuzlu delivers less than it is asked for, and never 0.6:
+
+    >>> import impact
+    >>> round(impact.solve("gharib-hurmuzlu-2012", "e", {"e_out": 0.5}).roots[0].value, 6)
+    0.697958
+    >>> impact.solve("gharib-hurmuzlu-2012", "e", {"e_out": 0.6}).status
+    'no_root'
+    """
+    # its module imports scipy.optimize, which other functions do without
+    from .inverse.solve import placeholder_override, solve_input, unknown_of
+
+    if over is not None and len(over) != 1:
+        raise UsageError(f"--over: got {len(over)} inputs, expected one")
+    plugin_set = read_plugins(plugins)
+    law = find(model, plugin_set.models)
+    unknown = unknown_of(law, name)
+    changes = [*placeholder_override(law, unknown), *overrides]
+    config, _ = single_point(source, changes, plugin_set, model, at, over)
+    return solve_input(config, plugin_set.of(config.models), unknown, target)
 
 
 def extend(

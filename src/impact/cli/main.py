@@ -27,6 +27,11 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
     ),
     "report": ("report", "Write a report as one HTML page.", "results.h5 -o report.html"),
     "run": ("run", "Run one impact.", "--model gharib-hurmuzlu-2012 --at e=0.05 --at m2=2.0 --history out.h5"),
+    "solve": (
+        "solve",
+        "Find the value that gives a rebound.",
+        "--model mujoco-solref --for dampratio --target e_out=0.6",
+    ),
     "compare": ("compare", "Compare a result with a baseline.", "results.h5 baseline.h5 --plot differences.png"),
     "bless": ("compare", "Replace a baseline by a result.", 'results.h5 baseline.h5 --reason "finer tolerance"'),
     "rerun": ("compare", "Repeat the sweep of a result, and compare.", "baseline.h5"),

@@ -24,6 +24,20 @@ class Tolerance(NamedTuple):
     value: float
 
 
+class Target(NamedTuple):
+    """A word NAME=NUMBER."""
+
+    name: str
+    value: float
+
+
+class InputRange(NamedTuple):
+    """Several values of an input, as in a config."""
+
+    name: str
+    values: object
+
+
 T = TypeVar("T", Setting, Tolerance)
 
 
@@ -40,6 +54,37 @@ def parse_setting(word: str) -> Setting:
         return Setting(name, float(value))
     except ValueError:
         return Setting(name, value)
+
+
+def parse_target(word: str) -> Target:
+    """Parse NAME=NUMBER, where the number may be in percent.
+
+    >>> parse_target("e_out=0.6")
+    Target(name='e_out', value=0.6)
+    """
+    name, _, text = word.partition("=")
+    value = _float_or_nan(text)
+    if not name or math.isnan(value):
+        raise invalid_value(word, "NAME=NUMBER, such as e_out=0.6")
+    return Target(name, value)
+
+
+def parse_range(word: str) -> InputRange:
+    """Parse NAME=FIRST:LAST:COUNT, evenly spaced values, or NAME=VALUES with a TOML list or range.
+
+    >>> parse_range("v1=0.1:3:30")
+    InputRange(name='v1', values={'linspace': [0.1, 3, 30]})
+    >>> parse_range("v1={geomspace = [0.1, 3, 30]}").values, parse_range("m2=[1.0, 2.0]").values
+    ({'geomspace': [0.1, 3, 30]}, [1.0, 2.0])
+    """
+    from ..config.files import read_value
+
+    name, _, text = word.partition("=")
+    parts = text.split(":")
+    values = read_value(text if len(parts) != 3 else f"{{linspace = [{', '.join(parts)}]}}")
+    if not name or not isinstance(values, list | dict):
+        raise invalid_value(word, "NAME=FIRST:LAST:COUNT, such as v1=0.1:3:30, or NAME=[VALUE, ...]")
+    return InputRange(name, values)
 
 
 def parse_tolerance(word: str) -> Tolerance:

@@ -182,7 +182,7 @@ def apply_overrides(
             problems.append(f"--set {safe_text(text)}: expected PATH=VALUE, such as sweep.e=0.5")
             continue
         new_range = path[0] in ("sweep", "model", "materials") and len(path) > 2 and path[-1] in RANGE_FORMS
-        data, start = set_value(data, path, _override_value(value_text), new_range=new_range)
+        data, start = set_value(data, path, read_value(value_text), new_range=new_range)
         overridden = {old: override for old, override in overridden.items() if old[: len(start)] != start}
         overridden[start] = (index, path)
         other = "alpha" if path[:2] == ("sweep", "e") else "e" if path[:2] == ("sweep", "alpha") else None
@@ -234,7 +234,7 @@ def set_value(
     return {**data, name: changed}, (name,) if base is not inner else (name, *start)
 
 
-def _override_value(text: str) -> object:
+def read_value(text: str) -> object:
     """The TOML value of a text, or the text itself: `sweep.material=steel` needs no quotes."""
     if len(text) > MAX_OVERRIDE_LENGTH:
         return text

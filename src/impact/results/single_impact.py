@@ -14,6 +14,7 @@ from pathlib import Path
 import xarray as xr
 
 from .._version import __version__
+from ..config.files import toml_text
 from ..config.grid import Axis, path_of
 from ..config.load import Config, parse_config, read_config
 from ..config.tables import SWEEP_QUANTITIES
@@ -242,8 +243,9 @@ def single_point(
     plugins: Plugins,
     model: str | None = None,
     at: Mapping[str, float | str] | None = None,
+    over: Mapping[str, object] | None = None,
 ) -> tuple[Config, tuple[str, ...]]:
-    """The config of a single impact.
+    """The config of a single impact, or of impacts over one input.
 
     Parameters
     ----------
@@ -254,11 +256,12 @@ def single_point(
     model : key of the model; by default the config's first
     at : values by config name, which need not be on the grid, except for inputs that vary together, in a zip group
         or in numbered cases; a case is chosen by the name of its dimension and its number
+    over : values of an input, as in a config, that stay an axis
 
     Returns
     -------
-    (Config, names) : a config without axes, and the names of the axes that are not in `at` and took their first
-        value
+    (Config, names) : a config without axes, but for those of `over`, and the names of the other axes that are not
+        in `at` and took their first value
 
     Raises
     ------
@@ -268,6 +271,8 @@ def single_point(
     read, parted = _config_reader(source, overrides, plugins)
     # each override, and the option that messages name instead
     option_names = {} if model is None else {f"models={json.dumps([model])}": f"--model {model}"}
+    for name, values in (over or {}).items():
+        option_names[f"{_override_path(name)}={toml_text(values)}"] = f"--over {name}"
     config = _read_with_option_names(read, option_names)
     columns = [_selectable_columns(axis) for axis in config.axes]
     varied = {name for names in columns for name in names}
@@ -285,11 +290,12 @@ def single_point(
 
     scalars = dict(config.scalars)
     first: list[str] = []
-    for axis in config.axes:
+    kept = tuple(axis for axis in config.axes if over and not over.keys().isdisjoint(axis.columns))
+    for axis in (axis for axis in config.axes if axis not in kept):
         scalars |= {name: values[_position_on_axis(axis, at)] for name, values in axis.columns.items()}
         if axis.size > 1 and not any(name in at for name in _selectable_columns(axis)):
             first += axis.columns
-    return replace(config, axes=(), scalars=scalars, models=config.models[:1]), tuple(first)
+    return replace(config, axes=kept, scalars=scalars, models=config.models[:1]), tuple(first)
 
 
 def _config_reader(

@@ -1,0 +1,132 @@
+"""The command `solve`: which value of a parameter gives the rebound I want?"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..formatting import number, quantity
+from .console import cell, console, dump
+from .options import JsonOption, PluginOption, SetOption
+from .params import (
+    InputRange,
+    Setting,
+    Target,
+    complete_model,
+    parse_range,
+    parse_setting,
+    parse_target,
+    reject_duplicates,
+)
+
+if TYPE_CHECKING:
+    from ..inverse.solve import SolveResult
+
+
+def solve(
+    model: Annotated[
+        str, typer.Option("--model", metavar="KEY", autocompletion=complete_model, help="The model.")
+    ],
+    name: Annotated[
+        str,
+        typer.Option(
+            "--for", metavar="PARAMETER", help="What to solve for: a parameter of the model, e to ask for, or K."
+        ),
+    ],
+    target: Annotated[
+        Target,
+        typer.Option(
+            "--target", metavar="NAME=VALUE", parser=parse_target, help="The wanted output, such as e_out=0.6."
+        ),
+    ],
+    source: Annotated[
+        Path | None, typer.Argument(help="A TOML file or a result. \\[default: Table 1 of the paper]")
+    ] = None,
+    at: Annotated[
+        list[Setting] | None,
+        typer.Option(
+            "--at",
+            metavar="NAME=VALUE",
+            parser=parse_setting,
+            callback=reject_duplicates,
+            help="Value of another input, such as v1=1; may be repeated.",
+        ),
+    ] = None,
+    over: Annotated[
+        InputRange | None,
+        typer.Option(
+            "--over",
+            metavar="NAME=FIRST:LAST:COUNT",
+            parser=parse_range,
+            help="Find the value that serves best over a range of an input, such as v1=0.1:3:30.",
+        ),
+    ] = None,
+    sets: SetOption = None,
+    plugins: PluginOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Find the value of a parameter, of K, or of the e to ask for, that gives a wanted output.
+
+    All values are found that give the target. With --over it is the value for which the largest distance from the
+    target over that range is least. The exit code is 0 also if there is none.
+    """
+    from .. import api
+
+    result = api.solve(
+        model,
+        name,
+        dict([target]),
+        source=source,
+        at=dict(at or ()),
+        over=dict([over]) if over else None,
+        overrides=sets or (),
+        plugins=plugins or (),
+    )
+    if as_json:
+        print(dump(solve_json(result)))
+    else:
+        _print_result(result)
+
+
+def solve_json(result: SolveResult) -> dict[str, Any]:
+    """The result as plain data."""
+    return {
+        "model": result.model,
+        "for": result.name,
+        "unit": result.unit,
+        "target": dict(result.target),
+        "status": result.status,
+        "roots": [{"value": root.value, "e_out": root.e_out} for root in result.roots],
+        "attainable": result.attainable,
+        "over": None if result.over is None else [dict(condition) for condition in result.over],
+    }
+
+
+def _print_result(result: SolveResult) -> None:
+    """One line for each root, or the range that can be attained."""
+    out = console(sys.stdout)
+    ((variable, wanted),) = result.target.items()
+    target = f"{variable} = {number(wanted)}"
+    for root in result.roots:
+        line = f"{result.name} = {quantity(root.value, result.unit, 10)}"
+        if result.over is None:
+            at_bound = ", its bound" if result.status == "at_bound" else ""
+            line += f"{at_bound}: {target}" + (f", e_out = {number(root.e_out)}" if variable != "e_out" else "")
+        else:
+            first, last = result.over[0], result.over[-1]
+            name = next(iter(first))
+            line += (
+                f": {variable} from {number(first[variable])} at {name} = {number(first[name])} "
+                f"to {number(last[variable])} at {name} = {number(last[name])}"
+            )
+        out.print(cell(line), soft_wrap=True)
+    if not result.roots:
+        range_text = (
+            f"{variable} is from {number(result.attainable[0])} to {number(result.attainable[1])}"
+            if result.attainable
+            else "all integrations fail"
+        )
+        out.print(cell(f"{result.model}: no value of {result.name} gives {target}; {range_text}"), soft_wrap=True)

@@ -1,0 +1,349 @@
+"""Solve for an input of a law: the value of a parameter, of K, or the e to ask for, that gives a wanted output."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import elementwise, minimize_scalar
+
+from ..array_types import Array, Mask
+from ..config.grid import Axis
+from ..config.load import Config, Output
+from ..contact.model import ForceModel, Parameter
+from ..contact.units import with_numbers
+from ..engine.build_impacts import build_impacts
+from ..engine.execute import never_stop
+from ..engine.plan import Inputs, Plan
+from ..engine.plugins import Plugins
+from ..errors import UsageError, did_you_mean
+from ..results.schema import SCHEMA
+from ..results.sweep import sweep_in_memory
+from ..text import safe_text
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# values that are tried before roots are refined: powers of ten times the contact's own unit of the parameter
+SCAN_DECADES, SCAN_PER_DECADE = 8, 20
+# values that are tried between two finite bounds
+SCAN_BETWEEN_BOUNDS = 401
+# the scan is coarse, and gives up integrations that take more steps
+SCAN_RTOL, SCAN_MAX_STEPS = 1e-7, 1000
+# values of the scan that are this near to the target are integrated again
+SCAN_TOLERANCE = 1e-4
+# a value of the scan is a root within this multiple of the tolerance of the integration
+TARGET_TOLERANCE = 10.0
+# a refined root is a jump of the output if it is farther from the target
+REFINED_TOLERANCE = 1e-7
+
+SolveStatus: TypeAlias = Literal["ok", "at_bound", "several_roots", "no_root"]
+
+
+@dataclass(frozen=True)
+class Root:
+    """A value that gives the target, and the restitution there; over a range of inputs, its mean."""
+
+    value: float
+    e_out: float
+
+
+@dataclass(frozen=True)
+class SolveResult:
+    """The values of an input with which a law gives a wanted output.
+
+    Parameters
+    ----------
+    model : key of the law
+    name : of the input: a parameter of the law, "K" or "e"
+    unit : SI unit of the input
+    target : the wanted value by variable
+    status : "ok" for one root, "several_roots", "at_bound" where the only root is the least or largest allowed
+        value, "no_root"
+    roots : in ascending order; over a range of inputs, the best value
+    attainable : the least and the largest value of the target over all values that were tried; None if all failed
+    over : the conditions of a range of inputs, each with its e_out and the target variable; None without a range
+    """
+
+    model: str
+    name: str
+    unit: str
+    target: Mapping[str, float]
+    status: SolveStatus
+    roots: tuple[Root, ...]
+    attainable: tuple[float, float] | None
+    over: tuple[Mapping[str, float], ...] | None
+
+
+def unknown_of(model: ForceModel, name: str) -> Parameter:
+    """The input to solve for, as a parameter with its unit and bounds.
+
+    Raises
+    ------
+    UsageError : the law has no such parameter
+
+    >>> from impact.contact.models import find
+    >>> unknown_of(find("hunt-crossley-1975"), "e").most
+    1.0
+    """
+    unknowns = {parameter.name: parameter for parameter in model.parameters}
+    unknowns["K"] = Parameter("K", "N/m^n", "stiffness", least=0.0)
+    if "e" in model.quantities:
+        unknowns["e"] = Parameter("e", "1", "restitution to ask for", default=0.5, least=0.0, most=1.0)
+    if name not in unknowns:
+        raise UsageError(
+            f'--for: {model.key} has no parameter "{safe_text(name)}"; {did_you_mean(name, list(unknowns))}'
+        )
+    return unknowns[name]
+
+
+def placeholder_override(model: ForceModel, unknown: Parameter) -> list[str]:
+    """The override that gives the unknown a valid value, so that the config needs none."""
+    if unknown.name == "K":
+        return []
+    value = next((v for v in (unknown.default, unknown.typical) if v is not None), 1.0)
+    value = min(max(value, unknown.least), unknown.most)
+    return [f"sweep.e={value!r}" if unknown.name == "e" else f"model.{model.key}.{unknown.name}={value!r}"]
+
+
+def check_target(target: Mapping[str, float]) -> tuple[str, float]:
+    """The variable and the value of a target.
+
+    Raises
+    ------
+    UsageError : it is not one variable of a result with a finite value
+    """
+    names = [variable.name for variable in SCHEMA if variable.dtype == "f8" and variable.per == "model"]
+    if len(target) != 1:
+        raise UsageError(f"--target: got {len(target)} targets, expected one, such as e_out=0.6")
+    ((name, value),) = target.items()
+    if name not in names:
+        raise UsageError(f'--target: no output "{safe_text(name)}"; {did_you_mean(name, names)}')
+    if not (isinstance(value, int | float) and math.isfinite(value)):
+        raise UsageError(f"--target {name}: got {safe_text(str(value))}, expected a finite number")
+    return name, float(value)
+
+
+def solve_input(config: Config, plugins: Plugins, unknown: Parameter, target: Mapping[str, float]) -> SolveResult:
+    """Find the values of an input of a law that give a target.
+
+    Without an axis in the config: all roots, by a scan over the allowed values and Chandrupatla's method between
+    neighbours on different sides of the target. With an axis: the value for which the largest distance
+    from the target over that axis is least.
+
+    Parameters
+    ----------
+    config : of one law, with at most one axis, over which the value has to serve
+    plugins : models that are not built in
+    unknown : see `unknown_of`
+    target : value by variable, see `check_target`
+    """
+    variable, wanted = check_target(target)
+    problem = _Problem(config, plugins, unknown, variable)
+    return _best_over_axis(problem, wanted) if config.axes else _all_roots(problem, wanted)
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """The target variable as a function of the unknown and of the condition, a position on the axis."""
+
+    config: Config
+    plugins: Plugins
+    unknown: Parameter
+    variable: str
+
+    @property
+    def model(self) -> ForceModel:
+        return self.config.models[0]
+
+    @property
+    def name(self) -> str:
+        """Config name of the unknown."""
+        name = self.unknown.name
+        is_shared = name == "e" or (name == "K" and self.model.exponent is None)
+        return name if is_shared else f"{self.model.key}.{name}"
+
+    def plan(self, values: Array, conditions: NDArray[np.intp], *, is_scan: bool = False) -> Plan:
+        """The plan that integrates each value under the condition of the same position."""
+        columns: dict[str, Any] = {self.name: tuple(values.tolist())}
+        for axis in self.config.axes:
+            for name, column in axis.columns.items():
+                columns[name] = tuple(column[at] for at in conditions.tolist())
+        solver = self.config.solver
+        replaced = {self.name, "alpha"} if self.name == "e" else {self.name}
+        config = replace(
+            self.config,
+            axes=(Axis(columns, numbered="trial"),),
+            scalars={name: value for name, value in self.config.scalars.items() if name not in replaced},
+            output=Output(layout="full"),
+            solver=replace(solver, rtol=max(solver.rtol, SCAN_RTOL), max_steps=SCAN_MAX_STEPS)
+            if is_scan
+            else solver,
+        )
+        return Plan(config, self.plugins)
+
+    def evaluate(
+        self, values: Array, conditions: NDArray[np.intp] | None = None, *, is_scan: bool = False
+    ) -> xr.Dataset:
+        """The outputs at some values, along the dimension `trial`; NaN where the integration fails."""
+        at = np.zeros(values.size, np.intp) if conditions is None else conditions
+        result = sweep_in_memory(
+            self.plan(values, at, is_scan=is_scan), on_progress=lambda progress: None, should_stop=never_stop
+        )
+        return result.isel(model=0)
+
+    def target_values(
+        self, values: Array, conditions: NDArray[np.intp] | None = None, *, is_scan: bool = False
+    ) -> Array:
+        """The target variable at some values, shape (n,); NaN where the integration fails."""
+        result: Array = self.evaluate(values, conditions, is_scan=is_scan)[self.variable].values
+        return result
+
+    def scan_values(self) -> Array:
+        """The allowed values that are tried first, in ascending order."""
+        least, most = self.unknown.least, self.unknown.most
+        decades = np.arange(-SCAN_DECADES * SCAN_PER_DECADE, SCAN_DECADES * SCAN_PER_DECADE + 1) / SCAN_PER_DECADE
+        sizes = self._scale() * 10.0**decades
+        values = [sizes, np.array([bound for bound in (0.0, least, most) if math.isfinite(bound)])]
+        if least < 0.0:
+            values.append(-sizes)
+        if math.isfinite(least) and math.isfinite(most):
+            values.append(np.linspace(least, most, SCAN_BETWEEN_BOUNDS))
+        all_values: Array = np.unique(np.concatenate(values))
+        # a stiffness of zero is no contact
+        is_allowed = (all_values > 0.0) | (self.unknown.name != "K")
+        return all_values[is_allowed & (all_values >= least) & (all_values <= most)]
+
+    def unit(self) -> str:
+        """The SI unit of the unknown, with numbers for the names in its exponents."""
+        numbers = {name.rpartition(".")[2]: v for name, v in self.config.scalars.items() if isinstance(v, float)}
+        exponent = {} if self.model.exponent is None else {"n": self.model.exponent}
+        return with_numbers(self.unknown.unit, {**numbers, **exponent})
+
+    def _scale(self) -> float:
+        """The size of the unknown that is 1 in the contact's own units, or that of its typical value."""
+        if self.unknown.typical:
+            return abs(self.unknown.typical)
+        inputs = self.plan(np.ones(1), np.zeros(1, np.intp)).inputs
+        impacts = build_impacts(inputs, self.model, inputs.index())
+        if self.unknown.name == "K":
+            # without a stiffness in the config that of the materials, else of the radii, is the scale
+            others = Inputs(self.config.scalars, (), self.config.materials)
+            stiffness = float(build_impacts(others, self.model, ()).K[0])
+            return stiffness if 0.0 < stiffness < math.inf else 1.0
+        if self.unknown.name == "e":
+            return 1.0
+        unit = 1.0 / float(impacts.dimensionless(self.model, self.unknown.name)[0])
+        return unit if 0.0 < unit < math.inf else 1.0
+
+
+def _all_roots(problem: _Problem, wanted: float) -> SolveResult:
+    """All values that give the target."""
+    scan = problem.scan_values()
+    values = problem.target_values(scan, is_scan=True)
+    scale = 1.0 if problem.variable.startswith("e_") else abs(wanted)
+    # neighbours of the target, and the extremes, which are reported
+    precise = (np.abs(values - wanted) <= SCAN_TOLERANCE * scale) | np.isin(values, _extremes(values))
+    if precise.any():
+        values[precise] = problem.target_values(scan[precise])
+    distance = values - wanted
+    tolerance = TARGET_TOLERANCE * problem.config.solver.rtol * scale
+    reached = np.abs(distance) <= tolerance
+    bounds = {problem.unknown.least, problem.unknown.most}
+    roots = _ends_of_runs(reached, scan, bounds)
+    between = (distance[:-1] * distance[1:] < 0.0) & ~reached[:-1] & ~reached[1:]
+    if between.any():
+        refined = elementwise.find_root(
+            lambda x: problem.target_values(x) - wanted,
+            (scan[:-1][between], scan[1:][between]),
+            tolerances={"xatol": 0.0, "xrtol": 4.0 * np.finfo(float).eps, "fatol": 0.0, "frtol": 0.0},
+        )
+        # where the output jumps across the target there is no root
+        is_root = np.abs(refined.f_x) <= max(tolerance, REFINED_TOLERANCE * scale)
+        roots += refined.x[is_root].tolist()
+    roots.sort()
+    e_out = problem.evaluate(np.array(roots))["e_out"].values.tolist() if roots else []
+    status: SolveStatus = "no_root" if not roots else "several_roots" if len(roots) > 1 else "ok"
+    if status == "ok" and roots[0] in bounds:
+        status = "at_bound"
+    return _result(problem, wanted, status, map(Root, roots, e_out), values)
+
+
+def _extremes(values: Array) -> tuple[float, ...]:
+    """The least and the largest value that are not NaN; empty if there are none."""
+    known = values[~np.isnan(values)]
+    return (float(known.min()), float(known.max())) if known.size else ()
+
+
+def _ends_of_runs(reached: Mask, scan: Array, bounds: set[float]) -> list[float]:
+    """The ends of each run of neighbouring values that reach the target; of a run at a bound, the bound alone."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], reached, [False]]))).reshape(-1, 2)
+    roots: list[float] = []
+    for first, after in edges.tolist():
+        ends = {float(scan[first]), float(scan[after - 1])}
+        roots += sorted(ends & bounds)[:1] or sorted(ends)
+    return roots
+
+
+def _best_over_axis(problem: _Problem, wanted: float) -> SolveResult:
+    """The value for which the largest distance from the target over the axis of the config is least."""
+    (axis,) = problem.config.axes
+    conditions = np.arange(axis.size)
+
+    def largest_distance(values: Array, *, is_scan: bool = False) -> Array:
+        """Over all conditions, shape (n,); infinite where an integration fails."""
+        trials = np.repeat(values, axis.size)
+        of_target = problem.target_values(trials, np.tile(conditions, values.size), is_scan=is_scan)
+        distances = np.abs(of_target - wanted).reshape(values.size, axis.size)
+        return np.where(np.isnan(distances).any(axis=1), np.inf, distances.max(axis=1))
+
+    scan = problem.scan_values()
+    distances = largest_distance(scan, is_scan=True)
+    best = int(np.argmin(distances))
+    if not np.isfinite(distances[best]):
+        return _result(problem, wanted, "no_root", (), np.full(1, np.nan))
+    value = float(scan[best])
+    neighbours = float(scan[max(best - 1, 0)]), float(scan[min(best + 1, scan.size - 1)])
+    refined = minimize_scalar(
+        lambda x: float(largest_distance(np.array([x]))[0]),
+        bounds=neighbours,
+        method="bounded",
+        options={"xatol": 1e-12 * max(map(abs, neighbours))},
+    )
+    if refined.fun < distances[best]:
+        value = float(refined.x)
+    outputs = problem.evaluate(np.full(axis.size, value), conditions)
+    inputs = {name: column for name, column in axis.columns.items() if not isinstance(column[0], str)}
+    over = tuple(
+        {name: float(column[at]) for name, column in inputs.items()}
+        | {name: float(outputs[name].values[at]) for name in dict.fromkeys((problem.variable, "e_out"))}
+        for at in conditions.tolist()
+    )
+    status: SolveStatus = "at_bound" if value in (problem.unknown.least, problem.unknown.most) else "ok"
+    root = Root(value, float(outputs["e_out"].values.mean()))
+    return _result(problem, wanted, status, (root,), outputs[problem.variable].values, over)
+
+
+def _result(
+    problem: _Problem,
+    wanted: float,
+    status: SolveStatus,
+    roots: Iterable[Root],
+    values: Array,
+    over: tuple[Mapping[str, float], ...] | None = None,
+) -> SolveResult:
+    extremes = _extremes(values)
+    return SolveResult(
+        model=problem.model.key,
+        name=problem.unknown.name,
+        unit=problem.unit(),
+        target={problem.variable: wanted},
+        status=status,
+        roots=tuple(roots),
+        attainable=(extremes[0], extremes[1]) if extremes else None,
+        over=over,
+    )
