@@ -20,13 +20,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import impact
-from impact.config.load import Config, Output, Solver, json_schema, parse_config, read_config
+from impact.config.load import Config, Output, Solver, parse_config, read_config
 from impact.config.tables import expand_models
 from impact.contact.materials import Material
 from impact.contact.model import ForceModel, Parameter
 from impact.contact.models import catalogue
 from impact.errors import ConfigError
 from impact.text import safe_text
+
+from .test_schema_agrees import SCHEMA
 
 ROOT = Path(__file__).parents[1]
 FIGURE6 = ROOT / "configs" / "figure6.toml"
@@ -708,9 +710,6 @@ def test_a_file_of_another_editor_is_read(tmp_path: Path) -> None:
     path.write_bytes(b"\xef\xbb\xbf" + GOOD.replace("\n", "\r\n").replace("e = 0.5", "e = 5").encode())
     with pytest.raises(ConfigError, match=re.escape(f"{path}:4: sweep.e: got 5, {E_EXPECTED}")):
         read_config(path)
-
-
-SCHEMA = json_schema()
 
 
 def test_the_schema_is_one_and_knows_the_configs() -> None:

@@ -296,9 +296,6 @@ def json_schema() -> dict[str, object]:
     Except for required keys, it does not cover conditions between keys: the rules of `impact.config.rules`, names
     of materials and columns, numbers of points. Nor does it cover the dimension and value of a string with a unit,
     and the size and overflow of a range.
-
-    >>> json_schema()["required"]
-    ['models', 'sweep']
     """
     models = catalogue()
     schema = document_type(models, list(models)).model_json_schema()
