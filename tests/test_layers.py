@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 from collections.abc import Callable
 from graphlib import TopologicalSorter
 from pathlib import Path
@@ -46,6 +47,7 @@ def part_of(path: Path) -> str:
     return "" if parts == ("__init__",) else parts[0]
 
 
+@functools.cache
 def imports(path: Path, *, inside_functions: bool = True) -> list[tuple[str, bool]]:
     """What a module imports, as absolute names, and whether for type checking only."""
     tree = ast.parse(path.read_text(encoding="utf-8"))

@@ -1,4 +1,4 @@
-"""What the documentation shows works as it stands, and what is generated is fresh."""
+"""The examples of the README run, numbers in the docs match the code, and generated pages are up to date."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ def test_the_toml_and_the_commands_of_daily_use(cli: Run, tmp_path: Path) -> Non
         assert program == "impact"
         done = cli(*words, cwd=tmp_path)
         assert done.returncode == 0, (line, done.stderr)
-    made = {"results.h5", "results.png", "baseline.h5", "differences.png", "figure-map.svg", "report.html"}
-    assert made <= {path.name for path in tmp_path.iterdir()}
+    written = {"results.h5", "results.png", "baseline.h5", "differences.png", "figure-map.svg", "report.html"}
+    assert written <= {path.name for path in tmp_path.iterdir()}
 
 
 @pytest.mark.parametrize("code", blocks("python"))
@@ -54,13 +54,13 @@ def test_the_python(code: str, tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
 
 
-def test_generated_pages_are_fresh() -> None:
+def test_generated_pages_are_up_to_date() -> None:
     import make_docs
 
     assert (ROOT / "docs" / "schema.md").read_text(encoding="utf-8") == make_docs.schema_page(), "run `make docs`"
 
 
-def test_the_page_on_sweeps_says_what_is_so() -> None:
+def test_the_numbers_and_the_config_of_the_page_on_sweeps_match_the_code() -> None:
     from impact.config.grid import MAX_POINTS
     from impact.config.load import parse_config
     from impact.config.quantities import MAX_AXIS_VALUES
@@ -78,13 +78,13 @@ def test_the_page_on_sweeps_says_what_is_so() -> None:
     assert output.chunks == {"e": 50}
 
 
-def test_links_lead_somewhere() -> None:
+def test_relative_links_lead_to_existing_files() -> None:
     for page in [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").glob("*.md")]:
         for target in re.findall(r"\]\((?!https?:)([^)#]+)", page.read_text(encoding="utf-8")):
             assert (page.parent / target).exists(), f"{page.name}: {target}"
 
 
-def test_the_version_is_one() -> None:
+def test_the_citation_file_has_the_version_of_the_package() -> None:
     import impact
 
     assert f"version: {impact.__version__}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
