@@ -1,4 +1,4 @@
-"""The workflow that docs/ci.md offers to other projects runs as it stands, the package installed from a wheel."""
+"""The workflow of docs/ci.md runs without changes, with the package installed from a wheel."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import yaml
 
 from .conftest import ROOT, Run
 
-# each makes environments and builds the package
+# these tests create environments and build the package
 pytestmark = pytest.mark.slow
 
 PAGE = (ROOT / "docs" / "ci.md").read_text(encoding="utf-8")
@@ -32,8 +32,8 @@ Shell = dict[str, str]
 
 
 def block(language: str) -> str:
-    (found,) = re.findall(rf"```{language}\n(.*?)```", PAGE, re.DOTALL)
-    return str(found)
+    (text,) = re.findall(rf"```{language}\n(.*?)```", PAGE, re.DOTALL)
+    return str(text)
 
 
 @pytest.fixture(scope="module")
@@ -61,13 +61,15 @@ def shell(tmp_path_factory: pytest.TempPathFactory) -> Shell:
 
 def run(command: str, shell: Shell, folder: Path) -> subprocess.CompletedProcess[str]:
     if not command.startswith("pip"):
-        # what the project depends on is here already: a path with the libraries, and without the editable project
+        # the dependencies are installed here: a path that has them, but not the editable project
         shell = {**shell, "PYTHONPATH": str(Path(np.__file__).parent.parent)}
     words = ["bash", "-e", "-c", command]
     return subprocess.run(words, cwd=folder, env=shell, capture_output=True, text=True, check=False, timeout=120)
 
 
-def test_the_workflow(shell: Shell, steps: list[dict[str, str]], tmp_path: Path) -> None:
+def test_the_workflow_runs_and_reports_a_difference(
+    shell: Shell, steps: list[dict[str, str]], tmp_path: Path
+) -> None:
     (tmp_path / "contact.toml").write_text(CONTACT, encoding="utf-8")
     (tmp_path / "baselines").mkdir()
     always = [step["run"] for step in steps if "run" in step and "if" not in step]
@@ -80,7 +82,7 @@ def test_the_workflow(shell: Shell, steps: list[dict[str, str]], tmp_path: Path)
     assert where.count(shell["PATH"].split(os.pathsep)[0].removesuffix("bin")) == 2, where
     assert run(always[2], shell, tmp_path).returncode == 0
 
-    # the numbers change: the job fails, says where, and the steps that run on failure leave what they say they do
+    # changed values: the job fails with their location, and the steps on failure write their files
     (tmp_path / "contact.toml").write_text(CONTACT.replace("6e9", "6.1e9"), encoding="utf-8")
     assert run(f"{always[1]} --overwrite", shell, tmp_path).returncode == 0
     failed = run(always[2], shell, tmp_path)
@@ -95,7 +97,7 @@ def test_the_workflow(shell: Shell, steps: list[dict[str, str]], tmp_path: Path)
     assert all((tmp_path / name).is_file() for name in str(kept).split())
 
 
-def test_the_commands_in_an_empty_folder(tmp_path: Path) -> None:
+def test_the_commands_run_in_an_empty_folder(tmp_path: Path) -> None:
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     done = subprocess.run(
         ["bash", "-e", "-c", block("sh")], cwd=tmp_path, env={**os.environ, "PATH": path}, check=False
@@ -104,7 +106,7 @@ def test_the_commands_in_an_empty_folder(tmp_path: Path) -> None:
     assert (tmp_path / "baselines" / "contact.h5").exists()
 
 
-def test_the_test(tmp_path: Path, cli: Run) -> None:
+def test_the_pytest_example_passes_and_fails(tmp_path: Path, cli: Run) -> None:
     (tmp_path / "contact.toml").write_text(CONTACT, encoding="utf-8")
     (tmp_path / "baselines").mkdir()
     assert cli("sweep", "contact.toml", "-o", "baselines/contact.h5", "-q", cwd=tmp_path).returncode == 0

@@ -1,7 +1,4 @@
-"""A config is read as it is meant, or refused with every one of its problems in a line of its own.
-
-The lines are exact: file, line, path, what was got, what is wanted.
-"""
+"""A config is read, or refused with one line for each problem: file, line, key, what it got, what it expected."""
 # ruff: noqa: E501 (messages are kept whole, so that they can be searched for)
 
 import json
@@ -54,7 +51,7 @@ def model(key: str, force: object = lambda elastic: elastic, **more: object) -> 
     return ForceModel(key, title=key, year=2026, equation="F", reference="", family="test", force=force, **more)
 
 
-# a law that asks for all that is not always there, one with an exponent of its own, one driven by parameters
+# models that need a yield strength or a radius, with another exponent, and with parameters
 PLASTIC = model("test-plastic", lambda elastic, yield_strength1, yield_strength2: elastic + 0 * yield_strength1)
 RADIUS = model("test-radius", lambda elastic, R1: elastic * R1)
 LINEAR = model("test-linear", exponent=1.0)
@@ -93,7 +90,7 @@ KNOWN = ", ".join(sorted(impact.materials()))
 MANY = "more than 1,000,000,000,000,000,000"
 LONG = "1" + "0" * 400
 
-# what takes the place of what in GOOD, and the lines that this gives
+# a text of GOOD, its replacement, and the lines of the error
 BAD = [
     # a number that is none, or is not in its interval
     ("e = 0.5", "e = 1.4", [f"x.toml:4: sweep.e: got 1.4, {E_EXPECTED}"]),
@@ -308,7 +305,7 @@ BAD = [
 @pytest.mark.parametrize(
     ("old", "new", "lines"), BAD, ids=[f"{i}-{new[:30]}" for i, (_, new, _) in enumerate(BAD)]
 )
-def test_bad_config(old: str, new: str, lines: list[str]) -> None:
+def test_a_wrong_config_is_refused_with_a_line_for_each_problem(old: str, new: str, lines: list[str]) -> None:
     assert problems(changed(old, new)) == lines
 
 
@@ -361,18 +358,18 @@ OVERRIDDEN = [
     (["materials.\"a.b\"={E=1}"],
      '--set materials."a.b"={E=1}: materials."a.b".nu: missing, '
      "expected a number > -1 and <= 0.5: Poisson's ratio"),
-    # a table that an override made is no place for a key that is missing in it
+    # a key missing in a table that an override created has no line in the file
     (["materials.new.E=1e9"],
      "x.toml: materials.new.nu: missing, expected a number > -1 and <= 0.5: Poisson's ratio"),
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize(("overrides", "line"), OVERRIDDEN, ids=[str(case[0])[:40] for case in OVERRIDDEN])
-def test_bad_override(overrides: list[str], line: str) -> None:
+def test_a_wrong_override_is_refused_with_its_text(overrides: list[str], line: str) -> None:
     assert problems(GOOD, *overrides) == [line]
 
 
-def test_overrides_replace_what_was_there() -> None:
+def test_overrides_replace_values() -> None:
     config = read(
         changed("e = 0.5", "e = { linspace = [0, 1, 3] }"),
         "sweep.e.arange=[0, 1, 0.5]",
@@ -389,7 +386,7 @@ def test_overrides_replace_what_was_there() -> None:
     assert read(GOOD, "sweep.e.linspace=[0,1,11]", "sweep.e=0.1").scalars["e"] == 0.1
 
 
-def test_what_overrides_replaced_is_not_read() -> None:
+def test_replaced_values_are_not_read() -> None:
     assert read(changed("e = 0.5", "e = [\n7,\n8]"), "sweep.e=1").scalars["e"] == 1.0
     assert problems(changed("e = 0.5", "e = [\n7,\n8]"), "sweep.e=[1, 9]") == [
         f"--set sweep.e=[1, 9]: sweep.e[1]: got 9, {E_EXPECTED}"
@@ -398,11 +395,11 @@ def test_what_overrides_replaced_is_not_read() -> None:
 
 def test_figure6_is_table_1() -> None:
     config = read_config(FIGURE6)
-    assert [one.key for one in config.models] == [
+    assert [model.key for model in config.models] == [
         "lankarani-nikravesh-1994", "lankarani-nikravesh-1990", "gharib-hurmuzlu-2012",
     ]  # fmt: skip
     assert config.scalars == {"v1": 1, "v2": 0, "m1": 1, "m2": 1, "material": "table1", "n": 1.5}
-    assert [dict(axis.columns) for axis in config.axes] == [{"e": tuple(place / 100 for place in range(101))}]
+    assert [dict(axis.columns) for axis in config.axes] == [{"e": tuple(index / 100 for index in range(101))}]
     assert config.materials == {"table1": Material(56e9, 0.3, 2712)}
     assert config.solver == Solver(rtol=1e-10)
     assert config.output == Output()
@@ -421,7 +418,7 @@ def test_every_option_of_the_starter_works() -> None:
     text = STARTER.read_text()
     shown = re.findall(r"^# (\[.*\]|\w+ = .*)$", text, re.MULTILINE)
     assert len(shown) > 15
-    # options that exclude each other or what is there, and those of which there are two, come one at a time
+    # options that exclude each other or existing keys are tested one at a time
     alone = {"alpha": "e", "material1": "material", "m2": "m2", "K": "", "zip": "m1 =", "R2": ""}
     rest = text
     for line in shown:
@@ -516,7 +513,7 @@ def test_a_wrong_value_in_a_later_axis_of_a_zip_group_is_the_error_of_that_value
     assert problem.startswith("x.toml:7: sweep.m2[1]: got ")
 
 
-def test_columns_behind_the_first_of_a_zip_group_may_repeat_themselves() -> None:
+def test_later_columns_of_a_zip_group_may_repeat_values() -> None:
     text = changed("e = 0.5\nv1 = 1.0", 'e = [0, 1]\nv1 = [1, 1]\nzip = [["e", "v1"]]')
     assert read(text).axes[0].columns == {"e": (0, 1), "v1": (1, 1)}
 
@@ -543,22 +540,23 @@ def test_parameters_of_models_are_scalars_and_axes_by_dotted_name() -> None:
     ],
 )
 def test_models_are_named_in_many_ways(models: str, keys: list[str]) -> None:
-    assert [one.key for one in read(changed('["lankarani-nikravesh-1990"]', models)).models] == keys
+    assert [model.key for model in read(changed('["lankarani-nikravesh-1990"]', models)).models] == keys
 
 
-def test_all_models_are_all() -> None:
+def test_all_models_are_selected_once_under_their_first_name() -> None:
     config = read_config({**tomllib.loads(GOOD), "models": "all"}, plugins=(), overrides=ALL_NEEDS)
     # a law that has two names is run once
-    assert [one.key for one in config.models] == [key for key, one in catalogue().items() if not one.same_as]
+    expected = [key for key, model in catalogue().items() if not model.same_as]
+    assert [model.key for model in config.models] == expected
 
 
 # what some built-in models ask for beyond the rest
 ALL_NEEDS = [
     "materials.steel.yield_strength=1e8",
     *(
-        f"model.{one.key}.{parameter.name}={min(max(1.0, parameter.least), parameter.most)}"
-        for one in catalogue().values()
-        for parameter in one.parameters
+        f"model.{model.key}.{parameter.name}={min(max(1.0, parameter.least), parameter.most)}"
+        for model in catalogue().values()
+        for parameter in model.parameters
         if parameter.default is None
     ),
 ]
@@ -587,11 +585,11 @@ GOOD_ENTRIES = [
 
 
 @pytest.mark.parametrize(("old", "new", "scalars"), GOOD_ENTRIES, ids=[new for _, new, _ in GOOD_ENTRIES])
-def test_good_scalar(old: str, new: str, scalars: dict[str, float | str]) -> None:
+def test_a_scalar_is_converted_to_si(old: str, new: str, scalars: dict[str, float | str]) -> None:
     assert scalars.items() <= read(changed(old, new)).scalars.items()
 
 
-def test_a_law_that_asks_for_the_material_wants_one_beside_K() -> None:
+def test_a_model_that_depends_on_the_material_needs_it_beside_K() -> None:
     text = changed('material = "steel"', "K = 1e9")
     assert read(text.replace("lankarani-nikravesh-1990", "hertz")).scalars["K"] == 1e9
     expected = "missing, expected a material of [materials]"
@@ -607,7 +605,7 @@ def test_a_density_is_required_only_where_a_radius_is_derived_from_it() -> None:
     radii = "R1 = 0.1\nR2 = inf"
     assert read(bare.replace("e = 0.5", f"e = 0.5\n{radii}")).materials["steel"].rho is None
     assert read(bare.replace("e = 0.5", "e = 0.5\nK = 1e9")).materials["steel"].rho is None
-    # one radius is given, or the law itself depends on one
+    # only one radius is set, or the model depends on a radius
     needs = "x.toml:10: materials.steel.rho: missing, expected a number > 0 kg/m^3, or R{} under [sweep]: {} needs a radius"
     for line, ball, key in (("R1 = 0.1", 2, "hertz"), ("R2 = 0.1", 1, "hertz"), ("K = 1e9", 1, "test-radius")):
         text = bare.replace("e = 0.5", f"e = 0.5\n{line}").replace("lankarani-nikravesh-1990", key)
@@ -618,7 +616,10 @@ def test_a_density_is_required_only_where_a_radius_is_derived_from_it() -> None:
 
 def test_a_sweep_with_both_radii_has_the_same_bits_without_a_density() -> None:
     text = changed("e = 0.5", "e = 0.5\nR1 = 0.1\nR2 = inf")
-    both = [impact.sweep(tomllib.loads(one)) for one in (text, text.replace("rho = 7850\n", ""))]
+    both = [
+        impact.sweep(tomllib.loads(config), overrides=["solver.rtol=1e-4"])
+        for config in (text, text.replace("rho = 7850\n", ""))
+    ]
     assert both[0].drop_attrs().identical(both[1].drop_attrs())
     assert np.isfinite(both[1]["e_out"]).all()
 
@@ -688,7 +689,9 @@ def test_a_mapping_of_anything_is_refused() -> None:
         (b"#" * 1_000_001, ": larger than 1,000,000 bytes"),
     ],
 )
-def test_bad_file(tmp_path: Path, content: bytes | None, line: str) -> None:
+def test_a_file_that_cannot_be_read_is_an_error_of_one_line(
+    tmp_path: Path, content: bytes | None, line: str
+) -> None:
     path = tmp_path / "x.toml"
     if content is not None:
         path.write_bytes(content)
@@ -697,7 +700,7 @@ def test_bad_file(tmp_path: Path, content: bytes | None, line: str) -> None:
     assert caught.value.problems == (f"{path}{line}",)
 
 
-def test_what_is_no_file_is_not_opened(tmp_path: Path) -> None:
+def test_only_regular_files_are_opened(tmp_path: Path) -> None:
     for path in (tmp_path, Path("/dev/zero"), Path("a\0b"), Path("x" * 5000)):
         with pytest.raises(ConfigError) as caught:
             read_config(path)
@@ -705,14 +708,14 @@ def test_what_is_no_file_is_not_opened(tmp_path: Path) -> None:
         assert line.startswith(safe_text(str(path)) + ": ")
 
 
-def test_a_file_of_another_editor_is_read(tmp_path: Path) -> None:
+def test_a_file_with_byte_order_mark_and_crlf_is_read(tmp_path: Path) -> None:
     path = tmp_path / "x.toml"
     path.write_bytes(b"\xef\xbb\xbf" + GOOD.replace("\n", "\r\n").replace("e = 0.5", "e = 5").encode())
     with pytest.raises(ConfigError, match=re.escape(f"{path}:4: sweep.e: got 5, {E_EXPECTED}")):
         read_config(path)
 
 
-def test_the_schema_is_one_and_knows_the_configs() -> None:
+def test_the_schema_is_valid_and_accepts_the_configs() -> None:
     validator = jsonschema.Draft202012Validator(SCHEMA)
     validator.check_schema(SCHEMA)
     for text in (FIGURE6.read_text(), STARTER.read_text(), EXAMPLE, GOOD):
@@ -794,6 +797,7 @@ def test_pint_is_imported_only_for_a_unit() -> None:
     subprocess.run([sys.executable, "-c", code, FIGURE6], check=True)
 
 
+@settings(max_examples=30)
 @given(st.floats(allow_nan=False, allow_infinity=False))
 def test_a_unit_scales_exactly(value: float) -> None:
     config = read(changed("v1 = 1.0", f'v1 = "{value!r} mm/s"'))
@@ -809,7 +813,7 @@ PIECES = st.one_of(
 )  # fmt: skip
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=75, deadline=None)
 @given(st.integers(0, len(GOOD)), st.integers(0, 30), PIECES, st.lists(PIECES, max_size=2))
 def test_any_text_gives_a_config_or_safe_lines(at: int, cut: int, piece: str, overrides: list[str]) -> None:
     lines: tuple[str, ...] = ()
@@ -844,9 +848,9 @@ def sweeps(draw: st.DrawFn) -> dict[str, object]:
     return {name: draw(NUMBERS[name] if name == "n" else NUMBERS[name] | unique[name]) for name in names}
 
 
-@settings(deadline=None)
+@settings(max_examples=30)
 @given(sweeps())
-def test_every_value_given_is_in_the_config_once_and_in_order(sweep: dict[str, object]) -> None:
+def test_every_value_is_in_the_config_once_and_in_order(sweep: dict[str, object]) -> None:
     config = read_config({"models": "hertz", "sweep": sweep})
     lists = {name: tuple(value) for name, value in sweep.items() if isinstance(value, list)}
     assert [(axis.name, axis.columns[axis.name]) for axis in config.axes] == list(lists.items())
@@ -855,7 +859,7 @@ def test_every_value_given_is_in_the_config_once_and_in_order(sweep: dict[str, o
 
 
 @given(st.text(), st.integers(2, 50))
-def test_safe_text_is_short_and_shows_nothing_unseen(text: str, limit: int) -> None:
+def test_safe_text_is_short_and_has_no_invisible_characters(text: str, limit: int) -> None:
     shown = safe_text(text, limit)
     assert len(shown) <= limit
     assert not UNSAFE.search(shown)

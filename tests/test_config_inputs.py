@@ -1,4 +1,4 @@
-"""Material properties as axes, masses from radii, tables of cases, the library of materials; what each refuses."""
+"""Material properties as axes, masses from radii, tables of cases and built-in materials are read or refused."""
 # ruff: noqa: E501 (messages are kept whole, so that they can be searched for)
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ def test_a_property_of_a_material_is_an_axis_between_those_of_the_sweep_and_of_m
     assert config.axes[1].columns == {"materials.block.E": (70e9, 140e9, 210e9)}
     assert math.isnan(config.materials["block"].E)
     assert (config.materials["block"].yield_strength, config.materials["block"].rho) == (None, 7850.0)
-    # what no ball is made of makes no axis
+    # properties of an unused material are not axes
     assert "other" in config.materials
     assert read(TEXT).axes == ()
 
@@ -92,7 +92,7 @@ def test_a_mass_follows_from_a_radius_and_a_density() -> None:
         "x.toml:8: materials.block.rho: missing, expected a number > 0 kg/m^3, or m1 under [sweep]: "
         "the mass of ball 1 is not set"
     ]
-    # all three are taken as they are
+    # mass, radius and density may be set together
     assert read(TEXT, "sweep.R1=0.1").scalars["m1"] == 1.0
 
 
@@ -120,7 +120,7 @@ def test_a_table_of_cases_is_one_axis_and_crosses_the_others(tmp_path: Path) -> 
     assert read(TEXT, "sweep.cases={v2 = [-1, -1]}").axes[0].columns == {"v2": (-1.0, -1.0)}
 
 
-def test_what_is_stored_needs_no_file(tmp_path: Path) -> None:
+def test_a_stored_config_needs_no_csv_file(tmp_path: Path) -> None:
     column = 'sweep.m2={file="cases.csv", column="m1"}'
     config = cases(tmp_path, CSV.replace("1e2", "200"), column, "sweep.zip=[]")
     assert config.text == CASES
@@ -128,7 +128,7 @@ def test_what_is_stored_needs_no_file(tmp_path: Path) -> None:
     again = parse_config(config.text, config.overrides)
     assert repr(again) == repr(config)
     assert again.axes[-1].columns == {"m2": (0.1, 0.2)} or again.axes[1].columns == {"m2": (0.1, 0.2)}
-    # a text from anywhere opens no file
+    # a config that is passed as text opens no file
     assert problems(CASES) == ["cases.csv: not read; a stored config contains values, not file names"]
 
 
@@ -171,7 +171,7 @@ BAD_CSV = [
 
 
 @pytest.mark.parametrize(("csv", "lines"), BAD_CSV, ids=range(len(BAD_CSV)))
-def test_a_bad_table_of_cases_is_told_by_line_and_column(
+def test_a_wrong_table_of_cases_is_an_error_with_line_and_column(
     tmp_path: Path, csv: str | bytes, lines: list[str]
 ) -> None:
     assert refused(tmp_path, csv) == lines
@@ -198,29 +198,29 @@ def test_a_bad_table_of_cases_is_told_by_line_and_column(
          "--set sweep.cases={v1 = 3}: sweep.cases.v1: got 3, expected a list of values"),
     ],
 )  # fmt: skip
-def test_a_file_that_gives_no_values_is_one_line(tmp_path: Path, override: str, line: str) -> None:
+def test_a_file_without_the_values_is_an_error_of_one_line(tmp_path: Path, override: str, line: str) -> None:
     (problem,) = refused(tmp_path, CSV, override)
     assert problem.removeprefix(str(tmp_path)) == line
 
 
-def test_values_of_cases_are_checked_where_they_stand() -> None:
+def test_values_of_cases_are_checked_with_their_line() -> None:
     assert problems(TEXT.replace("v1 = 1.0\n", "cases = { v1 = [\n1,\ntrue], v2 = [1] }\n")) == [
         "x.toml:5: sweep.cases.v2: got 1 values, expected 2, as in the first column",
         "x.toml:5: sweep.cases.v1[1]: got true, expected a finite number of m/s",
     ]
 
 
-def test_common_materials_need_no_table() -> None:
+def test_built_in_materials_need_no_table() -> None:
     text = TEXT.replace("block", "steel")
-    own = read(text)
-    assert own.materials["steel"] == Material(210e9, 0.3, 7850.0)
-    assert own.overrides == ()
+    config = read(text)
+    assert config.materials["steel"] == Material(210e9, 0.3, 7850.0)
+    assert config.overrides == ()
     text = text[: text.index("[materials")]
     config = read(text, 'sweep.material=["steel", "glass"]')
     steel = impact.materials()["steel"]
     assert config.materials["steel"] == Material(steel["E"], steel["nu"], steel["rho"], steel["yield_strength"])  # type: ignore[arg-type]
     assert set(config.materials) == {"steel", "glass"}
-    # what is stored does not depend on the library
+    # the stored config does not depend on the built-in materials
     assert config.overrides[0].startswith("materials.steel={E = 210000000000.0, nu = 0.3")
     assert parse_config(config.text, config.overrides) == config
     changed = read(text, "materials.steel.E=[1e9, 2e9]")
@@ -231,7 +231,7 @@ def test_common_materials_need_no_table() -> None:
     assert line.endswith('got "stel", expected a material of [materials]; did you mean "steel"?')
 
 
-def test_every_common_material_has_a_source_and_can_be_used() -> None:
+def test_every_built_in_material_has_a_source_and_can_be_used() -> None:
     for name, record in impact.materials().items():
         assert record["source"]
         assert read_config({"models": "hertz", "sweep": {"v1": 1, "R1": 1, "m2": 1, "material": name}}).models

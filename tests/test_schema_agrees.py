@@ -1,9 +1,9 @@
-"""The JSON Schema accepts what the reader accepts, and refuses what it refuses, key by key.
+"""The JSON Schema accepts and refuses the same values as the reader, key by key.
 
-What a schema cannot say: rules between keys, names of materials, units in strings and the values with them, and
-how many values a range has.
+A schema cannot express rules between keys, names of materials, units in strings and the values with them, and the
+number of values of a range.
 """
-# ruff: noqa: E501 (what a message says is kept on one line)
+# ruff: noqa: E501 (messages are kept on one line)
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ KEYS = [
     "materials.block.nu", "materials.block.rho", "solver.rtol", "solver.max_steps", "solver.collapse", "output.dtype",
     "output.variables", "output.chunks", "model.kelvin-voigt.C", "title", "models",
 ]  # fmt: skip
-# messages about what a schema cannot say
+# messages about conditions that a schema cannot express
 BEYOND = re.compile(
     r"sweep\.cases\.|a unit of|a bare number|got \"\s*[-+.0-9]+[^\"]*[^\"0-9.]|\\x|a material of|on an axis|twice|overflow|two ends|a step other"
     r"|got no value|got a value|an axis|a scalar|no axis|chunks of|no such input|one length|set together with|missing"
@@ -91,8 +91,8 @@ def part(key: str) -> dict[str, Any]:
     table, _, name = key.rpartition(".")
     definition = SCHEMA["$defs"][TABLES.get(table, table.removeprefix("model."))] if table else SCHEMA
     schema = definition["properties"][name]
-    used = {one: SCHEMA["$defs"][one] for one in re.findall(r"#/\$defs/([^']*)'", str(schema))}
-    return {**schema, "$defs": used}
+    definitions = {used: SCHEMA["$defs"][used] for used in re.findall(r"#/\$defs/([^']*)'", str(schema))}
+    return {**schema, "$defs": definitions}
 
 
 def with_value(key: str, value: object) -> dict[str, Any]:
@@ -106,12 +106,12 @@ def with_value(key: str, value: object) -> dict[str, Any]:
 
 
 def faults_at(key: str, data: dict[str, Any]) -> list[str]:
-    """What is wrong with a key."""
+    """The problems of a key."""
     try:
         read_config(data)
     except ConfigError as error:
         lines = [line.removeprefix("config: ") for line in error.problems]
-        # a file that is not there is told by its own name
+        # a missing file is named without its key
         return [line for line in lines if line.startswith(key) or "cannot be read" in line or "regular" in line]
     return []
 
@@ -123,7 +123,7 @@ def test_reader_and_schema_agree_on_a_key(key: str, tmp_path: Any, monkeypatch: 
     schema = part(key)
     validator = jsonschema.Draft202012Validator(schema)
 
-    @settings(max_examples=20, deadline=None, suppress_health_check=list(HealthCheck))
+    @settings(max_examples=12, deadline=None, suppress_health_check=list(HealthCheck))
     @given(values(schema, SCHEMA["$defs"]) | ANYTHING)
     def check(value: object) -> None:
         data = with_value(key, value)
