@@ -1,4 +1,4 @@
-"""A cluster of dask on this machine: a scheduler and workers, each a process started by command line."""
+"""A dask cluster on this machine: a scheduler and workers, each a process started by a command."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ m1 = 1.0
 m2 = 1.0
 K = 1e9
 """
-BLOCKS = 14
-PATIENCE = 60.0  # s after which what should have happened is not waited for any more
-DASK = (sys.executable, "-m", "dask")
-ALONE = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+BLOCK_COUNT = 14
+TIMEOUT_S = 60.0  # limit of every wait
+DASK_COMMAND = (sys.executable, "-m", "dask")
+SINGLE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
 @dataclass
-class Dask:
-    """A scheduler, and workers that come and go; `folder` is where they run, which is not where sweeps do."""
+class DaskCluster:
+    """A scheduler and workers; `folder` is their working directory, which differs from that of sweeps."""
 
     folder: Path
     children: dict[str, subprocess.Popen[str]] = field(default_factory=dict)
@@ -53,101 +53,129 @@ class Dask:
     def start(self, name: str, *words: str, **environment: str) -> None:
         with (self.folder / f"{name}.log").open("w") as log:
             self.children[name] = subprocess.Popen(
-                [*DASK, *words], cwd=self.folder, env={**os.environ, **ALONE, **environment}, text=True,
-                stdout=log, stderr=log,
-            )  # fmt: skip
+                [*DASK_COMMAND, *words],
+                cwd=self.folder,
+                env={**os.environ, **SINGLE_THREAD, **environment},
+                text=True,
+                stdout=log,
+                stderr=log,
+            )
 
     def scheduler(self, **environment: str) -> None:
         self.start(
-            "scheduler", "scheduler", "--host", "127.0.0.1", "--port", "0", "--dashboard-address", "127.0.0.1:0",
-            "--scheduler-file", str(self.file), **environment,
-        )  # fmt: skip
-        until(lambda: self.file.is_file() and self.file.stat().st_size > 0)
+            "scheduler",
+            "scheduler",
+            "--host",
+            "127.0.0.1",
+            "--port",
+            "0",
+            "--dashboard-address",
+            "127.0.0.1:0",
+            "--scheduler-file",
+            str(self.file),
+            **environment,
+        )
+        wait_until(lambda: self.file.is_file() and self.file.stat().st_size > 0)
 
     def worker(self, name: str, *, ready: bool = True, **environment: str) -> None:
         self.start(
-            name, "worker", "--scheduler-file", str(self.file), "--name", name, "--nthreads", "1", "--no-nanny",
-            "--no-dashboard", "--local-directory", str(self.folder), **environment,
-        )  # fmt: skip
+            name,
+            "worker",
+            "--scheduler-file",
+            str(self.file),
+            "--name",
+            name,
+            "--nthreads",
+            "1",
+            "--no-nanny",
+            "--no-dashboard",
+            "--local-directory",
+            str(self.folder),
+            **environment,
+        )
         if ready:
-            until(lambda: "Registered to" in (self.folder / f"{name}.log").read_text())
+            wait_until(lambda: "Registered to" in (self.folder / f"{name}.log").read_text())
 
     def kill(self, *names: str) -> None:
-        """End them at once, each by its own id."""
+        """Kill processes by their names."""
         for name in names:
             self.children[name].send_signal(signal.SIGKILL)
             self.children[name].wait()
 
 
 @contextmanager
-def dask(folder: Path, *workers: str, **environment: str) -> Iterator[Dask]:
-    """A scheduler with this environment, and workers."""
+def start_cluster(folder: Path, *workers: str, **environment: str) -> Iterator[DaskCluster]:
+    """Start a scheduler with this environment, and workers; they end with the context."""
     folder.mkdir(parents=True)
-    found = Dask(folder)
+    cluster = DaskCluster(folder)
     try:
-        found.scheduler(**environment)
+        cluster.scheduler(**environment)
         for name in workers:
-            found.worker(name)
-        yield found
+            cluster.worker(name)
+        yield cluster
     finally:
-        found.kill(*(name for name, child in found.children.items() if child.poll() is None))
+        cluster.kill(*(name for name, child in cluster.children.items() if child.poll() is None))
 
 
 @dataclass
-class Sweep:
+class RunningSweep:
     """A sweep on the command line, in a folder with its config."""
 
     folder: Path
     process: subprocess.Popen[str]
 
     def kept(self) -> set[str]:
-        """Its blocks that are kept."""
-        return {one.name for one in self.folder.glob("*.work/*.npz")}
+        """The files of its finished blocks."""
+        return {path.name for path in self.folder.glob("*.work/*.npz")}
 
-    def until_kept(self, count: int) -> None:
-        until(lambda: len(self.kept()) >= count or self.process.poll() is not None)
+    def wait_for_blocks(self, count: int) -> None:
+        wait_until(lambda: len(self.kept()) >= count or self.process.poll() is not None)
         assert self.process.poll() is None, self.process.communicate()
 
-    def ends(self, code: int = 0) -> str:
-        """What it said, when it has ended with this code."""
-        _, said = self.process.communicate(timeout=PATIENCE)
-        assert self.process.returncode == code, said
-        return said
+    def wait(self, code: int = 0) -> str:
+        """Wait for the end, check the exit status and return stderr."""
+        _, printed = self.process.communicate(timeout=TIMEOUT_S)
+        assert self.process.returncode == code, printed
+        return printed
 
     @property
     def content(self) -> bytes:
         return content(self.folder)
 
 
-def sweep(folder: Path, *words: str | Path, config: str = CONFIG) -> Sweep:
-    """Begin one, in a group of processes of its own."""
+def start_sweep(folder: Path, *words: str | Path, config: str = CONFIG) -> RunningSweep:
+    """Start a sweep in a separate process group."""
     folder.mkdir(exist_ok=True)
     (folder / "c.toml").write_text(config)
     process = subprocess.Popen(
-        [sys.executable, "-m", "impact", "sweep", "c.toml", *map(str, words)], cwd=folder,
-        env={**os.environ, **ALONE}, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        [sys.executable, "-m", "impact", "sweep", "c.toml", *map(str, words)],
+        cwd=folder,
+        env={**os.environ, **SINGLE_THREAD},
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
         start_new_session=True,
-    )  # fmt: skip
-    return Sweep(folder, process)
+    )
+    return RunningSweep(folder, process)
 
 
 def content(folder: Path) -> bytes:
-    """The bytes of its result."""
+    """The bytes of the result in a folder."""
     return (folder / "results.h5").read_bytes()
 
 
-def until(condition: Callable[[], bool]) -> None:
-    begun = time.monotonic()
+def wait_until(condition: Callable[[], bool]) -> None:
+    start = time.monotonic()
     while not condition():
-        assert time.monotonic() - begun < PATIENCE
+        assert time.monotonic() - start < TIMEOUT_S
         time.sleep(0.02)
 
 
-def in_group(group: int) -> list[int]:
-    """The processes of a group that run."""
-    found = []
+def processes_of_group(group: int) -> list[int]:
+    """The running processes of a group."""
+    pids = []
     for path in Path("/proc").glob("[0-9]*/stat"):
         with contextlib.suppress(OSError):
-            state, _, own = path.read_text().rpartition(")")[2].split()[:3]
-            found += [int(path.parent.name)] if own == str(group) and state != "Z" else []
-    return found
+            state, _, process_group = path.read_text().rpartition(")")[2].split()[:3]
+            pids += [int(path.parent.name)] if process_group == str(group) and state != "Z" else []
+    return pids

@@ -1,7 +1,7 @@
-"""The scripts of docs/cluster.md run as they stand, with something for what a cluster has and this machine lacks.
+"""The scripts of docs/cluster.md run unchanged, with replacements for what this machine lacks.
 
-SLURM tells a job its number by the environment, and so does the test. `ssh` begins a shell on another host: here
-it is one on this. Jobs of a queue are processes of this machine, by the class that dask-jobqueue has for that.
+The test sets the environment variables with which SLURM numbers jobs. `ssh` starts a shell on this host instead of
+another. Jobs of a queue are local processes, with the class that dask-jobqueue has for tests.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import pytest
 
 import impact
 
-from .clusters import CONFIG, PATIENCE
+from .clusters import CONFIG, TIMEOUT_S
 from .conftest import ROOT
 
 pytestmark = pytest.mark.slow
@@ -29,64 +29,69 @@ exec sh -c "$*"
 
 
 def script(name: str) -> str:
-    """The script that the page has under a name."""
-    found = re.search(rf"`{re.escape(name)}`[^`]*:\n\n```\w+\n(.*?)```", PAGE, re.DOTALL)
-    assert found, name
-    return found[1]
+    """The script of this name on the page."""
+    match = re.search(rf"`{re.escape(name)}`[^`]*:\n\n```\w+\n(.*?)```", PAGE, re.DOTALL)
+    assert match, name
+    return match[1]
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A folder with a sweep, and with this environment under the name that the scripts have for one."""
+    """A folder with a config, and with a virtual environment of the name that the scripts use."""
     (tmp_path / "config.toml").write_text(CONFIG.replace("200000", "40000"))
     (tmp_path / "venv" / "bin").mkdir(parents=True)
-    here = Path(sys.executable).parent
-    (tmp_path / "venv" / "bin" / "activate").write_text(f'PATH="{here}:$PATH"\nexport PATH\n')
+    bin_folder = Path(sys.executable).parent
+    (tmp_path / "venv" / "bin" / "activate").write_text(f'PATH="{bin_folder}:$PATH"\nexport PATH\n')
     return tmp_path
 
 
 def run(folder: Path, *words: str, **environment: str) -> str:
-    done = subprocess.run(
-        words, cwd=folder, env={**os.environ, **environment}, capture_output=True, text=True, timeout=2 * PATIENCE,
+    completed = subprocess.run(
+        words,
+        cwd=folder,
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        timeout=2 * TIMEOUT_S,
         check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout + done.stderr
+    )
+    assert completed.returncode == 0, completed.stdout + completed.stderr
+    return completed.stdout + completed.stderr
 
 
-def is_right(folder: Path) -> bool:
+def has_expected_result(folder: Path) -> bool:
     return bool(impact.load(folder / "results.h5").identical(impact.sweep(folder / "config.toml")))
 
 
-def test_a_job_array(folder: Path) -> None:
+def test_a_job_array_of_shards_gives_the_expected_result(folder: Path) -> None:
     for name in ("shards.sh", "merge.sh"):
         (folder / name).write_text(script(name))
     assert "#SBATCH --array=1-16\n" in script("shards.sh")
     for number in range(16, 0, -1):
-        told = {"SLURM_ARRAY_TASK_ID": str(number), "SLURM_ARRAY_TASK_COUNT": "16"}
-        run(folder, "bash", "shards.sh", SLURM_SUBMIT_DIR=str(folder), **told)
+        variables = {"SLURM_ARRAY_TASK_ID": str(number), "SLURM_ARRAY_TASK_COUNT": "16"}
+        run(folder, "bash", "shards.sh", SLURM_SUBMIT_DIR=str(folder), **variables)
     run(folder, "bash", "merge.sh", SLURM_SUBMIT_DIR=str(folder))
-    assert is_right(folder)
+    assert has_expected_result(folder)
     assert not list(folder.glob("*.work"))
 
 
-def test_by_hand_over_ssh(folder: Path) -> None:
+def test_workers_started_by_ssh_give_the_expected_result(folder: Path) -> None:
     (folder / "hosts.txt").write_text("one\ntwo\n")
     (folder / "by_ssh.sh").write_text(script("by_ssh.sh"))
     (folder / "bin").mkdir()
     (folder / "bin" / "ssh").write_text(SSH)
     (folder / "bin" / "ssh").chmod(0o755)
-    said = run(folder, "bash", "by_ssh.sh", PATH=f"{folder / 'bin'}{os.pathsep}{os.environ['PATH']}")
-    assert "workers" in said
-    assert is_right(folder)
+    printed = run(folder, "bash", "by_ssh.sh", PATH=f"{folder / 'bin'}{os.pathsep}{os.environ['PATH']}")
+    assert "workers" in printed
+    assert has_expected_result(folder)
 
 
-def test_by_a_queue(folder: Path) -> None:
+def test_workers_of_a_queue_give_the_expected_result(folder: Path) -> None:
     pytest.importorskip("dask_jobqueue")
     text = script("by_queue.py").replace("import SLURMCluster", "import LocalCluster as SLURMCluster")
     (folder / "by_queue.py").write_text(
         text.replace("from dask_jobqueue import", "from dask_jobqueue.local import")
     )
-    here = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    run(folder, sys.executable, "by_queue.py", PATH=here)
-    assert is_right(folder)
+    bin_folder = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    run(folder, sys.executable, "by_queue.py", PATH=bin_folder)
+    assert has_expected_result(folder)

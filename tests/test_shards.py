@@ -20,7 +20,7 @@ import impact
 from impact import ImpactError
 from impact.errors import UsageError
 
-from .clusters import content, sweep
+from .clusters import content, start_sweep
 from .conftest import Run
 from .fork_server import ForkServer
 
@@ -290,16 +290,16 @@ def test_a_shard_counts_failed_points_and_a_merge_with_failed_points_exits_with_
 
 @pytest.mark.slow
 def test_killed_shards_are_continued_and_merge_to_the_whole(tmp_path: Path) -> None:
-    sweep(tmp_path / "whole").ends()
+    start_sweep(tmp_path / "whole").wait()
     kept: dict[Path, int] = {}
     for number, count in ((1, 1), (1, 4), (2, 9)):
-        running = sweep(tmp_path / "shards", "--shard", f"{number}/2")
-        running.until_kept(count)
+        running = start_sweep(tmp_path / "shards", "--shard", f"{number}/2")
+        running.wait_for_blocks(count)
         running.process.kill()
         running.process.communicate()
         kept = {path: path.stat().st_mtime_ns for path in running.folder.glob("*.work/*.npz")}
     for number in (1, 2):
-        sweep(tmp_path / "shards", "--shard", f"{number}/2").ends()
+        start_sweep(tmp_path / "shards", "--shard", f"{number}/2").wait()
     assert all(path.stat().st_mtime_ns == modified for path, modified in kept.items())
     folders = list((tmp_path / "shards").glob("*.work"))
     subprocess.run([sys.executable, "-m", "impact", "merge", *folders], cwd=tmp_path / "shards", check=True)
