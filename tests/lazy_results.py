@@ -118,10 +118,14 @@ def stretched(
 
         varies = [*small_axes, *extras]
         variables[str(name)] = computed(
-            str(name), {dim: sizes[dim] for dim in along}, values, reads, dtype=variable.dtype,
+            str(name),
+            {dim: sizes[dim] for dim in along},
+            values,
+            reads,
+            dtype=variable.dtype,
             varies_along={str(key): varies for key in small["model"].values} if known else None,
             attrs=variable.attrs,
-        )  # fmt: skip
+        )
     coords = {
         **{name: coordinate.variable for name, coordinate in small.coords.items() if name not in axes},
         **{name: (name, np.asarray(of, float), small[name].attrs) for name, of in axes.items()},

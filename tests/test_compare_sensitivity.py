@@ -1,4 +1,4 @@
-"""No change of a number passes: whatever moves in a result by more than its tolerance, the verdict says so."""
+"""`impact.compare` detects every change of a number beyond its tolerance, a label, a unit or an attribute."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from impact.contact.status import Status
 
 from .fork_server import ForkServer
 
-# it starts many processes or reads many files: `make test-faults` runs it
+# hundreds of random changes: `make test-faults` runs them
 pytestmark = pytest.mark.slow
 
-# how far each variable may be off, written again here from the text of docs/schema.md
+# the scale of each variable, repeated here from docs/schema.md
 OF_SPEED = ("v1_post", "v2_post", "v1_reference", "v2_reference", "v1_error", "v2_error")
 OF_PEAK = ("peak_indentation", "permanent_indentation")
 OF_ITSELF = ("peak_force", "contact_time", "stiffness", "damping_ratio")
@@ -36,9 +36,9 @@ THROUGH_FILES = 20  # mutations that go through stored files and the command lin
 
 @dataclass(frozen=True)
 class Mutant:
-    """A result in which one thing was changed: the kind of fault that it is, and the name that has to be told."""
+    """A result with one change, the kind of the difference, and the name that the verdict must contain."""
 
-    what: str
+    change: str
     result: xr.Dataset
     kind: str
     name: str
@@ -46,18 +46,18 @@ class Mutant:
 
 @dataclass(frozen=True, repr=False)
 class Pair:
-    """A mutant, and the result that it was made from."""
+    """A mutant and the original result."""
 
     original: xr.Dataset
     mutant: Mutant
 
     def __repr__(self) -> str:
-        return f"{self.mutant.what} of {self.mutant.name}"
+        return f"{self.mutant.change} of {self.mutant.name}"
 
 
-def _scale(result: xr.Dataset, name: str, place: tuple[int, ...]) -> float:
-    """What one tolerance of a point is relative to, from its inputs and outputs alone."""
-    point = result.isel(dict(zip(result[name].dims, place, strict=True)))
+def _scale(result: xr.Dataset, name: str, position: tuple[int, ...]) -> float:
+    """The scale of a tolerance at a point, computed from its inputs and outputs."""
+    point = result.isel(dict(zip(result[name].dims, position, strict=True)))
     v0 = abs(float(point["v1"]) - float(point["v2"]))
     if name in OF_SPEED:
         return v0
@@ -68,48 +68,50 @@ def _scale(result: xr.Dataset, name: str, place: tuple[int, ...]) -> float:
     return abs(float(point[name])) if name in OF_ITSELF else 1.0
 
 
-def _changed(result: xr.Dataset, name: str, place: tuple[int, ...], value: float) -> xr.Dataset:
+def _changed(result: xr.Dataset, name: str, position: tuple[int, ...], value: float) -> xr.Dataset:
     values = result[name].values.copy()
-    values[place] = value
+    values[position] = value
     return result.assign({name: (result[name].dims, values, result[name].attrs)})
 
 
-def _place(draw: Any, result: xr.Dataset, name: str, *, finite: bool = True) -> tuple[int, ...]:
-    """A place where the variable has a number, or has none."""
-    places = np.argwhere(np.isfinite(result[name].values) == finite)
-    return tuple(int(one) for one in places[draw(st.integers(0, len(places) - 1))])
+def _draw_position(draw: Any, result: xr.Dataset, name: str, *, finite: bool = True) -> tuple[int, ...]:
+    """Draw a position at which the variable is finite, or is not."""
+    positions = np.argwhere(np.isfinite(result[name].values) == finite)
+    return tuple(int(index) for index in positions[draw(st.integers(0, len(positions) - 1))])
 
 
 def _moved(draw: Any, result: xr.Dataset, tolerances: float) -> Mutant:
-    """One number moved by so many tolerances of its point; a bounded one by so many beyond its bound."""
+    """One number changed by this many tolerances of its point; a residual by this many beyond its bound."""
     name = draw(st.sampled_from(NUMBERS))
-    place = _place(draw, result, name)
-    value, sign = float(result[name].values[place]), draw(st.sampled_from((-1.0, 1.0)))
-    by = tolerances * 10 * RTOL * _scale(result, name, place)
+    position = _draw_position(draw, result, name)
+    value, sign = float(result[name].values[position]), draw(st.sampled_from((-1.0, 1.0)))
+    by = tolerances * 10 * RTOL * _scale(result, name, position)
     if name in BOUNDED and tolerances > 1:
         value = sign * max(10 * RTOL, abs(value))
     if tolerances > 1:
-        # where nothing is allowed, the smallest number is a difference
+        # at scale 0 the smallest number is a difference
         by = by or math.ulp(0.0)
-    return Mutant("number moved", _changed(result, name, place, value + sign * by), "values", name)
+    return Mutant("number moved", _changed(result, name, position, value + sign * by), "values", name)
 
 
 def _flag_flipped(draw: Any, result: xr.Dataset) -> Mutant:
     name = draw(st.sampled_from(FLAGS))
-    place = _place(draw, result, name)
-    own = int(result[name].values[place])
-    other = [int(one) for one in (Status if name == "status" else (0, 1)) if one != own]
-    return Mutant(f"{name} flipped", _changed(result, name, place, draw(st.sampled_from(other))), "values", name)
+    position = _draw_position(draw, result, name)
+    value = int(result[name].values[position])
+    other = [int(flag) for flag in (Status if name == "status" else (0, 1)) if flag != value]
+    return Mutant(
+        f"{name} flipped", _changed(result, name, position, draw(st.sampled_from(other))), "values", name
+    )
 
 
 def _nan_moved(draw: Any, result: xr.Dataset) -> Mutant:
     name = draw(st.sampled_from(NUMBERS))
     ways = ["put"] + ["taken", "swapped"] * bool(np.isnan(result[name].values).any())
     way = draw(st.sampled_from(ways))
-    number = _place(draw, result, name)
+    number = _draw_position(draw, result, name)
     changed = result
     if way != "put":
-        nan = _place(draw, result, name, finite=False)
+        nan = _draw_position(draw, result, name, finite=False)
         value = draw(st.sampled_from([0.0, 1.0, math.inf])) if way == "taken" else result[name].values[number]
         changed = _changed(changed, name, nan, value)
     if way != "taken":
@@ -123,20 +125,20 @@ def _dropped(draw: Any, result: xr.Dataset) -> Mutant:
 
 
 def _relabelled(draw: Any, result: xr.Dataset) -> Mutant:
-    """A label of an axis, or a single value, changed by a millionth; that of a model or material by a letter."""
+    """A label of an axis or a single value, changed by a millionth; a model or a material by a letter."""
     names = [str(name) for name in result.coords if name not in ("title", "equation", "reference", "doi", "year")]
     name = draw(st.sampled_from(names))
-    one = result[name]
-    place = tuple(draw(st.integers(0, size - 1)) for size in one.shape)
-    values = one.values.astype(object)
-    old = values[place]
-    # a number that has no millionth, because it is 0 or infinite, becomes another one
+    coordinate = result[name]
+    position = tuple(draw(st.integers(0, size - 1)) for size in coordinate.shape)
+    values = coordinate.values.astype(object)
+    old = values[position]
+    # 0 and infinity are replaced by another number
     new = f"{old}x" if isinstance(old, str) else 1e-6 if not old else 1e6 if math.isinf(old) else old * (1 + 1e-6)
-    values[place] = new
-    given = values.astype(str if isinstance(old, str) else float)
-    changed = result.assign_coords({name: (one.dims, given, one.attrs)})
-    scalar = one.ndim == 0 or len(one) == 1
-    axis = "m1" if name == "m2" and one.ndim else "exponent" if name == "exponent" else name
+    values[position] = new
+    labels = values.astype(str if isinstance(old, str) else float)
+    changed = result.assign_coords({name: (coordinate.dims, labels, coordinate.attrs)})
+    scalar = coordinate.ndim == 0 or len(coordinate) == 1
+    axis = "m1" if name == "m2" and coordinate.ndim else "exponent" if name == "exponent" else name
     return Mutant("label changed", changed, "physics config" if scalar else "labels", axis)
 
 
@@ -163,48 +165,50 @@ MUTATIONS = (_flag_flipped, _nan_moved, _dropped, _relabelled, _other_unit, _oth
 
 @st.composite
 def mutants(draw: Any, results: tuple[xr.Dataset, ...]) -> Pair:
-    """A mutant of one of the results; every second one has a number moved by 10 tolerances."""
+    """A mutant of one of the results; in half of them a number is changed by 10 tolerances."""
     result = draw(st.sampled_from(results))
     if draw(st.booleans()):
         return Pair(result, _moved(draw, result, 10.0))
     return Pair(result, draw(st.sampled_from(MUTATIONS))(draw, result))
 
 
-def _check_told(mutant: Mutant, told: str) -> None:
-    """The first line names the kind, and the variable or input."""
-    first = told.splitlines()[0]
-    assert first.startswith("not equal: "), f"{mutant.what} of {mutant.name}: {told}"
-    assert mutant.kind in first, f"{mutant.what} of {mutant.name}: {told}"
-    assert mutant.name in first, f"{mutant.what} of {mutant.name}: {told}"
+def _check_message(mutant: Mutant, printed: str) -> None:
+    """Check that the first line has the kind of the difference, and the variable or input."""
+    first = printed.splitlines()[0]
+    assert first.startswith("not equal: "), f"{mutant.change} of {mutant.name}: {printed}"
+    assert mutant.kind in first, f"{mutant.change} of {mutant.name}: {printed}"
+    assert mutant.name in first, f"{mutant.change} of {mutant.name}: {printed}"
 
 
 def _run(data: st.SearchStrategy[Any], examples: int, check: Any) -> None:
-    """Run a check over that many new examples; a random seed each time, so that every run tries others."""
+    """Run a check over this many examples, with a new random seed in each run."""
 
     @settings(
-        max_examples=examples, deadline=None, derandomize=False, database=None,
+        max_examples=examples,
+        deadline=None,
+        derandomize=False,
+        database=None,
         suppress_health_check=list(HealthCheck),
-    )  # fmt: skip
+    )
     @given(data)
-    def over_examples(one: Any) -> None:
-        check(one)
+    def over_examples(pair: Any) -> None:
+        check(pair)
 
     over_examples()
 
 
-@pytest.mark.slow
-def test_no_change_passes(figure6: xr.Dataset, wide: xr.Dataset) -> None:
+def test_every_change_is_detected(figure6: xr.Dataset, wide: xr.Dataset) -> None:
     def check(pair: Pair) -> None:
         result, mutant = pair.original, pair.mutant
         # counted by pytest --hypothesis-show-statistics
-        event(mutant.what)
+        event(mutant.change)
         for new, baseline in ((mutant.result, result), (result, mutant.result)):
-            _check_told(mutant, str(impact.compare(new, baseline)))
+            _check_message(mutant, str(impact.compare(new, baseline)))
 
     _run(mutants((figure6, wide)), 200, check)
 
 
-def test_half_a_tolerance_passes(figure6: xr.Dataset, wide: xr.Dataset) -> None:
+def test_a_change_by_half_a_tolerance_is_equal(figure6: xr.Dataset, wide: xr.Dataset) -> None:
     @st.composite
     def nudged(draw: Any) -> Pair:
         result = draw(st.sampled_from((figure6, wide)))
@@ -220,26 +224,29 @@ def test_half_a_tolerance_passes(figure6: xr.Dataset, wide: xr.Dataset) -> None:
 
 
 @pytest.mark.parametrize("name", NUMBERS)
-def test_every_variable_bites_at_every_kind_of_point(wide: xr.Dataset, figure6: xr.Dataset, name: str) -> None:
-    # what chance may pass over: each variable, at the first, the last and a middle point that has a number
+def test_a_change_of_each_variable_is_detected_at_the_first_the_last_and_a_middle_point(
+    wide: xr.Dataset, figure6: xr.Dataset, name: str
+) -> None:
+    # random positions may miss these
     for result in (figure6, wide):
-        places = np.argwhere(np.isfinite(result[name].values))
-        for place in (tuple(map(int, places[which])) for which in (0, len(places) // 2, -1)):
-            own, scale = float(result[name].values[place]), 10 * RTOL * _scale(result, name, place)
-            far = max(own, 10 * RTOL) if name in BOUNDED else own
-            # where nothing is allowed, the smallest number is a difference
+        positions = np.argwhere(np.isfinite(result[name].values))
+        for position in (tuple(map(int, positions[index])) for index in (0, len(positions) // 2, -1)):
+            value, scale = float(result[name].values[position]), 10 * RTOL * _scale(result, name, position)
+            far = max(value, 10 * RTOL) if name in BOUNDED else value
+            # at scale 0 the smallest number is a difference
             other = far + 10 * scale or math.ulp(0.0)
-            verdict = impact.compare(_changed(result, name, place, other), result)
+            verdict = impact.compare(_changed(result, name, position, other), result)
             assert verdict.headline == f"not equal: values ({name})"
-            (found,) = verdict.differing
-            assert found.different == 1
-            labels = result[name].isel(dict(zip(result[name].dims, place, strict=True)))
-            assert all(found.at[dim] == labels[dim].item() for dim in result[name].dims if dim in found.at)
-            assert found.at.keys() >= {dim for dim in result[name].dims if "." not in dim}
+            (difference,) = verdict.differing
+            assert difference.different == 1
+            labels = result[name].isel(dict(zip(result[name].dims, position, strict=True)))
+            assert all(
+                difference.at[dim] == labels[dim].item() for dim in result[name].dims if dim in difference.at
+            )
+            assert difference.at.keys() >= {dim for dim in result[name].dims if "." not in dim}
 
 
-@pytest.mark.slow
-def test_no_change_passes_through_files(
+def test_every_change_is_detected_in_files(
     forked: ForkServer, figure6: xr.Dataset, wide: xr.Dataset, tmp_path: Path
 ) -> None:
     files = {}
@@ -254,7 +261,7 @@ def test_no_change_passes_through_files(
         impact.save(mutant.result, path, overwrite=True)
         for words in ((path, files[id(result)]), (files[id(result)], path)):
             done = forked("compare", *words)
-            assert (done.returncode, done.stderr) == (1, ""), f"{mutant.what} of {mutant.name}: {done}"
-            _check_told(mutant, done.stdout)
+            assert (done.returncode, done.stderr) == (1, ""), f"{mutant.change} of {mutant.name}: {done}"
+            _check_message(mutant, done.stdout)
 
     _run(mutants((figure6, wide)), THROUGH_FILES, check)
