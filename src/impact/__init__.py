@@ -33,6 +33,7 @@ if TYPE_CHECKING:
         sweep,
         sweep_shard,
         sweep_to_file,
+        timestep,
     )
     from .comparison.verdict import Verdict
     from .contact.evidence import Evidence
@@ -74,6 +75,7 @@ __all__ = [
     "sweep",
     "sweep_shard",
     "sweep_to_file",
+    "timestep",
 ]
 
 

@@ -62,6 +62,7 @@ if TYPE_CHECKING:
 
     from .contact.checks import Finding
     from .inverse.solve import SolveResult
+    from .inverse.timestep import TimestepResult
     from .plots.kinds import Choice, PlotData
     from .results.estimate import Estimate
 
@@ -502,6 +503,55 @@ def solve(
     changes = [*placeholder_override(law, unknown), *overrides]
     config, _ = single_point(source, changes, plugin_set, model, at, over)
     return solve_input(config, plugin_set.of(config.models), unknown, target)
+
+
+def timestep(
+    model: str,
+    *,
+    source: str | Path | Mapping[str, object] | None = None,
+    at: Mapping[str, float | str] | None = None,
+    steps_per_contact: Sequence[float] = (),
+    dt: Sequence[float] = (),
+    phases: int = 400,
+    tol: float | None = None,
+    overrides: Sequence[str] = (),
+    plugins: Sequence[ForceModel | str | Path] = (),
+) -> TimestepResult:
+    """What a code with a fixed time step delivers: mean, least and largest restitution over the phase.
+
+    The phase is the part of a step in which the contact begins: a code sees an overlap at its first step after it.
+    The scheme is that of LAMMPS, LIGGGHTS, YADE and MuJoCo, `impact.contact.timestep.SCHEMES["kick-drift"]`.
+
+    Parameters
+    ----------
+    model : key of the law
+    source, at, overrides, plugins : see `solve`
+    steps_per_contact : contact times of the continuous law over dt; by default 10, 20, 50 and 100
+    dt : further time steps [s]
+    phases : number of phases, (i + 1/2)/phases
+    tol : relative tolerance for which the smallest number of steps per contact is found
+
+    Returns
+    -------
+    TimestepResult : a row for each step, those of `steps_per_contact` first, and the number of steps needed
+
+    Raises
+    ------
+    UsageError : a step is not positive, or the law has no rebound at these inputs
+    ConfigError, ModelError : see `sweep`
+
+    A linear spring and dashpot that is asked for 0.5, with twenty steps per contact:
+
+    >>> import impact
+    >>> (row,) = impact.timestep("anagnostopoulos-1988", at={"e": 0.5}, steps_per_contact=[20]).rows
+    >>> round(row.e_mean, 4), round(row.e_least, 3), round(row.e_largest, 3), round(row.e_to_ask, 4)
+    (0.4945, 0.48, 0.519, 0.5054)
+    """
+    # its module imports scipy.optimize, which other functions do without
+    from .inverse.timestep import timestep_study
+
+    config, _ = single_point(source, overrides, read_plugins(plugins), model, at)
+    return timestep_study(config, steps_per_contact=steps_per_contact, dt=dt, phases=phases, tol=tol)
 
 
 def extend(

@@ -1,0 +1,142 @@
+"""The command `timestep`: which restitution does a code deliver at a fixed time step?"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..formatting import decimals, number, quantity
+from .console import cell, console, dump, table
+from .options import JsonOption, PluginOption, SetOption
+from .params import (
+    Setting,
+    complete_model,
+    parse_number,
+    parse_setting,
+    parse_whole_number,
+    reject_duplicates,
+)
+
+if TYPE_CHECKING:
+    from ..inverse.timestep import TimestepResult
+
+
+def timestep(
+    model: Annotated[
+        str, typer.Option("--model", metavar="KEY", autocompletion=complete_model, help="The model.")
+    ],
+    source: Annotated[
+        Path | None, typer.Argument(help="A TOML file or a result. \\[default: Table 1 of the paper]")
+    ] = None,
+    at: Annotated[
+        list[Setting] | None,
+        typer.Option(
+            "--at",
+            metavar="NAME=VALUE",
+            parser=parse_setting,
+            callback=reject_duplicates,
+            help="Value of an input, such as e=0.5; may be repeated.",
+        ),
+    ] = None,
+    steps_per_contact: Annotated[
+        list[float] | None,
+        typer.Option(
+            "--steps-per-contact",
+            metavar="N",
+            parser=parse_number,
+            help="Contact time of the continuous law over the time step; may be repeated. "
+            "\\[default: 10, 20, 50, 100]",
+        ),
+    ] = None,
+    dt: Annotated[
+        list[float] | None,
+        typer.Option("--dt", metavar="SECONDS", parser=parse_number, help="A time step \\[s]; may be repeated."),
+    ] = None,
+    phases: Annotated[
+        int,
+        typer.Option(
+            "--phases",
+            metavar="N",
+            parser=parse_whole_number,
+            help="Phases at which the contact begins.",
+        ),
+    ] = 400,
+    tol: Annotated[
+        float | None,
+        typer.Option(
+            "--tol",
+            metavar="VALUE",
+            parser=parse_number,
+            help="Find the number of steps per contact with which every phase is within this relative tolerance, "
+            "such as 0.01 or 1%.",
+        ),
+    ] = None,
+    sets: SetOption = None,
+    plugins: PluginOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Show which restitution an explicit code delivers at a fixed time step, and which e to ask it for.
+
+    The restitution depends on the phase, the part of a step in which the contact begins. The table has its mean,
+    least and largest value over all phases.
+    """
+    from .. import api
+
+    result = api.timestep(
+        model,
+        source=source,
+        at=dict(at or ()),
+        steps_per_contact=steps_per_contact or (),
+        dt=dt or (),
+        phases=phases,
+        tol=tol,
+        overrides=sets or (),
+        plugins=plugins or (),
+    )
+    if as_json:
+        print(dump(timestep_json(result)))
+    else:
+        _print_result(result, tol)
+
+
+def timestep_json(result: TimestepResult) -> dict[str, Any]:
+    """The result as plain data; numbers that do not apply are null."""
+    return {
+        "model": result.model,
+        "scheme": result.scheme,
+        "e": result.e,
+        "e_continuous": result.e_continuous,
+        "contact_time": result.contact_time,
+        "rows": [asdict(row) for row in result.rows],
+        "needed": None if result.needed is None else asdict(result.needed),
+    }
+
+
+def _print_result(result: TimestepResult, tol: float | None) -> None:
+    """Print the continuous law, a line for each step, and the number of steps that is needed."""
+    out = console(sys.stdout)
+    asked = "" if result.e != result.e else f"e = {number(result.e)}, "
+    contact = quantity(result.contact_time, "s")
+    out.print(
+        cell(f"{result.model}: {asked}e_out = {number(result.e_continuous)} in a contact time of {contact}"),
+        soft_wrap=True,
+    )
+    out.print()
+    rows = table("steps per contact", "dt [s]", "e mean", "e least", "e largest", "e to ask")
+    rows.columns[0].justify = "right"
+    for row in result.rows:
+        values = map(decimals, (row.e_mean, row.e_least, row.e_largest, row.e_to_ask))
+        rows.add_row(number(row.steps_per_contact), number(row.dt), *values)
+    out.print(rows)
+    if tol is not None:
+        out.print()
+        if result.needed is None:
+            line = f"no number of steps per contact keeps every phase within {number(100 * tol)} %"
+        else:
+            steps, dt = result.needed.steps_per_contact, quantity(result.needed.dt, "s")
+            line = f"within {number(100 * tol)} % at every phase: {steps} steps per contact, dt <= {dt}"
+        out.print(cell(line), soft_wrap=True)

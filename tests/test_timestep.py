@@ -1,0 +1,154 @@
+"""`impact timestep` predicts what an explicit code delivers at a fixed time step."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import impact
+from impact.contact.models import find
+from impact.contact.timestep import collide_at_fixed_step
+
+from .conftest import ROOT, Run
+
+LINEAR = "anagnostopoulos-1988"
+Array = NDArray[np.float64]
+
+
+def linear_map(e: Array, steps_per_contact: Array, phase: Array) -> tuple[Array, Array]:
+    """Restitution of a linear spring and dashpot at a fixed step, in closed form, and the step."""
+    zeta = -np.log(e) / np.hypot(np.pi, np.log(e))
+    h = np.pi / np.sqrt(1.0 - zeta**2) / steps_per_contact
+    c, k = 2.0 * zeta * h, h * h
+    r = np.sqrt(1.0 - c)
+    theta = np.arccos((2.0 - k - c) / (2.0 * r))
+    x0 = phase * h
+    x1 = (1.0 - k) * x0 + h * (1.0 - c)
+    b = (x1 / r - x0 * np.cos(theta)) / np.sin(theta)
+    last = np.ceil((np.pi - np.arctan2(x0, b)) / theta)
+
+    def position(number: Array) -> Array:
+        return r**number * (x0 * np.cos(number * theta) + b * np.sin(number * theta))
+
+    return -(position(last) - position(last - 1.0)) / h, h
+
+
+def test_the_loop_agrees_with_the_closed_form_in_3000_random_cases() -> None:
+    random = np.random.default_rng(20260724)
+    e, steps = random.uniform(0.05, 1.0, 3000), random.uniform(8.0, 300.0, 3000)
+    phase = random.uniform(1e-3, 1.0, 3000)
+    exact, h = linear_map(e, steps, phase)
+    result = collide_at_fixed_step(find(LINEAR), 1.0, {"e": e}, h, phase, 10_000)
+    assert np.max(np.abs(result.e_out - exact)) < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("e", "steps", "mean", "least", "largest"),
+    [
+        (0.9, 10, 0.9000, 0.894, 0.921),
+        (0.9, 20, 0.8999, 0.898, 0.909),
+        (0.5, 10, 0.491, 0.454, 0.542),
+        (0.5, 20, 0.4945, 0.480, 0.519),
+        (0.5, 50, 0.4976, 0.493, 0.507),
+        (0.1, 10, 0.060, 0.037, 0.072),
+        (0.1, 20, 0.080, 0.067, 0.089),
+    ],
+)
+def test_table_of_a_linear_contact(e: float, steps: int, mean: float, least: float, largest: float) -> None:
+    (row,) = impact.timestep(LINEAR, at={"e": e}, steps_per_contact=[steps]).rows
+    assert row.e_mean == pytest.approx(mean, abs=6e-4)
+    assert (row.e_least, row.e_largest) == pytest.approx((least, largest), abs=6e-4)
+
+
+@pytest.mark.parametrize(("e", "steps"), [(0.9, 21), (0.5, 74), (0.1, 654)])
+def test_number_of_steps_that_keeps_every_phase_within_one_percent(e: float, steps: int) -> None:
+    result = impact.timestep(LINEAR, at={"e": e}, steps_per_contact=[10], tol=0.01)
+    assert result.needed is not None
+    assert result.needed.steps_per_contact == steps
+    assert result.needed.dt == pytest.approx(result.contact_time / steps)
+
+
+@pytest.mark.parametrize(("e", "steps", "to_ask"), [(0.5, 20, 0.5054), (0.5, 50, 0.5024), (0.1, 20, 0.1202)])
+def test_the_e_to_ask_gives_the_mean_that_is_wanted(e: float, steps: int, to_ask: float) -> None:
+    wanted = impact.timestep(LINEAR, at={"e": e}, steps_per_contact=[steps])
+    assert wanted.rows[0].e_to_ask == pytest.approx(to_ask, abs=1e-4)
+    # the step stays the same while the e that is asked for changes
+    asked = impact.timestep(LINEAR, at={"e": wanted.rows[0].e_to_ask}, dt=[wanted.rows[0].dt])
+    assert asked.rows[0].e_mean == pytest.approx(e, abs=1e-3)
+
+
+def test_the_range_over_the_phase_is_of_third_order_without_damping() -> None:
+    rows = impact.timestep(LINEAR, at={"e": 1.0}, steps_per_contact=[10, 20, 40]).rows
+    halves = [0.5 * (row.e_largest - row.e_least) for row in rows]
+    assert halves == pytest.approx([1.99e-3, 2.50e-4, 3.14e-5], rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("model", "parameters"),
+    [
+        ("hertz", {}),
+        ("tsuji-1992", {}),
+        ("tsuji-1992-no-tension", {}),
+        ("hunt-crossley-1975", {}),
+        ("bilinear", {}),
+        ("luding-2008", {"k2": 5.0}),
+        ("thornton-1997", {}),
+    ],
+)
+def test_small_steps_deliver_what_the_continuous_law_delivers(model: str, parameters: dict[str, float]) -> None:
+    at = {"e": 0.6} | {f"{model}.{name}": value for name, value in parameters.items()}
+    overrides = [f"model.{model}.{name}={value}" for name, value in parameters.items()]
+    overrides.append("materials.table1.yield_strength='1 GPa'")
+    result = impact.timestep(model, at=at, overrides=overrides, steps_per_contact=[2000], phases=4)
+    (row,) = result.rows
+    assert row.e_least == pytest.approx(result.e_continuous, abs=2e-3)
+    assert row.e_largest == pytest.approx(result.e_continuous, abs=2e-3)
+
+
+def test_a_law_without_an_e_has_none_to_ask_for(cli: Run) -> None:
+    done = cli("timestep", "--model", "mujoco-solref", "--steps-per-contact", "20", "--phases", "8", "--json")
+    printed = json.loads(done.stdout)
+    assert (printed["e"], printed["rows"][0]["e_to_ask"], printed["needed"]) == (None, None, None)
+
+
+def test_json_of_the_command(cli: Run) -> None:
+    words = ("--steps-per-contact", "20", "--dt", "1e-6", "--phases", "8", "--tol", "5%", "--json")
+    printed = json.loads(cli("timestep", "--model", LINEAR, "--at", "e=0.5", *words).stdout)
+    assert printed["model"] == LINEAR
+    assert printed["e"] == 0.5
+    assert [row["steps_per_contact"] for row in printed["rows"]] == [
+        20.0,
+        pytest.approx(printed["contact_time"] / 1e-6),
+    ]
+    assert printed["rows"][0].keys() == {"dt", "steps_per_contact", "e_mean", "e_least", "e_largest", "e_to_ask"}
+    assert printed["needed"].keys() == {"tol", "steps_per_contact", "dt"}
+
+
+def test_the_page_prints_what_the_commands_print(cli: Run) -> None:
+    page = (ROOT / "docs" / "timestep.md").read_text(encoding="utf-8")
+    examples = re.findall(r"\$ impact (.*)\n((?:.*\n)+?)```", page)
+    assert examples
+    for command, printed in examples:
+        shown = "".join(line.rstrip() + "\n" for line in cli(*shlex.split(command)).stdout.splitlines())
+        assert shown == printed
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--steps-per-contact", "0"), "--steps-per-contact: got 0, expected a finite number > 0"),
+        (("--dt", "-1e-6"), "--dt: got -1e-06, expected a finite number > 0"),
+        (("--at", "e=0"), "has no rebound at these inputs"),
+        (("--phases", "0"), "expected a whole number of at least 1"),
+    ],
+)
+def test_bad_input_is_one_line(cli: Run, words: tuple[str, ...], message: str) -> None:
+    done = cli("timestep", "--model", LINEAR, *words)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert done.stderr.count("\n") == 1
