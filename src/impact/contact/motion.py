@@ -71,7 +71,7 @@ class MotionLaw:
 
         With `strong`, the velocity is replaced by the coordinate that the model declares for strong damping.
         """
-        arguments = {wish for formula in model.motion_formulas for wish in argument_names(formula)}
+        arguments = {name for formula in model.motion_formulas for name in argument_names(formula)}
         param_names = {*model.quantities, *model.coefficients} - {"K", "m", "v0", "n"}
         return cls(
             model,

@@ -89,7 +89,7 @@ def estimate(plan: Plan, jobs: int = 1) -> Estimate:
     """
     maps = trajectory_maps(plan)
     plan = with_core(plan, maps)
-    total = sum(seconds_per_trajectory_of_driver.count for seconds_per_trajectory_of_driver in maps)
+    total = sum(trajectory_map.count for trajectory_map in maps)
     ranges = list(trajectory_ranges(maps))
     # a range in the middle, to avoid the extreme values at both ends
     chosen = ranges[len(ranges) // 2]
@@ -121,7 +121,7 @@ def estimate(plan: Plan, jobs: int = 1) -> Estimate:
     return Estimate(
         plan.points,
         total,
-        tuple(_model_counts(plan, own_map) for own_map in maps),
+        tuple(_model_counts(plan, trajectory_map) for trajectory_map in maps),
         (whole if is_full else factored_template(whole, table, stored_variables(plan))).nbytes,
         work_folder_bytes,
         each * total / jobs + writing_seconds,
