@@ -8,7 +8,8 @@ from scipy.optimize import minimize_scalar
 
 from impact.config.load import DEFAULT_RTOL
 from impact.contact import motion
-from impact.contact.closed_forms import contact_time_ratio, damped_peak_indentation, peak_indentation
+from impact.contact.closed_forms.elastic import contact_time_ratio, peak_indentation
+from impact.contact.closed_forms.hysteresis import damped_peak_indentation
 from impact.contact.impacts import Impacts
 from impact.contact.models import find
 from impact.contact.models.hysteresis import hysteresis

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import impact
-from impact.contact.closed_forms import jkr_root
+from impact.contact.closed_forms.adhesive import jkr_root
 from impact.contact.impacts import Impacts
 from impact.contact.models import find
 from impact.contact.outputs import Outputs, collide

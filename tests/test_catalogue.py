@@ -11,18 +11,16 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, minimize_scalar
 
 from impact.config.load import DEFAULT_RTOL
-from impact.contact.closed_forms import (
-    approach_damped_restitution,
+from impact.contact.closed_forms.dashpot import (
     approach_damping,
     approach_restitution,
     force_damping,
     force_restitution,
     gap_damping,
     gap_restitution,
-    pade_damping,
-    pade_restitution,
 )
-from impact.contact.closed_forms.hysteresis import WORK_SERIES_BELOW_CHI
+from impact.contact.closed_forms.hysteresis import WORK_SERIES_BELOW_CHI, approach_damped_restitution
+from impact.contact.closed_forms.viscoelastic import pade_damping, pade_restitution
 from impact.contact.models import catalogue, find
 from impact.contact.outputs import collide
 from impact.contact.scaling import delivered

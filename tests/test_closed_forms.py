@@ -6,14 +6,14 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from impact.contact.closed_forms import (
-    contact_time_ratio,
+from impact.contact.closed_forms.elastic import contact_time_ratio, peak_indentation
+from impact.contact.closed_forms.hysteresis import (
+    SERIES_BELOW_CHI,
+    SERIES_FROM_E,
     damped_peak_indentation,
     delivered_restitution,
     exact_damping_ratio,
-    peak_indentation,
 )
-from impact.contact.closed_forms.hysteresis import SERIES_BELOW_CHI, SERIES_FROM_E
 
 DIGITS = 80
 EXPONENTS = (1.0, 1.3, 1.5, 2.0, 3.0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from impact.contact.checks import contract
-from impact.contact.closed_forms import delivered_restitution
+from impact.contact.closed_forms.hysteresis import delivered_restitution
 from impact.contact.model import ForceModel
 from impact.contact.models import catalogue
 from impact.contact.models.hysteresis import hysteresis

@@ -9,7 +9,8 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import impact
-from impact.contact.closed_forms import delivered_restitution, force_restitution, limited_restitution
+from impact.contact.closed_forms.dashpot import force_restitution, limited_restitution
+from impact.contact.closed_forms.hysteresis import delivered_restitution
 from impact.contact.impulse import velocities_after
 from impact.contact.models import find
 from impact.contact.outputs import Outputs, collide

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import impact
-from impact.contact.closed_forms import delivered_restitution
+from impact.contact.closed_forms.hysteresis import delivered_restitution
 from impact.contact.impacts import Impacts
 from impact.contact.model import ForceModel, Parameter
 from impact.contact.models import find

@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from impact.contact.closed_forms import contact_time_ratio, peak_indentation
+from impact.contact.closed_forms.elastic import contact_time_ratio, peak_indentation
 from impact.contact.history import follow
 from impact.contact.impacts import Impacts
 from impact.contact.impulse import velocities_after, velocities_at
