@@ -176,6 +176,7 @@ WARM_UP_COMMANDS = (
     "rerun warm.h5",
     "models",
     "expand warm.h5 -o full.h5",
+    "timestep --model hertz --steps-per-contact 9 --phases 1",
 )
 WARM_UP_CONFIG = """models = ["hertz", "gharib-hurmuzlu-2012"]
 [sweep]

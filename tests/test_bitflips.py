@@ -74,6 +74,7 @@ def test_each_flip_of_the_header_is_detected(good: Path, tmp_path: Path) -> None
     check_flips(tmp_path / "flip.h5", content, iter([*positions, *flips(USER_BLOCK_BYTES, HEADER_FLIPS, 2)]))
 
 
+@pytest.mark.slow
 def test_the_commands_refuse_a_flipped_bit(good: Path, cli: Run, tmp_path: Path) -> None:
     content = good.read_bytes()
     (tmp_path / "good.h5").write_bytes(content)

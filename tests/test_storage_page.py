@@ -52,6 +52,7 @@ def shell(line: str, cli: Run, folder: Path) -> str:
     return done.stdout + done.stderr
 
 
+@pytest.mark.slow
 def test_the_examples_print_what_the_page_shows(cli: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     with h5py.File("old.h5", "w") as old:

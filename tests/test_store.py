@@ -173,8 +173,9 @@ def test_h5ls_reads_it(stored: Path, factored: Path) -> None:
     assert re.search(r"trajectory_e_out +Dataset \{303\}", listed)
 
 
-@pytest.mark.parametrize("layout", ["full", slow("factored")])
-@pytest.mark.parametrize("option", ["all", *(slow(name) for name in OPTIONS if name != "all")])
+@pytest.mark.slow
+@pytest.mark.parametrize("layout", ["full", "factored"])
+@pytest.mark.parametrize("option", OPTIONS)
 def test_two_processes_write_equal_bytes(cli: Run, tmp_path: Path, layout: str, option: str) -> None:
     if layout == "factored" and "chunks" in OPTIONS[option]:
         pytest.skip("a factored file has chunks of its own")
@@ -200,7 +201,8 @@ MANY = {
 }
 
 
-@pytest.mark.parametrize("layout", ["full", slow("factored")])
+@pytest.mark.slow
+@pytest.mark.parametrize("layout", ["full", "factored"])
 def test_threads_processes_and_an_interruption_change_no_byte(tmp_path: Path, layout: str) -> None:
     plan = prepare(MANY | {"output": {"layout": layout}})
     sweep_into(tmp_path / "serial.h5", plan)

@@ -92,9 +92,9 @@ def test_the_range_over_the_phase_is_of_third_order_without_damping() -> None:
     ("model", "parameters"),
     [
         ("hertz", {}),
-        ("tsuji-1992", {}),
-        ("tsuji-1992-no-tension", {}),
-        ("hunt-crossley-1975", {}),
+        pytest.param("tsuji-1992", {}, marks=pytest.mark.slow),
+        pytest.param("tsuji-1992-no-tension", {}, marks=pytest.mark.slow),
+        pytest.param("hunt-crossley-1975", {}, marks=pytest.mark.slow),
         ("bilinear", {}),
         ("luding-2008", {"k2": 5.0}),
         ("thornton-1997", {}),
@@ -104,7 +104,7 @@ def test_small_steps_deliver_what_the_continuous_law_delivers(model: str, parame
     at = {"e": 0.6} | {f"{model}.{name}": value for name, value in parameters.items()}
     overrides = [f"model.{model}.{name}={value}" for name, value in parameters.items()]
     overrides.append("materials.table1.yield_strength='1 GPa'")
-    result = impact.timestep(model, at=at, overrides=overrides, steps_per_contact=[2000], phases=4)
+    result = impact.timestep(model, at=at, overrides=overrides, steps_per_contact=[1000], phases=4)
     (row,) = result.rows
     assert row.e_least == pytest.approx(result.e_continuous, abs=2e-3)
     assert row.e_largest == pytest.approx(result.e_continuous, abs=2e-3)

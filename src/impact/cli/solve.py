@@ -111,7 +111,8 @@ def _print_result(result: SolveResult) -> None:
     ((variable, wanted),) = result.target.items()
     target = f"{variable} = {number(wanted)}"
     for root in result.roots:
-        line = f"{result.name} = {quantity(root.value, result.unit, 10)}"
+        # a minimum has half the digits of a root
+        line = f"{result.name} = {quantity(root.value, result.unit, 10 if result.over is None else 6)}"
         if result.over is None:
             at_bound = ", its bound" if result.status == "at_bound" else ""
             line += f"{at_bound}: {target}" + (f", e_out = {number(root.e_out)}" if variable != "e_out" else "")

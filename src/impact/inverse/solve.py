@@ -29,13 +29,13 @@ if TYPE_CHECKING:
     import xarray as xr
 
 # values that are tried before roots are refined: powers of ten times the contact's own unit of the parameter
-SCAN_DECADES, SCAN_PER_DECADE = 8, 20
+SCAN_DECADES, SCAN_PER_DECADE = 8, 16
 # values that are tried between two finite bounds
-SCAN_BETWEEN_BOUNDS = 401
+SCAN_BETWEEN_BOUNDS = 201
 # the scan is coarse, and gives up integrations that take more steps
-SCAN_RTOL, SCAN_MAX_STEPS = 1e-7, 1000
+SCAN_RTOL, SCAN_MAX_STEPS = 1e-7, 400
 # values of the scan that are this near to the target are integrated again
-SCAN_TOLERANCE = 1e-4
+SCAN_TOLERANCE = 1e-3
 # a value of the scan is a root within this multiple of the tolerance of the integration
 TARGET_TOLERANCE = 10.0
 # a refined root is a jump of the output if it is farther from the target
@@ -65,7 +65,8 @@ class SolveResult:
     status : "ok" for one root, "several_roots", "at_bound" where the only root is the least or largest allowed
         value, "no_root"
     roots : in ascending order; over a range of inputs, the best value
-    attainable : the least and the largest value of the target over all values that were tried; None if all failed
+    attainable : the least and the largest value of the target over all values that were tried, to six digits; None
+        if all failed
     over : the conditions of a range of inputs, each with its e_out and the target variable; None without a range
     """
 
@@ -246,10 +247,9 @@ def _all_roots(problem: _Problem, wanted: float) -> SolveResult:
     scan = problem.scan_values()
     values = problem.target_values(scan, is_scan=True)
     scale = 1.0 if problem.variable.startswith("e_") else abs(wanted)
-    # neighbours of the target, and the extremes, which are reported
-    precise = (np.abs(values - wanted) <= SCAN_TOLERANCE * scale) | np.isin(values, _extremes(values))
-    if precise.any():
-        values[precise] = problem.target_values(scan[precise])
+    near = np.abs(values - wanted) <= SCAN_TOLERANCE * scale
+    if near.any():
+        values[near] = problem.target_values(scan[near])
     distance = values - wanted
     tolerance = TARGET_TOLERANCE * problem.config.solver.rtol * scale
     reached = np.abs(distance) <= tolerance
@@ -274,9 +274,9 @@ def _all_roots(problem: _Problem, wanted: float) -> SolveResult:
 
 
 def _extremes(values: Array) -> tuple[float, ...]:
-    """The least and the largest value that are not NaN; empty if there are none."""
+    """The least and the largest value that are not NaN, to the digits of the scan; empty if there are none."""
     known = values[~np.isnan(values)]
-    return (float(known.min()), float(known.max())) if known.size else ()
+    return tuple(float(f"{extreme:.6g}") for extreme in (known.min(), known.max())) if known.size else ()
 
 
 def _ends_of_runs(reached: Mask, scan: Array, bounds: set[float]) -> list[float]:
