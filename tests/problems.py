@@ -106,10 +106,9 @@ LAWS = [key for key, model in catalogue().items() if not model.same_as]
 
 
 def _form(model: ForceModel) -> tuple[object, ...]:
-    """The compiled formulas of a law without its coefficients, its release and its velocity coordinate."""
-    codes = [getattr(formula, "__code__", None) for formula in (model.force, model.unloading)]
-    formulas = [(code.co_code, code.co_consts, code.co_names) if code else None for code in codes]
-    return (*map(str, formulas), model.release, model.velocity_coordinate, len(model.breakpoints))
+    """What decides how a law is integrated: its branches, its release and its velocity coordinate."""
+    is_permanent = model.residual is not None or model.recovered is not None
+    return (model.unloading is not None, is_permanent, model.release, model.velocity_coordinate)
 
 
 def _each_law() -> Iterator[object]:

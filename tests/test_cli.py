@@ -420,6 +420,7 @@ def test_info(cli: Run, stored: Path) -> None:
     assert printed["attributes"]["config"].startswith("#:schema")
 
 
+@pytest.mark.slow
 def test_init_and_schema(cli: Run, tmp_path: Path) -> None:
     import jsonschema
 

@@ -741,7 +741,9 @@ gamma = [1.5, 4.0]
 }
 
 
-@pytest.mark.parametrize("config", REPLAYED)
+@pytest.mark.parametrize(
+    "config", ["alpha", *(pytest.param(name, marks=pytest.mark.slow) for name in REPLAYED if name != "alpha")]
+)
 def test_the_printed_command_repeats_the_worst_point(forked: ForkServer, tmp_path: Path, config: str) -> None:
     (tmp_path / "a config.toml").write_text(REPLAYED[config], encoding="utf-8")
     result = impact.sweep(tmp_path / "a config.toml", overrides=["solver.rtol=1e-4"])

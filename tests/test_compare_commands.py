@@ -637,6 +637,7 @@ def test_a_rerun_uses_the_models_and_the_rtol_of_the_file(tmp_path: Path) -> Non
     assert impact.rerun(tmp_path / "other.h5", tol=1e-4).equal
 
 
+@pytest.mark.slow
 def test_a_rerun_repeats_the_points_of_the_file(
     forked: ForkServer, figure6: xr.Dataset, many_axes: xr.Dataset, tmp_path: Path
 ) -> None:
@@ -702,6 +703,7 @@ def test_a_rerun_needs_the_plug_in_of_the_result(forked: ForkServer, tmp_path: P
     assert impact.rerun(tmp_path / "results.h5", plugins=[plugin]).equal
 
 
+@pytest.mark.slow
 def test_a_rerun_with_a_changed_plug_in_has_a_note(forked: ForkServer, tmp_path: Path) -> None:
     config = 'models = ["mine-2026"]\n[sweep]\ne = [0.2, 0.8]\nv1 = 1\nm1 = 1\nm2 = 1\nK = 6e9\n'
     config += "[solver]\nrtol = 1e-4\n"

@@ -114,6 +114,7 @@ def test_deduplication_changes_no_bit_of_a_result(config: dict[str, object]) -> 
     assert_same_bits(sweep_with_plugins(config), sweep_with_plugins(config, "solver.collapse=false"))
 
 
+@pytest.mark.slow
 @settings(max_examples=10)
 @given(configs())
 def test_deduplication_within_blocks_changes_no_bit_of_a_result(config: dict[str, object]) -> None:

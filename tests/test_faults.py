@@ -66,7 +66,7 @@ def check_kills(sweeps: SweepServer, count: int | None) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "count"), [(CONFIG_TEXT, 6), pytest.param(FACTORED_CONFIG, 4, marks=pytest.mark.slow)]
+    ("text", "count"), [(CONFIG_TEXT, 3), pytest.param(FACTORED_CONFIG, 4, marks=pytest.mark.slow)]
 )
 def test_a_sweep_killed_at_a_file_operation_is_resumed(sweeps: SweepServer, text: str, count: int) -> None:
     check_kills(sweeps.with_config(text), count)
@@ -296,6 +296,7 @@ def test_without_fsync_a_power_failure_leaves_an_incomplete_result_and_loses_blo
     pytest.fail("no block was lost, or no result was incomplete")
 
 
+@pytest.mark.slow
 def test_a_power_failure_while_another_sweep_replaces_the_work_folder(sweeps: SweepServer) -> None:
     # the work folder of a sweep, which another sweep overwrites
     old, text = sweeps.copy_finished(), CONFIG_TEXT.replace("1e-4", "1e-5")
@@ -343,7 +344,7 @@ def check_failures(sweeps: SweepServer, count: int | None) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "count"), [(CONFIG_TEXT, 4), pytest.param(FACTORED_CONFIG, 3, marks=pytest.mark.slow)]
+    ("text", "count"), [(CONFIG_TEXT, 2), pytest.param(FACTORED_CONFIG, 3, marks=pytest.mark.slow)]
 )
 def test_a_sweep_is_resumed_after_a_disk_error(sweeps: SweepServer, text: str, count: int) -> None:
     check_failures(sweeps.with_config(text), count)
@@ -367,6 +368,7 @@ def test_a_disk_error_before_the_first_block_leaves_no_trace_or_prints_how_to_co
             assert not sweeps(cwd=folder).returncode or "--resume" in completed.stderr, completed
 
 
+@pytest.mark.slow
 def test_a_disk_error_after_the_result_is_stored_does_not_damage_it(sweeps: SweepServer) -> None:
     for operation in range(sweeps.find_operation("unlink", f"{RESULT}.part"), len(sweeps.operations), 2):
         folder = sweeps.folder()

@@ -389,7 +389,7 @@ def check_signals(sweeps: SweepServer, count: int | None, moments: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "count"), [(CONFIG_TEXT, 5), pytest.param(FACTORED_CONFIG, 3, marks=pytest.mark.slow)]
+    ("text", "count"), [(CONFIG_TEXT, 3), pytest.param(FACTORED_CONFIG, 3, marks=pytest.mark.slow)]
 )
 def test_an_interrupted_sweep_prints_one_line_and_is_resumed(sweeps: SweepServer, text: str, count: int) -> None:
     check_signals(sweeps.with_config(text), count, 1)
@@ -445,6 +445,7 @@ def check_workers(sweeps: SweepServer, ways: Iterable[tuple[int, bool, int]]) ->
     report.check()
 
 
+@pytest.mark.slow
 def test_no_process_outlives_the_writing_process(sweeps: SweepServer) -> None:
     check_workers(sweeps, [(KILL, False, 1)])
 
@@ -455,6 +456,7 @@ def test_no_process_outlives_the_writing_process_after_any_signal(sweeps: SweepS
     check_workers(sweeps, [(*way, count) for way in ways for count in (0, 2)])
 
 
+@pytest.mark.slow
 def test_an_interrupt_while_processes_start_prints_one_line(sweeps: SweepServer) -> None:
     # a terminal sends the signal to all processes
     folder = sweeps.folder(LONG_CONFIG)

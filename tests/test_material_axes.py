@@ -218,7 +218,7 @@ def test_a_model_without_material_is_not_integrated_for_each_property() -> None:
     assert [trajectories.count for trajectories in trajectory_maps(plan)] == [2, 3]
 
 
-@pytest.mark.parametrize("layout", LAYOUTS)
+@pytest.mark.parametrize("layout", ["full", pytest.param("factored", marks=pytest.mark.slow)])
 def test_values_of_a_property_are_added_to_a_result(tmp_path: Path, layout: str) -> None:
     def swept(**properties: Any) -> dict[str, Any]:
         sweep = {"e": [0.3, 0.9], "v1": 1.0, "R1": 0.01, "R2": 0.02, "material1": "steel", "material2": "brass"}

@@ -89,6 +89,7 @@ def test_an_implausible_modulus_of_an_axis_gives_a_note(tmp_path: Path) -> None:
     assert f"<p>Note: {note}</p>" in page
 
 
+@pytest.mark.slow
 def test_the_configs_of_the_project_give_no_note(tmp_path: Path) -> None:
     configs = sorted((ROOT / "configs").glob("*.toml"))
     assert configs

@@ -440,8 +440,10 @@ def test_an_unknown_name_or_value_is_an_error_with_the_known_ones(
     assert words in str(caught.value)
 
 
-# EPS embeds fonts, which takes seconds
-@pytest.mark.parametrize("form", ["png", "svg", "pdf", pytest.param("eps", marks=pytest.mark.slow)])
+# PDF and EPS embed fonts, which takes seconds
+@pytest.mark.parametrize(
+    "form", ["png", "svg", *(pytest.param(form, marks=pytest.mark.slow) for form in ("pdf", "eps"))]
+)
 def test_plots_are_files_of_their_format(coarse: xr.Dataset, tmp_path: Path, form: str) -> None:
     figure = impact.plot(coarse, kind="restitution", width="single")
     save_figure(figure, tmp_path / f"plot.{form}")

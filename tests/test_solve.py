@@ -81,6 +81,7 @@ def test_several_roots_are_all_found() -> None:
     assert np.subtract(1.0, values) == pytest.approx([abs(1.0 - values[0]), -abs(1.0 - values[0])], abs=1e-8)
 
 
+@pytest.mark.slow
 def test_one_value_over_a_range_of_speeds_has_equal_distances_at_both_ends() -> None:
     speeds = {"linspace": [0.1, 3.0, 5]}
     result = impact.solve(VISCOELASTIC, "eta", {"e_out": 0.6}, source=BEADS, over={"v1": speeds})

@@ -55,7 +55,7 @@ OPTIONS: dict[str, dict[str, object]] = {
     "plain": {}, "float32": {"dtype": "float32"}, "gzip": {"compression": "gzip"}, "chunks": {"chunks": {"e": 20}},
     "all": {"dtype": "float32", "compression": "gzip", "chunks": {"e": 33}},
 }  # fmt: skip
-QUICK_OPTIONS = ("plain", "all")
+QUICK_OPTIONS = ("all",)
 
 
 @pytest.fixture(scope="module")

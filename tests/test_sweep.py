@@ -384,7 +384,7 @@ def four_axes(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, xr.Datase
 
 @pytest.mark.parametrize(
     "name",
-    [pytest.param(name, marks=[pytest.mark.slow] * (name in ("compressed", "chunked"))) for name in FORMATS],
+    [pytest.param(name, marks=[pytest.mark.slow] * (name != "default")) for name in FORMATS],
 )
 def test_a_result_is_stored_in_the_format_of_its_config(
     four_axes: tuple[Path, xr.Dataset], tmp_path: Path, name: str
