@@ -47,9 +47,13 @@ def test_a_root_agrees_with_the_closed_form_of_the_linear_dashpot() -> None:
     assert linear_restitution(zeta) == pytest.approx(0.6, abs=1e-9)
 
 
-def test_what_to_ask_chrono_for_to_get_0_6() -> None:
-    (root,) = impact.solve("chrono-smc-hertz", "e", {"e_out": 0.6}).roots
-    assert root.value == pytest.approx(0.561, abs=5e-4)
+@pytest.mark.parametrize(
+    ("model", "e"),
+    [("chrono-smc-hertz", 0.561), ("yade-betan-pulling", 0.628), ("yade-betan", 0.591)],
+)
+def test_the_restitution_to_ask_for_to_get_0_6(model: str, e: float) -> None:
+    (root,) = impact.solve(model, "e", {"e_out": 0.6}).roots
+    assert root.value == pytest.approx(e, abs=5e-4)
 
 
 def test_an_unreachable_target_has_no_root_and_names_the_range() -> None:

@@ -70,8 +70,9 @@ def solve(
 ) -> None:
     """Find the value of a parameter, of K, or of the e to ask for, that gives a wanted output.
 
-    All values are found that give the target. With --over it is the value for which the largest distance from the
-    target over that range is least. The exit code is 0 also if there is none.
+    All values that give the target are printed, or the range that can be attained.
+
+    With --over it is one value: that with the least largest distance from the target over the range.
     """
     from .. import api
 

@@ -81,8 +81,9 @@ def timestep(
 ) -> None:
     """Show which restitution an explicit code delivers at a fixed time step, and which e to ask it for.
 
-    The restitution depends on the phase, the part of a step in which the contact begins. The table has its mean,
-    least and largest value over all phases.
+    The restitution depends on the phase, the part of a step in which the contact begins.
+
+    The table has its mean, least and largest value over all phases.
     """
     from .. import api
 
