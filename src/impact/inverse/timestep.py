@@ -24,10 +24,10 @@ from ..formatting import number
 
 # steps per contact if none are given
 STEPS_PER_CONTACT = (10.0, 20.0, 50.0, 100.0)
-# the search for the number of steps that are needed tries no more
+# more steps per contact are refused, and not tried in the search for the number of steps that are needed
 MAX_STEPS_PER_CONTACT = 2**17
 # values of e between which the one to ask for is searched; many laws take the logarithm of e
-LEAST_E, TRIED_E = 1e-6, 65
+LEAST_E, TRIED_E = 1e-6, 33
 # largest jump of the mean over the phases that is taken for a root
 MAX_JUMP = 1e-2
 
@@ -236,6 +236,9 @@ def timestep_study(
     if not steps_per_contact and not dt:
         steps_per_contact = STEPS_PER_CONTACT
     steps = [*(contact_time / number_of_steps for number_of_steps in steps_per_contact), *dt]
+    most = contact_time / min(steps)
+    if most > MAX_STEPS_PER_CONTACT:
+        raise UsageError(f"got {number(most)} steps per contact, expected at most {MAX_STEPS_PER_CONTACT:,}")
     return TimestepResult(
         model=model.key,
         scheme=KICK_DRIFT,
