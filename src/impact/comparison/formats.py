@@ -140,7 +140,7 @@ def as_markdown(report: Report) -> str:
         for variable in differing:
             numbers = f"{number(variable.worst, 3)} | {number(variable.times, 3)}"
             values = f"{number(variable.new, 12)} | {number(variable.baseline, 12)}"
-            counts, point = f"{variable.different} of {variable.points}", _escape_markdown(variable.place)
+            counts, point = f"{variable.different} of {variable.points}", _escape_markdown(variable.location)
             lines.append(f"| `{variable.name}` | {counts} | {numbers} | {point} | {values} |")
         repeats = dict.fromkeys(case.replay for case in report.cases if case.replay)
         # a fence of four backticks, since a name may contain three

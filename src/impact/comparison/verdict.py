@@ -67,11 +67,11 @@ class Judged:
         return self.different == 0 or self.judged == "reported"
 
     @property
-    def place(self) -> str:
+    def location(self) -> str:
         """The coordinates of the worst point.
 
         >>> steps = Judged("steps", "reported", 0.0, 9, 1, 2.0, 0.0, {"model": "hertz", "e": 0.1 + 0.2}, 5, 7)
-        >>> steps.place
+        >>> steps.location
         'model=hertz, e=0.3'
         """
         return describe_point(self.at)
@@ -82,7 +82,7 @@ class Judged:
         if not self.different:
             return f"{self.name}: none of {self.points} differ"
         many = f"{self.name}: {self.different} of {self.points} differ"
-        at = f" at {self.place}" if self.place else ""
+        at = f" at {self.location}" if self.location else ""
         if self.judged == "exact" or self.worst != self.worst:
             words = (_format_outcome(self.name, value) for value in (self.new, self.baseline))
             both = self.new != self.new and self.baseline != self.baseline
@@ -160,7 +160,7 @@ class Verdict:
             closest = max(judged, key=lambda variable: variable.times, default=None)
             if closest is None or not closest.times:
                 return f"{count}, none differs"
-            at = f" at {closest.place}" if closest.place else ""
+            at = f" at {closest.location}" if closest.location else ""
             return f"{count}, largest difference {number(closest.times, 2)} x tolerance: {closest.name}{at}"
         by_kind: dict[FaultKind, dict[str, None]] = {}
         for fault in self.faults:
