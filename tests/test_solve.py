@@ -134,6 +134,7 @@ def test_the_page_prints_what_the_commands_print(cli: Run) -> None:
         (("--for", "dampratio", "--target", "e_out"), 'got "e_out", expected NAME=NUMBER'),
         (("--for", "dampratio", "--target", "e_out=0.6", "--over", "v1=1:2"), "expected NAME=FIRST:LAST:COUNT"),
         (("--for", "dampratio", "--target", "e_out=0.6", "--over", "v9=1:2:3"), "v9"),
+        (("--for", "dampratio", "--target", "e_out=0.6", "--at", "v1=-1"), "the balls do not approach"),
     ],
 )
 def test_bad_input_is_one_line(cli: Run, words: tuple[str, ...], message: str) -> None:

@@ -126,9 +126,6 @@ def _print_result(result: SolveResult) -> None:
             )
         out.print(cell(line), soft_wrap=True)
     if not result.roots:
-        range_text = (
-            f"{variable} is from {number(result.attainable[0])} to {number(result.attainable[1])}"
-            if result.attainable
-            else "all integrations fail"
-        )
-        out.print(cell(f"{result.model}: no value of {result.name} gives {target}; {range_text}"), soft_wrap=True)
+        least, largest = map(number, result.attainable)
+        text = f"{result.model}: no value of {result.name} gives {target}; {variable} is from {least} to {largest}"
+        out.print(cell(text), soft_wrap=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, NoReturn, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from ..array_types import Array, Mask
 from ..config.grid import Axis
 from ..config.load import Config, Output
 from ..contact.model import ForceModel, Parameter
+from ..contact.status import Status
 from ..contact.units import with_numbers
 from ..engine.build_impacts import build_impacts
 from ..engine.execute import never_stop
@@ -65,8 +66,7 @@ class SolveResult:
     status : "ok" for one root, "several_roots", "at_bound" where the only root is the least or largest allowed
         value, "no_root"
     roots : in ascending order; over a range of inputs, the best value
-    attainable : the least and the largest value of the target over all values that were tried, to six digits; None
-        if all failed
+    attainable : the least and the largest value of the target over all values that were tried, to six digits
     over : the conditions of a range of inputs, each with its e_out and the target variable; None without a range
     """
 
@@ -76,7 +76,7 @@ class SolveResult:
     target: Mapping[str, float]
     status: SolveStatus
     roots: tuple[Root, ...]
-    attainable: tuple[float, float] | None
+    attainable: tuple[float, float]
     over: tuple[Mapping[str, float], ...] | None
 
 
@@ -142,6 +142,10 @@ def solve_input(config: Config, plugins: Plugins, unknown: Parameter, target: Ma
     plugins : models that are not built in
     unknown : see `unknown_of`
     target : value by variable, see `check_target`
+
+    Raises
+    ------
+    UsageError : all integrations fail
     """
     variable, wanted = check_target(target)
     problem = _Problem(config, plugins, unknown, variable)
@@ -204,6 +208,13 @@ class _Problem:
         result: Array = self.evaluate(values, conditions, is_scan=is_scan)[self.variable].values
         return result
 
+    def raise_failure(self, values: Array, conditions: NDArray[np.intp] | None = None) -> NoReturn:
+        """Raise a UsageError with the most frequent status of the integrations that fail."""
+        result = self.evaluate(values, conditions, is_scan=True)
+        statuses = result["status"].values[np.isnan(result[self.variable].values)]
+        reason = Status(int(np.bincount(statuses).argmax())).meaning
+        raise UsageError(f"{self.model.key}: no {self.variable} at any value of {self.unknown.name}: {reason}")
+
     def scan_values(self) -> Array:
         """The allowed values that are tried first, in ascending order."""
         least, most = self.unknown.least, self.unknown.most
@@ -246,6 +257,8 @@ def _all_roots(problem: _Problem, wanted: float) -> SolveResult:
     """All values that give the target."""
     scan = problem.scan_values()
     values = problem.target_values(scan, is_scan=True)
+    if np.isnan(values).all():
+        problem.raise_failure(scan)
     scale = 1.0 if problem.variable.startswith("e_") else abs(wanted)
     near = np.abs(values - wanted) <= SCAN_TOLERANCE * scale
     if near.any():
@@ -273,10 +286,9 @@ def _all_roots(problem: _Problem, wanted: float) -> SolveResult:
     return _result(problem, wanted, status, map(Root, roots, e_out), values)
 
 
-def _extremes(values: Array) -> tuple[float, ...]:
-    """The least and the largest value that are not NaN, to the digits of the scan; empty if there are none."""
-    known = values[~np.isnan(values)]
-    return tuple(float(f"{extreme:.6g}") for extreme in (known.min(), known.max())) if known.size else ()
+def _extremes(values: Array) -> tuple[float, float]:
+    """The least and the largest value that are not NaN, to the digits of the scan."""
+    return float(f"{np.nanmin(values):.6g}"), float(f"{np.nanmax(values):.6g}")
 
 
 def _ends_of_runs(reached: Mask, scan: Array, bounds: set[float]) -> list[float]:
@@ -305,7 +317,7 @@ def _best_over_axis(problem: _Problem, wanted: float) -> SolveResult:
     distances = largest_distance(scan, is_scan=True)
     best = int(np.argmin(distances))
     if not np.isfinite(distances[best]):
-        return _result(problem, wanted, "no_root", (), np.full(1, np.nan))
+        problem.raise_failure(np.repeat(scan, axis.size), np.tile(conditions, scan.size))
     value = float(scan[best])
     neighbours = float(scan[max(best - 1, 0)]), float(scan[min(best + 1, scan.size - 1)])
     refined = minimize_scalar(
@@ -336,7 +348,6 @@ def _result(
     values: Array,
     over: tuple[Mapping[str, float], ...] | None = None,
 ) -> SolveResult:
-    extremes = _extremes(values)
     return SolveResult(
         model=problem.model.key,
         name=problem.unknown.name,
@@ -344,6 +355,6 @@ def _result(
         target={problem.variable: wanted},
         status=status,
         roots=tuple(roots),
-        attainable=(extremes[0], extremes[1]) if extremes else None,
+        attainable=_extremes(values),
         over=over,
     )
