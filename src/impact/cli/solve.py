@@ -89,7 +89,7 @@ def solve(
     if as_json:
         print(dump(solve_json(result)))
     else:
-        _print_result(result)
+        _print_roots(result)
 
 
 def solve_json(result: SolveResult) -> dict[str, Any]:
@@ -106,7 +106,7 @@ def solve_json(result: SolveResult) -> dict[str, Any]:
     }
 
 
-def _print_result(result: SolveResult) -> None:
+def _print_roots(result: SolveResult) -> None:
     """One line for each root, or the range that can be attained."""
     out = console(sys.stdout)
     ((variable, wanted),) = result.target.items()

@@ -101,7 +101,7 @@ def timestep(
     if as_json:
         print(dump(timestep_json(result)))
     else:
-        _print_result(result, tol)
+        _print_table(result, tol)
 
 
 def timestep_json(result: TimestepResult) -> dict[str, Any]:
@@ -117,7 +117,7 @@ def timestep_json(result: TimestepResult) -> dict[str, Any]:
     }
 
 
-def _print_result(result: TimestepResult, tol: float | None) -> None:
+def _print_table(result: TimestepResult, tol: float | None) -> None:
     """Print the continuous law, a line for each step, and the number of steps that is needed."""
     out = console(sys.stdout)
     asked = "" if result.e != result.e else f"e = {number(result.e)}, "

@@ -28,7 +28,7 @@ from .align import Aligned, Side
 from .verdict import Judged
 
 # a part of the common points, by axis; along axes that are not in it, the first point represents all
-Region = Mapping[str, slice]
+SlicesByDim = Mapping[str, slice]
 
 # at most this many points of a variable are compared, which takes an hour
 MAX_COMPARED_POINTS = 10**10
@@ -42,14 +42,14 @@ DIMENSIONLESS_SCALES = ("scaled by v0", "scaled by the peak", "scaled by itself"
 SCALE_INPUTS = {"scaled by v0": ("v1", "v2"), "scaled by m v0^2/2": ("v1", "v2", "m1", "m2")}
 
 
-def representative_regions(variables: Sequence[SchemaVariable], aligned: Aligned) -> dict[str, list[Region]]:
+def representative_regions(variables: Sequence[SchemaVariable], aligned: Aligned) -> dict[str, list[SlicesByDim]]:
     """By variable, the parts of the common points that represent all of them; see `compare` for the rule.
 
     Raises
     ------
     UsageError : a variable has more than `MAX_COMPARED_POINTS` representative points
     """
-    regions: dict[str, list[Region]] = {}
+    regions: dict[str, list[SlicesByDim]] = {}
     for variable in variables:
         if any(_declares_dims(side, variable.name) for side in (aligned.new, aligned.baseline)):
             regions[variable.name] = []
@@ -85,7 +85,7 @@ def _dataset_of_model(side: Side, model: int) -> xr.Dataset:
     return side.dataset.isel(model=slice(position, position + 1)) if "model" in side.dataset.dims else side.dataset
 
 
-def _region(dims: Iterable[str], sizes: Mapping[str, int], models: slice) -> Region:
+def _region(dims: Iterable[str], sizes: Mapping[str, int], models: slice) -> SlicesByDim:
     return {dim: slice(*(models if dim == "model" else slice(None)).indices(sizes[dim])[:2]) for dim in dims}
 
 
@@ -142,7 +142,7 @@ class Worst:
 
 
 def judge(
-    variable: SchemaVariable, aligned: Aligned, tol: float, regions: Iterable[Region]
+    variable: SchemaVariable, aligned: Aligned, tol: float, regions: Iterable[SlicesByDim]
 ) -> tuple[Judged, dict[str, NDArray[Any]]]:
     """Compare one variable at all common points: |new - baseline| over tolerance, inf if no difference is allowed.
 
@@ -205,7 +205,7 @@ def group_size(size: int) -> int:
     return -(-size // MAX_RATIO_GROUPS)
 
 
-def _slabs(name: str, aligned: Aligned, region: Region) -> Iterator[dict[str, slice]]:
+def _slabs(name: str, aligned: Aligned, region: SlicesByDim) -> Iterator[dict[str, slice]]:
     """A box in slabs; of a file with chunks, in slabs of whole chunks, so that each is read once."""
     sizes: dict[Hashable, int] = {dim: part.stop - part.start for dim, part in region.items()}
     variable = aligned.baseline.dataset.variables[name]
