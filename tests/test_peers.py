@@ -5,6 +5,9 @@ a step by which the balls overlap when the code first sees the contact. The mean
 a step of zero, from h and h/2 and again from h/2 and h/4. The code's own uncertainty is the difference of the two
 extrapolations plus half the spread over the phases at h/4.
 
+At coarse steps an explicit code delivers another restitution, which depends on the phase: it is that of the map of
+its scheme, `impact.contact.timestep`, at each phase.
+
 `tests/peers` has a script for each code, which runs in a child process. The table at the end of `make test-peers`
 has the largest difference and the largest uncertainty over the collisions of an entry.
 """
@@ -17,7 +20,7 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,6 +29,10 @@ import numpy as np
 import pytest
 
 import impact
+from impact.api import prepare
+from impact.contact.scaling import dimensionless_values
+from impact.contact.timestep import collide_at_fixed_step
+from impact.engine.build_impacts import build_impacts
 
 pytestmark = pytest.mark.peers
 
@@ -41,6 +48,8 @@ MAX_UNCERTAINTY = 2e-3
 FLOOR = 1e-7
 PHASES = (np.arange(4) + 0.5) / 4
 TIMEOUT_S = 300
+# between a code and the map of its scheme
+MAP_TOLERANCE = 1e-11
 
 Values = dict[str, Any]
 
@@ -380,28 +389,47 @@ ENTRIES += [
 SWEPT = {"e", "v1", "v2", "m1", "m2", "R1", "R2", "K", "n", "material", "material1", "material2"}
 
 
-def by_impact(key: str, collision: Values) -> tuple[float, float]:
-    """The restitution and the contact time [s] by impact."""
-    config = {
+def config_of(key: str, collision: Values) -> Values:
+    """The config of one collision."""
+    return {
         "models": key,
         "sweep": {name: value for name, value in collision.items() if name in SWEPT},
         "materials": MATERIALS,
         "model": {key: {name: value for name, value in collision.items() if name not in SWEPT}},
     }
-    result = impact.sweep(config)
+
+
+def by_impact(key: str, collision: Values) -> tuple[float, float]:
+    """The restitution and the contact time [s] by impact."""
+    result = impact.sweep(config_of(key, collision))
     return float(result["e_out"].item()), float(result["contact_time"].item())
 
 
-def by_code(entry: Entry, contact_times: list[float], folder: Path) -> tuple[str, np.ndarray]:
-    """The version of the code, and its restitutions by collision, step (h, h/2, h/4) and phase."""
+def by_map(key: str, collision: Values, steps: np.ndarray) -> np.ndarray:
+    """The restitution by the scheme kick-drift at time steps [s], and at each phase."""
+    plan = prepare(config_of(key, collision))
+    (model,) = plan.models
+    impacts = build_impacts(plan.inputs, model, ())
+    count = steps.size * PHASES.size
+    values = {name: np.repeat(value, count) for name, value in dimensionless_values(model, impacts).items()}
+    step, phase = np.repeat(steps / impacts.time[0], PHASES.size), np.tile(PHASES, steps.size)
+    result = collide_at_fixed_step(model, float(impacts.n[0]), values, step, phase, 10_000)
+    return result.e_out.reshape(steps.size, PHASES.size)
+
+
+def by_code(
+    entry: Entry, contact_times: list[float], folder: Path, steps_per_contact: Sequence[float] = ()
+) -> tuple[str, np.ndarray]:
+    """The version of the code, and its restitutions by collision, step and phase; by default at h, h/2 and h/4."""
+    steps_per_contact = steps_per_contact or [part * entry.code.steps_per_contact for part in (1, 2, 4)]
     if shutil.which(entry.code.needs) is None:
         pytest.skip(f"{entry.key}: {entry.code.needs} is not installed ({entry.code.install})")
     runs = []
     for collision, contact_time in zip(entry.collisions, contact_times, strict=True):
         balls = {name: collision[name] for name in BALLS[0]}
         closing_speed = collision["v1"] - collision["v2"]
-        for part in (1, 2, 4):
-            step = contact_time / entry.code.steps_per_contact / part
+        for number in steps_per_contact:
+            step = contact_time / number
             for phase in PHASES:
                 # a contact that the code ends later than the law still has time
                 count = math.ceil(2.5 * contact_time / step)
@@ -424,7 +452,9 @@ def by_code(entry: Entry, contact_times: list[float], folder: Path) -> tuple[str
             pytest.skip(f"{entry.key}: {last} ({entry.code.install})")
         pytest.fail(f"{' '.join(command)}: exit {process.returncode}\n{process.stdout}\n{process.stderr}")
     answer = json.loads((folder / "out.json").read_text(encoding="utf-8"))
-    return answer["version"], np.reshape(answer["restitutions"], (len(entry.collisions), 3, len(PHASES)))
+    return answer["version"], np.reshape(
+        answer["restitutions"], (len(entry.collisions), len(steps_per_contact), len(PHASES))
+    )
 
 
 def extrapolate(restitutions: np.ndarray, order: int) -> tuple[np.ndarray, np.ndarray]:
@@ -455,6 +485,38 @@ def test_a_code_gives_the_restitution_of_its_entry(
     print("impact", ours, "code", theirs, "difference", difference, "uncertainty", uncertainty)
     assert (uncertainty <= MAX_UNCERTAINTY).all()
     assert (np.abs(difference) <= np.maximum(uncertainty + entry.slack, FLOOR)).all()
+
+
+# entries of codes whose scheme is "kick-drift", with MuJoCo's integrator Euler; not those whose damping the code
+# itself only approximates
+EXPLICIT = [
+    entry
+    for entry in ENTRIES
+    if not entry.slack
+    and (entry.code.name in ("LAMMPS", "LIGGGHTS", "YADE") or (entry.code is MUJOCO and entry.variant == "Euler"))
+]
+COARSE_STEPS = (12.0, 31.0)
+
+
+@pytest.mark.parametrize("entry", EXPLICIT, ids=lambda entry: "-".join(filter(None, (entry.key, entry.variant))))
+def test_an_explicit_code_delivers_the_restitution_of_the_map_at_coarse_steps(
+    entry: Entry, tmp_path: Path, record_property: Callable[[str, object], None]
+) -> None:
+    contact_times = [by_impact(entry.key, collision)[1] for collision in entry.collisions]
+    version, theirs = by_code(entry, contact_times, tmp_path, COARSE_STEPS)
+    if not entry.holds(version):
+        pytest.skip(f"{entry.key}: {entry.code.name} {version} has another law: {entry.holds.__doc__}")
+    ours = np.array(
+        [
+            by_map(entry.key, collision, contact_time / np.array(COARSE_STEPS))
+            for collision, contact_time in zip(entry.collisions, contact_times, strict=True)
+        ]
+    )
+    difference = float(np.abs(theirs - ours).max())
+    variant = " ".join(filter(None, (entry.variant, "T/12, T/31")))
+    record_property("peer", (entry.code.name, version, entry.key, variant, ours.size, difference, MAP_TOLERANCE))
+    print("impact", ours, "code", theirs)
+    assert difference <= MAP_TOLERANCE
 
 
 # entries of codes that no package of PyPI or Debian can check, by key or by its first word
