@@ -18,6 +18,22 @@ from .params import (
 )
 
 ResultArgument = Annotated[Path, typer.Argument(help="A result of `impact sweep`.")]
+SourceArgument = Annotated[
+    Path | None, typer.Argument(help="A TOML file or a result. \\[default: Table 1 of the paper]")
+]
+AtOption = Annotated[
+    list[Setting] | None,
+    typer.Option(
+        "--at",
+        metavar="NAME=VALUE",
+        parser=parse_setting,
+        callback=reject_duplicates,
+        help="Value of an input, such as e=0.05; may be repeated.",
+    ),
+]
+ModelKeyOption = Annotated[
+    str, typer.Option("--model", metavar="KEY", autocompletion=complete_model, help="The model.")
+]
 OutputOption = Annotated[Path, typer.Option("-o", "--output", help="The result file.")]
 OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Replace the output if it exists.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")]

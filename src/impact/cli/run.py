@@ -13,17 +13,15 @@ from ..formatting import quantity
 from ..text import safe_text
 from . import exits
 from .console import dump, print_rows
-from .options import JsonOption, OverwriteOption, PluginOption, SetOption
-from .params import Setting, complete_model, parse_setting, parse_whole_number, reject_duplicates
+from .options import AtOption, JsonOption, OverwriteOption, PluginOption, SetOption, SourceArgument
+from .params import complete_model, parse_whole_number
 
 if TYPE_CHECKING:
     from ..api import Impact
 
 
 def run(
-    source: Annotated[
-        Path | None, typer.Argument(help="A TOML file or a result. \\[default: Table 1 of the paper]")
-    ] = None,
+    source: SourceArgument = None,
     model: Annotated[
         str | None,
         typer.Option(
@@ -33,16 +31,7 @@ def run(
             help="The model. \\[default: the first of the source]",
         ),
     ] = None,
-    at: Annotated[
-        list[Setting] | None,
-        typer.Option(
-            "--at",
-            metavar="NAME=VALUE",
-            parser=parse_setting,
-            callback=reject_duplicates,
-            help="Value of an input, such as e=0.05; may be repeated.",
-        ),
-    ] = None,
+    at: AtOption = None,
     sets: SetOption = None,
     plugins: PluginOption = None,
     history: Annotated[

@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ..formatting import number, quantity
 from .console import cell, console, dump
-from .options import JsonOption, PluginOption, SetOption
+from .options import AtOption, JsonOption, ModelKeyOption, PluginOption, SetOption, SourceArgument
 from .params import (
     InputRange,
-    Setting,
     Target,
-    complete_model,
     parse_range,
-    parse_setting,
     parse_target,
-    reject_duplicates,
 )
 
 if TYPE_CHECKING:
@@ -27,9 +22,7 @@ if TYPE_CHECKING:
 
 
 def solve(
-    model: Annotated[
-        str, typer.Option("--model", metavar="KEY", autocompletion=complete_model, help="The model.")
-    ],
+    model: ModelKeyOption,
     name: Annotated[
         str,
         typer.Option(
@@ -42,19 +35,8 @@ def solve(
             "--target", metavar="NAME=VALUE", parser=parse_target, help="The wanted output, such as e_out=0.6."
         ),
     ],
-    source: Annotated[
-        Path | None, typer.Argument(help="A TOML file or a result. \\[default: Table 1 of the paper]")
-    ] = None,
-    at: Annotated[
-        list[Setting] | None,
-        typer.Option(
-            "--at",
-            metavar="NAME=VALUE",
-            parser=parse_setting,
-            callback=reject_duplicates,
-            help="Value of another input, such as v1=1; may be repeated.",
-        ),
-    ] = None,
+    source: SourceArgument = None,
+    at: AtOption = None,
     over: Annotated[
         InputRange | None,
         typer.Option(

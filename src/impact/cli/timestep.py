@@ -4,21 +4,16 @@ from __future__ import annotations
 
 import sys
 from dataclasses import asdict
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ..formatting import decimals, number, quantity
 from .console import cell, console, dump, table
-from .options import JsonOption, PluginOption, SetOption
+from .options import AtOption, JsonOption, ModelKeyOption, PluginOption, SetOption, SourceArgument
 from .params import (
-    Setting,
-    complete_model,
     parse_number,
-    parse_setting,
     parse_whole_number,
-    reject_duplicates,
 )
 
 if TYPE_CHECKING:
@@ -26,22 +21,9 @@ if TYPE_CHECKING:
 
 
 def timestep(
-    model: Annotated[
-        str, typer.Option("--model", metavar="KEY", autocompletion=complete_model, help="The model.")
-    ],
-    source: Annotated[
-        Path | None, typer.Argument(help="A TOML file or a result. \\[default: Table 1 of the paper]")
-    ] = None,
-    at: Annotated[
-        list[Setting] | None,
-        typer.Option(
-            "--at",
-            metavar="NAME=VALUE",
-            parser=parse_setting,
-            callback=reject_duplicates,
-            help="Value of an input, such as e=0.5; may be repeated.",
-        ),
-    ] = None,
+    model: ModelKeyOption,
+    source: SourceArgument = None,
+    at: AtOption = None,
     steps_per_contact: Annotated[
         list[float] | None,
         typer.Option(

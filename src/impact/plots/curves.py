@@ -341,7 +341,7 @@ def _label_bands(axes: Axes, panel: Panel) -> None:
     """Write the values of bands at their lines on a logarithmic axis.
 
     The label of the widest band is above its line. Labels of narrower bands are below theirs, where no label can
-    overlap them, except near the lower end of the axis, where there is no room below but some between the lines.
+    overlap them, except near the lower end of the axis, where only the space between the lines is left.
     """
     low, high = axes.get_ylim()
     for band in panel.bands if panel.y_log else ():
