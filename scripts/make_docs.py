@@ -24,6 +24,7 @@ PACKAGES = (
     "api",
     "reporting",
     "plots",
+    "exporters",
     "inverse",
     "comparison",
     "results",

@@ -20,6 +20,7 @@ LAYERS = (
     {"results"},
     {"comparison"},
     {"inverse"},
+    {"exporters"},
     {"plots"},
     {"reporting"},
     # the package itself, "", hands out the functions of api

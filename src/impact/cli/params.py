@@ -141,6 +141,13 @@ def complete_model(incomplete: str) -> list[str]:
     return [key for key in catalogue(read_plugins([]).models) if key.startswith(incomplete)]
 
 
+def complete_code(incomplete: str) -> list[str]:
+    """The codes to which laws are exported whose names begin with a word."""
+    from ..exporters.codes import CODES
+
+    return [name for name in CODES if name.startswith(incomplete)]
+
+
 def complete_family(incomplete: str) -> list[str]:
     """The families of models that begin with a word."""
     from ..contact.models import FAMILIES

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import elementwise
@@ -107,6 +107,14 @@ class FixedStepLaw:
     def has_e(self) -> bool:
         return "e" in self.model.quantities
 
+    @property
+    def e(self) -> float:
+        """The e that is asked for; NaN for a law without one."""
+        return float(self.impact.e[0]) if self.has_e else math.nan
+
+    def with_phases(self, phases: int) -> FixedStepLaw:
+        return replace(self, phases=phases)
+
     def restitution(self, dt: Array, e: Array | None = None) -> Array:
         """The delivered restitution at steps dt [s], shape (k,), over all phases, shape (k, phases).
 
@@ -157,7 +165,7 @@ def e_to_ask(law: FixedStepLaw, dt: Array) -> Array:
     """
     if not law.has_e:
         return np.full(dt.size, np.nan)
-    wanted = float(law.impact.e[0])
+    wanted = law.e
 
     def distance(e: Array, steps: Array) -> Array:
         e, steps = np.broadcast_arrays(e, steps)
@@ -185,7 +193,7 @@ def needed_steps(law: FixedStepLaw, tol: float, e_continuous: float) -> NeededSt
     tol : largest accepted |e_out - e|/e
     e_continuous : restitution of the continuous law, which replaces e for a law without one
     """
-    wanted = float(law.impact.e[0]) if law.has_e else e_continuous
+    wanted = law.e if law.has_e else e_continuous
     if not wanted > 0.0:
         raise UsageError("--tol is relative to e, expected e > 0")
 
@@ -204,6 +212,42 @@ def needed_steps(law: FixedStepLaw, tol: float, e_continuous: float) -> NeededSt
     return NeededSteps(tol, most, law.contact_time / most)
 
 
+def fixed_step_law(config: Config, phases: int) -> tuple[FixedStepLaw, dict[str, float]]:
+    """The law and the impact of a config without axes, and the outputs of the continuous law by name, in SI.
+
+    Raises
+    ------
+    UsageError : the continuous law does not end with a rebound
+    """
+    plan = Plan(config)
+    model = config.models[0]
+    impact = build_impacts(plan.inputs, model, ())
+    outputs = collide(model, impact, rtol=config.solver.rtol, max_steps=config.solver.max_steps)
+    collision = {name: array[0].item() for name, array in outputs.items()}
+    status = Status(collision["status"])
+    if status != Status.OK:
+        raise UsageError(f"{model.key} has no rebound at these inputs: {status.meaning}")
+    return FixedStepLaw(model, impact, collision["contact_time"], phases), collision
+
+
+def time_steps(contact_time: float, steps_per_contact: Sequence[float], dt: Sequence[float]) -> list[float]:
+    """Time steps [s] from numbers of steps per contact, and from themselves.
+
+    Raises
+    ------
+    UsageError : a number is not positive, or there are too many steps per contact
+    """
+    for name, values in (("--steps-per-contact", steps_per_contact), ("--dt", dt)):
+        for value in values:
+            if not (math.isfinite(value) and value > 0.0):
+                raise UsageError(f"{name}: got {number(value)}, expected a finite number > 0")
+    steps = [*(contact_time / steps for steps in steps_per_contact), *dt]
+    most = contact_time / min(steps)
+    if most > MAX_STEPS_PER_CONTACT:
+        raise UsageError(f"got {number(most)} steps per contact, expected at most {MAX_STEPS_PER_CONTACT:,}")
+    return steps
+
+
 def timestep_study(
     config: Config,
     *,
@@ -218,31 +262,17 @@ def timestep_study(
     ------
     UsageError : a step is not positive, or the continuous law does not end with a rebound
     """
-    for name, values in (("--steps-per-contact", steps_per_contact), ("--dt", dt)):
-        for value in values:
-            if not (math.isfinite(value) and value > 0.0):
-                raise UsageError(f"{name}: got {number(value)}, expected a finite number > 0")
     if phases < 1:
         raise UsageError(f"--phases: got {phases}, expected a whole number >= 1")
-    plan = Plan(config)
-    model = config.models[0]
-    impact = build_impacts(plan.inputs, model, ())
-    collision = collide(model, impact, rtol=config.solver.rtol, max_steps=config.solver.max_steps)
-    status = Status(int(collision["status"][0]))
-    if status != Status.OK:
-        raise UsageError(f"{model.key} has no rebound at these inputs: {status.meaning}")
-    contact_time, e_continuous = float(collision["contact_time"][0]), float(collision["e_out"][0])
-    law = FixedStepLaw(model, impact, contact_time, phases)
+    law, collision = fixed_step_law(config, phases)
+    contact_time, e_continuous = law.contact_time, collision["e_out"]
     if not steps_per_contact and not dt:
         steps_per_contact = STEPS_PER_CONTACT
-    steps = [*(contact_time / number_of_steps for number_of_steps in steps_per_contact), *dt]
-    most = contact_time / min(steps)
-    if most > MAX_STEPS_PER_CONTACT:
-        raise UsageError(f"got {number(most)} steps per contact, expected at most {MAX_STEPS_PER_CONTACT:,}")
+    steps = time_steps(contact_time, steps_per_contact, dt)
     return TimestepResult(
-        model=model.key,
+        model=law.model.key,
         scheme=KICK_DRIFT,
-        e=float(impact.e[0]) if law.has_e else math.nan,
+        e=law.e,
         e_continuous=e_continuous,
         contact_time=contact_time,
         rows=timestep_rows(law, steps),

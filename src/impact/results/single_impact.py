@@ -273,16 +273,24 @@ def single_point(
     option_names = {} if model is None else {f"models={json.dumps([model])}": f"--model {model}"}
     for name, values in (over or {}).items():
         option_names[f"{_override_path(name)}={toml_text(values)}"] = f"--over {name}"
+    for name, value in (at or {}).items():
+        if model is not None and name.startswith(f"{model}."):
+            # a parameter without a default has no other value yet
+            option_names[f"{_override_path(name)}={_toml_value(value)}"] = f"--at {name}={value}"
     config = _read_with_option_names(read, option_names)
     columns = [_selectable_columns(axis) for axis in config.axes]
     varied = {name for names in columns for name in names}
     if at and {"e", "alpha"} <= at.keys():
         raise UsageError("--at alpha: got alpha and e, expected one of the two")
     at = {**{name: value for name, value in parted.items() if name in varied}, **(at or {})}
+    law = config.models[0]
+    if "K" in at and law.exponent is not None:
+        # K in [sweep] belongs to the exponent there
+        at[f"{law.key}.K"] = at.pop("K")
     together = {name for names in columns if len(names) > 1 for name in names}
     inputs = [*(name for names in columns for name in names), *config.scalars]
     for name, value in at.items():
-        if name not in inputs and name not in SWEEP_QUANTITIES:
+        if name not in inputs and name not in SWEEP_QUANTITIES and name != f"{law.key}.K":
             raise UsageError(f'no input "{safe_text(name)}" here; {did_you_mean(name, inputs)}')
         if name not in together:
             option_names[f"{_override_path(name)}={_toml_value(value)}"] = f"--at {name}={value}"

