@@ -189,6 +189,7 @@ def _print_codes(as_json: bool) -> None:
         installed = code["installed"] or "not installed"
         out.print(cell(f"{code['code']}: {code['title']} ({installed}; {code['tested']})"), soft_wrap=True)
         rows = table("law", "in the code")
+        rows.columns[1].justify = "left"
         for key, name in code["laws"].items():
             rows.add_row(key, name)
         out.print(rows)

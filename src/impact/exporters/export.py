@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from .._version import __version__
 from ..errors import UsageError
-from ..formatting import decimals, number, percentage, quantity
+from ..formatting import decimals, number, quantity
 from ..inverse.timestep import TimestepRow, needed_steps, time_steps, timestep_rows
 from .code import Collision, Parameters
 from .problem import ExportProblem
@@ -148,13 +148,13 @@ def _header(problem: ExportProblem, collision: Collision, row: TimestepRow) -> l
         header.append(f"{steps}: what the code's scheme delivers there is not predicted")
     else:
         header.append(
-            f"{steps}, scheme {code.scheme}: mean e {decimals(row.e_mean)}, from {decimals(row.e_least)} to "
-            f"{decimals(row.e_largest)} by the phase of the step in which the contact begins"
+            f"{steps}: mean e {decimals(row.e_mean)}, {decimals(row.e_least)} to {decimals(row.e_largest)} by the "
+            f"phase in the step ({code.scheme})"
         )
         if row.e_to_ask == row.e_to_ask:
             header.append(f"a mean of {number(problem.wanted)} at this dt: ask for e = {decimals(row.e_to_ask)}")
         needed = needed_steps(law, ADVISED_TOL, problem.e_continuous) if problem.wanted > 0.0 else None
         if needed is not None:
-            within = f"within {percentage(ADVISED_TOL)} of {number(problem.wanted)}"
+            within = f"within {number(100.0 * ADVISED_TOL)} % of {number(problem.wanted)}"
             header.append(f"advised: dt <= {quantity(needed.dt, 's', 3)}, where every phase is {within}")
     return [*header, *code.notes(collision), code.tested]

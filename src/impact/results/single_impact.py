@@ -23,6 +23,7 @@ from ..contact.history import History, follow
 from ..contact.impacts import Impacts
 from ..contact.materials import Material
 from ..contact.model import ForceModel
+from ..contact.models import find
 from ..contact.outputs import collide
 from ..contact.status import Status
 from ..engine.build_impacts import build_impacts
@@ -273,7 +274,11 @@ def single_point(
     option_names = {} if model is None else {f"models={json.dumps([model])}": f"--model {model}"}
     for name, values in (over or {}).items():
         option_names[f"{_override_path(name)}={toml_text(values)}"] = f"--over {name}"
-    for name, value in (at or {}).items():
+    at = dict(at or {})
+    if model is not None and "K" in at and find(model, plugins.models).exponent is not None:
+        # K in [sweep] belongs to the exponent there
+        at[f"{model}.K"] = at.pop("K")
+    for name, value in at.items():
         if model is not None and name.startswith(f"{model}."):
             # a parameter without a default has no other value yet
             option_names[f"{_override_path(name)}={_toml_value(value)}"] = f"--at {name}={value}"
@@ -282,15 +287,11 @@ def single_point(
     varied = {name for names in columns for name in names}
     if at and {"e", "alpha"} <= at.keys():
         raise UsageError("--at alpha: got alpha and e, expected one of the two")
-    at = {**{name: value for name, value in parted.items() if name in varied}, **(at or {})}
-    law = config.models[0]
-    if "K" in at and law.exponent is not None:
-        # K in [sweep] belongs to the exponent there
-        at[f"{law.key}.K"] = at.pop("K")
+    at = {**{name: value for name, value in parted.items() if name in varied}, **at}
     together = {name for names in columns if len(names) > 1 for name in names}
     inputs = [*(name for names in columns for name in names), *config.scalars]
     for name, value in at.items():
-        if name not in inputs and name not in SWEEP_QUANTITIES and name != f"{law.key}.K":
+        if name not in inputs and name not in SWEEP_QUANTITIES and name != f"{config.models[0].key}.K":
             raise UsageError(f'no input "{safe_text(name)}" here; {did_you_mean(name, inputs)}')
         if name not in together:
             option_names[f"{_override_path(name)}={_toml_value(value)}"] = f"--at {name}={value}"

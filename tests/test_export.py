@@ -1,0 +1,156 @@
+"""`impact export` writes a law in the units and conventions of a code, with what the code delivers."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+import impact
+from impact.exporters.codes import CODES
+
+from .conftest import ROOT, Run
+
+# two balls whose effective mass is 0.75 kg and whose effective radius is 0.03 m
+BALLS = {"v1": 1.0, "v2": 0.0, "m1": 1.0, "m2": 3.0, "R1": 0.04, "R2": 0.12}
+SOFT = {"E": 1e9, "nu": 0.3}
+HARD = {"E": 5e9, "nu": 0.2}
+
+
+def source(*materials: str, **values: float) -> dict[str, object]:
+    """A config of one impact, with materials or with a stiffness."""
+    named = {f"material{i}": name for i, name in enumerate(materials, 1)}
+    return {
+        "models": "hertz",
+        "materials": {"soft": SOFT, "hard": HARD},
+        "sweep": BALLS | {"e": 0.5} | named | values,
+    }
+
+
+def test_the_stiffness_of_lammps_hertz_is_per_root_of_the_effective_radius() -> None:
+    export = impact.export("lammps", source=source(K=1e8), code_version="22Jul2025")
+    assert export.parameters == {"k_n": pytest.approx(1e8 / math.sqrt(0.03), rel=1e-15), "e": 0.5}
+
+
+def test_lammps_takes_the_moduli_of_both_types_of_two_materials() -> None:
+    export = impact.export("lammps", source=source("soft", "hard"), code_version="22Jul2025")
+    assert [line.split()[1:7] for line in export.lines if line.startswith("pair_coeff")] == [
+        ["1", "1", "hertz/material", "1000000000.0", "0.5", "0.3"],
+        ["2", "2", "hertz/material", "5000000000.0", "0.5", "0.2"],
+    ]
+
+
+@pytest.mark.parametrize(
+    ("key", "expected"),
+    [
+        # ζ = −ln 0.5/√(π² + ln² 0.5) of a linear spring that pulls, K = 1e6 N/m and m = 0.75 kg
+        ("lammps-velocity-hooke", 2.0 * 0.2154537620 * math.sqrt(0.75e6)),
+        ("lammps-mass-velocity-hooke", 2.0 * 0.2154537620 * math.sqrt(1e6 / 0.75)),
+    ],
+)
+def test_the_damping_of_a_law_without_e_is_solved_for(key: str, expected: float) -> None:
+    export = impact.export("lammps", key, source=source(), at={"e": 0.5, "K": 1e6}, code_version="22Jul2025")
+    assert export.parameters["eta_n0"] == pytest.approx(expected, rel=1e-8)
+    assert export.e_continuous == pytest.approx(0.5, abs=1e-9)
+
+
+def test_mujoco_gets_a_damping_ratio_and_a_constant_impedance() -> None:
+    export = impact.export("mujoco", at={"e": 0.6})
+    timeconst, dampratio = map(float, str(export.parameters["solref"]).split())
+    assert (timeconst, dampratio) == (0.02, pytest.approx(0.1808583084, abs=1e-9))
+    assert export.parameters["solimp"] == "0.9 0.9 0.001 0.5 2"
+
+
+def test_a_tsuji_before_the_factor_is_another_law_and_warned_about() -> None:
+    export = impact.export("lammps", "lammps-tsuji", at={"e": 0.5}, code_version="22Jul2025")
+    assert export.model == "lammps-tsuji-without-root"
+    assert export.e_continuous == pytest.approx(0.616076, abs=1e-6)
+    assert "lammps-coeff-restitution-hertz" in export.warnings[0]
+    corrected = impact.export("lammps", "lammps-tsuji", at={"e": 0.5}, code_version="1Sep2026")
+    assert corrected.model == "lammps-tsuji"
+    assert corrected.e_continuous == pytest.approx(0.5, abs=0.005)
+
+
+def test_a_law_of_the_catalogue_is_exported_under_the_name_of_the_code() -> None:
+    assert impact.export("lammps", "tsuji-1992").model == "lammps-coeff-restitution-hertz"
+
+
+def test_what_is_delivered_at_dt_is_that_of_timestep() -> None:
+    at = {"e": 0.5, "v1": 1.0}
+    export = impact.export("lammps", at=at, dt=2e-5, code_version="22Jul2025")
+    (row,) = impact.timestep("lammps-coeff-restitution-hertz", at=at, dt=[2e-5]).rows
+    assert export.at_dt == row
+
+
+def test_the_json_has_the_names_of_the_contract(cli: Run) -> None:
+    data = json.loads(cli("export", "--to", "mujoco", "--at", "e=0.6", "--json").stdout)
+    assert {"code", "version", "model", "e_continuous", "contact_time", "e_at_dt", "parameters", "lines"} <= set(
+        data
+    )
+    assert set(data["e_at_dt"]) == {"dt", "mean", "least", "largest"}
+    assert data["e_at_dt"]["dt"] == pytest.approx(data["contact_time"] / 50)
+
+
+def test_the_output_is_a_file_that_is_not_replaced_silently(cli: Run, tmp_path: Path) -> None:
+    words = ("export", "--to", "lammps", "--script", "-o", tmp_path / "in.balls")
+    first = cli(*words)
+    assert (first.returncode, first.stdout) == (0, "")
+    assert "e_out = " in (tmp_path / "in.balls").read_text(encoding="utf-8")
+    assert cli(*words).returncode == 2
+    assert cli(*words, "--overwrite").returncode == 0
+
+
+@pytest.mark.parametrize("name", CODES)
+def test_every_law_of_a_code_is_in_the_list(cli: Run, name: str) -> None:
+    listed = {code["code"]: code for code in json.loads(cli("export", "--list", "--json").stdout)}
+    assert listed[name]["laws"] == dict(CODES[name].laws)
+    assert listed[name]["laws"].keys() <= impact.models().keys()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ((), "--to: expected a code; impact export --list shows them"),
+        (("--to", "lamps"), '--to: no code "lamps"; did you mean "lammps"?'),
+        (("--to", "mujoco", "--model", "hertz"), 'MuJoCo has no law "hertz"; known: mujoco-solref'),
+        (("--to", "lammps", "--script", "--at", "m2=inf"), "--script: m2: got inf, expected a finite value"),
+        (("--to", "lammps", "--dt", "0"), "--dt: got 0, expected a finite number > 0"),
+        (("--to", "lammps", "--code-version", "new"), '--code-version: got "new", expected the date of a release'),
+        (
+            ("--to", "lammps", "--code-version", "29Aug2019"),
+            "has no coeff_restitution, expected 20240601 or later",
+        ),
+        (
+            ("--to", "lammps", "--verify", "--program", "/nowhere"),
+            '"/nowhere": no LAMMPS, pair style granular there',
+        ),
+        (("--to", "mujoco", "--at", "e=0.6", "--dt", "0.015"), "expected at most half of timeconst = 0.02"),
+        (("--to", "mujoco", "--at", "e=0.6", "--at", "mujoco-solref.dampratio=1"), "expected one of the two"),
+    ],
+)
+def test_bad_input_is_one_line(cli: Run, words: tuple[str, ...], message: str) -> None:
+    done = cli("export", *words)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+EXAMPLES = re.findall(
+    r"\$ impact (.*)\n((?:.*\n)+?)```", (ROOT / "docs" / "export.md").read_text(encoding="utf-8")
+)
+
+
+@pytest.mark.parametrize(("command", "printed"), EXAMPLES, ids=[command for command, _ in EXAMPLES])
+def test_the_page_prints_what_the_commands_print(cli: Run, command: str, printed: str) -> None:
+    done = cli(*shlex.split(command))
+    shown = (done.stdout + done.stderr).splitlines()
+    assert [line.rstrip() for line in shown] == printed.splitlines()
+
+
+def test_the_page_has_an_example_of_each_code() -> None:
+    shown = {word for command, _ in EXAMPLES for word in re.findall(r"--to (\S+)", command)}
+    assert shown == CODES.keys()

@@ -1,0 +1,159 @@
+"""The scripts that `impact export` writes run in their codes, and measure the predicted restitution.
+
+The collisions are those of test_peers.py. A code whose scheme is known is compared with the map of the scheme at
+coarse steps and at four phases, any other with the continuous law by extrapolation. `make test-peers` runs this.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import impact
+from impact.errors import UsageError
+from impact.exporters.code import Code
+from impact.exporters.codes import CODES
+from impact.exporters.problem import prepare_export
+from impact.exporters.verify import choose_version, verify
+
+from .conftest import Run
+from .test_peers import ENTRIES, MATERIALS, PYTHON, WITHOUT_PEER, by_impact, config_of
+
+pytestmark = pytest.mark.peers
+
+# where the wheels of codes are installed; None is the program on the path
+PROGRAMS = {"python": PYTHON, "lmp": str(Path(PYTHON).with_name("lmp"))}
+# steps per contact of the three collisions of an entry, for codes whose scheme is known
+COARSE_STEPS = (12.0, 20.0, 31.0)
+# the largest difference from the map of the scheme, by code; 1e-9 for the others
+TOLERANCES: dict[str, float] = {}
+
+# one entry for each law of a code that has scripts
+EXPORTED = {
+    (code.name, entry.key): entry
+    for code in CODES.values()
+    for entry in ENTRIES
+    if code.script is not None and entry.key in code.laws
+}
+
+
+def code_and_version(name: str) -> tuple[Code, str, str]:
+    """A code, the program that runs its scripts, and its version; skips the test where it is not installed."""
+    code = CODES[name]
+    try:
+        program, version = choose_version(code, PROGRAMS.get(code.program), None, verify=True)
+    except UsageError as error:
+        pytest.skip(str(error))
+    assert program is not None
+    return code, program, version
+
+
+@pytest.mark.parametrize(("name", "key"), EXPORTED, ids="-".join)
+def test_an_exported_script_measures_the_predicted_restitution(
+    name: str, key: str, record_property: Callable[[str, object], None]
+) -> None:
+    code, program, version = code_and_version(name)
+    entry = EXPORTED[name, key]
+    steps = COARSE_STEPS if code.scheme is not None else (float(entry.code.steps_per_contact),)
+    differences, uncertainties = [], []
+    for collision, steps_per_contact in zip(entry.collisions, steps, strict=False):
+        source = config_of(key, collision)
+        _, contact_time = by_impact(key, collision)
+        export = impact.export(
+            name, key, source=source, dt=contact_time / steps_per_contact, verify=True, program=program
+        )
+        if export.model != key:
+            pytest.skip(f"{key}: {code.title} {version} has {export.model}")
+        assert export.verification is not None
+        differences.append(export.verification.difference)
+        uncertainties.append(export.verification.uncertainty)
+        print(export.verification)
+    tolerance = TOLERANCES.get(name, 1e-9) if code.scheme is not None else max(uncertainties)
+    record_property("peer", (code.name, version, key, "script", 4 * len(differences), max(differences), tolerance))
+    assert max(differences) <= tolerance
+    assert max(uncertainties) <= (tolerance if code.scheme is not None else 5e-3)
+
+
+# errors that a template could have: a text of the script of a law, and what it becomes
+PLANTED = (
+    ("lammps", "lammps-coeff-restitution-hertz", "diameter 0.1", "diameter 0.05"),
+    ("lammps", "lammps-coeff-restitution-hertz", "mass 1.0 vx", "mass 2.0 vx"),
+    ("lammps", "lammps-coeff-restitution-hertz", "damping coeff_restitution", "damping tsuji"),
+    ("lammps", "lammps-coeff-restitution-hertz", "(v_v2-v_v1)", "(v_v1-v_v2)"),
+    ("mujoco", "mujoco-solref", 'solref="0.02 0.3"', 'solref="0.02 0.15"'),
+    ("mujoco", "mujoco-solref-direct", 'solref="-', 'solref="-2'),
+    ("mujoco", "mujoco-solref", "0.9 0.9 0.001 0.5 2", "0.9 0.95 0.001 0.5 2"),
+)
+
+
+@pytest.mark.parametrize(("name", "key", "old", "new"), PLANTED)
+def test_an_error_in_a_template_is_found(name: str, key: str, old: str, new: str) -> None:
+    code, program, version = code_and_version(name)
+    entry = EXPORTED[name, key]
+    problem = prepare_export(code, key, version, config_of(key, entry.collisions[0]), {}, ())
+    original = code.script
+    assert original is not None
+
+    def wrong(collision, parameters):  # type: ignore[no-untyped-def]
+        text = original(collision, parameters)
+        assert old in text
+        return text.replace(old, new)
+
+    dt = problem.law.contact_time / 12
+    assert verify(problem, program, dt).agrees
+    assert not verify(replace(problem, code=replace(code, script=wrong)), program, dt).agrees
+
+
+@pytest.mark.parametrize("materials", [("soft", "hard"), ("hard", "hard")], ids="-".join)
+def test_lammps_mixes_two_materials_as_the_law_does(materials: tuple[str, str]) -> None:
+    """With the moduli of two atom types in hertz/material; other codes are in `EXPORTED`."""
+    _, program, _ = code_and_version("lammps")
+    sweep = {"v1": 1.0, "m1": 1.0, "m2": 3.0, "R1": 0.05, "R2": 0.08, "e": 0.5}
+    source = {
+        "models": "lammps-coeff-restitution-hertz",
+        "materials": MATERIALS,
+        "sweep": sweep | {"material1": materials[0], "material2": materials[1]},
+    }
+    export = impact.export("lammps", source=source, verify=True, program=program, script=True)
+    assert export.verification is not None
+    assert export.verification.difference <= 1e-9
+    assert export.script is not None
+    assert export.script.count("hertz/material") == len(set(materials))
+
+
+def test_every_law_of_a_code_with_scripts_is_run_or_has_a_reason() -> None:
+    """The reasons are those of test_peers.py."""
+    laws = {(code.name, key) for code in CODES.values() if code.script is not None for key in code.laws}
+    assert {key for _, key in laws - EXPORTED.keys()} <= WITHOUT_PEER.keys()
+
+
+def test_verify_exits_with_0_where_the_code_agrees_and_with_1_where_it_differs(cli: Run, tmp_path: Path) -> None:
+    """The code that differs is the real one, behind a program that changes the restitution in its input."""
+    _, program, _ = code_and_version("lammps")
+    words = ("export", "--to", "lammps", "--at", "e=0.6", "--verify", "--program")
+    agreeing = cli(*words, program)
+    assert (agreeing.returncode, agreeing.stderr) == (0, "")
+    assert "agrees" in agreeing.stdout
+    wrapper = tmp_path / "lmp"
+    wrapper.write_text(f'#!/bin/sh\nsed -i "s/ 0.6 / 0.5 /" "$2" 2> {os.devnull}\nexec {program} "$@"\n')
+    wrapper.chmod(0o755)
+    differing = cli(*words, wrapper)
+    assert differing.returncode == 1
+    assert "DIFFERS" in differing.stdout
+
+
+@pytest.mark.parametrize(("name", "words"), [("lammps", ("-in",)), ("mujoco", ())])
+def test_a_script_runs_in_an_empty_folder(cli: Run, tmp_path: Path, name: str, words: tuple[str, ...]) -> None:
+    code, program, _ = code_and_version(name)
+    file = tmp_path / f"two_balls{code.suffix}"
+    assert cli("export", "--to", name, "--at", "e=0.6", "--script", "-o", file).returncode == 0
+    done = subprocess.run(
+        [program, *words, file.name], cwd=tmp_path, capture_output=True, text=True, check=True, timeout=120
+    )
+    last = done.stdout.splitlines()[-1]
+    assert float(last.removeprefix("e_out = ")) == pytest.approx(0.6, abs=0.01)
