@@ -85,6 +85,14 @@ that sets negative forces to zero counts the contact until the indentation is ze
 is computed from the works that are integrated with the motion. `impact run` computes both again from the history
 of the force.
 
+With `[solver] integrator` other than `"exact"` a point is a collision at a fixed step
+([timestep.md](timestep.md)), and its values are those of the scheme. `peak_indentation` is the largest at the end
+of a step, `permanent_indentation` the residual of the law, `peak_force` the largest force before a step, `steps`
+the number of fixed steps, and `contact_time` that number times the step. `closed_form_error` is the error of the
+scheme: `e_out` minus the closed form of the continuous law. The works of `energy_residual` and `e_energetic` are
+those of the law's force along the steps, by the trapezoidal rule from the first touch to the end of the contact:
+`energy_residual` is the energy that the scheme adds, relative to m v0²/2, and negative for energy that it takes.
+
 `impact compare` judges the variables as follows. A *scaled* value may differ by its tolerance times the named
 scale at that point. A *bounded* value must stay below its bound or change by less than it. *Exact* values must
 be equal. *Reported* values are printed only. See [ci.md](ci.md).
@@ -103,7 +111,7 @@ Points with status 1 to 9 have values; with status 10 and above they are NaN.
 - `config`: the verbatim text of the config (JSON if it was a mapping). `config_set`: the overrides in order, as
   JSON.
 - `fingerprint`: SHA-256 of the effective config. `rtol` and `max_steps` of the solver, and the `core` that was
-  used.
+  used. `integrator`: the scheme; missing for `"exact"`.
 - `materials`: the materials of the balls, as JSON from name to `E` [Pa], `nu`, `rho` [kg/m3] and
   `yield_strength` [Pa]; null if a property is unknown or an axis.
 - `plugins`: models that are not built in, as JSON from key to `file`, the name of the model's Python file (null

@@ -45,7 +45,20 @@ def test_every_model_is_in_a_baseline(baselines: list[xr.Dataset]) -> None:
 
 def test_every_kind_of_axis_is_in_a_baseline(baselines: list[xr.Dataset]) -> None:
     axes = {str(dim) for baseline in baselines for dim in baseline.dims}
-    assert {"e", "alpha", "v1", "v2", "m1", "m2", "n", "K", "material2", "ismail-stronge-2008.gamma"} <= axes
+    assert {
+        "e",
+        "alpha",
+        "v1",
+        "v2",
+        "m1",
+        "m2",
+        "n",
+        "K",
+        "material2",
+        "dt",
+        "phase",
+        "ismail-stronge-2008.gamma",
+    } <= axes
     zipped = [baseline for baseline in baselines if "m1" in baseline.dims and baseline["m2"].dims == ("m1",)]
     walls = [baseline for baseline in baselines if np.isinf(baseline["m2"]).any()]
     dissimilar = [
@@ -62,7 +75,10 @@ def test_every_status_that_a_config_can_cause_is_in_a_baseline(baselines: list[x
         Status.OK,
         Status.NO_IMPACT,
         Status.LIMIT,
+        Status.NOT_SEPARATED,
         Status.MAX_STEPS,
+        Status.NOT_FINITE,
         Status.INVALID_PARAMETER,
         Status.OUT_OF_RANGE,
+        Status.UNSTABLE,
     }

@@ -298,7 +298,7 @@ BAD = [
     ('"steel"', '"\\u001b[31m\\u202e"',
      ['x.toml:8: sweep.material: got "\\x1b[31m\\u202e", expected a material of [materials]; known: ' + KNOWN]),
     ("e = 0.5", 'e = 0.5\n"\\u001b]0;" = 1',
-     ['x.toml:5: sweep."\\x1b]0;": unknown key; ' "known: K, R1, R2, alpha, cases, e, m1, m2, material, material1, material2, n, v1, v2, zip"]),
+     ['x.toml:5: sweep."\\x1b]0;": unknown key; ' "known: K, R1, R2, alpha, cases, dt, e, m1, m2, material, material1, material2, n, phase, steps_per_contact, v1, v2, zip"]),
 ]  # fmt: skip
 
 
@@ -420,17 +420,18 @@ def test_every_option_of_the_starter_works() -> None:
     assert len(shown) > 15
     # options that exclude each other or existing keys are tested one at a time
     alone = {"alpha": "e", "material1": "material", "m2": "m2", "K": "", "zip": "m1 =", "R2": ""}
+    alone["dt"] = "steps_per_contact"
     rest = text
     for line in shown:
         if line.split(" = ")[0] not in (*alone, "material2"):
             rest = rest.replace(f"# {line}\n", f"{line}\n", 1)
     config = read_config_text(rest)
-    assert config.solver == Solver(1e-10, 10_000)
+    assert config.solver == Solver(1e-10, 10_000, integrator="kick-drift")
     assert set(config.materials) == {"table1", "steel"}
     assert config.output == Output(("v1_post", "v2_post", "e_out", "status"), "float32", "gzip", {"e": 50}, "full")
     # without e as an axis there is nothing to cut along it
     rest = re.sub(r"^chunks = .*\n", "", rest, flags=re.MULTILINE)
-    one_by_one = [line for line in shown if line.split(" = ")[0] in ("alpha", "m2", "K", "R2")]
+    one_by_one = [line for line in shown if line.split(" = ")[0] in ("alpha", "m2", "K", "R2", "dt")]
     for line in one_by_one:
         key = line.split(" = ")[0]
         without = re.sub(rf"^({alone[key] or key}) = .*\n", "", rest, flags=re.MULTILINE)

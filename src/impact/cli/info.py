@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 SHOWN_ATTRIBUTES = (
     "rtol",
+    "integrator",
     "materials",
     "impact_version",
     "schema_version",

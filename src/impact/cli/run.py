@@ -70,7 +70,7 @@ def run(
         raise typer.Exit(exits.EXIT_POINTS_FAILED)
     if history is not None:
         if impact.history is None:
-            raise UsageError(f"no history to store: {impact.status.meaning}")
+            raise UsageError(f"no history to store: {impact.why_no_history}")
         api.save(impact.history, history, overwrite=overwrite)
         exits.print_line(f"{safe_text(str(history))}: {impact.history.sizes['t']} points in time")
 
@@ -81,6 +81,7 @@ def run_json(impact: Impact) -> dict[str, Any]:
         "model": impact.model.key,
         "inputs": dict(impact.point),
         "first_value_of": list(impact.first),
+        "integrator": impact.integrator,
         "exponent": impact.exponent,
         "closing_speed": impact.closing_speed,
         "outputs": {**impact.values, "status": impact.status.name.lower()},
@@ -96,6 +97,7 @@ def run_json(impact: Impact) -> dict[str, Any]:
 def print_run(impact: Impact) -> None:
     """Print one impact: inputs, outputs, the three restitutions and estimated errors."""
     from ..config.tables import MATERIAL_QUANTITIES
+    from ..contact.timestep import EXACT
     from ..results.schema import SCHEMA, plain_unit
     from ..results.single_impact import DERIVED_QUANTITIES
 
@@ -123,6 +125,8 @@ def print_run(impact: Impact) -> None:
     rows["e_energetic"] = quantity(impact.e_energetic, "1", 12) + "  (3), the root of -W_r/W_c"
     rows["in the stated domain"] = "yes" if impact.values["in_domain"] else f"no: {impact.model.domain_text}"
     rows["steps"] = impact.values["steps"]
+    if impact.integrator != EXACT:
+        rows["integrator"] = impact.integrator
     print_rows(rows)
 
 

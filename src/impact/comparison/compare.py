@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from ..contact.timestep import EXACT
 from ..errors import UsageError
 from ..formatting import number
 from ..results.attributes import read_attribute
@@ -179,8 +180,9 @@ def _unit_faults(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
 def _attribute_notes(new: xr.Dataset, baseline: xr.Dataset) -> list[str]:
     """Differences between attributes, which may explain differences between values."""
     notes = []
-    for name in ("rtol", "max_steps", "impact_version"):
-        a, b = (dataset.attrs.get(name) for dataset in (new, baseline))
+    # results of the continuous law have no attribute `integrator`
+    for name, default in (("rtol", None), ("max_steps", None), ("integrator", EXACT), ("impact_version", None)):
+        a, b = (dataset.attrs.get(name, default) for dataset in (new, baseline))
         if not _attributes_equal(a, b):
             notes.append(safe_text(f"{name} is {a}, in BASELINE {b}", 400))
     for name in ("packages", "plugins"):

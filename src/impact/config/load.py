@@ -17,6 +17,7 @@ from ..contact.model import ForceModel
 from ..contact.models import catalogue
 from ..contact.numba.dispatch import is_installed
 from ..contact.outputs import BY_DEFAULT
+from ..contact.timestep import EXACT
 from ..errors import ConfigError
 from .cases import expand_cases, inline_files
 from .files import (
@@ -36,6 +37,7 @@ from .quantities import Column, ConfigProblem, KeyPath, Names, Numbers, Table, V
 from .rules import RawConfig, listed_names, rule_problems
 from .tables import (
     DEFAULT_RTOL,
+    FIXED_STEP_DEFAULTS,
     MATERIAL_KEYS,
     SWEEP_DEFAULTS,
     SWEEP_QUANTITIES,
@@ -188,7 +190,10 @@ class _Reader:
         sweep, parameters = as_table(data.get("sweep")), as_table(data.get("model"))
         n = read_exponent(sweep)
         models, _ = expand_models(data.get("models"), self.models)
-        raw = RawConfig(sweep, as_table(data.get("materials")), parameters, models, data.get("models"), n)
+        integrator = as_table(data.get("solver")).get("integrator", EXACT)
+        raw = RawConfig(
+            sweep, as_table(data.get("materials")), parameters, models, data.get("models"), n, integrator
+        )
         context = ValidationContext(n, tuple({**raw.materials, **library()}), self.models)
         document, invalid_values = self._validate(data, context)
         problems += invalid_values
@@ -217,7 +222,8 @@ class _Reader:
             problems += _settings_problems(document, grid.axes, len(models))
         if problems:
             return None, _locate_in_cases(problems, cases)
-        defaults = SWEEP_DEFAULTS | {
+        fixed_step_defaults = {} if document.solver.integrator == EXACT else FIXED_STEP_DEFAULTS
+        defaults = {**SWEEP_DEFAULTS, **fixed_step_defaults} | {
             f"{model.key}.{parameter.name}": parameter.default
             for model in models
             for parameter in model.parameters

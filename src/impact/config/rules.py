@@ -11,9 +11,10 @@ from ..contact.formula import argument_names
 from ..contact.materials import hertz_stiffness
 from ..contact.model import ForceModel, with_base_quantities
 from ..contact.scaling import required_quantities
+from ..contact.timestep import EXACT, SCHEMES
 from .files import as_table
 from .quantities import ConfigProblem
-from .tables import MATERIAL_QUANTITIES, SWEEP_QUANTITIES, model_quantities
+from .tables import FIXED_STEP_INPUTS, MATERIAL_QUANTITIES, SWEEP_QUANTITIES, model_quantities
 
 
 def listed_names(value: object) -> list[str]:
@@ -31,6 +32,7 @@ class RawConfig:
     models : the selected models
     selection : the value of the key `models`
     n : the exponent of the sweep; None where it is an axis, NaN where it is unknown
+    integrator : of [solver], which may be invalid
     """
 
     sweep: Mapping[str, Any]
@@ -39,6 +41,7 @@ class RawConfig:
     models: Sequence[ForceModel]
     selection: object
     n: float | None
+    integrator: object
 
     @property
     def names(self) -> list[str]:
@@ -89,6 +92,7 @@ def rule_problems(raw: RawConfig) -> Iterator[ConfigProblem]:
     yield from _mass_problems(raw)
     yield from _radius_problems(raw)
     yield from _parameter_problems(raw)
+    yield from _fixed_step_problems(raw)
 
 
 def _velocity_problems(raw: RawConfig) -> Iterable[ConfigProblem]:
@@ -210,6 +214,26 @@ def _parameter_problems(raw: RawConfig) -> Iterable[ConfigProblem]:
                 expected = model_quantities(model)[parameter.name].expected
                 about = f"missing, expected {expected}: {parameter.meaning}{raw.exclusion_hint(model)}"
                 yield ("model", model.key, parameter.name), about
+
+
+def _fixed_step_problems(raw: RawConfig) -> Iterable[ConfigProblem]:
+    """A scheme has one fixed step, given in either of two ways; the continuous law has none."""
+    if raw.integrator == EXACT:
+        for name in FIXED_STEP_INPUTS:
+            if name in raw.sweep:
+                expected = f'solver.integrator = "{next(iter(SCHEMES))}" as well'
+                yield (
+                    ("sweep", name),
+                    f'set with solver.integrator = "{EXACT}", which has no fixed step, expected {expected}',
+                )
+    elif raw.integrator in SCHEMES:
+        given = [name for name in ("steps_per_contact", "dt") if name in raw.sweep]
+        if len(given) == 2:
+            yield ("sweep", "dt"), "set together with steps_per_contact, expected one of the two"
+        elif not given:
+            quantity = SWEEP_QUANTITIES["steps_per_contact"]
+            about = f"missing, expected {quantity.expected}: {quantity.meaning}; or dt"
+            yield ("sweep", "steps_per_contact"), about
 
 
 def _stiffness_arguments(model: ForceModel) -> frozenset[str]:

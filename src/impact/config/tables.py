@@ -23,6 +23,7 @@ from pydantic_core import PydanticCustomError
 from ..contact.model import ForceModel
 from ..contact.models import built_in, catalogue
 from ..contact.outputs import OUTPUTS
+from ..contact.timestep import EXACT, MAX_STEPS_PER_CONTACT, SCHEMES
 from .quantities import (
     MAX_AXIS_VALUES,
     MAX_PROBLEMS,
@@ -52,6 +53,7 @@ DEFAULT_TITLE = "Impact sweep"
 DEFAULT_RTOL = 1e-10
 MAX_SOLVER_STEPS = 10**9
 CORES = ("auto", "numpy", "numba")
+INTEGRATORS = (EXACT, *SCHEMES)
 MODELS_EXPECTED = 'a model, or a list of models; "all" are all'
 
 
@@ -96,6 +98,16 @@ class Sweep(Table):
     R2: Annotated[Numbers | None, Quantity("m", "radius of ball 2", 0, above=True, infinite=True)] = None
     K: Annotated[Numbers | None, Quantity("N/m^n", "stiffness of the contact, F = K x^n", 0, above=True)] = None
     n: Annotated[Numbers, Quantity("1", "compliance exponent", least=1, most=10)] = 1.5
+    steps_per_contact: Annotated[
+        Numbers | None,
+        Quantity(
+            "1", "contact time of the continuous law over the fixed step", 0, MAX_STEPS_PER_CONTACT, above=True
+        ),
+    ] = None
+    dt: Annotated[Numbers | None, Quantity("s", "fixed time step", 0, above=True)] = None
+    phase: Annotated[
+        Numbers | None, Quantity("1", "part of the first step in which the balls touch", 0, 1, above=True)
+    ] = None
     material: Annotated[Names | None, MATERIAL_NAME] = Field(None, description="material of both balls")
     material1: Annotated[Names | None, MATERIAL_NAME] = Field(None, description="material of ball 1")
     material2: Annotated[Names | None, MATERIAL_NAME] = Field(None, description="material of ball 2")
@@ -131,6 +143,9 @@ MATERIAL_KEYS = {
     name: str(Sweep.model_fields[name].description) for name in ("material", "material1", "material2")
 }
 SWEEP_DEFAULTS = {name: float(Sweep.model_fields[name].default) for name in ("v2", "n")}
+# inputs of an integrator with a fixed step only, and their defaults
+FIXED_STEP_INPUTS = ("steps_per_contact", "dt", "phase")
+FIXED_STEP_DEFAULTS = {"phase": 0.5}
 # K of a model with a fixed exponent
 LAW_STIFFNESS = Quantity("N/m^n", "stiffness of this law, in place of the sweep's", 0, above=True)
 
@@ -145,6 +160,7 @@ class Solver:
     max_steps : steps that one impact may take
     collapse : integrate impacts that are the same in the contact's own units once; changes no bit
     core : "numpy"; "numba", which compiles what it can; or "auto", depending on the number of trajectories
+    integrator : "exact", the continuous law with error control; or a scheme with a fixed step
     """
 
     rtol: Annotated[float, Quantity("1", "relative tolerance of the integration", 1e-13, 1e-4)] = DEFAULT_RTOL
@@ -157,6 +173,11 @@ class Solver:
     core: Annotated[str, ReadAs(Literal[CORES]), Field(description="NumPy, numba where it can, or the faster")] = (
         "auto"
     )
+    integrator: Annotated[
+        Annotated[str, ReadAs(Literal[INTEGRATORS])],
+        known_name("an integrator", lambda info: INTEGRATORS),
+        Field(description="the continuous law with error control, or a scheme with a fixed step"),
+    ] = EXACT
 
 
 OutputVariable = Annotated[Literal[*OUTPUTS], known_name("a variable of the result", lambda info: OUTPUTS)]  # type: ignore[valid-type]

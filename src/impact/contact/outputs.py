@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from .powers import all_within
 from .scaling import dimensionless_values
 from .simulate import CollisionResult, simulate
 from .status import FIRST_FAILURE, LIMIT, NO_IMPACT, STATUS_OK
+from .timestep import EXACT
 
 Outputs = dict[str, NDArray[Any]]
 InSI = Callable[[Array, Array], Array]
@@ -90,6 +91,8 @@ def collide(
     max_steps: int,
     collapse: bool = True,
     core: str = "numpy",
+    integrator: str = EXACT,
+    fixed_step: Mapping[str, Array] | None = None,
     errors: dict[str, str] | None = None,
     names: Iterable[str] = OUTPUTS,
 ) -> Outputs:
@@ -103,6 +106,10 @@ def collide(
     max_steps : attempted steps per phase after which an impact fails
     collapse : integrate impacts that are equal in the contact's own units once; changes no bit of the results
     core : "numpy", or "numba" for the laws that it compiles; the results agree within the tolerance
+    integrator : "exact", the continuous law with error control; or a scheme with a fixed step, one of
+        `impact.contact.timestep.SCHEMES`
+    fixed_step : the phase and the step of a scheme by name, see `impact.contact.simulate.simulate`, each of shape
+        (n,)
     errors : receives a line for each distinct error that the law raised, see `impact.contact.formula.explained`
     names : names of the outputs
 
@@ -112,6 +119,7 @@ def collide(
     """
     with np.errstate(all="ignore"):
         values, checked = dimensionless_values(model, impacts), check_inputs(model, impacts)
+    values |= fixed_step or {}
     result = simulate(
         model,
         impacts.n,
@@ -121,6 +129,7 @@ def collide(
         max_steps=max_steps,
         collapse=collapse,
         core=core,
+        integrator=integrator,
         errors=errors,
     )
     return outputs(model, impacts, result, names, checked)

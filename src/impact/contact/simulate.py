@@ -22,6 +22,7 @@ from .piecewise import in_parts
 from .powers import distinct_values
 from .scaling import LawValues, chi_of, exact_restitution, with_coefficients, with_units
 from .status import LIMIT, STATUS_OK, Status
+from .timestep import EXACT, MAX_CONTACTS, MAX_RESTITUTION, FixedStepResult, collide_at_fixed_step
 from .velocity_coordinates import VelocityCoordinate, is_strong
 
 # the status that belongs to each termination, by its number; no trajectory ends running
@@ -31,6 +32,12 @@ STATUS_OF_TERMINATION[Termination.EVENT_UNREACHABLE] = Status.NOT_SEPARATED
 STATUS_OF_TERMINATION[Termination.MAX_STEPS] = Status.MAX_STEPS
 STATUS_OF_TERMINATION[Termination.STEP_UNDERFLOW] = Status.STEP_UNDERFLOW
 STATUS_OF_TERMINATION[Termination.NOT_FINITE] = Status.NOT_FINITE
+
+# names of the values of a fixed step, which no value of a law has: steps in the contact time of the continuous
+# law, or the step in the contact's unit of time; and the phase
+STEPS_PER_CONTACT, STEP, PHASE = "sweep.steps_per_contact", "sweep.dt", "sweep.phase"
+# the contact time of a linear spring, in the contact's unit of time
+LINEAR_CONTACT_TIME = np.pi
 
 # positions of impacts; a slice for all of them, so that nothing is copied
 Positions = NDArray[np.intp] | slice
@@ -104,6 +111,8 @@ class CollisionResult:
         return CollisionResult(**{field.name: getattr(self, field.name)[where] for field in fields(self)})
 
 
+# integrates impacts with the same n: the model, n, the values and the number of impacts, and `collapse`
+SimulatePart = Callable[..., CollisionResult]
 # columns of the trajectory table
 TABLE_COLUMNS = tuple(field.name for field in fields(CollisionResult))
 
@@ -121,6 +130,10 @@ class RecordedCollision:
     params: Params
 
 
+# integrates distinct impacts through both phases, see `integrate_phases`
+IntegrateBoth = Callable[..., RecordedCollision]
+
+
 def simulate(
     model: ForceModel,
     n: Array,
@@ -131,6 +144,7 @@ def simulate(
     max_steps: int,
     collapse: bool = True,
     core: str = "numpy",
+    integrator: str = EXACT,
     errors: dict[str, str] | None = None,
 ) -> CollisionResult:
     """Integrate impacts by the law of a model.
@@ -139,9 +153,10 @@ def simulate(
     ----------
     model : the law
     n : compliance exponents, shape (k,)
-    values : `dimensionless_values` of the impacts, by name, each of shape (k,)
+    values : `dimensionless_values` of the impacts, by name, each of shape (k,); for a scheme also `PHASE`, and one
+        of `STEPS_PER_CONTACT` and `STEP`
     status : status by `check_inputs`, shape (k,); impacts that are not OK are not integrated
-    rtol, max_steps, collapse, core, errors : see `impact.contact.outputs.collide`
+    rtol, max_steps, collapse, core, integrator, errors : see `impact.contact.outputs.collide`
 
     Returns
     -------
@@ -149,6 +164,9 @@ def simulate(
     """
     parts: list[tuple[Positions, CollisionResult]] = []
     integrate_both = partial(integrate_phases, rtol=rtol, max_steps=max_steps, core=core)
+    simulate_part: SimulatePart = partial(_simulate_distinct, integrate_both=integrate_both)
+    if integrator != EXACT:
+        simulate_part = partial(_simulate_fixed_steps, integrate_both=integrate_both, max_steps=max_steps)
     errors = {} if errors is None else errors
     with np.errstate(all="ignore"):
         for exponent in distinct_values(n):
@@ -157,7 +175,7 @@ def simulate(
             if count:
                 chosen_values = _values_at(values, where)
                 part = _isolate_failures(
-                    model, float(exponent), chosen_values, count, integrate_both, collapse, errors
+                    model, float(exponent), chosen_values, count, simulate_part, collapse, errors
                 )
                 parts.append((where, part))
     return CollisionResult.joined(n.size, status, parts)
@@ -172,7 +190,7 @@ def _isolate_failures(
     n: float,
     values: ValueArrays,
     count: int,
-    integrate_both: Callable[..., RecordedCollision],
+    simulate_part: SimulatePart,
     collapse: bool,
     errors: dict[str, str],
 ) -> CollisionResult:
@@ -184,8 +202,8 @@ def _isolate_failures(
     try:
         if count == 1:
             twice = _values_at(values, np.array([0, 0]))
-            return _simulate_distinct(model, n, twice, 2, integrate_both, collapse=False).take(np.array([0]))
-        return _simulate_distinct(model, n, values, count, integrate_both, collapse)
+            return simulate_part(model, n, twice, 2, collapse=False).take(np.array([0]))
+        return simulate_part(model, n, values, count, collapse=collapse)
     except ModelError as error:
         result = CollisionResult.blank(count)
         if count == 1:
@@ -194,7 +212,7 @@ def _isolate_failures(
             return result
         for half in np.array_split(np.arange(count), 2):
             part = _isolate_failures(
-                model, n, _values_at(values, half), half.size, integrate_both, collapse, errors
+                model, n, _values_at(values, half), half.size, simulate_part, collapse, errors
             )
             result.put(half, part)
         return result
@@ -205,7 +223,8 @@ def _simulate_distinct(
     n: float,
     values: ValueArrays,
     count: int,
-    integrate_both: Callable[..., RecordedCollision],
+    *,
+    integrate_both: IntegrateBoth,
     collapse: bool,
 ) -> CollisionResult:
     """Integrate each distinct dimensionless problem once, those with strong damping in their own coordinate."""
@@ -233,6 +252,104 @@ def _simulate_distinct(
         for array in (result.e_out, result.peak, result.permanent):
             array[stopped] = 0.0
     return result
+
+
+def _simulate_fixed_steps(
+    model: ForceModel,
+    n: float,
+    values: ValueArrays,
+    count: int,
+    *,
+    integrate_both: IntegrateBoth,
+    collapse: bool,
+    max_steps: int,
+) -> CollisionResult:
+    """Integrate each distinct dimensionless problem at its fixed step once."""
+    if collapse:
+        first, row_of_impact = deduplicate([values[name] for name in sorted(values)], (count,))
+        if first.size < count:
+            distinct = _collide_at_fixed_steps(
+                model, n, _values_at(values, first), first.size, integrate_both, collapse, max_steps
+            )
+            return distinct.take(row_of_impact)
+    return _collide_at_fixed_steps(model, n, values, count, integrate_both, collapse, max_steps)
+
+
+def _collide_at_fixed_steps(
+    model: ForceModel,
+    n: float,
+    values: ValueArrays,
+    count: int,
+    integrate_both: IntegrateBoth,
+    collapse: bool,
+    max_steps: int,
+) -> CollisionResult:
+    """Integrate impacts at a fixed step; if it is a part of the contact time, the continuous law comes first."""
+    of_law = {name: array for name, array in values.items() if name not in (STEPS_PER_CONTACT, STEP, PHASE)}
+
+    def contact_times(where: Positions, size: int) -> tuple[Array, NDArray[np.int8]]:
+        """The contact times of the continuous law, and statuses that are OK where there is one."""
+        continuous = _simulate_distinct(
+            model, n, _values_at(of_law, where), size, integrate_both=integrate_both, collapse=collapse
+        )
+        never_ends = continuous.status == LIMIT
+        return continuous.contact_time, np.where(never_ends, np.int8(Status.NOT_SEPARATED), continuous.status)
+
+    law_values = with_coefficients(model, with_units(of_law, n), count)
+    status = _check_coefficients(model, law_values, of_law, count)
+    status[status == LIMIT] = Status.OK
+    if STEPS_PER_CONTACT in values:
+        times, status = contact_times(slice(None), count)
+        step = times / values[STEPS_PER_CONTACT]
+    else:
+        times, step = np.full(count, LINEAR_CONTACT_TIME), values[STEP]
+    result = replace(
+        CollisionResult.blank(count),
+        status=status,
+        chi=chi_of(law_values, count),
+        exact=exact_restitution(model, law_values, count),
+    )
+
+    def collide(where: NDArray[np.intp]) -> None:
+        # at least the contacts of one step
+        limits = np.ceil(MAX_CONTACTS * np.maximum(times[where] / step[where], 1.0))
+        limits = np.fmin(limits, max_steps).astype(np.int64)
+        fixed = collide_at_fixed_step(
+            model, n, _values_at(of_law, where), step[where], values[PHASE][where], limits
+        )
+        _put_fixed_steps(result, where, fixed, step[where], limits >= max_steps)
+
+    going = np.flatnonzero(status == STATUS_OK)
+    if going.size:
+        collide(going)
+    if STEP in values:
+        # the contact time is needed only where the balls do not separate within many of those of a linear spring
+        unfinished = np.flatnonzero(result.status == Status.NOT_SEPARATED)
+        if unfinished.size:
+            longer, has_time = contact_times(unfinished, unfinished.size)
+            is_longer = (has_time == STATUS_OK) & (longer > LINEAR_CONTACT_TIME)
+            times[unfinished] = longer
+            if is_longer.any():
+                collide(unfinished[is_longer])
+    return result
+
+
+def _put_fixed_steps(
+    result: CollisionResult,
+    where: NDArray[np.intp],
+    fixed: FixedStepResult,
+    step: Array,
+    is_limited: NDArray[np.bool_],
+) -> None:
+    """Write collisions at a fixed step to their positions; `is_limited` where the user limits the steps."""
+    unfinished = np.where(is_limited, np.int8(Status.MAX_STEPS), np.int8(Status.NOT_SEPARATED))
+    status = np.where(fixed.status == Status.NOT_SEPARATED, unfinished, fixed.status)
+    is_unstable = (status == STATUS_OK) & (fixed.e_out > MAX_RESTITUTION)
+    result.status[where] = np.where(is_unstable, np.int8(Status.UNSTABLE), status)
+    result.e_out[where] = np.where(is_unstable, np.nan, fixed.e_out)
+    for name in ("peak", "permanent", "force", "approach_work", "restitution_work", "steps"):
+        getattr(result, name)[where] = getattr(fixed, name)
+    result.contact_time[where] = fixed.steps * step
 
 
 def _check_coefficients(

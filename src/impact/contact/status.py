@@ -18,6 +18,7 @@ class Status(IntEnum):
     INVALID_PARAMETER = 14
     OUT_OF_RANGE = 15
     MODEL_ERROR = 16
+    UNSTABLE = 17
 
     @property
     def meaning(self) -> str:
@@ -35,6 +36,7 @@ MEANINGS = {
     Status.INVALID_PARAMETER: "a value that arises here is out of its range, such as e = 1 - alpha v0 below 0",
     Status.OUT_OF_RANGE: "a derived quantity is not finite, such as K of two planes or m of two walls",
     Status.MODEL_ERROR: "the force raised an error or returned the wrong shape",
+    Status.UNSTABLE: "the step is too long for the scheme: the balls rebound faster than twice their approach",
 }
 STATUSES = tuple(map(int, Status))
 # an array is compared with a plain number eight times as fast as with a member of an enum

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..array_types import Array
+from ..errors import ModelError
 from .formula import Formula, argument_names
 from .model import ForceModel
 from .motion import MotionLaw, force_at_peak, indentation, unloading_state
@@ -16,6 +18,8 @@ from .powers import power
 from .scaling import with_coefficients, with_units
 from .status import Status
 
+# the integration of the continuous law with error control; all other integrators are schemes with a fixed step
+EXACT = "exact"
 # the update of one step, by the name of the scheme
 KICK_DRIFT = "kick-drift"
 SCHEMES = {
@@ -24,6 +28,13 @@ SCHEMES = {
 }
 # a contact that takes more steps, in units of its steps at the continuous contact time, never ends
 MAX_CONTACTS = 50
+# more steps per contact are refused
+MAX_STEPS_PER_CONTACT = 2**17
+# A rebound faster than this, relative to the approach, is a failure of the step. For a linear spring of frequency
+# omega the kick-drift step conserves u^2 - h omega^2 x u + omega^2 x^2. It is v0^2 (1 - s (1 - s) h^2 omega^2) <=
+# v0^2 at the first step that sees the contact, and at the step that ends it at least e^2 v0^2 (1 - h^2 omega^2/4):
+# thus e^2 <= 1/(1 - h^2 omega^2/4), which is 4 at h omega = sqrt(3); from h omega = 2 on there is no bound
+MAX_RESTITUTION = 2.0
 # trajectories that have ended are removed when they are this share
 COMPACTION_SHARE = 0.25
 
@@ -32,18 +43,25 @@ COMPACTION_SHARE = 0.25
 class FixedStepResult:
     """Collisions at a fixed step, in the contact's own units; arrays of shape (n,).
 
-    `e_out` is NaN for a collision that fails, `peak` the largest indentation at the end of a step, `steps` the
-    number of steps, `status` a `Status`.
+    `e_out` is NaN for a collision that fails, `peak` the largest indentation at the end of a step, `permanent` the
+    residual indentation of the law, `force` the largest force before a step, `steps` the number of steps, `status`
+    a `Status`. `approach_work` and `restitution_work` are twice the works done against the force of the law while
+    the indentation grows and falls, by the trapezoidal rule over the ends of the steps, from the first touch to
+    the end of the contact, which are inside a step.
     """
 
     e_out: Array
     peak: Array
+    permanent: Array
+    force: Array
+    approach_work: Array
+    restitution_work: Array
     steps: NDArray[np.int32]
     status: NDArray[np.int8]
 
 
 def collide_at_fixed_step(
-    model: ForceModel, n: float, values: Mapping[str, Array], step: Array, phase: Array, max_steps: int
+    model: ForceModel, n: float, values: Mapping[str, Array], step: Array, phase: Array, max_steps: int | Array
 ) -> FixedStepResult:
     """Collisions by the scheme "kick-drift".
 
@@ -59,26 +77,38 @@ def collide_at_fixed_step(
     values : `impact.contact.scaling.dimensionless_values`, each of shape (k,)
     step : time step, in the contact's own unit of time, shape (k,)
     phase : where in its step the contact begins, 0 < phase <= 1, shape (k,)
-    max_steps : steps that a collision may take
+    max_steps : steps that a collision may take, for all or of shape (k,); one that takes more never separates
 
     Returns
     -------
     FixedStepResult : arrays of shape (k,)
+
+    Raises
+    ------
+    ModelError : a formula of the law fails, or returns an array of another shape
     """
     count = step.size
     law = MotionLaw.of(model, n, strong=False)
     with np.errstate(all="ignore"):
         law_values = with_coefficients(model, with_units(values, n), count)
         params = tuple(np.broadcast_to(law_values[name], count).copy() for name in law.names)
-        return _run(_Contacts(law, params, step.copy(), phase * step, np.ones(count)), max_steps)
+        limit = np.broadcast_to(np.asarray(max_steps, np.int64), count).copy()
+        return _run(_Contacts(law, params, step.copy(), phase * step, np.ones(count), limit))
 
 
 class _Contacts:
     """The collisions that go on; arrays of shape (n,), of which those that have ended are removed."""
 
-    def __init__(self, law: MotionLaw, params: tuple[Array, ...], step: Array, x: Array, u: Array) -> None:
-        self.law, self.params, self.step, self.x, self.u = law, params, step, x, u
+    def __init__(
+        self, law: MotionLaw, params: tuple[Array, ...], step: Array, x: Array, u: Array, limit: NDArray[np.int64]
+    ) -> None:
+        self.law, self.params, self.step, self.x, self.u, self.limit = law, params, step, x, u, limit
         self.peak, self.residual = x.copy(), np.zeros_like(x)
+        self.largest_force = np.full_like(x, -np.inf)
+        # the force before the last step, the displacement in it, and its growing part
+        self.last_force, self.moved, self.moved_in = np.zeros_like(x), x.copy(), x.copy()
+        # twice the work against the force, and its part while the indentation grows
+        self.work, self.approach_work = np.zeros_like(x), np.zeros_like(x)
         self.rows = np.arange(x.size)
         self.unloads = np.zeros(x.size, bool)
         # what the unloading branch needs besides the law's own params
@@ -103,23 +133,54 @@ class _Contacts:
             force = np.where(self.unloads, self._formula(unloading, self.params, extra), force)
         return np.maximum(force, 0.0) if law.model.release == "force" else force
 
+    def force_at(self, x: Array) -> Array:
+        """The force at other positions, zero where the law has no finite one."""
+        other = copy(self)
+        other.x = x
+        force = other.force()
+        return np.where(np.isfinite(force), force, 0.0)
+
+    def begin_work(self) -> None:
+        """Add the work between the first touch and the first step, half of it of the force at the touch."""
+        self.work += self.force_at(np.zeros_like(self.x)) * self.x
+        self.approach_work += self.work
+
+    def restitution_work(self) -> Array:
+        """Twice the work while the indentation falls, of contacts that end in this step, inside it."""
+        out = self.residual - (self.x - self.moved)
+        beyond = self.last_force * (out - self.moved) + self.force_at(self.residual) * out
+        return self.work - self.approach_work + beyond
+
     def _formula(self, formula: Formula, params: tuple[Array, ...], extra: Mapping[str, Array]) -> Array:
         names = argument_names(formula)
         arguments: dict[str, Array] = {"x": self.x, "v": self.u, **extra}
         if "elastic" in names:
             arguments["elastic"] = power(np.maximum(self.x, 0.0), self.law.n)
         value = self.law.call(formula, params, arguments)
+        if value.shape not in ((), self.x.shape):
+            raise ModelError(f"{self.law.model.key}: the force has shape {value.shape}, expected {self.x.shape}")
         return np.broadcast_to(value, self.x.shape)
 
     def advance(self) -> None:
         """One step of all collisions."""
-        self.u = self.u - self.step * self.force()
-        self.x = self.x + self.step * self.u
+        force = self.force()
+        self.u = self.u - self.step * force
+        moved = self.step * self.u
+        self.x = self.x + moved
+        self._add_work(force, moved)
         np.maximum(self.peak, self.x, out=self.peak)
         if self.law.model.unloading is not None:
             turned = ~self.unloads & (self.u <= 0.0)
             if turned.any():
                 self._turn(turned)
+
+    def _add_work(self, force: Array, moved: Array) -> None:
+        """Add the work of the force before a step: half of it in the step before, half in the step itself."""
+        np.maximum(self.largest_force, force, out=self.largest_force)
+        moved_in = np.maximum(moved, 0.0)
+        self.work += force * (self.moved + moved)
+        self.approach_work += force * (self.moved_in + moved_in)
+        self.last_force, self.moved, self.moved_in = force, moved, moved_in
 
     def _turn(self, turned: NDArray[np.bool_]) -> None:
         """Begin the unloading branch of some collisions at the largest indentation that they reached."""
@@ -135,32 +196,63 @@ class _Contacts:
 
     def keep(self, going: NDArray[np.bool_]) -> None:
         """Remove the collisions that have ended."""
-        for name in ("step", "x", "u", "peak", "residual", "rows", "unloads"):
+        for name in KEPT_ARRAYS:
             setattr(self, name, getattr(self, name)[going])
         self.params = tuple(column[going] for column in self.params)
         self.branch = tuple(column[going] for column in self.branch)
 
 
-def _run(contacts: _Contacts, max_steps: int) -> FixedStepResult:
+# the arrays of `_Contacts` besides the params
+KEPT_ARRAYS = (
+    "step",
+    "x",
+    "u",
+    "limit",
+    "peak",
+    "residual",
+    "largest_force",
+    "last_force",
+    "moved",
+    "moved_in",
+    "work",
+    "approach_work",
+    "rows",
+    "unloads",
+)
+
+
+def _run(contacts: _Contacts) -> FixedStepResult:
     count = contacts.x.size
     result = FixedStepResult(
         e_out=np.full(count, np.nan),
         peak=np.full(count, np.nan),
-        steps=np.full(count, max_steps, np.int32),
+        permanent=np.full(count, np.nan),
+        force=np.full(count, np.nan),
+        approach_work=np.full(count, np.nan),
+        restitution_work=np.full(count, np.nan),
+        steps=contacts.limit.astype(np.int32),
         status=np.full(count, Status.NOT_SEPARATED, np.int8),
     )
     going = np.ones(count, bool)
-    for step in range(1, max_steps + 1):
+    contacts.begin_work()
+    for step in range(1, int(contacts.limit.max(initial=0)) + 1):
         contacts.advance()
         is_finite = np.isfinite(contacts.x) & np.isfinite(contacts.u)
         has_ended = going & ((contacts.x <= contacts.residual) | ~is_finite)
-        if has_ended.any():
-            rows, ended_well = contacts.rows[has_ended], is_finite[has_ended]
-            result.e_out[rows] = np.where(ended_well, -contacts.u[has_ended], np.nan)
-            result.peak[rows] = contacts.peak[has_ended]
+        is_over = has_ended | (contacts.limit <= step)
+        if is_over.any():
+            ended, ended_well = copy(contacts), is_finite[has_ended]
+            ended.keep(has_ended)
+            rows = ended.rows
+            result.e_out[rows] = np.where(ended_well, -ended.u, np.nan)
+            result.peak[rows] = ended.peak
+            result.permanent[rows] = ended.residual
+            result.force[rows] = ended.largest_force
+            result.approach_work[rows] = ended.approach_work
+            result.restitution_work[rows] = ended.restitution_work()
             result.steps[rows] = step
             result.status[rows] = np.where(ended_well, Status.OK, Status.NOT_FINITE)
-            going &= ~has_ended
+            going &= ~is_over
             if not going.any():
                 break
             if np.count_nonzero(going) < (1.0 - COMPACTION_SHARE) * going.size:

@@ -14,6 +14,7 @@ from ..contact.impacts import Impacts
 from ..contact.impacts import stiffness as hertz_or_secant
 from ..contact.materials import effective_mass, hertz_stiffness, sphere_mass, sphere_radius
 from ..contact.model import Law
+from ..contact.simulate import PHASE, STEP, STEPS_PER_CONTACT
 from ..errors import ModelError
 from .plan import Index, Inputs, dimensions
 
@@ -88,6 +89,18 @@ def build_impacts(inputs: Inputs, model: Law, index: Index, stiffness: Stiffness
     if K.shape not in ((), (math.prod(shape),)):
         raise ModelError(f"{model.key}: stiffness returned the shape {K.shape}, expected ({math.prod(shape)},)")
     return replace(impacts, K=np.broadcast_to(K, math.prod(shape)).reshape(shape))
+
+
+def fixed_steps_at(inputs: Inputs, impacts: Impacts, index: Index) -> dict[str, Array]:
+    """The fixed step and the phase of the impacts at cells, by the names of `simulate`; empty without a scheme."""
+    names = inputs.names()
+    if "phase" not in names:
+        return {}
+    phase = {PHASE: values_at(inputs, "phase", index)}
+    if "dt" not in names:
+        return {STEPS_PER_CONTACT: values_at(inputs, "steps_per_contact", index), **phase}
+    with np.errstate(all="ignore"):
+        return {STEP: values_at(inputs, "dt", index) / impacts.time, **phase}
 
 
 def values_at(inputs: Inputs, name: str, index: Index) -> Array:

@@ -17,6 +17,7 @@ from .._version import __version__
 from ..config.load import Axis, Config
 from ..contact.materials import Material
 from ..contact.model import ForceModel
+from ..contact.timestep import EXACT
 from .plugins import Plugins
 
 # values of a variable up to which layout "auto" stores a result in full; the smaller limit holds where values
@@ -217,7 +218,11 @@ class Plan:
             ],
             "materials": self.material_record,
             # without `collapse`, which changes no value
-            "solver": {"rtol": config.solver.rtol, "max_steps": config.solver.max_steps},
+            "solver": {
+                "rtol": config.solver.rtol,
+                "max_steps": config.solver.max_steps,
+                **({} if config.solver.integrator == EXACT else {"integrator": config.solver.integrator}),
+            },
             "plugins": self.plugins.hashes,
         }
 

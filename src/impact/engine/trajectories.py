@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..contact.deduplicate import deduplicate
-from ..contact.impacts import CHECKS, Impacts, check_inputs
+from ..contact.impacts import CHECKS, check_inputs
 from ..contact.model import ForceModel
 from ..contact.scaling import dimensionless_values, exponent_names
 from ..errors import UsageError
 from ..text import safe_text
-from .build_impacts import build_impacts
+from .build_impacts import build_impacts, fixed_steps_at
 from .plan import Index, Inputs, Plan, dimensions
 
 # cells up to which equal values are found in the whole plan; with more, only within a range of trajectories
@@ -28,8 +28,8 @@ MAX_CELLS = 2**22
 # trajectories integrated at a time: many, to amortise the interpreter's overhead, and few enough to stay in cache
 RANGE_TRAJECTORIES = 32768
 
-# the dimensionless problems of trajectories: the exponent `n`, the `status` after the checks of inputs, and the
-# arguments of the law by name
+# the dimensionless problems of trajectories: the exponent `n`, the `status` after the checks of inputs, and by
+# name the arguments of the law and the fixed step of a scheme
 Columns = dict[str, NDArray[Any]]
 
 
@@ -185,6 +185,7 @@ def columns_at(plan: Plan, model: ForceModel, axes: Sequence[int], index: Index)
             "n": impacts.n,
             "status": check_inputs(model, impacts, checks),
             **dimensionless_values(model, impacts),
+            **fixed_steps_at(plan.inputs, impacts, index),
         }
 
 
@@ -204,15 +205,17 @@ def axes_of_arrays(arrays: Iterable[NDArray[Any]]) -> frozenset[int]:
 
 
 def axes_of_law(inputs: Inputs, model: ForceModel) -> tuple[int, ...]:
-    """The axes on which the values of a law depend."""
-    impacts = _probe_impacts(inputs, model)
+    """The axes on which the values of a law and of its fixed step depend."""
+    index = _probe_index(inputs, model)
+    impacts = build_impacts(inputs, model, index)
     with np.errstate(all="ignore"):
-        return tuple(sorted(axes_of_arrays([impacts.n, *dimensionless_values(model, impacts).values()])))
+        values = dimensionless_values(model, impacts) | fixed_steps_at(inputs, impacts, index)
+        return tuple(sorted(axes_of_arrays([impacts.n, *values.values()])))
 
 
 def axes_of_checks(inputs: Inputs, model: ForceModel) -> Mapping[str, frozenset[int]]:
     """The axes on which each check of `check_inputs` depends."""
-    impacts = _probe_impacts(inputs, model)
+    impacts = build_impacts(inputs, model, _probe_index(inputs, model))
     with np.errstate(all="ignore"):
         checked_arrays = {
             "e": [impacts.e],
@@ -222,8 +225,8 @@ def axes_of_checks(inputs: Inputs, model: ForceModel) -> Mapping[str, frozenset[
     return {check: axes_of_arrays(checked_arrays[check]) for check in CHECKS}
 
 
-def _probe_impacts(inputs: Inputs, model: ForceModel) -> Impacts:
+def _probe_index(inputs: Inputs, model: ForceModel) -> Index:
     # an exponent of a unit may be zero at some values, where the unit drops out: all values of exponents are used
     names = exponent_names(model)
     exponents = {"n", *names, *(f"{model.key}.{name}" for name in names)}
-    return build_impacts(inputs, model, probe_index(inputs, exponents))
+    return probe_index(inputs, exponents)

@@ -16,6 +16,7 @@ from ..config.grid import Axis
 from ..config.load import Config, Output
 from ..contact.model import ForceModel, Parameter
 from ..contact.status import Status
+from ..contact.timestep import EXACT
 from ..contact.units import with_numbers
 from ..engine.build_impacts import build_impacts
 from ..engine.execute import never_stop
@@ -185,8 +186,9 @@ class _Problem:
             axes=(Axis(columns, numbered="trial"),),
             scalars={name: value for name, value in self.config.scalars.items() if name not in replaced},
             output=Output(layout="full"),
+            # the number of fixed steps of a scheme is no choice
             solver=replace(solver, rtol=max(solver.rtol, SCAN_RTOL), max_steps=SCAN_MAX_STEPS)
-            if is_scan
+            if is_scan and solver.integrator == EXACT
             else solver,
         )
         return Plan(config, self.plugins)

@@ -16,7 +16,7 @@ from ..contact.model import ForceModel
 from ..contact.outputs import collide
 from ..contact.scaling import dimensionless_values
 from ..contact.status import Status
-from ..contact.timestep import KICK_DRIFT, MAX_CONTACTS, collide_at_fixed_step
+from ..contact.timestep import KICK_DRIFT, MAX_CONTACTS, MAX_STEPS_PER_CONTACT, collide_at_fixed_step
 from ..engine.build_impacts import build_impacts
 from ..engine.plan import Plan
 from ..errors import UsageError
@@ -24,8 +24,6 @@ from ..formatting import number
 
 # steps per contact if none are given
 STEPS_PER_CONTACT = (10.0, 20.0, 50.0, 100.0)
-# more steps per contact are refused, and not tried in the search for the number of steps that are needed
-MAX_STEPS_PER_CONTACT = 2**17
 # values of e between which the one to ask for is searched; many laws take the logarithm of e
 LEAST_E, TRIED_E = 1e-6, 33
 # largest jump of the mean over the phases that is taken for a root

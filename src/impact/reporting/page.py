@@ -213,6 +213,7 @@ def _facts(dataset: xr.Dataset) -> list[tuple[str, str]]:
         "program": f"impact {attributes.get('impact_version', '')}",
         "packages": ", ".join(f"{name} {version}" for name, version in packages.items()),
         "solver": ", ".join(f"{name} {number(attributes[name])}" for name in settings if name in attributes),
+        "integrator": attributes.get("integrator", ""),
         "core": attributes.get("core", ""),
         "fingerprint": attributes.get("fingerprint", ""),
         "seal": dataset.encoding.get("seal") or "",

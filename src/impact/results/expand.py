@@ -21,6 +21,7 @@ from xarray.core import indexing
 
 from ..array_types import Array
 from ..config.grid import Axis
+from ..config.tables import FIXED_STEP_INPUTS
 from ..contact.impacts import CHECKS, Impacts, check_inputs
 from ..contact.model import Law
 from ..contact.outputs import Outputs, outputs
@@ -194,7 +195,7 @@ def checks_that_may_fail(inputs: Inputs, law: Law, stiffness: Stiffness | None =
     ends: dict[str, tuple[Any, ...]] = {"v1": tuple(speeds.tolist())}
     for axis in inputs.axes:
         for name, values in axis.columns.items():
-            if name not in ("v1", "v2", "e", "alpha") and owner_of(name) in ("", law.key):
+            if name not in ("v1", "v2", "e", "alpha", *FIXED_STEP_INPUTS) and owner_of(name) in ("", law.key):
                 is_text = isinstance(values[0], str)
                 ends[name] = tuple(sorted({*values})) if is_text else tuple({min(values), max(values)})
     if stiffness is not None or has_stiffness_rule(inputs, law):

@@ -21,6 +21,7 @@ from ..config.tables import MATERIAL_KEYS, MATERIAL_QUANTITIES, SWEEP_QUANTITIES
 from ..contact.materials import effective_mass
 from ..contact.outputs import BY_DEFAULT
 from ..contact.status import Status
+from ..contact.timestep import EXACT
 from ..engine.build_impacts import mass_at, restitution_at
 from ..engine.plan import Index, Inputs, Plan, is_foreign, is_own, material_property
 from ..formatting import number
@@ -387,6 +388,8 @@ def _provenance_attributes(plan: Plan) -> dict[str, object]:
         "rtol": config.solver.rtol,
         "max_steps": config.solver.max_steps,
         "core": config.solver.core,
+        # results of the continuous law have the attributes that they had before there were schemes
+        **({} if config.solver.integrator == EXACT else {"integrator": config.solver.integrator}),
         "impact_version": __version__,
         "packages": json.dumps({name: version(name) for name in RECORDED_PACKAGES}),
         "plugins": json.dumps(plan.plugins.record),

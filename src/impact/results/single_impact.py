@@ -17,7 +17,7 @@ from .._version import __version__
 from ..config.files import toml_text
 from ..config.grid import Axis, path_of
 from ..config.load import Config, parse_config, read_config
-from ..config.tables import SWEEP_QUANTITIES
+from ..config.tables import FIXED_STEP_INPUTS, SWEEP_QUANTITIES
 from ..contact.force_expressions import returning, stiffer
 from ..contact.history import History, follow
 from ..contact.impacts import Impacts
@@ -26,14 +26,15 @@ from ..contact.model import ForceModel
 from ..contact.models import find
 from ..contact.outputs import collide
 from ..contact.status import Status
-from ..engine.build_impacts import build_impacts
+from ..contact.timestep import EXACT
+from ..engine.build_impacts import build_impacts, fixed_steps_at
 from ..engine.plan import Plan, owner_of
 from ..engine.plugins import Plugins
 from ..errors import ConfigError, UsageError, did_you_mean
 from ..text import safe_text
 from .backend import open_result
 from .provenance import changed_plugins, check_plugins, stored_config, unknown_plugins
-from .schema import HISTORY_VARIABLES, SCHEMA_VERSION
+from .schema import HISTORY_VARIABLES, SCHEMA_VERSION, is_case, is_input
 from .seal import is_result
 
 STARTER_CONFIG = files("impact") / "config" / "starter.toml"
@@ -69,11 +70,13 @@ class Impact:
     values : the outputs under the names of the result file, in SI
     materials : those of the balls, by name
     derived : the quantities of DERIVED_QUANTITIES by name, in SI; NaN for those that do not apply
+    integrator : "exact", or the scheme with a fixed step, which gives no history
     exponent : compliance exponent n of the law
     closing_speed : v0 = v1 - v2 [m/s]
     damping : damping factor lambda = chi K/v0 [N s/m^(n+1)], NaN if the law has none
     e_kinematic, e_kinetic, e_energetic : restitution from velocities, impulses and works, equations (1) to (3);
-        the last two by quadrature of the force over the history, 0 if the balls stay together
+        the last two by quadrature of the force over the history; without a history those of the outputs, which
+        are 0 if the balls stay together
     history : the time history as a dataset over t, or None if the motion cannot be integrated
     """
 
@@ -83,6 +86,7 @@ class Impact:
     values: Mapping[str, float]
     materials: Mapping[str, Material]
     derived: Mapping[str, float]
+    integrator: str
     exponent: float
     closing_speed: float
     damping: float
@@ -94,6 +98,16 @@ class Impact:
     @property
     def status(self) -> Status:
         return Status(int(self.values["status"]))
+
+    @property
+    def why_no_history(self) -> str:
+        """Why there is no time history, for a message."""
+        return self.status.meaning if self.integrator == EXACT else no_motion(self.integrator)
+
+
+def no_motion(integrator: str) -> str:
+    """The reason why a scheme with a fixed step has no time history."""
+    return f'integrator = "{safe_text(integrator, 40)}" has no history, expected solver.integrator = "{EXACT}"'
 
 
 def run_single_impact(plan: Plan, first: tuple[str, ...], times: int | None = None) -> Impact:
@@ -110,18 +124,26 @@ def run_single_impact(plan: Plan, first: tuple[str, ...], times: int | None = No
     impacts = build_impacts(plan.inputs, law, ())
     solver = config.solver
     errors: dict[str, str] = {}
-    collision = collide(law, impacts, rtol=solver.rtol, max_steps=solver.max_steps, errors=errors)
+    collision = collide(
+        law,
+        impacts,
+        rtol=solver.rtol,
+        max_steps=solver.max_steps,
+        integrator=solver.integrator,
+        fixed_step=fixed_steps_at(plan.inputs, impacts, ()),
+        errors=errors,
+    )
     values = {name: array[0].item() for name, array in collision.items()}
     for error in errors.values():
         warnings.warn(error, stacklevel=2)
-    going = values["status"] == Status.OK
+    # a history is that of the continuous law
+    going = values["status"] == Status.OK and solver.integrator == EXACT
     history = follow(law, impacts, rtol=solver.rtol, max_steps=solver.max_steps, times=times) if going else None
     v0 = impacts.v0[0].item()
     # a law may have its own n, which replaces that of the config
     point = {**config.scalars, "n": impacts.n[0].item()}
     if "alpha" in config.scalars:
         point["e"] = impacts.e[0].item()
-    without_history = 0.0 if values["status"] == Status.LIMIT else math.nan
     return Impact(
         model=law,
         point=point,
@@ -129,12 +151,13 @@ def run_single_impact(plan: Plan, first: tuple[str, ...], times: int | None = No
         values=values,
         materials=plan.materials_used,
         derived=_derived_quantities(law, impacts, values, history),
+        integrator=solver.integrator,
         exponent=impacts.n[0].item(),
         closing_speed=v0,
         damping=values["lambda"],
         e_kinematic=(values["v2_post"] - values["v1_post"]) / v0 if v0 > 0.0 else float("nan"),
-        e_kinetic=history.e_kinetic if history else without_history,
-        e_energetic=history.e_energetic if history else without_history,
+        e_kinetic=history.e_kinetic if history else values["e_kinetic"],
+        e_energetic=history.e_energetic if history else values["e_energetic"],
         history=history_dataset(history, law.key, point) if history else None,
     )
 
@@ -214,6 +237,9 @@ def histories(
     for key in models or ():
         if key not in keys:
             raise UsageError(f'no model "{safe_text(key)}" in this result; {did_you_mean(key, keys)}')
+    integrator = str(dataset.attrs.get("integrator", EXACT))
+    if integrator != EXACT:
+        raise UsageError(f"no motion to draw in this result: {no_motion(integrator)}")
     check_plugins(dataset.attrs, plugins, "the result")
     for changed in changed_plugins(dataset.attrs, plugins, "the result"):
         # a changed law has another motion than the result
@@ -282,7 +308,18 @@ def single_point(
         if model is not None and name.startswith(f"{model}."):
             # a parameter without a default has no other value yet
             option_names[f"{_override_path(name)}={_toml_value(value)}"] = f"--at {name}={value}"
-    config = _read_with_option_names(read, option_names)
+    try:
+        config = _read_with_option_names(read, option_names)
+    except ConfigError:
+        for name in at:
+            if not is_input(name) and not is_case(name):
+                raise UsageError(
+                    f'no input "{safe_text(name)}" here; {did_you_mean(name, list(SWEEP_QUANTITIES))}'
+                ) from None
+        # a fixed step may be among the values of `at` only
+        fixed_step = {name: value for name, value in at.items() if name in FIXED_STEP_INPUTS}
+        option_names |= {f"{_override_path(k)}={_toml_value(v)}": f"--at {k}={v}" for k, v in fixed_step.items()}
+        config = _read_with_option_names(read, option_names)
     columns = [_selectable_columns(axis) for axis in config.axes]
     varied = {name for names in columns for name in names}
     if at and {"e", "alpha"} <= at.keys():
