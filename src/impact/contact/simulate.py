@@ -166,7 +166,10 @@ def simulate(
     integrate_both = partial(integrate_phases, rtol=rtol, max_steps=max_steps, core=core)
     simulate_part: SimulatePart = partial(_simulate_distinct, integrate_both=integrate_both)
     if integrator != EXACT:
-        simulate_part = partial(_simulate_fixed_steps, integrate_both=integrate_both, max_steps=max_steps)
+        collide_part = partial(
+            _collide_at_fixed_steps, scheme=integrator, integrate_both=integrate_both, max_steps=max_steps
+        )
+        simulate_part = partial(_simulate_fixed_steps, collide_part=collide_part)
     errors = {} if errors is None else errors
     with np.errstate(all="ignore"):
         for exponent in distinct_values(n):
@@ -260,19 +263,16 @@ def _simulate_fixed_steps(
     values: ValueArrays,
     count: int,
     *,
-    integrate_both: IntegrateBoth,
+    collide_part: SimulatePart,
     collapse: bool,
-    max_steps: int,
 ) -> CollisionResult:
     """Integrate each distinct dimensionless problem at its fixed step once."""
     if collapse:
         first, row_of_impact = deduplicate([values[name] for name in sorted(values)], (count,))
         if first.size < count:
-            distinct = _collide_at_fixed_steps(
-                model, n, _values_at(values, first), first.size, integrate_both, collapse, max_steps
-            )
+            distinct = collide_part(model, n, _values_at(values, first), first.size, collapse=collapse)
             return distinct.take(row_of_impact)
-    return _collide_at_fixed_steps(model, n, values, count, integrate_both, collapse, max_steps)
+    return collide_part(model, n, values, count, collapse=collapse)
 
 
 def _collide_at_fixed_steps(
@@ -280,6 +280,8 @@ def _collide_at_fixed_steps(
     n: float,
     values: ValueArrays,
     count: int,
+    *,
+    scheme: str,
     integrate_both: IntegrateBoth,
     collapse: bool,
     max_steps: int,
@@ -315,7 +317,7 @@ def _collide_at_fixed_steps(
         limits = np.ceil(MAX_CONTACTS * np.maximum(times[where] / step[where], 1.0))
         limits = np.fmin(limits, max_steps).astype(np.int64)
         fixed = collide_at_fixed_step(
-            model, n, _values_at(of_law, where), step[where], values[PHASE][where], limits
+            model, n, _values_at(of_law, where), step[where], values[PHASE][where], limits, scheme
         )
         _put_fixed_steps(result, where, fixed, step[where], limits >= max_steps)
 

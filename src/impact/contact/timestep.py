@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..array_types import Array
-from ..errors import ModelError
+from ..errors import ModelError, UsageError, did_you_mean
+from ..text import safe_text
 from .formula import Formula, argument_names
 from .model import ForceModel
 from .motion import MotionLaw, force_at_peak, indentation, unloading_state
@@ -61,9 +62,15 @@ class FixedStepResult:
 
 
 def collide_at_fixed_step(
-    model: ForceModel, n: float, values: Mapping[str, Array], step: Array, phase: Array, max_steps: int | Array
+    model: ForceModel,
+    n: float,
+    values: Mapping[str, Array],
+    step: Array,
+    phase: Array,
+    max_steps: int | Array,
+    scheme: str = KICK_DRIFT,
 ) -> FixedStepResult:
-    """Collisions by the scheme "kick-drift".
+    """Collisions by a scheme with a fixed step.
 
     The contact begins with the overlap `phase * step * v0` at the first step that sees it. The contact ends with
     the first step after which the surfaces do not overlap. The force of a law that ends at zero force is never
@@ -78,6 +85,7 @@ def collide_at_fixed_step(
     step : time step, in the contact's own unit of time, shape (k,)
     phase : where in its step the contact begins, 0 < phase <= 1, shape (k,)
     max_steps : steps that a collision may take, for all or of shape (k,); one that takes more never separates
+    scheme : one of `SCHEMES`
 
     Returns
     -------
@@ -86,7 +94,10 @@ def collide_at_fixed_step(
     Raises
     ------
     ModelError : a formula of the law fails, or returns an array of another shape
+    UsageError : there is no such scheme
     """
+    if scheme not in SCHEMES:
+        raise UsageError(f'no scheme "{safe_text(scheme)}"; {did_you_mean(scheme, list(SCHEMES))}')
     count = step.size
     law = MotionLaw.of(model, n, strong=False)
     with np.errstate(all="ignore"):
