@@ -29,7 +29,11 @@ plotted numbers.
 {pictures}
 """
 # the config of each result
-RESULTS = {"figure6": "configs/figure6.toml", "speeds": "docs/gallery/speeds.toml"}
+RESULTS = {
+    "figure6": "configs/figure6.toml",
+    "timestep": "docs/timestep.toml",
+    "speeds": "docs/gallery/speeds.toml",
+}
 
 
 @dataclass(frozen=True)
@@ -67,6 +71,13 @@ ENTRIES = (
     ),
     Entry("restitution", "figure6", "", "Delivered restitution of each model over the requested restitution."),
     Entry("error", "figure6", "", "Delivered minus requested restitution, with bands at 0.01 and 0.05."),
+    Entry(
+        "timestep",
+        "timestep",
+        "",
+        "What an explicit code delivers at a fixed step, over the steps in the contact time: the mean and the "
+        "range over the phase, the part of a step in which the contact begins; [timestep.md](timestep.md).",
+    ),
     Entry(
         "map",
         "speeds",

@@ -198,6 +198,13 @@ def write_paper_figures(folder: Path) -> None:
         save_figure(impact.plot(result, kind=kind, equations=True), folder / f"{name}.svg")
 
 
+def write_timestep_figure(path: Path) -> None:
+    """Write the picture of docs/timestep.md that the gallery does not have: the restitution over the phase."""
+    result = impact.sweep(ROOT / "docs" / "timestep.toml")
+    at = {"e": 0.5, "steps_per_contact": 10.0}
+    save_figure(impact.plot(result, kind="restitution", x="phase", sel=at), path)
+
+
 def main() -> None:
     (ROOT / "docs" / "schema.md").write_text(schema_page(), encoding="utf-8")
     architecture = ROOT / "docs" / "architecture.md"
@@ -206,6 +213,7 @@ def main() -> None:
     write_pictures(ROOT / "docs" / "models")
     (ROOT / "docs" / "gallery.md").write_text(gallery_page(), encoding="utf-8")
     write_gallery(ROOT / "docs" / "gallery")
+    write_timestep_figure(ROOT / "docs" / "timestep.svg")
     write_paper_figures(ROOT / "docs" / "paper")
     result = impact.sweep(ROOT / "configs" / "figure6.toml")
     save_figure(impact.plot(result, equations=True), ROOT / "docs" / "figure6.png")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import signal
 import subprocess
 import sys
@@ -18,8 +19,11 @@ import impact
 from impact.contact.status import Status
 from impact.contact.timestep import MAX_STEPS_PER_CONTACT, SCHEMES
 from impact.errors import ConfigError, UsageError
+from impact.plots.curves import Curve, CurveData
+from impact.plots.kinds import Choice
 
 from .conftest import ROOT, Run
+from .test_plots import check_layout, names_of
 
 LINEAR = "anagnostopoulos-1988"
 BALLS = {"v1": 1.0, "m1": 1.0, "m2": 1.0, "material": "steel"}
@@ -365,6 +369,103 @@ def test_compare_notes_another_integrator_and_recommend_ranks() -> None:
     assert "integrator is kick-drift, in BASELINE exact" in verdict.notes
     (ranked,) = impact.recommend(swept(e=[0.5, 0.9], steps_per_contact=[10, 50]), tol=0.05).models
     assert ranked.serves_everywhere
+
+
+@pytest.fixture(scope="module")
+def coarse() -> xr.Dataset:
+    """Two laws at two values of e, over steps and phases."""
+    return swept([LINEAR, "hertz"], e=[0.5, 0.9], steps_per_contact=[5, 10, 20, 50], phase=[0.1, 0.4, 0.7, 1.0])
+
+
+def curves_of(dataset: xr.Dataset, **choice: Any) -> tuple[Curve, ...]:
+    curve_data = impact.api.get_plot_data(dataset, "timestep", Choice(**choice))
+    assert isinstance(curve_data, CurveData)
+    (panel,) = curve_data.panels
+    assert panel.x_log
+    return panel.curves
+
+
+def test_the_picture_has_the_mean_and_the_range_over_the_phase(coarse: xr.Dataset) -> None:
+    half, nine, *delivered = curves_of(coarse)
+    assert [(guide.case, set(guide.y), guide.is_guide) for guide in (half, nine)] == [
+        ("e = 0.5", {0.5}, True),
+        ("e = 0.9", {0.9}, True),
+    ]
+    # hertz does not depend on e
+    assert [(curve.model, curve.case) for curve in delivered] == [
+        (LINEAR, "e = 0.5"),
+        (LINEAR, "e = 0.9"),
+        ("hertz", ""),
+    ]
+    for curve, e in zip(delivered, (0.5, 0.9, 0.5), strict=True):
+        values = coarse["e_out"].sel(model=curve.model, e=e)
+        assert curve.x == (5.0, 10.0, 20.0, 50.0)
+        np.testing.assert_allclose(curve.y, values.mean("phase"), rtol=1e-14)
+        np.testing.assert_array_equal(curve.least, values.min("phase"))
+        np.testing.assert_array_equal(curve.largest, values.max("phase"))
+
+
+def test_the_picture_over_dt_at_one_phase_has_no_band() -> None:
+    guide, curve = curves_of(swept(e=0.5, dt=["5 us", "2 us"]))
+    assert (guide.case, curve.x, curve.least) == ("e = 0.5", (2e-6, 5e-6), ())
+
+
+@pytest.mark.parametrize("width", ["single", "double"])
+def test_the_texts_of_the_picture_do_not_overlap(coarse: xr.Dataset, width: str) -> None:
+    figure = impact.plot(coarse, kind="timestep", width=width)
+    check_layout(figure)
+    names = ["Requested", "Anagnostopoulos (1988)", "Hertz (1882)", "Least to largest over the phase"]
+    assert names_of(figure) == names
+    near = impact.plot(swept(e=[0.5, 0.51, 0.52], steps_per_contact=[5, 20]), kind="timestep", width=width)
+    check_layout(near)
+
+
+def test_the_numbers_of_the_picture_have_the_range(coarse: xr.Dataset, tmp_path: Path, cli: Run) -> None:
+    impact.save(coarse, tmp_path / "r.h5")
+    done = cli("plot", "r.h5", "--kind", "timestep", "--data", "wide.csv", "-o", "r.svg", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    head, first, *_ = (tmp_path / "wide.csv").read_text(encoding="utf-8").splitlines()
+    assert head.split(",")[3:6] == [f"e_out{part} {LINEAR} e=0.5" for part in ("", "_least", "_largest")]
+    assert float(first.split(",")[4]) == coarse["e_out"].sel(model=LINEAR, e=0.5, steps_per_contact=5).min()
+    rows = list(impact.api.get_plot_data(coarse, "timestep", Choice()).rows())
+    assert len(rows) == 4 * (2 + 3 * 3)
+
+
+@pytest.mark.parametrize(
+    ("sweep", "message"),
+    [
+        (
+            {"integrator": "exact"},
+            "this result is of the continuous law; timestep needs an axis steps_per_contact",
+        ),
+        ({"dt": 1e-6}, "this result has a single step; timestep needs an axis steps_per_contact or dt"),
+        ({"dt": [1e-6, 2e-6], "e": np.linspace(0.1, 0.9, 9).tolist()}, "got 9 values of e, expected at most 8"),
+    ],
+)
+def test_a_result_without_the_axis_is_refused_in_one_line(sweep: dict[str, Any], message: str) -> None:
+    with pytest.raises(UsageError, match=message):
+        impact.plot(swept(**{"e": 0.5} | sweep), kind="timestep")
+
+
+def test_a_report_has_the_picture_and_no_loop(coarse: xr.Dataset) -> None:
+    page = impact.report(coarse)
+    assert "Restitution at fixed steps: mean, least and largest over the phase." in page
+    assert "left out" not in page
+    assert "Force over indentation" not in page
+
+
+def test_the_page_shows_the_jump_over_the_phase() -> None:
+    result = impact.sweep(
+        ROOT / "docs" / "timestep.toml", overrides=["sweep.e=0.5", "sweep.steps_per_contact=[10.0, 20.0]"]
+    )
+    ten = result.isel(model=0).sel(steps_per_contact=10.0)
+    assert (float(ten["e_out"].min()), float(ten["e_out"].max())) == pytest.approx((0.454, 0.542), abs=5e-4)
+    late = ten["phase"].values > 0.59
+    assert set(ten["steps"].values[late].tolist()) == {9}
+    assert set(ten["steps"].values[~late].tolist()) == {10}
+    page = (ROOT / "docs" / "timestep.md").read_text(encoding="utf-8")
+    for picture in re.findall(r"!\[[^]]*\]\(([^)]*)\)", page):
+        assert (ROOT / "docs" / picture).is_file()
 
 
 def test_the_attributes_of_the_continuous_law_are_unchanged() -> None:

@@ -31,7 +31,8 @@ from impact.results.single_impact import Impact
 from .conftest import ROOT, Run
 from .fork_server import ForkServer
 
-CURVES = [kind for kind in KINDS if kind not in ("map", "validity")]
+# those of the result of an ordinary sweep
+CURVES = [kind for kind in KINDS if kind not in ("map", "validity", "timestep")]
 
 
 def selection_of(kind: str) -> dict[str, float]:

@@ -101,7 +101,7 @@ class Sweep(Table):
     steps_per_contact: Annotated[
         Numbers | None,
         Quantity(
-            "1", "contact time of the continuous law over the fixed step", 0, MAX_STEPS_PER_CONTACT, above=True
+            "1", "fixed steps in the contact time of the continuous law", 0, MAX_STEPS_PER_CONTACT, above=True
         ),
     ] = None
     dt: Annotated[Numbers | None, Quantity("s", "fixed time step", 0, above=True)] = None

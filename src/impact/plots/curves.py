@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
@@ -9,14 +10,18 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from ..errors import UsageError
 from ..formatting import heading
+from ..formatting import label as number_label
 from ..results.schema import plain_unit
 from ..text import safe_text
 from .labels import REFERENCE, label_axis, law_text, pretty_conditions, symbol, words_of
-from .slices import conditions_of, is_ordered, parameter_text, read, scalars_of, take_line
+from .slices import NO_BREAK, conditions_of, is_ordered, parameter_text, read, scalars_of, take_line
 from .style import is_geometric, model_styles
 
 if TYPE_CHECKING:
@@ -25,6 +30,7 @@ if TYPE_CHECKING:
     from .data import Points
     from .kinds import Choice
 
+BAND_NAME = "Least to largest over the phase"
 FIGURE_6 = "Final velocities comparison"
 # distances from zero that are shaded, the widest first, and their colours
 BANDS = (0.05, 0.01)
@@ -33,6 +39,13 @@ BAND_COLOURS = ("#ebf3f8", "#cde2ef")
 MIN_DRAWN_ERROR = 1e-9
 # height of a panel over the width of the picture: of a single panel, and of several below each other
 PANEL_ASPECT, STACKED_PANEL_ASPECT = 0.56, 0.36
+# the axes of a picture of fixed steps, and the message about a result without one
+STEP_AXES = ("steps_per_contact", "dt")
+NEEDS_STEPS = 'timestep needs an axis steps_per_contact or dt, with solver.integrator = "kick-drift"'
+# values of e of a picture of fixed steps
+MAX_RESTITUTIONS = 8
+# the part of a model's colour in a band, on white; and the least distance of labels, as a part of the axis
+BAND_SHADE, LABEL_DISTANCE = 0.22, 0.055
 # from this number of laws on the legend shows keys instead of titles
 MANY_LAWS = 16
 
@@ -48,6 +61,9 @@ class Curve:
     x, y : its points, in SI
     end : text beside the last point
     variable : name of its y in a result or a time history
+    case : value of an input that distinguishes curves of one model, such as "e = 0.5"
+    least, largest : a band around the curve; empty for none
+    is_guide : whether it is a thin line, with its case beside its end
     """
 
     label: str
@@ -56,6 +72,10 @@ class Curve:
     y: tuple[float, ...]
     end: str = ""
     variable: str = ""
+    case: str = ""
+    least: tuple[float, ...] = ()
+    largest: tuple[float, ...] = ()
+    is_guide: bool = False
 
 
 @dataclass(frozen=True)
@@ -118,8 +138,10 @@ class CurveData:
             )
             for curve in panel.curves:
                 name = " ".join(part for part in (curve.label, curve.end) if part)
-                for x, y in zip(curve.x, curve.y, strict=True):
-                    yield (*axes, name, curve.model or "", x, y)
+                name = ", ".join(part for part in (name, curve.case) if part)
+                for suffix, values in (("", curve.y), (", least", curve.least), (", largest", curve.largest)):
+                    for x, y in zip(curve.x, values, strict=bool(values)):
+                        yield (*axes, name + suffix, curve.model or "", x, y)
 
     def table(self) -> dict[str, tuple[float, ...]]:
         """The points of all curves, one column per curve; curves with the same x share its column.
@@ -132,7 +154,10 @@ class CurveData:
         for panel, curve in all_curves:
             owner = curve.model or "reference"
             columns[heading(panel.x_name, "" if is_shared else owner, panel.x_unit)] = curve.x
-            columns[heading(curve.variable, owner, panel.y_unit)] = curve.y
+            for suffix, values in (("", curve.y), ("_least", curve.least), ("_largest", curve.largest)):
+                if values:
+                    name = " ".join(part for part in (owner, curve.case.replace(" ", "")) if part)
+                    columns[heading(f"{curve.variable}{suffix}", name, panel.y_unit)] = values
         return columns
 
     @property
@@ -200,6 +225,54 @@ def error_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     return _curve_data(dataset, line, "Error of the restitution", panels, choice)
 
 
+def timestep_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
+    """The restitution at fixed steps over the step: its mean over the phase, the least and the largest.
+
+    There is a curve for each model and each requested e. For the parameters and errors see `velocity_curves`; by
+    default x is the number of steps per contact, or the step.
+    """
+    if "phase" not in dataset.coords:
+        raise UsageError(f"this result is of the continuous law; {NEEDS_STEPS}")
+    along = [name for name in STEP_AXES if name in dataset.coords and dataset[name].ndim == 1]
+    if choice.x is None and not along:
+        raise UsageError(f"this result has a single step; {NEEDS_STEPS}")
+    line = _take_line(dataset, replace(choice, x=choice.x or along[0]), "e_out", keep=("phase", "e"))
+    (x_dim,) = line.data[line.x].dims
+    phase_dims = [dim for dim in line.data["phase"].dims if dim != x_dim]
+    e_dims = [dim for dim in (line.data["e"].dims if "e" in line.data.coords else ()) if dim not in phase_dims]
+    over_e = [dim for dim in e_dims if dim != x_dim]
+    count = line.data.sizes[over_e[0]] if over_e else 1
+    if count > MAX_RESTITUTIONS:
+        raise UsageError(
+            f"got {count} values of e, expected at most {MAX_RESTITUTIONS} to draw; use --sel e=VALUE"
+        )
+    references: list[Curve] = []
+    curves: list[Curve] = []
+    for label, key, of_model in _split_by_model(line, choice):
+        of_cases = [of_model.isel({over_e[0]: number}) for number in range(count)] if over_e else [of_model]
+        delivered = [of_case["e_out"].transpose(x_dim, *phase_dims).values for of_case in of_cases]
+        delivered = [np.asarray(values, float).reshape(len(values), -1) for values in delivered]
+        # a law that does not depend on e has one curve
+        differ = any(not np.array_equal(delivered[0], values, equal_nan=True) for values in delivered)
+        for of_case, values in zip(of_cases, delivered, strict=True):
+            case = f"e = {number_label(of_case['e'].item())}" if over_e else ""
+            curve = _curve(label, key, line, values.mean(axis=1), "e_out")
+            if values.shape[1] > 1:
+                least, largest = (tuple(edge.tolist()) for edge in (values.min(axis=1), values.max(axis=1)))
+                curve = replace(curve, least=least, largest=largest)
+            if differ or not curves or curves[-1].model != key:
+                curves.append(replace(curve, case=case if differ else ""))
+            if "e" in of_case.coords and len(references) < count:
+                at_end = f"e = {number_label(of_case['e'].item())}" if of_case["e"].ndim == 0 else ""
+                guide = _curve("Requested", None, line, of_case["e"], "e")
+                references.append(replace(guide, case=at_end, is_guide=True))
+    panel = Panel("", "Delivered restitution", (*_without_empty(references), *curves), y_name="e_out")
+    title = f"Restitution at fixed steps, {safe_text(str(dataset.attrs.get('integrator', '')), 40)}"
+    plot_data = _curve_data(dataset, line, title, [panel], choice)
+    panels = (replace(panel, x_log=panel.x_log or line.x in STEP_AXES) for panel in plot_data.panels)
+    return replace(plot_data, panels=tuple(panels))
+
+
 @dataclass(frozen=True)
 class _Line:
     """A line through a result: its variables in memory, the coordinate `x`, and values that are not drawn."""
@@ -209,9 +282,9 @@ class _Line:
     not_drawn: tuple[str, ...]
 
 
-def _take_line(dataset: xr.Dataset, choice: Choice, *names: str) -> _Line:
-    """The line of a result that is drawn, with some variables in memory."""
-    line, x, not_drawn = take_line(dataset, choice.x, choice.sel, choice.models)
+def _take_line(dataset: xr.Dataset, choice: Choice, *names: str, keep: Sequence[str] = ()) -> _Line:
+    """The line of a result that is drawn, with some variables in memory; `keep` as in `take_line`."""
+    line, x, not_drawn = take_line(dataset, choice.x, choice.sel, choice.models, keep)
     missing = [name for name in names if name not in dataset]
     if missing:
         raise UsageError(f"this result has no {', '.join(missing)}; sweep without [output] variables, or add them")
@@ -292,6 +365,7 @@ def draw_curves(
     models = dict.fromkeys(curve.model for panel in plot_data.panels for curve in panel.curves if curve.model)
     styles = model_styles([model for model in models if model])
     entries: dict[str, Artist] = {}
+    band: dict[str, Artist] = {}
     for axes, panel in zip(all_axes, plot_data.panels, strict=True):
         _draw_bands(axes, panel)
         axes.set(xscale="log" if panel.x_log else "linear", yscale="log" if panel.y_log else "linear")
@@ -301,6 +375,8 @@ def draw_curves(
             name = chosen_name or pretty_conditions(default_name)
             (line,) = axes.plot(curve.x, curve.y, label=f"_{name}", **_line_style(curve, panel, styles))
             entries.setdefault(name, line)
+            if curve.least:
+                band[BAND_NAME] = _draw_band(axes, curve, line)
         entries |= points.draw(axes, panel) if points else {}
         # the names of marks need room at the ends of the axes
         axes.margins(x=0.06 if panel.marks else 0.02, y=0.12 if panel.marks else None)
@@ -310,13 +386,16 @@ def draw_curves(
         for mark in panel.marks:
             _draw_mark(axes, mark)
         _label_curve_ends(axes, panel.curves)
-    return [(artist, name) for name, artist in entries.items()]
+        _label_guides(axes, [curve for curve in panel.curves if curve.is_guide and curve.case])
+    return [(artist, name) for name, artist in (entries | band).items()]
 
 
 def _line_style(curve: Curve, panel: Panel, styles: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     """The line style of a curve: a reference is a plain line, points without an order have no line."""
     points = len(curve.x)
     scattered: dict[str, Any] = {} if panel.joined else {"linestyle": "none"}
+    if curve.is_guide:
+        return {"color": "#555555", "linewidth": 0.7, "linestyle": (0, (5, 2)), "zorder": 1.4, **scattered}
     if curve.model is None:
         # without a line it is a disc, larger than the markers of the models
         disc = {"marker": "o", "markersize": 9.0, "alpha": None} if points == 1 or scattered else {}
@@ -326,6 +405,36 @@ def _line_style(curve: Curve, panel: Panel, styles: Mapping[str, Mapping[str, An
     every = 1 if scattered else max(1, points // 12)
     start = list(styles).index(curve.model) * every // max(1, len(styles)) % every
     return {**style, "markevery": (start, every), "markerfacecolor": "white", **scattered}
+
+
+def _draw_band(axes: Axes, curve: Curve, line: Line2D) -> Artist:
+    """Draw the band of a curve, opaque for formats without transparency; returns its symbol in a legend."""
+    colour = to_rgb(line.get_color())
+    shade = tuple(1.0 - BAND_SHADE * (1.0 - part) for part in colour)
+    axes.fill_between(curve.x, curve.least, curve.largest, color=shade, linewidth=0.0, zorder=0.8)
+    # the edges are above the bands of other curves
+    for edge in (curve.least, curve.largest):
+        axes.plot(curve.x, edge, color=colour, linewidth=0.5, label="_", zorder=1.3)
+    return Patch(facecolor="#dddddd", edgecolor="#777777", linewidth=0.5)
+
+
+def _label_guides(axes: Axes, guides: Sequence[Curve]) -> None:
+    """Write the cases of guides beside their ends, without overlap."""
+    low, high = axes.get_ylim()
+    lowest = -math.inf
+    for guide in sorted(guides, key=lambda curve: curve.y[-1]):
+        lowest = max((guide.y[-1] - low) / (high - low), lowest + LABEL_DISTANCE)
+        axes.annotate(
+            pretty_conditions(guide.case.replace(" ", NO_BREAK)),
+            (1.0, lowest),
+            (4, 0),
+            xycoords="axes fraction",
+            textcoords="offset points",
+            va="center",
+            fontsize="small",
+            color="#555555",
+            annotation_clip=False,
+        )
 
 
 def _draw_bands(axes: Axes, panel: Panel) -> None:

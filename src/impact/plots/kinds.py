@@ -29,6 +29,7 @@ KINDS = {
     "final-velocities": "velocities after the impact and the impulse-momentum solution, Figure 6 of the paper",
     "restitution": "delivered over requested restitution",
     "error": "error of the restitution, signed and absolute",
+    "timestep": "restitution at fixed steps: mean, least and largest over the phase",
     "map": "a variable over two axes, a panel for each model",
     "validity": "model with the smallest error over two axes, and that error",
     "loop": "force over indentation",
@@ -96,6 +97,7 @@ def plot_data_of(
         "final-velocities": curves.velocity_curves,
         "restitution": curves.restitution_curves,
         "error": curves.error_curves,
+        "timestep": curves.timestep_curves,
         "map": maps.field_map,
         "validity": maps.validity_map,
     }

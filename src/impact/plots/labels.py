@@ -60,6 +60,8 @@ MATH_SYMBOLS = {
     "damping_ratio": r"\chi",
     "E1": "E_1",
     "E2": "E_2",
+    "dt": r"h",
+    "phase": "s",
     "e_kinetic": r"e_\mathrm{kinetic}",
     "e_energetic": r"e_\mathrm{energetic}",
 }
@@ -178,7 +180,8 @@ def number_axis(axis: Axis, size: float = 1.0, *, log: bool = False) -> None:
     axis.set_major_formatter(FuncFormatter(lambda value, _: typographic(value / size, powers=log)))
     if log:
         low, high = sorted(axis.get_view_interval())
-        axis.set_major_locator(LogLocator(subs=(1.0, 3.0) if high < 1e3 * low else (1.0,)))
+        narrow = (1.0, 2.0, 5.0) if high < 1e2 * low else (1.0, 3.0)
+        axis.set_major_locator(LogLocator(subs=narrow if high < 1e3 * low else (1.0,)))
         axis.set_minor_formatter(NullFormatter())
     else:
         axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 2.5, 5, 10], min_n_ticks=3))

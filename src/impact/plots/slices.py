@@ -28,7 +28,11 @@ Selection = Mapping[str, float | str] | None
 
 
 def take_line(
-    dataset: xr.Dataset, x: str | None = None, sel: Selection = None, models: Sequence[str] | None = None
+    dataset: xr.Dataset,
+    x: str | None = None,
+    sel: Selection = None,
+    models: Sequence[str] | None = None,
+    keep: Sequence[str] = (),
 ) -> tuple[xr.Dataset, str, tuple[str, ...]]:
     """Cut a line through a result.
 
@@ -38,6 +42,7 @@ def take_line(
     x : the coordinate to draw over; by default e, else the first numeric axis
     sel : values of other axes, by name; an axis that is not named shows its first value
     models : keys of the models to show; by default all
+    keep : names of coordinates whose axes, where they vary along a single one, are kept
 
     Returns
     -------
@@ -49,7 +54,8 @@ def take_line(
     """
     dataset = _select(dataset, sel, models)
     x = x_axis(dataset, x)
-    line, not_drawn = _sorted_along(_drop_other_axes(dataset, [dataset[x].dims[0]]), x)
+    kept = [dataset[name].dims[0] for name in keep if name in dataset.coords and dataset[name].ndim == 1]
+    line, not_drawn = _sorted_along(_drop_other_axes(dataset, [dataset[x].dims[0], *kept]), x)
     if not line[x].size:
         raise UsageError(f"{safe_text(x)} has no finite value to draw over")
     return line, x, not_drawn

@@ -15,6 +15,7 @@ from ..contact.status import FIRST_FAILURE, NO_IMPACT
 from ..engine.plan import owner_of
 from ..errors import ImpactError
 from ..formatting import label
+from ..plots.curves import MAX_RESTITUTIONS, STEP_AXES
 from ..plots.kinds import WIDTHS, Choice, draw
 from ..plots.style import encoded
 from ..results.schema import columns_along, is_input, plain_unit
@@ -31,6 +32,7 @@ FIGURES = {
     "final-velocities": "Velocities after the impact, and the impulse-momentum solution.",
     "restitution": "Delivered over requested restitution.",
     "error": "Error of the restitution: signed above, absolute below.",
+    "timestep": "Restitution at fixed steps: mean, least and largest over the phase.",
     "map": "Error of the restitution over two axes, a panel for each model.",
     "validity": "Model with the smallest error, and that error.",
     "loop": "Force over indentation at one point: the area of a loop is the energy loss.",
@@ -123,14 +125,20 @@ def iterate_choices(dataset: xr.Dataset, keys: Sequence[str]) -> Iterator[tuple[
     # a parameter of a single model is not an axis of a map of several models
     across = [name for name in along if len(keys) == 1 or not owner_of(name)]
     y = next((name for name in across if x and along[name].dims != along[x].dims), None)
+    few_e = ("e",) if "e" in along and along["e"].size <= MAX_RESTITUTIONS else ()
+    steps = next((name for name in STEP_AXES if name in along), None)
     for kind in FIGURES:
         if kind in MAP_KINDS and not y:
             continue
-        drawn = [along[name].dims[0] for name in ((x, y) if kind in MAP_KINDS else (x,)) if name]
+        if (kind == "timestep" and not steps) or (kind == "loop" and "integrator" in dataset.attrs):
+            continue
+        names = (x, y) if kind in MAP_KINDS else (steps, "phase", *few_e) if kind == "timestep" else (x,)
+        drawn = list(dict.fromkeys(along[name].dims[0] for name in names if name in along))
         position = _first_answered_index(dataset, keys, drawn)
         if kind != "loop":
             sel = {str(dim): dataset[dim].values[index].item() for dim, index in position.items()}
-            yield kind, Choice(x, y if kind in MAP_KINDS else None, sel=sel, models=keys), position
+            shown_x = steps if kind == "timestep" else x
+            yield kind, Choice(shown_x, y if kind in MAP_KINDS else None, sel=sel, models=keys), position
             continue
         if x:
             position[drawn[0]] = int(np.argsort(along[x].values, kind="stable")[along[x].size // 2])
