@@ -59,6 +59,19 @@ class Collision:
         return self.materials[0] == self.materials[1]
 
     @property
+    def effective_radius(self) -> float:
+        """R* [m], of the radii that are taken where the law needs none.
+
+        Raises
+        ------
+        UsageError : two planes
+        """
+        curvature = 1.0 / self["R1"] + 1.0 / self["R2"]
+        if curvature == 0.0:
+            raise UsageError("R1 and R2: got inf, expected one finite radius")
+        return 1.0 / curvature
+
+    @property
     def reach(self) -> float:
         """Distance [m] from the first point of contact that no part of a ball leaves."""
         speed = abs(self["v1"]) + abs(self["v2"])

@@ -4,10 +4,22 @@ from __future__ import annotations
 
 from ..errors import UsageError, did_you_mean
 from ..text import safe_text
-from . import lammps, mujoco
+from . import adams, chrono, lammps, mercurydpm, modelica, mujoco, simscape
 from .code import Code
 
-CODES: dict[str, Code] = {code.name: code for code in (lammps.CODE, mujoco.CODE)}
+CODES: dict[str, Code] = {
+    code.name: code
+    for code in (
+        lammps.CODE,
+        mujoco.CODE,
+        # text only
+        chrono.CODE,
+        mercurydpm.CODE,
+        modelica.CODE,
+        adams.CODE,
+        simscape.CODE,
+    )
+}
 
 
 def find_code(name: str) -> Code:

@@ -153,7 +153,9 @@ def _header(problem: ExportProblem, collision: Collision, row: TimestepRow) -> l
         )
         if row.e_to_ask == row.e_to_ask:
             header.append(f"a mean of {number(problem.wanted)} at this dt: ask for e = {decimals(row.e_to_ask)}")
-        needed = needed_steps(law, ADVISED_TOL, problem.e_continuous) if problem.wanted > 0.0 else None
+        # where the continuous law delivers another e, no step does what is advised
+        reachable = abs(problem.e_continuous - problem.wanted) < ADVISED_TOL * problem.wanted
+        needed = needed_steps(law, ADVISED_TOL, problem.e_continuous) if reachable else None
         if needed is not None:
             within = f"within {number(100.0 * ADVISED_TOL)} % of {number(problem.wanted)}"
             header.append(f"advised: dt <= {quantity(needed.dt, 's', 3)}, where every phase is {within}")

@@ -110,7 +110,7 @@ def parameters(collision: Collision) -> dict[str, float | str]:
         return {"E": collision["E1"], **last, "nu": collision["nu1"]} | (
             {} if collision.has_one_material else {"E2": collision["E2"], "nu2": collision["nu2"]}
         )
-    k = collision["K"] if spring == "hooke" else collision["K"] / math.sqrt(collision["R_eff"])
+    k = collision["K"] if spring == "hooke" else collision["K"] / math.sqrt(collision.effective_radius)
     return {"k_n": k, **last}
 
 
@@ -160,7 +160,9 @@ def notes(collision: Collision) -> list[str]:
             "two materials: E* = 1/((1 - nu1^2)/E1 + (1 - nu2^2)/E2); damping is the geometric mean of both types"
         )
     elif spring == "hertz":
-        said.append(f"k_n = K/sqrt(R*), for R* = {number(collision['R_eff'])} m; hertz/material takes E and nu")
+        said.append(
+            f"k_n = K/sqrt(R*), for R* = {number(collision.effective_radius)} m; hertz/material takes E and nu"
+        )
     if damping == "viscoelastic":
         said.append("eta_n0 is per effective mass and contact radius, in 1/(m s)")
     if damping == "mass_velocity":

@@ -78,7 +78,7 @@ def choose_version(
         version = code.read_version(version)
         if not verify:
             return None, version
-    if verify and not code.program:
+    if not code.program and (verify or program is not None):
         raise UsageError(f"--verify: no script for {code.title}: {code.tested}")
     found = code.find_program(program) if code.program else None
     installed = None if found is None else code.version_of(found)

@@ -1,0 +1,76 @@
+"""MercuryDPM, species of viscoelastic contacts."""
+
+from __future__ import annotations
+
+import math
+
+from ..formatting import quantity
+from .code import Code, Collision, Parameters
+
+SPECIES = {
+    "mercurydpm-linear-viscoelastic": "LinearViscoelasticSpecies",
+    "tsuji-1992": "HertzianViscoelasticSpecies",
+    "kuwabara-kono-1987": "HertzianBSHPViscoelasticSpecies",
+}
+
+
+def parameters(collision: Collision) -> dict[str, float | str]:
+    """The arguments of the setters; the mass is twice the effective one."""
+    c = collision
+    if c.model.key == "mercurydpm-linear-viscoelastic":
+        return {"stiffness": c["K"], "restitution": c["e"], "mass": 2.0 * c["m"]}
+    modulus = {"effectiveElasticModulus": 0.75 * c["K"] / math.sqrt(c.effective_radius)}
+    return (
+        {**modulus, "restitution": c["e"]} if c.model.key == "tsuji-1992" else {**modulus, "dissipation": c["A"]}
+    )
+
+
+def lines(collision: Collision, parameters: Parameters) -> list[str]:
+    name = SPECIES[collision.model.key]
+    values = [repr(value) for value in parameters.values()]
+    if name == "LinearViscoelasticSpecies":
+        setters = [f"species.setStiffnessAndRestitutionCoefficient({', '.join(values)});"]
+    elif name == "HertzianViscoelasticSpecies":
+        setters = [f"species.setEffectiveElasticModulusAndRestitutionCoefficient({', '.join(values)});"]
+    else:
+        setters = [f"species.setEffectiveElasticModulus({values[0]});", f"species.setDissipation({values[1]});"]
+    return [f"{name} species;", *setters, f"setTimeStep({collision.dt!r});"]
+
+
+def notes(collision: Collision) -> list[str]:
+    c = collision
+    said = ["in SI, C++; the values are those of the pair"]
+    if c.model.key == "mercurydpm-linear-viscoelastic":
+        said += [
+            "two species: the mixed one has the harmonic means 2/(1/a + 1/b) of stiffness and dissipation",
+            f"the mass is twice the effective one: 2 m1 m2/(m1 + m2) = {quantity(2.0 * c['m'], 'kg')}",
+            "the setter stores a dissipation constant: other masses of the same species have another restitution",
+            "after setConstantRestitution (since 2021) stiffness and dissipation are per mass 2 m1 m2/(m1 + m2)",
+        ]
+    else:
+        said += [
+            "the modulus is E* = 1/((1 - nu1^2)/E1 + (1 - nu2^2)/E2)",
+            "two species: the mixed one has the harmonic means 2/(1/a + 1/b), which is right for their own E*",
+        ]
+    if c.model.key == "tsuji-1992":
+        said.append("before September 2021 the setter was setElasticModulusAndRestitutionCoefficient")
+    if c.model.key == "kuwabara-kono-1987":
+        said.append("the force is never negative; the species exists since September 2022")
+    else:
+        said.append("the force pulls before the contact ends")
+    return [*said, "no speed switches the restitution off"]
+
+
+CODE = Code(
+    name="mercurydpm",
+    title="MercuryDPM",
+    laws=SPECIES,
+    damping={"kuwabara-kono-1987": "A"},
+    newest="1.0 (trunk of July 2024)",
+    tested="not run by us; read in kuwt/MercuryDPM_fork, Kernel @fb0ebf1d (2024)",
+    scheme="kick-drift",
+    comment=("// ", ""),
+    parameters=parameters,
+    lines=lines,
+    notes=notes,
+)

@@ -1,0 +1,73 @@
+"""Simscape Multibody, block Spatial Contact Force."""
+
+from __future__ import annotations
+
+import math
+
+from ..formatting import number, quantity
+from .code import Code, Collision, Parameters
+
+# of the peak indentation of the undamped spring: a wider transition region is warned about
+WIDE_TRANSITION = 0.1
+
+
+def parameters(collision: Collision) -> dict[str, float | str]:
+    """The parameters of the section Normal Force, in the block's default units."""
+    c = collision
+    return {
+        "NormalForceType": "SmoothSpringDamper",
+        "NormalStiffness": c["K"],
+        "NormalDamping": c["b"],
+        "NormalTransitionRegionWidth": c["w"],
+    }
+
+
+def lines(collision: Collision, parameters: Parameters) -> list[str]:
+    pairs = [f"'{name}', '{value}'" for name, value in parameters.items()]
+    return ["set_param(block, ...", *(f"    {pair}, ..." for pair in pairs[:-1]), f"    {pairs[-1]});"]
+
+
+def transition_share(collision: Collision) -> float:
+    """The width of the transition region over the peak indentation v₀ √(m/K) of the undamped spring [-]."""
+    c = collision
+    return c["w"] / (c["v0"] * math.sqrt(c["m"] / c["K"]))
+
+
+def notes(collision: Collision) -> list[str]:
+    share = number(transition_share(collision), 3)
+    return [
+        "in the default units of the block, N/m, N/(m/s) and m; block is its path in the model",
+        "in its dialog: Stiffness, Damping and Transition Region Width, in the section Normal Force",
+        "the documentation gives no formula for s, only that it goes from 0 to 1 and is level at both ends",
+        "the cubic s and that the force is never negative are our assumptions",
+        f"the width is {share} of the peak indentation of the undamped spring; the less, the less s matters",
+        "two materials: there is no mixing; the values are those of the pair",
+        "no speed switches the restitution off",
+        "a variable-step solver chooses its steps: limit them to a small share of the contact time",
+        "the block exists since R2019b",
+    ]
+
+
+def warnings(collision: Collision) -> list[str]:
+    share = transition_share(collision)
+    if share <= WIDE_TRANSITION:
+        return []
+    return [
+        f"Transition Region Width = {quantity(collision['w'], 'm')} is {number(share, 3)} of the peak indentation "
+        "of the undamped spring: the restitution depends on s of the block, whose formula is not documented"
+    ]
+
+
+CODE = Code(
+    name="simscape",
+    title="Simscape Multibody, Spatial Contact Force",
+    laws={"simscape-contact": "Smooth Spring-Damper"},
+    damping={"simscape-contact": "b"},
+    newest="R2019b",
+    tested="not run by us; read in the MathWorks page of the block; names of parameters of public scripts",
+    comment=("% ", ""),
+    parameters=parameters,
+    lines=lines,
+    notes=notes,
+    warnings=warnings,
+)

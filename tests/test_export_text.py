@@ -1,0 +1,416 @@
+"""Lines for codes that we do not run: in the formula of the code's own source, they give the exported law.
+
+Each formula is written after the source that the exporter's module names, apart from the package. It reads the
+numbers from the lines, and its equation of motion is integrated with scipy.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import impact
+from impact.exporters.codes import CODES
+from impact.exporters.export import Export
+from impact.exporters.problem import prepare_export
+
+from .conftest import Run
+
+# effective mass 0.75 kg and effective radius 0.03 m
+V0, M1, M2, R1, R2 = 1.5, 1.0, 3.0, 0.04, 0.12
+M = M1 * M2 / (M1 + M2)
+R = R1 * R2 / (R1 + R2)
+BALLS = {"v1": V0, "v2": 0.0, "m1": M1, "m2": M2, "R1": R1, "R2": R2}
+MATERIALS = {"soft": {"E": 1e9, "nu": 0.3}, "hard": {"E": 5e9, "nu": 0.2}}
+MODULUS = 1.0 / ((1.0 - 0.3**2) / 1e9 + (1.0 - 0.2**2) / 5e9)
+EPSILON = float(np.finfo(float).eps)
+NUMBER = r"([-+0-9.e]+)"
+
+Force = Callable[[float, float], float]
+
+
+def config(*materials: str, **values: object) -> dict[str, object]:
+    """A config of the two balls that asks for e = 0.55, with materials or with a stiffness."""
+    named = {f"material{i}": name for i, name in enumerate(materials, 1)}
+    return {"models": "hertz", "materials": MATERIALS, "sweep": BALLS | {"e": 0.55} | named | values}
+
+
+def collide(force: Force, mass: float, speed: float, scale: float) -> tuple[float, float]:
+    """The restitution and the peak indentation by an equation of motion, to zero indentation.
+
+    Parameters
+    ----------
+    force : of indentation and its rate, positive where it pushes
+    mass, speed : effective mass and closing speed, in the units of the force
+    scale : expected size of the indentation
+    """
+
+    def rate(t: float, y: Sequence[float]) -> tuple[float, float]:
+        return y[1], -force(max(y[0], 0.0), y[1]) / mass
+
+    def gap(t: float, y: Sequence[float]) -> float:
+        return y[0]
+
+    def velocity(t: float, y: Sequence[float]) -> float:
+        return y[1]
+
+    gap.terminal, gap.direction = True, -1.0  # type: ignore[attr-defined]
+    duration = 200.0 * scale / speed
+    # a first step that begins inside the contact, so that the event is the end
+    start = 1e-9 * scale
+    done = solve_ivp(
+        rate, (0.0, duration), (start, speed), "DOP853", events=(gap, velocity), rtol=1e-11, atol=1e-14 * scale,
+        max_step=scale / speed / 50.0,
+    )  # fmt: skip
+    (end,), (peak, *_) = done.y_events
+    return float(-end[1] / speed), float(peak[0])
+
+
+def same_law(
+    name: str,
+    key: str | None,
+    force_of: Callable[[Sequence[str]], Force],
+    source: dict[str, object],
+    at: Mapping[str, float],
+    length: float = 1.0,
+) -> Export:
+    """Export a law, check that its lines give its restitution and its peak indentation, and return it.
+
+    Parameters
+    ----------
+    name, key, source, at : see `impact.export`
+    force_of : the force of the code [N] from the lines, for an indentation and a rate in its unit of length
+    length : units of length of the code in 1 m
+    """
+    export = impact.export(name, key, source=source, at=at)
+    scale = V0 * export.contact_time * length
+    e, peak = collide(force_of(export.lines), M / length, V0 * length, scale)
+    problem = prepare_export(CODES[name], key, export.version, source, at, ())
+    assert e == pytest.approx(export.e_continuous, abs=1e-6)
+    assert peak == pytest.approx(problem.peak * length, rel=1e-6)
+    return export
+
+
+def arguments(lines: Sequence[str], pattern: str) -> list[float]:
+    """The numbers in lines that match a pattern, in which # is a number."""
+    return [
+        float(value)
+        for match in re.finditer(pattern.replace("#", NUMBER), "\n".join(lines))
+        for value in match.groups()
+    ]
+
+
+# ---- Chrono: ChContactSMC.cpp, ChContactMaterialSMC.cpp, ChIterativeSolverMulticoreSMC.cpp
+
+
+def chrono_force(lines: Sequence[str]) -> Force:
+    """Fn = kn δ − gn vn of a version of the code, from what the lines set; vn < 0 on approach."""
+    text = "\n".join(lines)
+    multicore = "ChSystemMulticoreSMC sys;" in text
+    (model,) = re.findall(r"ChSystemSMC::(Hertz|Hooke|PlainCoulomb|Flores)", text)
+    properties = re.search(r"(UseMaterialProperties\(|use_material_properties = )true", text) is not None
+    young, poisson = arguments(lines, r"SetYoungModulus\(#\)"), arguments(lines, r"SetPoissonRatio\(#\)")
+    # one material for both balls, or one for each
+    young, poisson = (young * 2)[:2], (poisson * 2)[:2]
+    inverse = sum((1.0 - nu * nu) / modulus for modulus, nu in zip(young, poisson, strict=True))
+    cr = min(arguments(lines, r"SetRestitution\(#\)"), default=math.nan)
+    kn_own, gn_own = arguments(lines, r"SetKn\(#\)"), arguments(lines, r"SetGn\(#\)")
+    speed = ([*arguments(lines, r"SetCharacteristicImpactVelocity\(#\)"), *arguments(lines, "vel = #;")] or [1.0])[
+        0
+    ]
+    # Bullet: the default radius; multicore: that of the shapes
+    radius = R if multicore else (arguments(lines, r"SetDefaultEffectiveCurvatureRadius\(#\)") or [0.1])[0]
+    loge = math.log(max(cr, EPSILON)) if properties else math.nan
+    beta = loge / math.sqrt(loge * loge + math.pi**2)
+
+    def force(delta: float, rate: float) -> float:
+        vn = -rate
+        if model == "Hooke" and properties:
+            k = 16.0 / 15.0 * math.sqrt(radius) / inverse
+            kn = k * (M * speed * speed / k) ** 0.2
+            gn = math.sqrt(4.0 * M * kn / (1.0 + (math.pi / loge) ** 2))
+        elif model == "Hooke":
+            kn, gn = kn_own[0], M * gn_own[0]
+        elif properties:
+            Sn = 2.0 / inverse * math.sqrt(delta if model == "PlainCoulomb" else radius * delta)
+            kn = 2.0 / 3.0 * Sn
+            gn = -2.0 * math.sqrt(5.0 / 6.0) * beta * math.sqrt(Sn * M)
+            if model == "Flores":
+                gn = 8.0 * (1.0 - max(cr, 0.01)) * kn * delta / (5.0 * max(cr, 0.01) * speed)
+        else:
+            factor = radius * math.sqrt(delta)
+            kn, gn = factor * kn_own[0], factor * M * gn_own[0]
+        # with the sign of the code, where the normal points from ball 1 to ball 2
+        total = kn * delta - gn * vn
+        return total if multicore else max(total, 0.0)
+
+    return force
+
+
+# a law, the materials, other inputs of the config, and inputs of --at
+CHRONO: tuple[tuple[str, tuple[str, ...], dict[str, float], dict[str, float]], ...] = (
+    ("chrono-smc-hertz", ("soft", "hard"), {}, {}),
+    ("chrono-smc-hertz", (), {"K": 1e9}, {}),
+    ("chrono-smc-hooke", ("soft", "hard"), {}, {"chrono-smc-hooke.vc": 2.5}),
+    ("chrono-smc-hooke", (), {"K": 1e7, "n": 1}, {}),
+    ("chrono-smc-plaincoulomb", ("soft", "hard"), {}, {}),
+    ("chrono-smc-plaincoulomb", (), {"K": 1e9}, {}),
+    ("chrono-smc-flores", ("soft", "hard"), {}, {"chrono-smc-flores.vc": 2.0}),
+    ("tsuji-1992", ("soft", "hard"), {}, {}),
+    ("liggghts-hooke", ("soft", "hard"), {}, {}),
+    ("liggghts-hooke", (), {"K": 1e7, "n": 1}, {}),
+    ("kelvin-voigt-no-tension", (), {"K": 1e7, "n": 1}, {"e": 0.7}),
+    ("kuwabara-kono-1987", (), {"K": 1e9}, {"e": 0.7}),
+    ("kuwabara-kono-1987", ("soft", "hard"), {}, {"e": 0.7}),
+)
+
+
+@pytest.mark.parametrize(("key", "materials", "inputs", "at"), CHRONO)
+def test_the_lines_of_chrono_give_the_law(
+    key: str, materials: Sequence[str], inputs: Mapping[str, float], at: Mapping[str, float]
+) -> None:
+    same_law("chrono", key, chrono_force, config(*materials, **inputs), at)
+
+
+def test_every_law_of_chrono_is_compared() -> None:
+    assert {key for key, *_ in CHRONO} == CODES["chrono"].laws.keys()
+
+
+def test_chrono_hertz_delivers_the_value_known_for_zero_force() -> None:
+    """ζ = 0.2154537620 of e = 0.5 gives exp(−2ζ acos ζ/√(1 − ζ²)) = 0.5503."""
+    export = impact.export("chrono", source=config("soft", "soft", e=0.5))
+    assert export.e_continuous == pytest.approx(0.5503, abs=5e-5)
+    assert "delivers 0.550283 where e = 0.5 is asked for" in export.warnings[0]
+
+
+def test_chrono_takes_both_materials_or_a_modulus_that_gives_the_stiffness() -> None:
+    two = impact.export("chrono", source=config("soft", "hard", e=0.5)).parameters
+    assert (two["YoungModulus"], two["PoissonRatio2"]) == (1e9, 0.2)
+    assert two["EffectiveCurvatureRadius"] == pytest.approx(0.03, rel=1e-15)
+    # E* = 3 K/(4 √R) and E = 2 (1 − ν²) E*
+    one = impact.export("chrono", source=config(e=0.5, K=1e9)).parameters
+    assert one["YoungModulus"] == pytest.approx(2.0 * 0.91 * 0.75e9 / math.sqrt(0.03), rel=1e-14)
+
+
+def test_the_classes_of_chrono_have_the_names_of_the_release() -> None:
+    new = "\n".join(impact.export("chrono", code_version="9.0.0").lines)
+    old = "\n".join(impact.export("chrono", code_version="8.0.0").lines)
+    assert "<ChContactMaterialSMC>" in new
+    assert "\nChCollisionInfo::" in new
+    assert "<ChMaterialSurfaceSMC>" in old
+    assert "\ncollision::ChCollisionInfo::" in old
+
+
+def test_a_wall_of_chrono_gets_a_mass_that_does_not_change_the_effective_one() -> None:
+    export = impact.export("chrono", source=config("soft", "hard", e=0.5), at={"m2": math.inf})
+    (mass,) = arguments(export.lines, r"wall->SetMass\(#\)")
+    assert mass * M1 / (mass + M1) == pytest.approx(M1, rel=2e-9)
+
+
+def test_flores_at_another_speed_than_its_characteristic_one_is_warned_about() -> None:
+    key = "chrono-smc-flores"
+    same = impact.export("chrono", key, source=config("soft", "hard", e=0.9), at={f"{key}.vc": V0})
+    other = impact.export("chrono", key, source=config("soft", "hard", e=0.9), at={f"{key}.vc": 2.0 * V0})
+    assert not any("characteristic_vel" in warning for warning in same.warnings)
+    assert any("characteristic_vel = 3 m/s" in warning for warning in other.warnings)
+
+
+# ---- MercuryDPM: NormalForceSpecies and NormalForceInteractions
+
+
+def mercurydpm_force(lines: Sequence[str]) -> Force:
+    species = lines[0].removesuffix(" species;")
+    loge_term = lambda loge: loge / math.sqrt(math.pi**2 + loge * loge)  # noqa: E731
+    if species == "LinearViscoelasticSpecies":
+        k, eps, mass = arguments(lines, r"setStiffnessAndRestitutionCoefficient\(#, #, #\)")
+        dissipation = -math.sqrt(2.0 * mass * k) * loge_term(math.log(eps))
+        return lambda overlap, rate: k * overlap + dissipation * rate
+    if species == "HertzianViscoelasticSpecies":
+        modulus, rest = arguments(lines, r"setEffectiveElasticModulusAndRestitutionCoefficient\(#, #\)")
+        factor = math.sqrt(5.0) * abs(loge_term(math.log(rest)))
+
+        def hertz(overlap: float, rate: float) -> float:
+            stiffness = 4.0 / 3.0 * modulus * math.sqrt(R * overlap)
+            return stiffness * overlap + factor * math.sqrt(M * stiffness) * rate
+
+        return hertz
+    assert species == "HertzianBSHPViscoelasticSpecies"
+    (modulus,) = arguments(lines, r"setEffectiveElasticModulus\(#\)")
+    (dissipation,) = arguments(lines, r"setDissipation\(#\)")
+
+    def bshp(overlap: float, rate: float) -> float:
+        stiffness = 4.0 / 3.0 * modulus * math.sqrt(R * overlap)
+        return max(0.0, stiffness * overlap + 1.5 * dissipation * stiffness * rate)
+
+    return bshp
+
+
+MERCURYDPM: tuple[tuple[str, tuple[str, ...], dict[str, float], dict[str, float]], ...] = (
+    ("mercurydpm-linear-viscoelastic", (), {"K": 1e7, "n": 1}, {}),
+    ("tsuji-1992", ("soft", "hard"), {}, {}),
+    ("tsuji-1992", (), {"K": 1e9}, {}),
+    ("kuwabara-kono-1987", ("soft", "hard"), {}, {"e": 0.7}),
+)
+
+
+@pytest.mark.parametrize(("key", "materials", "inputs", "at"), MERCURYDPM)
+def test_the_lines_of_mercurydpm_give_the_law(
+    key: str, materials: Sequence[str], inputs: Mapping[str, float], at: Mapping[str, float]
+) -> None:
+    export = same_law("mercurydpm", key, mercurydpm_force, config(*materials, **inputs), at)
+    assert export.e_continuous == pytest.approx(at.get("e", 0.55), abs=1e-8)
+
+
+def test_every_law_of_mercurydpm_is_compared() -> None:
+    assert {key for key, *_ in MERCURYDPM} == CODES["mercurydpm"].laws.keys()
+
+
+def test_mercurydpm_gets_twice_the_effective_mass_and_the_modulus_of_the_pair() -> None:
+    linear = impact.export("mercurydpm", source=config(e=0.5, K=1e7, n=1)).parameters
+    assert linear == {"stiffness": 1e7, "restitution": 0.5, "mass": 1.5}
+    hertz = impact.export("mercurydpm", "tsuji-1992", source=config("soft", "hard", e=0.5)).parameters
+    assert hertz == {"effectiveElasticModulus": pytest.approx(MODULUS, rel=1e-13), "restitution": 0.5}
+
+
+# ---- Modelica: ElastoGap.mo
+
+
+def modelica_force(lines: Sequence[str]) -> Force:
+    c, d, n, s_rel0 = arguments(lines, r"contact\(c = #, d = #, n = #, s_rel0 = #\)")
+
+    def force(compression: float, rate: float) -> float:
+        s_rel, v_rel = s_rel0 - compression, -rate
+        f_c = -c * abs(s_rel - s_rel0) ** n if s_rel < s_rel0 else 0.0
+        f_d = min(max(d * v_rel, f_c), -f_c)
+        return -(f_c + f_d)
+
+    return force
+
+
+@pytest.mark.parametrize("n", [1.0, 1.5])
+def test_the_lines_of_modelica_give_the_law(n: float) -> None:
+    export = same_law("modelica", None, modelica_force, config(K=1e8, n=n), {"e": 0.6})
+    assert export.e_continuous == pytest.approx(0.6, abs=1e-8)
+
+
+# ---- Adams: IMPACT and STEP, in mm
+
+
+def adams_force(lines: Sequence[str]) -> Force:
+    """The force in N, of mm and mm/s."""
+    names = ("stiffness", "damping", "exponent", "dmax")
+    k, cmax, e, d = (arguments(lines, rf"\b{name} = #")[0] for name in names)
+
+    def step(x: float, x0: float, h0: float, x1: float, h1: float) -> float:
+        share = min(max((x - x0) / (x1 - x0), 0.0), 1.0)
+        return h0 + (h1 - h0) * share * share * (3.0 - 2.0 * share)
+
+    def force(penetration: float, rate: float) -> float:
+        # free length 0: x is the distance, and falls on approach
+        x, dx = -penetration, -rate
+        return max(0.0, k * (0.0 - x) ** e - step(x, 0.0 - d, cmax, 0.0, 0.0) * dx)
+
+    return force
+
+
+@pytest.mark.parametrize(("n", "d"), [(1.5, 1e-5), (2.2, 1e-4)])
+def test_the_lines_of_adams_give_the_law_in_millimetres(n: float, d: float) -> None:
+    """The mass is then in N s²/mm."""
+    source = config(K=1e8 * 1e3 ** (n - 1.5), n=n)
+    export = same_law("adams", None, adams_force, source, {"e": 0.6, "adams-impact.d": d}, length=1e3)
+    assert export.e_continuous == pytest.approx(0.6, abs=1e-8)
+
+
+def test_the_statement_and_the_function_of_adams_have_the_same_numbers() -> None:
+    at = {"adams-impact.c": 2e3, "adams-impact.d": 1e-5}
+    export = impact.export("adams", source=config(K=1e8), at=at)
+    assert arguments(export.lines, r"IMPACT\(x, dx/dt, x1, #, #, #, #\)") == list(export.parameters.values())
+    assert export.parameters["stiffness"] == pytest.approx(1e8 / 1e3**1.5, rel=1e-14)
+    assert export.parameters["dmax"] == pytest.approx(0.01, rel=1e-14)
+
+
+# ---- Simscape: s(d)(k d + b d'), with the cubic and the limit at zero that are ours
+
+
+def simscape_force(lines: Sequence[str]) -> Force:
+    k, b, w = arguments(lines, r"(?:Stiffness|Damping|RegionWidth)', '#'")
+
+    def force(depth: float, rate: float) -> float:
+        share = min(depth / w, 1.0)
+        return max(0.0, share * share * (3.0 - 2.0 * share) * (k * depth + b * rate))
+
+    return force
+
+
+def test_the_lines_of_simscape_give_the_law() -> None:
+    at = {"e": 0.6, "simscape-contact.w": 2e-5}
+    export = same_law("simscape", None, simscape_force, config(K=1e7, n=1), at)
+    assert export.e_continuous == pytest.approx(0.6, abs=1e-8)
+
+
+def test_a_wide_transition_of_simscape_is_warned_about() -> None:
+    """The peak indentation of the undamped spring is v0 √(m/K) = 4.108e-4 m."""
+    narrow, wide = (
+        impact.export(
+            "simscape", source=config(K=1e7, n=1), at={"simscape-contact.b": 1e3, "simscape-contact.w": w}
+        )
+        for w in (4.1e-5, 5e-5)
+    )
+    assert not narrow.warnings
+    assert "0.122 of the peak indentation" in wide.warnings[0]
+
+
+# ---- all of them
+
+TEXT_ONLY = [name for name, code in CODES.items() if code.script is None]
+
+
+def test_codes_without_a_script_are_marked_as_not_run() -> None:
+    assert set(TEXT_ONLY) == {"chrono", "mercurydpm", "modelica", "adams", "simscape"}
+    for name in TEXT_ONLY:
+        assert CODES[name].tested.startswith("not run by us; ")
+        assert not CODES[name].program
+
+
+@pytest.mark.parametrize(
+    ("name", "option"),
+    [*((name, "--script") for name in TEXT_ONLY), ("chrono", "--verify"), ("chrono", "--program=python")],
+)
+def test_no_script_is_written_or_run_for_them(cli: Run, name: str, option: str) -> None:
+    parameters = {
+        "modelica": ("--at", "modelica-elastogap.d=1e3"),
+        "adams": ("--at", "adams-impact.c=1e3", "--at", "adams-impact.d=1e-5"),
+        "simscape": ("--at", "simscape-contact.b=1e3", "--at", "simscape-contact.w=1e-5"),
+    }
+    done = cli("export", "--to", name, *parameters.get(name, ()), option)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "not run by us" in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--code-version", "latest"), 'got "latest", expected a release, such as 9.0.1'),
+        (("--code-version", "5.0.1"), "got 5.0.1, expected 6.0.0 or later: older releases were not read"),
+        (("--at", "R1=inf", "--at", "R2=inf", "--at", "K=1e9"), "R1 and R2: got inf, expected one finite radius"),
+    ],
+)
+def test_what_cannot_be_written_is_one_line(cli: Run, words: tuple[str, ...], message: str) -> None:
+    done = cli("export", "--to", "chrono", *words)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def test_a_law_without_known_radii_gets_finite_numbers() -> None:
+    """The radii that are taken for it are those of a script."""
+    source = {"models": "hertz", "sweep": {"v1": V0, "v2": 0.0, "m1": M1, "m2": M2, "e": 0.5, "K": 1e9}}
+    for name in ("lammps", "chrono"):
+        values = impact.export(name, source=source).parameters.values()
+        assert all(math.isfinite(value) for value in values if isinstance(value, float))
