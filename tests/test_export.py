@@ -58,6 +58,28 @@ def test_the_damping_of_a_law_without_e_is_solved_for(key: str, expected: float)
     assert export.e_continuous == pytest.approx(0.5, abs=1e-9)
 
 
+def test_liggghts_takes_the_properties_of_each_type_and_pair() -> None:
+    parameters = impact.export("liggghts", source=source("soft", "hard"), code_version="3.8.0").parameters
+    assert parameters["youngsModulus"] == "peratomtype 1000000000.0 5000000000.0"
+    assert parameters["poissonsRatio"] == "peratomtype 0.3 0.2"
+    assert parameters["coefficientRestitution"] == "peratomtypepair 2 0.5 0.5 0.5 0.5"
+
+
+@pytest.mark.parametrize(
+    ("version", "key"), [("2011.05", "yade-en-pulling"), ("2022.01a", "yade-en-clamped"), ("2023.02a", "yade-en")]
+)
+def test_the_law_of_en_depends_on_the_version_of_yade(version: str, key: str) -> None:
+    export = impact.export("yade", source=source("soft", "soft"), code_version=version)
+    assert (export.model, export.parameters["en"]) == (key, 0.5)
+
+
+def test_yade_gets_twice_the_spring_and_dashpot_of_the_contact_for_each_ball() -> None:
+    export = impact.export(
+        "yade", "yade-viscoelastic", source=source(), at={"K": 1e6, "yade-viscoelastic.C": 300.0}
+    )
+    assert (export.parameters["kn"], export.parameters["cn"]) == (2e6, 600.0)
+
+
 def test_mujoco_gets_a_damping_ratio_and_a_constant_impedance() -> None:
     export = impact.export("mujoco", at={"e": 0.6})
     timeconst, dampratio = map(float, str(export.parameters["solref"]).split())
@@ -127,6 +149,12 @@ def test_every_law_of_a_code_is_in_the_list(cli: Run, name: str) -> None:
         (
             ("--to", "lammps", "--verify", "--program", "/nowhere"),
             '"/nowhere": no LAMMPS, pair style granular there',
+        ),
+        (("--to", "liggghts", "--at", "e=0.01"), "e: got 0.01, expected 0.05 < e <= 1"),
+        (("--to", "liggghts", "--at", "K=1e8"), "expected a material, not K"),
+        (
+            ("--to", "yade", "--code-version", "new"),
+            '--code-version: got "new", expected a release such as 2023.02a',
         ),
         (("--to", "mujoco", "--at", "e=0.6", "--dt", "0.015"), "expected at most half of timeconst = 0.02"),
         (("--to", "mujoco", "--at", "e=0.6", "--at", "mujoco-solref.dampratio=1"), "expected one of the two"),

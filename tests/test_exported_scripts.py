@@ -53,7 +53,7 @@ def code_and_version(name: str) -> tuple[Code, str, str]:
     return code, program, version
 
 
-@pytest.mark.parametrize(("name", "key"), EXPORTED, ids="-".join)
+@pytest.mark.parametrize(("name", "key"), EXPORTED, ids=[key for _, key in EXPORTED])
 def test_an_exported_script_measures_the_predicted_restitution(
     name: str, key: str, record_property: Callable[[str, object], None]
 ) -> None:
@@ -85,6 +85,13 @@ PLANTED = (
     ("lammps", "lammps-coeff-restitution-hertz", "mass 1.0 vx", "mass 2.0 vx"),
     ("lammps", "lammps-coeff-restitution-hertz", "damping coeff_restitution", "damping tsuji"),
     ("lammps", "lammps-coeff-restitution-hertz", "(v_v2-v_v1)", "(v_v1-v_v2)"),
+    ("liggghts", "liggghts-hertz", "diameter 0.1", "diameter 0.05"),
+    ("liggghts", "liggghts-hertz", "mass 1.0 vx", "mass 0.5 vx"),
+    ("liggghts", "liggghts-hertz", "no_history", "no_history limitForce on"),
+    ("liggghts", "liggghts-hooke", "characteristicVelocity scalar 1.0", "characteristicVelocity scalar 2.0"),
+    ("yade", "yade-en", "en=0.5", "betan=0.5"),
+    ("yade", "yade-viscoelastic", "kn=2000000.0", "kn=1000000.0"),
+    ("yade", "yade-viscoelastic", "cn=600.0", "cn=300.0"),
     ("mujoco", "mujoco-solref", 'solref="0.02 0.3"', 'solref="0.02 0.15"'),
     ("mujoco", "mujoco-solref-direct", 'solref="-', 'solref="-2'),
     ("mujoco", "mujoco-solref", "0.9 0.9 0.001 0.5 2", "0.9 0.95 0.001 0.5 2"),

@@ -188,7 +188,7 @@ def output_of(command: Sequence[str]) -> str | None:
         )
     except (OSError, subprocess.TimeoutExpired):
         return None
-    return done.stdout if done.returncode == 0 else None
+    return done.stdout
 
 
 def python_package_version(package: str) -> Callable[[str], str | None]:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from ..errors import UsageError, did_you_mean
 from ..text import safe_text
-from . import adams, chrono, lammps, mercurydpm, modelica, mujoco, simscape
+from . import adams, chrono, lammps, liggghts, mercurydpm, modelica, mujoco, simscape, yade
 from .code import Code
 
 CODES: dict[str, Code] = {
     code.name: code
     for code in (
         lammps.CODE,
+        liggghts.CODE,
+        yade.CODE,
         mujoco.CODE,
         # text only
         chrono.CODE,

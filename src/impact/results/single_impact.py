@@ -17,7 +17,7 @@ from .._version import __version__
 from ..config.files import toml_text
 from ..config.grid import Axis, path_of
 from ..config.load import Config, parse_config, read_config
-from ..config.tables import FIXED_STEP_INPUTS, SWEEP_QUANTITIES
+from ..config.tables import SWEEP_QUANTITIES
 from ..contact.force_expressions import returning, stiffer
 from ..contact.history import History, follow
 from ..contact.impacts import Impacts
@@ -300,31 +300,33 @@ def single_point(
     option_names = {} if model is None else {f"models={json.dumps([model])}": f"--model {model}"}
     for name, values in (over or {}).items():
         option_names[f"{_override_path(name)}={toml_text(values)}"] = f"--over {name}"
-    at = dict(at or {})
-    if model is not None and "K" in at and find(model, plugins.models).exponent is not None:
-        # K in [sweep] belongs to the exponent there
-        at[f"{model}.K"] = at.pop("K")
-    for name, value in at.items():
-        if model is not None and name.startswith(f"{model}."):
-            # a parameter without a default has no other value yet
-            option_names[f"{_override_path(name)}={_toml_value(value)}"] = f"--at {name}={value}"
+    values = dict(at or {})
+
+    def with_values() -> dict[str, str]:
+        """The overrides, and those of all values of `at`."""
+        by_override = {f"{_override_path(k)}={_toml_value(v)}": f"--at {k}={v}" for k, v in values.items()}
+        return {**option_names, **by_override}
+
+    fixed_exponent = model is not None and find(model, plugins.models).exponent is not None
+    if "K" in values and fixed_exponent and not _is_valid(read, with_values()):
+        # K in [sweep] belongs to another exponent
+        values[f"{model}.K"] = values.pop("K")
     try:
         config = _read_with_option_names(read, option_names)
     except ConfigError:
-        for name in at:
+        for name in values:
             if not is_input(name) and not is_case(name):
                 raise UsageError(
                     f'no input "{safe_text(name)}" here; {did_you_mean(name, list(SWEEP_QUANTITIES))}'
                 ) from None
-        # a fixed step may be among the values of `at` only
-        fixed_step = {name: value for name, value in at.items() if name in FIXED_STEP_INPUTS}
-        option_names |= {f"{_override_path(k)}={_toml_value(v)}": f"--at {k}={v}" for k, v in fixed_step.items()}
+        # an input that the config lacks may be among the values of `at`
+        option_names = with_values()
         config = _read_with_option_names(read, option_names)
     columns = [_selectable_columns(axis) for axis in config.axes]
     varied = {name for names in columns for name in names}
-    if at and {"e", "alpha"} <= at.keys():
+    if {"e", "alpha"} <= values.keys():
         raise UsageError("--at alpha: got alpha and e, expected one of the two")
-    at = {**{name: value for name, value in parted.items() if name in varied}, **at}
+    at = {**{name: value for name, value in parted.items() if name in varied}, **values}
     together = {name for names in columns if len(names) > 1 for name in names}
     inputs = [*(name for names in columns for name in names), *config.scalars]
     for name, value in at.items():
@@ -404,6 +406,15 @@ def _override_path(name: str) -> str:
 
 def _toml_value(value: float | str) -> str:
     return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
+
+
+def _is_valid(read: ReadConfig, option_names: Mapping[str, str]) -> bool:
+    """Whether a config can be read with some overrides."""
+    try:
+        read(list(option_names))
+    except ConfigError:
+        return False
+    return True
 
 
 def _read_with_option_names(read: ReadConfig, option_names: Mapping[str, str]) -> Config:

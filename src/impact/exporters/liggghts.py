@@ -1,0 +1,155 @@
+"""LIGGGHTS, pair style gran."""
+
+from __future__ import annotations
+
+import re
+
+from ..errors import UsageError
+from ..formatting import number
+from ..text import safe_text
+from .code import Code, Collision, Parameters, output_of
+
+# model of pair style gran, and its options, by key of the catalogue
+OPTIONS = {
+    "liggghts-hertz": ("hertz", ""),
+    "liggghts-hertz-limit-force": ("hertz", " limitForce on"),
+    "liggghts-hooke": ("hooke", ""),
+    "liggghts-hooke-limit-force": ("hooke", " limitForce on"),
+    "liggghts-edinburgh": ("edinburgh", ""),
+}
+# LIGGGHTS refuses a restitution of this or less
+LEAST_E = 0.05
+# Young's moduli [Pa] below the first and above the second have to be allowed
+SOFT, HARD = 5e6, 1e9
+TWO_BALLS = """\
+units           si
+atom_style      granular
+atom_modify     map array
+boundary        f f f
+newton          off
+communicate     single vel yes
+region          box block -{reach} {reach} -{reach} {reach} -{reach} {reach} units box
+create_box      2 box
+neighbor        {skin} bin
+neigh_modify    delay 0
+{lines}
+create_atoms    1 single {x1} 0 0
+create_atoms    2 single {x2} 0 0
+set             atom 1 diameter {d1} mass {m1} vx {v1} vy 0 vz 0
+set             atom 2 diameter {d2} mass {m2} vx {v2} vy 0 vz 0
+fix             move all nve/sphere
+run             {steps}
+variable        e_out equal (vx[2]-vx[1])/{v0}
+print           "e_out = ${{e_out}}"
+"""
+
+
+def version_of(program: str) -> str | None:
+    match = re.search(r"LIGGGHTS-PUBLIC ([\d.]+)", output_of([program, "-help"]) or "")
+    return match[1] if match else None
+
+
+def read_version(text: str) -> str:
+    if not re.fullmatch(r"\d+\.\d+\.\d+", text):
+        raise UsageError(f'--code-version: got "{safe_text(text)}", expected a release such as 3.8.0')
+    if tuple(map(int, text.split("."))) < (3, 0, 0):
+        raise UsageError(f"--code-version: got {text}, expected 3.0.0 or later, whose laws were read")
+    return text
+
+
+def parameters(collision: Collision) -> dict[str, float | str]:
+    """The words after each property of fix property/global: its kind, and its values by type or pair of types."""
+    c = collision
+    if not c.has_materials:
+        raise UsageError("LIGGGHTS takes Young's modulus and Poisson's ratio: expected a material, not K")
+    e = 1.0 if c.model.key == "liggghts-edinburgh" else c["e"]
+    if not LEAST_E < e <= 1.0:
+        raise UsageError(f"e: got {number(e)}, expected {LEAST_E} < e <= 1: LIGGGHTS refuses others")
+
+    def pairs(value: float) -> str:
+        return "peratomtypepair 2 " + " ".join([repr(value)] * 4)
+
+    properties: dict[str, float | str] = {
+        "youngsModulus": f"peratomtype {c['E1']!r} {c['E2']!r}",
+        "poissonsRatio": f"peratomtype {c['nu1']!r} {c['nu2']!r}",
+        "coefficientRestitution": pairs(e),
+        "coefficientFriction": pairs(0.0),
+    }
+    model, _ = OPTIONS[c.model.key]
+    if model == "hooke":
+        properties["characteristicVelocity"] = f"scalar {c['vc']!r}"
+    if model == "edinburgh":
+        properties |= {
+            "UnloadingStiffness": pairs(c["k2"]),
+            "surfaceEnergy": pairs(c["gamma"]),
+            "pullOffForce": pairs(0.0),
+            "coefficientAdhesionStiffness": pairs(0.0),
+            "overlapExponent": f"scalar {c['n']!r}",
+            "adhesionExponent": f"scalar {c['adhesion_exponent']!r}",
+            # for the check of inputs only
+            "characteristicVelocity": "scalar 1.0",
+        }
+    return properties
+
+
+def lines(collision: Collision, parameters: Parameters) -> list[str]:
+    model, options = OPTIONS[collision.model.key]
+    moduli = collision["E1"], collision["E2"]
+    return [
+        *(["soft_particles  yes"] if min(moduli) < SOFT else []),
+        *(["hard_particles  yes"] if max(moduli) > HARD else []),
+        *(
+            f"fix             m{number} all property/global {name} {words}"
+            for number, (name, words) in enumerate(parameters.items(), 1)
+        ),
+        f"pair_style      gran model {model} tangential no_history{options}",
+        "pair_coeff      * *",
+        f"timestep        {collision.dt!r}",
+    ]
+
+
+def script(collision: Collision, parameters: Parameters) -> str:
+    skin = 0.1 * min(collision["R1"], collision["R2"])
+    text = "\n".join(lines(collision, parameters))
+    return TWO_BALLS.format(**collision.script_values(), skin=repr(skin), lines=text)
+
+
+def notes(collision: Collision) -> list[str]:
+    model, options = OPTIONS[collision.model.key]
+    said = [
+        "in SI (units si); the two atom types are those of ball 1 and ball 2",
+        "two materials: 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2; coefficientRestitution is of each pair of types",
+        f"refused: e <= {LEAST_E}, and Young's moduli outside 5e6 to 1e9 Pa without soft_ or hard_particles yes",
+    ]
+    if model == "hooke":
+        said.append("the stiffness follows from characteristicVelocity: set it to your speed of contact")
+    if model == "edinburgh":
+        said.append("without its dashpot: coefficientRestitution is 1; UnloadingStiffness is k2/K")
+    else:
+        said.append(
+            "limitForce on: the force is never negative"
+            if options
+            else "the force pulls before the contact ends; limitForce on cuts that off, which is another law"
+        )
+    said.append("no friction: replace tangential no_history and coefficientFriction by yours")
+    return said
+
+
+CODE = Code(
+    name="liggghts",
+    title="LIGGGHTS, pair style gran",
+    laws={key: f"model {model}{options}" for key, (model, options) in OPTIONS.items()},
+    newest="3.8.0",
+    tested="scripts were run in LIGGGHTS 3.8.0",
+    scheme="kick-drift",
+    parameters=parameters,
+    lines=lines,
+    read_version=read_version,
+    notes=notes,
+    script=script,
+    suffix=".in",
+    program="liggghts",
+    install="on Debian: apt-get install liggghts",
+    version_of=version_of,
+    command=lambda program, file: (program, "-in", file, "-log", "none"),
+)

@@ -1,0 +1,167 @@
+"""YADE, contacts of Hertz and Mindlin and viscoelastic contacts."""
+
+from __future__ import annotations
+
+import math
+import re
+
+from ..errors import UsageError
+from ..text import safe_text
+from .code import Code, Collision, Parameters, output_of
+
+LAWS = {
+    "yade-en": "Law2_ScGeom_MindlinPhys_Mindlin, en",
+    "yade-en-clamped": "Law2_ScGeom_MindlinPhys_Mindlin, en before 2023.02a",
+    "yade-en-pulling": "Law2_ScGeom_MindlinPhys_Mindlin, en before September 2013",
+    "yade-betan": "Law2_ScGeom_MindlinPhys_Mindlin, betan by the formula of a linear spring",
+    "yade-betan-pulling": "Law2_ScGeom_MindlinPhys_Mindlin, the same before September 2013",
+    "yade-betan-direct": "Law2_ScGeom_MindlinPhys_Mindlin, betan",
+    "yade-viscoelastic": "Law2_ScGeom_ViscElPhys_Basic, kn and cn",
+    "yade-viscoelastic-pulling": "Law2_ScGeom_ViscElPhys_Basic, kn and cn before January 2014",
+}
+# the law of each option by the release, or month, that it begins with; the oldest first
+HISTORY = (
+    (("", "yade-en-pulling"), ("2013.09", "yade-en-clamped"), ("2023.02a", "yade-en")),
+    (("", "yade-betan-pulling"), ("2013.09", "yade-betan")),
+    (("", "yade-viscoelastic-pulling"), ("2014.01", "yade-viscoelastic")),
+)
+TWO_BALLS = """\
+{lines}
+{materials}
+for x, radius, mass, speed, material in (
+    ({x1}, {R1}, {m1}, {v1}, material1),
+    ({x2}, {R2}, {m2}, {v2}, material2),
+):
+    ball = O.bodies[O.bodies.append(utils.sphere((x, 0, 0), radius, material=material))]
+    ball.state.mass = mass
+    ball.state.vel = (speed, 0, 0)
+O.run({steps}, True)
+v1, v2 = (ball.state.vel[0] for ball in O.bodies)
+print("e_out =", (v2 - v1) / {v0})
+"""
+
+
+def version_of(program: str) -> str | None:
+    match = re.search(r"\d{4}\.\d{2}[a-z]?", output_of([program, "--version"]) or "")
+    return match[0] if match else None
+
+
+def read_version(text: str) -> str:
+    if not re.fullmatch(r"\d{4}\.\d{2}[a-z]?", text):
+        raise UsageError(
+            f'--code-version: got "{safe_text(text)}", expected a release such as 2023.02a, or its year and month'
+        )
+    return text
+
+
+def entry(key: str, version: str) -> str:
+    """The law of an option in a version.
+
+    >>> entry("yade-en", "2022.01a"), entry("yade-betan", "2011.05")
+    ('yade-en-clamped', 'yade-betan-pulling')
+    """
+    for periods in HISTORY:
+        if key in dict(map(reversed, periods)):  # type: ignore[arg-type]
+            return [law for since, law in periods if since <= version][-1]
+    return key
+
+
+def parameters(collision: Collision) -> dict[str, float | str]:
+    """Arguments of the material and of the functor that makes the contact."""
+    c = collision
+    if "viscoelastic" in c.model.key:
+        # the springs and dashpots of the two balls act in series
+        return {"kn": 2.0 * c["K"], "cn": 2.0 * c["C"], "ks": 0.0, "cs": 0.0}
+    if not c.has_materials:
+        raise UsageError("YADE takes Young's modulus and Poisson's ratio: expected a material, not K")
+    elastic: dict[str, float | str] = {"young": c["E1"], "poisson": c["nu1"]}
+    if not c.has_one_material:
+        elastic |= {"young2": c["E2"], "poisson2": c["nu2"]}
+    if c.model.key.startswith("yade-en"):
+        return elastic | {"en": c["e"]}
+    # ζ of the law is √1.2 β
+    return elastic | {"betan": c["betan"] if c.model.key == "yade-betan-direct" else linear_damping(c["e"])}
+
+
+def linear_damping(e: float) -> float:
+    """The damping ratio of a linear spring and dashpot that ends at zero indentation, see `yade-betan`."""
+    logarithm = math.log(e)
+    return -logarithm / math.hypot(math.pi, logarithm)
+
+
+def lines(collision: Collision, parameters: Parameters) -> list[str]:
+    given = dict(parameters)
+    second = {name: given.pop(f"{name}2") for name in ("young", "poisson") if f"{name}2" in given}
+    if "kn" in given:
+        material, physics = f"ViscElMat({_arguments(given)}", "Ip2_ViscElMat_ViscElMat_ViscElPhys()"
+        law = "Law2_ScGeom_ViscElPhys_Basic()"
+    else:
+        elastic = {name: given.pop(name) for name in ("young", "poisson")}
+        material = f"FrictMat({_arguments(elastic)}"
+        physics = f"Ip2_FrictMat_FrictMat_MindlinPhys({_arguments(given)})"
+        law = "Law2_ScGeom_MindlinPhys_Mindlin()"
+    text = [f"material1 = O.materials.append({material}, frictionAngle=0))"]
+    if second:
+        text.append(f"material2 = O.materials.append(FrictMat({_arguments(second)}, frictionAngle=0))")
+    return [
+        *text,
+        "O.engines = [",
+        "    ForceResetter(),",
+        "    InsertionSortCollider([Bo1_Sphere_Aabb()]),",
+        f"    InteractionLoop([Ig2_Sphere_Sphere_ScGeom()], [{physics}], [{law}]),",
+        "    NewtonIntegrator(damping=0),",
+        "]",
+        f"O.dt = {collision.dt!r}",
+    ]
+
+
+def _arguments(values: Parameters) -> str:
+    return ", ".join(f"{name}={value!r}" for name, value in values.items())
+
+
+def script(collision: Collision, parameters: Parameters) -> str:
+    same = "" if "young2" in parameters else "material2 = material1"
+    text = "\n".join(lines(collision, parameters))
+    return TWO_BALLS.format(**collision.script_values(), lines=text, materials=same)
+
+
+def notes(collision: Collision) -> list[str]:
+    said = ["in SI; NewtonIntegrator(damping=0): its default of 0.2 damps every motion"]
+    if "viscoelastic" in collision.model.key:
+        return [
+            *said,
+            "kn and cn are of one ball: two balls act in series, so that they are twice those of the contact",
+            "en of ViscElMat finds its damping only roughly; kn and cn are exact",
+            "the force is never negative (since January 2014)",
+        ]
+    return [
+        *said,
+        "two materials: 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2; en and betan are set for each pair by MatchMaker",
+        "set en or betan, not both; en of 2023.02a is by Thornton and others, before that by Tsuji and others",
+        "the force is never negative (since September 2013); frictionAngle=0: replace it by yours",
+    ]
+
+
+CODE = Code(
+    name="yade",
+    title="YADE",
+    laws=LAWS,
+    damping={
+        "yade-betan-direct": "betan",
+        "yade-viscoelastic": "C",
+        "yade-viscoelastic-pulling": "C",
+    },
+    newest="2023.02a",
+    tested="scripts were run in YADE 2023.02a",
+    scheme="kick-drift",
+    parameters=parameters,
+    lines=lines,
+    entry=entry,
+    read_version=read_version,
+    notes=notes,
+    script=script,
+    program="yade",
+    install="on Debian: apt-get install yade",
+    version_of=version_of,
+    command=lambda program, file: (program, "-j1", "-n", "-x", file),
+)
