@@ -192,7 +192,6 @@ CODE = Code(
     damping={"kelvin-voigt-no-tension": "C", "kuwabara-kono-1987": "A"},
     newest="10.0.0",
     tested=f"not run by us; read in {CHRONO}",
-    scheme="kick-drift",
     read_version=read_version,
     comment=("// ", ""),
     parameters=parameters,

@@ -68,7 +68,6 @@ CODE = Code(
     damping={"kuwabara-kono-1987": "A"},
     newest="1.0 (trunk of July 2024)",
     tested="not run by us; read in kuwt/MercuryDPM_fork, Kernel @fb0ebf1d (2024)",
-    scheme="kick-drift",
     comment=("// ", ""),
     parameters=parameters,
     lines=lines,
