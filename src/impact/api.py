@@ -516,13 +516,15 @@ def timestep(
     dt: Sequence[float] = (),
     phases: int = 400,
     tol: float | None = None,
+    scheme: str | None = None,
     overrides: Sequence[str] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
 ) -> TimestepResult:
     """What a code with a fixed time step delivers: mean, least and largest restitution over the phase.
 
     The phase is the part of a step in which the contact begins: a code sees an overlap at its first step after it.
-    The scheme is that of LAMMPS, LIGGGHTS, YADE and MuJoCo, `impact.contact.timestep.SCHEMES["kick-drift"]`.
+    The scheme "kick-drift" is that of LAMMPS, LIGGGHTS, YADE and MuJoCo, "drake-tamsi" and "drake-sap" are those
+    of Drake's discrete solvers; `impact.contact.timestep.SCHEMES` has what they do in a step.
 
     Parameters
     ----------
@@ -532,6 +534,7 @@ def timestep(
     dt : further time steps [s]
     phases : number of phases, (i + 1/2)/phases
     tol : relative tolerance for which the smallest number of steps per contact is found
+    scheme : its name; by default "drake-tamsi" for the laws of Drake, "kick-drift" for all others
 
     Returns
     -------
@@ -539,7 +542,8 @@ def timestep(
 
     Raises
     ------
-    UsageError : a step is not positive, or the law has no rebound at these inputs
+    UsageError : a step is not positive, the scheme does not take the law, or the law has no rebound at these
+        inputs
     ConfigError, ModelError : see `sweep`
 
     A linear spring and dashpot that is asked for 0.5, with twenty steps per contact:
@@ -553,7 +557,9 @@ def timestep(
     from .inverse.timestep import timestep_study
 
     config, _ = single_point(source, overrides, read_plugins(plugins), model, at)
-    return timestep_study(config, steps_per_contact=steps_per_contact, dt=dt, phases=phases, tol=tol)
+    return timestep_study(
+        config, steps_per_contact=steps_per_contact, dt=dt, phases=phases, tol=tol, scheme=scheme
+    )
 
 
 def export(

@@ -57,6 +57,15 @@ def timestep(
             "such as 0.01 or 1%.",
         ),
     ] = None,
+    scheme: Annotated[
+        str | None,
+        typer.Option(
+            "--scheme",
+            metavar="NAME",
+            help="kick-drift, drake-tamsi or drake-sap. "
+            "\\[default: drake-tamsi for laws of Drake, else kick-drift]",
+        ),
+    ] = None,
     sets: SetOption = None,
     plugins: PluginOption = None,
     as_json: JsonOption = False,
@@ -77,6 +86,7 @@ def timestep(
         dt=dt or (),
         phases=phases,
         tol=tol,
+        scheme=scheme,
         overrides=sets or (),
         plugins=plugins or (),
     )

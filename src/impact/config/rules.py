@@ -11,7 +11,7 @@ from ..contact.formula import argument_names
 from ..contact.materials import hertz_stiffness
 from ..contact.model import ForceModel, with_base_quantities
 from ..contact.scaling import required_quantities
-from ..contact.timestep import EXACT, SCHEMES
+from ..contact.timestep import EXACT, SCHEMES, has_scheme, law_problem
 from .files import as_table
 from .quantities import ConfigProblem
 from .tables import FIXED_STEP_INPUTS, MATERIAL_QUANTITIES, SWEEP_QUANTITIES, model_quantities
@@ -226,7 +226,13 @@ def _fixed_step_problems(raw: RawConfig) -> Iterable[ConfigProblem]:
                     ("sweep", name),
                     f'set with solver.integrator = "{EXACT}", which has no fixed step, expected {expected}',
                 )
-    elif raw.integrator in SCHEMES:
+    elif isinstance(raw.integrator, str) and raw.integrator in SCHEMES:
+        for model in raw.models:
+            n = model.exponent or raw.n
+            # an exponent that is an axis has values that the scheme does not take
+            if not has_scheme(model, math.nan if n is None else n, raw.integrator):
+                yield ("solver", "integrator"), law_problem(model, raw.integrator)
+                break
         given = [name for name in ("steps_per_contact", "dt") if name in raw.sweep]
         if len(given) == 2:
             yield ("sweep", "dt"), "set together with steps_per_contact, expected one of the two"

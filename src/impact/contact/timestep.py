@@ -18,14 +18,24 @@ from .motion import MotionLaw, force_at_peak, indentation, unloading_state
 from .powers import power
 from .scaling import with_coefficients, with_units
 from .status import Status
+from .velocity_coordinates import force_form
 
 # the integration of the continuous law with error control; all other integrators are schemes with a fixed step
 EXACT = "exact"
 # the update of one step, by the name of the scheme
-KICK_DRIFT = "kick-drift"
+KICK_DRIFT, DRAKE_TAMSI, DRAKE_SAP = "kick-drift", "drake-tamsi", "drake-sap"
 SCHEMES = {
     KICK_DRIFT: "u <- u - h F(x, u)/m, then x <- x + h u; the force is evaluated at the position and velocity "
     "before the step",
+    DRAKE_TAMSI: "u <- u', the root of u' = u - (h/m) K max(0, x + h u') max(0, 1 + chi u'/v0), then "
+    "x <- x + h u'; the force is that at the end of the step",
+    DRAKE_SAP: "u <- u', the root of u' = u - (h/m) max(0, K (x + h u') + C u'), then x <- x + h u'; the force is "
+    "that at the end of the step",
+}
+# the laws of the schemes that take only some
+LAWS_OF_SCHEME = {
+    DRAKE_TAMSI: "F = K δ (1 + χ δ̇/v₀), n = 1, such as drake-point-contact",
+    DRAKE_SAP: "F = K δ + C δ̇ to F = 0, such as kelvin-voigt-no-tension",
 }
 # a contact that takes more steps, in units of its steps at the continuous contact time, never ends
 MAX_CONTACTS = 50
@@ -38,6 +48,37 @@ MAX_STEPS_PER_CONTACT = 2**17
 MAX_RESTITUTION = 2.0
 # trajectories that have ended are removed when they are this share
 COMPACTION_SHARE = 0.25
+
+
+def default_scheme(model: ForceModel) -> str:
+    """The scheme of the codes that a law is of: "drake-tamsi" for Drake's, else "kick-drift"."""
+    return DRAKE_TAMSI if model.key.startswith("drake-") else KICK_DRIFT
+
+
+def has_scheme(model: ForceModel, n: float, scheme: str) -> bool:
+    """Whether a scheme takes a law with an exponent n.
+
+    Parameters
+    ----------
+    model : the law
+    n : compliance exponent
+    scheme : one of `SCHEMES`
+
+    >>> from impact.contact.models import find
+    >>> [has_scheme(find(key), 1.0, "drake-sap") for key in ("kelvin-voigt-no-tension", "kelvin-voigt")]
+    [True, False]
+    """
+    if scheme == DRAKE_TAMSI:
+        return n == 1.0 and model.velocity_coordinate == "log"
+    if scheme == DRAKE_SAP:
+        is_force = n == 1.0 and model.velocity_coordinate == "force" and model.release == "force"
+        return is_force and force_form(model, n).drag == 0.0
+    return True
+
+
+def law_problem(model: ForceModel, scheme: str) -> str:
+    """What to tell a user who asks for a scheme that does not take the law."""
+    return f'scheme "{scheme}" does not take {model.key}, expected a law {LAWS_OF_SCHEME[scheme]}'
 
 
 @dataclass(frozen=True)
@@ -61,6 +102,14 @@ class FixedStepResult:
     status: NDArray[np.int8]
 
 
+def check_scheme(model: ForceModel, n: float, scheme: str) -> None:
+    """Raise a UsageError if there is no such scheme, or if it does not take the law."""
+    if scheme not in SCHEMES:
+        raise UsageError(f'no scheme "{safe_text(scheme)}"; {did_you_mean(scheme, list(SCHEMES))}')
+    if not has_scheme(model, n, scheme):
+        raise UsageError(law_problem(model, scheme))
+
+
 def collide_at_fixed_step(
     model: ForceModel,
     n: float,
@@ -74,8 +123,8 @@ def collide_at_fixed_step(
 
     The contact begins with the overlap `phase * step * v0` at the first step that sees it. The contact ends with
     the first step after which the surfaces do not overlap. The force of a law that ends at zero force is never
-    negative. A law with an unloading branch follows it from the first step after which the velocity is not
-    positive.
+    negative, nor is that of a scheme of Drake. A law with an unloading branch follows it from the first step after
+    which the velocity is not positive.
 
     Parameters
     ----------
@@ -94,25 +143,32 @@ def collide_at_fixed_step(
     Raises
     ------
     ModelError : a formula of the law fails, or returns an array of another shape
-    UsageError : there is no such scheme
+    UsageError : there is no such scheme, or it does not take the law
     """
-    if scheme not in SCHEMES:
-        raise UsageError(f'no scheme "{safe_text(scheme)}"; {did_you_mean(scheme, list(SCHEMES))}')
+    check_scheme(model, n, scheme)
     count = step.size
     law = MotionLaw.of(model, n, strong=False)
     with np.errstate(all="ignore"):
         law_values = with_coefficients(model, with_units(values, n), count)
         params = tuple(np.broadcast_to(law_values[name], count).copy() for name in law.names)
         limit = np.broadcast_to(np.asarray(max_steps, np.int64), count).copy()
-        return _run(_Contacts(law, params, step.copy(), phase * step, np.ones(count), limit))
+        return _run(_Contacts(law, params, step.copy(), phase * step, np.ones(count), limit, scheme))
 
 
 class _Contacts:
     """The collisions that go on; arrays of shape (n,), of which those that have ended are removed."""
 
     def __init__(
-        self, law: MotionLaw, params: tuple[Array, ...], step: Array, x: Array, u: Array, limit: NDArray[np.int64]
+        self,
+        law: MotionLaw,
+        params: tuple[Array, ...],
+        step: Array,
+        x: Array,
+        u: Array,
+        limit: NDArray[np.int64],
+        scheme: str,
     ) -> None:
+        self.scheme = scheme
         self.law, self.params, self.step, self.x, self.u, self.limit = law, params, step, x, u, limit
         self.peak, self.residual = x.copy(), np.zeros_like(x)
         self.largest_force = np.full_like(x, -np.inf)
@@ -142,7 +198,8 @@ class _Contacts:
                 "stretch": np.maximum(self.x - residual, 0.0),
             }
             force = np.where(self.unloads, self._formula(unloading, self.params, extra), force)
-        return np.maximum(force, 0.0) if law.model.release == "force" else force
+        is_clamped = law.model.release == "force" or self.scheme != KICK_DRIFT
+        return np.maximum(force, 0.0) if is_clamped else force
 
     def force_at(self, x: Array) -> Array:
         """The force at other positions, zero where the law has no finite one."""
@@ -175,7 +232,7 @@ class _Contacts:
     def advance(self) -> None:
         """One step of all collisions."""
         force = self.force()
-        self.u = self.u - self.step * force
+        self.u = self.next_velocity(force)
         moved = self.step * self.u
         self.x = self.x + moved
         self._add_work(force, moved)
@@ -184,6 +241,25 @@ class _Contacts:
             turned = ~self.unloads & (self.u <= 0.0)
             if turned.any():
                 self._turn(turned)
+
+    def next_velocity(self, force: Array) -> Array:
+        """The velocity at the end of the step; `force` is that before it.
+
+        The schemes of Drake take the force at the end of the step. Both forces grow with u', so that the force is
+        zero at the end if and only if it is zero with u' = u. Where it is not, u' is for TAMSI the larger root of
+        h² χ u'² + (1 + h² + h χ x) u' + h x - u = 0, with which both factors of the force are positive, and
+        for SAP that of a linear equation.
+        """
+        h, x, u, names = self.step, self.x, self.u, self.law.names
+        if self.scheme == DRAKE_TAMSI:
+            chi = self.params[names.index("chi")]
+            half = 0.5 * (1.0 + h * (h + chi * x))
+            implicit = (u - h * x) / (half + np.sqrt(half * half + h * h * chi * (u - h * x)))
+            return np.where((x + h * u > 0.0) & (1.0 + chi * u > 0.0), implicit, u)
+        if self.scheme == DRAKE_SAP:
+            reach = h + self.params[names.index("c")]
+            return np.where(x + reach * u > 0.0, (u - h * x) / (1.0 + h * reach), u)
+        return u - h * force
 
     def _add_work(self, force: Array, moved: Array) -> None:
         """Add the work of the force before a step: half of it in the step before, half in the step itself."""

@@ -148,7 +148,7 @@ def prepare_export(
             raise UsageError(f"--at e={wanted}: {key} delivers {least} to {most} at any {parameter}")
         at[solved] = result.roots[0].value
     config, _ = single_point(source, overrides, plugins, key, at)
-    fixed, collision = fixed_step_law(config, PHASES)
+    fixed, collision = fixed_step_law(config, PHASES, code.scheme)
     return ExportProblem(
         code=code,
         version=version,

@@ -16,7 +16,14 @@ from ..contact.model import ForceModel
 from ..contact.outputs import collide
 from ..contact.scaling import dimensionless_values
 from ..contact.status import Status
-from ..contact.timestep import KICK_DRIFT, MAX_CONTACTS, MAX_STEPS_PER_CONTACT, collide_at_fixed_step
+from ..contact.timestep import (
+    KICK_DRIFT,
+    MAX_CONTACTS,
+    MAX_STEPS_PER_CONTACT,
+    check_scheme,
+    collide_at_fixed_step,
+    default_scheme,
+)
 from ..engine.build_impacts import build_impacts
 from ..engine.plan import Plan
 from ..errors import UsageError
@@ -94,12 +101,14 @@ class FixedStepLaw:
     impact : the impact, one of them
     contact_time : of the continuous law [s]
     phases : number of phases, (i + 1/2)/phases
+    scheme : name of the scheme, see `impact.contact.timestep.SCHEMES`
     """
 
     model: ForceModel
     impact: Impacts
     contact_time: float
     phases: int
+    scheme: str = KICK_DRIFT
 
     @property
     def has_e(self) -> bool:
@@ -132,7 +141,7 @@ class FixedStepLaw:
         step = np.repeat(dt / self.impact.time[0], self.phases)
         max_steps = math.ceil(MAX_CONTACTS * max(self.contact_time / float(dt.min()), 1.0))
         result = collide_at_fixed_step(
-            self.model, float(self.impact.n[0]), values, step, np.tile(phase, dt.size), max_steps
+            self.model, float(self.impact.n[0]), values, step, np.tile(phase, dt.size), max_steps, self.scheme
         )
         return result.e_out.reshape(dt.size, self.phases)
 
@@ -210,22 +219,32 @@ def needed_steps(law: FixedStepLaw, tol: float, e_continuous: float) -> NeededSt
     return NeededSteps(tol, most, law.contact_time / most)
 
 
-def fixed_step_law(config: Config, phases: int) -> tuple[FixedStepLaw, dict[str, float]]:
+def fixed_step_law(
+    config: Config, phases: int, scheme: str | None = None
+) -> tuple[FixedStepLaw, dict[str, float]]:
     """The law and the impact of a config without axes, and the outputs of the continuous law by name, in SI.
+
+    Parameters
+    ----------
+    config : of one impact
+    phases : number of phases
+    scheme : its name; None for that of the codes that the law is of, `default_scheme`
 
     Raises
     ------
-    UsageError : the continuous law does not end with a rebound
+    UsageError : the continuous law does not end with a rebound, or the scheme does not take the law
     """
     plan = Plan(config)
     model = config.models[0]
     impact = build_impacts(plan.inputs, model, ())
+    scheme = default_scheme(model) if scheme is None else scheme
+    check_scheme(model, float(impact.n[0]), scheme)
     outputs = collide(model, impact, rtol=config.solver.rtol, max_steps=config.solver.max_steps)
     collision = {name: array[0].item() for name, array in outputs.items()}
     status = Status(collision["status"])
     if status != Status.OK:
         raise UsageError(f"{model.key} has no rebound at these inputs: {status.meaning}")
-    return FixedStepLaw(model, impact, collision["contact_time"], phases), collision
+    return FixedStepLaw(model, impact, collision["contact_time"], phases, scheme), collision
 
 
 def time_steps(contact_time: float, steps_per_contact: Sequence[float], dt: Sequence[float]) -> list[float]:
@@ -253,23 +272,25 @@ def timestep_study(
     dt: Sequence[float],
     phases: int,
     tol: float | None,
+    scheme: str | None = None,
 ) -> TimestepResult:
     """What the law of a config without axes delivers at fixed steps; see `impact.timestep`.
 
     Raises
     ------
-    UsageError : a step is not positive, or the continuous law does not end with a rebound
+    UsageError : a step is not positive, the scheme does not take the law, or the continuous law does not end with
+        a rebound
     """
     if phases < 1:
         raise UsageError(f"--phases: got {phases}, expected a whole number >= 1")
-    law, collision = fixed_step_law(config, phases)
+    law, collision = fixed_step_law(config, phases, scheme)
     contact_time, e_continuous = law.contact_time, collision["e_out"]
     if not steps_per_contact and not dt:
         steps_per_contact = STEPS_PER_CONTACT
     steps = time_steps(contact_time, steps_per_contact, dt)
     return TimestepResult(
         model=law.model.key,
-        scheme=KICK_DRIFT,
+        scheme=law.scheme,
         e=law.e,
         e_continuous=e_continuous,
         contact_time=contact_time,
