@@ -5,8 +5,8 @@ a step by which the balls overlap when the code first sees the contact. The mean
 a step of zero, from h and h/2 and again from h/2 and h/4. The code's own uncertainty is the difference of the two
 extrapolations plus half the spread over the phases at h/4.
 
-At coarse steps an explicit code delivers another restitution, which depends on the phase: it is that of the map of
-its scheme, `impact.contact.timestep`, at each phase.
+At coarse steps a code delivers another restitution, which depends on the phase: it is that of the map of its
+scheme, `impact.contact.timestep`, at each phase.
 
 `tests/peers` has a script for each code, which runs in a child process. The table at the end of `make test-peers`
 has the largest difference and the largest uncertainty over the collisions of an entry.
@@ -292,7 +292,16 @@ ENTRIES += [
 
 DRAKE = Code("Drake", "run_drake.py", steps_per_contact=100)
 
-for scheme in ("semi_explicit_euler", "tamsi"):
+# the scheme of each of its integrators and discrete approximations
+DRAKE_SCHEMES = {
+    "semi_explicit_euler": "kick-drift",
+    "tamsi": "drake-tamsi",
+    "lagged": "drake-tamsi",
+    "similar": "drake-tamsi",
+    "sap": "drake-sap",
+}
+
+for scheme in ("semi_explicit_euler", "tamsi", "lagged", "similar"):
     ENTRIES += [
         Entry(
             "drake-point-contact", DRAKE,
@@ -305,6 +314,14 @@ for scheme in ("semi_explicit_euler", "tamsi"):
             collisions(d1=(0.5, 3.0, 0.1), d2=(2.0, 0.3, 0.0), k1=2e6, k2=5e6, K=1e7 / 7, n=1.0), variant=scheme,
         ),
     ]  # fmt: skip
+
+ENTRIES += [
+    Entry(
+        "kelvin-voigt-no-tension", DRAKE,
+        lambda c: {"scheme": "sap", "k": (2 * c["K"], 2 * c["K"]), "d": (0.0, 0.0), "tau": c["C"] / c["K"]},
+        collisions(C=(300.0, 900.0, 50.0), K=1e6, n=1.0), variant="sap",
+    ),
+]  # fmt: skip
 
 # ---- Simbody, in OpenSim; its stiffness is the modulus of plane strain
 
@@ -405,15 +422,15 @@ def by_impact(key: str, collision: Values) -> tuple[float, float]:
     return float(result["e_out"].item()), float(result["contact_time"].item())
 
 
-def by_map(key: str, collision: Values, steps: np.ndarray) -> np.ndarray:
-    """The restitution by the scheme kick-drift at time steps [s], and at each phase."""
+def by_map(key: str, collision: Values, steps: np.ndarray, scheme: str = "kick-drift") -> np.ndarray:
+    """The restitution by a scheme at time steps [s], and at each phase."""
     plan = prepare(config_of(key, collision))
     (model,) = plan.models
     impacts = build_impacts(plan.inputs, model, ())
     count = steps.size * PHASES.size
     values = {name: np.repeat(value, count) for name, value in dimensionless_values(model, impacts).items()}
     step, phase = np.repeat(steps / impacts.time[0], PHASES.size), np.tile(PHASES, steps.size)
-    result = collide_at_fixed_step(model, float(impacts.n[0]), values, step, phase, 10_000)
+    result = collide_at_fixed_step(model, float(impacts.n[0]), values, step, phase, 10_000, scheme)
     return result.e_out.reshape(steps.size, PHASES.size)
 
 
@@ -487,36 +504,54 @@ def test_a_code_gives_the_restitution_of_its_entry(
     assert (np.abs(difference) <= np.maximum(uncertainty + entry.slack, FLOOR)).all()
 
 
-# entries of codes whose scheme is "kick-drift", with MuJoCo's integrator Euler; not those whose damping the code
-# itself only approximates
-EXPLICIT = [
+# entries of codes whose scheme is known, with MuJoCo's integrator Euler; not those whose damping the code itself
+# only approximates
+OF_A_SCHEME = [
     entry
     for entry in ENTRIES
     if not entry.slack
-    and (entry.code.name in ("LAMMPS", "LIGGGHTS", "YADE") or (entry.code is MUJOCO and entry.variant == "Euler"))
+    and (
+        entry.code.name in ("LAMMPS", "LIGGGHTS", "YADE", "Drake")
+        or (entry.code is MUJOCO and entry.variant == "Euler")
+    )
 ]
 COARSE_STEPS = (12.0, 31.0)
+# by variant. Drake ends the iterations of LAGGED and SIMILAR before they come to rounding, and its Python package
+# has no setting for that; those of TAMSI come to rounding, as does SAP, whose equation is linear
+MAP_TOLERANCES = {"lagged": 2e-9, "similar": 2e-9}
+WRONG_FORCE = 1e-6
 
 
-@pytest.mark.parametrize("entry", EXPLICIT, ids=lambda entry: "-".join(filter(None, (entry.key, entry.variant))))
-def test_an_explicit_code_delivers_the_restitution_of_the_map_at_coarse_steps(
+@pytest.mark.parametrize(
+    "entry", OF_A_SCHEME, ids=lambda entry: "-".join(filter(None, (entry.key, entry.variant)))
+)
+def test_a_code_delivers_the_restitution_of_the_map_of_its_scheme_at_coarse_steps(
     entry: Entry, tmp_path: Path, record_property: Callable[[str, object], None]
 ) -> None:
     contact_times = [by_impact(entry.key, collision)[1] for collision in entry.collisions]
     version, theirs = by_code(entry, contact_times, tmp_path, COARSE_STEPS)
     if not entry.holds(version):
         pytest.skip(f"{entry.key}: {entry.code.name} {version} has another law: {entry.holds.__doc__}")
-    ours = np.array(
-        [
-            by_map(entry.key, collision, contact_time / np.array(COARSE_STEPS))
-            for collision, contact_time in zip(entry.collisions, contact_times, strict=True)
-        ]
-    )
+    scheme = DRAKE_SCHEMES[entry.variant] if entry.code is DRAKE else "kick-drift"
+    tolerance = MAP_TOLERANCES.get(entry.variant, MAP_TOLERANCE)
+
+    def by_maps(changes: Values) -> np.ndarray:
+        return np.array(
+            [
+                by_map(entry.key, collision | changes, contact_time / np.array(COARSE_STEPS), scheme)
+                for collision, contact_time in zip(entry.collisions, contact_times, strict=True)
+            ]
+        )
+
+    ours = by_maps({})
     difference = float(np.abs(theirs - ours).max())
     variant = " ".join(filter(None, (entry.variant, "T/12, T/31")))
-    record_property("peer", (entry.code.name, version, entry.key, variant, ours.size, difference, MAP_TOLERANCE))
+    record_property("peer", (entry.code.name, version, entry.key, variant, ours.size, difference, tolerance))
     print("impact", ours, "code", theirs)
-    assert difference <= MAP_TOLERANCE
+    assert difference <= tolerance
+    if entry.code is DRAKE:
+        stiffness = entry.collisions[0]["K"] * (1 + WRONG_FORCE)
+        assert float(np.abs(theirs - by_maps({"K": stiffness})).max()) > tolerance
 
 
 # entries of codes that no package of PyPI or Debian can check, by key or by its first word

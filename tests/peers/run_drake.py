@@ -17,17 +17,24 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import DiagramBuilder
 from runner import serve
 
+APPROXIMATIONS = {
+    "tamsi": DiscreteContactApproximation.kTamsi,
+    "lagged": DiscreteContactApproximation.kLagged,
+    "similar": DiscreteContactApproximation.kSimilar,
+    "sap": DiscreteContactApproximation.kSap,
+}
+
 
 def collide(
     scheme: str, k: list[float], d: list[float], m1: float, m2: float, R1: float, R2: float, v1: float, v2: float,
-    gap: float, step: float, count: int,
+    gap: float, step: float, count: int, tau: float = 0.0,
 ) -> tuple[float, float]:  # fmt: skip
-    discrete = scheme == "tamsi"
+    discrete = scheme in APPROXIMATIONS
     builder = DiagramBuilder()
     plant, _ = AddMultibodyPlantSceneGraph(builder, step if discrete else 0.0)
     plant.set_contact_model(ContactModel.kPoint)
     if discrete:
-        plant.set_discrete_contact_approximation(DiscreteContactApproximation.kTamsi)
+        plant.set_discrete_contact_approximation(APPROXIMATIONS[scheme])
     plant.mutable_gravity_field().set_gravity_vector([0, 0, 0])
     joints = []
     for i, mass, radius in ((0, m1, R1), (1, m2, R2)):
@@ -39,6 +46,8 @@ def collide(
         AddContactMaterial(
             dissipation=d[i], point_stiffness=k[i], friction=CoulombFriction(0, 0), properties=properties
         )
+        # that of the pair is the sum
+        properties.AddProperty("material", "relaxation_time", tau / 2)
         plant.RegisterCollisionGeometry(body, RigidTransform(), Sphere(radius), f"sphere{i}", properties)
     plant.Finalize()
     diagram = builder.Build()
