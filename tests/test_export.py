@@ -87,6 +87,24 @@ def test_mujoco_gets_a_damping_ratio_and_a_constant_impedance() -> None:
     assert export.parameters["solimp"] == "0.9 0.9 0.001 0.5 2"
 
 
+def test_drake_gets_the_stiffness_and_dissipation_of_each_ball() -> None:
+    key = "drake-point-contact-mixed"
+    at = {f"{key}.{name}": value for name, value in {"k1": 2e6, "k2": 6e6, "d1": 0.5, "d2": 2.0}.items()}
+    own = impact.export("drake", key, at=at, code_version="1.51.1").parameters
+    assert own == {"point_stiffness1": 2e6, "dissipation1": 0.5, "point_stiffness2": 6e6, "dissipation2": 2.0}
+    # 1/(1/k1 + 1/k2) = 3e6 N/m for k1 : k2 = 1 : 3; d is weighted by that ratio
+    scaled = impact.export("drake", key, at=at | {"K": 3e6}, code_version="1.51.1").parameters
+    assert (scaled["point_stiffness1"], scaled["point_stiffness2"]) == pytest.approx((4e6, 12e6), rel=1e-15)
+
+
+def test_drake_is_asked_for_the_dissipation_that_gives_the_e_of_the_continuous_law_and_delivers_less() -> None:
+    export = impact.export("drake", at={"e": 0.9, "v1": 1.0, "K": 1e6}, code_version="1.51.1")
+    # d v0 of e = 0.9, from its closed form
+    assert export.parameters["dissipation1"] == pytest.approx(0.16648195, abs=1e-7)
+    assert export.parameters["point_stiffness1"] == 2e6
+    assert (export.scheme, export.at_dt.e_mean) == ("drake-tamsi", pytest.approx(0.8213, abs=1e-3))
+
+
 def test_a_tsuji_before_the_factor_is_another_law_and_warned_about() -> None:
     export = impact.export("lammps", "lammps-tsuji", at={"e": 0.5}, code_version="22Jul2025")
     assert export.model == "lammps-tsuji-without-root"
@@ -158,6 +176,10 @@ def test_every_law_of_a_code_is_in_the_list(cli: Run, name: str) -> None:
         ),
         (("--to", "mujoco", "--at", "e=0.6", "--dt", "0.015"), "expected at most half of timeconst = 0.02"),
         (("--to", "mujoco", "--at", "e=0.6", "--at", "mujoco-solref.dampratio=1"), "expected one of the two"),
+        (
+            ("--to", "drake", "--model", "drake-point-contact-mixed", "--at", "e=0.9"),
+            "drake-point-contact-mixed deliv",
+        ),
     ],
 )
 def test_bad_input_is_one_line(cli: Run, words: tuple[str, ...], message: str) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..errors import UsageError, did_you_mean
 from ..text import safe_text
-from . import adams, chrono, lammps, liggghts, mercurydpm, modelica, mujoco, simscape, yade
+from . import adams, chrono, drake, lammps, liggghts, mercurydpm, modelica, mujoco, simscape, yade
 from .code import Code
 
 CODES: dict[str, Code] = {
@@ -14,6 +14,7 @@ CODES: dict[str, Code] = {
         liggghts.CODE,
         yade.CODE,
         mujoco.CODE,
+        drake.CODE,
         # text only
         chrono.CODE,
         mercurydpm.CODE,

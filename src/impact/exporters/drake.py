@@ -1,0 +1,115 @@
+"""Drake, point contact with the discrete solver TAMSI."""
+
+from __future__ import annotations
+
+from .code import Code, Collision, Parameters, python_package_version
+
+TWO_BALLS = """\
+from pydrake.geometry import AddContactMaterial, ProximityProperties, Sphere
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import (
+    AddMultibodyPlantSceneGraph,
+    ContactModel,
+    CoulombFriction,
+    DiscreteContactApproximation,
+)
+from pydrake.multibody.tree import PrismaticJoint, SpatialInertia
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
+
+builder = DiagramBuilder()
+{lines}
+plant.mutable_gravity_field().set_gravity_vector([0, 0, 0])
+joints = []
+for ball, m, R, material in ((1, {m1}, {R1}, material1), (2, {m2}, {R2}, {material2})):
+    body = plant.AddRigidBody(f"ball{{ball}}", SpatialInertia.SolidSphereWithMass(m, R))
+    joint = PrismaticJoint(f"joint{{ball}}", plant.world_frame(), body.body_frame(), [1, 0, 0])
+    joints.append(plant.AddJoint(joint))
+    plant.RegisterCollisionGeometry(body, RigidTransform(), Sphere(R), f"sphere{{ball}}", material)
+plant.Finalize()
+simulator = Simulator(builder.Build())
+context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+for joint, x, v in zip(joints, ({x1}, {x2}), ({v1}, {v2})):
+    joint.set_translation(context, x)
+    joint.set_translation_rate(context, v)
+simulator.AdvanceTo({steps} * {dt})
+v1, v2 = (joint.get_translation_rate(context) for joint in joints)
+print("e_out =", (v2 - v1) / {v0})
+"""
+
+
+def parameters(collision: Collision) -> dict[str, float | str]:
+    """Point stiffness [N/m] and dissipation [s/m] of each ball; those of one where both are the same.
+
+    The stiffnesses act in series. A stiffness of the contact that the user sets replaces theirs, at their ratio.
+    """
+    c = collision
+    k1, k2 = c["k1"], c["k2"]
+    if c.has_own_K:
+        k1, k2 = c["K"] * (1.0 + k1 / k2), c["K"] * (1.0 + k2 / k1)
+    if c.model.key == "drake-point-contact":
+        d1 = d2 = c["d"]
+    else:
+        d1, d2 = c["d1"], c["d2"]
+    values: dict[str, float | str] = {"point_stiffness1": k1, "dissipation1": d1}
+    return values if (k1, d1) == (k2, d2) else {**values, "point_stiffness2": k2, "dissipation2": d2}
+
+
+def lines(collision: Collision, parameters: Parameters) -> list[str]:
+    text = []
+    for ball in ("1", "2") if "point_stiffness2" in parameters else ("1",):
+        text += [
+            f"material{ball} = ProximityProperties()",
+            "AddContactMaterial(",
+            f"    dissipation={parameters[f'dissipation{ball}']!r},",
+            f"    point_stiffness={parameters[f'point_stiffness{ball}']!r},",
+            "    friction=CoulombFriction(0.0, 0.0),",
+            f"    properties=material{ball},",
+            ")",
+        ]
+    return [
+        *text,
+        f"plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step={collision.dt!r})",
+        "plant.set_contact_model(ContactModel.kPoint)",
+        "plant.set_discrete_contact_approximation(DiscreteContactApproximation.kTamsi)",
+    ]
+
+
+def script(collision: Collision, parameters: Parameters) -> str:
+    text = "\n".join(lines(collision, parameters))
+    second = "material2" if "point_stiffness2" in parameters else "material1"
+    return TWO_BALLS.format(**collision.script_values(), lines=text, material2=second)
+
+
+def notes(collision: Collision) -> list[str]:
+    return [
+        "point_stiffness [N/m] is of one ball, two equal balls act with half of it; dissipation is in s/m",
+        "two materials: k = k1 k2/(k1 + k2), dissipation d = (k2 d1 + k1 d2)/(k1 + k2)",
+        "unset, dissipation is 50 s/m and point_stiffness 1e6 N/m (since 1.36.0): 50 s/m is e = 0.02 at 1 m/s",
+        "unset, the contact model is hydroelastic with fallback: point_stiffness holds only where it falls back",
+        "unset, the approximation is LAGGED, which gives the same restitution; SAP has relaxation_time instead",
+        "the force is that at the end of the step, never negative; each step takes energy, so that e is smaller",
+        "time_step=0 with the integrator semi_explicit_euler loses less: impact timestep --scheme kick-drift",
+        "no friction: replace CoulombFriction(0, 0) by yours; unset, both coefficients are 0.5",
+    ]
+
+
+CODE = Code(
+    name="drake",
+    title="Drake",
+    laws={
+        "drake-point-contact": "point contact, one material",
+        "drake-point-contact-mixed": "point contact, two materials",
+    },
+    damping={"drake-point-contact": "d", "drake-point-contact-mixed": "d1"},
+    newest="1.51.1",
+    tested="scripts were run in Drake 1.51.1, TAMSI",
+    scheme="drake-tamsi",
+    parameters=parameters,
+    lines=lines,
+    notes=notes,
+    script=script,
+    program="python",
+    install="pip install drake",
+    version_of=python_package_version("drake"),
+)
