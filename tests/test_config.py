@@ -141,7 +141,7 @@ BAD = [
     ("e = 0.5", 'e = 0.5\nK = "1 N/m"',
      ['x.toml:5: sweep.K: got "1 N/m", expected a unit of N/m^n with n = 1.5']),
     ("e = 0.5", 'e = 0.5\nK = "1 N/m^2"\nn = [1.5, 2]',
-     ['x.toml:5: sweep.K: got "1 N/m^2", expected a bare number: its unit N/m^n depends on n, which is an axis',
+     ['x.toml:5: sweep.K: got "1 N/m^2", expected a bare number: its unit N/m^n depends on n, which varies',
       "x.toml:5: sweep.K: its unit N/m^n depends on n, which is an axis; expected one K for each n, zipped with it"]),
     # lists and ranges
     ("e = 0.5", "e = []",

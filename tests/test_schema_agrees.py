@@ -8,6 +8,7 @@ number of values of a range.
 from __future__ import annotations
 
 import copy
+import json
 import re
 from typing import Any
 
@@ -168,3 +169,70 @@ def test_a_stored_table_of_cases_is_in_the_schema() -> None:
     assert VALIDATOR.is_valid(data)
     config = read_config(data)
     assert parse_config(config.text, config.overrides) == config
+
+
+DATA_NUMBERS = st.integers(-1, 3) | st.floats(-1.0, 2.0) | st.sampled_from(["0.5", "1 s", "x", True, None])
+FIT_VALUES: dict[str, Any] = {
+    "e": st.fixed_dictionaries({"fit": st.lists(DATA_NUMBERS, max_size=3) | DATA_NUMBERS}, optional={"x9": st.just(1)}),
+    "sigma": DATA_NUMBERS | st.lists(DATA_NUMBERS, max_size=3) | st.just({"fit": [0, 1]}),
+    "noise": st.sampled_from(["given", "scale", "excess", "normal", 1]),
+    "file": st.sampled_from(["drops.csv", 1, ["drops.csv"]]),
+    "lines": st.lists(st.integers(-1, 9), max_size=3) | DATA_NUMBERS,
+    "columns": st.dictionaries(st.sampled_from(["v1", "e_out"]), DATA_NUMBERS | st.lists(DATA_NUMBERS, max_size=3), max_size=2),
+}  # fmt: skip
+# conditions that a JSON Schema does not express
+BEYOND_DATA = (
+    "least < most",
+    "a bare number",
+    "a unit of",
+    "values, expected",
+    "no column of an output",
+    "not read",
+)
+BEYOND_DATA += (
+    "without standard deviations",
+    "set together with",
+    'got "',
+    "number from 0 to 1",
+    "missing, expected",
+)
+
+
+@pytest.mark.parametrize("key", FIT_VALUES)
+def test_reader_and_schema_agree_on_a_calibration(key: str) -> None:
+    @settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
+    @given(FIT_VALUES[key])
+    def check(value: object) -> None:
+        data: dict[str, Any] = {"columns": {"v1": [1.0, 2.0], "e_out": [0.5, 0.5]}}
+        fits: object = {"fit": [0, 1]}
+        if key == "e":
+            fits = value
+        elif key == "file":
+            data = {"file": value}
+        else:
+            data[key] = value
+        config = {
+            "models": "lankarani-nikravesh-1990",
+            "data": data,
+            "sweep": {"e": fits, "m1": 1.0, "m2": 1.0, "R1": 1.0, "R2": 1.0, "material": "steel"},
+        }
+        problems: list[str] = []
+        try:
+            parse_config(json.dumps(config), purpose="calibrate")
+        except ConfigError as error:
+            problems = list(error.problems)
+        if VALIDATOR.is_valid(config):
+            unexpected = [line for line in problems if not any(text in line for text in BEYOND_DATA)]
+            assert not unexpected, "the reader refuses what the schema accepts"
+        else:
+            assert problems, "the schema refuses what the reader accepts"
+
+    check()
+
+
+def test_schema_requires_the_speed_of_a_sweep_but_not_of_measurements() -> None:
+    sweep = {"e": 0.5, "m1": 1.0, "m2": 1.0, "material": "steel"}
+    config: dict[str, Any] = {"models": "hertz", "sweep": sweep}
+    assert not VALIDATOR.is_valid(config)
+    assert VALIDATOR.is_valid({**config, "data": {"file": "drops.csv"}})
+    assert not VALIDATOR.is_valid({**config, "data": {"noise": "scale"}})

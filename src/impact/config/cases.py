@@ -157,13 +157,9 @@ def inline_files(
         return files[file]
 
     def store_values(path: KeyPath, value: object) -> None:
-        text = f"{'.'.join(toml_key(str(part)) for part in path)}={toml_text(value)}"
-        if len(text) > MAX_OVERRIDE_LENGTH:
-            limit = f"{MAX_OVERRIDE_LENGTH:,} characters"
-            raise ConfigError([f"{path[-1]}: larger than {limit}"])
         nonlocal data
+        overrides.append(values_override(path, value))
         data, _ = set_value(data, path, value)
-        overrides.append(text)
 
     cases = as_table(data.get("sweep")).get("cases")
     if isinstance(cases, str):
@@ -186,6 +182,19 @@ def inline_files(
     return dict(data), overrides, list(dict.fromkeys(problems))
 
 
+def values_override(path: KeyPath, value: object) -> str:
+    """The override that sets the values of a file.
+
+    Raises
+    ------
+    ConfigError : it is too long
+    """
+    text = f"{'.'.join(toml_key(str(part)) for part in path)}={toml_text(value)}"
+    if len(text) > MAX_OVERRIDE_LENGTH:
+        raise ConfigError([f"{path[-1]}: larger than {MAX_OVERRIDE_LENGTH:,} characters"])
+    return text
+
+
 def _read_cases(
     table: CsvTable, models: Mapping[str, ForceModel], n: float | None
 ) -> dict[str, list[float | str]]:
@@ -200,19 +209,19 @@ def _read_cases(
         except ConfigError as error:
             problems += error.problems
         except KeyError:
-            problems.append(f"{table.name}:1: {safe_text(column, 60)}: {_unknown_input_message(column, models)}")
+            problems.append(f"{table.name}:1: {safe_text(column, 60)}: {unknown_input_message(column, models)}")
     if problems:
         raise ConfigError(problems)
     return values
 
 
-def _unknown_input_message(name: str, models: Mapping[str, ForceModel]) -> str:
+def unknown_input_message(name: str, models: Mapping[str, ForceModel]) -> str:
     """A message about the name of a column that is no input."""
     table, key, *_ = map(str, path_of(name))
     if table == "materials":
         inputs = [f"materials.{key}.{field}" for field in MATERIAL_QUANTITIES]
     elif table == "sweep":
-        inputs = [*SWEEP_QUANTITIES, *MATERIAL_KEYS]
+        inputs = input_names()
     elif key in models:
         inputs = [f"{key}.{parameter}" for parameter in model_quantities(models[key])]
     else:
@@ -220,16 +229,27 @@ def _unknown_input_message(name: str, models: Mapping[str, ForceModel]) -> str:
     return f"no such input; {suggest(name, inputs)}"
 
 
-def _file_columns(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, Mapping[str, str]]]:
-    """The path and the table of every `{ file = ..., column = ... }`."""
+def input_names() -> list[str]:
+    """The names of the inputs in [sweep]."""
+    return [*SWEEP_QUANTITIES, *MATERIAL_KEYS]
+
+
+def input_values(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, Any]]:
+    """The path and the value of every key of [sweep], of a material and of [model.KEY]."""
     tables: dict[KeyPath, dict[str, Any]] = {("sweep",): as_table(data.get("sweep"))}
     for name in ("materials", "model"):
         tables |= {(name, key): as_table(table) for key, table in as_table(data.get(name)).items()}
     for path, table in tables.items():
-        for key, reference in table.items():
-            is_column = isinstance(reference, dict) and reference.keys() == {"file", "column"}
-            if is_column and all(isinstance(text, str) for text in reference.values()):
-                yield (*path, key), reference
+        for key, value in table.items():
+            yield (*path, key), value
+
+
+def _file_columns(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, Mapping[str, str]]]:
+    """The path and the table of every `{ file = ..., column = ... }`."""
+    for path, reference in input_values(data):
+        is_column = isinstance(reference, dict) and reference.keys() == {"file", "column"}
+        if is_column and all(isinstance(text, str) for text in reference.values()):
+            yield path, reference
 
 
 def expand_cases(
@@ -259,10 +279,10 @@ def expand_cases(
         try:
             quantity_at(path, models)
         except KeyError:
-            problems.append((cases_path, _unknown_input_message(name, models)))
+            problems.append((cases_path, unknown_input_message(name, models)))
             new["sweep"].pop(name, None)
             continue
-        if _contains_path(data, path):
+        if contains_path(data, path):
             problems.append((cases_path, f"set together with {'.'.join(map(str, path))}, expected one of the two"))
         if len(values) != n_cases or not values:
             problems.append(
@@ -277,7 +297,7 @@ def expand_cases(
     return new, names, problems
 
 
-def _contains_path(data: Mapping[str, Any], path: KeyPath) -> bool:
+def contains_path(data: Mapping[str, Any], path: KeyPath) -> bool:
     """Whether the data has a value at a path."""
     for key in path[:-1]:
         data = as_table(data.get(str(key)))

@@ -181,7 +181,8 @@ def apply_overrides(
         if not path:
             problems.append(f"--set {safe_text(text)}: expected PATH=VALUE, such as sweep.e=0.5")
             continue
-        new_range = path[0] in ("sweep", "model", "materials") and len(path) > 2 and path[-1] in RANGE_FORMS
+        is_input = path[0] in ("sweep", "model", "materials") and len(path) > 2
+        new_range = is_input and path[-1] in (*RANGE_FORMS, "fit")
         data, start = set_value(data, path, read_value(value_text), new_range=new_range)
         overridden = {old: override for old, override in overridden.items() if old[: len(start)] != start}
         overridden[start] = (index, path)
@@ -220,7 +221,7 @@ def set_value(
 ) -> tuple[dict[str, Any], KeyPath]:
     """The data with the value at the path, and the part of the path that is new or replaced.
 
-    With `new_range`, the other keys of the innermost table are removed: one range replaces another.
+    With `new_range`, the other keys of the innermost table are removed: one range or fit replaces another.
 
     >>> set_value({"sweep": {"e": 0.5}}, ("sweep", "e", "linspace"), [0, 1, 3], new_range=True)
     ({'sweep': {'e': {'linspace': [0, 1, 3]}}}, ('sweep', 'e'))

@@ -16,6 +16,7 @@ from .quantities import RANGE_FORMS, Column, ConfigProblem, KeyPath, show, sugge
 from .tables import (
     MATERIAL_QUANTITIES,
     MODELS_EXPECTED,
+    Data,
     Document,
     MaterialTable,
     Output,
@@ -237,13 +238,17 @@ def _unknown_key_hint(location: KeyPath, models: Mapping[str, ForceModel]) -> st
     keys: Iterable[str]
     match location[:-1]:
         case (*_, quantities.RANGE):
-            keys = RANGE_FORMS
+            keys = (*RANGE_FORMS, "fit")
+        case (*_, quantities.FIT):
+            keys = ("fit",)
         case (*_, quantities.COLUMN):
             keys = Column.model_fields
         case ():
             keys = Document.model_fields
         case ("sweep",):
             keys = Sweep.model_fields
+        case ("data",):
+            keys = Data.model_fields
         case ("materials", _):
             keys = MaterialTable.model_fields
         case ("model",):

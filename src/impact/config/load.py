@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from pydantic import ValidationError
 from pydantic_core import PydanticCustomError
@@ -33,7 +33,15 @@ from .files import (
 from .grid import MAX_POINTS, Axis, build_grid, chunk_problems, name_of, path_of
 from .library import library
 from .lines import SourceLocations, key_lines, problem_lines, validation_problems
-from .quantities import Column, ConfigProblem, KeyPath, Names, Numbers, Table, ValidationContext
+from .measurements import (
+    Measurements,
+    count_problems,
+    expand_measurements,
+    fit_paths,
+    inline_measurements,
+    purpose_problems,
+)
+from .quantities import Column, ConfigProblem, FitRange, KeyPath, Names, Numbers, Range, Table, ValidationContext
 from .rules import RawConfig, listed_names, rule_problems
 from .tables import (
     DEFAULT_RTOL,
@@ -51,29 +59,46 @@ from .tables import (
     quantity_at,
 )
 
-__all__ = ["DEFAULT_RTOL", "Axis", "Config", "Output", "Solver", "json_schema", "parse_config", "read_config"]
+__all__ = [
+    "DEFAULT_RTOL",
+    "Axis",
+    "Config",
+    "Measurements",
+    "Output",
+    "Purpose",
+    "Solver",
+    "json_schema",
+    "parse_config",
+    "read_config",
+]
+
+# what a config is read for: only a calibration has measurements and parameters to fit, only a sweep has axes
+Purpose = Literal["sweep", "calibrate"]
 
 
 @dataclass(frozen=True)
 class Config:
-    """A valid config of a sweep, in SI units.
+    """A valid config of a sweep or of a calibration, in SI units.
 
     Parameters
     ----------
     title : of the sweep
     models : the contact force models, in config order
     scalars : values that do not vary, by config name ("v1", "material1", "KEY.name" for a parameter of a model),
-        including defaults; a mass or radius that is not in the config is derived from the other and the density
+        including defaults; a mass or radius that is not in the config is derived from the other and the density.
+        A parameter to fit has a value between its bounds here, and an input that is measured its first value
     axes : the dimensions of the grid in config order: those of [sweep], of materials ("materials.steel.E"), of
         models
-    materials : by name, including the library materials that the config uses; a property that is an axis is NaN
-        for E and nu, and None for rho and yield_strength
+    materials : by name, including the library materials that the config uses; a property that is an axis or fitted
+        is NaN for E and nu, and None for rho and yield_strength
     solver : tolerances and core
     output : which variables are stored, and how
     text : the TOML text verbatim, or a mapping as JSON, without overrides
     overrides : PATH=VALUE strings in order: first the library materials that the config uses, then those of the
         caller, then the values of the CSV files that the config names. So text and overrides define the config
         without the library or any file
+    fits : the least and the largest value of each parameter to fit, by config name; empty for a sweep
+    data : the measurements to which they are fitted; None for a sweep
     """
 
     title: str
@@ -85,6 +110,8 @@ class Config:
     output: Output
     text: str
     overrides: tuple[str, ...]
+    fits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    data: Measurements | None = None
 
 
 def read_config(
@@ -92,6 +119,7 @@ def read_config(
     overrides: Sequence[str] = (),
     plugins: Sequence[ForceModel] = (),
     max_points: int = MAX_POINTS,
+    purpose: Purpose = "sweep",
 ) -> Config:
     """Read the config of a TOML file or a mapping.
 
@@ -102,6 +130,7 @@ def read_config(
     overrides : strings such as "sweep.e.linspace=[0,1,11]"
     plugins : models that are not built in
     max_points : limit of the points of all models together, checked before any array is allocated
+    purpose : "sweep" refuses measurements and parameters to fit; "calibrate" requires them and refuses axes
 
     Raises
     ------
@@ -112,7 +141,7 @@ def read_config(
     >>> read_config({"models": "hertz", "sweep": sweep, "materials": {"steel": steel}}).axes
     (Axis(columns={'e': (0.5, 1.0)}, numbered='', numbers=()),)
     """
-    reader = _Reader(catalogue(plugins), tuple(overrides), max_points, Path())
+    reader = _Reader(catalogue(plugins), tuple(overrides), max_points, Path(), purpose)
     if isinstance(source, Mapping):
         return reader.read(source, None, "config")
     path = Path(source)
@@ -126,12 +155,13 @@ def parse_config(
     plugins: Sequence[ForceModel] = (),
     name: str = "<text>",
     max_points: int = MAX_POINTS,
+    purpose: Purpose = "sweep",
 ) -> Config:
     """Read the config of a TOML text, or of a JSON text, which starts with a brace; see `read_config`.
 
     No file is read, because the text may come from a result of unknown origin.
     """
-    reader = _Reader(catalogue(plugins), tuple(overrides), max_points, None)
+    reader = _Reader(catalogue(plugins), tuple(overrides), max_points, None, purpose)
     return reader.read(parse_document(text, name), text, name)
 
 
@@ -142,7 +172,7 @@ class _Reader:
     Parameters
     ----------
     models : all models by key
-    overrides, max_points : see `read_config`
+    overrides, max_points, purpose : see `read_config`
     folder : of the files that the config names; None if no file may be read
     """
 
@@ -150,6 +180,7 @@ class _Reader:
     overrides: tuple[str, ...]
     max_points: int
     folder: Path | None
+    purpose: Purpose
 
     def read(self, source: object, text: str | None, name: str) -> Config:
         """Read a config, or report every problem of its overrides, files and values.
@@ -169,12 +200,16 @@ class _Reader:
             data, overridden, override_problems = apply_overrides(source_data, overrides)
             locations = SourceLocations(name, overrides=overrides, overridden=overridden)
             data, problems = to_plain_data(data)
+            if self.purpose == "sweep":
+                problems = problems or purpose_problems(data)
         if not problems:
             if text is None:
                 text = json.dumps(source_data, separators=(",", ":"), default=str)
             n = read_exponent(as_table(data.get("sweep")))
             data, file_overrides, file_problems = inline_files(data, self.folder, self.models, n)
-            config, problems = self._build_config(data, text, (*overrides, *file_overrides))
+            data, data_overrides, data_problems = inline_measurements(data, self.folder, self.models, n)
+            file_problems += data_problems
+            config, problems = self._build_config(data, text, (*overrides, *file_overrides, *data_overrides))
         if config is None or override_problems or file_problems:
             if text is not None and not text.lstrip().startswith("{"):
                 locations = replace(locations, lines=key_lines(text))
@@ -187,8 +222,11 @@ class _Reader:
         """The config of plain data, or None and the problems of the data."""
         data, library_overrides = _add_library_materials(data)
         data, cases, problems = expand_cases(data, self.models)
+        n = read_exponent(as_table(data.get("sweep")))
+        data, measurements, data_problems = expand_measurements(data, self.models, n)
+        problems += data_problems
         sweep, parameters = as_table(data.get("sweep")), as_table(data.get("model"))
-        n = read_exponent(sweep)
+        n = None if measurements is not None and "n" in measurements.inputs else n
         models, _ = expand_models(data.get("models"), self.models)
         integrator = as_table(data.get("solver")).get("integrator", EXACT)
         raw = RawConfig(
@@ -199,19 +237,24 @@ class _Reader:
         problems += invalid_values
         if isinstance(data.get("sweep"), dict):
             problems += rule_problems(raw)
-        if "cases" in sweep:
-            # cases that cannot be read may contain the inputs that seem to be missing
+        if "cases" in sweep or ("data" in data and measurements is None):
+            # cases and measurements that cannot be read may contain the inputs that seem to be missing
             problems = [(path, message) for path, message in problems if not message.startswith("missing")]
         if document is None:
             return None, _locate_in_cases(problems, cases)
         values = _valid_values(document, raw)
+        fits = {name: value.fit for name, value in values.items() if isinstance(value, FitRange)}
+        values = {name: value.middle if isinstance(value, FitRange) else value for name, value in values.items()}
+        if self.purpose == "calibrate":
+            problems += _calibration_problems(data, values, fits)
+            values = {name: value for name, value in values.items() if isinstance(value, float | str)}
         quantities = {name: quantity_at(path_of(name), self.models) for name in values}
         output = document.output
         grid = build_grid(
             values,
             {name: quantity for name, quantity in quantities.items() if quantity is not None},
-            document.sweep.zip,
-            tuple(cases),
+            document.sweep.zip if self.purpose == "sweep" else (),
+            tuple(cases) if self.purpose == "sweep" else (),
             raw.names,
             len(models),
             self.max_points,
@@ -220,6 +263,8 @@ class _Reader:
         problems += grid.problems
         if not problems:
             problems += _settings_problems(document, grid.axes, len(models))
+        if not problems and measurements is not None:
+            problems += count_problems(measurements, fits, models)
         if problems:
             return None, _locate_in_cases(problems, cases)
         fixed_step_defaults = {} if document.solver.integrator == EXACT else FIXED_STEP_DEFAULTS
@@ -232,13 +277,19 @@ class _Reader:
         return Config(
             title=document.title,
             models=tuple(models),
-            scalars={**grid.scalars, **{name: value for name, value in defaults.items() if name not in values}},
+            scalars={
+                **grid.scalars,
+                **{name: column[0] for name, column in (measurements.inputs if measurements else {}).items()},
+                **{name: value for name, value in defaults.items() if name not in values},
+            },
             axes=grid.axes,
             materials={name: _build_material(table) for name, table in document.materials.items()},
             solver=document.solver,
             output=output,
             text=text,
             overrides=(*library_overrides, *overrides),
+            fits=fits,
+            data=measurements,
         ), []
 
     def _validate(
@@ -259,7 +310,7 @@ class _Reader:
 
 
 def read_exponent(sweep: Mapping[str, Any]) -> float | None:
-    """The exponent n of [sweep], which the unit of K contains: None for an axis, NaN where it cannot be read."""
+    """The exponent n of [sweep], which the unit of K contains: None if it varies, NaN where it cannot be read."""
     n = sweep.get("n", SWEEP_DEFAULTS["n"])
     if isinstance(n, list | dict) or "n" in as_table(sweep.get("cases")):
         return None
@@ -293,13 +344,13 @@ def _material_override(name: str, properties: Mapping[str, object]) -> str:
 def _add_library_materials(data: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
     """The data with tables for the library materials that a ball may have, and overrides that add those tables."""
     sweep = as_table(data.get("sweep"))
-    cases = as_table(sweep.get("cases"))
+    cases = as_table(sweep.get("cases")) | as_table(as_table(data.get("data")).get("columns"))
     names = dict.fromkeys(
         name for key in MATERIAL_KEYS for table in (sweep, cases) for name in listed_names(table.get(key))
     )
     names |= {str(path[1]): None for path in map(path_of, cases) if path[0] == "materials"}
     materials = {
-        # a column of cases replaces a property
+        # a column of cases or of measurements replaces a property
         name: {key: value for key, value in library()[name].items() if f"materials.{name}.{key}" not in cases}
         for name in names
         if _is_from_library(name, data) and isinstance(data.get("materials", {}), dict)
@@ -328,7 +379,7 @@ def _remove_invalid(data: Mapping[str, Any], paths: Sequence[KeyPath]) -> dict[s
 
 
 def _valid_values(document: Document, raw: RawConfig) -> dict[str, Numbers | Names]:
-    """The valid values by config name: keys of [sweep], axes of the materials of the balls, and parameters."""
+    """The valid values by config name: keys of [sweep], varying or fitted properties of balls, and parameters."""
     sweep = _values_by_key(document.sweep)
     values = {name: sweep[name] for name in raw.sweep if name in sweep and name not in ("zip", "cases")}
     used_materials = {name for ball in "12" for name in raw.materials_of(ball)}
@@ -358,6 +409,38 @@ def _build_material(table: MaterialTable) -> Material:
     """The material of a table, without the properties that are axes."""
     numbers = {name: value for name, value in _values_by_key(table).items() if isinstance(value, float)}
     return Material(**({"E": math.nan, "nu": math.nan} | numbers))
+
+
+def _calibration_problems(
+    data: Mapping[str, Any], values: Mapping[str, Numbers | Names], fits: Mapping[str, tuple[float, float]]
+) -> list[ConfigProblem]:
+    """Problems of a calibration: no measurements, no parameter to fit, or axes.
+
+    Parameters
+    ----------
+    data : plain data of the config
+    values : valid values by config name; parameters to fit have one
+    fits : bounds of the parameters to fit
+    """
+    problems: list[ConfigProblem] = []
+    single = "expected a single value, a column of [data] or { fit = [least, most] }"
+    if "data" not in data:
+        problems.append(
+            (("data",), 'missing, expected a table [data] of measurements, such as file = "drops.csv"')
+        )
+    if not fits and not list(fit_paths(data)):
+        problems.append((("sweep",), "got no parameter to fit, expected at least one { fit = [least, most] }"))
+    elif not fits:
+        problems += [
+            (path, "got a fit, expected a value: no model and no ball of this config uses it")
+            for path in fit_paths(data)
+        ]
+    for name, value in values.items():
+        if isinstance(value, tuple | Range):
+            problems.append((path_of(name), f"got an axis, {single}"))
+    if as_table(data.get("sweep")).get("zip"):
+        problems.append((("sweep", "zip"), f"got axes that vary together, {single} for each name"))
+    return problems
 
 
 def _settings_problems(document: Document, axes: Sequence[Axis], n_models: int) -> list[ConfigProblem]:

@@ -1,4 +1,4 @@
-"""Numbers of a config as pydantic types: quantities with units and bounds, lists, ranges and columns of files."""
+"""Numbers of a config as pydantic types: quantities with units and bounds, lists, ranges, columns and fits."""
 
 from __future__ import annotations
 
@@ -59,12 +59,15 @@ _PRODUCT = rf"{_FACTOR}(?:\s*[*/·]\s*{_FACTOR}|\s+{_FACTOR})*+"
 UNIT_SYNTAX = re.compile(rf"/?\s*{_PRODUCT}(?:\s*[*/]\s*\(\s*{_PRODUCT}\s*\))?")
 
 # tags of the forms that a value may have; no key of a config contains NUL, so tags can be removed from paths
-SCALAR, LIST, RANGE, COLUMN = "\0scalar", "\0list", "\0range", "\0column"
+SCALAR, LIST, RANGE, COLUMN, FIT = "\0scalar", "\0list", "\0range", "\0column", "\0fit"
 RANGE_FORMS = {
     "linspace": "[first, last, count]",
     "geomspace": "[first, last, count]",
     "arange": "[first, stop, step]",
 }
+FIT_FORM = "[least, most]"
+# ratio of the bounds of a positive parameter from which its middle is the geometric mean
+WIDE_BOUNDS_RATIO = 100.0
 
 
 @dataclass
@@ -73,7 +76,7 @@ class ValidationContext:
 
     Parameters
     ----------
-    n : the exponent of the sweep: None where it is an axis, NaN where it cannot be read
+    n : the exponent of the sweep: None where it varies, NaN where it cannot be read
     materials : names of the materials that a ball may have
     models : all models by key
     n_errors : number of invalid values so far
@@ -334,16 +337,43 @@ class Range(Table):
         return tuple((values + 0.0).tolist())
 
 
+class FitRange(Table):
+    """A parameter that is fitted to measurements, with the least and the largest value that it may have."""
+
+    fit: tuple[float, float]
+
+    @model_validator(mode="after")
+    def _check_order(self) -> FitRange:
+        least, most = self.fit
+        if least >= most:
+            raise located_errors([(("fit",), f"got {least:g} to {most:g}, expected {FIT_FORM} with least < most")])
+        return self
+
+    @property
+    def middle(self) -> float:
+        """A value between the bounds: the geometric mean of positive bounds that are far apart, else the mean.
+
+        >>> FitRange(fit=(1e-6, 1e-2)).middle, FitRange(fit=(0.0, 1.0)).middle
+        (0.0001, 0.5)
+        """
+        least, most = self.fit
+        if least > 0.0 and most / least > WIDE_BOUNDS_RATIO:
+            return min(max(math.sqrt(least) * math.sqrt(most), least), most)
+        return 0.5 * least + 0.5 * most
+
+
 # the values of keys that may be axes
-Numbers: TypeAlias = float | tuple[float, ...] | Range | Column
+Numbers: TypeAlias = float | tuple[float, ...] | Range | Column | FitRange
 Names: TypeAlias = str | tuple[str, ...] | Column
 
 
 def value_form(value: object) -> str:
-    """The tag of the form of a value: a number or text, a list, a range, or a column of a file."""
+    """The tag of the form of a value: a number or text, a list, a range, a column of a file, or a fit."""
     match value:
         case list():
             return LIST
+        case {"fit": _} | FitRange():
+            return FIT
         case {"file": _} | {"column": _}:
             return COLUMN
         case dict() | Range():
@@ -353,7 +383,7 @@ def value_form(value: object) -> str:
 
 def _name_form(value: object) -> str:
     form = value_form(value)
-    return SCALAR if form == RANGE else form
+    return SCALAR if form in (RANGE, FIT) else form
 
 
 def _list_of(element: Any, description: str) -> Any:
@@ -385,7 +415,7 @@ class Quantity:
     """A number of the config: its unit, meaning and interval; used as the annotation of its type.
 
     `Annotated[float, Quantity("1", "tolerance", 0, 1)]` is a number, bare or with its unit;
-    `Annotated[Numbers, Quantity("kg", "mass", 0)]` may also be a list, a range or a column of a file.
+    `Annotated[Numbers, Quantity("kg", "mass", 0)]` may also be a list, a range, a column of a file or a fit.
 
     Parameters
     ----------
@@ -458,7 +488,7 @@ class Quantity:
         Parameters
         ----------
         value : from the config
-        n : the exponent that the unit may contain; None where it is an axis, NaN where it is unknown
+        n : the exponent that the unit may contain; None where it varies, NaN where it is unknown
 
         Raises
         ------
@@ -501,7 +531,7 @@ class Quantity:
         if others:
             raise mismatch_error(text, f"a bare number: its unit {self.unit} depends on {' and '.join(others)}")
         if n is None and self.exponents:
-            raise mismatch_error(text, f"a bare number: its unit {self.unit} depends on n, which is an axis")
+            raise mismatch_error(text, f"a bare number: its unit {self.unit} depends on n, which varies")
         of_n = f" with n = {n:g}" if self.exponents and n is not None else ""
         wanted = "a bare number" if self.unit == "1" else f"a unit of {self.unit}{of_n}{example}"
         scale = _si_scale(unit)
@@ -536,38 +566,43 @@ def number_type(quantity: Quantity) -> Any:
 
 @cache
 def numbers_type(quantity: Quantity) -> Any:
-    """The type of a number, list, range or column of a file; the form decides which type validates it."""
+    """The type of a number, list, range, column of a file or fit; the form decides which type validates it."""
     number, end = number_type(quantity), number_type(replace(quantity, infinite=False))
     any_number, count = number_type(Quantity(quantity.unit, "")), bounded_int(1).type
-    triple = cast(Any, tuple)
+    numbers_of = cast(Any, tuple)
     types = {
-        "linspace": triple[end, end, count],
-        "geomspace": triple[end, end, count],
+        "linspace": numbers_of[end, end, count],
+        "geomspace": numbers_of[end, end, count],
         # the stop and the step of arange need not be allowed values
-        "arange": triple[end, any_number, any_number],
+        "arange": numbers_of[end, any_number, any_number],
     }
     fields: dict[str, Any] = {}
     for kind, numbers in types.items():
         form = Field(description=RANGE_FORMS[kind], strict=False)
-        fields[kind] = Annotated[numbers, form, BeforeValidator(_range_numbers(kind))], None
-    range_type = create_model(f"Range of {quantity.expected.removeprefix('a ')}", __base__=Range, **fields)
+        fields[kind] = Annotated[numbers, form, BeforeValidator(_list_of_length(3, RANGE_FORMS[kind]))], None
+    of_quantity = quantity.expected.removeprefix("a ")
+    range_type = create_model(f"Range of {of_quantity}", __base__=Range, **fields)
+    bounds = Field(description=f"{FIT_FORM}, between which impact calibrate fits it", strict=False)
+    fit_field: Any = Annotated[numbers_of[end, end], bounds, BeforeValidator(_list_of_length(2, FIT_FORM))]
+    fit_type = create_model(f"Fit of {of_quantity}", __base__=FitRange, fit=(fit_field, ...))
     return Annotated[
         Annotated[number, Tag(SCALAR)]
         | Annotated[_list_of(number, quantity.expected), Tag(LIST)]
         | Annotated[range_type, Tag(RANGE)]
-        | Annotated[Column, Tag(COLUMN)],
+        | Annotated[Column, Tag(COLUMN)]
+        | Annotated[fit_type, Tag(FIT)],
         Discriminator(value_form),
     ]
 
 
-def _range_numbers(kind: str) -> Callable[[object], object]:
-    """A check that the list of a range has three numbers."""
+def _list_of_length(length: int, form: str) -> Callable[[object], object]:
+    """A check that the list of a range or a fit has as many numbers as its form."""
 
     def check(value: object) -> object:
-        if isinstance(value, list | tuple) and len(value) == 3:
+        if isinstance(value, list | tuple) and len(value) == length:
             return value
         got = f"a list of {len(value)}" if isinstance(value, list | tuple) else show(value)
-        raise value_error(f"got {got}, expected {RANGE_FORMS[kind]}")
+        raise value_error(f"got {got}, expected {form}")
 
     return check
 

@@ -31,7 +31,7 @@ class RawConfig:
     sweep, materials, parameters : the tables [sweep], [materials] and [model]
     models : the selected models
     selection : the value of the key `models`
-    n : the exponent of the sweep; None where it is an axis, NaN where it is unknown
+    n : the exponent of the sweep; None where it varies, NaN where it is unknown
     integrator : of [solver], which may be invalid
     """
 
@@ -118,7 +118,9 @@ def _stiffness_problems(raw: RawConfig) -> Iterable[ConfigProblem]:
     groups = raw.sweep.get("zip")
     together = [group for group in groups if isinstance(group, list)] if isinstance(groups, list) else []
     together.append(raw.sweep.get("cases") or [])
-    if n is None and not any("K" in group and "n" in group for group in together):
+    value = raw.sweep.get("n")
+    is_axis = isinstance(value, list) or (isinstance(value, dict) and "fit" not in value)
+    if is_axis and not any("K" in group and "n" in group for group in together):
         yield (
             ("sweep", "K"),
             "its unit N/m^n depends on n, which is an axis; expected one K for each n, zipped with it",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import field
 from fnmatch import fnmatchcase
@@ -54,6 +55,7 @@ DEFAULT_RTOL = 1e-10
 MAX_SOLVER_STEPS = 10**9
 CORES = ("auto", "numpy", "numba")
 INTEGRATORS = (EXACT, *SCHEMES)
+NOISES = ("given", "scale", "excess")
 MODELS_EXPECTED = 'a model, or a list of models; "all" are all'
 
 
@@ -63,30 +65,20 @@ MATERIAL_NAME = name_or_names(
 ZipGroup = Annotated[
     list[Annotated[str, expected("a name")]], Field(min_length=2), expected("a group of at least two names")
 ]
+# lists of values by name
+ListsByName = Annotated[
+    dict[str, Annotated[list[float | str], Field(min_length=1), expected("a list of values")]], Field(min_length=1)
+]
 CASES_EXPECTED = "the name of a CSV file, or a table of lists by config name, such as { v1 = [1.0, 2.0] }"
 CasesTable = Annotated[
     Annotated[str, expected(CASES_EXPECTED), Tag(SCALAR)]
-    | Annotated[
-        dict[str, Annotated[list[float | str], Field(min_length=1), expected("a list of values")]],
-        Field(min_length=1),
-        expected(CASES_EXPECTED),
-        Tag(RANGE),
-    ],
+    | Annotated[ListsByName, expected(CASES_EXPECTED), Tag(RANGE)],
     Discriminator(lambda value: RANGE if isinstance(value, dict) else SCALAR),
 ]
 
 
-def _sweep_schema(schema: dict[str, Any]) -> None:
-    """Require each of these inputs by one of its alternative keys."""
-    simplify_schema(schema)
-    alternatives = (("v1", "cases"), ("m1", "R1", "cases"), ("m2", "R2", "cases"))
-    schema["allOf"] = [{"anyOf": [{"required": [key]} for key in keys]} for keys in alternatives]
-
-
 class Sweep(Table):
     """What to sweep: single values, and lists and ranges, which are the axes of the grid."""
-
-    model_config = ConfigDict(json_schema_extra=_sweep_schema)
 
     e: Annotated[Numbers | None, Quantity("1", "coefficient of restitution", least=0, most=1)] = None
     alpha: Annotated[Numbers | None, Quantity("s/m", "slope of e = 1 - alpha v0", least=0)] = None
@@ -226,6 +218,58 @@ class Output:
     ] = "auto"
 
 
+def _is_positive(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and 0.0 < value < math.inf
+
+
+def _sigma(value: object) -> object:
+    """A standard deviation or a list of them; their unit is that of an output, see `measurements`."""
+    deviations = value if isinstance(value, list) and value else [value]
+    if isinstance(value, dict) and "fit" in value:
+        raise value_error(
+            'got a fit, expected noise = "scale", which estimates sigma, or "excess", which adds to it'
+        )
+    if not all(isinstance(element, str) or _is_positive(element) for element in deviations):
+        raise mismatch_error(value, SIGMA_EXPECTED)
+    return value
+
+
+SIGMA_EXPECTED = "a number > 0 in the unit of the output, or a list of one for each point"
+_Sigma: Any = Annotated[float, Field(gt=0.0)] | str
+
+
+def _data_schema(schema: dict[str, Any]) -> None:
+    """Require the measurements in a file or in the config."""
+    simplify_schema(schema)
+    schema["anyOf"] = [{"required": ["file"]}, {"required": ["columns"]}]
+
+
+class Data(Table):
+    """Measurements, to which `impact calibrate` fits the parameters that have bounds."""
+
+    model_config = ConfigDict(json_schema_extra=_data_schema)
+
+    file: Annotated[Any, ReadAs(str), expected("the name of a CSV file")] = Field(
+        None, description="CSV file, whose columns are inputs and outputs with units, and standard deviations"
+    )
+    columns: Annotated[
+        Any,
+        ReadAs(ListsByName),
+        expected("a table of lists by name, such as { v1 = [1.0, 2.0], e_out = [0.8, 0.7] }"),
+    ] = Field(None, description="the values of the file, in SI")
+    lines: Annotated[
+        Any, ReadAs(list[Annotated[int, bounded_int(1)]]), expected("a list of the numbers of lines")
+    ] = Field(None, description="the line of each point in the file, if the values are in columns")
+    noise: Annotated[Any, ReadAs(Literal[NOISES]), known_name("a kind of noise", lambda info: NOISES)] = Field(
+        None,
+        description="the standard deviations are given, have a common factor (scale), or an excess variance is "
+        "added to theirs; given by default where there are any, otherwise scale",
+    )
+    sigma: Annotated[
+        Any, PlainValidator(_sigma, json_schema_input_type=_Sigma | Annotated[list[_Sigma], Field(min_length=1)])
+    ] = Field(None, description="standard deviation of the first output, or a list of them")
+
+
 def model_quantities(model: ForceModel) -> dict[str, Quantity]:
     """The quantities of [model.KEY]: the parameters, and K of a model with a fixed exponent."""
     stiffness = {} if model.exponent is None else {"K": LAW_STIFFNESS}
@@ -285,6 +329,7 @@ class Document(Table):
     )
     solver: Solver = Field(default_factory=lambda: Solver())
     output: Output = Field(default_factory=lambda: Output())
+    data: Annotated[Any, ReadAs(Data)] = Field(None, description="measurements, for impact calibrate only")
     model: Any = None
 
 
@@ -320,6 +365,13 @@ def json_schema() -> dict[str, object]:
     """
     models = catalogue()
     schema = document_type(models, list(models)).model_json_schema()
+    # these inputs have alternative keys; measurements may contain them
+    alternatives = (("v1", "cases"), ("m1", "R1", "cases"), ("m2", "R2", "cases"))
+    required = [{"anyOf": [{"required": [key]} for key in keys]} for keys in alternatives]
+    schema |= {
+        "if": {"not": {"required": ["data"]}},
+        "then": {"properties": {"sweep": {"allOf": required}}},
+    }
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
 

@@ -22,30 +22,36 @@ from .timestep import EXACT
 Outputs = dict[str, NDArray[Any]]
 InSI = Callable[[Array, Array], Array]
 
-# the outputs that a result has by default, in its order; OUTPUTS also has those on request
-BY_DEFAULT = (
-    "v1_post",
-    "v2_post",
-    "v1_reference",
-    "v2_reference",
-    "v1_error",
-    "v2_error",
-    "e_out",
-    "e_error",
-    "peak_indentation",
-    "permanent_indentation",
-    "peak_force",
-    "contact_time",
-    "energy_loss",
-    "stiffness",
-    "damping_ratio",
-    "energy_residual",
-    "closed_form_error",
-    "status",
-    "in_domain",
-    "steps",
-)
-OUTPUTS = (*BY_DEFAULT, "e_kinetic", "e_energetic", "lambda", "separation_time")
+# SI units of the outputs that a result has by default, in its order, and of those on request
+DEFAULT_UNITS = {
+    "v1_post": "m/s",
+    "v2_post": "m/s",
+    "v1_reference": "m/s",
+    "v2_reference": "m/s",
+    "v1_error": "m/s",
+    "v2_error": "m/s",
+    "e_out": "1",
+    "e_error": "1",
+    "peak_indentation": "m",
+    "permanent_indentation": "m",
+    "peak_force": "N",
+    "contact_time": "s",
+    "energy_loss": "J",
+    "stiffness": "N/m^n",
+    "damping_ratio": "1",
+    "energy_residual": "1",
+    "closed_form_error": "1",
+    "status": "1",
+    "in_domain": "1",
+    "steps": "1",
+}
+UNITS = DEFAULT_UNITS | {
+    "e_kinetic": "1",
+    "e_energetic": "1",
+    "lambda": "N s/m^(n+1)",
+    "separation_time": "s",
+}
+BY_DEFAULT, OUTPUTS = tuple(DEFAULT_UNITS), tuple(UNITS)
 
 
 def outputs(

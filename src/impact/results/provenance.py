@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from ..config.grid import MAX_POINTS
-from ..config.load import Config, parse_config
+from ..config.load import Config, Purpose, parse_config
 from ..engine.plugins import Plugins
 from ..errors import ResultError, UsageError
 from ..text import safe_text
@@ -25,8 +25,9 @@ def stored_config(
     max_points: int = MAX_POINTS,
     *,
     allow_changed_plugins: bool = False,
+    purpose: Purpose = "sweep",
 ) -> Config:
-    """The config of the sweep that a result came from.
+    """The config of the sweep or the calibration that a result came from.
 
     Parameters
     ----------
@@ -36,6 +37,7 @@ def stored_config(
     name : of the result, for messages
     max_points : refuse a sweep of more points
     allow_changed_plugins : accept another version of a plug-in; see `changed_plugins`
+    purpose : "calibrate" for the result of a calibration, whose config has measurements
 
     Raises
     ------
@@ -52,7 +54,7 @@ def stored_config(
         for reason in (*changed_plugins(attributes, plugins, name), *unknown_plugins(attributes, plugins, name)):
             raise UsageError(reason)
     stored = read_attribute(attributes, "config_set", name, required=True)
-    return parse_config(text, [*stored, *overrides], plugins.models, name, max_points)
+    return parse_config(text, [*stored, *overrides], plugins.models, name, max_points, purpose)
 
 
 def config_of_part(config: Config, dataset: xr.Dataset) -> Config:

@@ -19,7 +19,7 @@ from .._version import __version__
 from ..array_types import Array
 from ..config.tables import MATERIAL_KEYS, MATERIAL_QUANTITIES, SWEEP_QUANTITIES, model_quantities
 from ..contact.materials import effective_mass
-from ..contact.outputs import BY_DEFAULT
+from ..contact.outputs import BY_DEFAULT, UNITS
 from ..contact.status import Status
 from ..contact.timestep import EXACT
 from ..engine.build_impacts import mass_at, restitution_at
@@ -42,7 +42,6 @@ class SchemaVariable:
     """
 
     name: str
-    unit: str
     per: Literal["model", "axes"]
     judged: Literal[
         "scaled by v0",
@@ -59,59 +58,64 @@ class SchemaVariable:
     dtype: str = "f8"
 
     @property
+    def unit(self) -> str:
+        """Its unit in the spelling of netCDF."""
+        return udunits(UNITS[self.name])
+
+    @property
     def by_default(self) -> bool:
         """Whether it is stored if `[output] variables` is not set."""
         return self.name in BY_DEFAULT
 
 
 SCHEMA = (
-    SchemaVariable("v1_post", "m s-1", "model", "scaled by v0", "velocity of ball 1 after the impact",
+    SchemaVariable("v1_post", "model", "scaled by v0", "velocity of ball 1 after the impact",
              "v1+ = v1 - (1 + e_out)(m/m1) v0"),
-    SchemaVariable("v2_post", "m s-1", "model", "scaled by v0", "velocity of ball 2 after the impact",
+    SchemaVariable("v2_post", "model", "scaled by v0", "velocity of ball 2 after the impact",
              "v2+ = v2 + (1 + e_out)(m/m2) v0"),
-    SchemaVariable("v1_reference", "m s-1", "axes", "scaled by v0", "velocity of ball 1 by impulse and momentum",
+    SchemaVariable("v1_reference", "axes", "scaled by v0", "velocity of ball 1 by impulse and momentum",
              "v1+ = v1 - (1 + e)(m/m1) v0  (6)"),
-    SchemaVariable("v2_reference", "m s-1", "axes", "scaled by v0", "velocity of ball 2 by impulse and momentum",
+    SchemaVariable("v2_reference", "axes", "scaled by v0", "velocity of ball 2 by impulse and momentum",
              "v2+ = v2 + (1 + e)(m/m2) v0  (7)"),
-    SchemaVariable("v1_error", "m s-1", "model", "scaled by v0", "error of the velocity of ball 1",
+    SchemaVariable("v1_error", "model", "scaled by v0", "error of the velocity of ball 1",
              "v1_post - v1_reference"),
-    SchemaVariable("v2_error", "m s-1", "model", "scaled by v0", "error of the velocity of ball 2",
+    SchemaVariable("v2_error", "model", "scaled by v0", "error of the velocity of ball 2",
              "v2_post - v2_reference"),
-    SchemaVariable("e_out", "1", "model", "scaled by 1", "restitution that the model delivers",
+    SchemaVariable("e_out", "model", "scaled by 1", "restitution that the model delivers",
              "(v2+ - v1+)/(v1 - v2)  (5)"),
-    SchemaVariable("e_error", "1", "model", "scaled by 1", "delivered minus requested restitution", "e_out - e"),
-    SchemaVariable("peak_indentation", "m", "model", "scaled by the peak", "largest indentation", "δₘ at v = 0"),
-    SchemaVariable("permanent_indentation", "m", "model", "scaled by the peak", "indentation at the release",
+    SchemaVariable("e_error", "model", "scaled by 1", "delivered minus requested restitution", "e_out - e"),
+    SchemaVariable("peak_indentation", "model", "scaled by the peak", "largest indentation", "δₘ at v = 0"),
+    SchemaVariable("permanent_indentation", "model", "scaled by the peak", "indentation at the release",
              "δₚ at the end of the contact"),
-    SchemaVariable("peak_force", "N", "model", "scaled by itself", "largest contact force",
+    SchemaVariable("peak_force", "model", "scaled by itself", "largest contact force",
              "max F over the approach"),
-    SchemaVariable("contact_time", "s", "model", "scaled by itself", "contact time",
+    SchemaVariable("contact_time", "model", "scaled by itself", "contact time",
              "from first contact to release"),
-    SchemaVariable("energy_loss", "J", "model", "scaled by m v0^2/2", "kinetic energy lost",
+    SchemaVariable("energy_loss", "model", "scaled by m v0^2/2", "kinetic energy lost",
              "m v0²(1 - e_out²)/2"),
-    SchemaVariable("stiffness", "N m-n", "model", "scaled by itself",
+    SchemaVariable("stiffness", "model", "scaled by itself",
              "contact stiffness used; n is the coordinate exponent; without K and with n other than 1.5 it is "
              "F_m/delta_m^n at the Hertz peak", "K  (12)"),
-    SchemaVariable("damping_ratio", "1", "model", "scaled by itself",
+    SchemaVariable("damping_ratio", "model", "scaled by itself",
              "dimensionless damping, where the law has one",
              "χ = λ v0/K"),
-    SchemaVariable("energy_residual", "1", "model", "bounded by 10 rtol", "residual of the work balance",
+    SchemaVariable("energy_residual", "model", "bounded by 10 rtol", "residual of the work balance",
              "[work of the force - m v0²(1 - e_out²)/2]/(m v0²/2)"),
-    SchemaVariable("closed_form_error", "1", "model", "bounded by 10 rtol",
+    SchemaVariable("closed_form_error", "model", "bounded by 10 rtol",
              "distance from the closed form, where one exists", "e_out - exact e_out"),
-    SchemaVariable("status", "1", "model", "exact", "outcome of the point", "see flag_meanings", "i1"),
-    SchemaVariable("in_domain", "1", "model", "exact", "1 if the inputs are in the stated domain of the law",
+    SchemaVariable("status", "model", "exact", "outcome of the point", "see flag_meanings", "i1"),
+    SchemaVariable("in_domain", "model", "exact", "1 if the inputs are in the stated domain of the law",
              "1 inside every stated interval", "i1"),
-    SchemaVariable("steps", "1", "model", "reported", "accepted steps of the integrator",
+    SchemaVariable("steps", "model", "reported", "accepted steps of the integrator",
              "approach + restitution", "i4"),
-    SchemaVariable("e_kinetic", "1", "model", "scaled by 1",
+    SchemaVariable("e_kinetic", "model", "scaled by 1",
              "kinetic restitution; the impulses are the changes of the momentum, so that it is e_out",
              "τ_r/τ_c  (2)"),
-    SchemaVariable("e_energetic", "1", "model", "scaled by 1",
+    SchemaVariable("e_energetic", "model", "scaled by 1",
              "energetic restitution, from the integrated works of the two phases", "√(-W_r/W_c)  (3)"),
-    SchemaVariable("lambda", "N s m-(n+1)", "model", "scaled by itself",
+    SchemaVariable("lambda", "model", "scaled by itself",
              "damping factor, where the law has one; n is the coordinate exponent", "λ = χ K/v0  (18)"),
-    SchemaVariable("separation_time", "s", "model", "scaled by itself", "time until the surfaces separate",
+    SchemaVariable("separation_time", "model", "scaled by itself", "time until the surfaces separate",
              "contact_time + remaining indentation/(e_out v0)"),
 )  # fmt: skip
 

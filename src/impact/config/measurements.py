@@ -1,0 +1,383 @@
+"""Measurements of a config: the table [data], from a CSV file or inline, and the parameters fitted to them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic_core import PydanticCustomError
+
+from ..contact.model import ForceModel, with_base_quantities
+from ..contact.outputs import UNITS
+from ..errors import ConfigError
+from ..formatting import number
+from ..text import safe_text
+from .cases import (
+    CsvTable,
+    column_values,
+    contains_path,
+    input_names,
+    input_values,
+    read_csv,
+    unknown_input_message,
+    values_override,
+)
+from .files import as_table, set_value
+from .grid import name_of, path_of
+from .quantities import MAX_PROBLEMS, ConfigProblem, KeyPath, Quantity, show, suggest, value_error
+from .tables import MATERIAL_KEYS, NOISES, quantity_at
+
+Noise = Literal["given", "scale", "excess"]
+
+SIGMA = "sigma"
+_ANY: dict[str, Any] = {}
+_POSITIVE: dict[str, Any] = {"least": 0.0, "above": True}
+_FRACTION: dict[str, Any] = {"least": 0.0, "most": 1.0}
+# the outputs that can be measured, with the interval of their values
+MEASURED_OUTPUTS = {
+    name: Quantity(UNITS[name], "measured", **interval)
+    for name, interval in {
+        "e_out": _FRACTION,
+        "v1_post": _ANY,
+        "v2_post": _ANY,
+        "contact_time": _POSITIVE,
+        "separation_time": _POSITIVE,
+        "peak_force": _POSITIVE,
+        "peak_indentation": _POSITIVE,
+        "permanent_indentation": _ANY,
+        "energy_loss": _ANY,
+        "e_kinetic": _FRACTION,
+        "e_energetic": _FRACTION,
+    }.items()
+}
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """Measured points, in SI.
+
+    Parameters
+    ----------
+    file : name of the CSV file as in the config; empty for values in the config
+    lines : the line of each point in the file; its number, from 1, for values in the config
+    inputs : values of the inputs that vary from point to point, by config name
+    outputs : measured values, by the name of the output
+    sigma : their standard deviations, by the name of the output; without the outputs that have none
+    noise : "given", the standard deviations as they are; "scale", times a common factor, which also stands for
+        the standard deviation of an output without one; or "excess", with a variance between specimens added
+    """
+
+    file: str
+    lines: tuple[int, ...]
+    inputs: Mapping[str, tuple[float, ...]]
+    outputs: Mapping[str, tuple[float, ...]]
+    sigma: Mapping[str, tuple[float, ...]]
+    noise: Noise
+
+
+@dataclass(frozen=True)
+class _DataColumn:
+    """What a column holds: values of an input or an output, by its name, or standard deviations of an output."""
+
+    kind: Literal["input", "output", "sigma"]
+    name: str
+    quantity: Quantity
+
+
+def fit_paths(data: Mapping[str, Any]) -> Iterator[KeyPath]:
+    """The path of every `{ fit = ... }`."""
+    for path, value in input_values(data):
+        if isinstance(value, dict) and "fit" in value:
+            yield path
+
+
+def purpose_problems(data: Mapping[str, Any]) -> list[ConfigProblem]:
+    """The problem of a sweep with measurements or with parameters to fit, which only a calibration takes."""
+    takes = "use impact calibrate, which takes [data] and { fit = [least, most] }"
+    if "data" in data:
+        return [(("data",), f"got measurements, expected a sweep; {takes}")]
+    return [(path, f"got a fit, expected a value or an axis; {takes}") for path in fit_paths(data)][:1]
+
+
+def _columns_of(
+    names: Sequence[str], data: Mapping[str, Any], models: Mapping[str, ForceModel]
+) -> tuple[dict[str, _DataColumn], list[tuple[str, str]]]:
+    """The columns with these names, and problems: messages with the name of a column, or "" for all together."""
+    columns: dict[str, _DataColumn] = {}
+    problems: list[tuple[str, str]] = []
+    outputs = [name for name in names if name in MEASURED_OUTPUTS]
+    for name in names:
+        try:
+            columns[name] = column = _column_of(name, outputs, models)
+        except PydanticCustomError as error:
+            problems.append((name, error.message()))
+            continue
+        other = next(
+            key for key, before in columns.items() if (before.kind, before.name) == (column.kind, column.name)
+        )
+        if other != name:
+            problems.append((name, f"got a second column of {column.name}, beside {show(other)}, expected one"))
+        elif column.kind == "input" and contains_path(data, path_of(name)):
+            problems.append(
+                (name, f"set together with {'.'.join(map(str, path_of(name)))}, expected one of the two")
+            )
+    if not outputs and not problems:
+        problems.append(("", "got no column of an output, expected one, such as e_out or contact_time"))
+    return columns, problems
+
+
+def _column_of(name: str, outputs: Sequence[str], models: Mapping[str, ForceModel]) -> _DataColumn:
+    """What the column with a name holds; `outputs` are the outputs that have a column."""
+    if name in MEASURED_OUTPUTS:
+        return _DataColumn("output", name, MEASURED_OUTPUTS[name])
+    if name == SIGMA or name.removeprefix(f"{SIGMA}_") in MEASURED_OUTPUTS:
+        if name == SIGMA and len(outputs) > 1:
+            expected = " or ".join(f"{SIGMA}_{output}" for output in outputs)
+            raise value_error(f"got {len(outputs)} outputs, expected {expected}")
+        output = name.removeprefix(f"{SIGMA}_") if name != SIGMA else next(iter(outputs), "e_out")
+        if outputs and output not in outputs:
+            raise value_error(f"got no column {output}, expected one beside its standard deviation")
+        return _DataColumn("sigma", output, Quantity(UNITS[output], "standard deviation", **_POSITIVE))
+    if not name:
+        raise value_error("got a column without a name, expected that of an input or an output")
+    path = path_of(name)
+    try:
+        quantity = quantity_at(path, models)
+    except KeyError:
+        if path[0] != "sweep":
+            raise value_error(unknown_input_message(name, models)) from None
+        inputs = [key for key in input_names() if key not in MATERIAL_KEYS]
+        choices = [*MEASURED_OUTPUTS, SIGMA, *inputs, *(f"{SIGMA}_{output}" for output in outputs)]
+        raise value_error(f"no such input or output; {suggest(name, choices)}") from None
+    if quantity is None:
+        raise value_error("got names of materials, expected numbers; all points have the materials of [sweep]")
+    return _DataColumn("input", name_of(path), replace(quantity, infinite=False))
+
+
+def inline_measurements(
+    data: Mapping[str, Any], folder: Path | None, models: Mapping[str, ForceModel], n: float | None
+) -> tuple[dict[str, Any], list[str], list[str]]:
+    """Replace the file of [data] by its values; parameters and returned values are those of `inline_files`."""
+    table = as_table(data.get("data"))
+    file = table.get("file")
+    if not isinstance(file, str) or "columns" in table:
+        return dict(data), [], []
+    if folder is None:
+        return dict(data), [], [f"{safe_text(file)}: not read; a stored config contains values, not file names"]
+    try:
+        values, lines = _read_values(read_csv(folder / file), data, models, n)
+        stored: dict[KeyPath, object] = {("data", "columns"): values, ("data", "lines"): lines}
+        overrides = [values_override(path, value) for path, value in stored.items()]
+    except ConfigError as error:
+        return dict(data), [], list(error.problems)
+    for path, value in stored.items():
+        data, _ = set_value(data, path, value)
+    return dict(data), overrides, []
+
+
+def _read_values(
+    table: CsvTable, data: Mapping[str, Any], models: Mapping[str, ForceModel], n: float | None
+) -> tuple[dict[str, list[float | str]], list[int]]:
+    """The values of all columns of a CSV file in SI units, and the lines of its points.
+
+    Raises
+    ------
+    ConfigError : with the line of each problem
+    """
+    columns, named_problems = _columns_of(list(table.units), data, models)
+    problems = [
+        ": ".join(part for part in (f"{table.name}:1", safe_text(name, 60), message) if part)
+        for name, message in named_problems
+    ]
+    n = None if "n" in table.units else n
+    units = {name: "" if unit in ("-", "1") else unit for name, unit in table.units.items()}
+    for name, column in columns.items():
+        if column.kind == "sigma":
+            units[name] = units[name] or units.get(column.name, "")
+    values: dict[str, list[float | str]] = {}
+    for name, column in columns.items():
+        shown, unit, expected_unit = safe_text(name, 60), units[name], column.quantity.unit
+        percent = [(line, cell) for line, cell in table.cells[name] if "%" in cell]
+        if _is_percent(unit):
+            expected = f'a fraction: divide the column by 100 and write "{shown}"'
+            problems.append(f"{table.name}:1: {shown}: got [{safe_text(unit)}], expected {expected}")
+        elif not unit and expected_unit != "1":
+            expected = f'one in brackets, such as "{shown} [{expected_unit}]"'
+            problems.append(f"{table.name}:1: {shown}: got no unit, expected {expected}")
+        elif percent:
+            problems += [f"{table.name}:{line}: {shown}: {_percent_message(cell)}" for line, cell in percent]
+        else:
+            try:
+                values[name] = column_values(replace(table, units=units), name, column.quantity, n)
+            except ConfigError as error:
+                problems += error.problems
+    if problems:
+        raise ConfigError(problems[:MAX_PROBLEMS])
+    return values, [line for line, _ in next(iter(table.cells.values()))]
+
+
+def _is_percent(unit: str) -> bool:
+    return unit.lower() in ("%", "percent", "pct", "per cent")
+
+
+def _percent_message(text: str) -> str:
+    """The message about a value in percent, with the fraction to write instead."""
+    try:
+        fraction = f", such as {number(float(text.strip().removesuffix('%')) / 100.0)}"
+    except ValueError:
+        fraction = ""
+    return f"got {show(text.strip())}, expected a fraction{fraction}"
+
+
+def expand_measurements(
+    data: Mapping[str, Any], models: Mapping[str, ForceModel], n: float | None
+) -> tuple[dict[str, Any], Measurements | None, list[ConfigProblem]]:
+    """The measurements of a config.
+
+    Parameters
+    ----------
+    data : plain data of a config, with the values of the file of [data]
+    models : all models by key
+    n : the exponent that units may contain
+
+    Returns
+    -------
+    The data with the first value of each measured input at the path of the input, so that rules between inputs
+    apply to it; the measurements; and problems. Without valid measurements the data is unchanged.
+    """
+    table = as_table(data.get("data"))
+    lists = table.get("columns")
+    if not isinstance(lists, dict) or not lists or not all(isinstance(v, list) and v for v in lists.values()):
+        return dict(data), None, []
+    path: KeyPath = ("data", "columns")
+    columns, named_problems = _columns_of(list(lists), data, models)
+    problems: list[ConfigProblem] = [((*path, name) if name else path, text) for name, text in named_problems]
+    if any(column.name == "n" for column in columns.values()):
+        n = None
+    n_points = len(next(iter(lists.values())))
+    for name, elements in lists.items():
+        if len(elements) != n_points:
+            problems.append(
+                ((*path, name), f"got {len(elements)} values, expected {n_points}, as in the first column")
+            )
+    values: dict[str, tuple[float, ...]] = {}
+    for name, column in columns.items():
+        values[name], value_problems = _read_list(lists[name], (*path, name), column.quantity, n)
+        problems += value_problems
+    lines = table.get("lines")
+    if "file" in table and lines is None:
+        problems.append((path, "set together with file, expected one of the two"))
+    if isinstance(lines, list) and len(lines) != n_points:
+        problems.append((("data", "lines"), f"got {len(lines)} values, expected {n_points}, one for each point"))
+
+    def of_kind(kind: str) -> dict[str, tuple[float, ...]]:
+        return {column.name: values[name] for name, column in columns.items() if column.kind == kind}
+
+    outputs, sigma = of_kind("output"), of_kind("sigma")
+    if "sigma" in table and outputs:
+        first = next(iter(outputs))
+        deviations, sigma_problems = _read_sigma(table["sigma"], first, n_points)
+        if first in sigma:
+            sigma_problems = [
+                (("data", "sigma"), f"set together with a column for {first}, expected one of the two")
+            ]
+        sigma[first] = deviations
+        problems += sigma_problems
+    noise = table.get("noise", "given" if sigma else "scale")
+    problems += _noise_problems(noise, list(outputs), list(sigma))
+    if problems or noise not in NOISES:
+        return dict(data), None, problems[:MAX_PROBLEMS]
+    measurements = Measurements(
+        file=str(table.get("file", "")),
+        lines=tuple(lines) if isinstance(lines, list) else tuple(range(1, n_points + 1)),
+        inputs=of_kind("input"),
+        outputs=outputs,
+        sigma={name: sigma[name] for name in outputs if name in sigma},
+        noise=noise,
+    )
+    for name, column_of_input in measurements.inputs.items():
+        data, _ = set_value(data, path_of(name), column_of_input[0])
+    return dict(data), measurements, []
+
+
+def _read_list(
+    elements: Sequence[object], path: KeyPath, quantity: Quantity, n: float | None
+) -> tuple[tuple[float, ...], list[ConfigProblem]]:
+    """The numbers of a list in SI units, and problems."""
+    values: list[float] = []
+    problems: list[ConfigProblem] = []
+    for index, element in enumerate(elements):
+        try:
+            if isinstance(element, str) and "%" in element:
+                raise value_error(_percent_message(element))
+            values.append(quantity.read(element, n))
+        except PydanticCustomError as error:
+            problems.append(((*path, index), error.message()))
+            if len(problems) >= MAX_PROBLEMS:
+                break
+    return tuple(values), problems
+
+
+def _read_sigma(value: object, output: str, n_points: int) -> tuple[tuple[float, ...], list[ConfigProblem]]:
+    """The standard deviations of an output from the key `sigma`, and problems that validation does not report."""
+    path: KeyPath = ("data", "sigma")
+    if isinstance(value, list) and len(value) != n_points:
+        return (), [(path, f"got {len(value)} values, expected {n_points}, one for each point")]
+    quantity = Quantity(UNITS[output], "standard deviation", **_POSITIVE)
+    elements = value if isinstance(value, list) else [value]
+    deviations, problems = _read_list(elements, path, quantity, None)
+    if not isinstance(value, list):
+        problems = [(path, message) for _, message in problems]
+    # invalid numbers are reported by the validation of the table
+    problems = [(at, message) for at, message in problems if _is_text(value, at)]
+    return deviations if isinstance(value, list) else deviations * n_points, problems
+
+
+def _is_text(value: object, path: KeyPath) -> bool:
+    index = path[-1]
+    return isinstance(value[index] if isinstance(value, list) and isinstance(index, int) else value, str)
+
+
+def _noise_problems(noise: object, outputs: Sequence[str], with_sigma: Sequence[str]) -> list[ConfigProblem]:
+    """Problems of outputs without the standard deviation that the kind of noise needs."""
+    missing = [name for name in outputs if name not in with_sigma]
+    if missing and len(outputs) > 1:
+        expected = f"a column {SIGMA}_{missing[0]}: each of several outputs needs one"
+        return [(("data",), f"got no standard deviation of {missing[0]}, expected {expected}")]
+    if missing and noise in ("given", "excess"):
+        expected = f'a column {SIGMA} or the key {SIGMA}, or noise = "scale"'
+        return [(("data", "noise"), f'got "{noise}" without standard deviations, expected {expected}')]
+    return []
+
+
+def fitted_parameters(fits: Mapping[str, tuple[float, float]], model: ForceModel) -> tuple[str, ...]:
+    """The config names of the fitted parameters that a law has, in the order of the config.
+
+    Parameters
+    ----------
+    fits : bounds by config name
+    model : the law
+    """
+    uses_e = "e" in with_base_quantities(model.quantities)
+    return tuple(
+        name
+        for name in fits
+        if (path_of(name)[0] != "model" or path_of(name)[1] == model.key)
+        and (uses_e or name not in ("e", "alpha"))
+    )
+
+
+def count_problems(
+    measurements: Measurements, fits: Mapping[str, tuple[float, float]], models: Sequence[ForceModel]
+) -> list[ConfigProblem]:
+    """The problem of fewer measured values than parameters of a law."""
+    n_values = len(measurements.lines) * len(measurements.outputs)
+    counts = {model.key: len(fitted_parameters(fits, model)) for model in models}
+    key = max(counts, key=lambda name: counts[name])
+    if counts[key] <= n_values:
+        return []
+    got = f"{n_values} measured value{'s' * (n_values != 1)}"
+    expected = f"at least {counts[key]}, the number of parameters to fit of {key}"
+    return [(("data", "file" if measurements.file else "columns"), f"got {got}, expected {expected}")]
