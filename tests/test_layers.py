@@ -32,7 +32,7 @@ HEIGHT = {part: height for height, parts in enumerate(LAYERS) for part in parts}
 # where each library may be imported
 LIBRARIES = {
     "typer": {"cli"}, "rich": {"cli"}, "matplotlib": {"plots"}, "pandas": {"plots"}, "jinja2": {"reporting"},
-    "markupsafe": {"reporting"}, "xarray": {"results", "comparison"},
+    "markupsafe": {"reporting"}, "xarray": {"results", "comparison", "inverse"},
     "h5py": {"results"}, "h5netcdf": {"results"}, "tomllib": {"config"}, "pydantic": {"config", "results"},
     "pydantic_core": {"config"},
     "pint": {"config"}, "filelock": {"engine"}, "numba": {"contact"},

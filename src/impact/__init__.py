@@ -9,6 +9,7 @@ from ._version import __version__ as __version__
 if TYPE_CHECKING:
     from .api import (
         bless,
+        calibrate,
         check_model,
         compare,
         estimate,
@@ -51,6 +52,7 @@ __all__ = [
     "Parameter",
     "Verdict",
     "bless",
+    "calibrate",
     "check_model",
     "compare",
     "estimate",

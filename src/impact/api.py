@@ -562,6 +562,63 @@ def timestep(
     )
 
 
+def calibrate(
+    source: str | Path | Mapping[str, object],
+    *,
+    output: str | Path | None = None,
+    best: str | Path | None = None,
+    overwrite: bool = False,
+    overrides: Sequence[str] = (),
+    plugins: Sequence[ForceModel | str | Path] = (),
+) -> xr.Dataset:
+    """Fit laws to measurements: which law fits, with which parameters, and what the data cannot determine.
+
+    Parameters
+    ----------
+    source : a TOML file, or a mapping with the same keys, with `[data]` and values `{ fit = [least, most] }`
+    output : result file to write
+    best : TOML file to write, with the config of the best law and its parameters, for `sweep` and `export`
+    overwrite : replace files that exist
+    overrides, plugins : see `sweep`
+
+    Returns
+    -------
+    Dataset : of dimensions model, parameter and point, the best law first; see docs/calibrate.md
+
+    Raises
+    ------
+    ConfigError : with one line for each problem
+    UsageError, StoreError : a file exists or cannot be written
+
+    The restitution that a linear spring and dashpot was asked for, from three measurements of it:
+
+    >>> import impact
+    >>> fit = impact.calibrate({
+    ...     "models": "anagnostopoulos-1988",
+    ...     "sweep": {"v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 1e6, "n": 1.0, "e": {"fit": [0.1, 1.0]}},
+    ...     "data": {"columns": {"e_out": [0.49, 0.5, 0.51], "sigma": [0.01, 0.01, 0.01]}},
+    ... })
+    >>> round(fit["estimate"].item(), 6), round(fit["chi2_reduced"].item(), 6)
+    (0.5, 1.0)
+    """
+    # its modules import scipy.optimize, which other functions do without
+    from .inverse.calibrate import best_config, calibrate_config, calibration_dataset
+
+    plugin_set = read_plugins(plugins)
+    read = Path(source) if isinstance(source, str) else source
+    config = read_config(read, overrides, plugin_set.models, purpose="calibrate")
+    for path in (output, best):
+        if path is not None:
+            check_output(Path(path), overwrite=overwrite)
+    calibration = calibrate_config(config)
+    result = calibration_dataset(calibration, plugin_set.of(config.models))
+    if output is not None:
+        save(result, output, overwrite=overwrite)
+    if best is not None:
+        write_file(Path(best), best_config(calibration).encode(), overwrite=overwrite)
+    return result
+
+
 def export(
     to: str,
     model: str | None = None,

@@ -64,6 +64,12 @@ class Impacts:
         arrays = {f.name: getattr(self, f.name)[chosen] for f in fields(self) if f.name != "parameters"}
         return Impacts(**arrays, parameters={name: a[chosen] for name, a in self.parameters.items()})
 
+    def broadcast(self) -> Impacts:
+        """The same impacts, with every field of the shape of all of them."""
+        arrays = {f.name: np.broadcast_to(getattr(self, f.name), self.shape) for f in fields(self)[:-1]}
+        parameters = {name: np.broadcast_to(array, self.shape) for name, array in self.parameters.items()}
+        return Impacts(**arrays, parameters=parameters)
+
     @cached_property
     def shape(self) -> tuple[int, ...]:
         """The shape to which all fields broadcast."""

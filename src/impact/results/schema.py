@@ -186,7 +186,7 @@ def dataset_template(plan: Plan) -> xr.Dataset:
         zeros = np.broadcast_to(np.zeros((), variable.dtype), shape)
         variables[variable.name] = (dims, zeros, attributes_of(variable))
     # in one call: xarray merges the whole dataset in each call; the coordinates come first in a file
-    return xr.Dataset(coords=plan_coordinates(plan), attrs=_provenance_attributes(plan)).assign(variables)
+    return xr.Dataset(coords=plan_coordinates(plan), attrs=provenance_attributes(plan)).assign(variables)
 
 
 def plan_coordinates(plan: Plan) -> xr.Coordinates:
@@ -224,9 +224,9 @@ def _coordinates_by_name(plan: Plan) -> dict[str, object]:
         if axis.numbered:
             coordinates[axis.name] = (axis.name, list(axis.labels), {"long_name": "number of the case"})
         for name, values in axis.columns.items():
-            coordinates[name] = (axis.name, list(values), _coordinate_attributes(plan, name))
+            coordinates[name] = (axis.name, list(values), coordinate_attributes(plan, name))
     for name, value in plan.config.scalars.items():
-        coordinates[name] = ((), value, _coordinate_attributes(plan, name))
+        coordinates[name] = ((), value, coordinate_attributes(plan, name))
     coordinates["exponent"] = _exponent_coordinate(plan)
     if "alpha" in plan.inputs.names():
         coordinates["e"] = _restitution_coordinate(plan)
@@ -236,7 +236,7 @@ def _coordinates_by_name(plan: Plan) -> dict[str, object]:
     return coordinates
 
 
-def _coordinate_attributes(plan: Plan, name: str) -> dict[str, str]:
+def coordinate_attributes(plan: Plan, name: str) -> dict[str, str]:
     """Units and meaning of a coordinate, as attributes."""
     material, field = material_property(name) or ("", "")
     if material:
@@ -366,7 +366,7 @@ def _restitution_coordinate(plan: Plan) -> tuple[tuple[str, ...], object, dict[s
 def _mass_coordinate(plan: Plan, ball: str) -> tuple[tuple[str, ...], object, dict[str, str]]:
     of_materials = [f"materials.{name}.rho" for name in plan.inputs.materials_of(ball)]
     names = (f"R{ball}", "material", f"material{ball}", *of_materials)
-    about = {**_coordinate_attributes(plan, f"m{ball}"), "equation": "m = (4/3) pi R^3 rho"}
+    about = {**coordinate_attributes(plan, f"m{ball}"), "equation": "m = (4/3) pi R^3 rho"}
     return *_derived_values(plan, names, lambda inputs, index: mass_at(inputs, ball, index)), about
 
 
@@ -381,7 +381,8 @@ def _derived_values(
     return tuple(plan.config.axes[axis].name for axis in axes), values.reshape(shape)
 
 
-def _provenance_attributes(plan: Plan) -> dict[str, object]:
+def provenance_attributes(plan: Plan) -> dict[str, object]:
+    """The attributes from which a result can be repeated."""
     config = plan.config
     return {
         "title": config.title,

@@ -18,12 +18,13 @@ from ..engine.plan import material_property
 from ..errors import ResultError
 from ..text import safe_text
 from .attributes import ATTRIBUTE_TYPES, read_attribute
+from .calibration import CALIBRATION_COORDINATES, CALIBRATION_TEXTS, CALIBRATION_VARIABLES
 from .schema import HISTORY_VARIABLES, MODEL_METADATA, SCHEMA, is_case
 from .slabs import VARIES_ALONG, is_lazy, slabs
 
 RESULT_VARIABLES = frozenset(variable.name for variable in SCHEMA)
 HISTORY_NAMES = frozenset(name for name, _, _ in HISTORY_VARIABLES)  # over the time t
-TEXT_COORDINATES = frozenset({"model", *MODEL_METADATA, *MATERIAL_KEYS} - {"year"})
+TEXT_COORDINATES = frozenset({"model", *MODEL_METADATA, *MATERIAL_KEYS, *CALIBRATION_TEXTS} - {"year"})
 # the trajectory table of a factored file, see `impact.results.factored`
 TABLE_VARIABLES = frozenset(
     {
@@ -39,6 +40,8 @@ ALLOWED_NAMES = (
     | HISTORY_NAMES
     | TEXT_COORDINATES
     | TABLE_VARIABLES
+    | CALIBRATION_VARIABLES.keys()
+    | CALIBRATION_COORDINATES
     | {"t", "year", "exponent", *SWEEP_QUANTITIES}
 )
 # a parameter of one model: the key of the model, and a Python identifier
@@ -60,7 +63,7 @@ def is_name(name: str) -> bool:
 
 def is_quantity(name: str, axes: tuple[str, ...]) -> bool:
     """Whether a variable is an output; inputs are coordinates. The velocity of a ball may be either."""
-    return name in RESULT_VARIABLES or (name in HISTORY_NAMES and axes == ("t",))
+    return name in RESULT_VARIABLES or name in CALIBRATION_VARIABLES or (name in HISTORY_NAMES and axes == ("t",))
 
 
 # required attributes of a result: text, in part JSON, and numbers

@@ -1,0 +1,116 @@
+"""Run many solvers at the same time, and evaluate what they ask for in one batch.
+
+A solver such as `scipy.optimize.least_squares` asks for one value at a time, and a vectorised function is fast
+only for many. Here each solver runs in a thread; when all of them wait for a value, their requests are evaluated
+together.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from queue import SimpleQueue
+from typing import TypeVar
+
+import numpy as np
+
+from ..array_types import Array
+
+T = TypeVar("T")
+# rows (k, p) to values (k, n)
+VectorFunction = Callable[[Array], Array]
+# called by a solver: the key of a function, and rows of its arguments
+Evaluate = Callable[[str, Array], Array]
+# threads at a time
+MAX_THREADS = 256
+
+
+class _Stopped(Exception):
+    """Ends a waiting solver after a function or another solver failed."""
+
+
+def run_together(functions: Mapping[str, VectorFunction], solvers: Sequence[Callable[[Evaluate], T]]) -> list[T]:
+    """The results of solvers, whose requests are evaluated in batches.
+
+    A result does not depend on the other solvers, as long as the functions treat each row separately.
+
+    Parameters
+    ----------
+    functions : by key; rows of shape (k, p) to values of shape (k, n)
+    solvers : each is called with a function `evaluate(key, rows)`
+
+    Raises
+    ------
+    The first exception of a function or a solver.
+
+    >>> def root_of(square):
+    ...     def newton(evaluate):
+    ...         x = np.ones(1)
+    ...         for _ in range(8):
+    ...             x = x - (evaluate("square", x[None, :])[0] - square) / (2 * x)
+    ...         return float(x[0].round(12))
+    ...     return newton
+    >>> run_together({"square": lambda rows: rows**2}, [root_of(4.0), root_of(9.0)])
+    [2.0, 3.0]
+    """
+    results: list[T] = []
+    for start in range(0, len(solvers), MAX_THREADS):
+        results += _run_threads(functions, solvers[start : start + MAX_THREADS])
+    return results
+
+
+def _run_threads(functions: Mapping[str, VectorFunction], solvers: Sequence[Callable[[Evaluate], T]]) -> list[T]:
+    # what threads send: their number, and a request, a result or an exception
+    messages: SimpleQueue[tuple[int, str, object]] = SimpleQueue()
+    answers: list[SimpleQueue[Array | None]] = [SimpleQueue() for _ in solvers]
+
+    def evaluate(number: int, key: str, rows: Array) -> Array:
+        messages.put((number, "request", (key, rows)))
+        answer = answers[number].get()
+        if answer is None:
+            raise _Stopped
+        return answer
+
+    def solve(number: int) -> None:
+        try:
+            messages.put((number, "result", solvers[number](partial(evaluate, number))))
+        except _Stopped:
+            pass
+        except BaseException as error:
+            messages.put((number, "error", error))
+
+    threads = [threading.Thread(target=solve, args=(number,), daemon=True) for number in range(len(solvers))]
+    for thread in threads:
+        thread.start()
+    results: dict[int, T] = {}
+    requests: dict[int, tuple[str, Array]] = {}
+    try:
+        while len(results) < len(solvers):
+            number, kind, content = messages.get()
+            if kind == "error":
+                raise content  # type: ignore[misc]
+            (requests if kind == "request" else results)[number] = content  # type: ignore[assignment]
+            if len(requests) + len(results) == len(solvers):
+                for number, values in _evaluate_all(functions, requests).items():
+                    answers[number].put(values)
+                requests = {}
+    finally:
+        for answer in answers:
+            answer.put(None)
+        for thread in threads:
+            thread.join()
+    return [results[number] for number in range(len(solvers))]
+
+
+def _evaluate_all(
+    functions: Mapping[str, VectorFunction], requests: Mapping[int, tuple[str, Array]]
+) -> dict[int, Array]:
+    """The values of all requests; those of one function are evaluated together, in the order of the solvers."""
+    values: dict[int, Array] = {}
+    for key in dict.fromkeys(key for key, _ in requests.values()):
+        numbers = sorted(number for number, (of, _) in requests.items() if of == key)
+        rows = [requests[number][1] for number in numbers]
+        parts = np.split(functions[key](np.concatenate(rows)), np.cumsum([len(part) for part in rows])[:-1])
+        values |= dict(zip(numbers, parts, strict=True))
+    return values

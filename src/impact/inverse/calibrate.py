@@ -1,0 +1,362 @@
+"""Calibrate laws with measurements: which laws fit, with which parameters, and what the data cannot determine."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from fractions import Fraction
+
+import numpy as np
+import xarray as xr
+
+from ..array_types import Array
+from ..config.files import toml_key, toml_text
+from ..config.grid import Axis, path_of
+from ..config.load import Config
+from ..config.tables import quantity_at
+from ..contact.model import ForceModel
+from ..contact.outputs import collide
+from ..contact.units import dimension
+from ..engine.build_impacts import build_impacts
+from ..engine.plan import Inputs, is_foreign
+from ..engine.plugins import Plugins
+from ..results.calibration import FIT_STATUSES, calibration_template
+from .batch import VectorFunction
+from .fit import Bounds, DataPoints, Fit, Problem, fit_all, squared_quantile
+
+# points of the curve of each law over an input
+CURVE_POINTS = 101
+# the curve is spaced logarithmically if the largest value of the input is larger by this factor
+LOG_CURVE_RATIO = 30.0
+# denominators of the exponents of a group of parameters
+MAX_DENOMINATOR = 12
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """The fits of laws to measurements.
+
+    Parameters
+    ----------
+    config : with the measurements and the parameters to fit
+    names : config names of the parameters of each law, by its key
+    fits : by the key of the law
+    curves : values of each output over an input, with the ends of their bands; by the key of the law, of shape
+        (3, outputs, CURVE_POINTS)
+    varied : the input of the curves, and its values; "" where the data vary with more than one input or none
+    """
+
+    config: Config
+    names: Mapping[str, tuple[str, ...]]
+    fits: Mapping[str, Fit]
+    curves: Mapping[str, Array]
+    varied: tuple[str, Array]
+
+    @property
+    def ranked(self) -> list[str]:
+        """The keys of the laws, best first: by AICc, those whose fit has a defect last."""
+
+        def order(key: str) -> tuple[bool, bool, float, float]:
+            fit = self.fits[key]
+            return (
+                fit.status != "ok",
+                math.isnan(fit.aicc),
+                0.0 if math.isnan(fit.aicc) else fit.aicc,
+                math.inf if math.isnan(fit.chi2_reduced) else fit.chi2_reduced,
+            )
+
+        return sorted(self.fits, key=order)
+
+    @property
+    def weights(self) -> dict[str, float]:
+        """Akaike weights of the laws whose fit has no defect; 0 for the others."""
+        usable = {key: fit.aicc for key, fit in self.fits.items() if fit.status == "ok" and fit.aicc == fit.aicc}
+        least = min(usable.values(), default=0.0)
+        likelihood = {key: math.exp(-0.5 * (aicc - least)) for key, aicc in usable.items()}
+        total = sum(likelihood.values())
+        return {key: likelihood.get(key, 0.0) / total if total else 0.0 for key in self.fits}
+
+
+def fitted_names(config: Config, model: ForceModel) -> tuple[str, ...]:
+    """The config names of the parameters that are fitted for a law."""
+    return tuple(
+        name
+        for name in config.fits
+        if not is_foreign([name], model.key) and (name != "e" or "e" in model.quantities)
+    )
+
+
+def prediction(
+    config: Config, model: ForceModel, names: Sequence[str], inputs: Mapping[str, Sequence[float]], points: int
+) -> VectorFunction:
+    """The outputs of a law as a function of its parameters.
+
+    Parameters
+    ----------
+    config : the inputs that do not vary, and the outputs
+    model : the law
+    names : config names of its parameters
+    inputs : values of the inputs that vary from point to point, by config name
+    points : their number, n
+
+    Returns
+    -------
+    Parameters of shape (k, len(names)) to outputs of shape (k, outputs n): all points of the first output, then of
+    the next; NaN where the law has no result
+    """
+    assert config.data is not None
+    outputs = tuple(config.data.outputs)
+    scalars = {name: value for name, value in config.scalars.items() if name not in (*names, *inputs)}
+    core = "numba" if config.solver.core == "numba" else "numpy"
+
+    def predict(rows: Array) -> Array:
+        columns = {name: np.tile(values, len(rows)) for name, values in inputs.items()}
+        columns |= {name: np.repeat(values, points) for name, values in zip(names, rows.T, strict=True)}
+        # the values are arrays here, for speed
+        columns["trial"] = np.arange(len(rows) * points)
+        axis = Axis(columns, numbered="trial")  # type: ignore[arg-type]
+        swept = Inputs(scalars, (axis,), config.materials)
+        impacts = build_impacts(swept, model, swept.index()).broadcast()
+        collisions = collide(
+            model,
+            impacts,
+            rtol=config.solver.rtol,
+            max_steps=config.solver.max_steps,
+            core=core,
+            names=outputs,
+        )
+        return np.concatenate([collisions[name].reshape(len(rows), points) for name in outputs], axis=1)
+
+    return predict
+
+
+def calibrate_config(config: Config) -> Calibration:
+    """Fit the laws of a config to its measurements; see `impact.calibrate`."""
+    assert config.data is not None
+    data = config.data
+    values = np.concatenate([np.asarray(column, float) for column in data.outputs.values()])
+    sigma = np.concatenate(
+        [np.asarray(data.sigma.get(name, np.ones(len(column))), float) for name, column in data.outputs.items()]
+    )
+    names = {model.key: fitted_names(config, model) for model in config.models}
+    problems, functions = [], {}
+    for model in config.models:
+        least, most = np.array([config.fits[name] for name in names[model.key]]).reshape(-1, 2).T
+        problems.append(Problem(model.key, Bounds(least, most), DataPoints(values, sigma, data.noise)))
+        functions[model.key] = prediction(config, model, names[model.key], data.inputs, len(data.lines))
+    fits = dict(zip(names, fit_all(problems, functions), strict=True))
+    varied = varied_input(data.inputs)
+    curves = {
+        problem.key: _curve(config, model, names[model.key], fits[model.key], problem, varied)
+        for model, problem in zip(config.models, problems, strict=True)
+    }
+    return Calibration(config, names, fits, curves, varied)
+
+
+def varied_input(inputs: Mapping[str, Sequence[float]]) -> tuple[str, Array]:
+    """The only input that varies among the points and the values of its curve; "" if there are several or none."""
+    varying = {name: np.asarray(column) for name, column in inputs.items() if len(set(column)) > 1}
+    if len(varying) != 1:
+        return "", np.array([])
+    ((name, column),) = varying.items()
+    least, most = float(column.min()), float(column.max())
+    if least > 0.0 and most / least > LOG_CURVE_RATIO:
+        return name, np.geomspace(least, most, CURVE_POINTS)
+    return name, np.linspace(least, most, CURVE_POINTS)
+
+
+def _curve(
+    config: Config, model: ForceModel, names: Sequence[str], fit: Fit, problem: Problem, varied: tuple[str, Array]
+) -> Array:
+    """The outputs over the varied input, with the ends of the band of 95 % of the prediction without its noise."""
+    assert config.data is not None
+    name, grid = varied
+    outputs = len(config.data.outputs)
+    if not name:
+        return np.full((3, outputs, 0), np.nan)
+    inputs = {other: [column[0]] * grid.size for other, column in config.data.inputs.items()} | {
+        name: grid.tolist()
+    }
+    predict = prediction(config, model, names, inputs, grid.size)
+    u = problem.bounds.units(fit.estimate)
+    steps = np.where(u < 0.5, 1e-4, -1e-4)
+    rows = problem.bounds.values(np.clip(np.vstack([u, u + np.diag(steps)]), 0.0, 1.0))
+    values = predict(rows)
+    slopes = (values[1:] - values[0]) / (rows[1:] - rows[0]).diagonal()[:, None]
+    half = np.full(values.shape[1], np.nan)
+    if np.isfinite(fit.covariance).all() and problem.is_determined:
+        variance = np.einsum("pi,pq,qi->i", slopes, fit.covariance, slopes)
+        half = np.sqrt(squared_quantile(problem) * np.maximum(variance, 0.0))
+    return np.stack([values[0], values[0] - half, values[0] + half]).reshape(3, outputs, grid.size)
+
+
+def determined_groups(config: Config, model: ForceModel, names: Sequence[str], fit: Fit) -> list[str]:
+    """What the data determine of the parameters that they do not identify, as products of powers.
+
+    The effective mass m and the closing speed v0 make a product dimensionless where they can.
+
+    Parameters
+    ----------
+    config, model, names : the law and the config names of its parameters
+    fit : its fit, with positive parameters
+
+    Returns
+    -------
+    list : such as ["C/sqrt(m K)"]; empty where all parameters are identified, or none of these is determined
+    """
+    involved = np.flatnonzero(~fit.identifiable)
+    directions = fit.unidentified[:, involved]
+    positive = all(config.fits[names[number]][0] > 0.0 for number in involved.tolist())
+    if not involved.size or not positive:
+        return []
+    # the directions that the data do determine, in reduced echelon form from the last parameter on
+    _, sizes, rows = np.linalg.svd(directions)
+    complement = rows[np.count_nonzero(sizes > 0.5) :]
+    reduced = _reduced(complement[:, ::-1])[:, ::-1]
+    groups = []
+    for row in reduced:
+        powers = {
+            names[number].rpartition(".")[2]: Fraction(float(power)).limit_denominator(MAX_DENOMINATOR)
+            for number, power in zip(involved.tolist(), row, strict=True)
+        }
+        units = [_unit(config, model, names[number]) for number in involved.tolist()]
+        groups.append(_product(_completion(list(powers.values()), units, config, model) | powers))
+    return groups
+
+
+def _unit(config: Config, model: ForceModel, name: str) -> str:
+    quantity = quantity_at(path_of(name), {m.key: m for m in config.models})
+    assert quantity is not None
+    return quantity.unit
+
+
+def _completion(
+    powers: Sequence[Fraction], units: Sequence[str], config: Config, model: ForceModel
+) -> dict[str, Fraction]:
+    """The powers of m and v0 that make a product of powers of parameters dimensionless; empty if none do."""
+    exponents = {"n": float(model.exponent or config.scalars.get("n", 1.5))}
+    mass = length = time = Fraction(0)
+    for power, unit in zip(powers, units, strict=True):
+        of_unit = [Fraction(float(part)).limit_denominator(MAX_DENOMINATOR) for part in dimension(unit, exponents)]
+        mass, length, time = mass + power * of_unit[0], length + power * of_unit[1], time + power * of_unit[2]
+    if length != -time:
+        return {}
+    return {name: power for name, power in (("m", -mass), ("v0", time)) if power}
+
+
+def _reduced(rows: Array) -> Array:
+    """Reduced row echelon form."""
+    rows = rows.copy()
+    column = 0
+    for row in range(len(rows)):
+        while column < rows.shape[1] and np.abs(rows[row:, column]).max() < 1e-6:
+            column += 1
+        if column == rows.shape[1]:
+            break
+        pivot = row + int(np.abs(rows[row:, column]).argmax())
+        rows[[row, pivot]] = rows[[pivot, row]]
+        rows[row] /= rows[row, column]
+        others = np.arange(len(rows)) != row
+        rows[others] -= np.outer(rows[others, column], rows[row])
+        column += 1
+    return rows
+
+
+def _product(powers: Mapping[str, Fraction]) -> str:
+    """A product of powers as text.
+
+    >>> _product({"m": Fraction(-1, 2), "C": Fraction(1), "K": Fraction(-1, 2)})
+    'C/sqrt(m K)'
+    """
+    above, below = ([(name, abs(p)) for name, p in powers.items() if p * sign > 0] for sign in (1, -1))
+    denominator = _factors(below)
+    return (_factors(above) or "1") + (f"/{denominator}" if denominator else "")
+
+
+def _factors(powers: Sequence[tuple[str, Fraction]]) -> str:
+    roots = [name for name, power in powers if power == Fraction(1, 2)]
+    words = [
+        name if power == 1 else f"{name}^{power if power.denominator == 1 else f'({power})'}"
+        for name, power in powers
+        if name not in roots
+    ]
+    if roots:
+        words.append(f"sqrt({' '.join(roots)})")
+    text = " ".join(words)
+    return f"({text})" if len(words) > 1 else text
+
+
+def best_config(calibration: Calibration) -> str:
+    """A config in TOML with the best law and its parameters; inputs that vary in the data are axes.
+
+    It has all values in SI units, and needs no other file.
+    """
+    config, key = calibration.config, calibration.ranked[0]
+    assert config.data is not None
+    values: dict[str, object] = dict(config.scalars)
+    values |= {name: sorted(set(column)) for name, column in config.data.inputs.items()}
+    fit = calibration.fits[key]
+    values |= dict(zip(calibration.names[key], map(float, fit.estimate), strict=True))
+    tables: dict[str, dict[str, object]] = {"sweep": {}}
+    for name, material in config.materials.items():
+        known = {field: value for field, value in asdict(material).items() if value is not None and value == value}
+        tables[f"materials.{toml_key(name)}"] = known
+    for name, value in values.items():
+        table, _, parameter = name.rpartition(".")
+        if is_foreign([name], key):
+            continue
+        place = "sweep" if not table else table if table.startswith("materials.") else f"model.{table}"
+        if isinstance(value, list) and len(value) == 1:
+            (value,) = value
+        tables.setdefault(place, {})[parameter] = value
+    lines = [f"models = {toml_text([key])}", f"title = {toml_text(config.title)}"]
+    for place, table_values in tables.items():
+        lines += ["", f"[{place}]", *(f"{name} = {toml_text(value)}" for name, value in table_values.items())]
+    return "\n".join(lines) + "\n"
+
+
+def calibration_dataset(calibration: Calibration, plugins: Plugins) -> xr.Dataset:
+    """The result of a calibration, with the laws in the order of their rank."""
+    config = calibration.config
+    assert config.data is not None
+    keys = calibration.ranked
+    by_key = {model.key: model for model in config.models}
+    parameters = list(config.fits)
+    shape = (len(keys), len(parameters))
+    dataset = calibration_template(config, [by_key[key] for key in keys], plugins, calibration.varied)
+    arrays = {name: np.full(shape, np.nan) for name in ("estimate", "lower", "upper")}
+    covariance = np.full((*shape, len(parameters)), np.nan)
+    identifiable = np.full(shape, -1, np.int8)
+    for row, key in enumerate(keys):
+        fit = calibration.fits[key]
+        where = [parameters.index(name) for name in calibration.names[key]]
+        for name, column in arrays.items():
+            column[row, where] = getattr(fit, name)
+        covariance[row][np.ix_(where, where)] = fit.covariance
+        identifiable[row, where] = fit.identifiable
+    fits = [calibration.fits[key] for key in keys]
+    weights = calibration.weights
+    groups = [
+        "; ".join(determined_groups(config, by_key[key], calibration.names[key], calibration.fits[key]))
+        for key in keys
+    ]
+    values: dict[str, object] = {
+        **arrays,
+        "covariance": covariance,
+        "identifiable": identifiable,
+        "fit_status": np.array([list(FIT_STATUSES).index(fit.status) for fit in fits], np.int8),
+        "chi2_reduced": np.array([fit.chi2_reduced for fit in fits]),
+        "excess": np.array([fit.excess for fit in fits]),
+        "aicc": np.array([fit.aicc for fit in fits]),
+        "weight": np.array([weights[key] for key in keys]),
+        "loo": np.array([fit.loo for fit in fits]),
+        "predicted": np.array([fit.predicted for fit in fits]),
+        "residual": np.array([fit.residual for fit in fits]),
+    }
+    if calibration.varied[0]:
+        curve, lower, upper = np.stack([calibration.curves[key] for key in keys], axis=1)
+        values |= {"curve": curve, "curve_lower": lower, "curve_upper": upper}
+    return dataset.assign(
+        {name: (dataset[name].dims, array, dataset[name].attrs) for name, array in values.items()}
+    ).assign_coords(determined=("model", groups))

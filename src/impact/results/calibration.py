@@ -1,0 +1,122 @@
+"""The dataset of a calibration: parameters of laws, how well they fit, and the measurements."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import xarray as xr
+
+from ..array_types import Array
+from ..config.grid import path_of
+from ..config.load import Config
+from ..contact.model import ForceModel
+from ..engine.plan import Plan
+from ..engine.plugins import Plugins
+from .schema import SCHEMA, coordinate_attributes, plan_coordinates, provenance_attributes
+
+# what became of a fit; its number is its position
+FIT_STATUSES = {
+    "ok": "the solver met its tolerance inside the bounds",
+    "at_bound": "a parameter stands at a bound",
+    "not_converged": "the solver did not meet its tolerance",
+    "too_few_points": "there are not more points than parameters",
+    "no_prediction": "the law has no result at a point",
+}
+# name: dimensions, unit, meaning
+CALIBRATION_VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
+    "estimate": (("model", "parameter"), "SI", "best value of the parameter; NaN where the law does not have it"),
+    "lower": (("model", "parameter"), "SI", "lower end of the interval of 95 % by profile likelihood"),
+    "upper": (("model", "parameter"), "SI", "upper end of the interval of 95 % by profile likelihood"),
+    "covariance": (("model", "parameter", "other_parameter"), "SI", "covariance in the linear approximation"),
+    "identifiable": (
+        ("model", "parameter"),
+        "1",
+        "1 if the data determine the parameter, -1 if it is not the law's",
+    ),
+    "fit_status": (("model",), "1", "outcome of the fit"),
+    "chi2_reduced": (("model",), "1", "squared residuals in variances per degree of freedom"),
+    "excess": (("model",), "SI", "standard deviation between specimens, besides that of the measurements"),
+    "aicc": (("model",), "1", "corrected information criterion of Akaike"),
+    "weight": (("model",), "1", "Akaike weight among the laws whose fit has no defect"),
+    "loo": (("model",), "1", "root mean square of leave-one-out residuals, in standard deviations"),
+    "predicted": (("model", "point"), "SI", "output of the law at the point"),
+    "residual": (("model", "point"), "SI", "measured minus predicted"),
+    "curve": (("model", "output_name", "grid"), "SI", "output of the law over the varied input"),
+    "curve_lower": (("model", "output_name", "grid"), "SI", "lower end of the band of 95 % of the curve"),
+    "curve_upper": (("model", "output_name", "grid"), "SI", "upper end of the band of 95 % of the curve"),
+}
+# coordinates besides those of models and inputs; those that are text
+CALIBRATION_TEXTS = frozenset({"parameter", "other_parameter", "output_name", "output", "determined"})
+CALIBRATION_COORDINATES = CALIBRATION_TEXTS | {"point", "grid", "measured", "sigma", "line"}
+
+
+def calibration_template(
+    config: Config, models: Sequence[ForceModel], plugins: Plugins, varied: tuple[str, Array]
+) -> xr.Dataset:
+    """The dataset of a calibration with NaN in place of its results.
+
+    Parameters
+    ----------
+    config : with the measurements
+    models : the laws, in the order of the dataset
+    plugins : the models that are not built in
+    varied : the input of the curves and its values; "" for none
+    """
+    data = config.data
+    assert data is not None
+    plan = Plan(replace(config, models=tuple(models)), plugins)
+    fitted, parameters = set(config.fits), list(config.fits)
+    coordinates = {
+        name: coordinate
+        for name, coordinate in plan_coordinates(plan).variables.items()
+        if name not in fitted and name not in data.inputs
+    }
+    outputs = list(data.outputs)
+    rows = len(data.lines)
+    units = {variable.name: variable.unit for variable in SCHEMA}
+    new: dict[str, object] = {
+        "parameter": ("parameter", parameters, {"long_name": "fitted parameter, by its config name"}),
+        "other_parameter": ("other_parameter", parameters, {"long_name": "fitted parameter, by its config name"}),
+        "point": ("point", np.arange(1, rows * len(outputs) + 1), {"long_name": "number of the measured value"}),
+        "line": ("point", np.tile(data.lines, len(outputs)), {"long_name": "line of the file"}),
+        "output": ("point", np.repeat(outputs, rows), {"long_name": "measured output"}),
+        "measured": ("point", np.concatenate([*data.outputs.values()]), {"long_name": "measured value"}),
+        "sigma": (
+            "point",
+            np.concatenate([data.sigma.get(name, np.full(rows, np.nan)) for name in outputs]),
+            {"long_name": "standard deviation of the measured value"},
+        ),
+    }
+    for name, column in data.inputs.items():
+        new[name] = ("point", np.tile(column, len(outputs)), coordinate_attributes(plan, name))
+    sizes = {"model": len(models), "parameter": len(parameters), "other_parameter": len(parameters)}
+    sizes |= {"point": rows * len(outputs), "output_name": len(outputs)}
+    name, grid = varied
+    if name:
+        sizes["grid"] = grid.size
+        new["grid"] = ("grid", grid, coordinate_attributes(plan, name))
+        new["output_name"] = (
+            "output_name", outputs, {"long_name": "measured output", "units": " ".join(units[o] for o in outputs)},
+        )  # fmt: skip
+    variables = {}
+    for variable, (dims, unit, meaning) in CALIBRATION_VARIABLES.items():
+        if set(dims) <= sizes.keys() and (name or "grid" not in dims):
+            about: dict[str, object] = {"units": unit, "long_name": meaning}
+            dtype = np.int8 if variable in ("identifiable", "fit_status") else float
+            if variable == "fit_status":
+                about |= {
+                    "flag_values": np.arange(len(FIT_STATUSES), dtype=np.int8),
+                    "flag_meanings": " ".join(FIT_STATUSES),
+                }
+            variables[variable] = (dims, np.zeros([sizes[dim] for dim in dims], dtype), about)
+    attributes = provenance_attributes(plan) | {
+        "noise": data.noise,
+        "data_file": data.file,
+        "varied": name,
+        "fit_paths": json.dumps([".".join(map(str, path_of(name))) for name in parameters]),
+        "fit_bounds": json.dumps({name: list(ends) for name, ends in config.fits.items()}),
+    }
+    return xr.Dataset(variables, {**coordinates, **new}, attributes)

@@ -1,0 +1,169 @@
+"""Least-squares fits: estimates, intervals, criteria and identifiability, against closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from impact.inverse.fit import Bounds, DataPoints, Fit, Problem, fit_all
+
+Array = NDArray[np.float64]
+# damping ratio of a linear spring and dashpot with e = 0.5, and de/dzeta there
+ZETA, SLOPE = 0.2154537620, -1.6868808088
+X = np.linspace(0.1, 3.0, 30)
+
+
+def restitution(zeta: Array) -> Array:
+    """Of a linear spring and dashpot until zero indentation."""
+    limited = np.minimum(zeta, 1.0 - 1e-12)
+    result: Array = np.exp(-np.pi * limited / np.sqrt(1.0 - limited**2))
+    return result
+
+
+def of_zeta(rows: Array) -> Array:
+    return np.repeat(restitution(rows[:, :1]), 20, axis=1)
+
+
+def of_spring_and_dashpot(rows: Array) -> Array:
+    """Rows of (K, C) with an effective mass of 1."""
+    return np.repeat(restitution(rows[:, 1:] / 2.0 / np.sqrt(rows[:, :1])), X.size, axis=1)
+
+
+def decay(rows: Array) -> Array:
+    result: Array = rows[:, :1] * np.exp(-rows[:, 1:] * X)
+    return result
+
+
+def line(rows: Array) -> Array:
+    result: Array = rows[:, :1] + rows[:, 1:] * X
+    return result
+
+
+FUNCTIONS = {"zeta": of_zeta, "K, C": of_spring_and_dashpot, "decay": decay, "line": line}
+
+
+def fit(key: str, least: list[float], most: list[float], values: Array, sigma: float, noise: str = "given") -> Fit:
+    data = DataPoints(values, np.full(values.size, sigma), noise)  # type: ignore[arg-type]
+    (result,) = fit_all([Problem(key, Bounds(np.array(least), np.array(most)), data)], FUNCTIONS)
+    return result
+
+
+def test_data_without_noise_give_the_parameters_to_1e_8() -> None:
+    result = fit("decay", [1e-3, 1e-3], [10.0, 10.0], decay(np.array([[1.3, 0.7]]))[0], 0.01)
+    assert result.status == "ok"
+    np.testing.assert_allclose(result.estimate, [1.3, 0.7], rtol=1e-8)
+
+
+def test_the_variance_of_a_dashpot_is_the_cramer_rao_bound() -> None:
+    result = fit("zeta", [0.01], [0.9], np.full(20, 0.5), 0.01)
+    assert result.estimate[0] == pytest.approx(ZETA, abs=1e-9)
+    assert result.jacobian[:, 0] == pytest.approx(SLOPE, rel=1e-7)
+    assert np.sqrt(result.covariance[0, 0]) == pytest.approx(0.00132556, abs=1e-8)
+
+
+@pytest.mark.parametrize("noise", ["given", "scale", "excess"])
+def test_a_line_has_the_estimates_and_intervals_of_linear_regression(noise: str) -> None:
+    """With a scale the intervals are those of Student's t, in closed form."""
+    from scipy.stats import chi2, t
+
+    random = np.random.default_rng(7)
+    y = 0.5 + 0.2 * X + 0.03 * random.standard_normal(X.size)
+    result = fit("line", [-1.0, -1.0], [2.0, 2.0], y, 0.01, noise)
+    design = np.stack([np.ones_like(X), X], axis=1)
+    exact, (squares,), *_ = np.linalg.lstsq(design, y, rcond=None)
+    np.testing.assert_allclose(result.estimate, exact, atol=1e-9)
+    freedom = X.size - 2
+    variance = 0.01**2 if noise == "given" else squares / freedom
+    deviation = np.sqrt(variance * np.diag(np.linalg.inv(design.T @ design)))
+    quantile = np.sqrt(chi2.ppf(0.95, 1)) if noise == "given" else t.ppf(0.975, freedom)
+    np.testing.assert_allclose(np.sqrt(np.diag(result.covariance)), deviation, rtol=1e-6)
+    np.testing.assert_allclose(result.lower, exact - quantile * deviation, rtol=1e-5)
+    np.testing.assert_allclose(result.upper, exact + quantile * deviation, rtol=1e-5)
+    if noise == "excess":
+        assert 0.01**2 + result.excess**2 == pytest.approx(variance, rel=1e-8)
+
+
+def test_leave_one_out_residuals_of_a_line_are_those_of_the_hat_matrix() -> None:
+    random = np.random.default_rng(8)
+    y = 0.5 + 0.2 * X + 0.03 * random.standard_normal(X.size)
+    result = fit("line", [-1.0, -1.0], [2.0, 2.0], y, 0.03)
+    design = np.stack([np.ones_like(X), X], axis=1)
+    hat = design @ np.linalg.inv(design.T @ design) @ design.T
+    left_out = (y - hat @ y) / (1.0 - np.diag(hat)) / 0.03
+    assert result.loo == pytest.approx(np.sqrt(np.mean(left_out**2)), rel=1e-6)
+
+
+def test_aicc_of_a_line_is_that_of_its_likelihood() -> None:
+    random = np.random.default_rng(9)
+    y = 0.5 + 0.2 * X + 0.03 * random.standard_normal(X.size)
+    result = fit("line", [-1.0, -1.0], [2.0, 2.0], y, 0.03)
+    likelihood = -0.5 * np.sum((result.residual / 0.03) ** 2 + np.log(2.0 * np.pi * 0.03**2))
+    assert result.aicc == pytest.approx(2 * 2 - 2 * likelihood + 2 * 2 * 3 / (30 - 3), rel=1e-10)
+
+
+def test_spring_and_dashpot_are_not_identified_by_restitutions() -> None:
+    """Only C/sqrt(K) is: the direction that changes nothing is (2, 1)/sqrt(5) in the logarithms."""
+    result = fit("K, C", [1e4, 10.0], [1e8, 1e4], np.full(X.size, 0.5), 0.01)
+    assert not result.identifiable.any()
+    assert np.isnan(result.lower).all()
+    np.testing.assert_allclose(np.abs(result.unidentified), [[2 / np.sqrt(5), 1 / np.sqrt(5)]], atol=1e-6)
+    K, C = result.estimate
+    assert C / 2 / np.sqrt(K) == pytest.approx(ZETA, abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("values", "status"),
+    [(np.full(20, 0.99), "at_bound"), (np.full(20, 0.5), "ok")],
+)
+def test_a_parameter_at_a_bound_is_reported(values: Array, status: str) -> None:
+    result = fit("zeta", [0.05], [0.9], values, 0.01)
+    assert result.status == status
+    assert (result.lower[0] == 0.05) == (status == "at_bound")
+
+
+def test_as_many_points_as_parameters_are_too_few() -> None:
+    functions = {"line": lambda rows: rows[:, :1] + rows[:, 1:] * X[:2]}
+    data = DataPoints(np.array([0.5, 0.6]), np.full(2, 0.01), "scale")
+    (result,) = fit_all([Problem("line", Bounds(np.full(2, -1.0), np.full(2, 2.0)), data)], functions)
+    assert result.status == "too_few_points"
+    assert np.isnan(result.lower).all()
+    assert np.isnan(result.aicc)
+
+
+def test_a_fit_does_not_depend_on_the_others() -> None:
+    random = np.random.default_rng(10)
+    problems = [
+        Problem(
+            "decay",
+            Bounds(np.array([1e-3, 1e-3]), np.array([10.0, 10.0])),
+            DataPoints(
+                decay(np.array([[1.3, 0.7]]))[0] + 0.01 * random.standard_normal(30), np.full(30, 0.01), "given"
+            ),
+        )
+        for _ in range(3)
+    ]
+    together = fit_all(problems, FUNCTIONS)
+    for problem, of_all in zip(problems, together, strict=True):
+        (alone,) = fit_all([problem], FUNCTIONS)
+        for name in ("estimate", "lower", "upper", "covariance", "aicc", "loo"):
+            assert np.array_equal(getattr(alone, name), getattr(of_all, name))
+
+
+@pytest.mark.slow
+def test_coverage_and_bias_of_4000_synthetic_sets() -> None:
+    """Each within four standard errors of the check itself; the figures are in docs/calibrate.md."""
+    count, n, sigma = 4000, 20, 0.01
+    random = np.random.default_rng(20261123)
+    bounds = Bounds(np.array([0.01]), np.array([0.9]))
+    values = restitution(np.array([ZETA])) + sigma * random.standard_normal((count, n))
+    problems = [Problem("zeta", bounds, DataPoints(row, np.full(n, sigma), "given")) for row in values]
+    fits = fit_all(problems, FUNCTIONS, leave_one_out=False)
+    estimates = np.array([result.estimate[0] for result in fits])
+    covered = np.mean([result.lower[0] <= ZETA <= result.upper[0] for result in fits])
+    bound = 0.00132556
+    print(f"coverage {covered:.4f}, variance/bound {np.var(estimates) / bound**2:.4f}")
+    print(f"bias {np.mean(estimates) - ZETA:.2e}, standard error {bound / np.sqrt(count):.2e}")
+    assert abs(covered - 0.95) <= 4.0 * np.sqrt(0.95 * 0.05 / count)
+    assert abs(np.var(estimates) / bound**2 - 1.0) <= 4.0 * np.sqrt(2.0 / count)
+    assert abs(np.mean(estimates) - ZETA) <= 4.0 * bound / np.sqrt(count)
