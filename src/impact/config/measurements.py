@@ -248,6 +248,8 @@ def expand_measurements(
     apply to it; the measurements; and problems. Without valid measurements the data is unchanged.
     """
     table = as_table(data.get("data"))
+    if isinstance(data.get("data"), dict) and not {"file", "columns"} & table.keys():
+        return dict(data), None, [(("data",), 'got neither file nor columns, expected such as file = "drops.csv"')]
     lists = table.get("columns")
     if not isinstance(lists, dict) or not lists or not all(isinstance(v, list) and v for v in lists.values()):
         return dict(data), None, []
