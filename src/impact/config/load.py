@@ -246,7 +246,7 @@ class _Reader:
         fits = {name: value.fit for name, value in values.items() if isinstance(value, FitRange)}
         values = {name: value.middle if isinstance(value, FitRange) else value for name, value in values.items()}
         if self.purpose == "calibrate":
-            problems += _calibration_problems(data, values, fits)
+            problems += _calibration_problems(data, values, fits, are_valid=not invalid_values)
             values = {name: value for name, value in values.items() if isinstance(value, float | str)}
         quantities = {name: quantity_at(path_of(name), self.models) for name in values}
         output = document.output
@@ -412,7 +412,11 @@ def _build_material(table: MaterialTable) -> Material:
 
 
 def _calibration_problems(
-    data: Mapping[str, Any], values: Mapping[str, Numbers | Names], fits: Mapping[str, tuple[float, float]]
+    data: Mapping[str, Any],
+    values: Mapping[str, Numbers | Names],
+    fits: Mapping[str, tuple[float, float]],
+    *,
+    are_valid: bool,
 ) -> list[ConfigProblem]:
     """Problems of a calibration: no measurements, no parameter to fit, or axes.
 
@@ -421,6 +425,7 @@ def _calibration_problems(
     data : plain data of the config
     values : valid values by config name; parameters to fit have one
     fits : bounds of the parameters to fit
+    are_valid : no value has a problem of its own; otherwise a fit may be missing because of it
     """
     problems: list[ConfigProblem] = []
     single = "expected a single value, a column of [data] or { fit = [least, most] }"
@@ -430,7 +435,7 @@ def _calibration_problems(
         )
     if not fits and not list(fit_paths(data)):
         problems.append((("sweep",), "got no parameter to fit, expected at least one { fit = [least, most] }"))
-    elif not fits:
+    elif not fits and are_valid:
         problems += [
             (path, "got a fit, expected a value: no model and no ball of this config uses it")
             for path in fit_paths(data)
