@@ -113,7 +113,7 @@ def test_a_wrong_config_is_refused_with_its_line(folder: Path, old: str, new: st
 
 def test_fewer_points_than_parameters_are_refused_with_both_numbers() -> None:
     sweep = {"v1": 1.0, "m1": {"fit": [0.1, 1.0]}, "m2": 1.0, "K": 1e6, "n": 1.5, "e": {"fit": [0.1, 1.0]}}
-    with pytest.raises(ConfigError, match="got 1 .*at least 2, the number of parameters"):
+    with pytest.raises(ConfigError, match=r"got 1 .*at least 2, the number of parameters"):
         read_config(
             {"models": "hunt-crossley-1975", "sweep": sweep, "data": {"columns": {"e_out": [0.5]}}},
             purpose="calibrate",
