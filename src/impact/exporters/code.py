@@ -127,6 +127,7 @@ class Code:
     scheme : name of its fixed-step scheme, see `impact.contact.timestep.SCHEMES`; None if its restitution at a
         time step is not predicted
     uncertainty : largest difference of e between the code and the map of its scheme
+    rough : the same by law, where the code itself finds the damping only roughly
     entry : the entry of the catalogue that holds in a version, from the key of another one and the version
     read_version : a version as the user writes it, in the form in which versions are compared
     comment : what begins and ends a comment among the lines
@@ -150,6 +151,7 @@ class Code:
     damping: Mapping[str, str] = field(default_factory=dict)
     scheme: str | None = None
     uncertainty: float = 1e-9
+    rough: Mapping[str, float] = field(default_factory=dict)
     entry: Callable[[str, str], str] = lambda key, version: key
     read_version: Callable[[str], str] = lambda text: text
     comment: tuple[str, str] = ("# ", "")
@@ -161,6 +163,10 @@ class Code:
     install: str = ""
     version_of: Callable[[str], str | None] = lambda program: None
     command: Callable[[str, str], Sequence[str]] = lambda program, file: (program, file)
+
+    def uncertainty_of(self, key: str) -> float:
+        """The largest difference of e that is no disagreement, of a law."""
+        return self.rough.get(key, self.uncertainty)
 
     def find_program(self, program: str | None) -> str | None:
         """The program that runs a script: the given one, or else the one that is installed.

@@ -4,7 +4,21 @@ from __future__ import annotations
 
 from ..errors import UsageError, did_you_mean
 from ..text import safe_text
-from . import adams, chrono, drake, lammps, liggghts, mercurydpm, modelica, mujoco, simscape, yade
+from . import (
+    adams,
+    chrono,
+    drake,
+    kratos,
+    lammps,
+    liggghts,
+    mercurydpm,
+    modelica,
+    mujoco,
+    opensees,
+    simbody,
+    simscape,
+    yade,
+)
 from .code import Code
 
 CODES: dict[str, Code] = {
@@ -15,6 +29,9 @@ CODES: dict[str, Code] = {
         yade.CODE,
         mujoco.CODE,
         drake.CODE,
+        kratos.CODE,
+        opensees.CODE,
+        simbody.CODE,
         # text only
         chrono.CODE,
         mercurydpm.CODE,

@@ -148,7 +148,7 @@ def verify(problem: ExportProblem, program: str, dt: float) -> Verification:
             phases=(float("nan"),),
             measured=(value,),
             predicted=(problem.e_continuous,),
-            uncertainty=max(uncertainty, FLOOR, code.uncertainty),
+            uncertainty=max(uncertainty, FLOOR, code.uncertainty_of(problem.model.key)),
         )
     predicted = problem.law.with_phases(PHASES).restitution(steps)
     return Verification(
@@ -157,7 +157,7 @@ def verify(problem: ExportProblem, program: str, dt: float) -> Verification:
         phases=tuple(phases.tolist()),
         measured=tuple(measured.ravel().tolist()),
         predicted=tuple(predicted.ravel().tolist()),
-        uncertainty=code.uncertainty,
+        uncertainty=code.uncertainty_of(problem.model.key),
     )
 
 

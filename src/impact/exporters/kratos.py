@@ -1,0 +1,187 @@
+"""Kratos, application DEM."""
+
+from __future__ import annotations
+
+import json
+
+from ..errors import UsageError
+from .code import Code, Collision, Parameters, python_package_version
+
+LAWS = {
+    "kratos-hertz": "DEM_D_Hertz_viscous_Coulomb",
+    "kratos-linear": "DEM_D_Linear_viscous_Coulomb",
+}
+TWO_BALLS = '''\
+import json
+import math
+import os
+
+# two spheres are no work for threads
+os.environ["OMP_NUM_THREADS"] = "1"
+import KratosMultiphysics as Kratos
+from KratosMultiphysics.DEMApplication.DEM_analysis_stage import DEMAnalysisStage
+
+Kratos.Logger.GetDefaultOutput().SetSeverity(Kratos.Logger.Severity.WARNING)
+with open("ballsDEM.mdpa", "w") as mesh:
+    mesh.write("""
+Begin Properties 0
+End Properties
+Begin Nodes
+1 {x1} 0 0
+2 {x2} 0 0
+End Nodes
+Begin Elements SphericParticle3D
+1 0 1
+2 0 2
+End Elements
+Begin NodalData RADIUS
+1 0 {R1}
+2 0 {R2}
+End NodalData
+Begin SubModelPart ball1
+Begin SubModelPartNodes
+1
+End SubModelPartNodes
+Begin SubModelPartElements
+1
+End SubModelPartElements
+End SubModelPart
+Begin SubModelPart ball2
+Begin SubModelPartNodes
+2
+End SubModelPartNodes
+Begin SubModelPartElements
+2
+End SubModelPartElements
+End SubModelPart
+""")
+
+{lines}
+
+materials = {{
+    "materials": [
+        {{
+            "material_name": f"material{{i}}",
+            "material_id": i,
+            "Variables": {{**elastic, "PARTICLE_DENSITY": mass / (4 / 3 * math.pi * radius**3)}},
+        }}
+        for i, (elastic, mass, radius) in enumerate(
+            ((material1, {m1}, {R1}), (material2, {m2}, {R2})), 1
+        )
+    ],
+    "material_relations": [
+        {{
+            "material_names_list": [f"material{{i}}", f"material{{j}}"],
+            "material_ids_list": [i, j],
+            "Variables": relation,
+        }}
+        for i, j in ((1, 1), (1, 2), (2, 2))
+    ],
+    "material_assignation_table": [[f"SpheresPart.ball{{i}}", f"material{{i}}"] for i in (1, 2)],
+}}
+with open("MaterialsDEM.json", "w") as file:
+    json.dump(materials, file)
+stage = DEMAnalysisStage(Kratos.Model(), Kratos.Parameters(json.dumps({{
+    **parameters,
+    "problem_name": "balls",
+    "FinalTime": {steps} * parameters["MaxTimeStep"],
+    "do_print_results_option": False,
+    "dem_inlet_option": False,
+    "GravityZ": 0.0,
+    "RotationOption": False,
+    "SearchTolerance": 0.01,
+    "NeighbourSearchFrequency": 100,
+    "solver_settings": {{
+        "strategy": "sphere_strategy",
+        "material_import_settings": {{"materials_filename": "MaterialsDEM.json"}},
+    }},
+}})))
+stage.Initialize()
+balls = [stage.spheres_model_part.Nodes[i] for i in (1, 2)]
+for ball, speed in zip(balls, ({v1}, {v2})):
+    ball.SetSolutionStepValue(Kratos.VELOCITY_X, speed)
+solver = stage._GetSolver()
+for _ in range({steps}):
+    stage.time = solver.AdvanceInTime(stage.time)
+    solver.Predict()
+    solver.SolveSolutionStep()
+v1, v2 = (ball.GetSolutionStepValue(Kratos.VELOCITY_X) for ball in balls)
+print("e_out =", (v2 - v1) / {v0}, flush=True)
+# not to end with the messages of Kratos
+os._exit(0)
+'''
+
+
+def parameters(collision: Collision) -> dict[str, float | str]:
+    """Variables of the materials and of their relation, by their names in Kratos."""
+    c = collision
+    if not c.has_materials:
+        raise UsageError("Kratos takes Young's modulus and Poisson's ratio: expected a material, not K")
+    second: dict[str, float | str] = (
+        {} if c.has_one_material else {"YOUNG_MODULUS2": c["E2"], "POISSON_RATIO2": c["nu2"]}
+    )
+    return {
+        "YOUNG_MODULUS": c["E1"],
+        "POISSON_RATIO": c["nu1"],
+        **second,
+        "COEFFICIENT_OF_RESTITUTION": c["e"],
+        "DEM_DISCONTINUUM_CONSTITUTIVE_LAW_NAME": LAWS[c.model.key],
+    }
+
+
+def lines(collision: Collision, parameters: Parameters) -> list[str]:
+    elastic = ("YOUNG_MODULUS", "POISSON_RATIO")
+    materials = [{name: parameters[name] for name in elastic}]
+    materials.append({name: parameters.get(f"{name}2", parameters[name]) for name in elastic})
+    relation = {
+        "COEFFICIENT_OF_RESTITUTION": parameters["COEFFICIENT_OF_RESTITUTION"],
+        "DEM_DISCONTINUUM_CONSTITUTIVE_LAW_NAME": parameters["DEM_DISCONTINUUM_CONSTITUTIVE_LAW_NAME"],
+        "STATIC_FRICTION": 0.0,
+        "DYNAMIC_FRICTION": 0.0,
+        "FRICTION_DECAY": 500.0,
+        "ROLLING_FRICTION": 0.0,
+    }
+    project = {"TranslationalIntegrationScheme": "Symplectic_Euler", "MaxTimeStep": collision.dt}
+    return [
+        *(f"material{i} = {json.dumps(material)}" for i, material in enumerate(materials, 1)),
+        "relation = {",
+        *(f"    {json.dumps(name)}: {json.dumps(value)}," for name, value in relation.items()),
+        "}",
+        f"parameters = {json.dumps(project)}",
+    ]
+
+
+def script(collision: Collision, parameters: Parameters) -> str:
+    return TWO_BALLS.format(**collision.script_values(), lines="\n".join(lines(collision, parameters)))
+
+
+def notes(collision: Collision) -> list[str]:
+    said = [
+        "in SI; material1, material2 and relation are the Variables of materials and of their relation in",
+        "MaterialsDEM.json, parameters are keys of ProjectParametersDEM.json",
+        "two materials: 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2; the restitution is that of the pair",
+        "an e below 0.001 is raised to it, and above 0.999 there is no damping; the force is never negative",
+    ]
+    if collision.model.key == "kratos-linear":
+        said.append("Kratos finds the damping ratio by bisection to 1e-4")
+    said.append("a sphere finds its neighbours only every NeighbourSearchFrequency steps, within SearchTolerance")
+    return said
+
+
+CODE = Code(
+    name="kratos",
+    title="Kratos DEM",
+    laws=LAWS,
+    newest="10.4.4",
+    tested="scripts were run in Kratos DEM 10.4.4",
+    scheme="kick-drift",
+    # Kratos finds the damping ratio of this law by bisection to 1e-4
+    rough={"kratos-linear": 1e-4},
+    parameters=parameters,
+    lines=lines,
+    notes=notes,
+    script=script,
+    program="python",
+    install="pip install KratosDEMApplication",
+    version_of=python_package_version("KratosDEMApplication"),
+)

@@ -1,0 +1,112 @@
+"""OpenSees, uniaxial materials for pounding."""
+
+from __future__ import annotations
+
+import math
+
+from .code import Code, Collision, Parameters, python_package_version
+
+MATERIALS = {
+    "opensees-hertzdamp": "Hertzdamp",
+    "opensees-jankowski-impact": "JankowskiImpact",
+    "opensees-impact-material": "ImpactMaterial",
+    "kelvin-voigt": "ViscoelasticGap",
+}
+# yield displacement over the indentation that ImpactMaterial is designed for
+YIELD_SHARE = 0.1
+TWO_MASSES = """\
+import openseespy.opensees as ops
+
+ops.model("basic", "-ndm", 1, "-ndf", 1)
+for tag, mass in ((1, {m1}), (2, {m2})):
+    ops.node(tag, 0.0)
+    ops.mass(tag, mass)
+gap = -{gap}
+{lines}
+# only now: the element subtracts the velocities that its nodes have when it is made
+ops.setNodeVel(1, 1, {v1}, "-commit")
+ops.setNodeVel(2, 1, {v2}, "-commit")
+ops.constraints("Plain")
+ops.numberer("Plain")
+ops.system("FullGeneral")
+ops.test("NormDispIncr", 1e-13 * {v0} * {dt} * {steps}, 50)
+ops.algorithm("Newton")
+ops.integrator("Newmark", 0.5, 0.25)
+ops.analysis("Transient")
+if ops.analyze({steps}, {dt}):
+    raise SystemExit("no convergence")
+v1, v2 = ops.nodeVel(1, 1), ops.nodeVel(2, 1)
+print("e_out =", (v2 - v1) / {v0})
+"""
+
+
+def parameters(collision: Collision) -> dict[str, float | str]:
+    """Arguments of the material, except for the gap."""
+    c = collision
+    match MATERIALS[c.model.key]:
+        case "Hertzdamp":
+            return {"Kh": c["K"], "xiNorm": 8.0 * (1.0 - c["e"]) / (5.0 * c["e"]), "n": 1.5}
+        case "JankowskiImpact":
+            e = c["e"]
+            xi = 9.0 * math.sqrt(5.0) / 2.0 * (1.0 - e**2) / (e * (e * (9.0 * math.pi - 16.0) + 16.0))
+            return {"Kh": c["K"], "xi": xi, "Meff": c["m"], "n": 1.5}
+        case "ImpactMaterial":
+            # of equal energy and loss as a spring of Hertz with the indentation d
+            secant, loss = c["K"] * math.sqrt(c["d"]), (1.0 - c["e"] ** 2) / 2.5
+            ratio = 1.0 / YIELD_SHARE
+            return {
+                "K1": secant * (1.0 + ratio * loss),
+                "K2": secant * (1.0 - ratio * loss / (ratio - 1.0)),
+                "delta_y": -YIELD_SHARE * c["d"],
+            }
+    return {"K": c["K"], "C": c["C"]}
+
+
+def lines(collision: Collision, parameters: Parameters) -> list[str]:
+    name = MATERIALS[collision.model.key]
+    before = [repr(value) for key, value in parameters.items() if key != "n"]
+    after = [repr(parameters["n"])] if "n" in parameters else []
+    arguments = ", ".join([*before, "gap", *after])
+    return [
+        f'ops.uniaxialMaterial("{name}", 1, {arguments})',
+        'ops.element("zeroLength", 1, 1, 2, "-mat", 1, "-dir", 1)',
+    ]
+
+
+def script(collision: Collision, parameters: Parameters) -> str:
+    text = "\n".join(lines(collision, parameters))
+    return TWO_MASSES.format(**collision.script_values(), gap=repr(collision.gap), lines=text)
+
+
+def notes(collision: Collision) -> list[str]:
+    said = [
+        "in SI; the order of the arguments is that of the element: "
+        f"{', '.join(name for name in parameters(collision) if name != 'n')}, gap"
+        + (", n" if "n" in parameters(collision) else ""),
+        "compression is negative: the gap, and delta_y, are numbers below 0; set the gap to yours",
+    ]
+    if collision.model.key == "opensees-jankowski-impact":
+        said.append("Meff is the effective mass m1 m2/(m1 + m2), not the sum")
+    if collision.model.key == "opensees-impact-material":
+        said.append("a bilinear spring for one indentation d only: another speed gives another restitution")
+    if collision.model.key == "kelvin-voigt":
+        said.append("the force pulls before the gap opens")
+    said.append("make the element before the nodes have velocities, which it would subtract")
+    return said
+
+
+CODE = Code(
+    name="opensees",
+    title="OpenSees",
+    laws={key: f'uniaxialMaterial "{name}"' for key, name in MATERIALS.items()},
+    damping={"kelvin-voigt": "C"},
+    newest="3.7.1.2",
+    tested="scripts were run in openseespy 3.7.1.2, Newmark with 0.5 and 0.25",
+    parameters=parameters,
+    lines=lines,
+    notes=notes,
+    script=script,
+    program="python",
+    install="pip install openseespy",
+    version_of=python_package_version("openseespy"),
+)

@@ -1,0 +1,120 @@
+"""Simbody, by the HuntCrossleyForce of OpenSim."""
+
+from __future__ import annotations
+
+from ..errors import UsageError
+from .code import Code, Collision, Parameters, python_package_version
+
+LAWS = {
+    "simbody-hunt-crossley": "HuntCrossleyForce, equal materials",
+    "simbody-hunt-crossley-mixed": "HuntCrossleyForce, two materials",
+}
+TWO_BALLS = '''\
+import opensim
+
+opensim.Logger.setLevelString("Error")
+# Python has no class for the parameters of one sphere
+with open("contact.xml", "w") as file:
+    file.write("""<?xml version="1.0" encoding="UTF-8" ?>
+<OpenSimDocument Version="40600">
+<HuntCrossleyForce name="contact">
+<HuntCrossleyForce::ContactParametersSet name="contact_parameters">
+<objects>
+{lines}
+</objects>
+</HuntCrossleyForce::ContactParametersSet>
+<transition_velocity>1</transition_velocity>
+</HuntCrossleyForce>
+</OpenSimDocument>
+""")
+contact = opensim.HuntCrossleyForce.safeDownCast(opensim.OpenSimObject.makeObjectFromFile("contact.xml"))
+model = opensim.Model()
+model.setGravity(opensim.Vec3(0))
+joints = []
+for name, mass, radius, x, speed in (
+    ("1", {m1}, {R1}, {x1}, {v1}),
+    ("2", {m2}, {R2}, {x2}, {v2}),
+):
+    body = opensim.Body("body" + name, mass, opensim.Vec3(0), opensim.Inertia(0.4 * mass * radius**2))
+    joint = opensim.SliderJoint("joint" + name, model.getGround(), body)
+    joint.updCoordinate().setDefaultValue(x)
+    joint.updCoordinate().setDefaultSpeedValue(speed)
+    sphere = opensim.ContactSphere(radius, opensim.Vec3(0), body, "sphere" + name)
+    model.addBody(body)
+    model.addJoint(joint)
+    model.addContactGeometry(sphere)
+    joints.append(joint)
+model.addForce(contact)
+state = model.initSystem()
+manager = opensim.Manager(model)
+manager.setIntegratorMethod(opensim.Manager.IntegratorMethod_RungeKutta3)
+manager.setIntegratorFixedStepSize({dt})
+manager.initialize(state)
+state = manager.integrate({steps} * {dt})
+v1, v2 = (joint.getCoordinate().getSpeedValue(state) for joint in joints)
+print("e_out =", (v2 - v1) / {v0})
+'''
+
+
+def parameters(collision: Collision) -> dict[str, float | str]:
+    """Stiffness and dissipation of each sphere; the stiffness is the modulus of plane strain."""
+    c = collision
+    if not c.has_materials:
+        raise UsageError("Simbody takes the moduli of both spheres: expected a material, not K")
+    mixed = c.model.key == "simbody-hunt-crossley-mixed"
+    return {
+        f"{name}{i}": value
+        for i in (1, 2)
+        for name, value in (
+            ("stiffness", c[f"E{i}"] / (1.0 - c[f"nu{i}"] ** 2)),
+            ("dissipation", c[f"c{i}"] if mixed else c["c"]),
+        )
+    }
+
+
+def lines(collision: Collision, parameters: Parameters) -> list[str]:
+    return [
+        line
+        for i in (1, 2)
+        for line in (
+            "<HuntCrossleyForce::ContactParameters>",
+            f"  <geometry>sphere{i}</geometry>",
+            f"  <stiffness>{parameters[f'stiffness{i}']!r}</stiffness>",
+            f"  <dissipation>{parameters[f'dissipation{i}']!r}</dissipation>",
+            "  <static_friction>0</static_friction>",
+            "  <dynamic_friction>0</dynamic_friction>",
+            "  <viscous_friction>0</viscous_friction>",
+            "</HuntCrossleyForce::ContactParameters>",
+        )
+    ]
+
+
+def script(collision: Collision, parameters: Parameters) -> str:
+    return TWO_BALLS.format(**collision.script_values(), lines="\n".join(lines(collision, parameters)))
+
+
+def notes(collision: Collision) -> list[str]:
+    return [
+        "in SI; stiffness is the modulus of plane strain E/(1 - nu^2) of a sphere, not E and not K",
+        "dissipation is c of F = K x^1.5 (1 + 1.5 c v), in s/m: the restitution depends on the speed",
+        "two materials: c = (c1 k2 + c2 k1)/(k1 + k2), where k1 and k2 are the stiffnesses to the power 2/3",
+        "the force is never negative",
+    ]
+
+
+CODE = Code(
+    name="simbody",
+    title="Simbody in OpenSim",
+    laws=LAWS,
+    damping={"simbody-hunt-crossley": "c", "simbody-hunt-crossley-mixed": "c1"},
+    newest="4.6",
+    tested="scripts were run in OpenSim 4.6, RungeKutta3 with a fixed step",
+    parameters=parameters,
+    lines=lines,
+    comment=("<!-- ", " -->"),
+    notes=notes,
+    script=script,
+    program="python",
+    install="pip install opensim",
+    version_of=python_package_version("opensim"),
+)
