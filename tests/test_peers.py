@@ -511,7 +511,7 @@ OF_A_SCHEME = [
     for entry in ENTRIES
     if not entry.slack
     and (
-        entry.code.name in ("LAMMPS", "LIGGGHTS", "YADE", "Drake")
+        entry.code.name in ("LAMMPS", "LIGGGHTS", "YADE", "Drake", "Kratos DEM")
         or (entry.code is MUJOCO and entry.variant == "Euler")
     )
 ]
