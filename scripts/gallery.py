@@ -28,11 +28,12 @@ plotted numbers.
 ```
 {pictures}
 """
-# the config of each result
+# the command and the config of each result
 RESULTS = {
-    "figure6": "configs/figure6.toml",
-    "timestep": "docs/timestep.toml",
-    "speeds": "docs/gallery/speeds.toml",
+    "figure6": ("sweep", "configs/figure6.toml"),
+    "timestep": ("sweep", "docs/timestep.toml"),
+    "speeds": ("sweep", "docs/gallery/speeds.toml"),
+    "drops": ("calibrate", "docs/calibrate/drops.toml"),
 }
 
 
@@ -100,13 +101,20 @@ ENTRIES = (
         "--sel e=0.5 --model lankarani-nikravesh-1990 --model gharib-hurmuzlu-2012",
         "The impulse-velocity diagram, Figure 2. All models follow the same lines and differ in the end point.",
     ),
+    Entry(
+        "calibration",
+        "drops",
+        "",
+        "Twelve measured restitutions and the laws that were fitted to them, the best one first, with their "
+        "residuals; [calibrate.md](calibrate.md).",
+    ),
 )
 
 
 def gallery_page() -> str:
     """docs/gallery.md as text."""
     return PAGE.format(
-        sweeps="\n".join(f"impact sweep {path} -o {name}.h5" for name, path in RESULTS.items()),
+        sweeps="\n".join(f"impact {command} {path} -o {name}.h5" for name, (command, path) in RESULTS.items()),
         pictures="\n".join(_sections()),
     )
 
@@ -130,8 +138,8 @@ def write_gallery(folder: Path) -> None:
     folder.mkdir(exist_ok=True)
     with TemporaryDirectory() as name:
         results = Path(name)
-        for result, path in RESULTS.items():
-            _run("sweep", str(ROOT / path), "-o", str(results / f"{result}.h5"), "--quiet")
+        for result, (command, path) in RESULTS.items():
+            _run(command, str(ROOT / path), "-o", str(results / f"{result}.h5"))
         numbers = {}
         for entry in ENTRIES:
             _, *arguments = entry.command
@@ -168,4 +176,9 @@ def summary(table: Path) -> dict[str, object]:
 
 
 def _run(*arguments: str) -> None:
-    subprocess.run([sys.executable, "-m", "impact", *arguments], check=True, stderr=subprocess.DEVNULL)
+    subprocess.run(
+        [sys.executable, "-m", "impact", *arguments],
+        check=True,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )

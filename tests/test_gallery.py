@@ -23,8 +23,8 @@ NUMBERS = FOLDER / "numbers.json"
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("gallery")
-    for name, path in gallery.RESULTS.items():
-        impact.save(impact.sweep(ROOT / path), folder / f"{name}.h5")
+    for name, (command, path) in gallery.RESULTS.items():
+        impact.save(getattr(impact, command)(ROOT / path), folder / f"{name}.h5")
     return folder
 
 

@@ -32,7 +32,7 @@ from .conftest import ROOT, Run
 from .fork_server import ForkServer
 
 # those of the result of an ordinary sweep
-CURVES = [kind for kind in KINDS if kind not in ("map", "validity", "timestep")]
+CURVES = [kind for kind in KINDS if kind not in ("map", "validity", "timestep", "calibration")]
 
 
 def selection_of(kind: str) -> dict[str, float]:

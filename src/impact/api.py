@@ -40,6 +40,7 @@ from .errors import UnfinishedError, UsageError, did_you_mean
 from .results.backend import check_output, open_result, write_file
 from .results.backend import load as load
 from .results.backend import save as save
+from .results.calibration import refuse_calibration
 from .results.extend import extend as extend_result
 from .results.plausibility import material_notes
 from .results.provenance import config_of_part, stored_config
@@ -901,6 +902,7 @@ def rerun(
     equal: 19 variables, 5,353 values, none differs
     """
     stored = load(result)
+    refuse_calibration(stored, "rerun")
     plugin_set = read_plugins(plugins)
     # models by key, because "all" may include new models; the tolerances that were used
     keys = stored["model"].values.tolist() if "model" in stored.dims else []
@@ -1212,6 +1214,7 @@ def recommend(
     >>> print(impact.recommend(result, models=["gharib-hurmuzlu-2012"]).headline)
     no model gives e within 0.01 everywhere; gharib-hurmuzlu-2012 is nearest: 25.7% of 101 points
     """
+    refuse_calibration(dataset, "recommend")
     return ranking(dataset, tol, sel, models)
 
 

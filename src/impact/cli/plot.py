@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..errors import UsageError
-from ..plots.kinds import KINDS, WIDTHS
+from ..plots.kinds import DEFAULT_KIND, KINDS, WIDTHS
 from ..text import safe_text
 from . import exits
 from .console import dump
@@ -17,8 +17,6 @@ from .options import JsonOption, ModelOption, OverwriteOption, PluginOption, Sel
 
 if TYPE_CHECKING:
     from ..plots.kinds import PlotData
-
-DEFAULT_KINDS = ("final-velocities",)
 
 
 def plot(
@@ -38,7 +36,7 @@ def plot(
             "--kind",
             "-k",
             metavar="KIND",
-            help=f"{', '.join(KINDS)}; may be repeated. \\[default: {DEFAULT_KINDS[0]}]",
+            help=f"{', '.join(KINDS)}; may be repeated. \\[default: {DEFAULT_KIND}, of a calibration calibration]",
         ),
     ] = None,
     x: Annotated[
@@ -114,7 +112,7 @@ def plot(
     files = api.plot_to_files(
         result,
         output,
-        kinds=kind or DEFAULT_KINDS,
+        kinds=kind or (DEFAULT_KIND,),
         x=x,
         y=y,
         variable=variable,

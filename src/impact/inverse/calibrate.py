@@ -304,7 +304,7 @@ def best_config(calibration: Calibration) -> str:
         tables[f"materials.{toml_key(name)}"] = known
     for name, value in values.items():
         table, _, parameter = name.rpartition(".")
-        if is_foreign([name], key):
+        if is_foreign([name], key) or (name in config.fits and name not in calibration.names[key]):
             continue
         place = "sweep" if not table else table if table.startswith("materials.") else f"model.{table}"
         if isinstance(value, list) and len(value) == 1:

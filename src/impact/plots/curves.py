@@ -102,6 +102,7 @@ class Panel:
     marks : named points
     x_name, y_name : name of each axis in a result or a time history
     joined : whether lines join the points
+    band_name : what the bands around curves are, for the legend
     """
 
     x_label: str
@@ -116,16 +117,22 @@ class Panel:
     x_name: str = ""
     y_name: str = ""
     joined: bool = True
+    band_name: str = ""
 
 
 @dataclass(frozen=True)
 class CurveData:
-    """The data of a picture of curves: title, conditions, panels one below the other, and what is not drawn."""
+    """The data of a picture of curves.
+
+    It has a title, conditions, panels one below the other, what is not drawn, and measured points of each panel,
+    if the result has them itself.
+    """
 
     title: str
     conditions: str
     panels: tuple[Panel, ...]
     not_drawn: tuple[str, ...] = ()
+    measured: tuple[Points, ...] = ()
 
     columns = ("x_axis", "y_axis", "curve", "model", "x", "y")
 
@@ -266,7 +273,8 @@ def timestep_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
                 at_end = f"e = {number_label(of_case['e'].item())}" if of_case["e"].ndim == 0 else ""
                 guide = _curve("Requested", None, line, of_case["e"], "e")
                 references.append(replace(guide, case=at_end, is_guide=True))
-    panel = Panel("", "Delivered restitution", (*_without_empty(references), *curves), y_name="e_out")
+    shown = (*_without_empty(references), *curves)
+    panel = Panel("", "Delivered restitution", shown, y_name="e_out", band_name=BAND_NAME)
     title = f"Restitution at fixed steps, {safe_text(str(dataset.attrs.get('integrator', '')), 40)}"
     plot_data = _curve_data(dataset, line, title, [panel], choice)
     panels = (replace(panel, x_log=panel.x_log or line.x in STEP_AXES) for panel in plot_data.panels)
@@ -366,6 +374,7 @@ def draw_curves(
     styles = model_styles([model for model in models if model])
     entries: dict[str, Artist] = {}
     band: dict[str, Artist] = {}
+    stored = {panel: own for panel, own in zip(plot_data.panels, plot_data.measured, strict=False) if own.columns}
     for axes, panel in zip(all_axes, plot_data.panels, strict=True):
         _draw_bands(axes, panel)
         axes.set(xscale="log" if panel.x_log else "linear", yscale="log" if panel.y_log else "linear")
@@ -376,8 +385,9 @@ def draw_curves(
             (line,) = axes.plot(curve.x, curve.y, label=f"_{name}", **_line_style(curve, panel, styles))
             entries.setdefault(name, line)
             if curve.least:
-                band[BAND_NAME] = _draw_band(axes, curve, line)
+                band[panel.band_name] = _draw_band(axes, curve, line)
         entries |= points.draw(axes, panel) if points else {}
+        entries |= stored[panel].draw(axes, panel) if panel in stored else {}
         # the names of marks need room at the ends of the axes
         axes.margins(x=0.06 if panel.marks else 0.02, y=0.12 if panel.marks else None)
         axes.autoscale_view()

@@ -35,7 +35,10 @@ KINDS = {
     "loop": "force over indentation",
     "history": "indentation, its rate and the force over time",
     "impulse": "velocities over the impulse",
+    "calibration": "measured values, the laws that fit them with their bands, and residuals",
 }
+# of a calibration it is "calibration"
+DEFAULT_KIND = "final-velocities"
 # kinds that show the motion at one point, which --sel selects
 MOTION_KINDS = ("loop", "history", "impulse")
 # width of one and of two columns of a journal [in]
@@ -88,8 +91,14 @@ def plot_data_of(
     UsageError : there is no such kind, or the result does not contain what it needs
     """
     check_kind(kind)
-    from . import curves, maps
+    from ..results.calibration import is_calibration
+    from . import calibrations, curves, maps
     from .motions import MOTIONS
+
+    if is_calibration(dataset):
+        if kind not in (DEFAULT_KIND, "calibration"):
+            raise UsageError(f"this is a calibration, which has the kind calibration, not {kind}")
+        kind = "calibration"
 
     if kind in MOTIONS:
         return MOTIONS[kind](histories(), equations=choice.equations)
@@ -100,6 +109,7 @@ def plot_data_of(
         "timestep": curves.timestep_curves,
         "map": maps.field_map,
         "validity": maps.validity_map,
+        "calibration": calibrations.calibration_curves,
     }
     return functions[kind](dataset, choice)
 

@@ -18,6 +18,7 @@ from ..formatting import label
 from ..plots.curves import MAX_RESTITUTIONS, STEP_AXES
 from ..plots.kinds import WIDTHS, Choice, draw
 from ..plots.style import encoded
+from ..results.calibration import is_calibration
 from ..results.schema import columns_along, is_input, plain_unit
 from ..results.selection import model_positions
 from ..results.slabs import distinct_points, is_computed, slabs
@@ -35,6 +36,7 @@ FIGURES = {
     "timestep": "Restitution at fixed steps: mean, least and largest over the phase.",
     "map": "Error of the restitution over two axes, a panel for each model.",
     "validity": "Model with the smallest error, and that error.",
+    "calibration": "Measured values, the laws that fit them with their bands of 95 %, and residuals.",
     "loop": "Force over indentation at one point: the area of a loop is the energy loss.",
 }
 MAP_KINDS = ("map", "validity")
@@ -115,6 +117,9 @@ def iterate_choices(dataset: xr.Dataset, keys: Sequence[str]) -> Iterator[tuple[
     -------
     (kind, Choice, position) : of each figure; the position has an index for each axis that is not drawn
     """
+    if is_calibration(dataset):
+        yield "calibration", Choice(), {}
+        return
     along = {name: dataset[name] for name in varying(dataset) if dataset[name].ndim == 1}
     along = {
         name: coordinate
@@ -128,7 +133,7 @@ def iterate_choices(dataset: xr.Dataset, keys: Sequence[str]) -> Iterator[tuple[
     few_e = ("e",) if "e" in along and along["e"].size <= MAX_RESTITUTIONS else ()
     steps = next((name for name in STEP_AXES if name in along), None)
     for kind in FIGURES:
-        if kind in MAP_KINDS and not y:
+        if kind == "calibration" or (kind in MAP_KINDS and not y):
             continue
         if (kind == "timestep" and not steps) or (kind == "loop" and "integrator" in dataset.attrs):
             continue

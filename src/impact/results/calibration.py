@@ -15,6 +15,7 @@ from ..config.load import Config
 from ..contact.model import ForceModel
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins
+from ..errors import UsageError
 from .schema import SCHEMA, coordinate_attributes, plan_coordinates, provenance_attributes
 
 # what became of a fit; its number is its position
@@ -51,6 +52,17 @@ CALIBRATION_VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
 # coordinates besides those of models and inputs; those that are text
 CALIBRATION_TEXTS = frozenset({"parameter", "other_parameter", "output_name", "output", "determined"})
 CALIBRATION_COORDINATES = CALIBRATION_TEXTS | {"point", "grid", "measured", "sigma", "line"}
+
+
+def is_calibration(dataset: xr.Dataset) -> bool:
+    """Whether a dataset is the result of a calibration."""
+    return "parameter" in dataset.dims
+
+
+def refuse_calibration(dataset: xr.Dataset, command: str) -> None:
+    """Raise a UsageError where a command takes the result of a sweep, and got that of a calibration."""
+    if is_calibration(dataset):
+        raise UsageError(f"{command}: this is a calibration, expected the result of a sweep")
 
 
 def calibration_template(

@@ -1,0 +1,91 @@
+"""The picture and the report of a calibration, and the commands that take no calibration."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import impact
+from impact.errors import UsageError
+
+from .conftest import ROOT, Run
+
+FOLDER = ROOT / "docs" / "calibrate"
+QUICK = ("solver.rtol=1e-6",)
+
+
+@pytest.fixture(scope="module")
+def drops() -> xr.Dataset:
+    models = 'models=["kuwabara-kono-1987", "hunt-crossley-1975"]'
+    return impact.calibrate(FOLDER / "drops.toml", overrides=[models, *QUICK])
+
+
+def test_the_picture_has_measured_values_curves_bands_and_residuals(drops: xr.Dataset) -> None:
+    figure = impact.plot(drops)
+    values, residuals = figure.axes
+    assert values.get_ylabel().startswith("Delivered restitution")
+    assert residuals.get_ylabel() == "Residual in standard deviations"
+    (bars,) = values.containers
+    np.testing.assert_array_equal(bars.lines[0].get_xdata(), drops["v1"])
+    np.testing.assert_array_equal(bars.lines[0].get_ydata(), drops["measured"])
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert any("weight 1.000" in name for name in names)
+    assert any("at bound" in name for name in names)
+    assert {"Measured", "Band of 95 %"} <= set(names)
+    drawn = residuals.lines[0]
+    expected = drops.isel(model=0)["residual"] / drops["sigma"]
+    np.testing.assert_allclose(drawn.get_ydata(), expected)
+
+
+def test_without_a_varied_input_the_values_are_over_their_number() -> None:
+    fit = impact.calibrate(FOLDER / "hdpe.toml", overrides=['models=["anagnostopoulos-1988"]', *QUICK])
+    values, residuals = impact.plot(fit).axes
+    assert residuals.get_xlabel() == "Number of the measured value"
+    assert values.containers[0].lines[0].get_xdata().tolist() == list(range(1, 51))
+
+
+def test_models_chooses_the_laws(drops: xr.Dataset) -> None:
+    figure = impact.plot(drops, models=["hunt-crossley-1975"])
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert not any("Kuwabara" in name for name in names)
+    with pytest.raises(UsageError, match="did you mean"):
+        impact.plot(drops, models=["hunt-crossley"])
+
+
+@pytest.mark.parametrize("kind", ["error", "map", "loop"])
+def test_a_calibration_has_one_kind_of_picture(drops: xr.Dataset, kind: str) -> None:
+    with pytest.raises(UsageError, match="has the kind calibration"):
+        impact.plot(drops, kind=kind)
+    with pytest.raises(UsageError, match="impact calibrate writes those"):
+        impact.plot(
+            impact.sweep(ROOT / "configs" / "figure6.toml", overrides=["sweep.e=[0.5]"]), kind="calibration"
+        )
+
+
+def test_a_report_shows_the_picture(drops: xr.Dataset) -> None:
+    page = impact.report(drops)
+    assert "Measured values, the laws that fit them" in page
+    assert page.count("<img") == 1
+
+
+def test_commands_that_take_a_sweep_refuse_a_calibration_in_one_line(
+    cli: Run, drops: xr.Dataset, tmp_path: Path
+) -> None:
+    impact.save(drops, tmp_path / "fit.h5")
+    for words in (
+        ("recommend", "fit.h5"),
+        ("rerun", "fit.h5"),
+        ("extend", "fit.h5", "--set", "sweep.m1=1"),
+        ("run", "fit.h5"),
+    ):
+        done = cli(*words, cwd=tmp_path)
+        assert (done.returncode, done.stderr.count("\n")) == (2, 1), (words, done.stderr)
+        assert "this is a calibration, expected the result of a sweep" in done.stderr
+    shown = cli("info", "fit.h5", cwd=tmp_path)
+    # two laws at twelve points
+    assert re.search(r"^points +24 *$", shown.stdout, re.MULTILINE)
+    assert cli("plot", "fit.h5", cwd=tmp_path).returncode == 0
