@@ -10,9 +10,9 @@ import pytest
 from scipy.optimize import brentq
 
 import impact
-from impact.contact.models import find
+from impact.contact.models import catalogue, find
 from impact.contact.status import Status
-from impact.contact.timestep import collide_at_fixed_step
+from impact.contact.timestep import LAWS_OF_SCHEME, collide_at_fixed_step, default_scheme, has_scheme
 from impact.errors import ConfigError, UsageError
 
 from .conftest import Run
@@ -83,6 +83,49 @@ def test_the_error_of_the_mean_is_of_first_order(model: str, at: dict[str, float
     errors = [result.e_continuous - row.e_mean for row in result.rows]
     assert 0.0 < errors[1] < 0.02
     assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.03)
+
+
+@pytest.mark.parametrize("scheme", LAWS_OF_SCHEME)
+def test_small_steps_give_the_continuous_law_for_every_law_that_a_scheme_takes(scheme: str) -> None:
+    keys = [
+        key
+        for key, law in catalogue().items()
+        if has_scheme(law, law.exponent or 1.0, scheme)
+        and all(parameter.default is not None for parameter in law.parameters)
+    ]
+    materials = {"ball": {"E": 1e9, "nu": 0.3, "rho": 1000.0}}
+    sweep = BALLS | {"e": 0.8, "material": "ball"}
+    config: dict[str, object] = {"models": keys, "sweep": sweep, "materials": materials}
+    if scheme == "drake-tamsi":
+        config["model"] = {POINT: {"d": 0.3}, f"{POINT}-mixed": {"d1": 0.3, "d2": 0.1}}
+    exact = impact.sweep(config)["e_out"]
+    fixed = {"steps_per_contact": 2000}
+    fine = impact.sweep(config | {"sweep": sweep | fixed, "solver": {"integrator": scheme}})["e_out"]
+    assert len(keys) > 8
+    np.testing.assert_allclose(fine, exact, atol=5e-3)
+
+
+def test_an_unloading_branch_is_not_taken_by_a_scheme_of_drake() -> None:
+    laws = [law for law in catalogue().values() if law.unloading is not None]
+    assert any(law.velocity_coordinate == "log" for law in laws)
+    assert not any(has_scheme(law, 1.0, scheme) for law in laws for scheme in LAWS_OF_SCHEME)
+
+
+@pytest.mark.parametrize(
+    ("scheme", "model", "parameter"), [("drake-tamsi", POINT, "d"), ("drake-sap", LINEAR, "C")]
+)
+def test_a_collision_without_end_or_without_numbers_has_a_status(scheme: str, model: str, parameter: str) -> None:
+    damping, step = np.array([1.0, 1.0, np.nan]), np.array([1e-4, 0.1, 0.1])
+    limits = np.array([100, 1000, 1000])
+    result = collide_at_fixed_step(find(model), 1.0, {parameter: damping}, step, np.full(3, 0.5), limits, scheme)
+    assert result.status.tolist() == [Status.NOT_SEPARATED, Status.OK, Status.NOT_FINITE]
+    assert np.isfinite(result.e_out).tolist() == [False, True, False]
+
+
+def test_only_laws_of_drake_have_a_scheme_of_drake_by_default() -> None:
+    schemes = {key: default_scheme(model) for key, model in catalogue().items()}
+    assert {key for key, scheme in schemes.items() if scheme == "drake-tamsi"} == {POINT, f"{POINT}-mixed"}
+    assert set(schemes.values()) == {"kick-drift", "drake-tamsi"}
 
 
 def test_a_sweep_has_the_schemes_of_drake() -> None:

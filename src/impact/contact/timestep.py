@@ -34,8 +34,8 @@ SCHEMES = {
 }
 # the laws of the schemes that take only some
 LAWS_OF_SCHEME = {
-    DRAKE_TAMSI: "F = K δ (1 + χ δ̇/v₀), n = 1, such as drake-point-contact",
-    DRAKE_SAP: "F = K δ + C δ̇ to F = 0, such as kelvin-voigt-no-tension",
+    DRAKE_TAMSI: "F = K δ (1 + χ δ̇/v₀), n = 1, in both phases, such as drake-point-contact",
+    DRAKE_SAP: "F = K δ + C δ̇ to F = 0, in both phases, such as kelvin-voigt-no-tension",
 }
 # a contact that takes more steps, in units of its steps at the continuous contact time, never ends
 MAX_CONTACTS = 50
@@ -52,7 +52,8 @@ COMPACTION_SHARE = 0.25
 
 def default_scheme(model: ForceModel) -> str:
     """The scheme of the codes that a law is of: "drake-tamsi" for Drake's, else "kick-drift"."""
-    return DRAKE_TAMSI if model.key.startswith("drake-") else KICK_DRIFT
+    is_of_drake = model.family == "codes" and model.key.startswith("drake-")
+    return DRAKE_TAMSI if is_of_drake else KICK_DRIFT
 
 
 def has_scheme(model: ForceModel, n: float, scheme: str) -> bool:
@@ -68,12 +69,15 @@ def has_scheme(model: ForceModel, n: float, scheme: str) -> bool:
     >>> [has_scheme(find(key), 1.0, "drake-sap") for key in ("kelvin-voigt-no-tension", "kelvin-voigt")]
     [True, False]
     """
+    if scheme not in LAWS_OF_SCHEME:
+        return True
+    # the form that a law declares by its velocity coordinate is that of `force` alone
+    if n != 1.0 or model.unloading is not None:
+        return False
     if scheme == DRAKE_TAMSI:
-        return n == 1.0 and model.velocity_coordinate == "log"
-    if scheme == DRAKE_SAP:
-        is_force = n == 1.0 and model.velocity_coordinate == "force" and model.release == "force"
-        return is_force and force_form(model, n).drag == 0.0
-    return True
+        return model.velocity_coordinate == "log"
+    is_force = model.velocity_coordinate == "force" and model.release == "force"
+    return is_force and force_form(model, n).drag == 0.0
 
 
 def law_problem(model: ForceModel, scheme: str) -> str:
@@ -255,10 +259,11 @@ class _Contacts:
             chi = self.params[names.index("chi")]
             half = 0.5 * (1.0 + h * (h + chi * x))
             implicit = (u - h * x) / (half + np.sqrt(half * half + h * h * chi * (u - h * x)))
-            return np.where((x + h * u > 0.0) & (1.0 + chi * u > 0.0), implicit, u)
+            # in this order, so that a NaN is not taken for a contact without force
+            return np.where((x + h * u <= 0.0) | (1.0 + chi * u <= 0.0), u, implicit)
         if self.scheme == DRAKE_SAP:
             reach = h + self.params[names.index("c")]
-            return np.where(x + reach * u > 0.0, (u - h * x) / (1.0 + h * reach), u)
+            return np.where(x + reach * u <= 0.0, u, (u - h * x) / (1.0 + h * reach))
         return u - h * force
 
     def _add_work(self, force: Array, moved: Array) -> None:
