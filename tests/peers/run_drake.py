@@ -27,7 +27,7 @@ APPROXIMATIONS = {
 
 def collide(
     scheme: str, k: list[float], d: list[float], m1: float, m2: float, R1: float, R2: float, v1: float, v2: float,
-    gap: float, step: float, count: int, tau: float = 0.0,
+    gap: float, step: float, count: int, tau: tuple[float, float] = (0.0, 0.0),
 ) -> tuple[float, float]:  # fmt: skip
     discrete = scheme in APPROXIMATIONS
     builder = DiagramBuilder()
@@ -46,8 +46,7 @@ def collide(
         AddContactMaterial(
             dissipation=d[i], point_stiffness=k[i], friction=CoulombFriction(0, 0), properties=properties
         )
-        # that of the pair is the sum
-        properties.AddProperty("material", "relaxation_time", tau / 2)
+        properties.AddProperty("material", "relaxation_time", tau[i])
         plant.RegisterCollisionGeometry(body, RigidTransform(), Sphere(radius), f"sphere{i}", properties)
     plant.Finalize()
     diagram = builder.Build()

@@ -148,6 +148,13 @@ def complete_code(incomplete: str) -> list[str]:
     return [name for name in CODES if name.startswith(incomplete)]
 
 
+def complete_scheme(incomplete: str) -> list[str]:
+    """The schemes with a fixed step whose names begin with a word."""
+    from ..contact.timestep import SCHEMES
+
+    return [name for name in SCHEMES if name.startswith(incomplete)]
+
+
 def complete_family(incomplete: str) -> list[str]:
     """The families of models that begin with a word."""
     from ..contact.models import FAMILIES

@@ -11,10 +11,7 @@ import typer
 from ..formatting import decimals, number, quantity
 from .console import cell, console, dump, table
 from .options import AtOption, JsonOption, ModelKeyOption, PluginOption, SetOption, SourceArgument
-from .params import (
-    parse_number,
-    parse_whole_number,
-)
+from .params import complete_scheme, parse_number, parse_whole_number
 
 if TYPE_CHECKING:
     from ..inverse.timestep import TimestepResult
@@ -62,15 +59,16 @@ def timestep(
         typer.Option(
             "--scheme",
             metavar="NAME",
-            help="kick-drift, drake-tamsi or drake-sap. "
+            help="How a step is computed: kick-drift, drake-tamsi (also LAGGED and SIMILAR) or drake-sap. "
             "\\[default: drake-tamsi for laws of Drake, else kick-drift]",
+            autocompletion=complete_scheme,
         ),
     ] = None,
     sets: SetOption = None,
     plugins: PluginOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Show which restitution an explicit code delivers at a fixed time step, and which e to ask it for.
+    """Show which restitution a code delivers at a fixed time step, and which e to ask it for.
 
     The restitution depends on the phase, the part of a step in which the contact begins.
 
@@ -118,6 +116,7 @@ def _print_table(result: TimestepResult, tol: float | None) -> None:
         cell(f"{result.model}: {asked}e_out = {number(result.e_continuous)} in a contact time of {contact}"),
         soft_wrap=True,
     )
+    out.print(cell(f"scheme: {result.scheme}"), soft_wrap=True)
     out.print()
     rows = table("steps per contact", "dt [s]", "e mean", "e least", "e largest", "e to ask")
     rows.columns[0].justify = "right"
