@@ -170,6 +170,7 @@ CHRONO: tuple[tuple[str, tuple[str, ...], dict[str, float], dict[str, float]], .
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("key", "materials", "inputs", "at"), CHRONO)
 def test_the_lines_of_chrono_give_the_law(
     key: str, materials: Sequence[str], inputs: Mapping[str, float], at: Mapping[str, float]
@@ -258,6 +259,7 @@ MERCURYDPM: tuple[tuple[str, tuple[str, ...], dict[str, float], dict[str, float]
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("key", "materials", "inputs", "at"), MERCURYDPM)
 def test_the_lines_of_mercurydpm_give_the_law(
     key: str, materials: Sequence[str], inputs: Mapping[str, float], at: Mapping[str, float]
@@ -292,6 +294,7 @@ def modelica_force(lines: Sequence[str]) -> Force:
     return force
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", [1.0, 1.5])
 def test_the_lines_of_modelica_give_the_law(n: float) -> None:
     export = same_law("modelica", None, modelica_force, config(K=1e8, n=n), {"e": 0.6})
@@ -318,6 +321,7 @@ def adams_force(lines: Sequence[str]) -> Force:
     return force
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("n", "d"), [(1.5, 1e-5), (2.2, 1e-4)])
 def test_the_lines_of_adams_give_the_law_in_millimetres(n: float, d: float) -> None:
     """The mass is then in N s²/mm."""
@@ -347,6 +351,7 @@ def simscape_force(lines: Sequence[str]) -> Force:
     return force
 
 
+@pytest.mark.slow
 def test_the_lines_of_simscape_give_the_law() -> None:
     at = {"e": 0.6, "simscape-contact.w": 2e-5}
     export = same_law("simscape", None, simscape_force, config(K=1e7, n=1), at)

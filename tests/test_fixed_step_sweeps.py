@@ -144,6 +144,7 @@ def test_only_distinct_problems_are_integrated(tmp_path: Path, cli: Run) -> None
     assert "e, steps_per_contact, phase" in dry.stdout
 
 
+@pytest.mark.slow
 def test_shards_extend_and_the_factored_layout_give_the_same_file(tmp_path: Path, cli: Run) -> None:
     (tmp_path / "c.toml").write_text(TOML, encoding="utf-8")
 
@@ -167,6 +168,7 @@ def test_shards_extend_and_the_factored_layout_give_the_same_file(tmp_path: Path
     run("rerun", "whole.h5")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="needs SIGKILL")
 def test_a_killed_sweep_is_resumed_byte_for_byte(tmp_path: Path, cli: Run) -> None:
     phases = "sweep.phase={ arange = [0.00001, 1, 0.000015] }"
