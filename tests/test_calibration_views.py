@@ -68,6 +68,9 @@ def test_a_calibration_has_one_kind_of_picture(drops: xr.Dataset, kind: str) -> 
 
 def test_a_report_shows_the_picture(drops: xr.Dataset) -> None:
     page = impact.report(drops)
+    assert "2 laws, 12 measured values, noise given" in page
+    assert "Failed points" not in page
+    assert "at_bound" in page
     assert "Measured values, the laws that fit them" in page
     assert page.count("<img") == 1
 

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..formatting import decimals, number
 from ..text import safe_text
 from . import exits
 from .console import cell, console, dump, table
@@ -53,6 +52,8 @@ def calibrate(
 
 def calibration_json(result: xr.Dataset) -> dict[str, Any]:
     """A calibration as plain data, the best law first; parameters by config path."""
+    from ..results.calibration import fit_status
+
     models, paths = [], json.loads(result.attrs["fit_paths"])
     for rank, key in enumerate(map(str, result["model"].values), 1):
         law = result.sel(model=key)
@@ -70,7 +71,7 @@ def calibration_json(result: xr.Dataset) -> dict[str, Any]:
             {
                 "model": key,
                 "rank": rank,
-                "status": _status(law),
+                "status": fit_status(law),
                 "parameters": parameters,
                 "determined": [group for group in str(law["determined"].item()).split("; ") if group],
                 **{name: float(law[name]) for name in ("chi2_reduced", "excess", "aicc", "weight", "loo")},
@@ -79,57 +80,17 @@ def calibration_json(result: xr.Dataset) -> dict[str, Any]:
     return {"models": models}
 
 
-def _status(law: xr.Dataset) -> str:
-    words = str(law["fit_status"].attrs["flag_meanings"]).split()
-    return words[int(law["fit_status"])]
-
-
 def _print_fits(result: xr.Dataset) -> None:
-    """Print a row for each law and parameter, the best law first."""
+    """Print a row for each law and parameter, the best law first, and what the data do not determine."""
+    from ..results.calibration import FIT_HEADINGS, describe_data, fit_rows, unidentified_notes
+
     out = console(sys.stdout)
-    points, noise = result.sizes["point"], result.attrs["noise"]
-    out.print(cell(f"{points} measured values, noise {noise}; the best law first"), soft_wrap=True)
+    out.print(cell(describe_data(result)), soft_wrap=True)
     out.print()
-    rows = table("law", "parameter", "estimate", "95 %", "chi2/dof", "AICc", "weight", "loo", "status")
-    rows.columns[1].justify = rows.columns[8].justify = "left"
-    notes = []
-    for key in map(str, result["model"].values):
-        law = result.sel(model=key)
-        status = _status(law)
-        quality = (
-            number(float(law["chi2_reduced"]), 3),
-            decimals(float(law["aicc"]), 1),
-            decimals(float(law["weight"]), 3),
-            number(float(law["loo"]), 3),
-            status,
-        )
-        parameters = [str(name) for name in law["parameter"].values[law["identifiable"].values >= 0]]
-        for position, name in enumerate(parameters or [""]):
-            first = position == 0
-            of_name = law.sel(parameter=name) if name else None
-            rows.add_row(
-                key if first else "",
-                cell(name.removeprefix(f"{key}.")),
-                *_estimate(of_name),
-                *(quality if first else ("",) * len(quality)),
-            )
-        unidentified = [name for name in parameters if int(law["identifiable"].sel(parameter=name)) == 0]
-        if unidentified:
-            groups = str(law["determined"].item())
-            short = ", ".join(name.removeprefix(f"{key}.") for name in unidentified)
-            only = f"only {groups} is determined" if groups else "the data do not determine them"
-            notes.append(f"{key}: {short}: {only}")
+    rows = table(*FIT_HEADINGS)
+    rows.columns[1].justify = rows.columns[-1].justify = "left"
+    for row in fit_rows(result):
+        rows.add_row(*map(cell, row))
     out.print(rows)
-    for note in notes:
+    for note in unidentified_notes(result):
         out.print(cell(note), soft_wrap=True)
-
-
-def _estimate(of_name: xr.Dataset | None) -> tuple[str, str]:
-    """An estimate and its interval as text."""
-    if of_name is None:
-        return "", ""
-    if not int(of_name["identifiable"]):
-        return number(float(of_name["estimate"]), 5), "not identified"
-    lower, upper = float(of_name["lower"]), float(of_name["upper"])
-    interval = "–" if lower != lower else f"{number(lower, 5)} to {number(upper, 5)}"
-    return number(float(of_name["estimate"]), 5), interval

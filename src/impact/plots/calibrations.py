@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..array_types import Array
-from ..config.tables import DEFAULT_TITLE
 from ..errors import UsageError, did_you_mean
 from ..formatting import decimals
-from ..results.calibration import is_calibration
+from ..results.calibration import calibration_title, fit_status, is_calibration
 from ..results.schema import SCHEMA, plain_unit
 from ..text import safe_text
 from .curves import Curve, CurveData, Panel, model_label
@@ -60,7 +59,7 @@ def calibration_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
         for panel, measured in _panels(of_output, name, varied, choice):
             panels.append(panel)
             points.append(measured)
-    title = safe_text(str(dataset.attrs.get("title", "")), 140).replace(DEFAULT_TITLE, "")
+    title = safe_text(calibration_title(dataset), 140)
     conditions = conditions_of(data.drop_vars(["grid", varied], errors="ignore").isel(point=0, model=[0]), "grid")
     return CurveData(
         "Calibration", ": ".join(filter(None, (title, conditions))), tuple(panels), not_drawn, tuple(points)
@@ -75,10 +74,9 @@ def _panels(data: xr.Dataset, name: str, varied: str, choice: Choice) -> list[tu
     grid = np.asarray(data["grid"].values, float) if varied else x
     output = next(variable for variable in SCHEMA if variable.name == name)
     curves, residuals = [], []
-    words = str(data["fit_status"].attrs["flag_meanings"]).split()
     for index, key in enumerate(map(str, data["model"].values)):
         law = data.isel(model=index)
-        status = words[int(law["fit_status"])]
+        status = fit_status(law)
         remark = f"weight {decimals(float(law['weight']), 3)}" if status == "ok" else status.replace("_", " ")
         label = f"{model_label(law, numbered=choice.equations)}, {remark}"
         if varied:

@@ -23,6 +23,15 @@ from ..errors import UsageError
 from ..formatting import label, number
 from ..plots.kinds import Choice
 from ..results.attributes import read_attribute
+from ..results.calibration import (
+    FIT_HEADINGS,
+    FIT_STATUSES,
+    calibration_title,
+    describe_data,
+    fit_rows,
+    is_calibration,
+    unidentified_notes,
+)
 from ..results.plausibility import material_notes, result_notes
 from ..results.ranking import Ranking, ranking
 from ..results.schema import count_points, exponents_of, is_input
@@ -58,7 +67,8 @@ def page(dataset: xr.Dataset, get_plot_data: Callable[[str, Choice], PlotData]) 
     if "model" not in dataset.dims:
         raise UsageError("got a time history, expected the result of a sweep")
     summary = summarize(dataset, MAX_FAILED)
-    ranked, headline = _rank_models(dataset)
+    fits = _fits_section(dataset) if is_calibration(dataset) else None
+    ranked, headline = (None, "") if fits else _rank_models(dataset)
     keys = [str(key) for key in dataset["model"].values]
     selection = ""
     if len(keys) > MAX_FIGURE_MODELS:
@@ -70,8 +80,9 @@ def page(dataset: xr.Dataset, get_plot_data: Callable[[str, Choice], PlotData]) 
     moduli = {str(name): dataset[name].values.tolist() for name in dataset.coords if str(name).endswith(".E")}
     lines = str(dataset.attrs.get("config", "")).replace("\r\n", "\n").expandtabs(4).split("\n")
     return _template().render(
-        title=str(dataset.attrs.get("title", "")) or "Impact of two balls",
-        summary=_summary_sentence(dataset),
+        title=_title(dataset),
+        summary=f"{describe_data(dataset)}." if fits else _summary_sentence(dataset),
+        fits=fits,
         notes=[*material_notes(read_attribute(dataset.attrs, "materials"), moduli), *result_notes(summary)],
         outcomes=list(_outcomes(summary)),
         axes=[(name, *_meaning_and_unit(dataset[name]), *_range(dataset[name])) for name in varying(dataset)],
@@ -88,6 +99,22 @@ def page(dataset: xr.Dataset, get_plot_data: Callable[[str, Choice], PlotData]) 
         config=Markup("\n").join(safe_text(line, MAX_LINE_LETTERS) for line in lines),
         changes=read_attribute(dataset.attrs, "config_set"),
     )
+
+
+def _title(dataset: xr.Dataset) -> str:
+    if is_calibration(dataset):
+        return calibration_title(dataset) or "Calibration"
+    return str(dataset.attrs.get("title", "")) or "Impact of two balls"
+
+
+def _fits_section(dataset: xr.Dataset) -> dict[str, Any]:
+    """The ranking of a calibration, what the data do not determine, and what its columns mean."""
+    return {
+        "headings": list(FIT_HEADINGS),
+        "rows": [[row[0] or "″", *row[1:]] for row in fit_rows(dataset)],
+        "notes": unidentified_notes(dataset),
+        "statuses": [f"{name}: {meaning}" for name, meaning in FIT_STATUSES.items() if name != "ok"],
+    }
 
 
 def _template() -> Template:

@@ -12,10 +12,12 @@ import xarray as xr
 from ..array_types import Array
 from ..config.grid import path_of
 from ..config.load import Config
+from ..config.tables import DEFAULT_TITLE
 from ..contact.model import ForceModel
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins
 from ..errors import UsageError
+from ..formatting import decimals, number
 from .schema import SCHEMA, coordinate_attributes, plan_coordinates, provenance_attributes
 
 # what became of a fit; its number is its position
@@ -63,6 +65,70 @@ def refuse_calibration(dataset: xr.Dataset, command: str) -> None:
     """Raise a UsageError where a command takes the result of a sweep, and got that of a calibration."""
     if is_calibration(dataset):
         raise UsageError(f"{command}: this is a calibration, expected the result of a sweep")
+
+
+FIT_HEADINGS = ("law", "parameter", "estimate", "95 %", "chi2/dof", "AICc", "weight", "loo", "status")
+
+
+def fit_status(law: xr.Dataset) -> str:
+    """The outcome of the fit of one law, one of FIT_STATUSES."""
+    return str(law["fit_status"].attrs["flag_meanings"]).split()[int(law["fit_status"])]
+
+
+def fit_rows(dataset: xr.Dataset) -> list[tuple[str, ...]]:
+    """A row of text for each parameter of each law, the best law first, under FIT_HEADINGS."""
+    rows: list[tuple[str, ...]] = []
+    for key in map(str, dataset["model"].values):
+        law = dataset.sel(model=key)
+        quality = (
+            number(float(law["chi2_reduced"]), 3),
+            decimals(float(law["aicc"]), 1),
+            decimals(float(law["weight"]), 3),
+            number(float(law["loo"]), 3),
+            fit_status(law),
+        )
+        names = [str(name) for name in law["parameter"].values[law["identifiable"].values >= 0]]
+        for position, name in enumerate(names or [""]):
+            estimate = _estimate_text(law.sel(parameter=name)) if name else ("", "")
+            rest = quality if position == 0 else ("",) * len(quality)
+            rows.append((key if position == 0 else "", name.removeprefix(f"{key}."), *estimate, *rest))
+    return rows
+
+
+def _estimate_text(of_name: xr.Dataset) -> tuple[str, str]:
+    """An estimate and its interval."""
+    estimate = number(float(of_name["estimate"]), 5)
+    if not int(of_name["identifiable"]):
+        return estimate, "not identified"
+    lower, upper = float(of_name["lower"]), float(of_name["upper"])
+    return estimate, "–" if lower != lower else f"{number(lower, 5)} to {number(upper, 5)}"
+
+
+def unidentified_notes(dataset: xr.Dataset) -> list[str]:
+    """What the data do not determine, in words, one line for each law that they do not determine."""
+    notes = []
+    for key in map(str, dataset["model"].values):
+        law = dataset.sel(model=key)
+        names = [str(name) for name in law["parameter"].values[law["identifiable"].values == 0]]
+        if names:
+            groups = str(law["determined"].item())
+            short = ", ".join(name.removeprefix(f"{key}.") for name in names)
+            only = f"only {groups} is determined" if groups else "the data do not determine them"
+            notes.append(f"{key}: {short}: {only}")
+    return notes
+
+
+def calibration_title(dataset: xr.Dataset) -> str:
+    """The title of the config; "" for its default, which is that of a sweep."""
+    title = str(dataset.attrs.get("title", ""))
+    return "" if title == DEFAULT_TITLE else title
+
+
+def describe_data(dataset: xr.Dataset) -> str:
+    """What the laws were fitted to, in a sentence without a full stop."""
+    laws, points = dataset.sizes["model"], dataset.sizes["point"]
+    plural = "" if laws == 1 else "s"
+    return f"{laws} law{plural}, {points} measured values, noise {dataset.attrs['noise']}; the best law first"
 
 
 def calibration_template(
