@@ -89,6 +89,20 @@ def test_commands_that_take_a_sweep_refuse_a_calibration_in_one_line(
         assert (done.returncode, done.stderr.count("\n")) == (2, 1), (words, done.stderr)
         assert "this is a calibration, expected the result of a sweep" in done.stderr
     shown = cli("info", "fit.h5", cwd=tmp_path)
-    # two laws at twelve points
-    assert re.search(r"^points +24 *$", shown.stdout, re.MULTILINE)
+    assert re.search(r"^points +12 *$", shown.stdout, re.MULTILINE)
     assert cli("plot", "fit.h5", cwd=tmp_path).returncode == 0
+
+
+def test_a_damaged_calibration_is_refused_in_one_line(drops: xr.Dataset, tmp_path: Path) -> None:
+    damaged = {
+        "estimate: got parameter, model": drops.assign(estimate=drops["estimate"].transpose()),
+        "lower: got none": drops.drop_vars("lower"),
+        "fit_status: got float64": drops.assign(fit_status=drops["fit_status"].astype(float)),
+        "no outcome of a fit": drops.assign(fit_status=drops["fit_status"] + np.int8(9)),
+        "noise": drops.assign_attrs(noise=3),
+        "measured: expected a coordinate along point": drops.drop_vars("measured"),
+    }
+    for number, (message, dataset) in enumerate(damaged.items()):
+        with pytest.raises(UsageError, match=message) as refused:
+            impact.save(dataset, tmp_path / f"{number}.h5")
+        assert "\n" not in str(refused.value)

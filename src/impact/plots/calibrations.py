@@ -112,7 +112,8 @@ def _panels(data: xr.Dataset, name: str, varied: str, choice: Choice) -> list[tu
         y_label="Residual in standard deviations", curves=tuple(residuals), bands=(SHADED_RESIDUAL,),
         y_name="residual", joined=False, **axis,
     )  # fmt: skip
-    columns = {x_name: x, name: measured} | ({SIGMA: sigma} if np.isfinite(sigma).all() else {})
+    # the error bars are those of the best law: with some noise they depend on the fit
+    columns = {x_name: x, name: measured, SIGMA: _deviation(data.isel(model=0), sigma)}
     return [(values, Points("measured", columns)), (rest, Points("", {}))]
 
 

@@ -26,6 +26,8 @@ ATTRIBUTE_TYPES: Mapping[str, Any] = {
     "axes": list[str],
     "config_set": list[str],
     "extended": list[Any],
+    "fit_bounds": dict[str, list[float]],
+    "fit_paths": list[str],
     "inputs": dict[str, float | str],
     "laws": dict[str, dict[str, Any]],
     "materials": dict[str, dict[str, Any]],

@@ -343,9 +343,6 @@ def count_points(dataset: xr.Dataset) -> int:
     """The number of points of a result, without repetitions along parameters of other models."""
     if "model" not in dataset.dims:
         return math.prod(dataset.sizes.values())
-    if "point" in dataset.dims:
-        # of a calibration
-        return dataset.sizes["model"] * dataset.sizes["point"]
     return sum(math.prod(part.sizes.values()) for part in parts_of_models(dataset))
 
 

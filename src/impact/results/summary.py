@@ -12,6 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ..contact.status import FIRST_FAILURE, Status
+from .calibration import is_calibration
 from .schema import count_points, parts_of_models
 from .slabs import MAX_SUMMARY_POINTS, distinct_points, is_computed, slabs
 
@@ -199,7 +200,7 @@ def describe(dataset: xr.Dataset) -> dict[str, Any]:
             **(extremes._asdict() if extremes else dict.fromkeys(Extremes._fields)),
         }
     return {
-        "points": count_points(dataset),
+        "points": dataset.sizes["point"] if is_calibration(dataset) else count_points(dataset),
         # of a result in memory neither is known
         **{name: dataset.encoding.get(name) for name in ("layout", "seal")},
         "dimensions": {str(name): size for name, size in dataset.sizes.items()},

@@ -18,7 +18,13 @@ from ..engine.plan import material_property
 from ..errors import ResultError
 from ..text import safe_text
 from .attributes import ATTRIBUTE_TYPES, read_attribute
-from .calibration import CALIBRATION_COORDINATES, CALIBRATION_TEXTS, CALIBRATION_VARIABLES
+from .calibration import (
+    CALIBRATION_COORDINATES,
+    CALIBRATION_TEXTS,
+    CALIBRATION_VARIABLES,
+    FIT_STATUSES,
+    is_calibration,
+)
 from .schema import HISTORY_VARIABLES, MODEL_METADATA, SCHEMA, is_case
 from .slabs import VARIES_ALONG, is_lazy, slabs
 
@@ -88,6 +94,7 @@ def schema_violation(dataset: xr.Dataset) -> str | None:
         _type_violations,
         _attribute_violations,
         _history_violations if "t" in dataset.dims else _result_violations,
+        _calibration_violations,
     )
     return next((safe_text(fault) for check in checks for fault in check(dataset)), None)
 
@@ -151,6 +158,53 @@ def _result_violations(dataset: xr.Dataset) -> Iterator[str]:
     for key in NUMBER_ATTRIBUTES:
         if not isinstance(dataset.attrs.get(key), int | float | np.number):
             yield f"no {key}, or not as a number"
+
+
+# coordinates of a calibration with their dimension
+CALIBRATION_AXES = {
+    "parameter": "parameter",
+    "other_parameter": "other_parameter",
+    "point": "point",
+    "line": "point",
+    "output": "point",
+    "measured": "point",
+    "sigma": "point",
+    "determined": "model",
+}
+CALIBRATION_ATTRIBUTES = ("noise", "data_file", "varied", "fit_paths", "fit_bounds")
+
+
+def _calibration_violations(dataset: xr.Dataset) -> Iterator[str]:
+    """Faults of a calibration: it has all of its variables, on their own axes."""
+    if not is_calibration(dataset):
+        strange = sorted((CALIBRATION_VARIABLES.keys() | CALIBRATION_COORDINATES) & set(dataset.variables))
+        if strange:
+            yield f"{', '.join(strange)}: of a calibration, which has the axis parameter"
+        return
+    grid = bool(dataset.attrs.get("varied"))
+    for name, (dims, *_) in CALIBRATION_VARIABLES.items():
+        if "grid" in dims and not grid:
+            continue
+        if name not in dataset or dataset[name].dims != dims:
+            found = "none" if name not in dataset else ", ".join(map(str, dataset[name].dims)) or "no axes"
+            yield f"{name}: got {found}, expected {', '.join(dims)}"
+        else:
+            kinds = "i" if name in ("identifiable", "fit_status") else "f"
+            if dataset[name].dtype.kind != kinds:
+                yield f"{name}: got {dataset[name].dtype}, expected {'int8' if kinds == 'i' else 'float64'}"
+    for name, dim in CALIBRATION_AXES.items() | (
+        {("grid", "grid"), ("output_name", "output_name")} if grid else set()
+    ):
+        if name not in dataset.coords or dataset[name].dims != (dim,):
+            yield f"{name}: expected a coordinate along {dim}"
+    for key in CALIBRATION_ATTRIBUTES:
+        if not isinstance(dataset.attrs.get(key), str):
+            yield f"no {key}, or not as text"
+    paths = read_attribute(dataset.attrs, "fit_paths")
+    if len(paths) != dataset.sizes.get("parameter"):
+        yield "fit_paths: expected a config path for each parameter"
+    if "fit_status" in dataset and not np.isin(dataset["fit_status"].values, range(len(FIT_STATUSES))).all():
+        yield "fit_status: got a number that is no outcome of a fit"
 
 
 def _has_unknown_status(status: xr.DataArray) -> bool:
