@@ -13,6 +13,7 @@ import pytest
 import xarray as xr
 
 import impact
+from impact.errors import UsageError
 
 from .conftest import ROOT, Run
 
@@ -107,11 +108,52 @@ def test_the_json_has_the_names_of_the_contract(cli: Run) -> None:
     assert law["determined"] == ["C/sqrt(m K)"]
 
 
-def test_a_result_is_stored_with_equal_bytes_and_read_again(cli: Run, tmp_path: Path) -> None:
-    for name in ("a.h5", "b.h5"):
-        done = cli("calibrate", FOLDER / "hdpe.toml", *ONE_LAW, "-o", tmp_path / name)
+def test_the_bytes_of_a_result_do_not_depend_on_the_number_of_processes(cli: Run, tmp_path: Path) -> None:
+    laws = ("--set", 'models=["anagnostopoulos-1988", "hunt-crossley-1975"]', "--set", "solver.rtol=1e-6")
+    for name, jobs in (("a.h5", "1"), ("b.h5", "2")):
+        done = cli("calibrate", FOLDER / "drops.toml", *laws, "-j", jobs, "-o", tmp_path / name)
         assert done.returncode == 0, done.stderr
     assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
+
+
+def test_a_rerun_repeats_a_calibration_and_names_what_changed(cli: Run, tmp_path: Path) -> None:
+    impact.calibrate(LINEAR, output=tmp_path / "a.h5")
+    done = cli("rerun", "a.h5", cwd=tmp_path)
+    assert (done.returncode, done.stdout.split(",")[-1].strip()) == (0, "none differs")
+    stored = impact.load(tmp_path / "a.h5")
+    changed = {
+        # the first is a 300th of the interval
+        "values (estimate)": stored.assign(estimate=stored["estimate"] + 7e-5),
+        "values (fit_status)": stored.assign(fit_status=stored["fit_status"] + np.int8(1)),
+        "labels (measured)": stored.assign_coords(measured=stored["measured"] + 1e-12),
+        "physics config (v1)": stored.assign_coords(v1=2.0),
+        "physics config (noise)": stored.assign_attrs(noise="scale"),
+        "physics config (e)": stored.assign_attrs(fit_bounds=json.dumps({"e": [0.1, 0.9]})),
+    }
+    for headline, dataset in changed.items():
+        assert impact.compare(dataset, stored).headline == f"not equal: {headline}"
+    assert impact.compare(changed["values (estimate)"], stored, tol=1e-3).equal
+    with pytest.raises(UsageError, match="expected the result of a sweep"):
+        impact.compare(stored, ROOT / "tests" / "data" / "figure6.h5")
+
+
+def test_laws_are_compared_by_name_whatever_their_rank(drops: xr.Dataset) -> None:
+    assert impact.compare(drops.isel(model=[1, 0]), drops).equal
+    only_one = impact.compare(drops.isel(model=[0]), drops)
+    assert only_one.headline == "not equal: labels (model)"
+    assert impact.compare(drops.isel(model=[0]), drops, subset=True).equal
+
+
+def test_the_value_of_a_parameter_that_is_not_identified_is_not_judged() -> None:
+    fit = impact.calibrate(FOLDER / "dashpot.toml", overrides=["solver.rtol=1e-6"])
+    moved = fit.assign(estimate=fit["estimate"] * 1.5)
+    assert fit["identifiable"].values.tolist() == [[0, 0]]
+    assert impact.compare(moved, fit).equal
+
+
+def test_a_result_is_stored_and_read_again(cli: Run, tmp_path: Path) -> None:
+    done = cli("calibrate", FOLDER / "hdpe.toml", *ONE_LAW, "-o", tmp_path / "a.h5")
+    assert done.returncode == 0, done.stderr
     stored = impact.load(tmp_path / "a.h5")
     assert stored["estimate"].sel(parameter="e").item() == pytest.approx(0.82166, abs=1e-5)
     again = cli("calibrate", FOLDER / "hdpe.toml", *ONE_LAW, "-o", tmp_path / "a.h5")

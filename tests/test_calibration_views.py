@@ -28,15 +28,15 @@ def test_the_picture_has_measured_values_curves_bands_and_residuals(drops: xr.Da
     figure = impact.plot(drops)
     values, residuals = figure.axes
     assert values.get_ylabel().startswith("Delivered restitution")
-    assert residuals.get_ylabel() == "Residual in standard deviations"
+    assert residuals.get_ylabel() == "Residual in σ"
     (bars,) = values.containers
     np.testing.assert_array_equal(bars.lines[0].get_xdata(), drops["v1"])
     np.testing.assert_array_equal(bars.lines[0].get_ydata(), drops["measured"])
     names = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert any("weight 1.000" in name for name in names)
+    assert any("ΔAICc = 0.0" in name for name in names)
     assert any("at bound" in name for name in names)
     assert {"Measured", "Band of 95 %"} <= set(names)
-    drawn = residuals.lines[0]
+    drawn = next(line for line in residuals.lines if len(line.get_xdata()) == drops.sizes["point"])
     expected = drops.isel(model=0)["residual"] / drops["sigma"]
     np.testing.assert_allclose(drawn.get_ydata(), expected)
 
@@ -81,7 +81,8 @@ def test_commands_that_take_a_sweep_refuse_a_calibration_in_one_line(
     impact.save(drops, tmp_path / "fit.h5")
     for words in (
         ("recommend", "fit.h5"),
-        ("rerun", "fit.h5"),
+        ("expand", "fit.h5", "-o", "full.h5"),
+        ("bless", "fit.h5", "baseline.h5", "--reason", "first"),
         ("extend", "fit.h5", "--set", "sweep.m1=1"),
         ("run", "fit.h5"),
     ):

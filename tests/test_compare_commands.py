@@ -297,7 +297,7 @@ def test_subset_and_nothing_in_common(forked: ForkServer, folder: Path) -> None:
     for words in ([], ["--subset"]):
         done = forked("compare", "low.h5", "high.h5", *words, "--plot", folder / "none.png", cwd=folder)
         assert (done.returncode, done.stdout.splitlines()[0]) == (1, "not equal: nothing in common (e)")
-        assert done.stderr == "nothing to draw: the results have no point in common\n"
+        assert done.stderr == "nothing to draw: no variable was compared along an axis\n"
         assert not (folder / "none.png").exists()
 
 

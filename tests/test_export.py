@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import impact
+from impact.errors import UsageError
 from impact.exporters.codes import CODES
 
 from .conftest import ROOT, Run
@@ -31,13 +32,28 @@ def source(*materials: str, **values: float) -> dict[str, object]:
     }
 
 
+def default_law(code: str) -> str:
+    return next(iter(CODES[code].laws))
+
+
+def test_the_law_is_the_first_of_the_source_that_the_code_has() -> None:
+    hooke, hertz = "lammps-coeff-restitution-hooke", "lammps-coeff-restitution-hertz"
+    config = source("soft", "soft") | {"models": ["gonthier-2004", hooke, hertz]}
+    assert impact.export("lammps", source=config).model == hooke
+    assert impact.export("lammps", hertz, source=config).model == hertz
+    with pytest.raises(UsageError, match="has none of the laws gonthier-2004"):
+        impact.export("lammps", source=config | {"models": "gonthier-2004"})
+
+
 def test_the_stiffness_of_lammps_hertz_is_per_root_of_the_effective_radius() -> None:
-    export = impact.export("lammps", source=source(K=1e8), code_version="22Jul2025")
+    export = impact.export("lammps", default_law("lammps"), source=source(K=1e8), code_version="22Jul2025")
     assert export.parameters == {"k_n": pytest.approx(1e8 / math.sqrt(0.03), rel=1e-15), "e": 0.5}
 
 
 def test_lammps_takes_the_moduli_of_both_types_of_two_materials() -> None:
-    export = impact.export("lammps", source=source("soft", "hard"), code_version="22Jul2025")
+    export = impact.export(
+        "lammps", default_law("lammps"), source=source("soft", "hard"), code_version="22Jul2025"
+    )
     assert [line.split()[1:7] for line in export.lines if line.startswith("pair_coeff")] == [
         ["1", "1", "hertz/material", "1000000000.0", "0.5", "0.3"],
         ["2", "2", "hertz/material", "5000000000.0", "0.5", "0.2"],
@@ -59,7 +75,9 @@ def test_the_damping_of_a_law_without_e_is_solved_for(key: str, expected: float)
 
 
 def test_liggghts_takes_the_properties_of_each_type_and_pair() -> None:
-    parameters = impact.export("liggghts", source=source("soft", "hard"), code_version="3.8.0").parameters
+    parameters = impact.export(
+        "liggghts", default_law("liggghts"), source=source("soft", "hard"), code_version="3.8.0"
+    ).parameters
     assert parameters["youngsModulus"] == "peratomtype 1000000000.0 5000000000.0"
     assert parameters["poissonsRatio"] == "peratomtype 0.3 0.2"
     assert parameters["coefficientRestitution"] == "peratomtypepair 2 0.5 0.5 0.5 0.5"
@@ -69,7 +87,7 @@ def test_liggghts_takes_the_properties_of_each_type_and_pair() -> None:
     ("version", "key"), [("2011.05", "yade-en-pulling"), ("2022.01a", "yade-en-clamped"), ("2023.02a", "yade-en")]
 )
 def test_the_law_of_en_depends_on_the_version_of_yade(version: str, key: str) -> None:
-    export = impact.export("yade", source=source("soft", "soft"), code_version=version)
+    export = impact.export("yade", default_law("yade"), source=source("soft", "soft"), code_version=version)
     assert (export.model, export.parameters["en"]) == (key, 0.5)
 
 
@@ -90,13 +108,15 @@ def test_opensees_gets_the_effective_mass_and_the_damping_of_its_documentation()
 
 
 def test_simbody_gets_the_modulus_of_plane_strain_of_each_sphere() -> None:
-    export = impact.export("simbody", source=source("soft", "soft"), at={"simbody-hunt-crossley.c": 0.3})
+    export = impact.export(
+        "simbody", default_law("simbody"), source=source("soft", "soft"), at={"simbody-hunt-crossley.c": 0.3}
+    )
     assert export.parameters["stiffness1"] == pytest.approx(1e9 / 0.91, rel=1e-15)
     assert export.parameters["dissipation2"] == 0.3
 
 
 def test_kratos_gets_the_restitution_in_the_relation_of_the_materials() -> None:
-    export = impact.export("kratos", source=source("soft", "hard"))
+    export = impact.export("kratos", default_law("kratos"), source=source("soft", "hard"))
     assert (export.parameters["YOUNG_MODULUS"], export.parameters["YOUNG_MODULUS2"]) == (1e9, 5e9)
     assert '    "COEFFICIENT_OF_RESTITUTION": 0.5,' in export.lines
 

@@ -32,7 +32,7 @@ from .engine.checkpoint import remove_stale_work_folder
 from .engine.execute import never_stop
 from .engine.executors import SERIAL, Backend, choose_backend
 from .engine.plan import Plan
-from .engine.plugins import read_plugins
+from .engine.plugins import Plugins, read_plugins
 from .engine.progress import Progress, ProgressCallback
 from .engine.trajectories import check_count
 from .errors import ImpactError as ImpactError
@@ -40,7 +40,7 @@ from .errors import UnfinishedError, UsageError, did_you_mean
 from .results.backend import check_output, open_result, write_file
 from .results.backend import load as load
 from .results.backend import save as save
-from .results.calibration import refuse_calibration
+from .results.calibration import is_calibration, refuse_calibration
 from .results.extend import extend as extend_result
 from .results.plausibility import material_notes
 from .results.provenance import config_of_part, stored_config
@@ -571,6 +571,7 @@ def calibrate(
     overwrite: bool = False,
     overrides: Sequence[str] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
+    jobs: int = 1,
 ) -> xr.Dataset:
     """Fit laws to measurements: which law fits, with which parameters, and what the data cannot determine.
 
@@ -581,6 +582,7 @@ def calibrate(
     best : TOML file to write, with the config of the best law and its parameters, for `sweep` and `export`
     overwrite : replace files that exist
     overrides, plugins : see `sweep`
+    jobs : number of processes; the result has the same bits for any number
 
     Returns
     -------
@@ -611,8 +613,9 @@ def calibrate(
     for path in (output, best):
         if path is not None:
             check_output(Path(path), overwrite=overwrite)
-    calibration = calibrate_config(config)
-    result = calibration_dataset(calibration, plugin_set.of(config.models))
+    of_config = plugin_set.of(config.models)
+    calibration = calibrate_config(config, of_config, jobs)
+    result = calibration_dataset(calibration, of_config)
     if output is not None:
         save(result, output, overwrite=overwrite)
     if best is not None:
@@ -640,7 +643,8 @@ def export(
     Parameters
     ----------
     to : name of the code, see `export_codes`
-    model : a law that the code has, by its key; by default the first one of `export_codes`
+    model : a law that the code has, by its key; by default the first one of the source that the code has, or the
+        first one of `export_codes` without a source
     source, overrides : see `solve`
     at : values of inputs by config name; an e for a law that takes none is reached by its damping parameter
     dt : time step [s]; by default the contact time of the continuous law over 50
@@ -842,7 +846,7 @@ def expand(
     Raises
     ------
     ResultError : the file is not a readable result
-    UsageError : it is a time history, it has more than `max_points` points, or the output exists
+    UsageError : it is no result of a sweep, it has more than `max_points` points, or the output exists
     StoreError : the disk is full or failed
 
     >>> import impact, tempfile
@@ -853,7 +857,9 @@ def expand(
     """
     output, shown = Path(output), safe_text(str(result))
     check_output(output, overwrite=overwrite, source=Path(result))
-    dataset = select(open_result(result), sel or {})
+    opened = open_result(result)
+    refuse_calibration(opened, "expand")
+    dataset = select(opened, sel or {})
     if "model" not in dataset.dims:
         raise UsageError(f"{shown}: is a time history, expected a result of a sweep")
     if models:
@@ -877,9 +883,9 @@ def rerun(
     max_points: int = MAX_POINTS,
     execute: Callable[[Plan], xr.Dataset] = execute,
 ) -> Verdict:
-    """Repeat the sweep of a result from its file alone, and compare the new values with the stored ones.
+    """Repeat the sweep or the calibration of a result from its file alone, and compare the new values with it.
 
-    Only the points in the file are repeated, even if its config has more.
+    Of a sweep, only the points in the file are repeated, even if its config has more.
 
     Parameters
     ----------
@@ -892,7 +898,7 @@ def rerun(
     Raises
     ------
     ResultError : the file is not a readable result
-    UsageError : it is not the result of a sweep, or a plug-in is missing or a different one
+    UsageError : it is a time history, or a plug-in is missing or a different one
     ConfigError : this version does not have a model of the result, or cannot read its config
 
     >>> import impact, tempfile
@@ -902,8 +908,10 @@ def rerun(
     equal: 19 variables, 5,353 values, none differs
     """
     stored = load(result)
-    refuse_calibration(stored, "rerun")
     plugin_set = read_plugins(plugins)
+    if is_calibration(stored):
+        new = _repeat_calibration(stored, plugin_set, str(result))
+        return replace(compare(new, stored, tol=tol, subset=subset), new="the rerun", baseline=str(result))
     # models by key, because "all" may include new models; the tolerances that were used
     keys = stored["model"].values.tolist() if "model" in stored.dims else []
     solver = (f"solver.{name}={stored.attrs.get(name)}" for name in ("rtol", "max_steps"))
@@ -920,6 +928,18 @@ def rerun(
     files = [word for path in plugins if isinstance(path, str | Path) for word in ("--plugin", str(path))]
     command = ("impact", "run", str(result), *files) if command_start(str(result), stored) else ()
     return replace(verdict, new="the rerun", baseline=str(result), repeats=command)
+
+
+def _repeat_calibration(stored: xr.Dataset, plugins: Plugins, name: str) -> xr.Dataset:
+    """The calibration of a stored config with the models and the tolerances of the result."""
+    # its modules import scipy.optimize, which other functions do without
+    from .inverse.calibrate import calibrate_config, calibration_dataset
+
+    changes = [f"models={json.dumps(stored['model'].values.tolist())}"]
+    changes += [f"solver.{key}={stored.attrs.get(key)}" for key in ("rtol", "max_steps")]
+    config = stored_config(stored.attrs, changes, plugins, name, allow_changed_plugins=True, purpose="calibrate")
+    of_config = plugins.of(config.models)
+    return calibration_dataset(calibrate_config(config, of_config), of_config)
 
 
 def models(

@@ -12,7 +12,7 @@ import typer
 from ..text import safe_text
 from . import exits
 from .console import cell, console, dump, table
-from .options import JsonOption, OverwriteOption, PluginOption, SetOption
+from .options import JobsOption, JsonOption, OverwriteOption, PluginOption, SetOption
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,6 +30,7 @@ def calibrate(
     ] = None,
     sets: SetOption = None,
     plugins: PluginOption = None,
+    jobs: JobsOption = 1,
     as_json: JsonOption = False,
 ) -> None:
     """Fit laws to measurements, and rank them.
@@ -39,12 +40,18 @@ def calibrate(
     from .. import api
 
     result = api.calibrate(
-        config, output=output, best=best, overwrite=overwrite, overrides=sets or (), plugins=plugins or ()
+        config,
+        output=output,
+        best=best,
+        overwrite=overwrite,
+        overrides=sets or (),
+        plugins=plugins or (),
+        jobs=jobs,
     )
     if as_json:
         print(dump(calibration_json(result)))
     else:
-        _print_fits(result)
+        print_fits(result)
     for path in (output, best):
         if path is not None:
             exits.print_line(f"{safe_text(str(path))}: written")
@@ -80,7 +87,7 @@ def calibration_json(result: xr.Dataset) -> dict[str, Any]:
     return {"models": models}
 
 
-def _print_fits(result: xr.Dataset) -> None:
+def print_fits(result: xr.Dataset) -> None:
     """Print a row for each law and parameter, the best law first, and what the data do not determine."""
     from ..results.calibration import FIT_HEADINGS, describe_data, fit_rows, unidentified_notes
 

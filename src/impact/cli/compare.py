@@ -110,7 +110,7 @@ def rerun(
     plot: PlotOption = None,
     quiet: QuietOption = False,
 ) -> None:
-    """Repeat the sweep of a result from the file alone, and compare the new values with the stored ones."""
+    """Repeat a sweep or a calibration from its result alone, and compare the new values with the stored ones."""
     with exits.catch_signals() as should_stop:
         from .. import api
         from ..comparison import formats
@@ -158,7 +158,7 @@ def _report_verdict(verdict: Verdict, format: Format, plot: Path | None) -> None
             _print_report(formats.report_of(verdict), format)
     if plot is not None and not verdict.worst_along:
         # a missing picture does not change the verdict
-        exits.print_line("nothing to draw: the results have no point in common")
+        exits.print_line("nothing to draw: no variable was compared along an axis")
     elif plot is not None:
         from ..plots import differences, style
 

@@ -33,7 +33,7 @@ def export(
             "--model",
             metavar="KEY",
             autocompletion=complete_model,
-            help="A law that the code has. \\[default: its first one in --list]",
+            help="A law that the code has. \\[default: the first of the source that it has, else of --list]",
         ),
     ] = None,
     at: AtOption = None,

@@ -46,7 +46,9 @@ def print_info(dataset: xr.Dataset, path: Path) -> None:
     """Print the contents of a file of any size; "–" where a summary would evaluate too many points."""
     from .. import api
     from ..results.attributes import read_attribute
+    from ..results.calibration import is_calibration
     from ..results.schema import exponents_of, plain_unit
+    from .calibrate import print_fits
     from .summary import worst_errors
 
     description = api.info(dataset)
@@ -89,6 +91,9 @@ def print_info(dataset: xr.Dataset, path: Path) -> None:
     if description["worst"]:
         out.print()
         out.print(worst_errors(description["worst"]))
+    if is_calibration(dataset):
+        out.print()
+        print_fits(dataset)
 
 
 def _values_text(dataset: xr.Dataset, name: str) -> str:

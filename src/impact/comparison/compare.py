@@ -14,10 +14,12 @@ from ..errors import UsageError
 from ..formatting import number
 from ..results.attributes import read_attribute
 from ..results.backend import load
+from ..results.calibration import is_calibration
 from ..results.replay_command import command_start
 from ..results.schema import MODEL_METADATA, SCHEMA, SCHEMA_VERSION, is_case, is_input
 from ..text import safe_text
 from .align import MODEL_COORDINATES, align
+from .calibrations import compare_calibrations
 from .judge import group_size, judge, representative_regions
 from .tolerances import ALL_VARIABLES, Tolerances, effective_tolerances
 from .verdict import Fault, Judged, Verdict
@@ -31,6 +33,8 @@ def compare(
     subset: bool = False,
 ) -> Verdict:
     """Compare a result with a baseline, each variable as docs/schema.md states, at points of equal labels.
+
+    Two calibrations are compared law by law, see docs/calibrate.md.
 
     Values are equal if |new - baseline| <= tolerance x scale, where the scale is that of the baseline's point.
     NaNs are equal if both points have the same status and that status explains them, or if the law lacks the
@@ -68,6 +72,8 @@ def compare(
     files = [str(source) if isinstance(source, str | Path) else "" for source in (new, baseline)]
     names = files[0] or "NEW", files[1] or "BASELINE"
     a, b = (load(source) if isinstance(source, str | Path) else source for source in (new, baseline))
+    if is_calibration(a) and is_calibration(b):
+        return compare_calibrations(a, b, names, tol, subset=subset)
     for dataset, name in zip((a, b), names, strict=True):
         check_comparable(dataset, name)
     strange = sorted({*_unknown_variables(a), *_unknown_variables(b)})
@@ -127,6 +133,8 @@ def check_comparable(dataset: xr.Dataset, name: str) -> None:
     UsageError : it is a time history, or lacks coordinates or axes that every result has
     """
     shown = safe_text(name)
+    if is_calibration(dataset):
+        raise UsageError(f"{shown}: this is a calibration, expected the result of a sweep")
     is_current = _attributes_equal(dataset.attrs.get("schema_version"), SCHEMA_VERSION)
     if not is_current or "rtol" not in dataset.attrs:
         about = "a time history" if "t" in dataset.coords else "not a result"

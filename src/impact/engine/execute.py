@@ -92,11 +92,11 @@ def integrate_remotely(key: str, columns: Columns, context: WorkerContext) -> In
     ------
     UsageError : this process has another version or other models, or lacks numba where `context` requires it
     """
-    return integrate_columns(_models_of_context(context)[key], columns, context.solver)
+    return integrate_columns(models_of_context(context)[key], columns, context.solver)
 
 
 @lru_cache(maxsize=4)
-def _models_of_context(context: WorkerContext) -> Mapping[str, ForceModel]:
+def models_of_context(context: WorkerContext) -> Mapping[str, ForceModel]:
     """All models of a sweep by key, cached for the most recent sweeps."""
     host = socket.gethostname()
     if context.version != __version__:

@@ -15,7 +15,7 @@ from ..errors import UsageError, did_you_mean
 from ..formatting import number
 from ..inverse.solve import placeholder_override, solve_input, unknown_of
 from ..inverse.timestep import FixedStepLaw, fixed_step_law
-from ..results.single_impact import ConfigSource, single_point
+from ..results.single_impact import ConfigSource, models_of_source, single_point
 from ..text import safe_text
 from .code import Code, Collision
 
@@ -114,6 +114,21 @@ def law_of_code(code: Code, model: str | None, version: str) -> str:
     return code.entry(key, version)
 
 
+def _first_common(code: Code, models: Sequence[str]) -> str | None:
+    """The first of some models that a code has, or None if there are no models.
+
+    Raises
+    ------
+    UsageError : the code has none of them
+    """
+    laws = {find(key).same_as or key for key in code.laws}
+    common = [key for key in models if (find(key).same_as or key) in laws]
+    if models and not common:
+        shown = ", ".join(models[:3]) + (f" and {len(models) - 3} more" if len(models) > 3 else "")
+        raise UsageError(f"{code.title} has none of the laws {safe_text(shown)}; --model names one of its own")
+    return next(iter(common), None)
+
+
 def prepare_export(
     code: Code,
     model: str | None,
@@ -129,6 +144,8 @@ def prepare_export(
     UsageError : the code has no such law, or no damping gives the e
     ConfigError : an input is not allowed
     """
+    if model is None and source is not None:
+        model = _first_common(code, models_of_source(source, overrides, Plugins(()), at))
     key = law_of_code(code, model, version)
     law, plugins = find(key), Plugins(())
     at, solved = dict(at), ""

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from fractions import Fraction
+from functools import partial
 
 import numpy as np
 import xarray as xr
@@ -13,13 +14,15 @@ import xarray as xr
 from ..array_types import Array
 from ..config.files import toml_key, toml_text
 from ..config.grid import Axis, path_of
-from ..config.load import Config
+from ..config.load import Config, parse_config
 from ..config.tables import quantity_at
 from ..contact.model import ForceModel
 from ..contact.outputs import collide
 from ..contact.units import dimension
 from ..engine.build_impacts import build_impacts
-from ..engine.plan import Inputs, is_foreign
+from ..engine.execute import WorkerContext, context_of, models_of_context
+from ..engine.executors import choose_backend
+from ..engine.plan import Inputs, Plan, is_foreign
 from ..engine.plugins import Plugins
 from ..results.calibration import FIT_STATUSES, calibration_template
 from .batch import VectorFunction
@@ -34,23 +37,35 @@ MAX_DENOMINATOR = 12
 
 
 @dataclass(frozen=True)
+class FittedLaw:
+    """The fit of one law.
+
+    Parameters
+    ----------
+    names : config names of its parameters
+    fit : the fit
+    curve : values of each output over the varied input, with the ends of their bands, shape (3, outputs,
+        CURVE_POINTS)
+    """
+
+    names: tuple[str, ...]
+    fit: Fit
+    curve: Array
+
+
+@dataclass(frozen=True)
 class Calibration:
     """The fits of laws to measurements.
 
     Parameters
     ----------
     config : with the measurements and the parameters to fit
-    names : config names of the parameters of each law, by its key
-    fits : by the key of the law
-    curves : values of each output over an input, with the ends of their bands; by the key of the law, of shape
-        (3, outputs, CURVE_POINTS)
+    laws : by key
     varied : the input of the curves, and its values; "" where the data vary with more than one input or none
     """
 
     config: Config
-    names: Mapping[str, tuple[str, ...]]
-    fits: Mapping[str, Fit]
-    curves: Mapping[str, Array]
+    laws: Mapping[str, FittedLaw]
     varied: tuple[str, Array]
 
     @property
@@ -58,7 +73,7 @@ class Calibration:
         """The keys of the laws, best first: by AICc, those whose fit has a defect last."""
 
         def order(key: str) -> tuple[bool, bool, float, float]:
-            fit = self.fits[key]
+            fit = self.laws[key].fit
             return (
                 fit.status != "ok",
                 math.isnan(fit.aicc),
@@ -66,16 +81,17 @@ class Calibration:
                 math.inf if math.isnan(fit.chi2_reduced) else fit.chi2_reduced,
             )
 
-        return sorted(self.fits, key=order)
+        return sorted(self.laws, key=order)
 
     @property
     def weights(self) -> dict[str, float]:
         """Akaike weights of the laws whose fit has no defect; 0 for the others."""
-        usable = {key: fit.aicc for key, fit in self.fits.items() if fit.status == "ok" and fit.aicc == fit.aicc}
+        fits = {key: law.fit for key, law in self.laws.items()}
+        usable = {key: fit.aicc for key, fit in fits.items() if fit.status == "ok" and fit.aicc == fit.aicc}
         least = min(usable.values(), default=0.0)
         likelihood = {key: math.exp(-0.5 * (aicc - least)) for key, aicc in usable.items()}
         total = sum(likelihood.values())
-        return {key: likelihood.get(key, 0.0) / total if total else 0.0 for key in self.fits}
+        return {key: likelihood.get(key, 0.0) / total if total else 0.0 for key in fits}
 
 
 def fitted_names(config: Config, model: ForceModel) -> tuple[str, ...]:
@@ -131,8 +147,36 @@ def prediction(
     return predict
 
 
-def calibrate_config(config: Config) -> Calibration:
-    """Fit the laws of a config to its measurements; see `impact.calibrate`."""
+def calibrate_config(config: Config, plugins: Plugins, jobs: int = 1) -> Calibration:
+    """Fit the laws of a config to its measurements; see `impact.calibrate`.
+
+    Parameters
+    ----------
+    config, plugins : the config, and its models that are not built in
+    jobs : number of processes; a law is fitted in one of them, and its fit does not depend on the others
+    """
+    if jobs > 1 and len(config.models) > 1:
+        context = context_of(Plan(config, plugins))
+        with choose_backend(jobs).executor() as executor:
+            fit = partial(_fit_remotely, text=config.text, overrides=config.overrides, context=context)
+            keys = [model.key for model in config.models]
+            laws = dict(zip(keys, executor.map(fit, keys), strict=True))
+    else:
+        laws = fit_laws(config)
+    assert config.data is not None
+    return Calibration(config, laws, varied_input(config.data.inputs))
+
+
+def _fit_remotely(key: str, text: str, overrides: Sequence[str], context: WorkerContext) -> FittedLaw:
+    """The fit of the law of a key, in any process, with a config given by its text and overrides."""
+    models = models_of_context(context)
+    plugins = [models[name] for name, _ in context.hashes]
+    selection = f"models={toml_text([key])}"
+    return fit_laws(parse_config(text, [*overrides, selection], plugins, "", purpose="calibrate"))[key]
+
+
+def fit_laws(config: Config) -> dict[str, FittedLaw]:
+    """The fits of all laws of a config, by key; they are evaluated together in this process."""
     assert config.data is not None
     data = config.data
     values = np.concatenate([np.asarray(column, float) for column in data.outputs.values()])
@@ -145,13 +189,12 @@ def calibrate_config(config: Config) -> Calibration:
         least, most = np.array([config.fits[name] for name in names[model.key]]).reshape(-1, 2).T
         problems.append(Problem(model.key, Bounds(least, most), DataPoints(values, sigma, data.noise)))
         functions[model.key] = prediction(config, model, names[model.key], data.inputs, len(data.lines))
-    fits = dict(zip(names, fit_all(problems, functions), strict=True))
+    fits = fit_all(problems, functions)
     varied = varied_input(data.inputs)
-    curves = {
-        problem.key: _curve(config, model, names[model.key], fits[model.key], problem, varied)
-        for model, problem in zip(config.models, problems, strict=True)
+    return {
+        model.key: FittedLaw(names[model.key], fit, _curve(config, model, names[model.key], fit, problem, varied))
+        for model, problem, fit in zip(config.models, problems, fits, strict=True)
     }
-    return Calibration(config, names, fits, curves, varied)
 
 
 def varied_input(inputs: Mapping[str, Sequence[float]]) -> tuple[str, Array]:
@@ -296,15 +339,15 @@ def best_config(calibration: Calibration) -> str:
     assert config.data is not None
     values: dict[str, object] = dict(config.scalars)
     values |= {name: sorted(set(column)) for name, column in config.data.inputs.items()}
-    fit = calibration.fits[key]
-    values |= dict(zip(calibration.names[key], map(float, fit.estimate), strict=True))
+    law = calibration.laws[key]
+    values |= dict(zip(law.names, map(float, law.fit.estimate), strict=True))
     tables: dict[str, dict[str, object]] = {"sweep": {}}
     for name, material in config.materials.items():
         known = {field: value for field, value in asdict(material).items() if value is not None and value == value}
         tables[f"materials.{toml_key(name)}"] = known
     for name, value in values.items():
         table, _, parameter = name.rpartition(".")
-        if is_foreign([name], key) or (name in config.fits and name not in calibration.names[key]):
+        if is_foreign([name], key) or (name in config.fits and name not in law.names):
             continue
         place = "sweep" if not table else table if table.startswith("materials.") else f"model.{table}"
         if isinstance(value, list) and len(value) == 1:
@@ -329,17 +372,17 @@ def calibration_dataset(calibration: Calibration, plugins: Plugins) -> xr.Datase
     covariance = np.full((*shape, len(parameters)), np.nan)
     identifiable = np.full(shape, -1, np.int8)
     for row, key in enumerate(keys):
-        fit = calibration.fits[key]
-        where = [parameters.index(name) for name in calibration.names[key]]
+        fit = calibration.laws[key].fit
+        where = [parameters.index(name) for name in calibration.laws[key].names]
         for name, column in arrays.items():
             column[row, where] = getattr(fit, name)
         covariance[row][np.ix_(where, where)] = fit.covariance
         identifiable[row, where] = fit.identifiable
-    fits = [calibration.fits[key] for key in keys]
+    fits = [calibration.laws[key].fit for key in keys]
     weights = calibration.weights
     groups = [
-        "; ".join(determined_groups(config, by_key[key], calibration.names[key], calibration.fits[key]))
-        for key in keys
+        "; ".join(determined_groups(config, by_key[key], law.names, law.fit))
+        for key, law in ((key, calibration.laws[key]) for key in keys)
     ]
     values: dict[str, object] = {
         **arrays,
@@ -355,7 +398,7 @@ def calibration_dataset(calibration: Calibration, plugins: Plugins) -> xr.Datase
         "residual": np.array([fit.residual for fit in fits]),
     }
     if calibration.varied[0]:
-        curve, lower, upper = np.stack([calibration.curves[key] for key in keys], axis=1)
+        curve, lower, upper = np.stack([calibration.laws[key].curve for key in keys], axis=1)
         values |= {"curve": curve, "curve_lower": lower, "curve_upper": upper}
     return dataset.assign(
         {name: (dataset[name].dims, array, dataset[name].attrs) for name, array in values.items()}

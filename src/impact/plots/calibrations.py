@@ -28,6 +28,8 @@ MAX_LAWS = 5
 BAND_NAME = "Band of 95 %"
 # standard deviations that are shaded among the residuals
 SHADED_RESIDUAL = 2.0
+# height of the panel of residuals over that of the values
+RESIDUAL_HEIGHT = 0.55
 
 
 def calibration_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
@@ -51,23 +53,33 @@ def calibration_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     shown = [key for key in keys if key in choice.models] if choice.models else keys[:MAX_LAWS]
     not_drawn = tuple(f"{key}, rank {keys.index(key) + 1}" for key in keys if key not in shown)
     data = dataset.load().sel(model=shown)
+    best = float(dataset["aicc"][0])
     varied = str(dataset.attrs.get("varied", ""))
     panels: list[Panel] = []
     points: list[Points] = []
     for name in dict.fromkeys(map(str, data["output"].values)):
         of_output = data.isel(point=np.flatnonzero(data["output"].values == name))
-        for panel, measured in _panels(of_output, name, varied, choice):
+        for panel, measured in _panels(of_output, name, varied, choice, best):
             panels.append(panel)
             points.append(measured)
     title = safe_text(calibration_title(dataset), 140)
-    conditions = conditions_of(data.drop_vars(["grid", varied], errors="ignore").isel(point=0, model=[0]), "grid")
+    conditions = conditions_of(data.drop_vars(["grid", varied], errors="ignore").isel(point=0), "grid")
     return CurveData(
         "Calibration", ": ".join(filter(None, (title, conditions))), tuple(panels), not_drawn, tuple(points)
     )
 
 
-def _panels(data: xr.Dataset, name: str, varied: str, choice: Choice) -> list[tuple[Panel, Points]]:
-    """The panel of an output and that of its residuals, with the measured points of each."""
+def _panels(data: xr.Dataset, name: str, varied: str, choice: Choice, best: float) -> list[tuple[Panel, Points]]:
+    """The panel of an output and that of its residuals, with the measured points of each.
+
+    Parameters
+    ----------
+    data : the laws that are drawn, at the points of the output
+    name : of the output
+    varied : the input of the curves; "" for none
+    choice : see `calibration_curves`
+    best : AICc of the best law
+    """
     x_name = varied or "point"
     x, measured = (np.asarray(data[key].values, float) for key in (x_name, "measured"))
     sigma = np.asarray(data[SIGMA].values, float)
@@ -77,8 +89,12 @@ def _panels(data: xr.Dataset, name: str, varied: str, choice: Choice) -> list[tu
     for index, key in enumerate(map(str, data["model"].values)):
         law = data.isel(model=index)
         status = fit_status(law)
-        remark = f"weight {decimals(float(law['weight']), 3)}" if status == "ok" else status.replace("_", " ")
-        label = f"{model_label(law, numbered=choice.equations)}, {remark}"
+        # a difference between the best law and others; a law alone has none
+        difference = float(law["aicc"]) - best
+        remark = status.replace("_", " ")
+        if status == "ok":
+            remark = f"ΔAICc = {decimals(difference, 1)}" if np.isfinite(difference) else ""
+        label = ", ".join(filter(None, (model_label(law, numbered=choice.equations), remark)))
         if varied:
             of_law = law.sel(output_name=name)
             y, least, largest = (of_law[key].values.tolist() for key in ("curve", "curve_lower", "curve_upper"))
@@ -98,19 +114,20 @@ def _panels(data: xr.Dataset, name: str, varied: str, choice: Choice) -> list[tu
         "x_name": x_name,
         "x_label": words_of(data[x_name].attrs, x_name),
         "x_unit": safe_text(plain_unit(str(data[x_name].attrs.get("units", "1")))),
-        "x_log": bool(varied) and is_geometric(grid),
+        "x_log": is_geometric(grid) if varied and not choice.log else "x" in choice.log and bool((x > 0.0).all()),
     }
     values = Panel(
         y_label="Delivered restitution" if name == "e_out" else output.meaning.capitalize(),
         curves=tuple(curves),
         y_unit=plain_unit(output.unit),
         y_name=name,
+        y_log="y" in choice.log,
         band_name=BAND_NAME,
         **axis,
     )
     rest = Panel(
-        y_label="Residual in standard deviations", curves=tuple(residuals), bands=(SHADED_RESIDUAL,),
-        y_name="residual", joined=False, **axis,
+        y_label="Residual in σ", curves=tuple(residuals), bands=(SHADED_RESIDUAL,),
+        y_name="residual", joined=False, height=RESIDUAL_HEIGHT, **axis,
     )  # fmt: skip
     # the error bars are those of the best law: with some noise they depend on the fit
     columns = {x_name: x, name: measured, SIGMA: _deviation(data.isel(model=0), sigma)}

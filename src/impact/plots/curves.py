@@ -103,6 +103,7 @@ class Panel:
     x_name, y_name : name of each axis in a result or a time history
     joined : whether lines join the points
     band_name : what the bands around curves are, for the legend
+    height : relative to other panels
     """
 
     x_label: str
@@ -118,6 +119,7 @@ class Panel:
     y_name: str = ""
     joined: bool = True
     band_name: str = ""
+    height: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -454,6 +456,7 @@ def _draw_bands(axes: Axes, panel: Panel) -> None:
             axes.axhline(band, color="#5a9cc5", linewidth=0.8, zorder=0.6)
         else:
             axes.axhspan(-band, band, color=colour, linewidth=0, zorder=0.5)
+            axes.axhline(0.0, color="#777777", linewidth=0.7, zorder=0.6)
 
 
 def _label_bands(axes: Axes, panel: Panel) -> None:

@@ -63,7 +63,7 @@ def difference_data(verdict: Verdict) -> DifferenceData:
     UsageError : the two have no point in common
     """
     if not verdict.worst_along:
-        raise UsageError("nothing to draw: the results have no point in common")
+        raise UsageError("nothing to draw: no variable was compared along an axis")
     judged = [variable for variable in verdict.variables if variable.judged != "reported"]
     wanted = verdict.differing or tuple(sorted((v for v in judged if v.times), key=_sort_key))
     shown = [variable.name for variable in wanted[: len(COLOURS)]]

@@ -177,8 +177,12 @@ def draw(
         width, height = width or default_width, height or default_height
         picture = Picture(width, *((heading, pretty_conditions(plot_data.conditions)) if title else ()))
         if isinstance(plot_data, curves.CurveData):
-            all_axes = list(picture.subplots(count, sharex=count > 1, squeeze=False).ravel())
-            body = count * width * (curves.PANEL_ASPECT if count == 1 else curves.STACKED_PANEL_ASPECT) + 0.3
+            heights = [panel.height for panel in plot_data.panels]
+            all_axes = list(
+                picture.subplots(count, sharex=count > 1, squeeze=False, height_ratios=heights).ravel()
+            )
+            aspect = curves.PANEL_ASPECT if count == 1 else curves.STACKED_PANEL_ASPECT
+            body = sum(heights) * width * aspect + 0.3
         else:
             all_axes, body = maps.place_panels(picture, plot_data, width, count)
         picture.add_legend(body, height, draw_panels(all_axes))

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 import xarray as xr
@@ -28,28 +29,59 @@ FIT_STATUSES = {
     "too_few_points": "there are not more points than parameters",
     "no_prediction": "the law has no result at a point",
 }
-# name: dimensions, unit, meaning
-CALIBRATION_VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
-    "estimate": (("model", "parameter"), "SI", "best value of the parameter; NaN where the law does not have it"),
-    "lower": (("model", "parameter"), "SI", "lower end of the interval of 95 % by profile likelihood"),
-    "upper": (("model", "parameter"), "SI", "upper end of the interval of 95 % by profile likelihood"),
-    "covariance": (("model", "parameter", "other_parameter"), "SI", "covariance in the linear approximation"),
-    "identifiable": (
-        ("model", "parameter"),
-        "1",
-        "1 if the data determine the parameter, -1 if it is not the law's",
+
+
+@dataclass(frozen=True)
+class CalibrationVariable:
+    """A variable of a calibration: its dimensions, unit and meaning, and how two of its values are compared.
+
+    A difference is judged in units of `scale`: the value and its interval; the standard deviations of two
+    parameters; the value; the value, or 1 if that is larger; or the largest measured value of the output.
+    """
+
+    dims: tuple[str, ...]
+    unit: str
+    meaning: str
+    scale: Literal["exact", "itself + interval", "deviations", "itself", "max(1, itself)", "measured"]
+
+
+_OF_PARAMETER = ("model", "parameter")
+_OF_CURVE = ("model", "output_name", "grid")
+CALIBRATION_VARIABLES = {
+    "estimate": CalibrationVariable(
+        _OF_PARAMETER, "SI", "best value of the parameter; NaN where the law does not have it", "itself + interval"
     ),
-    "fit_status": (("model",), "1", "outcome of the fit"),
-    "chi2_reduced": (("model",), "1", "squared residuals in variances per degree of freedom"),
-    "excess": (("model",), "SI", "standard deviation between specimens, besides that of the measurements"),
-    "aicc": (("model",), "1", "corrected information criterion of Akaike"),
-    "weight": (("model",), "1", "Akaike weight among the laws whose fit has no defect"),
-    "loo": (("model",), "1", "root mean square of leave-one-out residuals, in standard deviations"),
-    "predicted": (("model", "point"), "SI", "output of the law at the point"),
-    "residual": (("model", "point"), "SI", "measured minus predicted"),
-    "curve": (("model", "output_name", "grid"), "SI", "output of the law over the varied input"),
-    "curve_lower": (("model", "output_name", "grid"), "SI", "lower end of the band of 95 % of the curve"),
-    "curve_upper": (("model", "output_name", "grid"), "SI", "upper end of the band of 95 % of the curve"),
+    "lower": CalibrationVariable(
+        _OF_PARAMETER, "SI", "lower end of the interval of 95 % by profile likelihood", "itself + interval"
+    ),
+    "upper": CalibrationVariable(
+        _OF_PARAMETER, "SI", "upper end of the interval of 95 % by profile likelihood", "itself + interval"
+    ),
+    "covariance": CalibrationVariable(
+        (*_OF_PARAMETER, "other_parameter"), "SI", "covariance in the linear approximation", "deviations"
+    ),
+    "identifiable": CalibrationVariable(
+        _OF_PARAMETER, "1", "1 if the data determine the parameter, -1 if it is not the law's", "exact"
+    ),
+    "fit_status": CalibrationVariable(("model",), "1", "outcome of the fit", "exact"),
+    "chi2_reduced": CalibrationVariable(
+        ("model",), "1", "squared residuals in variances per degree of freedom", "max(1, itself)"
+    ),
+    "excess": CalibrationVariable(
+        ("model",), "SI", "standard deviation between specimens, besides that of the measurements", "itself"
+    ),
+    "aicc": CalibrationVariable(("model",), "1", "corrected information criterion of Akaike", "max(1, itself)"),
+    "weight": CalibrationVariable(
+        ("model",), "1", "Akaike weight among the laws whose fit has no defect", "max(1, itself)"
+    ),
+    "loo": CalibrationVariable(
+        ("model",), "1", "root mean square of leave-one-out residuals, in standard deviations", "max(1, itself)"
+    ),
+    "predicted": CalibrationVariable(("model", "point"), "SI", "output of the law at the point", "measured"),
+    "residual": CalibrationVariable(("model", "point"), "SI", "measured minus predicted", "measured"),
+    "curve": CalibrationVariable(_OF_CURVE, "SI", "output of the law over the varied input", "measured"),
+    "curve_lower": CalibrationVariable(_OF_CURVE, "SI", "lower end of the band of 95 % of the curve", "measured"),
+    "curve_upper": CalibrationVariable(_OF_CURVE, "SI", "upper end of the band of 95 % of the curve", "measured"),
 }
 # coordinates besides those of models and inputs; those that are text
 CALIBRATION_TEXTS = frozenset({"parameter", "other_parameter", "output_name", "output", "determined"})
@@ -180,16 +212,20 @@ def calibration_template(
             "output_name", outputs, {"long_name": "measured output", "units": " ".join(units[o] for o in outputs)},
         )  # fmt: skip
     variables = {}
-    for variable, (dims, unit, meaning) in CALIBRATION_VARIABLES.items():
-        if set(dims) <= sizes.keys() and (name or "grid" not in dims):
-            about: dict[str, object] = {"units": unit, "long_name": meaning}
+    for variable, of_variable in CALIBRATION_VARIABLES.items():
+        if set(of_variable.dims) <= sizes.keys() and (name or "grid" not in of_variable.dims):
+            about: dict[str, object] = {"units": of_variable.unit, "long_name": of_variable.meaning}
             dtype = np.int8 if variable in ("identifiable", "fit_status") else float
             if variable == "fit_status":
                 about |= {
                     "flag_values": np.arange(len(FIT_STATUSES), dtype=np.int8),
                     "flag_meanings": " ".join(FIT_STATUSES),
                 }
-            variables[variable] = (dims, np.zeros([sizes[dim] for dim in dims], dtype), about)
+            variables[variable] = (
+                of_variable.dims,
+                np.zeros([sizes[dim] for dim in of_variable.dims], dtype),
+                about,
+            )
     attributes = provenance_attributes(plan) | {
         "noise": data.noise,
         "data_file": data.file,

@@ -347,6 +347,18 @@ def single_point(
     return replace(config, axes=kept, scalars=scalars, models=config.models[:1]), tuple(first)
 
 
+def models_of_source(
+    source: ConfigSource, overrides: Sequence[str], plugins: Plugins, at: Mapping[str, float | str]
+) -> tuple[str, ...]:
+    """The keys of the models that a source of `single_point` selects; none where its config cannot be read."""
+    read, _ = _config_reader(source, overrides, plugins)
+    try:
+        config = read([f"{_override_path(name)}={_toml_value(value)}" for name, value in at.items()])
+    except ConfigError:
+        return ()
+    return tuple(model.key for model in config.models)
+
+
 def _config_reader(
     source: ConfigSource, overrides: Sequence[str], plugins: Plugins
 ) -> tuple[ReadConfig, dict[str, float | str]]:

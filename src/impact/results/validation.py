@@ -182,7 +182,8 @@ def _calibration_violations(dataset: xr.Dataset) -> Iterator[str]:
             yield f"{', '.join(strange)}: of a calibration, which has the axis parameter"
         return
     grid = bool(dataset.attrs.get("varied"))
-    for name, (dims, *_) in CALIBRATION_VARIABLES.items():
+    for name, variable in CALIBRATION_VARIABLES.items():
+        dims = variable.dims
         if "grid" in dims and not grid:
             continue
         if name not in dataset or dataset[name].dims != dims:
