@@ -25,7 +25,10 @@ SHOWN_ATTRIBUTES = (
     "plugins",
     "tolerances",
     "reason",
+    "design",
 )
+# longer lists of numbers are abbreviated
+MAX_LISTED_NUMBERS = 4
 
 
 def info(
@@ -108,6 +111,6 @@ def _values_text(dataset: xr.Dataset, name: str) -> str:
         return f"{ends}{coordinate.size} values"
     values = coordinate.values.reshape(-1)
     distinct = list(dict.fromkeys(values.tolist()))
-    if values.dtype.kind == "f" and len(distinct) > 4:
+    if values.dtype.kind in "fi" and len(distinct) > MAX_LISTED_NUMBERS:
         return f"{number(values.min())} … {number(values.max())}, {values.size} values"
     return ", ".join(label(value) for value in distinct)

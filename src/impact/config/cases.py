@@ -167,14 +167,18 @@ def inline_files(
             store_values(("sweep", "cases"), _read_cases(open_csv(cases), models, n))
         except ConfigError as error:
             problems += error.problems
-    for path, reference in list(_file_columns(data)):
+    for path, file, column in list(_file_columns(data)):
         try:
-            table, column = open_csv(reference["file"]), reference["column"]
+            table = open_csv(file)
+            is_sample = column is None
+            if column is None:
+                # the only column, or that of the input
+                column = next(iter(table.units)) if len(table.units) == 1 else name_of(path)
             if column not in table.units:
                 expected = f"one of its columns; {suggest(column, list(table.units))}"
                 raise ConfigError([f"{table.name}:1: got {show(column)}, expected {expected}"])
-            quantity = quantity_at(path, models)
-            store_values(path, column_values(table, column, quantity, n))
+            values = column_values(table, column, quantity_at(path, models), n)
+            store_values(path, {"empirical": values} if is_sample else values)
         except ConfigError as error:
             problems += error.problems
         except KeyError:
@@ -244,12 +248,14 @@ def input_values(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, Any]]:
             yield (*path, key), value
 
 
-def _file_columns(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, Mapping[str, str]]]:
-    """The path and the table of every `{ file = ..., column = ... }`."""
+def _file_columns(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, str, str | None]]:
+    """The path, the file and the column of every `{ file = ..., column = ... }` and `{ empirical = file }`."""
     for path, reference in input_values(data):
-        is_column = isinstance(reference, dict) and reference.keys() == {"file", "column"}
-        if is_column and all(isinstance(text, str) for text in reference.values()):
-            yield path, reference
+        match reference:
+            case {"file": str(file), "column": str(column), **others} if not others:
+                yield path, file, column
+            case {"empirical": str(file), **others} if not others:
+                yield path, file, None
 
 
 def expand_cases(

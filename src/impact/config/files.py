@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import ConfigError
 from ..text import safe_text
 from .lines import BARE_KEY
-from .quantities import RANGE_FORMS, ConfigProblem, KeyPath, show
+from .quantities import VALUE_FORMS, ConfigProblem, KeyPath, show
 
 MAX_CONFIG_BYTES = 1_000_000  # size of a TOML file
 MAX_OVERRIDE_LENGTH = 4_000_000  # characters of the value of an override
@@ -182,7 +182,7 @@ def apply_overrides(
             problems.append(f"--set {safe_text(text)}: expected PATH=VALUE, such as sweep.e=0.5")
             continue
         is_input = path[0] in ("sweep", "model", "materials") and len(path) > 2
-        new_range = is_input and path[-1] in (*RANGE_FORMS, "fit")
+        new_range = is_input and path[-1] in VALUE_FORMS
         data, start = set_value(data, path, read_value(value_text), new_range=new_range)
         overridden = {old: override for old, override in overridden.items() if old[: len(start)] != start}
         overridden[start] = (index, path)
@@ -221,7 +221,8 @@ def set_value(
 ) -> tuple[dict[str, Any], KeyPath]:
     """The data with the value at the path, and the part of the path that is new or replaced.
 
-    With `new_range`, the other keys of the innermost table are removed: one range or fit replaces another.
+    With `new_range`, the other keys of the innermost table are removed: one range, fit or distribution replaces
+    another.
 
     >>> set_value({"sweep": {"e": 0.5}}, ("sweep", "e", "linspace"), [0, 1, 3], new_range=True)
     ({'sweep': {'e': {'linspace': [0, 1, 3]}}}, ('sweep', 'e'))

@@ -15,6 +15,8 @@ from .quantities import MAX_PROBLEMS, ConfigProblem, KeyPath, Names, Numbers, Qu
 MAX_POINTS = 10**9
 # limit of the points of a factored result, which are not stored one by one: they must fit in 64-bit indices
 MAX_COUNTED_POINTS = 2**62
+# name of the dimension of the samples of uncertain inputs
+SAMPLE = "sample"
 # HDF5 arrays have at most 32 dimensions, and the models take one
 MAX_AXES = 31
 FULL_LAYOUT_HINT = ' in layout "full" (--max-points); layout = "factored" stores any number'
@@ -34,7 +36,7 @@ class Axis:
     ----------
     columns : values by config name, all of one length
     numbered : name of a dimension whose points are numbered from 0, because no column labels them: that of a table
-        of cases, or of a group with repeated values; empty where the first column labels the points
+        of cases, of samples, or of a group with repeated values; empty where the first column labels the points
     numbers : the numbers of its points, where it is a part of such a dimension; empty for a whole dimension
 
     >>> Axis({"m1": (1.0, 2.0), "m2": (2.0, 4.0)}).name
@@ -76,6 +78,7 @@ def build_grid(
     quantities: Mapping[str, Quantity],
     groups: Sequence[Sequence[str]],
     cases: Sequence[str],
+    samples: Sequence[str],
     config_names: Sequence[str],
     n_models: int,
     max_points: int = MAX_POINTS,
@@ -90,6 +93,7 @@ def build_grid(
     quantities : the quantity of each numeric value, by config name
     groups : config names that vary together
     cases : config names of the columns of a table of cases
+    samples : config names of the inputs with drawn values
     config_names : all names in the config, also those with invalid values
     n_models : number of models
     max_points : limit of the number of points
@@ -97,9 +101,11 @@ def build_grid(
     """
     axis_sizes = {name: _axis_size(value) for name, value in values.items()}
     scalars = {name: value for name, value in values.items() if isinstance(value, float | str)}
-    member_of, problems = _zip_groups(groups, axis_sizes, cases, config_names)
-    case_columns = [name for name in values if name in cases]
-    member_of |= dict.fromkeys(case_columns, case_columns)
+    together = dict.fromkeys(cases, "a column of cases") | dict.fromkeys(samples, "an uncertain input")
+    member_of, problems = _zip_groups(groups, axis_sizes, together, config_names)
+    for numbered in (cases, samples):
+        columns_of = [name for name in values if name in numbered]
+        member_of |= dict.fromkeys(columns_of, columns_of)
     axis_names = [name for name in values if name not in scalars]
     # a group takes the position of its first member
     leaders = [name for name in axis_names if member_of.get(name, (name,))[0] == name]
@@ -126,7 +132,7 @@ def build_grid(
     # a group member with an invalid value has no column; that problem is reported by the validation
     groups = [member_of.get(name, (name,)) for name in leaders]
     is_complete = not problems and all(name in columns for group in groups for name in group)
-    return Grid(scalars, _build_axes(groups, columns, cases) if is_complete else (), tuple(problems))
+    return Grid(scalars, _build_axes(groups, columns, cases, samples) if is_complete else (), tuple(problems))
 
 
 def _axis_size(value: Numbers | Names) -> int | None:
@@ -140,11 +146,15 @@ def _axis_size(value: Numbers | Names) -> int | None:
 
 
 def _build_axes(
-    groups: Sequence[Sequence[str]], columns: Mapping[str, AxisValues], cases: Sequence[str]
+    groups: Sequence[Sequence[str]],
+    columns: Mapping[str, AxisValues],
+    cases: Sequence[str],
+    samples: Sequence[str],
 ) -> tuple[Axis, ...]:
     """The axes of groups of columns; the first column without repeated values names the axis.
 
-    The points of cases, and of a group without such a column, are numbered: "case", then "case_2" and so on.
+    The points of cases, and of a group without such a column, are numbered: "case", then "case_2" and so on; the
+    points of uncertain inputs are numbered "sample".
     """
     axes: list[Axis] = []
     numbered = 1 if cases else 0
@@ -153,6 +163,8 @@ def _build_axes(
         dimension = ""
         if group[0] in cases:
             dimension = "case"
+        elif group[0] in samples:
+            dimension = SAMPLE
         elif not naming:
             numbered += 1
             dimension = "case" if numbered == 1 else f"case_{numbered}"
@@ -209,7 +221,7 @@ def name_of(path: KeyPath) -> str:
 def _zip_groups(
     groups: Sequence[Sequence[str]],
     sizes: Mapping[str, int | None],
-    cases: Sequence[str],
+    together: Mapping[str, str],
     config_names: Sequence[str],
 ) -> tuple[dict[str, Sequence[str]], list[ConfigProblem]]:
     """The group of each zipped name, and problems: names that are no axis, are repeated, or differ in length.
@@ -218,7 +230,7 @@ def _zip_groups(
     ----------
     groups : config names that vary together
     sizes : number of values of each valid key, by config name; None for a scalar
-    cases : config names of the columns of a table of cases, which vary together already
+    together : what the names are that vary together without a group, by config name
     config_names : all names in the config, also those with invalid values
     """
     member_of: dict[str, Sequence[str]] = {}
@@ -235,8 +247,8 @@ def _zip_groups(
                 problems.append((path, f"got {show(name)}, expected an axis; {suggestion}"))
             elif name in member_of:
                 problems.append((path, f"got {show(name)} twice, expected each name once"))
-            elif name in cases:
-                problems.append((path, f"got {show(name)}, a column of cases, which vary together already"))
+            elif name in together:
+                problems.append((path, f"got {show(name)}, {together[name]}; those vary together already"))
             elif name in sizes and size is None:
                 message = f"got {show(name)}, which is a scalar, expected an axis: a list or a range"
                 problems.append((path, message))

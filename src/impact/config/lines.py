@@ -12,11 +12,12 @@ from pydantic import ValidationError
 from ..contact.model import ForceModel
 from ..text import safe_text
 from . import quantities
-from .quantities import RANGE_FORMS, Column, ConfigProblem, KeyPath, show, suggest
+from .quantities import VALUE_FORMS, Column, ConfigProblem, KeyPath, show, suggest
 from .tables import (
     MATERIAL_QUANTITIES,
     MODELS_EXPECTED,
     Data,
+    Design,
     Document,
     MaterialTable,
     Output,
@@ -238,9 +239,11 @@ def _unknown_key_hint(location: KeyPath, models: Mapping[str, ForceModel]) -> st
     keys: Iterable[str]
     match location[:-1]:
         case (*_, quantities.RANGE):
-            keys = (*RANGE_FORMS, "fit")
+            keys = VALUE_FORMS
         case (*_, quantities.FIT):
             keys = ("fit",)
+        case (*_, quantities.DISTRIBUTION):
+            keys = quantities.DISTRIBUTION_FORMS
         case (*_, quantities.COLUMN):
             keys = Column.model_fields
         case ():
@@ -249,6 +252,8 @@ def _unknown_key_hint(location: KeyPath, models: Mapping[str, ForceModel]) -> st
             keys = Sweep.model_fields
         case ("data",):
             keys = Data.model_fields
+        case ("design",):
+            keys = Design.model_fields
         case ("materials", _):
             keys = MaterialTable.model_fields
         case ("model",):

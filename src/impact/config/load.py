@@ -20,6 +20,7 @@ from ..contact.outputs import BY_DEFAULT
 from ..contact.timestep import EXACT
 from ..errors import ConfigError
 from .cases import expand_cases, inline_files
+from .design import design_problems, distribution_paths, draw_columns, unit_samples
 from .files import (
     apply_overrides,
     as_table,
@@ -41,7 +42,18 @@ from .measurements import (
     inline_measurements,
     purpose_problems,
 )
-from .quantities import Column, ConfigProblem, FitRange, KeyPath, Names, Numbers, Range, Table, ValidationContext
+from .quantities import (
+    Column,
+    ConfigProblem,
+    Distribution,
+    FitRange,
+    KeyPath,
+    Names,
+    Numbers,
+    Range,
+    Table,
+    ValidationContext,
+)
 from .rules import RawConfig, listed_names, rule_problems
 from .tables import (
     DEFAULT_RTOL,
@@ -49,6 +61,7 @@ from .tables import (
     MATERIAL_KEYS,
     SWEEP_DEFAULTS,
     SWEEP_QUANTITIES,
+    Design,
     Document,
     MaterialTable,
     Output,
@@ -99,6 +112,8 @@ class Config:
         without the library or any file
     fits : the least and the largest value of each parameter to fit, by config name; empty for a sweep
     data : the measurements to which they are fitted; None for a sweep
+    design : how the samples of uncertain inputs are drawn; None without any
+    distributions : of the uncertain inputs, by config name; their drawn values are an axis
     """
 
     title: str
@@ -112,6 +127,8 @@ class Config:
     overrides: tuple[str, ...]
     fits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     data: Measurements | None = None
+    design: Design | None = None
+    distributions: Mapping[str, Distribution] = field(default_factory=dict)
 
 
 def read_config(
@@ -248,13 +265,23 @@ class _Reader:
         if self.purpose == "calibrate":
             problems += _calibration_problems(data, values, fits, are_valid=not invalid_values)
             values = {name: value for name, value in values.items() if isinstance(value, float | str)}
-        quantities = {name: quantity_at(path_of(name), self.models) for name in values}
+        else:
+            problems += design_problems(data)
+        optional = {name: quantity_at(path_of(name), self.models) for name in values}
+        quantities = {name: quantity for name, quantity in optional.items() if quantity is not None}
         output = document.output
+        distributions = {name: value for name, value in values.items() if isinstance(value, Distribution)}
+        if distributions and document.design is not None:
+            u = unit_samples(document.design, len(distributions))
+            drawn, draw_problems = draw_columns(distributions, quantities, u)
+            problems += [(path_of(name), message) for name, message in draw_problems.items()]
+            values |= {name: tuple(column.tolist()) for name, column in drawn.items()}
         grid = build_grid(
             values,
-            {name: quantity for name, quantity in quantities.items() if quantity is not None},
+            quantities,
             document.sweep.zip if self.purpose == "sweep" else (),
             tuple(cases) if self.purpose == "sweep" else (),
+            tuple(distributions),
             raw.names,
             len(models),
             self.max_points,
@@ -290,6 +317,8 @@ class _Reader:
             overrides=(*library_overrides, *overrides),
             fits=fits,
             data=measurements,
+            design=document.design,
+            distributions=distributions,
         ), []
 
     def _validate(
@@ -393,8 +422,12 @@ def _valid_values(document: Document, raw: RawConfig) -> dict[str, Numbers | Nam
         # parameters of models that are not selected are checked, but are not part of the grid
         parameters = _values_by_key(tables.get(key)) if key in selected else {}
         values |= {f"{key}.{name}": value for name, value in parameters.items()}
-    # a Column that is left names a file that cannot be read
-    return {name: value for name, value in values.items() if not isinstance(value, Column)}
+    # a file that is left cannot be read
+    return {name: value for name, value in values.items() if not _names_file(value)}
+
+
+def _names_file(value: Numbers | Names) -> bool:
+    return isinstance(value, Column) or (isinstance(value, Distribution) and isinstance(value.empirical, str))
 
 
 def _values_by_key(table: Table | None) -> dict[str, Any]:
@@ -443,6 +476,9 @@ def _calibration_problems(
     for name, value in values.items():
         if isinstance(value, tuple | Range):
             problems.append((path_of(name), f"got an axis, {single}"))
+    uncertain = next(distribution_paths(data), ("design",) if "design" in data else ())
+    if uncertain:
+        problems.append((uncertain, "got an uncertain input, which impact sweep and impact sensitivity take"))
     if as_table(data.get("sweep")).get("zip"):
         problems.append((("sweep", "zip"), f"got axes that vary together, {single} for each name"))
     return problems

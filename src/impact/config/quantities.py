@@ -1,4 +1,4 @@
-"""Numbers of a config as pydantic types: quantities with units and bounds, lists, ranges, columns and fits."""
+"""Numbers of a config as pydantic types: quantities with units and bounds, lists, ranges, fits, distributions."""
 
 from __future__ import annotations
 
@@ -60,12 +60,22 @@ UNIT_SYNTAX = re.compile(rf"/?\s*{_PRODUCT}(?:\s*[*/]\s*\(\s*{_PRODUCT}\s*\))?")
 
 # tags of the forms that a value may have; no key of a config contains NUL, so tags can be removed from paths
 SCALAR, LIST, RANGE, COLUMN, FIT = "\0scalar", "\0list", "\0range", "\0column", "\0fit"
+DISTRIBUTION = "\0distribution"
 RANGE_FORMS = {
     "linspace": "[first, last, count]",
     "geomspace": "[first, last, count]",
     "arange": "[first, stop, step]",
 }
 FIT_FORM = "[least, most]"
+DISTRIBUTION_FORMS = {
+    "uniform": "[least, most]",
+    "normal": "[mean, standard_deviation]",
+    "lognormal": "[median, geometric_standard_deviation]",
+    "triangular": "[least, mode, most]",
+    "empirical": "the name of a CSV file, or a list of numbers",
+}
+# keys of a table that is the value of an input
+VALUE_FORMS = (*RANGE_FORMS, "fit", *DISTRIBUTION_FORMS)
 # ratio of the bounds of a positive parameter from which its middle is the geometric mean
 WIDE_BOUNDS_RATIO = 100.0
 
@@ -362,18 +372,61 @@ class FitRange(Table):
         return 0.5 * least + 0.5 * most
 
 
+class Distribution(Table):
+    """The distribution of an uncertain input, from which [design] draws: exactly one of its fields is given."""
+
+    model_config = ConfigDict(json_schema_extra=_range_schema)
+
+    uniform: tuple[float, float] | None = None
+    normal: tuple[float, float] | None = None
+    lognormal: tuple[float, float] | None = None
+    triangular: tuple[float, float, float] | None = None
+    empirical: str | tuple[float, ...] | None = None
+
+    @model_validator(mode="after")
+    def _check_numbers(self) -> Distribution:
+        if len(self.model_fields_set) != 1:
+            got = " and ".join(name for name in DISTRIBUTION_FORMS if name in self.model_fields_set)
+            raise value_error(f"got {got}, expected one distribution")
+        form = DISTRIBUTION_FORMS[self.kind]
+        numbers = [part for part in self.parameters if isinstance(part, float)]
+        if self.kind in ("uniform", "triangular") and not (
+            sorted(numbers) == numbers and numbers[0] < numbers[-1]
+        ):
+            got = " to ".join(f"{number:g}" for number in numbers)
+            raise located_errors([((self.kind,), f"got {got}, expected {form} in ascending order")])
+        if self.kind == "lognormal" and numbers[0] <= 0.0:
+            raise located_errors([((self.kind, 0), f"got {numbers[0]:g}, expected a median > 0")])
+        return self
+
+    @property
+    def kind(self) -> str:
+        """Name of the field that is set."""
+        return next(name for name in DISTRIBUTION_FORMS if getattr(self, name) is not None)
+
+    @property
+    def parameters(self) -> tuple[float | str, ...]:
+        """The numbers of the distribution, or the name of a file that cannot be read."""
+        value = getattr(self, self.kind)
+        return (value,) if isinstance(value, str) else tuple(value)
+
+
 # the values of keys that may be axes
-Numbers: TypeAlias = float | tuple[float, ...] | Range | Column | FitRange
+Numbers: TypeAlias = float | tuple[float, ...] | Range | Column | FitRange | Distribution
 Names: TypeAlias = str | tuple[str, ...] | Column
 
 
 def value_form(value: object) -> str:
-    """The tag of the form of a value: a number or text, a list, a range, a column of a file, or a fit."""
+    """The tag of the form of a value: a number or text, a list, a range, a column, a fit or a distribution."""
     match value:
         case list():
             return LIST
         case {"fit": _} | FitRange():
             return FIT
+        case Distribution():
+            return DISTRIBUTION
+        case dict() if not DISTRIBUTION_FORMS.keys().isdisjoint(value):
+            return DISTRIBUTION
         case {"file": _} | {"column": _}:
             return COLUMN
         case dict() | Range():
@@ -383,7 +436,7 @@ def value_form(value: object) -> str:
 
 def _name_form(value: object) -> str:
     form = value_form(value)
-    return SCALAR if form in (RANGE, FIT) else form
+    return SCALAR if form in (RANGE, FIT, DISTRIBUTION) else form
 
 
 def _list_of(element: Any, description: str) -> Any:
@@ -415,7 +468,8 @@ class Quantity:
     """A number of the config: its unit, meaning and interval; used as the annotation of its type.
 
     `Annotated[float, Quantity("1", "tolerance", 0, 1)]` is a number, bare or with its unit;
-    `Annotated[Numbers, Quantity("kg", "mass", 0)]` may also be a list, a range, a column of a file or a fit.
+    `Annotated[Numbers, Quantity("kg", "mass", 0)]` may also be a list, a range, a column of a file, a fit or a
+    distribution.
 
     Parameters
     ----------
@@ -566,7 +620,7 @@ def number_type(quantity: Quantity) -> Any:
 
 @cache
 def numbers_type(quantity: Quantity) -> Any:
-    """The type of a number, list, range, column of a file or fit; the form decides which type validates it."""
+    """The type of a number, list, range, column, fit or distribution; its form decides which type validates it."""
     number, end = number_type(quantity), number_type(replace(quantity, infinite=False))
     any_number, count = number_type(Quantity(quantity.unit, "")), bounded_int(1).type
     numbers_of = cast(Any, tuple)
@@ -590,13 +644,38 @@ def numbers_type(quantity: Quantity) -> Any:
         | Annotated[_list_of(number, quantity.expected), Tag(LIST)]
         | Annotated[range_type, Tag(RANGE)]
         | Annotated[Column, Tag(COLUMN)]
-        | Annotated[fit_type, Tag(FIT)],
+        | Annotated[fit_type, Tag(FIT)]
+        | Annotated[_distribution_type(quantity, end), Tag(DISTRIBUTION)],
         Discriminator(value_form),
     ]
 
 
+def _distribution_type(quantity: Quantity, end: Any) -> type[Distribution]:
+    """The type of a distribution of a quantity; `end` is the type of one of its finite values."""
+    spread = number_type(Quantity(quantity.unit, "", 0.0, above=True))
+    ratio = number_type(Quantity("1", "", 1.0, above=True))
+    numbers_of = cast(Any, tuple)
+    types = {
+        "uniform": numbers_of[end, end],
+        "normal": numbers_of[end, spread],
+        "lognormal": numbers_of[end, ratio],
+        "triangular": numbers_of[end, end, end],
+    }
+    fields: dict[str, Any] = {}
+    for kind, numbers in types.items():
+        form = DISTRIBUTION_FORMS[kind]
+        check = BeforeValidator(_list_of_length(3 if kind == "triangular" else 2, form))
+        fields[kind] = Annotated[numbers, Field(description=form, strict=False), check], None
+    file: Any = Annotated[str, expected(DISTRIBUTION_FORMS["empirical"]), Tag(SCALAR)]
+    values: Any = Annotated[_list_of(end, quantity.expected), Tag(LIST)]
+    either = Annotated[file | values, Discriminator(lambda value: SCALAR if isinstance(value, str) else LIST)]
+    fields["empirical"] = Annotated[either, Field(description=DISTRIBUTION_FORMS["empirical"])], None
+    of_quantity = quantity.expected.removeprefix("a ")
+    return create_model(f"Distribution of {of_quantity}", __base__=Distribution, **fields)
+
+
 def _list_of_length(length: int, form: str) -> Callable[[object], object]:
-    """A check that the list of a range or a fit has as many numbers as its form."""
+    """A check that the list of a range, a fit or a distribution has as many numbers as its form."""
 
     def check(value: object) -> object:
         if isinstance(value, list | tuple) and len(value) == length:

@@ -17,6 +17,7 @@ from pydantic import (
     Tag,
     ValidationInfo,
     create_model,
+    model_validator,
 )
 from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
@@ -56,6 +57,8 @@ MAX_SOLVER_STEPS = 10**9
 CORES = ("auto", "numpy", "numba")
 INTEGRATORS = (EXACT, *SCHEMES)
 NOISES = ("given", "scale", "excess")
+DESIGN_METHODS = ("sobol", "lhs", "halton", "random")
+MAX_SAMPLES = 2**22
 MODELS_EXPECTED = 'a model, or a list of models; "all" are all'
 
 
@@ -270,6 +273,32 @@ class Data(Table):
     ] = Field(None, description="standard deviation of the first output, or a list of them")
 
 
+class Design(Table):
+    """How many samples of uncertain inputs are drawn, and by which method."""
+
+    method: Annotated[
+        str,
+        ReadAs(Literal[DESIGN_METHODS]),
+        known_name("a method", lambda info: DESIGN_METHODS),
+        Field(description="scrambled Sobol or Halton sequence, Latin hypercube, or independent samples"),
+    ] = "sobol"
+    n: Annotated[int, bounded_int(1, MAX_SAMPLES), Field(description="samples; a power of two for sobol")]
+    seed: Annotated[int, bounded_int(0, 2**63 - 1), Field(description="of the random numbers")] = 0
+
+    @model_validator(mode="after")
+    def _check_n(self) -> Design:
+        if self.method == "sobol":
+            check_power_of_two(self.n, "for sobol")
+        return self
+
+
+def check_power_of_two(n: int, purpose: str) -> None:
+    """Raise a ValidationError, which names the two next powers of two, if n is none."""
+    if n & (n - 1):
+        nearest = f"{1 << (n.bit_length() - 1)} or {1 << n.bit_length()}"
+        raise located_errors([(("n",), f"got {n}, expected a power of two {purpose}: {nearest}")])
+
+
 def model_quantities(model: ForceModel) -> dict[str, Quantity]:
     """The quantities of [model.KEY]: the parameters, and K of a model with a fixed exponent."""
     stiffness = {} if model.exponent is None else {"K": LAW_STIFFNESS}
@@ -330,6 +359,9 @@ class Document(Table):
     solver: Solver = Field(default_factory=lambda: Solver())
     output: Output = Field(default_factory=lambda: Output())
     data: Annotated[Any, ReadAs(Data)] = Field(None, description="measurements, for impact calibrate only")
+    design: Annotated[Any, ReadAs(Design)] = Field(
+        None, description="samples of the inputs that are distributions"
+    )
     model: Any = None
 
 

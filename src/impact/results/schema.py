@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 
 from .._version import __version__
 from ..array_types import Array
+from ..config.grid import SAMPLE
+from ..config.load import Config
 from ..config.tables import MATERIAL_KEYS, MATERIAL_QUANTITIES, SWEEP_QUANTITIES, model_quantities
 from ..contact.materials import effective_mass
 from ..contact.outputs import BY_DEFAULT, UNITS
@@ -222,7 +224,11 @@ def _coordinates_by_name(plan: Plan) -> dict[str, object]:
     }
     for axis in plan.config.axes:
         if axis.numbered:
-            coordinates[axis.name] = (axis.name, list(axis.labels), {"long_name": "number of the case"})
+            coordinates[axis.name] = (
+                axis.name,
+                list(axis.labels),
+                {"long_name": f"number of the {axis.name.partition('_')[0]}"},
+            )
         for name, values in axis.columns.items():
             coordinates[name] = (axis.name, list(values), coordinate_attributes(plan, name))
     for name, value in plan.config.scalars.items():
@@ -301,12 +307,12 @@ def is_input(name: str) -> bool:
 
 
 def is_case(name: str) -> bool:
-    """Whether a dimension numbers its points: that of a table of cases, or of a similar group.
+    """Whether a dimension numbers its points: that of a table of cases, of a similar group, or of samples.
 
-    >>> is_case("case"), is_case("case_2"), is_case("m1")
-    (True, True, False)
+    >>> is_case("case"), is_case("case_2"), is_case("sample"), is_case("m1")
+    (True, True, True, False)
     """
-    return re.fullmatch(r"case(_[0-9]{1,3})?", name) is not None
+    return re.fullmatch(rf"case(_[0-9]{{1,3}})?|{SAMPLE}", name) is not None
 
 
 def derived_names(coords: Mapping[Any, xr.DataArray]) -> frozenset[str]:
@@ -381,6 +387,17 @@ def _derived_values(
     return tuple(plan.config.axes[axis].name for axis in axes), values.reshape(shape)
 
 
+def design_record(config: Config) -> dict[str, object]:
+    """The method, number and seed of the samples of a config, and the distributions by config name."""
+    assert config.design is not None
+    return config.design.model_dump() | {
+        "distributions": {
+            name: {distribution.kind: list(distribution.parameters)}
+            for name, distribution in config.distributions.items()
+        }
+    }
+
+
 def provenance_attributes(plan: Plan) -> dict[str, object]:
     """The attributes from which a result can be repeated."""
     config = plan.config
@@ -399,4 +416,5 @@ def provenance_attributes(plan: Plan) -> dict[str, object]:
         "packages": json.dumps({name: version(name) for name in RECORDED_PACKAGES}),
         "plugins": json.dumps(plan.plugins.record),
         "materials": json.dumps(plan.material_record),
+        **({} if config.design is None else {"design": json.dumps(design_record(config))}),
     }

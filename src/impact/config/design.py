@@ -1,0 +1,121 @@
+"""Uncertain inputs of a config: the table [design], and the samples that it draws from distributions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from ..array_types import Array
+from .cases import input_values
+from .quantities import DISTRIBUTION_FORMS, ConfigProblem, Distribution, KeyPath, Quantity, show
+from .tables import Design
+
+# samples of a unit interval stay this far from its ends, half the resolution of a Sobol sequence, so that no value
+# of a normal distribution is infinite
+LEAST_UNIT = 2.0**-31
+
+
+def distribution_paths(data: Mapping[str, Any]) -> Iterator[KeyPath]:
+    """The path of every distribution in the plain data of a config."""
+    for path, value in input_values(data):
+        if isinstance(value, dict) and not DISTRIBUTION_FORMS.keys().isdisjoint(value):
+            yield path
+
+
+def design_problems(data: Mapping[str, Any]) -> list[ConfigProblem]:
+    """The problem of distributions without [design], or of [design] without a distribution."""
+    paths = list(distribution_paths(data))
+    if paths and "design" not in data:
+        return [
+            (path, "got a distribution, expected a table [design] as well, such as n = 1024") for path in paths
+        ][:1]
+    if not paths and "design" in data:
+        example = "{ normal = [1.0, 0.05] }"
+        return [
+            (
+                ("design",),
+                f"got a design without an uncertain input, expected at least one, such as v1 = {example}",
+            )
+        ]
+    return []
+
+
+def unit_samples(design: Design, dimensions: int) -> Array:
+    """Samples of the unit cube, shape (n, dimensions)."""
+    # it takes a third of a second, which sweeps without a design do without
+    from scipy.stats import qmc
+
+    random = np.random.default_rng(design.seed)
+    match design.method:
+        case "sobol":
+            samples = qmc.Sobol(dimensions, rng=random).random(design.n)
+        case "lhs":
+            samples = qmc.LatinHypercube(dimensions, rng=random).random(design.n)
+        case "halton":
+            samples = qmc.Halton(dimensions, rng=random).random(design.n)
+        case _:
+            samples = random.random((design.n, dimensions))
+    return np.clip(samples, LEAST_UNIT, 1.0 - LEAST_UNIT)
+
+
+def draw(distribution: Distribution, u: Array) -> Array:
+    """The values of a distribution at probabilities u: the inverse of its cumulative distribution function.
+
+    >>> draw(Distribution(triangular=(0.0, 1.0, 2.0)), np.array([0.125, 0.5, 0.875])).tolist()
+    [0.5, 1.0, 1.5]
+    >>> draw(Distribution(empirical=(3.0, 1.0)), np.array([0.2, 0.7])).tolist()
+    [1.0, 3.0]
+    """
+    from scipy.special import ndtri
+
+    numbers = [float(number) for number in distribution.parameters]
+    match distribution.kind:
+        case "uniform":
+            least, most = numbers
+            drawn = least + (most - least) * u
+        case "normal":
+            mean, deviation = numbers
+            drawn = mean + deviation * ndtri(u)
+        case "lognormal":
+            median, ratio = numbers
+            drawn = median * ratio ** ndtri(u)
+        case "triangular":
+            least, mode, most = numbers
+            rising = least + np.sqrt(u * (most - least) * (mode - least))
+            falling = most - np.sqrt((1.0 - u) * (most - least) * (most - mode))
+            drawn = np.where(u * (most - least) <= mode - least, rising, falling)
+        case _:
+            ordered = np.sort(numbers)
+            drawn = ordered[np.minimum((u * ordered.size).astype(int), ordered.size - 1)]
+    # -0.0 becomes 0.0
+    return np.asarray(drawn) + 0.0
+
+
+def draw_columns(
+    distributions: Mapping[str, Distribution], quantities: Mapping[str, Quantity], u: Array
+) -> tuple[dict[str, Array], dict[str, str]]:
+    """The drawn values of each input.
+
+    Parameters
+    ----------
+    distributions : by config name
+    quantities : the quantity of each input, whose interval the values have to be in
+    u : samples of the unit cube, shape (n, inputs)
+
+    Returns
+    -------
+    The values and the problems, both by config name.
+    """
+    columns: dict[str, Array] = {}
+    problems: dict[str, str] = {}
+    for (name, distribution), of_input in zip(distributions.items(), u.T, strict=True):
+        columns[name] = drawn = draw(distribution, of_input)
+        quantity = quantities[name]
+        above = drawn > quantity.least if quantity.above else drawn >= quantity.least
+        refused = drawn[~(above & (drawn <= quantity.most) & np.isfinite(drawn))]
+        if refused.size:
+            got = f"{refused.size:,} of {drawn.size:,} samples such as {show(float(refused[0]))}"
+            problems[name] = f"got {got}, expected a distribution whose values are each {quantity.expected}"
+    return columns, problems
