@@ -26,6 +26,7 @@ PACKAGES = (
     "plots",
     "exporters",
     "inverse",
+    "uncertainty",
     "comparison",
     "results",
     "engine",

@@ -190,7 +190,7 @@ def test_a_wrong_table_of_cases_is_an_error_with_line_and_column(
         ('sweep.e={file="cases.csv", column="m1", unit="g"}',
          '--set sweep.e={file="cases.csv", column="m1", unit="g"}: sweep.e.unit: unknown key; known: column, file'),
         ('sweep.zip=[["e", "v1"]]',
-         '--set sweep.zip=[["e", "v1"]]: sweep.zip[0][1]: got "v1", a column of cases, which vary together already'),
+         '--set sweep.zip=[["e", "v1"]]: sweep.zip[0][1]: got "v1", a column of cases; those vary together already'),
         ("sweep.cases=3",
          "--set sweep.cases=3: sweep.cases: got 3, expected the name of a CSV file, or a table of lists by config name, "
          "such as { v1 = [1.0, 2.0] }"),

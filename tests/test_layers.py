@@ -19,7 +19,7 @@ LAYERS = (
     {"engine"},
     {"results"},
     {"comparison"},
-    {"inverse"},
+    {"inverse", "uncertainty"},
     {"exporters"},
     {"plots"},
     {"reporting"},
@@ -32,11 +32,11 @@ HEIGHT = {part: height for height, parts in enumerate(LAYERS) for part in parts}
 # where each library may be imported
 LIBRARIES = {
     "typer": {"cli"}, "rich": {"cli"}, "matplotlib": {"plots"}, "pandas": {"plots"}, "jinja2": {"reporting"},
-    "markupsafe": {"reporting"}, "xarray": {"results", "comparison", "inverse"},
+    "markupsafe": {"reporting"}, "xarray": {"results", "comparison", "inverse", "uncertainty"},
     "h5py": {"results"}, "h5netcdf": {"results"}, "tomllib": {"config"}, "pydantic": {"config", "results"},
     "pydantic_core": {"config"},
     "pint": {"config"}, "filelock": {"engine"}, "numba": {"contact"},
-    "scipy": {"inverse"},
+    "scipy": {"config", "inverse", "uncertainty"},
     "dask": {"engine"}, "distributed": {"engine"},
 }  # fmt: skip
 MODULES = sorted(SOURCE.rglob("*.py"))

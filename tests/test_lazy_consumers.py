@@ -303,7 +303,11 @@ def test_coordinates_may_be_lazy(figure6: xr.Dataset, capsys: pytest.CaptureFixt
     assert sorted(capsys.readouterr().out.splitlines()) == sorted(expected.splitlines())
 
 
-@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in ("timestep", "calibration")])
+# kinds of picture that an ordinary sweep does not have
+OTHER_RESULTS = ("timestep", "calibration", "uncertainty", "sensitivity")
+
+
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in OTHER_RESULTS])
 def test_a_picture_reads_only_what_it_draws(small: xr.Dataset, big: tuple[xr.Dataset, Reads], kind: str) -> None:
     dataset, reads = big
     reads.clear()

@@ -31,8 +31,9 @@ from impact.results.single_impact import Impact
 from .conftest import ROOT, Run
 from .fork_server import ForkServer
 
+OTHER_RESULTS = ("timestep", "calibration", "uncertainty", "sensitivity")
 # those of the result of an ordinary sweep
-CURVES = [kind for kind in KINDS if kind not in ("map", "validity", "timestep", "calibration")]
+CURVES = [kind for kind in KINDS if kind not in ("map", "validity", *OTHER_RESULTS)]
 
 
 def selection_of(kind: str) -> dict[str, float]:

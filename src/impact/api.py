@@ -40,8 +40,8 @@ from .errors import UnfinishedError, UsageError, did_you_mean
 from .results.backend import check_output, open_result, write_file
 from .results.backend import load as load
 from .results.backend import save as save
-from .results.calibration import is_calibration, refuse_calibration
 from .results.extend import extend as extend_result
+from .results.kinds import is_calibration, require_sweep
 from .results.plausibility import material_notes
 from .results.provenance import config_of_part, stored_config
 from .results.ranking import Ranking, ranking
@@ -623,6 +623,66 @@ def calibrate(
     return result
 
 
+def sensitivity(
+    source: str | Path | Mapping[str, object],
+    *,
+    of: str = "e_out",
+    output: str | Path | None = None,
+    overwrite: bool = False,
+    overrides: Sequence[str] = (),
+    plugins: Sequence[ForceModel | str | Path] = (),
+    max_points: int = MAX_POINTS,
+    execute: Callable[[Plan], xr.Dataset] = execute,
+) -> xr.Dataset:
+    """Which uncertain input matters: Sobol indices of an output, its mean and quantiles, for every model.
+
+    For n samples of d uncertain inputs, n (d + 2) points are computed for each model and each point of the other
+    axes.
+
+    Parameters
+    ----------
+    source : a TOML file, or a mapping with the same keys, with distributions and `[design]`
+    of : name of the output
+    output : result file to write
+    overwrite : replace it if it exists
+    overrides, plugins : see `sweep`
+    max_points : the largest number of points
+    execute : function that runs a plan; by default it is run in this process
+
+    Returns
+    -------
+    Dataset : of dimensions model, the axes of the config, and input; see docs/uncertainty.md
+
+    Raises
+    ------
+    ConfigError : with one line for each problem; there is no design, or its n is no power of two
+    UsageError, StoreError : there is no such output, or the file exists or cannot be written
+
+    The peak force of Hertz' law is proportional to K^0.4 v^1.2:
+
+    >>> import impact
+    >>> study = impact.sensitivity({
+    ...     "models": "hertz",
+    ...     "sweep": {"v1": {"uniform": [0.8, 1.2]}, "m1": 1.0, "m2": 1.0, "K": {"uniform": [5e5, 1.5e6]}},
+    ...     "design": {"n": 1024},
+    ... }, of="peak_force")
+    >>> study["first"].values.round(2).tolist()
+    [[0.57, 0.43]]
+    """
+    # its modules import scipy.stats, which other functions do without
+    from .uncertainty.sensitivity import check_output_name, sensitivity_of, sensitivity_plan
+
+    check_output_name(of)
+    name = safe_text(str(source)) if isinstance(source, str | Path) else "config"
+    plan = sensitivity_plan(prepare(source, overrides, plugins, max_points), of, max_points, name)
+    if output is not None:
+        check_output(Path(output), overwrite=overwrite)
+    result = sensitivity_of(plan, of, execute)
+    if output is not None:
+        save(result, output, overwrite=overwrite)
+    return result
+
+
 def export(
     to: str,
     model: str | None = None,
@@ -858,7 +918,7 @@ def expand(
     output, shown = Path(output), safe_text(str(result))
     check_output(output, overwrite=overwrite, source=Path(result))
     opened = open_result(result)
-    refuse_calibration(opened, "expand")
+    require_sweep(opened, "expand")
     dataset = select(opened, sel or {})
     if "model" not in dataset.dims:
         raise UsageError(f"{shown}: is a time history, expected a result of a sweep")
@@ -912,6 +972,7 @@ def rerun(
     if is_calibration(stored):
         new = _repeat_calibration(stored, plugin_set, str(result))
         return replace(compare(new, stored, tol=tol, subset=subset), new="the rerun", baseline=str(result))
+    require_sweep(stored, "rerun")
     # models by key, because "all" may include new models; the tolerances that were used
     keys = stored["model"].values.tolist() if "model" in stored.dims else []
     solver = (f"solver.{name}={stored.attrs.get(name)}" for name in ("rtol", "max_steps"))
@@ -1018,10 +1079,10 @@ def info(result: xr.Dataset | str | Path) -> dict[str, Any]:
 def plot(
     dataset: xr.Dataset,
     *,
-    kind: str = "final-velocities",
+    kind: str | None = None,
     x: str | None = None,
     y: str | None = None,
-    variable: str = "e_error",
+    variable: str | None = None,
     sel: Mapping[str, float | str] | None = None,
     models: Sequence[str] | None = None,
     log: str = "",
@@ -1040,10 +1101,11 @@ def plot(
     Parameters
     ----------
     dataset : a result, or a time history
-    kind : one of `impact.plots.kinds.KINDS`
+    kind : one of `impact.plots.kinds.KINDS`; by default "final-velocities", "uncertainty" for samples of uncertain
+        inputs, or "calibration" or "sensitivity" for the result of that function
     x : the coordinate to draw over; by default e, else the first numeric axis
     y : second axis of a map, or of the kind validity; by default the next one
-    variable : name of the variable that a map shows
+    variable : name of the variable that a map or a band shows; by default e_error for a map, e_out for a band
     sel : values of the other axes, such as `{"m2": 1.0}`; the default is the first value. A loop, a history
         or an impulse may be at a point that is not on the grid
     models : keys of the models to show; by default all
@@ -1073,10 +1135,10 @@ def plot(
     >>> figure.axes[0].get_xlabel()
     'Coefficient of restitution $e$'
     """
-    from .plots.kinds import Choice, draw
+    from .plots.kinds import Choice, default_kind, draw
 
     choice = Choice(x, y, variable, sel, models, log, equations)
-    plot_data = get_plot_data(dataset, kind, choice, plugins)
+    plot_data = get_plot_data(dataset, kind or default_kind(dataset), choice, plugins)
     return draw(plot_data, width, height, style=style, title=title, labels=labels, points=points, ax=ax)
 
 
@@ -1084,10 +1146,10 @@ def plot_to_files(
     result: str | Path,
     output: str | Path | None = None,
     *,
-    kinds: Sequence[str] = ("final-velocities",),
+    kinds: Sequence[str] = (),
     x: str | None = None,
     y: str | None = None,
-    variable: str = "e_error",
+    variable: str | None = None,
     sel: Mapping[str, float | str] | None = None,
     models: Sequence[str] | None = None,
     log: str = "",
@@ -1135,7 +1197,7 @@ def plot_to_files(
     ['r.png']
     """
     from .plots.data import check_table, encode_table, read_points
-    from .plots.kinds import Choice, check_kind, draw
+    from .plots.kinds import Choice, check_kind, default_kind, draw
     from .plots.style import check_picture, length, save_figure
 
     choice = Choice(x, y, variable, sel, models, log, equations)
@@ -1151,15 +1213,20 @@ def plot_to_files(
 
     def path_of(kind: str, path: str | Path) -> Path:
         path = Path(path)
-        return path if len(kinds) == 1 else path.with_name(f"{path.stem}-{kind}{path.suffix}")
+        return path if len(kinds) < 2 else path.with_name(f"{path.stem}-{kind}{path.suffix}")
 
-    pictures = {kind: path_of(kind, output) for kind in kinds}
-    tables = {kind: path_of(kind, data) for kind in kinds} if data is not None else {}
+    # the default depends on the result, which is read after the paths are checked
+    pictures = {kind: path_of(kind, output) for kind in kinds or [""]}
+    tables = {kind: path_of(kind, data) for kind in pictures} if data is not None else {}
     for path in (*pictures.values(), *tables.values()):
         for source in (result, *([Path(points)] if points else [])):
             check_output(path, overwrite=overwrite, source=source)
     measured = None if points is None else read_points(points)
     dataset = load(result)
+    if not kinds:
+        kinds = [default_kind(dataset)]
+        pictures = dict.fromkeys(kinds, pictures[""])
+        tables = dict.fromkeys(kinds, tables[""]) if tables else {}
     drawn: dict[str, PlotData] = {}
     left_out: dict[str, str] = {}
     for kind in kinds:
@@ -1234,7 +1301,7 @@ def recommend(
     >>> print(impact.recommend(result, models=["gharib-hurmuzlu-2012"]).headline)
     no model gives e within 0.01 everywhere; gharib-hurmuzlu-2012 is nearest: 25.7% of 101 points
     """
-    refuse_calibration(dataset, "recommend")
+    require_sweep(dataset, "recommend")
     return ranking(dataset, tol, sel, models)
 
 

@@ -49,9 +49,10 @@ def print_info(dataset: xr.Dataset, path: Path) -> None:
     """Print the contents of a file of any size; "–" where a summary would evaluate too many points."""
     from .. import api
     from ..results.attributes import read_attribute
-    from ..results.calibration import is_calibration
+    from ..results.kinds import is_calibration, is_sensitivity
     from ..results.schema import exponents_of, plain_unit
     from .calibrate import print_fits
+    from .sensitivity import print_studies
     from .summary import worst_errors
 
     description = api.info(dataset)
@@ -97,6 +98,9 @@ def print_info(dataset: xr.Dataset, path: Path) -> None:
     if is_calibration(dataset):
         out.print()
         print_fits(dataset)
+    elif is_sensitivity(dataset):
+        out.print()
+        print_studies(dataset)
 
 
 def _values_text(dataset: xr.Dataset, name: str) -> str:

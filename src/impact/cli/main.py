@@ -35,6 +35,11 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
     "timestep": ("timestep", "Show what a fixed time step delivers.", "--model tsuji-1992 --at e=0.5 --tol 1%"),
     "export": ("export", "Write a law as a code takes it.", "--to lammps --at e=0.6 --at v1=1 --verify"),
     "calibrate": ("calibrate", "Fit laws to measurements.", "fit.toml -o fit.h5 --best best.toml"),
+    "sensitivity": (
+        "sensitivity",
+        "Find which uncertain input matters.",
+        "uncertain.toml --of peak_force -o study.h5",
+    ),
     "compare": ("compare", "Compare a result with a baseline.", "results.h5 baseline.h5 --plot differences.png"),
     "bless": ("compare", "Replace a baseline by a result.", 'results.h5 baseline.h5 --reason "finer tolerance"'),
     "rerun": ("compare", "Repeat the sweep of a result, and compare.", "baseline.h5"),

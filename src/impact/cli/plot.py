@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..errors import UsageError
-from ..plots.kinds import DEFAULT_KIND, KINDS, WIDTHS
+from ..plots.kinds import KINDS, WIDTHS
 from ..text import safe_text
 from . import exits
 from .console import dump
@@ -36,7 +36,7 @@ def plot(
             "--kind",
             "-k",
             metavar="KIND",
-            help=f"{', '.join(KINDS)}; may be repeated. \\[default: {DEFAULT_KIND}, of a calibration calibration]",
+            help=f"{', '.join(KINDS)}; may be repeated. \\[default: final-velocities, or the kind of the result]",
         ),
     ] = None,
     x: Annotated[
@@ -45,7 +45,12 @@ def plot(
     y: Annotated[
         str | None, typer.Option("--y", help="Vertical axis of a map, or of validity. \\[default: the next axis]")
     ] = None,
-    variable: Annotated[str, typer.Option("--variable", help="Variable shown by a map.")] = "e_error",
+    variable: Annotated[
+        str | None,
+        typer.Option(
+            "--variable", help="Variable of a map or of bands. \\[default: e_error of a map, e_out of bands]"
+        ),
+    ] = None,
     sel: SelectOption = None,
     model: ModelOption = None,
     log: Annotated[str, typer.Option("--log", metavar="AXES", help="Logarithmic axes: x, y or xy.")] = "",
@@ -112,7 +117,7 @@ def plot(
     files = api.plot_to_files(
         result,
         output,
-        kinds=kind or (DEFAULT_KIND,),
+        kinds=kind or (),
         x=x,
         y=y,
         variable=variable,

@@ -14,7 +14,7 @@ from ..errors import UsageError
 from ..formatting import number
 from ..results.attributes import read_attribute
 from ..results.backend import load
-from ..results.calibration import is_calibration
+from ..results.kinds import is_calibration, require_sweep
 from ..results.replay_command import command_start
 from ..results.schema import MODEL_METADATA, SCHEMA, SCHEMA_VERSION, is_case, is_input
 from ..text import safe_text
@@ -133,8 +133,7 @@ def check_comparable(dataset: xr.Dataset, name: str) -> None:
     UsageError : it is a time history, or lacks coordinates or axes that every result has
     """
     shown = safe_text(name)
-    if is_calibration(dataset):
-        raise UsageError(f"{shown}: this is a calibration, expected the result of a sweep")
+    require_sweep(dataset, shown)
     is_current = _attributes_equal(dataset.attrs.get("schema_version"), SCHEMA_VERSION)
     if not is_current or "rtol" not in dataset.attrs:
         about = "a time history" if "t" in dataset.coords else "not a result"

@@ -287,16 +287,16 @@ class Design(Table):
 
     @model_validator(mode="after")
     def _check_n(self) -> Design:
-        if self.method == "sobol":
-            check_power_of_two(self.n, "for sobol")
+        problem = check_power_of_two(self.n, "for sobol")
+        if self.method == "sobol" and problem:
+            raise located_errors([(("n",), problem)])
         return self
 
 
-def check_power_of_two(n: int, purpose: str) -> None:
-    """Raise a ValidationError, which names the two next powers of two, if n is none."""
-    if n & (n - 1):
-        nearest = f"{1 << (n.bit_length() - 1)} or {1 << n.bit_length()}"
-        raise located_errors([(("n",), f"got {n}, expected a power of two {purpose}: {nearest}")])
+def check_power_of_two(n: int, purpose: str) -> str:
+    """A message with the two next powers of two, if n is none; otherwise empty."""
+    nearest = f"{1 << (n.bit_length() - 1)} or {1 << n.bit_length()}"
+    return f"got {n}, expected a power of two {purpose}: {nearest}" if n & (n - 1) else ""
 
 
 def model_quantities(model: ForceModel) -> dict[str, Quantity]:

@@ -9,7 +9,8 @@ import numpy as np
 from ..array_types import Array
 from ..errors import UsageError, did_you_mean
 from ..formatting import decimals
-from ..results.calibration import calibration_title, fit_status, is_calibration
+from ..results.calibration import calibration_title, fit_status
+from ..results.kinds import is_calibration
 from ..results.schema import SCHEMA, plain_unit
 from ..text import safe_text
 from .curves import Curve, CurveData, Panel, model_label

@@ -22,8 +22,9 @@ if TYPE_CHECKING:
     from .curves import CurveData
     from .data import Points
     from .maps import MapData
+    from .uncertainty import BarData
 
-    PlotData: TypeAlias = CurveData | MapData
+    PlotData: TypeAlias = CurveData | MapData | BarData
 
 KINDS = {
     "final-velocities": "velocities after the impact and the impulse-momentum solution, Figure 6 of the paper",
@@ -36,9 +37,9 @@ KINDS = {
     "history": "indentation, its rate and the force over time",
     "impulse": "velocities over the impulse",
     "calibration": "measured values, the laws that fit them with their bands, and residuals",
+    "uncertainty": "an output of uncertain inputs over an axis: median, and 5 to 95 % of the samples",
+    "sensitivity": "which uncertain input matters: first-order and total Sobol indices",
 }
-# of a calibration it is "calibration"
-DEFAULT_KIND = "final-velocities"
 # kinds that show the motion at one point, which --sel selects
 MOTION_KINDS = ("loop", "history", "impulse")
 # width of one and of two columns of a journal [in]
@@ -57,7 +58,7 @@ class Choice:
 
     x: str | None = None
     y: str | None = None
-    variable: str = "e_error"
+    variable: str | None = None
     sel: Mapping[str, float | str] | None = None
     models: Sequence[str] | None = None
     log: str = ""
@@ -72,6 +73,18 @@ def check_kind(kind: str) -> None:
     """Raise a UsageError, which names the nearest kind, if there is no such kind of picture."""
     if kind not in KINDS:
         raise UsageError(f'--kind: no kind "{safe_text(kind)}"; {did_you_mean(kind, list(KINDS))}')
+
+
+def default_kind(dataset: xr.Dataset) -> str:
+    """The kind of picture that shows what a dataset is for."""
+    from ..config.grid import SAMPLE
+    from ..results.kinds import is_calibration, is_sensitivity
+
+    if is_calibration(dataset):
+        return "calibration"
+    if is_sensitivity(dataset):
+        return "sensitivity"
+    return "uncertainty" if SAMPLE in dataset.dims else "final-velocities"
 
 
 def plot_data_of(
@@ -91,15 +104,13 @@ def plot_data_of(
     UsageError : there is no such kind, or the result does not contain what it needs
     """
     check_kind(kind)
-    from ..results.calibration import is_calibration
-    from . import calibrations, curves, maps
+    from ..results.kinds import is_calibration, is_sensitivity
+    from . import calibrations, curves, maps, uncertainty
     from .motions import MOTIONS
 
-    if is_calibration(dataset):
-        if kind not in (DEFAULT_KIND, "calibration"):
-            raise UsageError(f"this is a calibration, which has the kind calibration, not {kind}")
-        kind = "calibration"
-
+    for own, is_own in (("calibration", is_calibration), ("sensitivity", is_sensitivity)):
+        if is_own(dataset) and kind != own:
+            raise UsageError(f"this result has the kind {own}, not {kind}")
     if kind in MOTIONS:
         return MOTIONS[kind](histories(), equations=choice.equations)
     functions: dict[str, Callable[[xr.Dataset, Choice], PlotData]] = {
@@ -110,6 +121,8 @@ def plot_data_of(
         "map": maps.field_map,
         "validity": maps.validity_map,
         "calibration": calibrations.calibration_curves,
+        "uncertainty": uncertainty.uncertainty_curves,
+        "sensitivity": uncertainty.sensitivity_bars,
     }
     return functions[kind](dataset, choice)
 
@@ -142,7 +155,7 @@ def draw(
     ------
     UsageError : an option is invalid, or does not apply to the picture
     """
-    from . import curves, maps
+    from . import curves, maps, uncertainty
     from .data import Points as Measured
     from .data import read_points
     from .labels import checked_labels, escape_mathtext, pretty_conditions
@@ -153,15 +166,17 @@ def draw(
     chosen = checked_labels(labels or {}, plot_data.names)
     measured = points if points is None or isinstance(points, Measured) else read_points(points)
     if measured is not None and not isinstance(plot_data, curves.CurveData):
-        raise UsageError(f"{measured.source}: measured points are drawn over curves, not over a map")
+        raise UsageError(f"{measured.source}: measured points are drawn over curves only")
 
     def draw_panels(all_axes: Sequence[Axes]) -> Any:
         if isinstance(plot_data, curves.CurveData):
             return curves.draw_curves(plot_data, all_axes, chosen, measured)
+        if isinstance(plot_data, uncertainty.BarData):
+            return uncertainty.draw_bars(plot_data, all_axes, chosen)
         return maps.draw_maps(plot_data, all_axes, chosen)
 
     heading = chosen.get("title", escape_mathtext(plot_data.title))
-    count = len(plot_data.panels) if isinstance(plot_data, curves.CurveData) or not plot_data.closest else 2
+    count = 2 if isinstance(plot_data, maps.MapData) and plot_data.closest else len(plot_data.panels)
     if ax is not None:
         all_axes = _check_axes(ax, count)
         entries = draw_panels(all_axes)
@@ -183,6 +198,9 @@ def draw(
             )
             aspect = curves.PANEL_ASPECT if count == 1 else curves.STACKED_PANEL_ASPECT
             body = sum(heights) * width * aspect + 0.3
+        elif isinstance(plot_data, uncertainty.BarData):
+            all_axes = list(picture.subplots(count, sharex=True, squeeze=False).ravel())
+            body = uncertainty.bars_height(plot_data)
         else:
             all_axes, body = maps.place_panels(picture, plot_data, width, count)
         picture.add_legend(body, height, draw_panels(all_axes))

@@ -154,7 +154,7 @@ def field_map(dataset: xr.Dataset, choice: Choice) -> MapData:
     ------
     UsageError : the result does not contain what `choice` selects, or does not have two axes
     """
-    plot_data = _map_data("map", dataset, choice.variable, choice, MAX_PANELS)
+    plot_data = _map_data("map", dataset, choice.variable or "e_error", choice, MAX_PANELS)
     if not plot_data.left_out:
         return plot_data
     count = f"the first {MAX_PANELS} of {MAX_PANELS + len(plot_data.left_out)} models"

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..config.grid import SAMPLE
 from ..contact.status import FIRST_FAILURE, NO_IMPACT
 from ..engine.plan import owner_of
 from ..errors import ImpactError
@@ -18,7 +19,7 @@ from ..formatting import label
 from ..plots.curves import MAX_RESTITUTIONS, STEP_AXES
 from ..plots.kinds import WIDTHS, Choice, draw
 from ..plots.style import encoded
-from ..results.calibration import is_calibration
+from ..results.kinds import is_calibration, is_sensitivity
 from ..results.schema import columns_along, is_input, plain_unit
 from ..results.selection import model_positions
 from ..results.slabs import distinct_points, is_computed, slabs
@@ -37,6 +38,8 @@ FIGURES = {
     "map": "Error of the restitution over two axes, a panel for each model.",
     "validity": "Model with the smallest error, and that error.",
     "calibration": "Measured values, the laws that fit them with their bands of 95 %, and residuals.",
+    "uncertainty": "Delivered restitution: median, and 5 to 95 % of the samples of uncertain inputs.",
+    "sensitivity": "First-order and total Sobol indices of the uncertain inputs, with intervals of 95 %.",
     "loop": "Force over indentation at one point: the area of a loop is the energy loss.",
 }
 MAP_KINDS = ("map", "validity")
@@ -117,9 +120,10 @@ def iterate_choices(dataset: xr.Dataset, keys: Sequence[str]) -> Iterator[tuple[
     -------
     (kind, Choice, position) : of each figure; the position has an index for each axis that is not drawn
     """
-    if is_calibration(dataset):
-        yield "calibration", Choice(), {}
-        return
+    for own, is_own in (("calibration", is_calibration), ("sensitivity", is_sensitivity)):
+        if is_own(dataset):
+            yield own, Choice(models=keys if own == "sensitivity" else None), {}
+            return
     along = {name: dataset[name] for name in varying(dataset) if dataset[name].ndim == 1}
     along = {
         name: coordinate
@@ -129,11 +133,15 @@ def iterate_choices(dataset: xr.Dataset, keys: Sequence[str]) -> Iterator[tuple[
     x = "e" if "e" in along else next(iter(along), None)
     # a parameter of a single model is not an axis of a map of several models
     across = [name for name in along if len(keys) == 1 or not owner_of(name)]
+    # an uncertain input is no axis of a map
+    across = [name for name in across if along[name].dims != (SAMPLE,)]
     y = next((name for name in across if x and along[name].dims != along[x].dims), None)
     few_e = ("e",) if "e" in along and along["e"].size <= MAX_RESTITUTIONS else ()
     steps = next((name for name in STEP_AXES if name in along), None)
     for kind in FIGURES:
-        if kind == "calibration" or (kind in MAP_KINDS and not y):
+        if kind in ("calibration", "sensitivity") or (kind in MAP_KINDS and not y):
+            continue
+        if kind == "uncertainty" and SAMPLE not in dataset.dims:
             continue
         if (kind == "timestep" and not steps) or (kind == "loop" and "integrator" in dataset.attrs):
             continue
@@ -142,7 +150,12 @@ def iterate_choices(dataset: xr.Dataset, keys: Sequence[str]) -> Iterator[tuple[
         position = _first_answered_index(dataset, keys, drawn)
         if kind != "loop":
             sel = {str(dim): dataset[dim].values[index].item() for dim, index in position.items()}
-            shown_x = steps if kind == "timestep" else x
+            if kind == "uncertainty":
+                sel.pop(SAMPLE, None)
+                position.pop(SAMPLE, None)
+            # bands are over an axis, not over an uncertain input
+            is_uncertain = x is not None and along[x].dims == (SAMPLE,)
+            shown_x = steps if kind == "timestep" else None if kind == "uncertainty" and is_uncertain else x
             yield kind, Choice(shown_x, y if kind in MAP_KINDS else None, sel=sel, models=keys), position
             continue
         if x:

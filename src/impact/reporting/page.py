@@ -29,12 +29,14 @@ from ..results.calibration import (
     calibration_title,
     describe_data,
     fit_rows,
-    is_calibration,
     unidentified_notes,
 )
+from ..results.kinds import is_calibration, is_sensitivity
 from ..results.plausibility import material_notes, result_notes
 from ..results.ranking import Ranking, ranking
+from ..results.replay_command import describe_point
 from ..results.schema import count_points, exponents_of, is_input
+from ..results.sensitivity import INDEX_HEADINGS, describe_design, describe_study, index_rows, iterate_studies
 from ..results.slabs import MAX_SUMMARY_POINTS, is_large
 from ..results.summary import Summary, extremes_of, summarize
 from ..text import safe_text, with_year
@@ -68,7 +70,8 @@ def page(dataset: xr.Dataset, get_plot_data: Callable[[str, Choice], PlotData]) 
         raise UsageError("got a time history, expected the result of a sweep")
     summary = summarize(dataset, MAX_FAILED)
     fits = _fits_section(dataset) if is_calibration(dataset) else None
-    ranked, headline = (None, "") if fits else _rank_models(dataset)
+    studies = list(_studies(dataset)) if is_sensitivity(dataset) else []
+    ranked, headline = (None, "") if fits or studies else _rank_models(dataset)
     keys = [str(key) for key in dataset["model"].values]
     selection = ""
     if len(keys) > MAX_FIGURE_MODELS:
@@ -81,8 +84,11 @@ def page(dataset: xr.Dataset, get_plot_data: Callable[[str, Choice], PlotData]) 
     lines = str(dataset.attrs.get("config", "")).replace("\r\n", "\n").expandtabs(4).split("\n")
     return _template().render(
         title=_title(dataset),
-        summary=f"{describe_data(dataset)}." if fits else _summary_sentence(dataset),
+        summary=f"{describe_data(dataset)}." if fits else "" if studies else _summary_sentence(dataset),
         fits=fits,
+        studies=studies,
+        index_headings=INDEX_HEADINGS,
+        design=describe_design(dataset),
         notes=[*material_notes(read_attribute(dataset.attrs, "materials"), moduli), *result_notes(summary)],
         outcomes=list(_outcomes(summary)),
         axes=[(name, *_meaning_and_unit(dataset[name]), *_range(dataset[name])) for name in varying(dataset)],
@@ -104,6 +110,8 @@ def page(dataset: xr.Dataset, get_plot_data: Callable[[str, Choice], PlotData]) 
 def _title(dataset: xr.Dataset) -> str:
     if is_calibration(dataset):
         return calibration_title(dataset) or "Calibration"
+    if is_sensitivity(dataset):
+        return f"Which uncertain input matters for {dataset.attrs['of']}"
     return str(dataset.attrs.get("title", "")) or "Impact of two balls"
 
 
@@ -115,6 +123,16 @@ def _fits_section(dataset: xr.Dataset) -> dict[str, Any]:
         "notes": unidentified_notes(dataset),
         "statuses": [f"{name}: {meaning}" for name, meaning in FIT_STATUSES.items() if name != "ok"],
     }
+
+
+def _studies(dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
+    """The distribution of the output of each model at each point, and the indices of the uncertain inputs."""
+    for point, study in iterate_studies(dataset):
+        yield {
+            "point": describe_point(point),
+            "sentence": f"{describe_study(study)}.",
+            "rows": index_rows(study) if study["total"].notnull().any() else [],
+        }
 
 
 def _template() -> Template:

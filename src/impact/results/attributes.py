@@ -25,6 +25,7 @@ class PluginRecord(BaseModel):
 ATTRIBUTE_TYPES: Mapping[str, Any] = {
     "axes": list[str],
     "config_set": list[str],
+    "design": dict[str, Any],
     "extended": list[Any],
     "fit_bounds": dict[str, list[float]],
     "fit_paths": list[str],

@@ -17,7 +17,6 @@ from ..config.tables import DEFAULT_TITLE
 from ..contact.model import ForceModel
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins
-from ..errors import UsageError
 from ..formatting import decimals, number
 from .schema import SCHEMA, coordinate_attributes, plan_coordinates, provenance_attributes
 
@@ -86,17 +85,6 @@ CALIBRATION_VARIABLES = {
 # coordinates besides those of models and inputs; those that are text
 CALIBRATION_TEXTS = frozenset({"parameter", "other_parameter", "output_name", "output", "determined"})
 CALIBRATION_COORDINATES = CALIBRATION_TEXTS | {"point", "grid", "measured", "sigma", "line"}
-
-
-def is_calibration(dataset: xr.Dataset) -> bool:
-    """Whether a dataset is the result of a calibration."""
-    return "parameter" in dataset.dims
-
-
-def refuse_calibration(dataset: xr.Dataset, command: str) -> None:
-    """Raise a UsageError where a command takes the result of a sweep, and got that of a calibration."""
-    if is_calibration(dataset):
-        raise UsageError(f"{command}: this is a calibration, expected the result of a sweep")
 
 
 FIT_HEADINGS = ("law", "parameter", "estimate", "95 %", "chi2/dof", "AICc", "weight", "loo", "status")

@@ -27,8 +27,8 @@ from ..errors import ResultError, UsageError
 from ..text import safe_text
 from .attributes import read_attribute
 from .backend import open_with_table
-from .calibration import refuse_calibration
 from .expand import TrajectoryTable
+from .kinds import require_sweep
 from .provenance import stored_config
 from .selection import IndexArray, match_labels
 from .summary import SweepOutcome
@@ -74,7 +74,7 @@ def extend(
     """
     name = safe_text(str(source))
     before, table = open_with_table(source)
-    refuse_calibration(before, "extend")
+    require_sweep(before, "extend")
     with before:
         config = stored_config(before.attrs, [], plugins, str(source), max_points)
         old = Plan(config, plugins.of(config.models))

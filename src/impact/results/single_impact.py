@@ -33,7 +33,7 @@ from ..engine.plugins import Plugins
 from ..errors import ConfigError, UsageError, did_you_mean
 from ..text import safe_text
 from .backend import open_result
-from .calibration import refuse_calibration
+from .kinds import require_sweep
 from .provenance import changed_plugins, check_plugins, stored_config, unknown_plugins
 from .schema import HISTORY_VARIABLES, SCHEMA_VERSION, is_case, is_input
 from .seal import is_result
@@ -379,7 +379,7 @@ def _config_reader(
 def _stored_config_reader(
     dataset: xr.Dataset, overrides: Sequence[str], plugins: Plugins, name: str
 ) -> tuple[ReadConfig, dict[str, float | str]]:
-    refuse_calibration(dataset, name)
+    require_sweep(dataset, name)
     attributes = dict(dataset.attrs)
     single = {str(key): label.values.item() for key, label in dataset.coords.items() if label.ndim == 0}
     if "config" in attributes:

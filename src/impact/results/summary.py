@@ -12,7 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ..contact.status import FIRST_FAILURE, Status
-from .calibration import is_calibration
+from .kinds import is_calibration, is_sensitivity
 from .schema import count_points, parts_of_models
 from .slabs import MAX_SUMMARY_POINTS, distinct_points, is_computed, slabs
 
@@ -200,7 +200,7 @@ def describe(dataset: xr.Dataset) -> dict[str, Any]:
             **(extremes._asdict() if extremes else dict.fromkeys(Extremes._fields)),
         }
     return {
-        "points": dataset.sizes["point"] if is_calibration(dataset) else count_points(dataset),
+        "points": _count_points(dataset),
         # of a result in memory neither is known
         **{name: dataset.encoding.get(name) for name in ("layout", "seal")},
         "dimensions": {str(name): size for name, size in dataset.sizes.items()},
@@ -214,6 +214,13 @@ def describe(dataset: xr.Dataset) -> dict[str, Any]:
             for name, value in dataset.attrs.items()
         },
     }
+
+
+def _count_points(dataset: xr.Dataset) -> int:
+    """The points of a sweep, the measured values of a calibration, or the studies of a sensitivity study."""
+    if is_calibration(dataset):
+        return dataset.sizes["point"]
+    return int(dataset["mean"].size) if is_sensitivity(dataset) else count_points(dataset)
 
 
 def worst_by_model(summary: Summary, dataset: xr.Dataset) -> dict[str, dict[str, float]]:

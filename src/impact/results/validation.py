@@ -23,14 +23,15 @@ from .calibration import (
     CALIBRATION_TEXTS,
     CALIBRATION_VARIABLES,
     FIT_STATUSES,
-    is_calibration,
 )
+from .kinds import is_calibration, is_sensitivity
 from .schema import HISTORY_VARIABLES, MODEL_METADATA, SCHEMA, is_case
+from .sensitivity import SENSITIVITY_COORDINATES, SENSITIVITY_VARIABLES
 from .slabs import VARIES_ALONG, is_lazy, slabs
 
 RESULT_VARIABLES = frozenset(variable.name for variable in SCHEMA)
 HISTORY_NAMES = frozenset(name for name, _, _ in HISTORY_VARIABLES)  # over the time t
-TEXT_COORDINATES = frozenset({"model", *MODEL_METADATA, *MATERIAL_KEYS, *CALIBRATION_TEXTS} - {"year"})
+TEXT_COORDINATES = frozenset({"model", *MODEL_METADATA, *MATERIAL_KEYS, *CALIBRATION_TEXTS, "input"} - {"year"})
 # the trajectory table of a factored file, see `impact.results.factored`
 TABLE_VARIABLES = frozenset(
     {
@@ -48,6 +49,8 @@ ALLOWED_NAMES = (
     | TABLE_VARIABLES
     | CALIBRATION_VARIABLES.keys()
     | CALIBRATION_COORDINATES
+    | SENSITIVITY_VARIABLES.keys()
+    | frozenset(SENSITIVITY_COORDINATES)
     | {"t", "year", "exponent", *SWEEP_QUANTITIES}
 )
 # a parameter of one model: the key of the model, and a Python identifier
@@ -69,7 +72,8 @@ def is_name(name: str) -> bool:
 
 def is_quantity(name: str, axes: tuple[str, ...]) -> bool:
     """Whether a variable is an output; inputs are coordinates. The velocity of a ball may be either."""
-    return name in RESULT_VARIABLES or name in CALIBRATION_VARIABLES or (name in HISTORY_NAMES and axes == ("t",))
+    of_study = name in CALIBRATION_VARIABLES or name in SENSITIVITY_VARIABLES
+    return name in RESULT_VARIABLES or of_study or (name in HISTORY_NAMES and axes == ("t",))
 
 
 # required attributes of a result: text, in part JSON, and numbers
@@ -95,6 +99,7 @@ def schema_violation(dataset: xr.Dataset) -> str | None:
         _attribute_violations,
         _history_violations if "t" in dataset.dims else _result_violations,
         _calibration_violations,
+        _sensitivity_violations,
     )
     return next((safe_text(fault) for check in checks for fault in check(dataset)), None)
 
@@ -206,6 +211,31 @@ def _calibration_violations(dataset: xr.Dataset) -> Iterator[str]:
         yield "fit_paths: expected a config path for each parameter"
     if "fit_status" in dataset and not np.isin(dataset["fit_status"].values, range(len(FIT_STATUSES))).all():
         yield "fit_status: got a number that is no outcome of a fit"
+
+
+def _sensitivity_violations(dataset: xr.Dataset) -> Iterator[str]:
+    """Faults of a sensitivity study: it has all of its variables, along the models and the same axes."""
+    if not is_sensitivity(dataset):
+        strange = sorted((SENSITIVITY_VARIABLES.keys() | {*SENSITIVITY_COORDINATES}) & set(dataset.variables))
+        if strange:
+            yield f"{', '.join(strange)}: of a sensitivity study, which has the axis input"
+        return
+    if "mean" not in dataset:
+        yield "mean: got none"
+        return
+    common = dataset["mean"].dims
+    for name, (own, _) in SENSITIVITY_VARIABLES.items():
+        dims = (*common, own) if own else common
+        if name not in dataset or dataset[name].dims != dims:
+            found = "none" if name not in dataset else ", ".join(map(str, dataset[name].dims)) or "no axes"
+            yield f"{name}: got {found}, expected {', '.join(map(str, dims))}"
+    for name in SENSITIVITY_COORDINATES:
+        if name not in dataset.coords or dataset[name].dims != (name,):
+            yield f"{name}: expected a coordinate along {name}"
+    if dataset.attrs.get("of") not in RESULT_VARIABLES:
+        yield "of: expected the name of an output"
+    if not read_attribute(dataset.attrs, "design"):
+        yield "no design"
 
 
 def _has_unknown_status(status: xr.DataArray) -> bool:

@@ -1,0 +1,155 @@
+"""The dataset of a sensitivity study: indices of the uncertain inputs, and the distribution of an output."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import xarray as xr
+
+from ..config.grid import SAMPLE, path_of
+from ..config.tables import quantity_at
+from ..contact.units import with_numbers
+from ..engine.plan import Plan
+from ..formatting import decimals, number
+from ..text import safe_text
+from .attributes import read_attribute
+from .schema import SCHEMA, plan_coordinates, provenance_attributes
+
+# probabilities of the quantiles
+QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+NO_BREAK = "\N{NO-BREAK SPACE}"
+# indices from the first half of the samples
+HALF = ("first_half", "total_half")
+# name: its own dimension, and its meaning
+SENSITIVITY_VARIABLES = {
+    "first": ("input", "first-order index: share of the variance that the input explains alone"),
+    "first_lower": ("input", "lower end of the bootstrap interval of 95 % of the first-order index"),
+    "first_upper": ("input", "upper end of the bootstrap interval of 95 % of the first-order index"),
+    "first_half": ("input", "first-order index from the first half of the samples"),
+    "total": ("input", "total index: share of the variance that is left if only the input is unknown"),
+    "total_lower": ("input", "lower end of the bootstrap interval of 95 % of the total index"),
+    "total_upper": ("input", "upper end of the bootstrap interval of 95 % of the total index"),
+    "total_half": ("input", "total index from the first half of the samples"),
+    "mean": ("", "mean of the output"),
+    "sd": ("", "standard deviation of the output"),
+    "quantiles": ("quantile", "quantiles of the output"),
+    "failed": ("", "points without a result; with any there is no mean and no index"),
+}
+SENSITIVITY_COORDINATES = ("input", "quantile")
+
+
+def sensitivity_template(plan: Plan, of: str, others: Sequence[str]) -> xr.Dataset:
+    """The dataset of a sensitivity study without its numbers.
+
+    Parameters
+    ----------
+    plan : of its points
+    of : the output
+    others : names of the axes other than those of models and samples
+    """
+    config = plan.config
+    assert config.design is not None
+    coordinates = {
+        name: coordinate
+        for name, coordinate in plan_coordinates(plan).variables.items()
+        if SAMPLE not in coordinate.dims
+    }
+    sizes = {axis.name: axis.size for axis in config.axes} | {"model": len(config.models)}
+    paths = [".".join(map(str, path_of(name))) for name in config.distributions]
+    new = {
+        "input": ("input", paths, {"long_name": "uncertain input, by its path in the config"}),
+        "quantile": ("quantile", list(QUANTILES), {"long_name": "probability", "units": "1"}),
+    }
+    sizes |= {"input": len(paths), "quantile": len(QUANTILES)}
+    (unit,) = (variable.unit for variable in SCHEMA if variable.name == of)
+    variables = {}
+    for name, (own, meaning) in SENSITIVITY_VARIABLES.items():
+        dims = ("model", *others, *filter(None, (own,)))
+        of_output = own != "input" and name != "failed"
+        about = {"units": unit if of_output else "1", "long_name": meaning}
+        dtype = np.int64 if name == "failed" else float
+        variables[name] = (dims, np.zeros([sizes[dim] for dim in dims], dtype), about)
+    return xr.Dataset(variables, {**coordinates, **new}, provenance_attributes(plan) | {"of": of})
+
+
+def distribution_texts(dataset: xr.Dataset) -> list[str]:
+    """The uncertain inputs of a result with their distributions; a name and its numbers stay on one line."""
+    texts = []
+    for name, distribution in read_attribute(dataset.attrs, "design").get("distributions", {}).items():
+        ((kind, numbers),) = distribution.items()
+        shown = ", ".join(number(value) for value in numbers[:3]) + (", …" if len(numbers) > 3 else "")
+        unit = _unit_of_input(name)
+        if "n" in dataset.coords and dataset["n"].ndim == 0:
+            unit = with_numbers(unit, {"n": float(dataset["n"])})
+        text = f"{name} = {kind}({shown}){'' if unit == '1' else f' {unit}'}"
+        texts.append(safe_text(text, 80).replace(" ", NO_BREAK))
+    return texts
+
+
+def _unit_of_input(name: str) -> str:
+    """The unit of an input by its config name; "1" for a parameter of a model."""
+    try:
+        quantity = quantity_at(path_of(name), {})
+    except KeyError:
+        return "1"
+    return "1" if quantity is None else quantity.unit
+
+
+def describe_design(dataset: xr.Dataset) -> str:
+    """How the samples of a result were drawn, in a sentence without a full stop; "" without samples."""
+    design = read_attribute(dataset.attrs, "design")
+    if not design:
+        return ""
+    drawn = f"{design['n']:,} samples ({design['method']}, seed {design['seed']})"
+    return f"{drawn} of {', '.join(distribution_texts(dataset))}"
+
+
+def iterate_studies(dataset: xr.Dataset) -> Iterator[tuple[dict[str, float | str], xr.Dataset]]:
+    """Each model at each point of the other axes: the model and the point, and the study there."""
+    dims = list(map(str, dataset["mean"].dims))
+    for index in np.ndindex(*(dataset.sizes[dim] for dim in dims)):
+        study = dataset.isel(dict(zip(dims, index, strict=True)))
+        yield {dim: study[dim].item() for dim in dims}, study
+
+
+INDEX_HEADINGS = ("input", "first-order", "95 %", "total", "95 %", "first-order, n/2", "total, n/2")
+
+
+def index_rows(study: xr.Dataset) -> list[tuple[str, ...]]:
+    """A row of text for each input of one study, the largest total index first, under INDEX_HEADINGS."""
+    order = np.argsort(-np.nan_to_num(study["total"].values), kind="stable")
+
+    def interval(row: xr.Dataset, name: str) -> str:
+        lower, upper = (float(row[f"{name}_{end}"]) for end in ("lower", "upper"))
+        return "–" if lower != lower else f"{decimals(lower, 4)} to {decimals(upper, 4)}"
+
+    def shown(row: xr.Dataset, name: str) -> str:
+        value = float(row[name])
+        return "–" if value != value else decimals(value, 4)
+
+    return [
+        (
+            str(row["input"].item()),
+            shown(row, "first"),
+            interval(row, "first"),
+            shown(row, "total"),
+            interval(row, "total"),
+            *(shown(row, name) for name in HALF),
+        )
+        for row in (study.isel(input=int(position)) for position in order)
+    ]
+
+
+def describe_study(study: xr.Dataset) -> str:
+    """The distribution of the output of one study, in a sentence without a full stop."""
+    of, unit = study.attrs["of"], str(study["mean"].attrs["units"])
+    failed = int(study["failed"])
+    if failed:
+        return f"{of}: {failed:,} points have no result, so there are no indices; narrow the distributions"
+    words = "" if unit == "1" else f" {unit}"
+    if not np.isfinite(study["total"].values).any():
+        return f"{of}: {number(float(study['mean']))}{words}; it does not depend on the uncertain inputs"
+    least, median, most = (float(study["quantiles"].sel(quantile=q)) for q in (0.05, 0.5, 0.95))
+    text = f"{of}: mean {number(float(study['mean']))}{words}, sd {number(float(study['sd']), 3)}, "
+    return f"{text}5 % {number(least)}, 50 % {number(median)}, 95 % {number(most)}"

@@ -1,0 +1,1 @@
+"""What uncertain inputs do to an output: Sobol indices and their convergence."""

@@ -1,0 +1,137 @@
+"""Which uncertain input matters: the sensitivity of an output of every model, at each point of the other axes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import xarray as xr
+
+from ..array_types import Array
+from ..config.design import draw_columns, unit_samples
+from ..config.grid import SAMPLE, path_of
+from ..config.lines import path_text
+from ..config.load import Config
+from ..config.tables import check_power_of_two, quantity_at
+from ..contact.outputs import OUTPUTS
+from ..engine.plan import Plan
+from ..engine.trajectories import check_count
+from ..errors import ConfigError, UsageError, did_you_mean
+from ..results.sensitivity import HALF, QUANTILES, sensitivity_template
+from ..text import safe_text
+from .indices import indices_of, mixed_rows
+
+# an output whose standard deviation is a smaller multiple of rtol and of its largest value is constant
+CONSTANT_FACTOR = 10.0
+
+
+def check_output_name(of: str) -> None:
+    """Raise a UsageError, which names the nearest output, if there is no such output."""
+    if of not in OUTPUTS or of in ("status", "in_domain"):
+        outputs = [name for name in OUTPUTS if name not in ("status", "in_domain")]
+        raise UsageError(f'--of: no output "{safe_text(of)}"; {did_you_mean(of, outputs)}')
+
+
+def sensitivity_plan(plan: Plan, of: str, max_points: int, name: str) -> Plan:
+    """The plan of all points that the indices of an output need: n (inputs + 2) for each n of the design.
+
+    Parameters
+    ----------
+    plan : of a config with a design
+    of : the output
+    max_points : the largest number of points
+    name : of the config, for messages
+
+    Raises
+    ------
+    ConfigError : the config has no design, its n is no power of two, or a sample is not an allowed value
+    UsageError : there are more than `max_points` points
+    """
+    config = plan.config
+    if config.design is None:
+        example = "[design] n = 1024 and v1 = { normal = [1.0, 0.05] }"
+        raise ConfigError(
+            [f"{name}: got no uncertain input, expected a design and distributions, such as {example}"]
+        )
+    if problem := check_power_of_two(config.design.n, "for Sobol indices"):
+        raise ConfigError([f"{name}: design.n: {problem}"])
+    names = list(config.distributions)
+    models = {model.key: model for model in config.models}
+    quantities = {key: q for key in names if (q := quantity_at(path_of(key), models)) is not None}
+    u = unit_samples(config.design, 2 * len(names))
+    parts = [draw_columns(config.distributions, quantities, part) for part in np.split(u, 2, axis=1)]
+    problems = dict(problem for _, of_part in parts for problem in of_part.items())
+    if problems:
+        raise ConfigError([f"{name}: {path_text(path_of(key))}: {text}" for key, text in problems.items()])
+    rows = mixed_rows(*(np.column_stack([drawn[key] for key in names]) for drawn, _ in parts))
+    columns = dict(zip(names, (tuple(column) for column in rows.T.tolist()), strict=True))
+    axes = tuple(replace(axis, columns=columns) if axis.name == SAMPLE else axis for axis in config.axes)
+    output = replace(config.output, variables=(of,), dtype="float64", chunks={})
+    whole = replace(plan, config=replace(config, axes=axes, output=output))
+    if whole.points > max_points:
+        got = f"{whole.points:,} points, {len(names) + 2} for each sample"
+        raise UsageError(f"{name}: got {got}, expected at most {max_points:,} (--max-points)")
+    check_count(whole, max_points, name)
+    return whole
+
+
+def sensitivity_of(plan: Plan, of: str, execute: Callable[[Plan], xr.Dataset]) -> xr.Dataset:
+    """The sensitivity of an output, as a dataset; see `impact.sensitivity`.
+
+    Parameters
+    ----------
+    plan : as `sensitivity_plan` returns it
+    of : the output
+    execute : runs the plan
+    """
+    config = plan.config
+    assert config.design is not None
+    inputs, n = list(config.distributions), config.design.n
+    swept = execute(plan)[of].transpose("model", ..., SAMPLE)
+    others = [str(dim) for dim in swept.dims if dim not in ("model", SAMPLE)]
+    shape = [swept.sizes["model"], *(swept.sizes[dim] for dim in others)]
+    values = np.asarray(swept.values, float).reshape(-1, len(inputs) + 2, n)
+    result = sensitivity_template(plan, of, others)
+    found = _statistics(values, config)
+    return result.assign(
+        {
+            name: (
+                result[name].dims,
+                np.asarray(array).reshape([*shape, *array.shape[1:]]).astype(result[name].dtype),
+                result[name].attrs,
+            )
+            for name, array in found.items()
+        }
+    )
+
+
+def _statistics(values: Array, config: Config) -> dict[str, Array]:
+    """Mean, standard deviation, quantiles and indices of outputs, from values of shape (outputs, inputs + 2, n).
+
+    They are NaN for an output with a failed sample; the indices are NaN for one that is constant.
+    """
+    assert config.design is not None
+    outputs, blocks, n = values.shape
+    failed = np.isnan(values).sum(axis=(1, 2))
+    independent = values[:, :2].reshape(outputs, -1)
+    mean, deviation = independent.mean(axis=1), independent.std(axis=1, ddof=1)
+    largest = np.abs(independent).max(axis=1)
+    varies = deviation > CONSTANT_FACTOR * config.solver.rtol * largest
+    found = {
+        "failed": failed,
+        "mean": mean,
+        "sd": deviation,
+        "quantiles": np.quantile(independent, QUANTILES, axis=1).T,
+    }
+    whole, half = indices_of(values[varies], config.design.seed), None
+    if n > 2:
+        half = indices_of(np.ascontiguousarray(values[varies][..., : n // 2]))
+    for name in ("first", "total", "first_lower", "first_upper", "total_lower", "total_upper"):
+        found[name] = np.full((outputs, blocks - 2), np.nan)
+        found[name][varies] = getattr(whole, name)
+    for name in HALF:
+        found[name] = np.full((outputs, blocks - 2), np.nan)
+        if half is not None:
+            found[name][varies] = getattr(half, name.removesuffix("_half"))
+    return found

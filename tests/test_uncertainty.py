@@ -1,0 +1,383 @@
+"""Uncertain inputs: samples from distributions, Sobol indices beside closed forms, and what is refused."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import shlex
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy import stats
+
+import impact
+from impact.errors import ConfigError, UsageError
+
+from .conftest import ROOT, Run
+
+# inputs of Hertz' law with closed forms, and the powers with which they enter the peak force and the contact time
+ENDS = {"m1": (0.9, 1.1), "K": (0.5, 1.5), "v1": (0.8, 1.2)}
+POWERS = {"peak_force": (0.6, 0.4, 1.2), "contact_time": (0.4, -0.4, -0.2)}
+MEAN_FACTOR = {"peak_force": 1.25**0.6}
+TEXT = """
+models = ["gonthier-2004", "tsuji-1992"]
+[design]
+n = 64
+[sweep]
+e = [0.3, 0.6]
+v1 = { normal = ["1 m/s", 0.05] }
+K = { lognormal = ["2 MN/m^1.5", 1.2] }
+m1 = 1
+m2 = 1
+"""
+
+
+def hertz(method: str = "sobol", n: int = 2**14, seed: int = 0) -> dict[str, Any]:
+    return {
+        "models": "hertz",
+        "design": {"method": method, "n": n, "seed": seed},
+        "sweep": {"m2": math.inf} | {name: {"uniform": list(ends)} for name, ends in ENDS.items()},
+        "output": {"variables": ["peak_force"]},
+    }
+
+
+def mean_power(least: float, most: float, power: float) -> float:
+    """The mean of x^power of a uniform x."""
+    return (most ** (power + 1) - least ** (power + 1)) / ((power + 1) * (most - least))
+
+
+def closed_form(of: str) -> tuple[np.ndarray, np.ndarray]:
+    """First-order and total indices of a product of powers: V_i/D and V_i prod(1 + V_j)/D."""
+    means = [
+        (mean_power(*ends, p), mean_power(*ends, 2 * p)) for ends, p in zip(ENDS.values(), POWERS[of], strict=True)
+    ]
+    v = np.array([square / mean**2 - 1.0 for mean, square in means])
+    d = np.prod(1.0 + v) - 1.0
+    return v / d, v * np.prod(1.0 + v) / (1.0 + v) / d
+
+
+@pytest.mark.parametrize("of", POWERS)
+def test_indices_are_those_of_the_closed_forms(of: str) -> None:
+    study = impact.sensitivity(hertz(), of=of).isel(model=0)
+    first, total = closed_form(of)
+    if of == "peak_force":
+        np.testing.assert_allclose(first, [0.03427839, 0.41174665, 0.54494422], atol=1e-8)
+        np.testing.assert_allclose(total, [0.03543821, 0.42012213, 0.55347986], atol=1e-8)
+    np.testing.assert_allclose(study["first"], first, atol=1e-3)
+    np.testing.assert_allclose(study["total"], total, atol=1e-3)
+    for name, exact in (("first", first), ("total", total)):
+        assert (study[f"{name}_lower"] < exact).all()
+        assert (exact < study[f"{name}_upper"]).all()
+    assert study["input"].values.tolist() == ["sweep.m1", "sweep.K", "sweep.v1"]
+
+
+def test_mean_and_quantiles_of_a_study_are_those_of_the_samples() -> None:
+    study = impact.sensitivity(hertz(n=2**12), of="peak_force").isel(model=0)
+    exact = MEAN_FACTOR["peak_force"] * math.prod(
+        mean_power(*ends, p) for ends, p in zip(ENDS.values(), POWERS["peak_force"], strict=True)
+    )
+    assert float(study["mean"]) == pytest.approx(exact, rel=1e-4)
+    swept = impact.sweep(hertz(n=2**14))["peak_force"]
+    assert float(study["sd"]) == pytest.approx(float(swept.std()), rel=2e-3)
+    np.testing.assert_allclose(study["quantiles"], np.quantile(swept, study["quantile"]), rtol=5e-3)
+
+
+def test_the_error_of_a_mean_falls_faster_with_sobol_than_with_random_samples() -> None:
+    exact = MEAN_FACTOR["peak_force"] * math.prod(
+        mean_power(*ends, p) for ends, p in zip(ENDS.values(), POWERS["peak_force"], strict=True)
+    )
+    sizes = 2 ** np.arange(5, 12)
+
+    def rate(method: str) -> float:
+        """The power of n with which the root mean square of the error over seeds falls."""
+        errors = [
+            [float(impact.sweep(hertz(method, int(n), seed))["peak_force"].mean()) - exact for seed in range(6)]
+            for n in sizes
+        ]
+        rms = np.sqrt(np.mean(np.square(errors), axis=1))
+        return float(np.polyfit(np.log(sizes), np.log(rms), 1)[0])
+
+    assert rate("sobol") < -0.8
+    assert rate("random") > -0.8
+
+
+def test_a_latin_hypercube_has_a_sample_in_each_stratum() -> None:
+    swept = impact.sweep(hertz("lhs", n=100, seed=3))
+    for name, (least, most) in ENDS.items():
+        strata = np.floor((swept[name].values - least) / (most - least) * 100).astype(int)
+        assert sorted(strata.tolist()) == list(range(100)), name
+
+
+@pytest.mark.parametrize(
+    ("value", "distribution"),
+    [
+        ({"uniform": ["1 km/h", "2 m/s"]}, stats.uniform(1 / 3.6, 2.0 - 1 / 3.6)),
+        ({"normal": [1.0, "10 cm/s"]}, stats.norm(1.0, 0.1)),
+        ({"lognormal": ["1 m/s", 1.5]}, stats.lognorm(math.log(1.5))),
+        ({"triangular": [0.5, 0.6, 1.5]}, stats.triang(0.1, 0.5, 1.0)),
+        ({"triangular": [0.5, 0.5, 1.5]}, stats.triang(0.0, 0.5, 1.0)),
+    ],
+)
+@pytest.mark.parametrize("method", ["sobol", "lhs", "halton", "random"])
+def test_samples_have_their_distribution(value: dict[str, Any], distribution: Any, method: str) -> None:
+    config = hertz(method, n=1024)
+    config["sweep"] |= {"v1": value, "K": 1.0, "m1": 1.0}
+    swept = impact.sweep(config)
+    assert swept["v1"].dims == ("sample",)
+    assert swept["K"].ndim == 0
+    assert stats.kstest(swept["v1"].values, distribution.cdf).pvalue > 1e-3
+
+
+def test_empirical_values_come_from_a_file_with_a_unit(tmp_path: Path) -> None:
+    (tmp_path / "speeds.csv").write_text("v1 [km/h], other\n3.6, 1\n7.2, 2\n18, 3\n")
+    text = TEXT.replace('{ normal = ["1 m/s", 0.05] }', '{ empirical = "speeds.csv" }')
+    (tmp_path / "c.toml").write_text(text)
+    swept = impact.sweep(tmp_path / "c.toml", output=tmp_path / "r.h5")
+    values, counts = np.unique(swept["v1"], return_counts=True)
+    np.testing.assert_allclose(values, [1.0, 2.0, 5.0])
+    assert counts.min() >= 20
+    # the values are stored, so that the file is not needed again
+    (tmp_path / "speeds.csv").unlink()
+    assert impact.rerun(tmp_path / "r.h5").equal
+
+
+def test_the_same_seed_gives_the_same_bytes_with_any_number_of_jobs(cli: Run, tmp_path: Path) -> None:
+    (tmp_path / "c.toml").write_text(TEXT)
+    for words in (["sweep", "c.toml"], ["sensitivity", "c.toml", "--of", "peak_force"]):
+        for name, jobs in (("1.h5", "1"), ("2.h5", "2")):
+            done = cli(*words, "-j", jobs, "-o", name, "--overwrite", cwd=tmp_path)
+            assert done.returncode == 0, done.stderr
+        assert (tmp_path / "1.h5").read_bytes() == (tmp_path / "2.h5").read_bytes()
+    one, other = (impact.sweep(tmp_path / "c.toml", overrides=[f"design.seed={seed}"]) for seed in (0, 1))
+    assert not np.array_equal(one["v1"], other["v1"])
+
+
+def test_a_result_says_how_its_samples_were_drawn(tmp_path: Path) -> None:
+    (tmp_path / "c.toml").write_text(TEXT)
+    design = json.loads(impact.sweep(tmp_path / "c.toml").attrs["design"])
+    assert {name: design[name] for name in ("method", "n", "seed")} == {"method": "sobol", "n": 64, "seed": 0}
+    assert design["distributions"] == {"v1": {"normal": [1.0, 0.05]}, "K": {"lognormal": [2e6, 1.2]}}
+
+
+def test_samples_are_an_axis_for_every_command(cli: Run, tmp_path: Path) -> None:
+    (tmp_path / "c.toml").write_text(TEXT)
+
+    def run(*words: str) -> str:
+        done = cli(*words, cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    run("sweep", "c.toml", "-o", "r.h5")
+    assert run("rerun", "r.h5").startswith("equal: ")
+    for part in ("1/2", "2/2"):
+        run("sweep", "c.toml", "--shard", part, "-o", "m.h5")
+    run("merge", "m.h5.1-of-2.work", "m.h5.2-of-2.work", "-o", "m.h5")
+    assert (tmp_path / "m.h5").read_bytes() == (tmp_path / "r.h5").read_bytes()
+    run("sweep", "c.toml", "-o", "f.h5", "--set", "output.layout=factored")
+    run("extend", "r.h5", "--set", "design.n=128", "-o", "x.h5")
+    run("sweep", "c.toml", "-o", "y.h5", "--set", "design.n=128")
+    for new, old in (("f.h5", "r.h5"), ("x.h5", "y.h5")):
+        assert run("compare", new, old).startswith("equal: ")
+    swept = impact.load(tmp_path / "r.h5")
+    point = swept.sel(model="tsuji-1992", e=0.6).isel(sample=17)
+    shot = json.loads(run("run", "r.h5", "--model", "tsuji-1992", "--at", "e=0.6", "--at", "sample=17", "--json"))
+    assert shot["outputs"]["peak_force"] == point["peak_force"].item()
+    assert shot["inputs"]["v1"] == point["v1"].item()
+
+
+def test_material_properties_and_parameters_of_models_may_be_uncertain() -> None:
+    swept = impact.sweep(
+        {
+            "models": ["kuwabara-kono-1987", "hertz"],
+            "design": {"n": 16},
+            "materials": {
+                "soft": {"E": {"lognormal": ["1 GPa", 1.3]}, "nu": {"uniform": [0.2, 0.4]}, "rho": 1000}
+            },
+            "sweep": {"v1": 1.0, "R1": 0.01, "R2": 0.01, "material": "soft"},
+            "model": {"kuwabara-kono-1987": {"A": {"uniform": ["1 us", "3 us"]}}},
+        }
+    )
+    for name in ("materials.soft.E", "materials.soft.nu", "kuwabara-kono-1987.A"):
+        assert swept[name].dims == ("sample",)
+        assert np.unique(swept[name]).size == 16
+    by_model = swept["e_out"].std("sample")
+    assert by_model.sel(model="kuwabara-kono-1987") > 1e-3
+    assert by_model.sel(model="hertz") < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ("design.n=1000", "design.n: got 1000, expected a power of two for sobol: 512 or 1024"),
+        ("design.method=grid", 'design.method: got "grid", expected a method; known: halton, lhs, random, sobol'),
+        ("design.n=0", "design.n: got 0, expected a whole number from 1 to 4,194,304"),
+        ("design.m=4", "design.m: unknown key; known: method, n, seed"),
+        ("sweep.v1.normal=[1.0, 0.0]", "sweep.v1.normal[1]: got 0.0, expected a number > 0 m/s"),
+        ("sweep.v1.uniform=[2, 1]", "sweep.v1.uniform: got 2 to 1, expected [least, most] in ascending order"),
+        ("sweep.v1.triangular=[1, 2]", "sweep.v1.triangular: got a list of 2, expected [least, mode, most]"),
+        ("sweep.v1.lognormal=[1, 0.5]", "sweep.v1.lognormal[1]: got 0.5, expected a number > 1"),
+        ("sweep.v1.lognormal=[-1, 1.5]", "sweep.v1.lognormal[0]: got -1, expected a median > 0"),
+        ("sweep.v1.gauss=[1, 2]", "sweep.v1.gauss: unknown key"),
+        ("sweep.v1.empirical=[]", "sweep.v1.empirical: got an empty list, expected a list of at least one"),
+        ("sweep.v1.empirical=no.csv", "no.csv: cannot be read"),
+        ("sweep.m1.normal=[1.0, 1.0]", "sweep.m1: got 10 of 64 samples such as"),
+        ('sweep.zip=[["v1", "e"]]', 'got "v1", an uncertain input; those vary together already'),
+        (
+            "sweep.v1={uniform=[1, 2], normal=[1, 2]}",
+            "sweep.v1: got uniform and normal, expected one distribution",
+        ),
+    ],
+)
+def test_a_wrong_design_is_one_line_with_its_place(change: str, message: str, tmp_path: Path) -> None:
+    (tmp_path / "c.toml").write_text(TEXT)
+    with pytest.raises(ConfigError) as refused:
+        impact.sweep(tmp_path / "c.toml", overrides=[change])
+    (line,) = refused.value.problems
+    assert message in line
+
+
+def test_distributions_and_the_table_design_need_each_other(tmp_path: Path) -> None:
+    path = tmp_path / "c.toml"
+    path.write_text(TEXT.replace("[design]\nn = 64\n", ""))
+    with pytest.raises(ConfigError, match=r"c.toml:5: sweep.v1: got a distribution, expected a table \[design\]"):
+        impact.sweep(path)
+    path.write_text(TEXT)
+    with pytest.raises(ConfigError, match=r"c.toml:3: design: got a design without an uncertain input"):
+        impact.sweep(path, overrides=["sweep.v1=1", "sweep.K=1e6"])
+    with pytest.raises(ConfigError, match="got no uncertain input, expected a design and distributions"):
+        impact.sensitivity(ROOT / "configs" / "figure6.toml")
+    with pytest.raises(
+        ConfigError, match=r"design.n: got 100, expected a power of two for Sobol indices: 64 or 128"
+    ):
+        impact.sensitivity(path, overrides=["design.method=lhs", "design.n=100"])
+    with pytest.raises(
+        ConfigError, match="got an uncertain input, which impact sweep and impact sensitivity take"
+    ):
+        impact.calibrate(path, overrides=["sweep.e.fit=[0.1, 1.0]", "data.columns={e_out=[0.5]}"])
+    with pytest.raises(UsageError, match='no output "peakforce"; did you mean "peak_force"'):
+        impact.sensitivity(path, of="peakforce")
+
+
+def test_failed_samples_are_counted_and_not_averaged(cli: Run, tmp_path: Path) -> None:
+    """A speed of mean and deviation 0.05 is negative for a sixth of the samples, where the balls do not meet."""
+    (tmp_path / "c.toml").write_text(TEXT)
+    slow = ("--set", "sweep.v1.normal=[0.05, 0.05]", "--set", "sweep.e=0.6")
+    done = cli("sensitivity", "c.toml", *slow, "--json", cwd=tmp_path)
+    assert done.returncode == 3
+    for study in json.loads(done.stdout):
+        assert study["failed"] > 10
+        assert study["mean"] is None
+        assert {index["total"] for index in study["indices"]} == {None}
+    swept = impact.sweep(tmp_path / "c.toml", overrides=["sweep.v1.normal=[0.05, 0.05]"])
+    (axes,) = impact.plot(swept).axes
+    requested, *drawn = (line.get_ydata() for line in axes.lines if np.size(line.get_xdata()) == 2)
+    assert np.isfinite(requested).all()
+    assert drawn
+    assert np.isnan(drawn).all()
+
+
+def test_the_json_has_the_names_of_the_contract(cli: Run, tmp_path: Path) -> None:
+    (tmp_path / "c.toml").write_text(TEXT)
+    words = ("--of", "peak_force", "--set", 'models="tsuji-1992"', "--set", "sweep.e=0.6", "--json")
+    study = json.loads(cli("sensitivity", "c.toml", *words, cwd=tmp_path).stdout)
+    assert {"of", "n", "mean", "sd", "quantiles", "indices"} <= study.keys()
+    assert (study["of"], study["n"], study["model"]) == ("peak_force", 64, "tsuji-1992")
+    assert study["quantiles"].keys() == {"0.05", "0.25", "0.5", "0.75", "0.95"}
+    ends = {f"{name}{end}" for name in ("first", "total") for end in ("", "_lower", "_upper")}
+    assert all({"input"} | ends <= index.keys() for index in study["indices"])
+    assert [index["input"] for index in study["indices"]] == ["sweep.v1", "sweep.K"]
+
+
+@pytest.fixture(scope="module")
+def samples(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
+    path = tmp_path_factory.mktemp("uncertain") / "c.toml"
+    path.write_text(TEXT)
+    return impact.sweep(path)
+
+
+def test_the_band_of_a_picture_is_that_of_the_samples(samples: xr.Dataset) -> None:
+    (axes,) = impact.plot(samples, variable="peak_force").axes
+    values = samples["peak_force"].sel(model="gonthier-2004")
+    lines = [line for line in axes.lines if line.get_xdata().size == 2]
+    np.testing.assert_allclose(lines[0].get_ydata(), values.median("sample"))
+    np.testing.assert_allclose(lines[1].get_ydata(), values.quantile(0.05, "sample"))
+    np.testing.assert_allclose(lines[2].get_ydata(), values.quantile(0.95, "sample"))
+
+
+def test_without_another_axis_the_picture_is_the_distribution_function(samples: xr.Dataset) -> None:
+    (axes,) = impact.plot(samples, variable="peak_force", sel={"e": 0.6}).axes
+    values = np.sort(samples["peak_force"].sel(model="gonthier-2004", e=0.6))
+    np.testing.assert_allclose(axes.lines[0].get_xdata(), values)
+    np.testing.assert_allclose(axes.lines[0].get_ydata(), (np.arange(64) + 0.5) / 64)
+
+
+def test_a_study_is_stored_drawn_and_reported(cli: Run, tmp_path: Path) -> None:
+    (tmp_path / "c.toml").write_text(TEXT)
+    study = impact.sensitivity(
+        tmp_path / "c.toml", of="peak_force", output=tmp_path / "s.h5", overrides=["sweep.e=0.6"]
+    )
+    xr.testing.assert_identical(impact.load(tmp_path / "s.h5").load(), study)
+    figure = impact.plot(study)
+    widths = [bar.get_width() for bar in figure.axes[0].patches]
+    np.testing.assert_allclose(widths, [*study["first"][0], *study["total"][0]])
+    assert cli("plot", "s.h5", cwd=tmp_path).returncode == 0
+    assert cli("report", "s.h5", "-o", "s.html", cwd=tmp_path).returncode == 0
+    page = (tmp_path / "s.html").read_text(encoding="utf-8")
+    assert f"{float(study['total'][0, 0]):.4f}" in page
+    assert page.count("<img") == 1
+    assert "64 samples (sobol, seed 0)" in cli("info", "s.h5", cwd=tmp_path).stdout
+
+
+@pytest.mark.parametrize(
+    "words",
+    ["recommend s.h5", "rerun s.h5", "extend s.h5 --set sweep.m1=1", "run s.h5", "compare s.h5 s.h5",
+     "expand s.h5 -o f.h5", "bless s.h5 b.h5 --reason first"],
+)  # fmt: skip
+def test_commands_that_take_a_sweep_refuse_a_study_in_one_line(cli: Run, tmp_path: Path, words: str) -> None:
+    impact.sensitivity(hertz(n=16), of="peak_force", output=tmp_path / "s.h5")
+    done = cli(*words.split(), cwd=tmp_path)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+    assert "this is a sensitivity study, expected the result of a sweep" in done.stderr
+
+
+def test_a_damaged_study_is_refused_in_one_line(tmp_path: Path) -> None:
+    study = impact.sensitivity(hertz(n=16), of="peak_force")
+    damaged = {
+        "total: got none": study.drop_vars("total"),
+        "first: got input, model": study.assign(first=study["first"].transpose()),
+        "of: expected the name of an output": study.assign_attrs(of="nothing"),
+        "no design": study.assign_attrs(design="{}"),
+    }
+    for number, (message, dataset) in enumerate(damaged.items()):
+        with pytest.raises(UsageError, match=message):
+            impact.save(dataset, tmp_path / f"{number}.h5")
+
+
+PAGE = (ROOT / "docs" / "uncertainty.md").read_text(encoding="utf-8")
+EXAMPLES = re.findall(r"\$ impact (.*)\n((?:.*\n)+?)```", PAGE)
+
+
+@pytest.mark.parametrize(("command", "printed"), EXAMPLES, ids=[command for command, _ in EXAMPLES])
+def test_the_page_prints_what_the_commands_print(cli: Run, command: str, printed: str) -> None:
+    """Numbers may differ in the last digit that is printed."""
+    shown = [line.split() for line in cli(*shlex.split(command)).stdout.splitlines()]
+    for words, expected in zip(shown, map(str.split, printed.splitlines()), strict=True):
+        for word, other in zip(words, expected, strict=True):
+            try:
+                assert float(word) == pytest.approx(float(other), rel=2e-3, abs=2e-3)
+            except ValueError:
+                assert word == other
+
+
+def test_the_page_explains_every_distribution_and_method() -> None:
+    from impact.config.quantities import DISTRIBUTION_FORMS
+    from impact.config.tables import DESIGN_METHODS
+
+    for name in DISTRIBUTION_FORMS:
+        assert f"{{ {name} = " in PAGE
+    for method in DESIGN_METHODS:
+        assert f'"{method}"' in PAGE
