@@ -13,10 +13,10 @@ from __future__ import annotations
 import argparse
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -24,7 +24,7 @@ ROOT = Path(__file__).parent.parent
 # what installs a version without building it; the lowest version of a small package may have no wheel for an
 # interpreter that is newer than it
 COMPILED = ("numpy", "scipy", "pandas", "h5py", "matplotlib", "pydantic-core", "contourpy", "pillow", "kiwisolver")
-TOOLS = ("build", "twine")
+TOOLS = ("build", "twine", "uv")
 TEST_TOOLS = (
     "pytest>=8.2",
     "pytest-xdist>=3.6",
@@ -73,16 +73,15 @@ def create_environment(folder: Path, python: str, *requirements: str | Path) -> 
     return programs
 
 
-def lowest_versions(dependencies: Sequence[str]) -> list[str]:
-    """The lowest versions that the requirements of pyproject.toml accept.
+def lowest_versions(uv: Path, python: str) -> list[str]:
+    """The lowest versions that pyproject.toml accepts and an interpreter can install, as requirements.
 
-    >>> lowest_versions(["numpy>=2.0", "pandas>=2.2.2"])
-    ['numpy==2.0', 'pandas==2.2.2']
+    An interpreter that is newer than the lowest version of a compiled package needs a higher one: NumPy 2.0 has no
+    wheel for Python 3.13.
     """
-    for dependency in dependencies:
-        if not re.fullmatch(r"[\w.-]+>=[\d.]+", dependency):
-            raise CheckError(f"pyproject.toml: got {dependency}, expected NAME>=VERSION")
-    return [dependency.replace(">=", "==") for dependency in dependencies]
+    wheels = [word for name in COMPILED for word in ("--only-binary", name)]
+    options = ("--resolution", "lowest-direct", "--python", python, "--no-header", "--no-annotate", *wheels)
+    return run(uv, "pip", "compile", "--quiet", "pyproject.toml", *options, cwd=ROOT).split()
 
 
 def version_problems(version: str) -> list[str]:
@@ -134,33 +133,34 @@ def main() -> int:
     parser.add_argument("--python", action="append", help="an interpreter; may be repeated (default: this one)")
     parser.add_argument("--tests", nargs="*", default=(), help="test files to run in each environment of a wheel")
     parser.add_argument("--quick", action="store_true", help="only the wheel with the newest dependencies")
-    parser.add_argument("--dist", type=Path, help="keep the built files in this folder")
+    parser.add_argument("--dist", type=Path, help="copy the built files into this folder")
     options = parser.parse_args()
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     is_failed = False
     with tempfile.TemporaryDirectory(prefix="impact-release-") as scratch:
         folder = Path(scratch)
-        dist = (options.dist or folder / "dist").resolve()
+        dist = folder / "dist"
         tools = create_environment(folder / "tools", sys.executable, *TOOLS)
         run(tools / "python", "-m", "build", "--outdir", dist, ROOT, cwd=folder)
         (wheel,), (sdist,) = (sorted(dist.glob(pattern)) for pattern in ("*.whl", "*.tar.gz"))
         print(run(tools / "python", "-m", "twine", "check", "--strict", wheel, sdist, cwd=folder).strip())
+        if options.dist is not None:
+            shutil.copytree(dist, options.dist, dirs_exist_ok=True)
         version = wheel.name.split("-")[1]
         for problem in version_problems(version):
             is_failed = True
             print(problem)
         print(changelog_note(version) or f"CHANGELOG.md: has {version}")
         test_tools = TEST_TOOLS if options.tests else TEST_TOOLS[:1]
-        kinds: list[tuple[str, Path, list[str], Sequence[str]]] = [("wheel, newest", wheel, [], options.tests)]
+        kinds: list[tuple[str, Path, Sequence[str]]] = [("wheel, newest", wheel, options.tests)]
         if not options.quick:
-            kinds.append(("wheel, lowest", wheel, lowest_versions(project["dependencies"]), options.tests))
-            kinds.append(("sdist, newest", sdist, [], ()))
+            kinds += [("wheel, lowest", wheel, options.tests), ("sdist, newest", sdist, ())]
         print(f"{'python':12}  {'installed':13}  outcome  numpy scipy h5py xarray")
         for number, python in enumerate(options.python or [sys.executable]):
             name = run(python, "-c", "import platform; print(platform.python_version())", cwd=folder).strip()
-            for kind, file, pins, tests in kinds:
+            for kind, file, tests in kinds:
                 place = folder / f"{number}-{kind.replace(', ', '-')}"
                 try:
+                    pins = lowest_versions(tools / "uv", python) if kind.endswith("lowest") else []
                     programs = create_environment(place, python, file, *pins, *test_tools)
                     outcome = f"ok       {check_environment(programs, place / 'run', version, tests)}"
                 except CheckError as error:
@@ -171,4 +171,7 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    try:
+        sys.exit(main())
+    except CheckError as error:
+        sys.exit(str(error))
