@@ -6,10 +6,10 @@ BIN := $(VENV)/bin
 RESULTS ?= results
 
 .DEFAULT_GOAL := help
-.PHONY: help figure figures regress test test-faults test-fast test-peers check docs bench clean
+.PHONY: help figure figures regress test test-faults test-fast test-peers check release-check docs bench clean
 
 help:  ## list the targets
-	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-11s %s\n", $$1, $$2}'
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-13s %s\n", $$1, $$2}'
 
 figure: $(BIN)/impact  ## sweep configs/figure6.toml and draw Figure 6 of the paper
 	@mkdir -p $(RESULTS)
@@ -51,6 +51,10 @@ check: $(VENV)/dev  ## lint and type-check
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+# PYTHONS="python3.11 python3.12" checks several interpreters, TESTS="tests/test_config.py" runs tests in addition
+release-check:  ## build the wheel and the sdist, install them with the newest and the lowest dependencies, and run them
+	$(PYTHON) scripts/check_release.py $(addprefix --python ,$(PYTHONS)) $(if $(TESTS),--tests $(TESTS))
 
 # the config of a baseline tests/data/NAME.h5 is tests/data/NAME.toml or configs/NAME.toml
 regress: $(patsubst tests/data/%.h5,regress-%,$(wildcard tests/data/*.h5))  ## sweep every config with a baseline and compare

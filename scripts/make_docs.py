@@ -21,6 +21,7 @@ PACKAGE = ROOT / "src" / "impact"
 # an importing package comes before the packages that it imports
 PACKAGES = (
     "cli",
+    "pytest_plugin",
     "api",
     "reporting",
     "plots",

@@ -52,6 +52,13 @@ gamma = [1.5, 4.0]
 """
 
 
+def default_law(code: str) -> str:
+    """The first law of a code to which laws are exported."""
+    from impact.exporters.codes import CODES
+
+    return next(iter(CODES[code].laws))
+
+
 @pytest.fixture(scope="session")
 def forked() -> Iterator[ForkServer]:
     """Run the program hundreds of times: processes of a server that has imported what they need."""

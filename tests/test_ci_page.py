@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 import subprocess
 import sys
 import venv
@@ -31,9 +32,9 @@ K = 6e9
 Shell = dict[str, str]
 
 
-def block(language: str) -> str:
-    (text,) = re.findall(rf"```{language}\n(.*?)```", PAGE, re.DOTALL)
-    return str(text)
+def block(language: str, position: int = 0) -> str:
+    """The block of a language at a position of the page."""
+    return str(re.findall(rf"```{language}\n(.*?)```", PAGE, re.DOTALL)[position])
 
 
 @pytest.fixture(scope="module")
@@ -118,6 +119,41 @@ def test_the_pytest_example_passes_and_fails(tmp_path: Path, cli: Run) -> None:
     assert failed.returncode == 1
     assert "not equal: labels (e)" in failed.stdout
     assert "e: 1 of 3 in NEW only: 0.2; 1 of 3 in BASELINE only: 0.1" in failed.stdout
+
+
+def test_the_example_of_the_pytest_plug_in_passes_and_fails(tmp_path: Path) -> None:
+    (tmp_path / "contact.toml").write_text(CONTACT, encoding="utf-8")
+    (tmp_path / "test_contact.py").write_text(block("python", 1), encoding="utf-8")
+    # without the entry point of an installation
+    options = ["-p", "no:impact", "-p", "impact.pytest_plugin", "-p", "no:cacheprovider"]
+    bless, check = ([sys.executable, "-m", *shlex.split(line), *options] for line in block("sh", 1).splitlines())
+    for words in (bless, check):
+        done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout
+    baselines = {path.name for path in (tmp_path / "baselines").iterdir()}
+    assert baselines == {"contact.h5", "test_contact-test_result.h5"}
+    (tmp_path / "contact.toml").write_text(CONTACT.replace("6e9", "6.1e9"), encoding="utf-8")
+    failed = subprocess.run(check, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert "2 failed" in failed.stdout
+    assert failed.stdout.count("physics config: K is 6100000000, in BASELINE 6000000000") == 2
+
+
+def test_the_examples_of_the_action_and_the_hook_use_what_exists() -> None:
+    action = yaml.safe_load((ROOT / "action.yml").read_text(encoding="utf-8"))
+    used = next(
+        step["with"]
+        for step in yaml.safe_load(block("yaml", 1))["jobs"]["regression"]["steps"]
+        if "impact@" in step["uses"]
+    )
+    required = {name for name, spec in action["inputs"].items() if spec.get("required")}
+    assert required <= used.keys() <= action["inputs"].keys()
+    rows = dict(re.findall(r"^\| `([\w-]+)` \| .* \| (.+) \|$", PAGE, re.MULTILINE))
+    assert rows.keys() == action["inputs"].keys()
+    for name, spec in action["inputs"].items():
+        assert not spec.get("default") or rows[name] == f"`{spec['default']}`"
+    (hook,) = yaml.safe_load((ROOT / ".pre-commit-hooks.yaml").read_text(encoding="utf-8"))
+    (repository,) = yaml.safe_load(block("yaml", 2))["repos"]
+    assert [entry["id"] for entry in repository["hooks"]] == [hook["id"]]
 
 
 def test_the_readme_shows_the_same_steps(steps: list[dict[str, str]]) -> None:

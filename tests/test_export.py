@@ -14,7 +14,7 @@ import impact
 from impact.errors import UsageError
 from impact.exporters.codes import CODES
 
-from .conftest import ROOT, Run
+from .conftest import ROOT, Run, default_law
 
 # two balls whose effective mass is 0.75 kg and whose effective radius is 0.03 m
 BALLS = {"v1": 1.0, "v2": 0.0, "m1": 1.0, "m2": 3.0, "R1": 0.04, "R2": 0.12}
@@ -30,10 +30,6 @@ def source(*materials: str, **values: float) -> dict[str, object]:
         "materials": {"soft": SOFT, "hard": HARD},
         "sweep": BALLS | {"e": 0.5} | named | values,
     }
-
-
-def default_law(code: str) -> str:
-    return next(iter(CODES[code].laws))
 
 
 def test_the_law_is_the_first_of_the_source_that_the_code_has() -> None:

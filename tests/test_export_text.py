@@ -19,7 +19,7 @@ from impact.exporters.codes import CODES
 from impact.exporters.export import Export
 from impact.exporters.problem import prepare_export
 
-from .conftest import Run
+from .conftest import Run, default_law
 
 # effective mass 0.75 kg and effective radius 0.03 m
 V0, M1, M2, R1, R2 = 1.5, 1.0, 3.0, 0.04, 0.12
@@ -184,17 +184,17 @@ def test_every_law_of_chrono_is_compared() -> None:
 
 def test_chrono_hertz_delivers_the_value_known_for_zero_force() -> None:
     """ζ = 0.2154537620 of e = 0.5 gives exp(−2ζ acos ζ/√(1 − ζ²)) = 0.5503."""
-    export = impact.export("chrono", source=config("soft", "soft", e=0.5))
+    export = impact.export("chrono", default_law("chrono"), source=config("soft", "soft", e=0.5))
     assert export.e_continuous == pytest.approx(0.5503, abs=5e-5)
     assert "delivers 0.550283 where e = 0.5 is asked for" in export.warnings[0]
 
 
 def test_chrono_takes_both_materials_or_a_modulus_that_gives_the_stiffness() -> None:
-    two = impact.export("chrono", source=config("soft", "hard", e=0.5)).parameters
+    two = impact.export("chrono", default_law("chrono"), source=config("soft", "hard", e=0.5)).parameters
     assert (two["YoungModulus"], two["PoissonRatio2"]) == (1e9, 0.2)
     assert two["EffectiveCurvatureRadius"] == pytest.approx(0.03, rel=1e-15)
     # E* = 3 K/(4 √R) and E = 2 (1 − ν²) E*
-    one = impact.export("chrono", source=config(e=0.5, K=1e9)).parameters
+    one = impact.export("chrono", default_law("chrono"), source=config(e=0.5, K=1e9)).parameters
     assert one["YoungModulus"] == pytest.approx(2.0 * 0.91 * 0.75e9 / math.sqrt(0.03), rel=1e-14)
 
 
@@ -208,7 +208,9 @@ def test_the_classes_of_chrono_have_the_names_of_the_release() -> None:
 
 
 def test_a_wall_of_chrono_gets_a_mass_that_does_not_change_the_effective_one() -> None:
-    export = impact.export("chrono", source=config("soft", "hard", e=0.5), at={"m2": math.inf})
+    export = impact.export(
+        "chrono", default_law("chrono"), source=config("soft", "hard", e=0.5), at={"m2": math.inf}
+    )
     (mass,) = arguments(export.lines, r"wall->SetMass\(#\)")
     assert mass * M1 / (mass + M1) == pytest.approx(M1, rel=2e-9)
 
@@ -273,7 +275,7 @@ def test_every_law_of_mercurydpm_is_compared() -> None:
 
 
 def test_mercurydpm_gets_twice_the_effective_mass_and_the_modulus_of_the_pair() -> None:
-    linear = impact.export("mercurydpm", source=config(e=0.5, K=1e7, n=1)).parameters
+    linear = impact.export("mercurydpm", default_law("mercurydpm"), source=config(e=0.5, K=1e7, n=1)).parameters
     assert linear == {"stiffness": 1e7, "restitution": 0.5, "mass": 1.5}
     hertz = impact.export("mercurydpm", "tsuji-1992", source=config("soft", "hard", e=0.5)).parameters
     assert hertz == {"effectiveElasticModulus": pytest.approx(MODULUS, rel=1e-13), "restitution": 0.5}
@@ -332,7 +334,7 @@ def test_the_lines_of_adams_give_the_law_in_millimetres(n: float, d: float) -> N
 
 def test_the_statement_and_the_function_of_adams_have_the_same_numbers() -> None:
     at = {"adams-impact.c": 2e3, "adams-impact.d": 1e-5}
-    export = impact.export("adams", source=config(K=1e8), at=at)
+    export = impact.export("adams", default_law("adams"), source=config(K=1e8), at=at)
     assert arguments(export.lines, r"IMPACT\(x, dx/dt, x1, #, #, #, #\)") == list(export.parameters.values())
     assert export.parameters["stiffness"] == pytest.approx(1e8 / 1e3**1.5, rel=1e-14)
     assert export.parameters["dmax"] == pytest.approx(0.01, rel=1e-14)
@@ -354,7 +356,7 @@ def simscape_force(lines: Sequence[str]) -> Force:
 @pytest.mark.slow
 def test_the_lines_of_simscape_give_the_law() -> None:
     at = {"e": 0.6, "simscape-contact.w": 2e-5}
-    export = same_law("simscape", None, simscape_force, config(K=1e7, n=1), at)
+    export = same_law("simscape", default_law("simscape"), simscape_force, config(K=1e7, n=1), at)
     assert export.e_continuous == pytest.approx(0.6, abs=1e-8)
 
 
@@ -362,7 +364,10 @@ def test_a_wide_transition_of_simscape_is_warned_about() -> None:
     """The peak indentation of the undamped spring is v0 √(m/K) = 4.108e-4 m."""
     narrow, wide = (
         impact.export(
-            "simscape", source=config(K=1e7, n=1), at={"simscape-contact.b": 1e3, "simscape-contact.w": w}
+            "simscape",
+            default_law("simscape"),
+            source=config(K=1e7, n=1),
+            at={"simscape-contact.b": 1e3, "simscape-contact.w": w},
         )
         for w in (4.1e-5, 5e-5)
     )
@@ -417,5 +422,5 @@ def test_a_law_without_known_radii_gets_finite_numbers() -> None:
     """The radii that are taken for it are those of a script."""
     source = {"models": "hertz", "sweep": {"v1": V0, "v2": 0.0, "m1": M1, "m2": M2, "e": 0.5, "K": 1e9}}
     for name in ("lammps", "chrono"):
-        values = impact.export(name, source=source).parameters.values()
+        values = impact.export(name, default_law(name), source=source).parameters.values()
         assert all(math.isfinite(value) for value in values if isinstance(value, float))

@@ -25,19 +25,19 @@ LAYERS = (
     {"reporting"},
     # the package itself, "", hands out the functions of api
     {"api", ""},
-    {"cli"},
+    {"cli", "pytest_plugin"},
     {"__main__"},
 )
 HEIGHT = {part: height for height, parts in enumerate(LAYERS) for part in parts}
 # where each library may be imported
 LIBRARIES = {
     "typer": {"cli"}, "rich": {"cli"}, "matplotlib": {"plots"}, "pandas": {"plots"}, "jinja2": {"reporting"},
-    "markupsafe": {"reporting"}, "xarray": {"results", "comparison", "inverse", "uncertainty"},
+    "markupsafe": {"reporting"}, "xarray": {"results", "comparison", "inverse", "uncertainty", "pytest_plugin"},
     "h5py": {"results"}, "h5netcdf": {"results"}, "tomllib": {"config"}, "pydantic": {"config", "results"},
     "pydantic_core": {"config"},
     "pint": {"config"}, "filelock": {"engine"}, "numba": {"contact"},
     "scipy": {"config", "inverse", "uncertainty"},
-    "dask": {"engine"}, "distributed": {"engine"},
+    "dask": {"engine"}, "distributed": {"engine"}, "pytest": {"pytest_plugin"},
 }  # fmt: skip
 MODULES = sorted(SOURCE.rglob("*.py"))
 

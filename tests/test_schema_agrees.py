@@ -18,6 +18,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from impact.config.load import json_schema, parse_config, read_config
+from impact.config.quantities import DISTRIBUTION_FORMS
 from impact.errors import ConfigError
 
 SCHEMA: dict[str, Any] = json_schema()
@@ -38,6 +39,7 @@ BEYOND = re.compile(
     r"sweep\.cases\.|a unit of|a bare number|got \"\s*[-+.0-9]+[^\"]*[^\"0-9.]|\\x|a material of|on an axis|twice|overflow|two ends|a step other"
     r"|got no value|got a value|an axis|a scalar|no axis|chunks of|no such input|one length|set together with|missing"
     r"|as in the first|not read|cannot be read|not a regular|some model matches|models to exclude|left out again|NUL|64 characters"
+    r"|samples such as|in ascending order|expected a median"
 )
 NUMBERS = st.integers(-3, 12) | st.floats(-2.0, 11.0) | st.floats(allow_nan=False, allow_infinity=False)
 ATOMS = (
@@ -47,7 +49,11 @@ LISTS = st.lists(ATOMS, max_size=4)
 ANYTHING = st.one_of(
     ATOMS,
     LISTS,
-    st.dictionaries(st.sampled_from(["linspace", "geomspace", "arange", "file", "v2"]), ATOMS | LISTS, max_size=2),
+    st.dictionaries(
+        st.sampled_from(["linspace", "arange", "file", "v2", "uniform", "normal", "empirical"]),
+        ATOMS | LISTS,
+        max_size=2,
+    ),
     st.tuples(NUMBERS, NUMBERS, NUMBERS).map(lambda ends: {"linspace": list(ends)}),
 )
 
@@ -103,6 +109,8 @@ def with_value(key: str, value: object) -> dict[str, Any]:
     for step in tables:
         table = table.setdefault(step, {})
     table[name] = value
+    if isinstance(value, dict) and not DISTRIBUTION_FORMS.keys().isdisjoint(value):
+        data["design"] = {"n": 4}
     return data
 
 

@@ -667,7 +667,7 @@ def sensitivity(
     ...     "design": {"n": 1024},
     ... }, of="peak_force")
     >>> study["first"].values.round(2).tolist()
-    [[0.57, 0.43]]
+    [[0.56, 0.43]]
     """
     # its modules import scipy.stats, which other functions do without
     from .uncertainty.sensitivity import check_output_name, sensitivity_of, sensitivity_plan

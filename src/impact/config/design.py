@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -68,10 +68,17 @@ def draw(distribution: Distribution, u: Array) -> Array:
     >>> draw(Distribution(empirical=(3.0, 1.0)), np.array([0.2, 0.7])).tolist()
     [1.0, 3.0]
     """
+    numbers = [float(number) for number in distribution.parameters]
+    with np.errstate(all="ignore"):
+        drawn = _draw(distribution.kind, numbers, u)
+    # -0.0 becomes 0.0
+    return drawn + 0.0
+
+
+def _draw(kind: str, numbers: Sequence[float], u: Array) -> Array:
     from scipy.special import ndtri
 
-    numbers = [float(number) for number in distribution.parameters]
-    match distribution.kind:
+    match kind:
         case "uniform":
             least, most = numbers
             drawn = least + (most - least) * u
@@ -89,8 +96,7 @@ def draw(distribution: Distribution, u: Array) -> Array:
         case _:
             ordered = np.sort(numbers)
             drawn = ordered[np.minimum((u * ordered.size).astype(int), ordered.size - 1)]
-    # -0.0 becomes 0.0
-    return np.asarray(drawn) + 0.0
+    return np.asarray(drawn)
 
 
 def draw_columns(

@@ -1,0 +1,203 @@
+"""The pytest plug-in: the fixture `impact_regression` compares a result, or a sweep, with a baseline.
+
+pytest loads this module through the entry point `pytest11`; nothing else imports it. It imports the rest of the
+package when a test uses the fixture, so that other test runs do not wait for it.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from .comparison.tolerances import Tolerances
+    from .comparison.verdict import Verdict
+    from .contact.model import ForceModel
+
+# the property of a test that brings its written baselines to the summary, also from workers of pytest-xdist
+WRITTEN = "impact baseline"
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the option --impact-bless."""
+    parser.getgroup("impact", "regression tests of impact").addoption(
+        "--impact-bless",
+        metavar="REASON",
+        help="Write the baselines of impact_regression that are missing or differ; the reason is stored in them.",
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Check the reason before any test runs."""
+    reason = config.getoption("--impact-bless")
+    # without a reason, the next argument of the command line would be taken for it
+    if reason is not None and (not reason.strip() or os.path.exists(reason.partition("::")[0])):
+        raise pytest.UsageError(f'--impact-bless: got "{reason}", expected the reason for the change')
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Print which baselines were written."""
+    written = [
+        value
+        for reports in terminalreporter.stats.values()
+        for report in reports
+        if getattr(report, "when", "") == "call"
+        for name, value in report.user_properties
+        if name == WRITTEN
+    ]
+    if written:
+        terminalreporter.section("baselines of impact")
+        for path in dict.fromkeys(written):
+            terminalreporter.line(f"written: {path}")
+
+
+@pytest.fixture
+def impact_regression(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> ImpactRegression:
+    """Compare a result, or the sweep of a config, with a stored baseline.
+
+    `impact_regression(source, baseline=None, *, tol=None, subset=False, overrides=(), plugins=(),
+    allow_failed=False)` fails the test with the verdict of `impact.compare` unless they are equal. With
+    --impact-bless REASON a baseline that is missing or differs is written.
+    """
+    return ImpactRegression(request, tmp_path_factory)
+
+
+@dataclass(frozen=True)
+class ImpactRegression:
+    """The value of the fixture `impact_regression`, a function with access to its test."""
+
+    request: pytest.FixtureRequest
+    tmp_path_factory: pytest.TempPathFactory
+
+    def __call__(
+        self,
+        source: str | Path | Mapping[str, object] | xr.Dataset,
+        baseline: str | Path | None = None,
+        *,
+        tol: float | Tolerances | None = None,
+        subset: bool = False,
+        overrides: Sequence[str] = (),
+        plugins: Sequence[ForceModel | str | Path] = (),
+        allow_failed: bool = False,
+    ) -> Verdict | None:
+        """Compare with a baseline; fail the test if they are not equal.
+
+        Relative paths start at the folder of the test file.
+
+        Parameters
+        ----------
+        source : a config, as a mapping or the path of a TOML file, which is swept; or a result, as a dataset or
+            the path of its file
+        baseline : the file of the baseline; by default baselines/FILE-TEST.h5, from the names of the test
+        tol, subset : see `impact.compare`
+        overrides, plugins : of the sweep, see `impact.sweep`
+        allow_failed : write a baseline even if some of its points failed
+
+        Returns
+        -------
+        Verdict : the comparison; None if there was no baseline and --impact-bless wrote it
+        """
+        __tracebackhide__ = True
+        import impact
+
+        try:
+            verdict, failure = self._check(source, baseline, tol, subset, overrides, plugins, allow_failed)
+        except impact.ImpactError as error:
+            verdict, failure = None, str(error)
+        if failure:
+            pytest.fail(failure, pytrace=False)
+        return verdict
+
+    def _check(
+        self,
+        source: str | Path | Mapping[str, object] | xr.Dataset,
+        baseline: str | Path | None,
+        tol: float | Tolerances | None,
+        subset: bool,
+        overrides: Sequence[str],
+        plugins: Sequence[ForceModel | str | Path],
+        allow_failed: bool,
+    ) -> tuple[Verdict | None, str]:
+        """The verdict, and why the test fails, or an empty text."""
+        import impact
+
+        path = self._path(baseline) if baseline is not None else self._default_baseline()
+        reason = self.request.config.getoption("--impact-bless")
+        new = self._result_file(source, overrides, plugins)
+        if reason is not None:
+            return self._bless(new, path, reason, tol=tol, subset=subset, allow_failed=allow_failed), ""
+        if reason is None and not path.exists():
+            return None, f"{path}: no baseline\n{self._hint('first baseline')}"
+        verdict = impact.compare(new, path, tol=tol, subset=subset)
+        if verdict.equal:
+            return verdict, ""
+        hint = self._hint("why the numbers change")
+        return verdict, f"{verdict}\nnew result: {new}\nbaseline: {path}\n{hint}"
+
+    def _bless(
+        self, new: Path, baseline: Path, reason: str, *, tol: Any, subset: bool, allow_failed: bool
+    ) -> Verdict | None:
+        """Write a baseline unless it is equal to the result, so that version control shows real changes only."""
+        import impact
+
+        try:
+            if baseline.exists() and (verdict := impact.compare(new, baseline, tol=tol, subset=subset)).equal:
+                return verdict
+        except impact.ImpactError:
+            # bless reports the same error and how to proceed
+            pass
+        baseline.parent.mkdir(parents=True, exist_ok=True)
+        verdict_of_old = impact.bless(new, baseline, reason=reason, tol=tol, allow_failed=allow_failed)
+        self.request.node.user_properties.append((WRITTEN, str(baseline)))
+        return verdict_of_old
+
+    def _result_file(
+        self,
+        source: str | Path | Mapping[str, object] | xr.Dataset,
+        overrides: Sequence[str],
+        plugins: Sequence[ForceModel | str | Path],
+    ) -> Path:
+        """The file of the new result; pytest keeps its folder, so that commands in a verdict can be repeated."""
+        import xarray as xr
+
+        import impact
+
+        is_config = isinstance(source, str | Path) and Path(source).suffix.lower() == ".toml"
+        if isinstance(source, xr.Dataset) or (isinstance(source, str | Path) and not is_config):
+            if overrides or plugins:
+                raise TypeError("got overrides or plugins and a result, expected them with a config")
+            if not isinstance(source, xr.Dataset):
+                return self._path(source)
+        new = self.tmp_path_factory.mktemp("impact_regression") / "new.h5"
+        if isinstance(source, xr.Dataset):
+            impact.save(source, new)
+        else:
+            config = self._path(source) if isinstance(source, str | Path) else source
+            files = [self._path(plugin) if isinstance(plugin, str | Path) else plugin for plugin in plugins]
+            impact.sweep(config, output=new, overrides=overrides, plugins=files)
+        return new
+
+    def _path(self, path: str | Path) -> Path:
+        """A path relative to the folder of the test file, whatever the working directory is."""
+        return Path(os.path.normpath(self.request.path.parent / path))
+
+    def _default_baseline(self) -> Path:
+        """The path of the baseline that belongs to the name of the test."""
+        name = f"{self.request.path.stem}-{self.request.node.name}"
+        return self._path("baselines") / (re.sub(r"[^\w.=+-]+", "_", name).strip("_") + ".h5")
+
+    def _hint(self, reason: str) -> str:
+        """How to accept the new result."""
+        test = shlex.quote(self.request.node.nodeid)
+        return f'to accept the new result: pytest {test} --impact-bless "{reason}"'
