@@ -78,6 +78,7 @@ def test_measured_beads_have_the_statistics_that_their_authors_print() -> None:
     assert round(float(fit["upper"] - fit["lower"]) / 2.0, 4) == 0.0044
 
 
+@pytest.mark.slow
 def test_several_outputs_identify_the_spring_and_the_dashpot() -> None:
     """The contact time adds what restitutions alone do not tell."""
     truth = {"K": 2e6, "C": 300.0}
@@ -108,6 +109,7 @@ def test_the_json_has_the_names_of_the_contract(cli: Run) -> None:
     assert law["determined"] == ["C/sqrt(m K)"]
 
 
+@pytest.mark.slow
 def test_the_bytes_of_a_result_do_not_depend_on_the_number_of_processes(cli: Run, tmp_path: Path) -> None:
     laws = ("--set", 'models=["anagnostopoulos-1988", "hunt-crossley-1975"]', "--set", "solver.rtol=1e-6")
     for name, jobs in (("a.h5", "1"), ("b.h5", "2")):
@@ -151,6 +153,7 @@ def test_the_value_of_a_parameter_that_is_not_identified_is_not_judged() -> None
     assert impact.compare(moved, fit).equal
 
 
+@pytest.mark.slow
 def test_a_result_is_stored_and_read_again(cli: Run, tmp_path: Path) -> None:
     done = cli("calibrate", FOLDER / "hdpe.toml", *ONE_LAW, "-o", tmp_path / "a.h5")
     assert done.returncode == 0, done.stderr

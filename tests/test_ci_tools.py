@@ -275,6 +275,7 @@ def test_the_action_sweeps_and_reports_a_difference(tmp_path: Path) -> None:
     assert "nothing in common (e)" in (tmp_path / "summary.md").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_the_hook_reports_every_invalid_config(tmp_path: Path) -> None:
     assert HOOK["id"] == "impact-check"
     (tmp_path / "contact.toml").write_text(CONTACT, encoding="utf-8")

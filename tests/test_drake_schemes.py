@@ -189,6 +189,7 @@ def test_a_sweep_of_a_law_that_the_scheme_does_not_take_is_a_config_error(n: obj
         impact.sweep(config)
 
 
+@pytest.mark.slow
 def test_a_hunt_crossley_law_with_n_1_is_taken() -> None:
     at = BALLS | {"e": 0.8}
     row = impact.timestep(

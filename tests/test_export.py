@@ -237,7 +237,19 @@ def numbers_and_text(line: str) -> tuple[list[float], str]:
     return [float(text) for text in re.findall(pattern, line)], re.sub(pattern, "#", line.rstrip())
 
 
-@pytest.mark.parametrize(("command", "printed"), EXAMPLES, ids=[command for command, _ in EXAMPLES])
+# each takes a second
+QUICK_EXAMPLES = ("export --to lammps", "export --to mujoco")
+
+
+@pytest.mark.parametrize(
+    ("command", "printed"),
+    [
+        pytest.param(
+            *example, id=example[0], marks=() if example[0].startswith(QUICK_EXAMPLES) else pytest.mark.slow
+        )
+        for example in EXAMPLES
+    ],
+)
 def test_the_page_prints_what_the_commands_print(cli: Run, command: str, printed: str) -> None:
     """The last digits of a number that was solved for depend on the processor."""
     done = cli(*shlex.split(command))

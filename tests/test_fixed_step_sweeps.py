@@ -355,6 +355,7 @@ def test_values_of_at_may_complete_a_config() -> None:
         impact.run(at={"steps_per_contact": 10.0, "dt": 1e-6}, overrides=fixed)
 
 
+@pytest.mark.slow
 def test_solve_finds_the_e_to_ask_for() -> None:
     fixed = ["solver.integrator='kick-drift'"]
     asked = impact.solve(
@@ -452,6 +453,7 @@ def test_a_result_without_the_axis_is_refused_in_one_line(sweep: dict[str, Any],
         impact.plot(swept(**{"e": 0.5} | sweep), kind="timestep")
 
 
+@pytest.mark.slow
 def test_a_report_has_the_picture_and_no_loop(coarse: xr.Dataset) -> None:
     page = impact.report(coarse)
     assert "Restitution at fixed steps: mean, least and largest over the phase." in page
