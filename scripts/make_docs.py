@@ -12,7 +12,9 @@ import impact
 from gallery import gallery_page, write_gallery
 from impact.contact.status import Status
 from impact.plots.style import save_figure
+from impact.results.calibration import CALIBRATION_VARIABLES
 from impact.results.schema import HISTORY_VARIABLES, SCHEMA, SCHEMA_VERSION
+from impact.results.sensitivity import SENSITIVITY_VARIABLES
 from models_page import models_page
 from models_pictures import pictures
 
@@ -66,7 +68,8 @@ cell of the grid for one model; cells that differ only in parameters of other mo
 The dimensions are `model`, followed by the swept axes in config order under their config names, such as `v1`,
 `bilinear.K` or `materials.steel.E`. A zip group is named after its first member; the other members are
 coordinates along it. Cases, and groups in which every column has repeated values, have the dimension `case`,
-with points numbered from 0 and all columns as coordinates. Scalars of the config are scalar coordinates.
+with points numbered from 0 and all columns as coordinates; samples of uncertain inputs have the dimension
+`sample`. Scalars of the config are scalar coordinates.
 Coordinates along `model` are `title`, `year`, `equation`, `reference`, `doi` and `exponent` (n). With `alpha`,
 `e` is a coordinate over the axes that it depends on, and so is a mass that is computed from radius and density.
 
@@ -142,6 +145,23 @@ All variables have the dimension `t` [s], the time since first contact.
 | variable | unit | meaning |
 |---|---|---|
 {history}
+
+## A calibration
+
+The result of `impact calibrate` has these variables; their order along `model` is the ranking.
+
+| variable | unit | dimensions | judged by compare relative to | meaning |
+|---|---|---|---|---|
+{calibration}
+
+## A sensitivity study
+
+The result of `impact sensitivity` has the dimensions `model`, the axes other than `sample`, and `input` or
+`quantile`; its attributes `of` and `design` name the output, the distributions and how they were drawn.
+
+| variable | own dimension | meaning |
+|---|---|---|
+{sensitivity}
 """
 
 
@@ -154,7 +174,18 @@ def schema_page() -> str:
         variables.append(f"| `{variable.name}` | {' | '.join(cells)} |")
     statuses = [f"| {status.value} | {status.name.lower()} | {status.meaning} |" for status in Status]
     history = [f"| `{name}` | {unit} | {meaning} |" for name, unit, meaning in HISTORY_VARIABLES]
-    tables = {"variables": variables, "statuses": statuses, "history": history}
+    calibration = [
+        f"| `{name}` | {variable.unit} | {', '.join(variable.dims)} | {variable.scale} | {variable.meaning} |"
+        for name, variable in CALIBRATION_VARIABLES.items()
+    ]
+    sensitivity = [f"| `{name}` | {own} | {meaning} |" for name, (own, meaning) in SENSITIVITY_VARIABLES.items()]
+    tables = {
+        "variables": variables,
+        "statuses": statuses,
+        "history": history,
+        "calibration": calibration,
+        "sensitivity": sensitivity,
+    }
     on_request = ", ".join(f"`{variable.name}`" for variable in SCHEMA if not variable.by_default)
     rows_as_text = {name: "\n".join(rows) for name, rows in tables.items()}
     return SCHEMA_PAGE.format(on_request=on_request, version=SCHEMA_VERSION, **rows_as_text)
