@@ -73,6 +73,8 @@ def test_indices_are_those_of_the_closed_forms(of: str) -> None:
         assert (study[f"{name}_lower"] < exact).all()
         assert (exact < study[f"{name}_upper"]).all()
     assert study["input"].values.tolist() == ["sweep.m1", "sweep.K", "sweep.v1"]
+    # the points that were computed for it are not part of it
+    assert "sample" not in study.dims
 
 
 def test_mean_and_quantiles_of_a_study_are_those_of_the_samples() -> None:
