@@ -54,7 +54,7 @@ from .results.single_impact import STARTER_CONFIG, histories, run_single_impact,
 from .results.single_impact import Impact as Impact
 from .results.summary import SweepOutcome, describe
 from .results.sweep import find_finished, sweep_in_memory, sweep_into
-from .text import safe_text
+from .text import html_table, safe_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -1035,7 +1035,21 @@ def models(
         raise UsageError(
             f'no model matches "{safe_text(pattern)}"; {did_you_mean(pattern.strip("*?"), list(of_family))}'
         )
-    return matching
+    return Models(matching)
+
+
+class Models(dict[str, ForceModel]):
+    """Models by key, which a notebook shows as a table."""
+
+    def __repr__(self) -> str:
+        return f"{len(self)} models: {', '.join(self)}"
+
+    def _repr_html_(self) -> str:
+        rows = (
+            (key, model.family, model.equation, ", ".join(p.name for p in model.parameters), model.domain_text)
+            for key, model in self.items()
+        )
+        return html_table(("model", "family", "equation", "parameters", "stated domain"), rows)
 
 
 def check_model(model: ForceModel) -> list[Finding]:
@@ -1077,7 +1091,7 @@ def info(result: xr.Dataset | str | Path) -> dict[str, Any]:
 
 
 def plot(
-    dataset: xr.Dataset,
+    dataset: xr.Dataset | Impact,
     *,
     kind: str | None = None,
     x: str | None = None,
@@ -1100,9 +1114,9 @@ def plot(
 
     Parameters
     ----------
-    dataset : a result, or a time history
+    dataset : a result, a time history, or an impact of `run`
     kind : one of `impact.plots.kinds.KINDS`; by default "final-velocities", "uncertainty" for samples of uncertain
-        inputs, or "calibration" or "sensitivity" for the result of that function
+        inputs, "loop" for an impact, or "calibration" or "sensitivity" for the result of that function
     x : the coordinate to draw over; by default e, else the first numeric axis
     y : second axis of a map, or of the kind validity; by default the next one
     variable : name of the variable that a map or a band shows; by default e_error for a map, e_out for a band
@@ -1137,6 +1151,10 @@ def plot(
     """
     from .plots.kinds import Choice, default_kind, draw
 
+    if isinstance(dataset, Impact):
+        if dataset.history is None:
+            raise UsageError(f"no motion to draw: {dataset.why_no_history}")
+        dataset = dataset.history
     choice = Choice(x, y, variable, sel, models, log, equations)
     plot_data = get_plot_data(dataset, kind or default_kind(dataset), choice, plugins)
     return draw(plot_data, width, height, style=style, title=title, labels=labels, points=points, ax=ax)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from enum import StrEnum
 from pathlib import Path
@@ -11,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..errors import ImpactError, UsageError
-from ..formatting import number
 from ..text import safe_text
 from . import exits
 from .console import dump
@@ -185,22 +183,18 @@ def _print_report(printed: Report, format: Format) -> None:
 
 def print_verdict(verdict: Verdict) -> None:
     """Print the headline, the differences with the commands that repeat them, and a table of changed variables."""
+    from ..comparison.verdict import VERDICT_HEADINGS
     from .console import cell, console, table
 
     out = console(sys.stdout)
     for line in (verdict.headline, *verdict.lines, *(f"note: {note}" for note in verdict.notes)):
         # no wrapping, so that commands can be copied
         out.print(line, soft_wrap=True)
-    moved = [variable for variable in verdict.ranked if variable.times]
-    if moved and out.width >= MIN_TABLE_WIDTH:
-        rows = table("variable", "judged", "tolerance", "differ", "worst", "x tolerance")
+    changed = verdict.rows()
+    if changed and out.width >= MIN_TABLE_WIDTH:
+        rows = table(*VERDICT_HEADINGS)
         rows.columns[1].justify = "left"
-        for variable in moved:
-            tolerance = number(variable.tolerance, 3)
-            times = number(variable.times if variable.tolerance == variable.tolerance else math.nan, 3)
-            many = f"{variable.different} of {variable.points}"
-            rows.add_row(
-                cell(variable.name), cell(variable.judged), tolerance, many, number(variable.worst, 3), times
-            )
+        for row in changed:
+            rows.add_row(*map(cell, row))
         out.print()
         out.print(rows)

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import UsageError
-from ..formatting import quantity
 from ..text import safe_text
 from . import exits
 from .console import dump, print_rows
@@ -65,7 +64,7 @@ def run(
     if as_json:
         print(dump(run_json(impact)))
     else:
-        print_run(impact)
+        print_rows(impact.rows())
     if impact.status >= FIRST_FAILURE:
         raise typer.Exit(exits.EXIT_POINTS_FAILED)
     if history is not None:
@@ -92,62 +91,3 @@ def run_json(impact: Impact) -> dict[str, Any]:
         "e_kinetic": impact.e_kinetic,
         "e_energetic": impact.e_energetic,
     }
-
-
-def print_run(impact: Impact) -> None:
-    """Print one impact: inputs, outputs, the three restitutions and estimated errors."""
-    from ..config.tables import MATERIAL_QUANTITIES
-    from ..contact.timestep import EXACT
-    from ..results.schema import SCHEMA, plain_unit
-    from ..results.single_impact import DERIVED_QUANTITIES
-
-    rows: dict[str, Any] = {"model": impact.model.key, "equation": impact.model.equation}
-    for name, value in impact.point.items():
-        note = "  (first value of its axis)" if name in impact.first else ""
-        rows[name] = quantity(value, _unit_at(impact, _unit_of(impact, name)), 10) + note
-    for name, material in impact.materials.items():
-        properties = {field: value for field, value in asdict(material).items() if value is not None}
-        about = (
-            f"{field} = {quantity(value, MATERIAL_QUANTITIES[field].unit, 10)}"
-            for field, value in properties.items()
-        )
-        rows[f"[materials.{name}]"] = ", ".join(about)
-    for name, unit, meaning in DERIVED_QUANTITIES:
-        if impact.derived[name] == impact.derived[name] and name not in impact.point:
-            rows[name] = f"{quantity(impact.derived[name], _unit_at(impact, plain_unit(unit)), 10)}  {meaning}"
-    rows["status"] = f"{impact.status.name.lower()}: {impact.status.meaning}"
-    for variable in SCHEMA:
-        if variable.dtype == "f8" and variable.name not in ("e_kinetic", "e_energetic"):
-            unit = _unit_at(impact, plain_unit(variable.unit))
-            rows[variable.name] = quantity(impact.values[variable.name], unit, 10)
-    rows["e_kinematic"] = quantity(impact.e_kinematic, "1", 12) + "  (1), from the velocities"
-    rows["e_kinetic"] = quantity(impact.e_kinetic, "1", 12) + "  (2), tau_r/tau_c"
-    rows["e_energetic"] = quantity(impact.e_energetic, "1", 12) + "  (3), the root of -W_r/W_c"
-    rows["in the stated domain"] = "yes" if impact.values["in_domain"] else f"no: {impact.model.domain_text}"
-    rows["steps"] = impact.values["steps"]
-    if impact.integrator != EXACT:
-        rows["integrator"] = impact.integrator
-    print_rows(rows)
-
-
-def _unit_of(impact: Impact, name: str) -> str:
-    """The unit of an input, which may be a parameter of the model, or a property of a material."""
-    from ..config.tables import MATERIAL_QUANTITIES, SWEEP_QUANTITIES, model_quantities
-
-    key, _, parameter = name.rpartition(".")
-    quantities = (
-        model_quantities(impact.model)
-        if key == impact.model.key
-        else MATERIAL_QUANTITIES
-        if key
-        else SWEEP_QUANTITIES
-    )
-    return quantities[parameter].unit if parameter in quantities else "1"
-
-
-def _unit_at(impact: Impact, unit: str) -> str:
-    """A unit with the values of n and of the parameters that its exponents have."""
-    from ..contact.units import with_numbers
-
-    values = {name.rpartition(".")[2]: value for name, value in impact.point.items() if isinstance(value, float)}
-    return with_numbers(unit, {**values, "n": impact.exponent})

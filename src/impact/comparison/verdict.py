@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
@@ -11,7 +12,7 @@ import xarray as xr
 from ..contact.status import Status
 from ..formatting import number
 from ..results.replay_command import describe_point, replay_command
-from ..text import safe_text
+from ..text import html_table, safe_text
 
 FaultKind = Literal["nothing in common", "physics config", "labels", "units", "missing variable", "values"]
 # in the order of a verdict: kinds that explain others first
@@ -23,6 +24,7 @@ FAULT_KINDS: tuple[FaultKind, ...] = (
     "missing variable",
     "values",
 )
+VERDICT_HEADINGS = ("variable", "judged", "tolerance", "differ", "worst", "x tolerance")
 MAX_NAMED_FAULTS = 4  # names per kind in the first line
 
 
@@ -184,6 +186,25 @@ class Verdict:
             # several variables are often worst at one point
             lines += [variable.text, command] if command.strip() and command not in lines else [variable.text]
         return tuple(lines)
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """A row of text for each variable that changed, the worst first, under VERDICT_HEADINGS."""
+        return [
+            (
+                variable.name,
+                variable.judged,
+                number(variable.tolerance, 3),
+                f"{variable.different} of {variable.points}",
+                number(variable.worst, 3),
+                number(variable.times if variable.tolerance == variable.tolerance else math.nan, 3),
+            )
+            for variable in self.ranked
+            if variable.times
+        ]
+
+    def _repr_html_(self) -> str:
+        above = " · ".join((self.headline, *self.lines, *(f"note: {note}" for note in self.notes)))
+        return html_table(VERDICT_HEADINGS, self.rows(), above) if self.rows() else html_table((), [[above]])
 
     def replay(self, variable: Judged) -> str:
         """The command that runs the worst point of a variable again; empty if there is none."""

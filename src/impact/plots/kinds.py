@@ -80,6 +80,8 @@ def default_kind(dataset: xr.Dataset) -> str:
     from ..config.grid import SAMPLE
     from ..results.kinds import is_calibration, is_sensitivity
 
+    if "t" in dataset.dims:
+        return "loop"
     if is_calibration(dataset):
         return "calibration"
     if is_sensitivity(dataset):

@@ -18,7 +18,7 @@ from ..contact.status import FIRST_FAILURE, Status
 from ..engine.plan import owner_of
 from ..errors import UsageError
 from ..formatting import label, number, percentage
-from ..text import safe_text
+from ..text import html_table, safe_text
 from .replay_command import describe_point
 from .schema import columns_along, foreign_dims, own_dims
 from .selection import model_positions, select
@@ -156,6 +156,9 @@ class Ranking:
         if first.within:
             return f"no model gives e within {tol} everywhere; {key} is nearest: {first.percent} of {points}"
         return f"no model gives e within {tol} at {alone or f'any of {points}'}"
+
+    def _repr_html_(self) -> str:
+        return html_table(self.headings, (ranked.row for ranked in self.models), self.headline)
 
 
 def ranking(

@@ -7,7 +7,7 @@ import math
 import re
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from importlib.resources import files
 from pathlib import Path
 
@@ -17,7 +17,7 @@ from .._version import __version__
 from ..config.files import toml_text
 from ..config.grid import Axis, path_of
 from ..config.load import Config, parse_config, read_config
-from ..config.tables import SWEEP_QUANTITIES
+from ..config.tables import MATERIAL_QUANTITIES, SWEEP_QUANTITIES, model_quantities
 from ..contact.force_expressions import returning, stiffer
 from ..contact.history import History, follow
 from ..contact.impacts import Impacts
@@ -27,15 +27,17 @@ from ..contact.models import find
 from ..contact.outputs import collide
 from ..contact.status import Status
 from ..contact.timestep import EXACT
+from ..contact.units import with_numbers
 from ..engine.build_impacts import build_impacts, fixed_steps_at
 from ..engine.plan import Plan, owner_of
 from ..engine.plugins import Plugins
 from ..errors import ConfigError, UsageError, did_you_mean
-from ..text import safe_text
+from ..formatting import number, quantity
+from ..text import html_table, safe_text
 from .backend import open_result
 from .kinds import require_sweep
 from .provenance import changed_plugins, check_plugins, stored_config, unknown_plugins
-from .schema import HISTORY_VARIABLES, SCHEMA_VERSION, is_case, is_input
+from .schema import HISTORY_VARIABLES, SCHEMA, SCHEMA_VERSION, is_case, is_input, plain_unit
 from .seal import is_result
 
 STARTER_CONFIG = files("impact") / "config" / "starter.toml"
@@ -104,6 +106,56 @@ class Impact:
     def why_no_history(self) -> str:
         """Why there is no time history, for a message."""
         return self.status.meaning if self.integrator == EXACT else no_motion(self.integrator)
+
+    def rows(self) -> dict[str, str]:
+        """What `impact run` prints: the inputs, outputs, the three restitutions and estimated errors, by name."""
+        rows = {"model": self.model.key, "equation": self.model.equation}
+        for name, value in self.point.items():
+            note = "  (first value of its axis)" if name in self.first else ""
+            rows[name] = quantity(value, self._unit_of(name), 10) + note
+        for name, material in self.materials.items():
+            properties = {field: value for field, value in asdict(material).items() if value is not None}
+            about = (
+                f"{field} = {quantity(value, MATERIAL_QUANTITIES[field].unit, 10)}"
+                for field, value in properties.items()
+            )
+            rows[f"[materials.{name}]"] = ", ".join(about)
+        for name, unit, meaning in DERIVED_QUANTITIES:
+            if self.derived[name] == self.derived[name] and name not in self.point:
+                rows[name] = f"{quantity(self.derived[name], self._with_numbers(plain_unit(unit)), 10)}  {meaning}"
+        rows["status"] = f"{self.status.name.lower()}: {self.status.meaning}"
+        for variable in SCHEMA:
+            if variable.dtype == "f8" and variable.name not in ("e_kinetic", "e_energetic"):
+                unit = self._with_numbers(plain_unit(variable.unit))
+                rows[variable.name] = quantity(self.values[variable.name], unit, 10)
+        rows["e_kinematic"] = quantity(self.e_kinematic, "1", 12) + "  (1), from the velocities"
+        rows["e_kinetic"] = quantity(self.e_kinetic, "1", 12) + "  (2), tau_r/tau_c"
+        rows["e_energetic"] = quantity(self.e_energetic, "1", 12) + "  (3), the root of -W_r/W_c"
+        rows["in the stated domain"] = "yes" if self.values["in_domain"] else f"no: {self.model.domain_text}"
+        rows["steps"] = number(self.values["steps"])
+        if self.integrator != EXACT:
+            rows["integrator"] = self.integrator
+        return rows
+
+    def _repr_html_(self) -> str:
+        return html_table((), self.rows().items())
+
+    def _unit_of(self, name: str) -> str:
+        """The unit of an input, which may be a parameter of the model, or a property of a material."""
+        key, _, parameter = name.rpartition(".")
+        quantities = (
+            model_quantities(self.model)
+            if key == self.model.key
+            else MATERIAL_QUANTITIES
+            if key
+            else SWEEP_QUANTITIES
+        )
+        return self._with_numbers(quantities[parameter].unit if parameter in quantities else "1")
+
+    def _with_numbers(self, unit: str) -> str:
+        """A unit with the values of n and of the parameters that its exponents have."""
+        values = {name.rpartition(".")[2]: value for name, value in self.point.items() if isinstance(value, float)}
+        return with_numbers(unit, {**values, "n": self.exponent})
 
 
 def no_motion(integrator: str) -> str:
