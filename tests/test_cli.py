@@ -644,6 +644,15 @@ def test_flags_are_shown_without_a_type(cli: Run) -> None:
         assert "bool" not in cli(*words).stdout
 
 
+def test_models_by_words_of_their_title_or_reference(cli: Run) -> None:
+    listed = json.loads(cli("models", "--search", "KUWABARA 1987", "--json").stdout)
+    assert "kuwabara-kono-1987" in {model["key"] for model in listed}
+    assert all("kuwabara" in json.dumps(model).casefold() for model in listed)
+    assert len(listed) < 10
+    none = cli("models", "--search", "no such words")
+    assert (none.returncode, none.stderr.count("\n")) == (2, 1)
+
+
 def test_models_by_a_pattern(cli: Run) -> None:
     keys = [record["key"] for record in json.loads(cli("models", "lammps-t*", "--json").stdout)]
     assert keys == [key for key in impact.models() if key.startswith("lammps-t")]

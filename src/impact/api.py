@@ -1003,9 +1003,27 @@ def _repeat_calibration(stored: xr.Dataset, plugins: Plugins, name: str) -> xr.D
     return calibration_dataset(calibrate_config(config, of_config), of_config)
 
 
+class Models(dict[str, ForceModel]):
+    """Models by key, which a notebook shows as a table."""
+
+    def __repr__(self) -> str:
+        return f"{len(self)} models: {', '.join(self)}"
+
+    def _repr_html_(self) -> str:
+        rows = (
+            (key, model.family, model.equation, ", ".join(p.name for p in model.parameters), model.domain_text)
+            for key, model in self.items()
+        )
+        return html_table(("model", "family", "equation", "parameters", "stated domain"), rows)
+
+
 def models(
-    plugins: Sequence[ForceModel | str | Path] = (), *, pattern: str = "*", family: str | None = None
-) -> Mapping[str, ForceModel]:
+    plugins: Sequence[ForceModel | str | Path] = (),
+    *,
+    pattern: str = "*",
+    family: str | None = None,
+    search: str | None = None,
+) -> Models:
     """The catalogue of contact force models, by key, or a part of it.
 
     Parameters
@@ -1013,10 +1031,11 @@ def models(
     plugins : plug-in models, and paths of Python files with such models, which come last
     pattern : pattern of the keys, such as "lammps-*"
     family : name of the family; by default all families
+    search : words that all have to occur in the key, title, year, equation, reference or DOI, in any case
 
     Raises
     ------
-    UsageError : no model matches the pattern, or there is no such family
+    UsageError : no model matches the pattern or the words, or there is no such family
     ModelError : a plug-in cannot be read or is invalid
 
     >>> import impact
@@ -1035,21 +1054,21 @@ def models(
         raise UsageError(
             f'no model matches "{safe_text(pattern)}"; {did_you_mean(pattern.strip("*?"), list(of_family))}'
         )
+    if search is not None:
+        words = search.casefold().split()
+        matching = {key: model for key, model in matching.items() if _contains(model, words)}
+        if not matching:
+            raise UsageError(
+                f'--search: no model has "{safe_text(search, 60)}" in its title, equation or reference'
+            )
     return Models(matching)
 
 
-class Models(dict[str, ForceModel]):
-    """Models by key, which a notebook shows as a table."""
-
-    def __repr__(self) -> str:
-        return f"{len(self)} models: {', '.join(self)}"
-
-    def _repr_html_(self) -> str:
-        rows = (
-            (key, model.family, model.equation, ", ".join(p.name for p in model.parameters), model.domain_text)
-            for key, model in self.items()
-        )
-        return html_table(("model", "family", "equation", "parameters", "stated domain"), rows)
+def _contains(model: ForceModel, words: Sequence[str]) -> bool:
+    """Whether all words occur in what is written about a model."""
+    about = (model.key, model.family, model.title, str(model.year), model.equation, model.reference, model.doi)
+    text = " ".join(about).casefold()
+    return all(word in text for word in words)
 
 
 def check_model(model: ForceModel) -> list[Finding]:

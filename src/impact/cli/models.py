@@ -45,6 +45,14 @@ def models(
             "--family", metavar="NAME", autocompletion=complete_family, help="List only the laws of this family."
         ),
     ] = None,
+    search: Annotated[
+        str | None,
+        typer.Option(
+            "--search",
+            metavar="WORDS",
+            help='List the laws with these words in key, title, equation or reference: "lammps hertz".',
+        ),
+    ] = None,
     check: Annotated[
         Path | None,
         typer.Option("--check", metavar="FILE", help="Check the models of a Python file against the contract."),
@@ -64,9 +72,9 @@ def models(
             as_json=as_json,
         )
         return
-    is_pattern = key is None or bool({*"*?["} & {*key})
+    is_pattern = key is None or search is not None or bool({*"*?["} & {*key})
     if is_pattern:
-        chosen = list(api.models(plugins or (), pattern=key or "*", family=family).values())
+        chosen = list(api.models(plugins or (), pattern=key or "*", family=family, search=search).values())
     else:
         chosen = [find(str(key), read_plugins(plugins or ()).models)]
     if as_json:

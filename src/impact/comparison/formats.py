@@ -13,6 +13,14 @@ from ..text import safe_text
 from .verdict import FAULT_KINDS, Judged, Verdict
 
 PROGRAM = "impact compare"
+# what a test of JUnit claims: that there is no fault of a kind
+CLAIMS: Mapping[str, str] = {
+    "nothing in common": "both have a variable in common",
+    "physics config": "both have the same inputs",
+    "labels": "both have the same points",
+    "units": "both have the same units",
+    "missing variable": "both have the same variables",
+}
 # differences that an annotation lists
 MAX_ANNOTATED = 3
 
@@ -100,9 +108,9 @@ def _safe_inputs(at: Mapping[str, float | str]) -> dict[str, float | str]:
 
 
 def as_junit(report: Report) -> str:
-    """JUnit XML: a suite with a test for each kind of fault and each variable."""
+    """JUnit XML: a suite with a test for each kind of fault and each variable, named by what it claims."""
     failed = [case for case in report.cases if case.texts]
-    cases = report.cases or (ReportCase("readable"),)
+    cases = report.cases or (ReportCase("both are readable"),)
     numbers = {"tests": len(cases), "failures": len(failed), "errors": int(report.equal is None), "skipped": 0}
     counts = {name: str(number) for name, number in numbers.items()}
     root = ElementTree.Element("testsuites", counts)
@@ -110,7 +118,7 @@ def as_junit(report: Report) -> str:
         root, "testsuite", {"name": f"{PROGRAM} {report.new} {report.baseline}", **counts}
     )
     for case in cases:
-        test = ElementTree.SubElement(suite, "testcase", {"classname": "impact.compare", "name": case.name})
+        test = ElementTree.SubElement(suite, "testcase", {"classname": "impact.compare", "name": _claim(case)})
         if report.equal is None:
             ElementTree.SubElement(test, "error", {"message": report.headline})
         elif case.texts:
@@ -120,6 +128,13 @@ def as_junit(report: Report) -> str:
     output.text = "\n".join([report.headline, *(f"note: {note}" for note in report.notes)])
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode", xml_declaration=True)
+
+
+def _claim(case: ReportCase) -> str:
+    """What a test claims, in words."""
+    if case.name == "both are readable":
+        return case.name
+    return CLAIMS.get(case.name, f"{case.name} is equal within its tolerance")
 
 
 def as_markdown(report: Report) -> str:
