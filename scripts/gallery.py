@@ -28,14 +28,14 @@ plotted numbers.
 ```
 {pictures}
 """
-# the command with its options, and the config of each result
+# the command that makes each result, without its output
 RESULTS = {
-    "figure6": ("sweep", "configs/figure6.toml"),
-    "timestep": ("sweep", "docs/timestep.toml"),
-    "speeds": ("sweep", "docs/gallery/speeds.toml"),
-    "drops": ("calibrate", "docs/calibrate/drops.toml"),
-    "samples": ("sweep --set 'sweep.e.linspace=[0.05, 0.95, 19]'", "docs/uncertainty/ball.toml"),
-    "study": ("sensitivity --of peak_force", "docs/uncertainty/ball.toml"),
+    "figure6": "sweep configs/figure6.toml",
+    "timestep": "sweep docs/timestep.toml",
+    "speeds": "sweep docs/gallery/speeds.toml",
+    "drops": "calibrate docs/calibrate/drops.toml",
+    "samples": "sweep docs/uncertainty/ball.toml --set 'sweep.e.linspace=[0.05, 0.95, 19]'",
+    "study": "sensitivity docs/uncertainty/ball.toml --of peak_force",
 }
 
 
@@ -131,7 +131,7 @@ ENTRIES = (
 def gallery_page() -> str:
     """docs/gallery.md as text."""
     return PAGE.format(
-        sweeps="\n".join(f"impact {command} {path} -o {name}.h5" for name, (command, path) in RESULTS.items()),
+        sweeps="\n".join(f"impact {command} -o {name}.h5" for name, command in RESULTS.items()),
         pictures="\n".join(_sections()),
     )
 
@@ -150,13 +150,18 @@ def _sections() -> Iterator[str]:
 ![{entry.kind}: {KINDS[entry.kind]}](gallery/{entry.kind}.svg)"""
 
 
+def write_results(folder: Path) -> None:
+    """Run the commands that make the results."""
+    for name, command in RESULTS.items():
+        _run(*shlex.split(command), "-o", str(folder / f"{name}.h5"))
+
+
 def write_gallery(folder: Path) -> None:
     """Run the commands of the page: writes the pictures, and numbers.json, by which a test detects stale ones."""
     folder.mkdir(exist_ok=True)
     with TemporaryDirectory() as name:
         results = Path(name)
-        for result, (command, path) in RESULTS.items():
-            _run(*shlex.split(command), str(ROOT / path), "-o", str(results / f"{result}.h5"))
+        write_results(results)
         numbers = {}
         for entry in ENTRIES:
             _, *arguments = entry.command
@@ -196,6 +201,7 @@ def _run(*arguments: str) -> None:
     subprocess.run(
         [sys.executable, "-m", "impact", *arguments],
         check=True,
+        cwd=ROOT,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )

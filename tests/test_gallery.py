@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-import impact
 from impact.plots.kinds import KINDS
 
 from .conftest import ROOT, Run
@@ -23,8 +22,7 @@ NUMBERS = FOLDER / "numbers.json"
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("gallery")
-    for name, (command, path) in gallery.RESULTS.items():
-        impact.save(getattr(impact, command)(ROOT / path), folder / f"{name}.h5")
+    gallery.write_results(folder)
     return folder
 
 

@@ -287,13 +287,13 @@ class Design(Table):
 
     @model_validator(mode="after")
     def _check_n(self) -> Design:
-        problem = check_power_of_two(self.n, "for sobol")
+        problem = power_of_two_problem(self.n, "for sobol")
         if self.method == "sobol" and problem:
             raise located_errors([(("n",), problem)])
         return self
 
 
-def check_power_of_two(n: int, purpose: str) -> str:
+def power_of_two_problem(n: int, purpose: str) -> str:
     """A message with the two next powers of two, if n is none; otherwise empty."""
     nearest = f"{1 << (n.bit_length() - 1)} or {1 << n.bit_length()}"
     return f"got {n}, expected a power of two {purpose}: {nearest}" if n & (n - 1) else ""

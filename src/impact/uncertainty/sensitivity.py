@@ -13,7 +13,7 @@ from ..config.design import draw_columns, unit_samples
 from ..config.grid import SAMPLE, path_of
 from ..config.lines import path_text
 from ..config.load import Config
-from ..config.tables import check_power_of_two, quantity_at
+from ..config.tables import power_of_two_problem, quantity_at
 from ..contact.outputs import OUTPUTS
 from ..engine.plan import Plan
 from ..engine.trajectories import check_count
@@ -54,7 +54,7 @@ def sensitivity_plan(plan: Plan, of: str, max_points: int, name: str) -> Plan:
         raise ConfigError(
             [f"{name}: got no uncertain input, expected a design and distributions, such as {example}"]
         )
-    if problem := check_power_of_two(config.design.n, "for Sobol indices"):
+    if problem := power_of_two_problem(config.design.n, "for Sobol indices"):
         raise ConfigError([f"{name}: design.n: {problem}"])
     names = list(config.distributions)
     models = {model.key: model for model in config.models}
