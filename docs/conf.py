@@ -1,0 +1,160 @@
+"""Configuration of the documentation site, which `make site` builds with Sphinx; it also writes the reference pages."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import impact
+from impact.cli.main import COMMANDS, load_command
+from impact.config.tables import (
+    FIXED_STEP_DEFAULTS,
+    SWEEP_DEFAULTS,
+    Data,
+    Design,
+    MaterialTable,
+    Output,
+    Solver,
+    Sweep,
+    quantities_of,
+)
+
+project = "impact"
+author = "impact contributors"
+version = release = impact.__version__
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_copybutton"]
+source_suffix = {".md": "markdown"}
+html_theme = "furo"
+html_title = "impact"
+html_show_copyright = False
+# headings are targets of links, as on GitHub
+myst_heading_anchors = 4
+napoleon_google_docstring = False
+default_role = "literal"
+autodoc_typehints = "none"
+autodoc_member_order = "bysource"
+copybutton_prompt_text = "$ "
+# outputs of commands are no shell language
+suppress_warnings = ["misc.highlighting_failure"]
+
+REFERENCE = Path(__file__).parent / "reference"
+# pages of the repository that are part of the site, and links to them and from them
+COPIED = {"CHANGELOG.md": "changelog.md", "SECURITY.md": "security.md"}
+MOVED = {f"](../{old})": f"](reference/{new})" for old, new in COPIED.items()}
+MOVED_COPIES = {f"]({old})": f"]({new})" for old, new in COPIED.items()} | {"](docs/": "](../"}
+
+
+def command_page() -> str:
+    """Every command with its arguments and options."""
+    lines = ["# Commands", "", "Every command has `--help`, and `impact help COMMAND` prints the same."]
+    for name, (_, summary, example) in COMMANDS.items():
+        command = load_command(name)
+        lines += ["", f"## impact {name}", "", summary, "", "```sh", f"impact {name} {example}", "```", ""]
+        rows = [row for parameter in command.params for row in _parameter_rows(parameter)]
+        lines += ["| argument or option | meaning |", "|---|---|", *rows] if rows else []
+    return "\n".join(lines) + "\n"
+
+
+def _parameter_rows(parameter: Any) -> Iterator[str]:
+    if parameter.name == "help" or getattr(parameter, "hidden", False):
+        return
+    is_argument = not parameter.opts[0].startswith("-")
+    words = parameter.name.upper() if is_argument else ", ".join(parameter.opts)
+    metavar = getattr(parameter, "metavar", None)
+    if metavar and not is_argument:
+        words += f" {metavar}"
+    text = (getattr(parameter, "help", None) or "").replace("\\[", "[").replace("|", "\\|")
+    yield f"| `{words}` | {text} |"
+
+
+def config_page() -> str:
+    """The keys of a config."""
+    lines = [
+        "# Config keys",
+        "",
+        "`impact schema` prints the JSON Schema. Numbers are in SI, or strings with a unit such as `\"5 km/h\"`. Any number",
+        "of `[sweep]`, `[materials.NAME]` and `[model.KEY]` may be a list or a range, which is an axis, a column of a CSV",
+        "file, `{ fit = [least, most] }` ([calibrate](../calibrate.md)) or a distribution ([uncertain",
+        "inputs](../uncertainty.md)).",
+    ]
+    tables = {"sweep": Sweep, "materials.NAME": MaterialTable, "design": Design, "data": Data}
+    for name, table in tables.items():
+        lines += ["", f"## [{name}]", "", "| key | meaning | values |", "|---|---|---|"]
+        quantities = quantities_of(table)
+        for key, field in table.model_fields.items():
+            quantity = quantities.get(key)
+            meaning = quantity.about if quantity else field.description or ""
+            default = {**SWEEP_DEFAULTS, **FIXED_STEP_DEFAULTS}.get(key) if name == "sweep" else None
+            values = (quantity.expected if quantity else "") + (f"; default {default:g}" if default is not None else "")
+            lines.append(f"| `{key}` | {meaning} | {values} |")
+    for name, settings in (("solver", Solver), ("output", Output)):
+        lines += ["", f"## [{name}]", "", "```text", *_parameters_of(settings.__doc__ or ""), "```"]
+    return "\n".join(lines) + "\n"
+
+
+def _parameters_of(docstring: str) -> list[str]:
+    """The lines of the section of parameters of a docstring."""
+    _, _, after = docstring.partition("----------\n")
+    return [line.removeprefix("    ") for line in after.rstrip().splitlines()]
+
+
+def api_page() -> str:
+    """The functions and classes of the package."""
+    lines = ["# Python", "", "```python", "import impact", "```"]
+    for name in impact.__all__:
+        thing = getattr(impact, name)
+        if name == "__version__":
+            continue
+        kind = "autoclass" if isinstance(thing, type) else "autofunction"
+        lines += ["", f"## {name}", "", "```{eval-rst}", f".. {kind}:: impact.{name}", "```"]
+    return "\n".join(lines) + "\n"
+
+
+def write_reference(app: Any) -> None:
+    """Write the pages that are generated from the code."""
+    REFERENCE.mkdir(exist_ok=True)
+    for name, page in {"commands": command_page, "config": config_page, "python": api_page}.items():
+        (REFERENCE / f"{name}.md").write_text(page(), encoding="utf-8")
+    for name, copy in COPIED.items():
+        text = (REFERENCE.parents[1] / name).read_text(encoding="utf-8")
+        for old, new in MOVED_COPIES.items():
+            text = text.replace(old, new)
+        (REFERENCE / copy).write_text(text, encoding="utf-8")
+
+
+def move_links(app: Any, document: str, source: list[str]) -> None:
+    """Replace links to pages that have another path in the site."""
+    for old, new in MOVED.items():
+        source[0] = source[0].replace(old, new)
+    # files of the repository are not part of the site
+    source[0] = re.sub(r"\[([^\]]*)\]\(\.\./((?:configs|tests|src)/[^)]*)\)", r"`\2`", source[0])
+
+
+def escape_docstring(app: Any, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
+    """Escape what reStructuredText would read as markup: docstrings are plain text with `code`."""
+    in_example = False
+    for number, line in enumerate(lines):
+        in_example = line.lstrip().startswith(">>>") or (in_example and bool(line.strip()))
+        if not in_example:
+            lines[number] = re.sub(r"([|*])", r"\\\1", line)
+    start = _start_of_examples(lines)
+    if start:
+        lines[start:start] = ["Examples", "--------", ""]
+
+
+def _start_of_examples(lines: list[str]) -> int:
+    """Where the text after the last section of a docstring begins; 0 if there is none."""
+    underlines = [number for number, line in enumerate(lines) if re.fullmatch("-{4,}", line.strip())]
+    for number in range(underlines[-1] + 2 if underlines else len(lines), len(lines)):
+        if not lines[number - 1].strip() and lines[number].strip() and not lines[number].startswith(" "):
+            return number
+    return 0
+
+
+def setup(app: Any) -> None:
+    app.connect("builder-inited", write_reference)
+    # before napoleon reads the sections
+    app.connect("autodoc-process-docstring", escape_docstring, priority=400)
+    app.connect("source-read", move_links)
