@@ -2,11 +2,12 @@
 PYTHON ?= python3
 VENV ?= .venv
 PEERS ?= .venv-peers
+SITE ?= .venv-site
 BIN := $(VENV)/bin
 RESULTS ?= results
 
 .DEFAULT_GOAL := help
-.PHONY: help figure figures regress test test-faults test-fast test-peers check release-check docs bench clean
+.PHONY: help figure figures regress test test-faults test-fast test-peers check release-check docs site bench clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-13s %s\n", $$1, $$2}'
@@ -67,13 +68,19 @@ regress-%: $(BIN)/impact
 docs: $(VENV)/dev  ## regenerate the generated pages and pictures of the documentation
 	$(BIN)/python scripts/make_docs.py
 
+# its tools have an environment of their own; a broken link, or a word that codespell knows as misspelt, is an error
+site: $(SITE)/site  ## build the documentation site in build/site, and check its links and its spelling
+	$(SITE)/bin/codespell
+	$(SITE)/bin/sphinx-build -q -W --keep-going -b html docs build/site
+	@echo "the site is build/site/index.html"
+
 bench: $(VENV)/dev  ## measure the cores against a solve_ivp loop, parallel sweeps, and the start of commands
 	$(BIN)/python scripts/bench_core.py
 	$(BIN)/python scripts/bench_parallel.py
 	$(BIN)/python scripts/bench_start.py
 
 clean:  ## remove the virtual environment and the results
-	rm -rf $(VENV) $(PEERS) $(RESULTS)
+	rm -rf $(VENV) $(PEERS) $(SITE) $(RESULTS) build/site docs/reference
 
 $(BIN)/impact: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -83,4 +90,9 @@ $(BIN)/impact: pyproject.toml
 $(VENV)/dev: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@touch $@
+
+$(SITE)/site: pyproject.toml
+	test -x $(SITE)/bin/python || $(PYTHON) -m venv $(SITE)
+	$(SITE)/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[site]'
 	@touch $@

@@ -74,7 +74,7 @@ def config_page() -> str:
     lines = [
         "# Config keys",
         "",
-        "`impact schema` prints the JSON Schema. Numbers are in SI, or strings with a unit such as `\"5 km/h\"`. Any number",
+        '`impact schema` prints the JSON Schema. Numbers are in SI, or strings with a unit such as `"5 km/h"`. Any number',
         "of `[sweep]`, `[materials.NAME]` and `[model.KEY]` may be a list or a range, which is an axis, a column of a CSV",
         "file, `{ fit = [least, most] }` ([calibrate](../calibrate.md)) or a distribution ([uncertain",
         "inputs](../uncertainty.md)).",
@@ -87,7 +87,9 @@ def config_page() -> str:
             quantity = quantities.get(key)
             meaning = quantity.about if quantity else field.description or ""
             default = {**SWEEP_DEFAULTS, **FIXED_STEP_DEFAULTS}.get(key) if name == "sweep" else None
-            values = (quantity.expected if quantity else "") + (f"; default {default:g}" if default is not None else "")
+            values = (quantity.expected if quantity else "") + (
+                f"; default {default:g}" if default is not None else ""
+            )
             lines.append(f"| `{key}` | {meaning} | {values} |")
     for name, settings in (("solver", Solver), ("output", Output)):
         lines += ["", f"## [{name}]", "", "```text", *_parameters_of(settings.__doc__ or ""), "```"]
@@ -140,8 +142,14 @@ def escape_docstring(app: Any, what: str, name: str, thing: Any, options: Any, l
         if not in_example:
             lines[number] = re.sub(r"([|*])", r"\\\1", line)
     start = _start_of_examples(lines)
-    if start:
-        lines[start:start] = ["Examples", "--------", ""]
+    examples = ["", "Examples", "--------", "", *lines[start:]] if start else []
+    lines[:] = [part for line in lines[: start or None] for part in _entry_lines(line)] + examples
+
+
+def _entry_lines(line: str) -> list[str]:
+    """An entry of a section, `name : meaning`, as the name and the meaning below it, which is not its type."""
+    match = re.fullmatch(r"(\w[^:]*?) : (.+)", line)
+    return [match[1], f"    {match[2]}"] if match else [line]
 
 
 def _start_of_examples(lines: list[str]) -> int:

@@ -1,0 +1,57 @@
+"""The tutorials print what their commands print, and the index of the site has every page."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from .conftest import ROOT, Run
+
+DOCS = ROOT / "docs"
+EXAMPLES = [
+    (page.stem, command, printed)
+    for page in sorted((DOCS / "tutorials").glob("*.md"))
+    for command, printed in re.findall(r"\$ impact (.*)\n((?:.*\n)+?)```", page.read_text(encoding="utf-8"))
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("page", "command", "printed"), EXAMPLES, ids=[f"{page}: {text}" for page, text, _ in EXAMPLES]
+)
+def test_a_tutorial_prints_what_its_commands_print(cli: Run, page: str, command: str, printed: str) -> None:
+    """Numbers may differ in the last digit that is printed; errors of the solver are below 1e-9."""
+    done = cli(*shlex.split(command))
+    assert done.returncode == 0, done.stderr
+    shown = [line.split() for line in done.stdout.splitlines()]
+    for words, expected in zip(shown, map(str.split, printed.splitlines()), strict=True):
+        for word, other in zip(words, expected, strict=True):
+            try:
+                assert float(word) == pytest.approx(float(other), rel=1e-6, abs=1e-9)
+            except ValueError:
+                assert word == other
+
+
+def test_the_commands_of_a_figure_for_a_paper(cli: Run, tmp_path: Path) -> None:
+    text = (DOCS / "tutorials" / "paper.md").read_text(encoding="utf-8")
+    (config,) = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
+    (tmp_path / "contact.toml").write_text(config, encoding="utf-8")
+    for block in re.findall(r"```sh\n(.*?)```", text, re.DOTALL):
+        for line in block.splitlines():
+            done = cli(*shlex.split(line)[1:], cwd=tmp_path)
+            assert done.returncode == 0, (line, done.stderr)
+    assert {path.name for path in tmp_path.iterdir()} >= {"contact.h5", "restitution.pdf", "restitution.csv"}
+
+
+def test_the_index_of_the_site_has_every_page() -> None:
+    index = (DOCS / "index.md").read_text(encoding="utf-8")
+    listed = {
+        line for block in re.findall(r"```\{toctree\}(.*?)```", index, re.DOTALL) for line in block.splitlines()
+    }
+    pages = {page.relative_to(DOCS).with_suffix("").as_posix() for page in DOCS.rglob("*.md")} - {"index"}
+    generated = {page for page in pages if page.startswith("reference/")}
+    assert pages - generated <= listed
+    assert {page for page in listed if page and not page.startswith((":", "reference/"))} <= pages
