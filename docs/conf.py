@@ -1,4 +1,4 @@
-"""Configuration of the documentation site, which `make site` builds with Sphinx; it also writes the reference pages."""
+"""Configuration of the documentation site, which `make site` builds; it also writes the reference pages."""
 
 from __future__ import annotations
 
@@ -74,10 +74,10 @@ def config_page() -> str:
     lines = [
         "# Config keys",
         "",
-        '`impact schema` prints the JSON Schema. Numbers are in SI, or strings with a unit such as `"5 km/h"`. Any number',
-        "of `[sweep]`, `[materials.NAME]` and `[model.KEY]` may be a list or a range, which is an axis, a column of a CSV",
-        "file, `{ fit = [least, most] }` ([calibrate](../calibrate.md)) or a distribution ([uncertain",
-        "inputs](../uncertainty.md)).",
+        '`impact schema` prints the JSON Schema. Numbers are in SI, or strings with a unit such as `"5 km/h"`.',
+        "Any number of `[sweep]`, `[materials.NAME]` and `[model.KEY]` may be a list or a range, which is an axis,",
+        "a column of a CSV file, `{ fit = [least, most] }` ([calibrate](../calibrate.md)) or a distribution",
+        "([uncertain inputs](../uncertainty.md)).",
     ]
     tables = {"sweep": Sweep, "materials.NAME": MaterialTable, "design": Design, "data": Data}
     for name, table in tables.items():

@@ -260,6 +260,12 @@ def test_the_page_prints_what_the_commands_print(cli: Run, command: str, printed
         assert numbers == pytest.approx(expected_numbers, rel=1e-9)
 
 
+def test_the_list_of_codes_leaves_no_file_in_the_folder(cli: Run, tmp_path: Path) -> None:
+    """LIGGGHTS, if it is installed, writes a log when it is asked for its version."""
+    assert cli("export", "--list", cwd=tmp_path).returncode == 0
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_the_page_has_an_example_of_each_code() -> None:
     shown = {word for command, _ in EXAMPLES for word in re.findall(r"--to (\S+)", command)}
     assert shown == CODES.keys()

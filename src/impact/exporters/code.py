@@ -6,6 +6,7 @@ import math
 import shutil
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import metadata
@@ -174,7 +175,9 @@ class Code:
         "python" is the interpreter that runs this; others are searched for beside it and on the path.
         """
         if program is not None:
-            return shutil.which(program)
+            found = shutil.which(program)
+            # it is run in another folder
+            return None if found is None else str(Path(found).absolute())
         if self.program == "python":
             return sys.executable
         beside = str(Path(sys.executable).parent)
@@ -182,18 +185,21 @@ class Code:
 
 
 def output_of(command: Sequence[str]) -> str | None:
-    """What a command prints on stdout; None if it cannot be run."""
-    try:
-        done = subprocess.run(
-            command,
-            capture_output=True,
-            text=True,
-            check=False,
-            timeout=VERSION_TIMEOUT_S,
-            stdin=subprocess.DEVNULL,
-        )
-    except (OSError, subprocess.TimeoutExpired):
-        return None
+    """What a command prints on stdout, run in an empty folder; None if it cannot be run."""
+    # LIGGGHTS writes a log into the folder in which it is asked for its help
+    with tempfile.TemporaryDirectory(prefix="impact-version-") as folder:
+        try:
+            done = subprocess.run(
+                command,
+                cwd=folder,
+                capture_output=True,
+                text=True,
+                check=False,
+                timeout=VERSION_TIMEOUT_S,
+                stdin=subprocess.DEVNULL,
+            )
+        except (OSError, subprocess.TimeoutExpired):
+            return None
     return done.stdout
 
 
