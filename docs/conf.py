@@ -75,7 +75,7 @@ def config_page() -> str:
         "# Config keys",
         "",
         '`impact schema` prints the JSON Schema. Numbers are in SI, or strings with a unit such as `"5 km/h"`.',
-        "Any number of `[sweep]`, `[materials.NAME]` and `[model.KEY]` may be a list or a range, which is an axis,",
+        "Any number of `[sweep]`, `[materials.NAME]` and `[model.KEY]` may be a list or a range (an axis),",
         "a column of a CSV file, `{ fit = [least, most] }` ([calibrate](../calibrate.md)) or a distribution",
         "([uncertain inputs](../uncertainty.md)).",
     ]
