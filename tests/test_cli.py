@@ -677,12 +677,30 @@ def test_the_catalogue_keeps_the_restitution_on_a_narrow_terminal(
     assert re.search(r"^tsuji-1992 +0\.\d{4}", "\n".join(lines), re.MULTILINE)
 
 
-def test_a_shell_completes_models_and_families(forked: ForkServer) -> None:
-    def completed(*words: str) -> list[str]:
+def test_a_shell_completes_models_keys_axes_and_outputs(forked: ForkServer, stored: Path) -> None:
+    def completed(*words: str | Path) -> list[str]:
         index = str(len(words) - 1)
-        line = {"COMP_WORDS": " ".join(words), "COMP_CWORD": index, "_IMPACT_COMPLETE": "complete_bash"}
-        return forked(**line).stdout.split()
+        line = {"COMP_WORDS": " ".join(map(str, words)), "COMP_CWORD": index, "_IMPACT_COMPLETE": "complete_bash"}
+        done = forked(**line)
+        assert done.stderr == ""
+        return done.stdout.split()
 
+    axes = [str(name) for name in impact.load(stored).dims if name != "model"]
+    assert completed("impact", "plot", stored, "--x", "") == axes
+    assert completed("impact", "plot", "--sel", "m2=1", stored, "--sel", "e") == ["e="]
+    assert completed("impact", "plot", "no-such-file.h5", "--x", "") == []
+    assert completed("impact", "plot", stored, "--kind", "f") == ["final-velocities"]
+    assert completed("impact", "sweep", "--set", "solver.max") == ["solver.max_steps="]
+    assert completed("impact", "sweep", "--set", "sweep.m") == [f"sweep.m{k}=" for k in (1, 2)] + [
+        f"sweep.material{k}=" for k in ("", 1, 2)
+    ]
+    assert completed("impact", "run", "--model", "mujoco-solref", "--at", "d") == ["dt=", "dampratio="]
+    assert completed("impact", "run", "--at", "d") == ["dt="]
+    assert completed("impact", "solve", "--model", "mujoco-solref", "--for", "") == [
+        "dampratio", "timeconst", "K", "e"
+    ]  # fmt: skip
+    assert completed("impact", "solve", "--target", "e_o") == ["e_out="]
+    assert completed("impact", "sensitivity", "--of", "peak_f") == ["peak_force"]
     keys = [key for key in impact.models() if key.startswith("thornton")]
     assert completed("impact", "models", "thornton") == keys
     assert completed("impact", "run", "--model", "thornton") == keys

@@ -22,7 +22,7 @@ LAYERS = (
     {"inverse", "uncertainty"},
     {"exporters"},
     {"plots"},
-    {"reporting"},
+    {"reporting", "progress_display"},
     # the package itself, "", hands out the functions of api
     {"api", ""},
     {"cli", "pytest_plugin"},
@@ -31,8 +31,9 @@ LAYERS = (
 HEIGHT = {part: height for height, parts in enumerate(LAYERS) for part in parts}
 # where each library may be imported
 LIBRARIES = {
-    "typer": {"cli"}, "rich": {"cli"}, "matplotlib": {"plots"}, "pandas": {"plots"}, "jinja2": {"reporting"},
-    "markupsafe": {"reporting"}, "xarray": {"results", "comparison", "inverse", "uncertainty", "pytest_plugin"},
+    "typer": {"cli"}, "rich": {"cli", "progress_display"}, "matplotlib": {"plots"}, "pandas": {"plots"},
+    "ipywidgets": {"plots"}, "jinja2": {"reporting"}, "markupsafe": {"reporting"},
+    "xarray": {"results", "comparison", "inverse", "uncertainty", "pytest_plugin"},
     "h5py": {"results"}, "h5netcdf": {"results"}, "tomllib": {"config"}, "pydantic": {"config", "results"},
     "pydantic_core": {"config"},
     "pint": {"config"}, "filelock": {"engine"}, "numba": {"contact"},

@@ -1,12 +1,18 @@
-"""What a notebook shows of the objects that the functions return."""
+"""What a notebook shows of the objects that the functions return, and its controls."""
 
 from __future__ import annotations
 
+import io
 import re
+import sys
+from typing import Any
 
+import numpy as np
 import pytest
+from matplotlib import image
 
 import impact
+from impact import progress_display
 from impact.errors import UsageError
 
 from .conftest import ROOT, Run
@@ -69,3 +75,75 @@ def test_an_impact_is_drawn_as_its_loop_or_over_time() -> None:
     apart = impact.run(SHOT, at={"v1": -1.0})
     with pytest.raises(UsageError, match="no motion to draw: "):
         impact.plot(apart)
+
+
+TWO_AXES: dict[str, Any] = {
+    "models": ["hertz", "hunt-crossley-1975"],
+    "sweep": {"e": [0.2, 0.5, 0.8], "v1": 1.0, "m1": 1.0, "m2": [1.0, 2.0], "K": 1e6},
+}
+
+
+def controls_of(box: object) -> tuple[dict[str, Any], Any, Any]:
+    """The controls of `impact.explore` by their names, the picture and the message."""
+    columns, message = box.children  # type: ignore[attr-defined]
+    controls, picture = columns.children
+    return {control.description: control for control in controls.children}, picture, message
+
+
+def test_controls_draw_what_they_select() -> None:
+    result = impact.sweep(TWO_AXES)
+    controls, picture, message = controls_of(impact.explore(result))
+    assert list(controls) == ["kind", "models", "x", "y", "e", "m2"]
+    assert controls["kind"].value == "final-velocities"
+    assert bytes(picture.value).startswith(b"\x89PNG")
+    # an axis that is drawn has no value to select, and a picture over one axis has no second one
+    assert [name for name, control in controls.items() if control.disabled] == ["y", "e"]
+    seen = {bytes(picture.value)}
+    changes = [("m2", 2.0), ("x", "m2"), ("kind", "loop"), ("e", 0.8), ("models", ("hertz",))]
+    for name, value in (*changes, ("kind", "error"), ("x", "e")):
+        controls[name].value = value
+        assert message.value == "", name
+        assert bytes(picture.value) not in seen, name
+        seen.add(bytes(picture.value))
+    drawn = io.BytesIO()
+    impact.plot(result, kind="error", x="e", sel={"m2": 2.0}, models=["hertz"]).savefig(drawn, dpi=110)
+    assert np.array_equal(*(image.imread(io.BytesIO(png)) for png in (bytes(picture.value), drawn.getvalue())))
+    controls["kind"].value = "map"
+    assert [name for name, control in controls.items() if control.disabled] == ["e", "m2"]
+
+
+def test_controls_explain_what_cannot_be_drawn() -> None:
+    controls, picture, message = controls_of(impact.explore(impact.sweep(TWO_AXES)))
+    before = bytes(picture.value)
+    controls["kind"].value = "map"
+    controls["x"].value = controls["y"].value
+    assert "needs two axes" in message.value
+    controls["kind"].value = "restitution"
+    assert (message.value, bytes(picture.value) == before) == ("", False)
+
+
+def test_a_history_has_no_controls() -> None:
+    history = impact.run(SHOT).history
+    with pytest.raises(UsageError, match=r"impact\.plot draws a time history"):
+        impact.explore(history)
+
+
+def test_a_sweep_shows_its_progress_on_request(
+    capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(progress_display, "FIRST_S", 0.0)
+    config = {
+        **TWO_AXES,
+        "sweep": {**TWO_AXES["sweep"], "K": {"linspace": [1e6, 2e6, 3000]}},
+        "solver": {"collapse": False},
+    }
+    impact.sweep(config, progress=True)
+    assert re.search(r"^trajectories [\d,]+ of 36,000 for 36,000 points", capfd.readouterr().err, re.MULTILINE)
+    impact.sweep(config)
+    assert capfd.readouterr().err == ""
+
+
+def test_controls_name_the_extra_that_they_need(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "ipywidgets", None)
+    with pytest.raises(UsageError, match=r"needs ipywidgets; pip install \"impact-sweep\[notebook\]\""):
+        impact.explore(impact.sweep(SHOT))

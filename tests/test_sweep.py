@@ -24,12 +24,12 @@ import xarray as xr
 
 import impact
 from impact.api import execute, prepare
-from impact.cli.progress import line, new_bar, update
 from impact.engine.execute import context_of, integrate_ranges, integrate_remotely
 from impact.engine.executors import SERIAL, Backend, choose_backend
 from impact.engine.progress import Progress
 from impact.engine.trajectories import columns_of, trajectory_maps, trajectory_ranges
 from impact.errors import ConfigError, StoreError, UsageError
+from impact.progress_display import line, new_bar, update
 from impact.results.summary import summarize
 from impact.results.sweep import sweep_into
 
@@ -56,7 +56,7 @@ rtol = 1e-4
 # enough models for a sweep of two seconds
 THREE_MODELS = 'models=["bilinear", "gharib-hurmuzlu-2012", "lankarani-nikravesh-1990"]'
 # progress is shown from the start, not after a second
-SHOW_PROGRESS_AT_ONCE = "from impact.cli import progress\nprogress.FIRST_S = 0.0"
+SHOW_PROGRESS_AT_ONCE = "from impact import progress_display\nprogress_display.FIRST_S = 0.0"
 PLUGIN = """import impact
 MODEL = impact.hysteresis("mine", title="", year=2026, equation="", reference="", chi=lambda e: 1 - e)
 """

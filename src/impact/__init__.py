@@ -14,6 +14,7 @@ if TYPE_CHECKING:
         compare,
         estimate,
         expand,
+        explore,
         export,
         export_codes,
         extend,
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
     from .contact.models.hysteresis import hysteresis
     from .contact.powers import power
     from .errors import ImpactError
+    from .progress_display import progress_bar
 
 __all__ = [
     "Evidence",
@@ -58,6 +60,7 @@ __all__ = [
     "compare",
     "estimate",
     "expand",
+    "explore",
     "export",
     "export_codes",
     "extend",
@@ -72,6 +75,7 @@ __all__ = [
     "plot",
     "plot_to_files",
     "power",
+    "progress_bar",
     "recommend",
     "report",
     "rerun",
@@ -89,6 +93,11 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     # loads the submodules on first use: `import impact` and `impact --help` need neither numpy nor more
+    if name == "progress_bar":
+        # rich is not needed otherwise
+        from .progress_display import progress_bar
+
+        return progress_bar
     if name in __all__:
         from . import api
 

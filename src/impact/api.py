@@ -9,6 +9,7 @@ from concurrent.futures import Executor
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from fnmatch import fnmatchcase
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -59,6 +60,7 @@ from .text import html_table, safe_text
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
+    from ipywidgets import VBox
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -131,6 +133,7 @@ def sweep(
     max_points: int = MAX_POINTS,
     resume: bool = False,
     overwrite: bool = False,
+    progress: bool = False,
 ) -> xr.Dataset:
     """Run a sweep; the result is in memory, or in a file and of any size.
 
@@ -149,6 +152,8 @@ def sweep(
     max_points : the largest number of points, of all models together
     resume : continue an interrupted sweep into `output`
     overwrite : replace `output` if it exists
+    progress : show a bar if it takes more than a second, in a terminal or, with ipywidgets, in a notebook; else
+        print a line every ten seconds
 
     Returns
     -------
@@ -172,18 +177,31 @@ def sweep(
     if output is None:
         if resume or overwrite:
             raise UsageError("resume and overwrite: got no output, expected one as well")
-        return execute(prepare(source, overrides, plugins, max_points), choose_backend(jobs, threads, executor))
-    sweep_to_file(
-        source,
-        output,
-        overrides=overrides,
-        plugins=plugins,
-        backend=nullcontext(choose_backend(jobs, threads, executor)),
-        max_points=max_points,
-        resume=resume,
-        overwrite=overwrite,
-    )
+        plan, backend = prepare(source, overrides, plugins, max_points), choose_backend(jobs, threads, executor)
+        with _progress(shown=progress) as on_progress:
+            return execute(plan, backend, on_progress)
+    with _progress(shown=progress) as on_progress:
+        sweep_to_file(
+            source,
+            output,
+            overrides=overrides,
+            plugins=plugins,
+            backend=nullcontext(choose_backend(jobs, threads, executor)),
+            max_points=max_points,
+            resume=resume,
+            overwrite=overwrite,
+            on_progress=on_progress,
+        )
     return load(output)
+
+
+def _progress(*, shown: bool) -> AbstractContextManager[ProgressCallback]:
+    """The progress bar, or nothing; rich is imported for a bar only."""
+    if not shown:
+        return nullcontext(ignore_progress)
+    from .progress_display import progress_bar
+
+    return progress_bar()
 
 
 def sweep_to_file(
@@ -1177,6 +1195,30 @@ def plot(
     choice = Choice(x, y, variable, sel, models, log, equations)
     plot_data = get_plot_data(dataset, kind or default_kind(dataset), choice, plugins)
     return draw(plot_data, width, height, style=style, title=title, labels=labels, points=points, ax=ax)
+
+
+def explore(dataset: xr.Dataset, *, plugins: Sequence[ForceModel | str | Path] = ()) -> VBox:
+    """Show a result with controls in a notebook: the kind of picture, the models, and a slider for each axis.
+
+    Parameters
+    ----------
+    dataset : a result
+    plugins : see `plot`
+
+    Returns
+    -------
+    ipywidgets.VBox : a notebook shows it as the value of a cell; needs the extra `notebook`
+
+    Raises
+    ------
+    UsageError : it is no result with models, or ipywidgets is not installed
+
+    >>> import impact
+    >>> controls = impact.explore(impact.sweep("configs/figure6.toml"))
+    """
+    from .plots.explore import explore as show_controls
+
+    return show_controls(dataset, partial(plot, dataset, plugins=plugins))
 
 
 def plot_to_files(

@@ -112,10 +112,10 @@ def rerun(
     with exits.catch_signals() as should_stop:
         from .. import api
         from ..comparison import formats
-        from .progress import progress
+        from ..progress_display import progress_bar
 
         def run_plan(plan: Plan) -> xr.Dataset:
-            with progress(quiet=quiet) as on_progress:
+            with progress_bar(exits.print_line, quiet=quiet) as on_progress:
                 return api.execute(plan, on_progress=on_progress, should_stop=should_stop)
 
         _check_plot(plot, result)

@@ -12,9 +12,10 @@ from ..errors import UsageError
 from ..formatting import decimals, number
 from ..text import safe_text
 from . import exits
+from .completion import complete_code, complete_model
 from .console import cell, console, dump, table
 from .options import AtOption, JsonOption, OverwriteOption, SetOption, SourceArgument
-from .params import complete_code, complete_model, parse_number
+from .params import parse_number
 
 if TYPE_CHECKING:
     from ..exporters.export import Export

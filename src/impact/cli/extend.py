@@ -77,11 +77,11 @@ def extend(
     """Add values to the axes of a result; only new trajectories are integrated."""
     with exits.catch_signals() as should_stop:
         from .. import api
+        from ..progress_display import progress_bar
         from . import summary
-        from .progress import progress
 
         executor = ExecutorOptions(jobs, threads)
-        with progress(quiet=quiet) as on_progress:
+        with progress_bar(exits.print_line, quiet=quiet) as on_progress:
             outcome = api.extend_to_file(
                 result,
                 sets,

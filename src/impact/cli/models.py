@@ -13,9 +13,9 @@ import typer
 from ..formatting import decimals, number
 from ..text import with_year
 from . import exits
+from .completion import complete_family, complete_model
 from .console import cell, console, dump, print_rows, table
 from .options import JsonOption, PluginOption
-from .params import complete_family, complete_model
 
 if TYPE_CHECKING:
     from rich.text import Text

@@ -7,10 +7,10 @@ from typing import Annotated
 
 import typer
 
+from .completion import complete_input, complete_model, complete_selection, complete_setting
 from .params import (
     Setting,
     Tolerance,
-    complete_model,
     parse_setting,
     parse_tolerance,
     parse_whole_number,
@@ -26,6 +26,7 @@ AtOption = Annotated[
     typer.Option(
         "--at",
         metavar="NAME=VALUE",
+        autocompletion=complete_input,
         parser=parse_setting,
         callback=reject_duplicates,
         help="Value of an input, such as e=0.05; may be repeated.",
@@ -42,7 +43,12 @@ AllowFailedOption = Annotated[bool, typer.Option("--allow-failed", help="Exit 0 
 ResumeOption = Annotated[bool, typer.Option("--resume", help="Continue an interrupted sweep.")]
 SetOption = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="PATH=VALUE", help="Change the config, such as sweep.m2=2.0; may be repeated."),
+    typer.Option(
+        "--set",
+        metavar="PATH=VALUE",
+        autocompletion=complete_setting,
+        help="Change the config, such as sweep.m2=2.0; may be repeated.",
+    ),
 ]
 PluginOption = Annotated[
     list[Path] | None,
@@ -53,6 +59,7 @@ SelectOption = Annotated[
     typer.Option(
         "--sel",
         metavar="NAME=VALUE",
+        autocompletion=complete_selection,
         parser=parse_setting,
         callback=reject_duplicates,
         help="Value of an axis, such as m2=1.0; may be repeated.",

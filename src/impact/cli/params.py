@@ -1,4 +1,4 @@
-"""Types of options and arguments: parsing, validation and shell completion."""
+"""Types of options and arguments: parsing and validation."""
 
 from __future__ import annotations
 
@@ -131,35 +131,6 @@ def parse_number(word: str | float) -> float:
     if math.isnan(read):
         raise invalid_value(word, "a number, such as 0.02 or 2%")
     return read
-
-
-def complete_model(incomplete: str) -> list[str]:
-    """The keys of the models that begin with a word, for the completion of a shell."""
-    from ..contact.models import catalogue
-    from ..engine.plugins import read_plugins
-
-    return [key for key in catalogue(read_plugins([]).models) if key.startswith(incomplete)]
-
-
-def complete_code(incomplete: str) -> list[str]:
-    """The codes to which laws are exported whose names begin with a word."""
-    from ..exporters.codes import CODES
-
-    return [name for name in CODES if name.startswith(incomplete)]
-
-
-def complete_scheme(incomplete: str) -> list[str]:
-    """The schemes with a fixed step whose names begin with a word."""
-    from ..contact.timestep import SCHEMES
-
-    return [name for name in SCHEMES if name.startswith(incomplete)]
-
-
-def complete_family(incomplete: str) -> list[str]:
-    """The families of models that begin with a word."""
-    from ..contact.models import FAMILIES
-
-    return [family for family in FAMILIES if family.startswith(incomplete)]
 
 
 def invalid_value(word: object, expected: str) -> typer.BadParameter:

@@ -12,6 +12,7 @@ from ..errors import UsageError
 from ..plots.kinds import KINDS, WIDTHS
 from ..text import safe_text
 from . import exits
+from .completion import complete_axis, complete_kind, complete_output
 from .console import dump
 from .options import JsonOption, ModelOption, OverwriteOption, PluginOption, SelectOption
 
@@ -36,19 +37,35 @@ def plot(
             "--kind",
             "-k",
             metavar="KIND",
+            autocompletion=complete_kind,
             help=f"{', '.join(KINDS)}; may be repeated. \\[default: final-velocities, or the kind of the result]",
         ),
     ] = None,
     x: Annotated[
-        str | None, typer.Option("--x", help="Horizontal axis. \\[default: e, else the first axis]")
+        str | None,
+        typer.Option(
+            "--x",
+            metavar="AXIS",
+            autocompletion=complete_axis,
+            help="Horizontal axis. \\[default: e, else the first axis]",
+        ),
     ] = None,
     y: Annotated[
-        str | None, typer.Option("--y", help="Vertical axis of a map, or of validity. \\[default: the next axis]")
+        str | None,
+        typer.Option(
+            "--y",
+            metavar="AXIS",
+            autocompletion=complete_axis,
+            help="Vertical axis of a map, or of validity. \\[default: the next axis]",
+        ),
     ] = None,
     variable: Annotated[
         str | None,
         typer.Option(
-            "--variable", help="Variable of a map or of bands. \\[default: e_error of a map, e_out of bands]"
+            "--variable",
+            metavar="NAME",
+            autocompletion=complete_output,
+            help="Variable of a map or of bands. \\[default: e_error of a map, e_out of bands]",
         ),
     ] = None,
     sel: SelectOption = None,

@@ -11,9 +11,10 @@ import typer
 from ..errors import UsageError
 from ..text import safe_text
 from . import exits
+from .completion import complete_model
 from .console import dump, print_rows
 from .options import AtOption, JsonOption, OverwriteOption, PluginOption, SetOption, SourceArgument
-from .params import complete_model, parse_whole_number
+from .params import parse_whole_number
 
 if TYPE_CHECKING:
     from ..api import Impact

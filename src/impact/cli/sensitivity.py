@@ -10,6 +10,7 @@ import typer
 
 from ..text import safe_text
 from . import exits
+from .completion import complete_output
 from .console import cell, console, dump, table
 from .options import (
     AllowFailedOption,
@@ -31,7 +32,12 @@ if TYPE_CHECKING:
 
 def sensitivity(
     config: Annotated[Path, typer.Argument(help="A TOML file with \\[design] and distributions.")],
-    of: Annotated[str, typer.Option("--of", metavar="OUTPUT", help="The output, such as peak_force.")] = "e_out",
+    of: Annotated[
+        str,
+        typer.Option(
+            "--of", metavar="OUTPUT", autocompletion=complete_output, help="The output, such as peak_force."
+        ),
+    ] = "e_out",
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="The result file. \\[default: none]")
     ] = None,
@@ -52,12 +58,12 @@ def sensitivity(
     with exits.catch_signals() as should_stop:
         from .. import api
         from ..engine.executors import choose_backend
-        from .progress import progress
+        from ..progress_display import progress_bar
 
         backend = choose_backend(jobs, threads)
 
         def run_plan(plan: Plan) -> xr.Dataset:
-            with progress(quiet=quiet) as on_progress:
+            with progress_bar(exits.print_line, quiet=quiet) as on_progress:
                 return api.execute(plan, backend, on_progress, should_stop)
 
         result = api.sensitivity(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..formatting import number, quantity
+from .completion import complete_input, complete_target, complete_unknown
 from .console import cell, console, dump
 from .options import AtOption, JsonOption, ModelKeyOption, PluginOption, SetOption, SourceArgument
 from .params import (
@@ -26,13 +27,20 @@ def solve(
     name: Annotated[
         str,
         typer.Option(
-            "--for", metavar="PARAMETER", help="What to solve for: a parameter of the model, e to ask for, or K."
+            "--for",
+            metavar="PARAMETER",
+            autocompletion=complete_unknown,
+            help="What to solve for: a parameter of the model, e to ask for, or K.",
         ),
     ],
     target: Annotated[
         Target,
         typer.Option(
-            "--target", metavar="NAME=VALUE", parser=parse_target, help="The wanted output, such as e_out=0.6."
+            "--target",
+            metavar="NAME=VALUE",
+            parser=parse_target,
+            autocompletion=complete_target,
+            help="The wanted output, such as e_out=0.6.",
         ),
     ],
     source: SourceArgument = None,
@@ -42,6 +50,7 @@ def solve(
         typer.Option(
             "--over",
             metavar="NAME=FIRST:LAST:COUNT",
+            autocompletion=complete_input,
             parser=parse_range,
             help="Find the value that serves best over a range of an input, such as v1=0.1:3:30.",
         ),

@@ -79,8 +79,8 @@ def sweep(
     """Run every model over a sweep and store post-impact velocities and their errors."""
     with exits.catch_signals() as should_stop:
         from .. import api
+        from ..progress_display import progress_bar
         from . import summary
-        from .progress import progress
 
         def print_note(note: str) -> None:
             if not quiet:
@@ -103,7 +103,7 @@ def sweep(
                 raise UnfinishedError("nothing was written")
             return
         backend = executor.backend(quiet=quiet, should_stop=should_stop)
-        with progress(quiet=quiet) as on_progress:
+        with progress_bar(exits.print_line, quiet=quiet) as on_progress:
             inputs |= {"backend": backend, "on_progress": on_progress, "should_stop": should_stop}
             if shard is not None:
                 done = api.sweep_shard(config, shard, output, overwrite=overwrite, **inputs)
@@ -173,10 +173,10 @@ def merge(
     """Join the shards of a sweep into its result; the work folders are not deleted."""
     with exits.catch_signals() as should_stop:
         from .. import api
+        from ..progress_display import progress_bar
         from . import summary
-        from .progress import progress
 
-        with progress(quiet=quiet) as on_progress:
+        with progress_bar(exits.print_line, quiet=quiet) as on_progress:
             outcome = api.merge(
                 folders,
                 output,

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..formatting import decimals, number, quantity
+from .completion import complete_scheme
 from .console import cell, console, dump, table
 from .options import AtOption, JsonOption, ModelKeyOption, PluginOption, SetOption, SourceArgument
-from .params import complete_scheme, parse_number, parse_whole_number
+from .params import parse_number, parse_whole_number
 
 if TYPE_CHECKING:
     from ..inverse.timestep import TimestepResult

@@ -1,4 +1,4 @@
-"""The progress of a sweep on stderr: a bar on a terminal, else a line every ten seconds."""
+"""The progress of a sweep: a bar on a terminal and in a notebook, else a line on stderr every ten seconds."""
 
 from __future__ import annotations
 
@@ -6,17 +6,16 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import timedelta
+from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
+from rich.console import Console
 from rich.progress import BarColumn, Task, TextColumn, TimeRemainingColumn
 from rich.progress import Progress as Bar
 from rich.text import Text
 
-from .console import console
-from .exits import print_line
-
 if TYPE_CHECKING:
-    from ..engine.progress import Progress
+    from .engine.progress import Progress
 
 # seconds after which something is printed, between two lines where there is no terminal, and from the beginning of
 # a phase until the remaining time can be estimated
@@ -70,23 +69,43 @@ def line(task: Task, points: int) -> str:
 
 
 def new_bar(get_time: Callable[[], float] | None = None) -> Bar:
-    """A bar on stderr, not yet shown; `get_time` is the clock, in seconds."""
+    """A bar on stderr or in a notebook, not yet shown; `get_time` is the clock, in seconds."""
+    console = Console(file=sys.stderr, markup=False, highlight=False, emoji=False)
+    # in a notebook rich shows a bar with ipywidgets
+    is_shown = sys.stderr.isatty() or (console.is_jupyter and find_spec("ipywidgets") is not None)
     return Bar(
         TextColumn("{task.description} {task.completed:,.0f} of {task.total:,.0f}"),
         BarColumn(),
         RemainingColumn(),
         TextColumn("{task.fields[failed]}"),
-        console=console(sys.stderr),
+        console=console,
         transient=True,
         get_time=get_time,
         speed_estimate_period=RATE_PERIOD_S,
-        disable=not sys.stderr.isatty(),
+        disable=not is_shown,
     )
 
 
+def write_to_stderr(line: str) -> None:
+    """Print a line on stderr."""
+    print(line, file=sys.stderr, flush=True)
+
+
 @contextmanager
-def progress(*, quiet: bool) -> Iterator[Callable[[Progress], None]]:
-    """A function that reports the progress of a sweep."""
+def progress_bar(
+    write: Callable[[str], None] = write_to_stderr, *, quiet: bool = False
+) -> Iterator[Callable[[Progress], None]]:
+    """A function that reports the progress of a sweep, to be passed as `on_progress`.
+
+    Parameters
+    ----------
+    write : prints a line where there is no bar
+    quiet : report nothing
+
+    >>> import impact, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder, impact.progress_bar() as on_progress:
+    ...     outcome = impact.sweep_to_file("configs/figure6.toml", f"{folder}/r.h5", on_progress=on_progress)
+    """
     if quiet:
         yield lambda at: None
         return
@@ -103,7 +122,7 @@ def progress(*, quiet: bool) -> Iterator[Callable[[Progress], None]]:
                 bar.start()
         elif now - last >= INTERVAL_S and not task.finished:
             last = now
-            print_line(line(task, at.of_points))
+            write(line(task, at.of_points))
 
     try:
         yield report

@@ -1,0 +1,134 @@
+"""Shell completion of the values of options: model keys, config keys, inputs, axes and outputs.
+
+A completion must not fail: where nothing is known, such as the axes of a file that does not exist, it is empty.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import fields
+from typing import Any
+
+import typer
+
+
+def complete_model(incomplete: str) -> list[str]:
+    """The keys of models, of those in installed packages too."""
+    return _beginning_with(incomplete, _models())
+
+
+def complete_family(incomplete: str) -> list[str]:
+    """The families of models."""
+    from ..contact.models import FAMILIES
+
+    return _beginning_with(incomplete, FAMILIES)
+
+
+def complete_code(incomplete: str) -> list[str]:
+    """The codes to which laws are exported."""
+    from ..exporters.codes import CODES
+
+    return _beginning_with(incomplete, CODES)
+
+
+def complete_scheme(incomplete: str) -> list[str]:
+    """The schemes with a fixed step."""
+    from ..contact.timestep import SCHEMES
+
+    return _beginning_with(incomplete, SCHEMES)
+
+
+def complete_kind(incomplete: str) -> list[str]:
+    """The kinds of pictures."""
+    from ..plots.kinds import KINDS
+
+    return _beginning_with(incomplete, KINDS)
+
+
+def complete_input(context: typer.Context, incomplete: str) -> list[str]:
+    """`NAME=` of the inputs, and of the parameters of the model of --model."""
+    return _beginning_with(incomplete, [f"{name}=" for name in _inputs(context)])
+
+
+def complete_unknown(context: typer.Context, incomplete: str) -> list[str]:
+    """What `impact solve` solves for: the parameters of the model, K and e."""
+    return _beginning_with(incomplete, [*_parameters(context), "K", "e"])
+
+
+def complete_output(incomplete: str) -> list[str]:
+    """The variables of a result."""
+    from ..results.schema import SCHEMA
+
+    return _beginning_with(incomplete, [variable.name for variable in SCHEMA])
+
+
+def complete_target(incomplete: str) -> list[str]:
+    """`NAME=` of the variables of a result."""
+    return [f"{name}=" for name in complete_output(incomplete)]
+
+
+def complete_axis(context: typer.Context, incomplete: str) -> list[str]:
+    """The axes of the result that the command line names."""
+    return _beginning_with(incomplete, _axes(context))
+
+
+def complete_selection(context: typer.Context, incomplete: str) -> list[str]:
+    """`NAME=` of the axes of the result that the command line names."""
+    return [f"{name}=" for name in complete_axis(context, incomplete)]
+
+
+def complete_setting(incomplete: str) -> list[str]:
+    """`TABLE.KEY=` of the keys of a config."""
+    from ..config.quantities import Table
+    from ..config.tables import Data, Design, Document, Output, Solver, Sweep
+
+    keys = ["title", "models"]
+    described: dict[str, type[Table]] = {"sweep": Sweep, "design": Design, "data": Data}
+    for name, table in described.items():
+        keys += [f"{name}.{key}" for key in table.model_fields]
+    for name, settings in {"solver": Solver, "output": Output}.items():
+        keys += [f"{name}.{field.name}" for field in fields(settings)]
+    tables = [f"{name}." for name in ("materials", "model") if name in Document.model_fields]
+    return _beginning_with(incomplete, [*(f"{key}=" for key in keys), *tables])
+
+
+def _beginning_with(incomplete: str, words: Iterable[str]) -> list[str]:
+    return [word for word in words if word.startswith(incomplete)]
+
+
+def _models() -> dict[str, Any]:
+    from ..contact.models import catalogue
+    from ..engine.plugins import read_plugins
+
+    return dict(catalogue(read_plugins([]).models))
+
+
+def _parameters(context: typer.Context) -> list[str]:
+    keys = context.params.get("model")
+    models = _models()
+    names = {
+        parameter.name
+        for key in ([keys] if isinstance(keys, str) else keys or ())
+        if key in models
+        for parameter in models[key].parameters
+    }
+    return sorted(names)
+
+
+def _inputs(context: typer.Context) -> list[str]:
+    from ..config.cases import input_names
+
+    return [*input_names(), *_parameters(context)]
+
+
+def _axes(context: typer.Context) -> list[str]:
+    from .. import api
+    from ..errors import ImpactError
+
+    # an option without its value yet leaves the arguments unparsed
+    for path in filter(None, (context.params.get("result"), *context.args)):
+        try:
+            return [str(name) for name in api.load(path).dims if name != "model"]
+        except (OSError, ImpactError):
+            continue
+    return []
