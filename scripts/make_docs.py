@@ -26,6 +26,7 @@ PACKAGES = (
     "pytest_plugin",
     "api",
     "reporting",
+    "progress_display",
     "plots",
     "exporters",
     "inverse",

@@ -299,7 +299,7 @@ def modelica_force(lines: Sequence[str]) -> Force:
 @pytest.mark.slow
 @pytest.mark.parametrize("n", [1.0, 1.5])
 def test_the_lines_of_modelica_give_the_law(n: float) -> None:
-    export = same_law("modelica", None, modelica_force, config(K=1e8, n=n), {"e": 0.6})
+    export = same_law("modelica", default_law("modelica"), modelica_force, config(K=1e8, n=n), {"e": 0.6})
     assert export.e_continuous == pytest.approx(0.6, abs=1e-8)
 
 
@@ -328,7 +328,9 @@ def adams_force(lines: Sequence[str]) -> Force:
 def test_the_lines_of_adams_give_the_law_in_millimetres(n: float, d: float) -> None:
     """The mass is then in N s²/mm."""
     source = config(K=1e8 * 1e3 ** (n - 1.5), n=n)
-    export = same_law("adams", None, adams_force, source, {"e": 0.6, "adams-impact.d": d}, length=1e3)
+    export = same_law(
+        "adams", default_law("adams"), adams_force, source, {"e": 0.6, "adams-impact.d": d}, length=1e3
+    )
     assert export.e_continuous == pytest.approx(0.6, abs=1e-8)
 
 

@@ -1,0 +1,30 @@
+"""The notebooks of the documentation run, and give the outputs that they show."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import nbformat
+import pytest
+
+from .conftest import ROOT
+
+sys.path.insert(0, str(ROOT / "scripts"))
+from notebooks import NOTEBOOKS, executed, texts
+
+PATHS = sorted(NOTEBOOKS.glob("*.ipynb"))
+
+
+def test_there_is_a_notebook_for_each_question_and_each_has_its_pictures() -> None:
+    assert [path.stem for path in PATHS] == ["calibrate", "figure6", "teaching", "uncertainty", "which-law"]
+    for path in PATHS:
+        shown = texts(nbformat.read(path, as_version=4))
+        assert ["picture"] in shown, path.name
+        assert path.stat().st_size < 500_000, path.name
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", PATHS, ids=lambda path: path.stem)
+def test_a_notebook_gives_what_it_shows(path: Path) -> None:
+    assert texts(executed(path)) == texts(nbformat.read(path, as_version=4))
