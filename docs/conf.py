@@ -24,11 +24,14 @@ from impact.config.tables import (
 project = "impact"
 author = "impact contributors"
 version = release = impact.__version__
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_copybutton"]
-source_suffix = {".md": "markdown"}
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_copybutton"]
+# `make test-faults` runs the notebooks; the site shows their stored outputs
+nb_execution_mode = "off"
 html_theme = "furo"
 html_title = "impact"
 html_show_copyright = False
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
 # headings are targets of links, as on GitHub
 myst_heading_anchors = 4
 napoleon_google_docstring = False
