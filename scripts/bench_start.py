@@ -1,8 +1,9 @@
 """Run time of short commands, compared with the start of the libraries that they need.
 
-`impact --help` is compared with a minimal typer program, and the sweep of Figure 6 with the import of its
-libraries. The same sweep is timed with each core, and with the compiled core before and after its code is cached.
-All times are of whole processes; the pairs run in turn. The tables show medians and their ratios.
+`impact --help` is compared with a minimal typer program, and the sweep of Figure 6, its pictures and
+`impact info` with the import of their libraries. The same sweep is timed with each core, and with the compiled
+core before and after its code is cached. All times are of whole processes; the pairs run in turn. The tables show
+medians and their ratios.
 
     python scripts/bench_start.py [--repeats 15]
 """
@@ -32,15 +33,16 @@ def hello(name: str = "you"):
 app()
 """
 LIBRARIES = "import xarray, h5netcdf, pydantic, typer, rich"
+DRAWING = f"{LIBRARIES}, matplotlib.figure"
 FIGURE6 = Path(__file__).parents[1] / "configs" / "figure6.toml"
 
 
 def run_time(arguments: list[str], **environment: str) -> float:
-    """Seconds of a Python process with these arguments."""
+    """Seconds of a Python process with these arguments; its modules are compiled before, as in an installation."""
+    environment = {**os.environ, **environment}
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
     start = time.perf_counter()
-    subprocess.run(
-        [sys.executable, *arguments], check=True, capture_output=True, env={**os.environ, **environment}
-    )
+    subprocess.run([sys.executable, *arguments], check=True, capture_output=True, env=environment)
     return time.perf_counter() - start
 
 
@@ -49,7 +51,9 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=15)
     repeats = parser.parse_args().repeats
     with tempfile.TemporaryDirectory() as folder:
-        sweep = ["-m", "impact", "sweep", str(FIGURE6), "-o", f"{folder}/figure6.h5", "--overwrite", "-q"]
+        result = f"{folder}/figure6.h5"
+        sweep = ["-m", "impact", "sweep", str(FIGURE6), "-o", result, "--overwrite", "-q"]
+        run_time(sweep)
         pairs = {
             "impact --help": (
                 ["-m", "impact", "--help"],
@@ -57,7 +61,11 @@ def main() -> None:
                 "minimal typer program",
             ),
             "impact sweep configs/figure6.toml": (sweep, ["-c", LIBRARIES], "import of its libraries"),
+            "impact info": (["-m", "impact", "info", result], ["-c", LIBRARIES], "import of its libraries"),
         }
+        for kind in ("final-velocities", "error", "loop", "history"):
+            plot = ["-m", "impact", "plot", result, "--kind", kind, "-o", f"{folder}/{kind}.png", "--overwrite"]
+            pairs[f"impact plot --kind {kind}"] = (plot, ["-c", DRAWING], "import of its libraries")
         table = Table("command", "median (s)", "compared with", "median (s)", "ratio", box=None)
         for name, (command, reference, reference_name) in pairs.items():
             for arguments in (command, reference):

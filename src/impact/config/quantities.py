@@ -219,7 +219,12 @@ class Table(BaseModel):
     """A table of a config: these keys and no others."""
 
     model_config = ConfigDict(
-        extra="forbid", strict=True, frozen=True, protected_namespaces=(), json_schema_extra=simplify_schema
+        extra="forbid",
+        strict=True,
+        frozen=True,
+        protected_namespaces=(),
+        defer_build=True,
+        json_schema_extra=simplify_schema,
     )
 
 

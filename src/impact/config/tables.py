@@ -373,6 +373,9 @@ def document_type(models_by_key: Mapping[str, ForceModel], with_tables: Sequence
     models_by_key : the models that the config may name
     with_tables : keys of the models that have a table for their parameters
     """
+    for table in (Sweep, MaterialTable, Data, Design):
+        # built once; the type of each config then contains it
+        table.model_rebuild()
     fields: dict[str, Any] = {
         f"field_{index}": (Annotated[parameter_table(models_by_key[key]), Field(alias=key)], None)
         for index, key in enumerate(with_tables)
