@@ -51,7 +51,8 @@ def test_the_index_of_the_site_has_every_page() -> None:
     listed = {
         line for block in re.findall(r"```\{toctree\}(.*?)```", index, re.DOTALL) for line in block.splitlines()
     }
-    pages = {page.relative_to(DOCS).with_suffix("").as_posix() for page in DOCS.rglob("*.md")} - {"index"}
+    files = (*DOCS.rglob("*.md"), *DOCS.rglob("*.ipynb"))
+    pages = {page.relative_to(DOCS).with_suffix("").as_posix() for page in files} - {"index"}
     generated = {page for page in pages if page.startswith("reference/")}
     assert pages - generated <= listed
     assert {page for page in listed if page and not page.startswith((":", "reference/"))} <= pages
