@@ -661,6 +661,9 @@ def test_models_by_a_pattern(cli: Run) -> None:
     wrong = cli("models", "lamps*")
     assert (wrong.returncode, wrong.stderr[:28]) == (2, 'no model matches "lamps*"; k'[:28])
     assert cli("models", "lammps-*", "--family", "elastic").returncode == 2
+    of_family = cli("models", "family:permanent", "--json").stdout
+    assert of_family == cli("models", "--family", "permanent", "--json").stdout
+    assert 'did you mean "permanent"?' in cli("models", "family:perm").stderr
 
 
 @pytest.mark.parametrize(("width", "columns"), [(40, 1), (80, 5), (120, 5)])

@@ -1047,7 +1047,7 @@ def models(
     Parameters
     ----------
     plugins : plug-in models, and paths of Python files with such models, which come last
-    pattern : pattern of the keys, such as "lammps-*"
+    pattern : pattern of the keys, such as "lammps-*", or a family as in a config, such as "family:hysteresis"
     family : name of the family; by default all families
     search : words that all have to occur in the key, title, year, equation, reference or DOI, in any case
 
@@ -1064,6 +1064,8 @@ def models(
     """
     all_models = catalogue(read_plugins(plugins).models)
     families = sorted({model.family for model in all_models.values()})
+    if pattern.startswith("family:"):
+        pattern, family = "*", pattern.removeprefix("family:")
     if family is not None and family not in families:
         raise UsageError(f'--family: no family "{safe_text(family)}"; {did_you_mean(family, families)}')
     of_family = {key: model for key, model in all_models.items() if family in (None, model.family)}

@@ -36,7 +36,8 @@ def models(
         str | None,
         typer.Argument(
             autocompletion=complete_model,
-            help='A model to describe in full, or a pattern of models to list: "lammps-*". \\[default: list all]',
+            help='A model to describe in full, or models to list: "lammps-*", family:hysteresis. '
+            "\\[default: list all]",
         ),
     ] = None,
     family: Annotated[
@@ -72,7 +73,7 @@ def models(
             as_json=as_json,
         )
         return
-    is_pattern = key is None or search is not None or bool({*"*?["} & {*key})
+    is_pattern = key is None or search is not None or key.startswith("family:") or bool({*"*?["} & {*key})
     if is_pattern:
         chosen = list(api.models(plugins or (), pattern=key or "*", family=family, search=search).values())
     else:

@@ -186,7 +186,9 @@ def x_axis(dataset: xr.Dataset, x: str | None) -> str:
             return str(name)
     if lines:
         return lines[0]
-    raise UsageError("this result has no numeric axis left to draw over; sweep one, such as e")
+    raise UsageError(
+        "this result has no numeric axis left to draw over; sweep one, such as e, or draw a point with --kind loop"
+    )
 
 
 def _is_float(dataset: xr.Dataset, name: str) -> bool:
