@@ -5,10 +5,12 @@ from __future__ import annotations
 import io
 import re
 import sys
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 from matplotlib import image
 
 import impact
@@ -120,6 +122,30 @@ def test_controls_explain_what_cannot_be_drawn() -> None:
     assert "needs two axes" in message.value
     controls["kind"].value = "restitution"
     assert (message.value, bytes(picture.value) == before) == ("", False)
+
+
+UNCERTAIN = {
+    "models": ["hertz", "tsuji-1992"],
+    "design": {"n": 16},
+    "sweep": {"e": 0.5, "v1": {"normal": [1.0, 0.05]}, "m1": 1.0, "m2": [1.0, 2.0], "K": 1e6},
+}
+
+
+@pytest.mark.parametrize(
+    ("dataset", "kind", "axes"),
+    [
+        (lambda: impact.sweep(UNCERTAIN), "uncertainty", ["m2"]),
+        (lambda: impact.sensitivity(UNCERTAIN, of="peak_force"), "sensitivity", []),
+        (lambda: impact.calibrate(ROOT / "docs" / "calibrate" / "drops.toml"), "calibration", []),
+    ],
+)
+def test_a_study_begins_with_its_own_picture(
+    dataset: Callable[[], xr.Dataset], kind: str, axes: list[str]
+) -> None:
+    controls, picture, message = controls_of(impact.explore(dataset()))
+    assert (controls["kind"].value, message.value) == (kind, "")
+    assert bytes(picture.value).startswith(b"\x89PNG")
+    assert list(controls) == ["kind", "models", "x", "y", *axes]
 
 
 def test_a_history_has_no_controls() -> None:

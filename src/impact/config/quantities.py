@@ -223,6 +223,7 @@ class Table(BaseModel):
         strict=True,
         frozen=True,
         protected_namespaces=(),
+        # commands that read no config need no validators
         defer_build=True,
         json_schema_extra=simplify_schema,
     )

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MAP_KINDS = ("map", "validity")
+# kinds of datasets that have one kind of picture
+STUDY_KINDS = ("calibration", "sensitivity")
 DPI = 110
 
 
@@ -44,12 +46,12 @@ def explore(dataset: xr.Dataset, draw: Callable[..., Figure]) -> VBox:
     if "model" not in dataset.dims:
         raise UsageError("expected the result of a sweep, with models; impact.plot draws a time history")
 
-    axes = [str(dim) for dim in dataset.dims if dim != "model" and dim in dataset.coords]
-    kinds = kinds_of(dataset)
+    kinds, axes = kinds_of(dataset), axes_of(dataset)
     keys = [str(key) for key in dataset["model"].values]
     kind = ipywidgets.Dropdown(options=kinds, value=default_kind(dataset), description="kind")
     models = ipywidgets.SelectMultiple(options=keys, value=keys, description="models", rows=min(len(keys), 8))
     first = x_axis(dataset, None) if axes else None
+    first = first if first in axes else next(iter(axes), None)
     others = [name for name in axes if name != first]
     x = ipywidgets.Dropdown(options=axes, value=first, description="x")
     y = ipywidgets.Dropdown(options=axes, value=others[0] if others else first, description="y")
@@ -58,7 +60,7 @@ def explore(dataset: xr.Dataset, draw: Callable[..., Figure]) -> VBox:
             options=_shown_values(dataset[name]), description=name, continuous_update=False
         )
         for name in axes
-        if dataset.sizes[name] > 1 and name != SAMPLE
+        if dataset.sizes[name] > 1
     }
     picture = ipywidgets.Image(format="png")
     message = ipywidgets.HTML()
@@ -94,14 +96,26 @@ def kinds_of(dataset: xr.Dataset) -> list[str]:
     ['final-velocities', 'restitution', 'error']
     """
     own = default_kind(dataset)
-    if own in ("calibration", "sensitivity"):
+    if own in STUDY_KINDS:
         return [own]
-    left_out = {"calibration", "sensitivity"}
+    left_out = {*STUDY_KINDS}
     if SAMPLE not in dataset.dims:
         left_out.add("uncertainty")
     if "phase" not in dataset.coords:
         left_out.add("timestep")
     return [kind for kind in KINDS if kind not in left_out]
+
+
+def axes_of(dataset: xr.Dataset) -> list[str]:
+    """The axes with values to select: not the samples, and none of a calibration or a sensitivity study.
+
+    >>> import impact
+    >>> axes_of(impact.sweep("configs/figure6.toml"))
+    ['e']
+    """
+    if default_kind(dataset) in STUDY_KINDS:
+        return []
+    return [str(dim) for dim in dataset.dims if dim not in ("model", SAMPLE) and dim in dataset.coords]
 
 
 def drawn_axes(kind: str, x: str | None, y: str | None) -> tuple[str, ...]:
