@@ -65,8 +65,9 @@ regress-%: $(BIN)/impact
 	$(BIN)/impact sweep $(or $(wildcard tests/data/$*.toml),configs/$*.toml) -o $(RESULTS)/$*.h5 --overwrite --quiet --allow-failed $(SWEEP)
 	$(BIN)/impact compare $(RESULTS)/$*.h5 tests/data/$*.h5
 
-docs: $(VENV)/dev  ## regenerate the generated pages and pictures of the documentation
+docs: $(VENV)/dev  ## regenerate the generated pages and pictures of the documentation, and run its notebooks
 	$(BIN)/python scripts/make_docs.py
+	$(BIN)/python scripts/notebooks.py
 
 # its tools have an environment of their own; a broken link, or a word that codespell knows as misspelt, is an error
 site: $(SITE)/site  ## build the documentation site in build/site, and check its links and its spelling

@@ -135,6 +135,7 @@ UNCERTAIN = {
     ("dataset", "kind", "axes"),
     [
         (lambda: impact.sweep(UNCERTAIN), "uncertainty", ["m2"]),
+        (lambda: impact.sweep(UNCERTAIN, overrides=["sweep.m2=1.0"]), "uncertainty", []),
         (lambda: impact.sensitivity(UNCERTAIN, of="peak_force"), "sensitivity", []),
         (lambda: impact.calibrate(ROOT / "docs" / "calibrate" / "drops.toml"), "calibration", []),
     ],
