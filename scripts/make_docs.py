@@ -179,7 +179,9 @@ def schema_page() -> str:
         f"| `{name}` | {variable.unit} | {', '.join(variable.dims)} | {variable.scale} | {variable.meaning} |"
         for name, variable in CALIBRATION_VARIABLES.items()
     ]
-    sensitivity = [f"| `{name}` | {own} | {meaning} |" for name, (own, meaning) in SENSITIVITY_VARIABLES.items()]
+    sensitivity = [
+        f"| `{name}` | {dimension} | {meaning} |" for name, (dimension, meaning) in SENSITIVITY_VARIABLES.items()
+    ]
     tables = {
         "variables": variables,
         "statuses": statuses,

@@ -52,6 +52,17 @@ gamma = [1.5, 4.0]
 """
 
 
+def assert_same_output(printed: str, expected: str, rel: float, abs: float) -> None:
+    """The words of two outputs are the same; numbers may differ in the last digit that is printed."""
+    lines = [[line.split() for line in text.splitlines()] for text in (printed, expected)]
+    for words, others in zip(*lines, strict=True):
+        for word, other in zip(words, others, strict=True):
+            try:
+                assert float(word) == pytest.approx(float(other), rel=rel, abs=abs)
+            except ValueError:
+                assert word == other
+
+
 def default_law(code: str) -> str:
     """The first law of a code to which laws are exported."""
     from impact.exporters.codes import CODES

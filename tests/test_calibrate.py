@@ -15,7 +15,7 @@ import xarray as xr
 import impact
 from impact.errors import UsageError
 
-from .conftest import ROOT, Run
+from .conftest import ROOT, Run, assert_same_output
 
 FOLDER = ROOT / "docs" / "calibrate"
 ONE_LAW = ("--set", 'models=["anagnostopoulos-1988"]')
@@ -218,11 +218,4 @@ EXAMPLES = re.findall(
 @pytest.mark.slow
 @pytest.mark.parametrize(("command", "printed"), EXAMPLES, ids=[command for command, _ in EXAMPLES])
 def test_the_page_prints_what_the_commands_print(cli: Run, command: str, printed: str) -> None:
-    """Numbers may differ in the last digit that is printed."""
-    shown = [line.split() for line in cli(*shlex.split(command)).stdout.splitlines()]
-    for words, expected in zip(shown, map(str.split, printed.splitlines()), strict=True):
-        for word, other in zip(words, expected, strict=True):
-            try:
-                assert float(word) == pytest.approx(float(other), rel=2e-3, abs=2e-3)
-            except ValueError:
-                assert word == other
+    assert_same_output(cli(*shlex.split(command)).stdout, printed, rel=2e-3, abs=2e-3)

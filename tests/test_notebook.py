@@ -85,9 +85,9 @@ TWO_AXES: dict[str, Any] = {
 }
 
 
-def controls_of(box: object) -> tuple[dict[str, Any], Any, Any]:
+def controls_of(box: Any) -> tuple[dict[str, Any], Any, Any]:
     """The controls of `impact.explore` by their names, the picture and the message."""
-    columns, message = box.children  # type: ignore[attr-defined]
+    columns, message = box.children
     controls, picture = columns.children
     return {control.description: control for control in controls.children}, picture, message
 

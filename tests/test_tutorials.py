@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from .conftest import ROOT, Run
+from .conftest import ROOT, Run, assert_same_output
 
 DOCS = ROOT / "docs"
 EXAMPLES = [
@@ -31,13 +31,7 @@ def test_a_tutorial_prints_what_its_commands_print(
         (tmp_path / path).symlink_to(ROOT / path)
     done = cli(*shlex.split(command), cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    shown = [line.split() for line in done.stdout.splitlines()]
-    for words, expected in zip(shown, map(str.split, printed.splitlines()), strict=True):
-        for word, other in zip(words, expected, strict=True):
-            try:
-                assert float(word) == pytest.approx(float(other), rel=1e-6, abs=1e-9)
-            except ValueError:
-                assert word == other
+    assert_same_output(done.stdout, printed, rel=1e-6, abs=1e-9)
 
 
 def test_the_commands_of_a_figure_for_a_paper(cli: Run, tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from scipy import stats
 import impact
 from impact.errors import ConfigError, UsageError
 
-from .conftest import ROOT, Run
+from .conftest import ROOT, Run, assert_same_output
 
 # inputs of Hertz' law with closed forms, and the powers with which they enter the peak force and the contact time
 ENDS = {"m1": (0.9, 1.1), "K": (0.5, 1.5), "v1": (0.8, 1.2)}
@@ -367,14 +367,7 @@ EXAMPLES = re.findall(r"\$ impact (.*)\n((?:.*\n)+?)```", PAGE)
 
 @pytest.mark.parametrize(("command", "printed"), EXAMPLES, ids=[command for command, _ in EXAMPLES])
 def test_the_page_prints_what_the_commands_print(cli: Run, command: str, printed: str) -> None:
-    """Numbers may differ in the last digit that is printed."""
-    shown = [line.split() for line in cli(*shlex.split(command)).stdout.splitlines()]
-    for words, expected in zip(shown, map(str.split, printed.splitlines()), strict=True):
-        for word, other in zip(words, expected, strict=True):
-            try:
-                assert float(word) == pytest.approx(float(other), rel=2e-3, abs=2e-3)
-            except ValueError:
-                assert word == other
+    assert_same_output(cli(*shlex.split(command)).stdout, printed, rel=2e-3, abs=2e-3)
 
 
 def test_the_page_explains_every_distribution_and_method() -> None:

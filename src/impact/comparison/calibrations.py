@@ -52,8 +52,8 @@ def compare_calibrations(
     faults = [*_data_faults(new, baseline)]
     keys = [list(map(str, dataset["model"].values)) for dataset in (new, baseline)]
     common = [key for key in keys[1] if key in keys[0]]
-    for own, other, side in ((keys[0], keys[1], "NEW"), (keys[1], keys[0], "BASELINE")):
-        only = [key for key in own if key not in other]
+    for here, there, side in ((keys[0], keys[1], "NEW"), (keys[1], keys[0], "BASELINE")):
+        only = [key for key in here if key not in there]
         if only and not subset:
             faults.append(Fault("labels", "model", f"model: in {side} only: {safe_text(', '.join(only), 400)}"))
     if not common:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -76,26 +77,24 @@ def draw(distribution: Distribution, u: Array) -> Array:
 
 
 def _draw(kind: str, numbers: Sequence[float], u: Array) -> Array:
-    from scipy.special import ndtri
+    from scipy import stats
 
     match kind:
         case "uniform":
             least, most = numbers
-            drawn = least + (most - least) * u
+            drawn = stats.uniform(least, most - least).ppf(u)
         case "normal":
             mean, deviation = numbers
-            drawn = mean + deviation * ndtri(u)
+            drawn = stats.norm(mean, deviation).ppf(u)
         case "lognormal":
             median, ratio = numbers
-            drawn = median * ratio ** ndtri(u)
+            drawn = stats.lognorm(math.log(ratio), scale=median).ppf(u)
         case "triangular":
             least, mode, most = numbers
-            rising = least + np.sqrt(u * (most - least) * (mode - least))
-            falling = most - np.sqrt((1.0 - u) * (most - least) * (most - mode))
-            drawn = np.where(u * (most - least) <= mode - least, rising, falling)
+            width = most - least
+            drawn = stats.triang((mode - least) / width, least, width).ppf(u)
         case _:
-            ordered = np.sort(numbers)
-            drawn = ordered[np.minimum((u * ordered.size).astype(int), ordered.size - 1)]
+            drawn = np.quantile(numbers, u, method="inverted_cdf")
     return np.asarray(drawn)
 
 

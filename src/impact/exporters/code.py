@@ -189,18 +189,27 @@ def output_of(command: Sequence[str]) -> str | None:
     # LIGGGHTS writes a log into the folder in which it is asked for its help
     with tempfile.TemporaryDirectory(prefix="impact-version-") as folder:
         try:
-            done = subprocess.run(
-                command,
-                cwd=folder,
-                capture_output=True,
-                text=True,
-                check=False,
-                timeout=VERSION_TIMEOUT_S,
-                stdin=subprocess.DEVNULL,
-            )
+            return run_program(command, folder, VERSION_TIMEOUT_S).stdout
         except (OSError, subprocess.TimeoutExpired):
             return None
-    return done.stdout
+
+
+def run_program(command: Sequence[str], folder: str, timeout_s: float) -> subprocess.CompletedProcess[str]:
+    """Run a command in a folder, without input, and return what it prints.
+
+    Raises
+    ------
+    OSError, subprocess.TimeoutExpired : it cannot be started, or takes longer
+    """
+    return subprocess.run(
+        command,
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=timeout_s,
+        stdin=subprocess.DEVNULL,
+    )
 
 
 def python_package_version(package: str) -> Callable[[str], str | None]:

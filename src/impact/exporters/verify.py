@@ -13,7 +13,7 @@ import numpy as np
 from ..array_types import Array
 from ..errors import UsageError
 from ..text import safe_text
-from .code import Code
+from .code import Code, run_program
 from .problem import ExportProblem
 
 # phases (i + 1/2)/4 at which a script is run
@@ -101,15 +101,7 @@ def run_script(code: Code, program: str, script: str) -> float:
         file = f"two_balls{code.suffix}"
         Path(folder, file).write_text(script, encoding="utf-8")
         try:
-            done = subprocess.run(
-                code.command(program, file),
-                cwd=folder,
-                capture_output=True,
-                text=True,
-                check=False,
-                timeout=TIMEOUT_S,
-                stdin=subprocess.DEVNULL,
-            )
+            done = run_program(code.command(program, file), folder, TIMEOUT_S)
         except (OSError, subprocess.TimeoutExpired) as error:
             raise UsageError(f"--verify: {safe_text(str(error), 300)}") from None
     last = (done.stdout.strip().splitlines() or [""])[-1]

@@ -13,7 +13,7 @@ from ..formatting import quantity
 from ..results.schema import plain_unit
 from ..text import safe_text
 from .curves import STEP_AXES
-from .kinds import KINDS, MOTION_KINDS, default_kind
+from .kinds import KINDS, MAP_KINDS, MOTION_KINDS, STUDY_KINDS, default_kind
 from .slices import x_axis
 
 if TYPE_CHECKING:
@@ -21,9 +21,6 @@ if TYPE_CHECKING:
     from ipywidgets import VBox
     from matplotlib.figure import Figure
 
-MAP_KINDS = ("map", "validity")
-# kinds of datasets that have one kind of picture
-STUDY_KINDS = ("calibration", "sensitivity")
 DPI = 110
 
 
@@ -95,9 +92,9 @@ def kinds_of(dataset: xr.Dataset) -> list[str]:
     >>> kinds_of(impact.sweep("configs/figure6.toml"))[:3]
     ['final-velocities', 'restitution', 'error']
     """
-    own = default_kind(dataset)
-    if own in STUDY_KINDS:
-        return [own]
+    default = default_kind(dataset)
+    if default in STUDY_KINDS:
+        return [default]
     left_out = {*STUDY_KINDS}
     if SAMPLE not in dataset.dims:
         left_out.add("uncertainty")

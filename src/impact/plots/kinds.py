@@ -42,6 +42,10 @@ KINDS = {
 }
 # kinds that show the motion at one point, which --sel selects
 MOTION_KINDS = ("loop", "history", "impulse")
+# kinds over two axes
+MAP_KINDS = ("map", "validity")
+# results of these kinds have no other picture
+STUDY_KINDS = ("calibration", "sensitivity")
 # width of one and of two columns of a journal [in]
 WIDTHS = {"single": 3.5, "double": 7.1}
 LOG_AXES = ("x", "y", "xy")
@@ -106,13 +110,12 @@ def plot_data_of(
     UsageError : there is no such kind, or the result does not contain what it needs
     """
     check_kind(kind)
-    from ..results.kinds import is_calibration, is_sensitivity
     from . import calibrations, curves, maps, uncertainty
     from .motions import MOTIONS
 
-    for own, is_own in (("calibration", is_calibration), ("sensitivity", is_sensitivity)):
-        if is_own(dataset) and kind != own:
-            raise UsageError(f"this result has the kind {own}, not {kind}")
+    default = default_kind(dataset)
+    if default in STUDY_KINDS and kind != default:
+        raise UsageError(f"this result has the kind {default}, not {kind}")
     if kind in MOTIONS:
         return MOTIONS[kind](histories(), equations=choice.equations)
     functions: dict[str, Callable[[xr.Dataset, Choice], PlotData]] = {

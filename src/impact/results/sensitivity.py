@@ -21,7 +21,7 @@ QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 NO_BREAK = "\N{NO-BREAK SPACE}"
 # indices from the first half of the samples
 HALF = ("first_half", "total_half")
-# name: its own dimension, and its meaning
+# name: the dimension besides those of the models and axes, and the meaning
 SENSITIVITY_VARIABLES = {
     "first": ("input", "first-order index: share of the variance that the input explains alone"),
     "first_lower": ("input", "lower end of the bootstrap interval of 95 % of the first-order index"),
@@ -64,9 +64,9 @@ def sensitivity_template(plan: Plan, of: str, others: Sequence[str]) -> xr.Datas
     sizes |= {"input": len(paths), "quantile": len(QUANTILES)}
     (unit,) = (variable.unit for variable in SCHEMA if variable.name == of)
     variables = {}
-    for name, (own, meaning) in SENSITIVITY_VARIABLES.items():
-        dims = ("model", *others, *filter(None, (own,)))
-        of_output = own != "input" and name != "failed"
+    for name, (dimension, meaning) in SENSITIVITY_VARIABLES.items():
+        dims = ("model", *others, *filter(None, (dimension,)))
+        of_output = dimension != "input" and name != "failed"
         about = {"units": unit if of_output else "1", "long_name": meaning}
         dtype = np.int64 if name == "failed" else float
         variables[name] = (dims, np.zeros([sizes[dim] for dim in dims], dtype), about)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,8 +63,12 @@ def indices_of(values: Array, seed: int | None = None) -> Indices:
     def estimate(rows: NDArray[np.integer[Any]]) -> Array:
         """First-order and total indices from some of the n rows, shape (2, outputs, inputs)."""
         chosen = values[..., rows]
-        of_blocks = {"f_A": chosen[:, 0], "f_B": chosen[:, 1], "f_AB": chosen[:, 2:].transpose(1, 0, 2)}
-        result = sobol_indices(func=of_blocks, n=n)  # type: ignore[arg-type]
+        of_blocks: dict[Literal["f_A", "f_B", "f_AB"], Array] = {
+            "f_A": chosen[:, 0],
+            "f_B": chosen[:, 1],
+            "f_AB": chosen[:, 2:].transpose(1, 0, 2),
+        }
+        result = sobol_indices(func=of_blocks, n=n)
         pair = np.stack([result.first_order, result.total_order])
         return np.asarray(pair.reshape(2, outputs, blocks - 2))
 
