@@ -124,8 +124,8 @@ def test_the_pytest_example_passes_and_fails(tmp_path: Path, cli: Run) -> None:
 def test_the_example_of_the_pytest_plug_in_passes_and_fails(tmp_path: Path) -> None:
     (tmp_path / "contact.toml").write_text(CONTACT, encoding="utf-8")
     (tmp_path / "test_contact.py").write_text(block("python", 1), encoding="utf-8")
-    # without the entry point of an installation
-    options = ["-p", "no:impact", "-p", "impact.pytest_plugin", "-p", "no:cacheprovider"]
+    # without the entry point of an installation, and without the summary, which repeats messages where CI is set
+    options = ["-p", "no:impact", "-p", "impact.pytest_plugin", "-p", "no:cacheprovider", "-rN"]
     bless, check = ([sys.executable, "-m", *shlex.split(line), *options] for line in block("sh", 1).splitlines())
     for words in (bless, check):
         done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
