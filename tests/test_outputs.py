@@ -1,5 +1,6 @@
 """A collision ends with the right status; its outputs depend on no other impact of a batch and on no unit."""
 
+import gc
 import sys
 from dataclasses import fields, replace
 
@@ -498,3 +499,21 @@ def test_a_law_that_uses_an_effective_quantity_needs_the_materials():
     }
     with pytest.raises(ConfigError, match=r"materials.soft.yield_strength: missing.*used by user"):
         impact.sweep(config, plugins=[model])
+
+
+def test_a_sweep_leaves_no_array_in_a_reference_cycle() -> None:
+    sweep = {"e": [0.2, 0.8], "v1": [0.5, 1.0], "m1": 1.0, "m2": 1.0, "K": 6e9}
+    config = {"models": ["gharib-hurmuzlu-2012", "kuwabara-kono-1987"], "sweep": sweep}
+    impact.sweep(config, overrides=["model.kuwabara-kono-1987.A=1e-6"])
+    gc.collect()
+    gc.disable()
+    try:
+        impact.sweep(config, overrides=["model.kuwabara-kono-1987.A=1e-6"])
+        gc.set_debug(gc.DEBUG_SAVEALL)
+        gc.collect()
+        kept = [value for item in gc.garbage for value in gc.get_referents(item) if isinstance(value, np.ndarray)]
+    finally:
+        gc.set_debug(0)
+        gc.garbage.clear()
+        gc.enable()
+    assert kept == []

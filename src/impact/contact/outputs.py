@@ -79,14 +79,16 @@ def outputs(
     if checked is not None:
         computed["checked"] = checked
 
-    def value(name: str) -> Any:
-        if name not in computed:
-            formula = FORMULAS[name]
-            computed[name] = formula(*map(value, argument_names(formula)))
-        return computed[name]
-
     with np.errstate(all="ignore"):
-        return {name: value(name) for name in names}
+        return {name: _compute(name, computed) for name in names}
+
+
+def _compute(name: str, computed: dict[str, Any]) -> Any:
+    """An output or intermediate value by name; it and what it needs are added to `computed`."""
+    if name not in computed:
+        formula = FORMULAS[name]
+        computed[name] = formula(*(_compute(needed, computed) for needed in argument_names(formula)))
+    return computed[name]
 
 
 def collide(

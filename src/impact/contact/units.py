@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import ast
+import operator
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..array_types import Array
 from ..errors import ModelError
@@ -31,6 +32,12 @@ UNIT_DIMENSIONS = {
     "Hz": Dimension(0, 0, -1),
 }
 
+OPERATORS: dict[type[ast.operator], Callable[[Any, Any], Array | float]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+}
 EXPONENT_PATTERN = r"\^(-?[\d.]+|[A-Za-z]\w*|\([^()]*(?:\([^()]*\)[^()]*)*\))"
 FACTOR_PATTERN = re.compile(rf"\s*([*/]?)\s*(1|[A-Za-z]+)(?:{EXPONENT_PATTERN})?")
 
@@ -93,27 +100,29 @@ def names_in(unit: str) -> frozenset[str]:
 
 def _exponent_value(text: str, values: Mapping[str, Array | float], unit: str) -> Array | float:
     """The value of an exponent such as `2`, `n` or `(n+1)/2`."""
-
-    def walk(node: ast.expr) -> Array | float:
-        match node:
-            case ast.Constant(value=int() | float() as number):
-                return float(number)
-            case ast.Name(id=name) if name in values:
-                return values[name]
-            case ast.UnaryOp(op=ast.USub(), operand=inner):
-                return -walk(inner)
-            case ast.BinOp(left=left, op=ast.Add(), right=right):
-                return walk(left) + walk(right)
-            case ast.BinOp(left=left, op=ast.Sub(), right=right):
-                return walk(left) - walk(right)
-            case ast.BinOp(left=left, op=ast.Mult(), right=right):
-                return walk(left) * walk(right)
-            case ast.BinOp(left=left, op=ast.Div(), right=right):
-                return walk(left) / walk(right)
-        names = ", ".join(values)
-        raise ModelError(f'unit "{unit}": the exponent "{text}" expected numbers, {names} and + - * /')
-
     try:
-        return walk(ast.parse(text, mode="eval").body)
+        return _evaluate(ast.parse(text, mode="eval").body, values)
     except SyntaxError:
         raise ModelError(f'unit "{unit}": the exponent "{text}" cannot be parsed') from None
+    except KeyError:
+        names = ", ".join(values)
+        raise ModelError(f'unit "{unit}": the exponent "{text}" expected numbers, {names} and + - * /') from None
+
+
+def _evaluate(node: ast.expr, values: Mapping[str, Array | float]) -> Array | float:
+    """The value of an expression.
+
+    Raises
+    ------
+    KeyError : a part of it is neither a number, a name of `values` nor + - * /
+    """
+    match node:
+        case ast.Constant(value=int() | float() as number):
+            return float(number)
+        case ast.Name(id=name):
+            return values[name]
+        case ast.UnaryOp(op=ast.USub(), operand=inner):
+            return -_evaluate(inner, values)
+        case ast.BinOp(left=left, op=op, right=right):
+            return OPERATORS[type(op)](_evaluate(left, values), _evaluate(right, values))
+    raise KeyError(ast.unparse(node))
