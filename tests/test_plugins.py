@@ -513,3 +513,12 @@ def test_the_replay_of_a_failed_point_fails_in_the_same_way(forked: ForkServer, 
     done = forked(*again[1:], cwd=folder)
     assert (done.returncode, done.stderr) == (3, AMBIGUOUS + "\n")
     assert "model_error" in done.stdout or "raised an error" in done.stdout
+
+
+def test_garbage_is_collected_while_a_command_runs(folder: Path) -> None:
+    (folder / "my_model.py").write_text(
+        "import gc\nassert gc.isenabled()\n" + PLUGIN.format(chi=CHI), encoding="utf-8"
+    )
+    words = [sys.executable, "-m", "impact", "sweep", "config.toml", "--plugin", "my_model.py", "-q"]
+    done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
