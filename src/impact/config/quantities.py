@@ -20,8 +20,10 @@ from pydantic import (
     Discriminator,
     Field,
     GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
     PlainValidator,
     Tag,
+    TypeAdapter,
     ValidationError,
     ValidationInfo,
     WrapValidator,
@@ -29,6 +31,7 @@ from pydantic import (
     model_validator,
 )
 from pydantic_core import InitErrorDetails, PydanticCustomError
+from pydantic_core.core_schema import CoreSchema, with_info_plain_validator_function
 
 from ..contact.model import ForceModel
 from ..contact.units import dimension, names_in
@@ -530,8 +533,8 @@ class Quantity:
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> Any:
         # quantities with the same unit and interval share a type, whatever their meaning
-        build_type = number_type if source is float else numbers_type
-        validated = build_type(replace(self, meaning=""))
+        of_any_meaning = replace(self, meaning="")
+        validated = number_type(of_any_meaning) if source is float else Annotated[Any, _AnyForm(of_any_meaning)]
         return handler.generate_schema(Annotated[validated, Field(description=self.about)])
 
     def validate(self, value: object, info: ValidationInfo) -> float:
@@ -606,6 +609,24 @@ class Quantity:
         return factor
 
 
+@dataclass(frozen=True)
+class _AnyForm:
+    """Annotation of a value of any form; a bare number does not need `numbers_type`, which takes long to build."""
+
+    quantity: Quantity
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return with_info_plain_validator_function(self.validate)
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> Any:
+        return handler(numbers_type(self.quantity).core_schema)
+
+    def validate(self, value: object, info: ValidationInfo) -> Any:
+        if value_form(value) == SCALAR:
+            return self.quantity.validate(value, info)
+        return numbers_type(self.quantity).validate_python(value, context=info.context)
+
+
 @cache
 def number_type(quantity: Quantity) -> Any:
     """The type of a number, bare or with a unit."""
@@ -625,7 +646,7 @@ def number_type(quantity: Quantity) -> Any:
 
 
 @cache
-def numbers_type(quantity: Quantity) -> Any:
+def numbers_type(quantity: Quantity) -> TypeAdapter[Any]:
     """The type of a number, list, range, column, fit or distribution; its form decides which type validates it."""
     number, end = number_type(quantity), number_type(replace(quantity, infinite=False))
     any_number, count = number_type(Quantity(quantity.unit, "")), bounded_int(1).type
@@ -645,7 +666,7 @@ def numbers_type(quantity: Quantity) -> Any:
     bounds = Field(description=f"{FIT_FORM}, between which impact calibrate fits it", strict=False)
     fit_field: Any = Annotated[numbers_of[end, end], bounds, BeforeValidator(_list_of_length(2, FIT_FORM))]
     fit_type = create_model(f"Fit of {of_quantity}", __base__=FitRange, fit=(fit_field, ...))
-    return Annotated[
+    any_form: Any = Annotated[
         Annotated[number, Tag(SCALAR)]
         | Annotated[_list_of(number, quantity.expected), Tag(LIST)]
         | Annotated[range_type, Tag(RANGE)]
@@ -654,6 +675,7 @@ def numbers_type(quantity: Quantity) -> Any:
         | Annotated[_distribution_type(quantity, end), Tag(DISTRIBUTION)],
         Discriminator(value_form),
     ]
+    return TypeAdapter(any_form, config=ConfigDict(strict=True))
 
 
 def _distribution_type(quantity: Quantity, end: Any) -> type[Distribution]:
