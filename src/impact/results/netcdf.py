@@ -88,7 +88,11 @@ def open_for_writing(sink: Sink, template: xr.Dataset, output: Output) -> Iterat
             **{str(name): size for name, size in template.sizes.items()},
             **{f"string{width}": width for width in widths},
         }
-        coordinates = [str(name) for name in template.coords if name not in template.dims]
+        coordinates = {
+            str(name): {*variable.dims}
+            for name, variable in template.coords.variables.items()
+            if name not in template.dims
+        }
         for name, variable in template.coords.items():
             if name in texts:
                 values = texts[str(name)]
@@ -101,7 +105,7 @@ def open_for_writing(sink: Sink, template: xr.Dataset, output: Output) -> Iterat
         for name, variable in template.data_vars.items():
             storage = _storage_options(variable, output)
             added = file.create_variable(str(name), variable.dims, variable.dtype, **storage)
-            related = [other for other in coordinates if {*template[other].dims} <= {*variable.dims}]
+            related = [other for other, dims in coordinates.items() if dims <= {*variable.dims}]
             _set_attributes(
                 added,
                 variable.attrs
