@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 
@@ -46,6 +47,29 @@ def test_without_a_varied_input_the_values_are_over_their_number() -> None:
     values, residuals = impact.plot(fit).axes
     assert residuals.get_xlabel() == "Number of the measured value"
     assert values.containers[0].lines[0].get_xdata().tolist() == list(range(1, 51))
+
+
+def test_the_table_of_a_picture_has_curves_residuals_and_measured_values(
+    cli: Run, drops: xr.Dataset, tmp_path: Path
+) -> None:
+    impact.save(drops, tmp_path / "fit.h5")
+    cli("plot", "fit.h5", "-o", "a.svg", "--data", "a.csv", cwd=tmp_path)
+    table = pd.read_csv(tmp_path / "a.csv")
+    for law in drops["model"].values:
+        curve = drops.sel(model=law, output_name="e_out")["curve"]
+        np.testing.assert_array_equal(table[f"v1 {law} [m/s]"].dropna(), drops["grid"])
+        np.testing.assert_array_equal(table[f"e_out {law}"].dropna(), curve)
+        np.testing.assert_array_equal(table[f"v1 e_out_residual {law} [m/s]"].dropna(), drops["v1"])
+        assert table[f"e_out_residual {law}"].count() == drops.sizes["point"]
+    np.testing.assert_array_equal(table["v1 e_out measured [m/s]"].dropna(), drops["v1"])
+    np.testing.assert_array_equal(table["e_out measured"].dropna(), drops["measured"])
+    np.testing.assert_array_equal(table["sigma e_out measured"].dropna(), drops["sigma"])
+    cli("plot", "fit.h5", "-o", "b.svg", "--data", "b.csv", "--data-form", "long", cwd=tmp_path)
+    rows = pd.read_csv(tmp_path / "b.csv")
+    measured = rows[rows["curve"] == "Measured"]
+    np.testing.assert_array_equal(measured["y"], drops["measured"])
+    # a number in the wide table for each row of the long one
+    assert len(rows) == sum(table[name].count() for name in table if not name.startswith("v1 "))
 
 
 def test_models_chooses_the_laws(drops: xr.Dataset) -> None:

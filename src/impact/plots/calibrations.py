@@ -110,7 +110,7 @@ def _panels(data: xr.Dataset, name: str, varied: str, choice: Choice, best: floa
         )  # fmt: skip
         deviation = _deviation(law, sigma)
         scaled = (law["residual"].values / deviation).tolist()
-        residuals.append(Curve(label, key, tuple(x.tolist()), tuple(scaled), variable="residual"))
+        residuals.append(Curve(label, key, tuple(x.tolist()), tuple(scaled), variable=f"{name}_residual"))
     axis: dict[str, Any] = {
         "x_name": x_name,
         "x_label": words_of(data[x_name].attrs, x_name),

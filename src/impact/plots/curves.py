@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -20,6 +21,7 @@ from ..formatting import heading
 from ..formatting import label as number_label
 from ..results.schema import plain_unit
 from ..text import safe_text
+from .data import MEASURED
 from .labels import REFERENCE, label_axis, law_text, pretty_conditions, symbol, words_of
 from .slices import NO_BREAK, conditions_of, is_ordered, parameter_text, read, scalars_of, take_line
 from .style import is_geometric, model_styles
@@ -139,8 +141,8 @@ class CurveData:
     columns = ("x_axis", "y_axis", "curve", "model", "x", "y")
 
     def rows(self) -> Iterator[tuple[str | float, ...]]:
-        """The points of all curves, one per row; for the names of the columns see `columns`."""
-        for panel in self.panels:
+        """The points of all curves and the measured ones, one per row, with the columns `columns`."""
+        for panel, points in zip_longest(self.panels, self.measured):
             axes = (
                 heading(f"{panel.x_label},", panel.x_name, panel.x_unit),
                 heading(f"{panel.y_label},", panel.y_name, panel.y_unit),
@@ -151,9 +153,16 @@ class CurveData:
                 for suffix, values in (("", curve.y), (", least", curve.least), (", largest", curve.largest)):
                     for x, y in zip(curve.x, values, strict=bool(values)):
                         yield (*axes, name + suffix, curve.model or "", x, y)
+            if points is not None and points.columns:
+                x_values = points.columns[panel.x_name].tolist()
+                for column, measured in points.columns.items():
+                    if column != panel.x_name:
+                        name = MEASURED if column == panel.y_name else f"{MEASURED}, {column}"
+                        for x, y in zip(x_values, measured.tolist(), strict=True):
+                            yield (*axes, name, "", x, y)
 
     def table(self) -> dict[str, tuple[float, ...]]:
-        """The points of all curves, one column per curve; curves with the same x share its column.
+        """The points of all curves and the measured ones, one column per curve; curves with the same x share it.
 
         The names of the columns are ASCII: variable, model, and the unit in brackets.
         """
@@ -162,11 +171,20 @@ class CurveData:
         is_shared = all(curve.x == all_curves[0][1].x for _, curve in all_curves)
         for panel, curve in all_curves:
             owner = curve.model or "reference"
-            columns[heading(panel.x_name, "" if is_shared else owner, panel.x_unit)] = curve.x
+            name = " ".join(part for part in (owner, curve.case.replace(" ", "")) if part)
+            x_column = heading(panel.x_name, "" if is_shared else owner, panel.x_unit)
+            # a law may have other points in another panel, such as its residuals
+            if columns.get(x_column, curve.x) != curve.x:
+                x_column = heading(panel.x_name, f"{curve.variable} {name}", panel.x_unit)
+            columns[x_column] = curve.x
             for suffix, values in (("", curve.y), ("_least", curve.least), ("_largest", curve.largest)):
                 if values:
-                    name = " ".join(part for part in (owner, curve.case.replace(" ", "")) if part)
                     columns[heading(f"{curve.variable}{suffix}", name, panel.y_unit)] = values
+        for panel, points in zip(self.panels, self.measured, strict=False):
+            for column, measured in points.columns.items():
+                of = "measured" if column == panel.y_name else f"{panel.y_name} measured"
+                unit = panel.x_unit if column == panel.x_name else panel.y_unit
+                columns[heading(column, of, unit)] = tuple(measured.tolist())
         return columns
 
     @property
