@@ -721,12 +721,13 @@ def export(
     Parameters
     ----------
     to : name of the code, see `export_codes`
-    model : a law that the code has, by its key; by default the first one of the source that the code has, or the
-        first one of `export_codes` without a source
+    model : a law that the code has, by its key; by default the first one of the source, or without a source the
+        first one of `export_codes`, that the release of the code has
     source, overrides : see `solve`
     at : values of inputs by config name; an e for a law that takes none is reached by its damping parameter
     dt : time step [s]; by default the contact time of the continuous law over 50
-    code_version : release of the code; by default that of the program, or else the newest known one
+    code_version : release of the code, letters, digits, spaces and `._+()-`; by default that of the program, or
+        else the newest known one
     script : write a complete input with two balls that prints the e that it measures
     verify : run such inputs at four phases, and compare their e with the prediction
     program : what runs scripts, such as the file of lmp, or of a Python with the code's package; by default found
@@ -746,7 +747,8 @@ def export(
     What LAMMPS takes for a restitution of 0.6:
 
     >>> import impact
-    >>> export = impact.export("lammps", "lammps-coeff-restitution-hooke", at={"e": 0.6, "K": 1e6})
+    >>> law, at = "lammps-coeff-restitution-hooke", {"e": 0.6, "K": 1e6}
+    >>> export = impact.export("lammps", law, at=at, code_version="22Jul2025")
     >>> export.lines[1]
     'pair_coeff      * * hooke 1000000.0 0.6 damping coeff_restitution tangential linear_nohistory 0.0 0.0'
     >>> round(export.at_dt.e_mean, 4)
