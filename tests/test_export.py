@@ -4,22 +4,35 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import re
 import shlex
+import subprocess
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
 import impact
-from impact.errors import UsageError
+from impact.errors import ConfigError, UsageError
+from impact.exporters.code import run_program
 from impact.exporters.codes import CODES
+from impact.exporters.export import comment_lines
+from impact.exporters.problem import first_law
 
-from .conftest import ROOT, Run, default_law
+from .conftest import ROOT, Run, default_law, write_program
 
 # two balls whose effective mass is 0.75 kg and whose effective radius is 0.03 m
 BALLS = {"v1": 1.0, "v2": 0.0, "m1": 1.0, "m2": 3.0, "R1": 0.04, "R2": 0.12}
 SOFT = {"E": 1e9, "nu": 0.3}
 HARD = {"E": 5e9, "nu": 0.2}
+# parameters of default laws that have no default
+OWN_PARAMETERS = {
+    "simbody": {"simbody-hunt-crossley.c": 0.3},
+    "modelica": {"modelica-elastogap.d": 1e3},
+    "adams": {"adams-impact.c": 1e3, "adams-impact.d": 1e-5},
+    "simscape": {"simscape-contact.b": 1e3, "simscape-contact.w": 1e-5},
+}
 
 
 def source(*materials: str, **values: float) -> dict[str, object]:
@@ -39,6 +52,44 @@ def test_the_law_is_the_first_of_the_source_that_the_code_has() -> None:
     assert impact.export("lammps", hertz, source=config).model == hertz
     with pytest.raises(UsageError, match="has none of the laws gonthier-2004"):
         impact.export("lammps", source=config | {"models": "gonthier-2004"})
+
+
+def test_the_default_law_is_the_first_that_the_installed_release_has(cli: Run, tmp_path: Path) -> None:
+    """LAMMPS of 2021, which Debian has, lacks the damping of the default law; the header says so."""
+    lmp = write_program(tmp_path / "lmp", 'echo "Massively Parallel Simulator - 29 Sep 2021 - Update 2"')
+    path = f"{tmp_path}:{os.environ['PATH']}"
+    done = cli("export", "--to", "lammps", "--at", "e=0.6", "--at", "v1=1", "--dt", "5e-6", PATH=path)
+    assert done.returncode == 0
+    assert "\n# law: lammps-tsuji-without-root, " in done.stdout
+    assert (
+        "\n# release 20210929 lacks the default law of 20250722, lammps-coeff-restitution-hertz\n" in done.stdout
+    )
+    assert "use --model lammps-coeff-restitution-hertz" not in done.stderr
+    models = ["lammps-coeff-restitution-hooke", "lammps-velocity-hooke"]
+    config = source("soft", "soft") | {"models": models, "model": {models[1]: {"C": 10.0}}}
+    assert impact.export("lammps", source=config, program=str(lmp)).model == models[1]
+    with pytest.raises(UsageError, match="LAMMPS 20210929 has no coeff_restitution, expected 20240601 or later"):
+        impact.export("lammps", source=config | {"models": models[0]}, program=str(lmp))
+
+
+@pytest.mark.parametrize("name", CODES)
+def test_the_default_law_of_the_newest_release_is_the_first_of_the_list(name: str) -> None:
+    code = CODES[name]
+    assert first_law(code, list(code.laws), code.newest) == default_law(name)
+
+
+def test_a_config_that_is_not_valid_is_not_exported_with_another_law() -> None:
+    viscoelastic = "lammps-viscoelastic-hertz"
+    config = source("soft", "soft") | {"models": viscoelastic}
+    with pytest.raises(ConfigError, match="eta: missing"):
+        impact.export("lammps", source=config)
+    assert impact.export("lammps", source=config, at={"e": 0.6}).model == viscoelastic
+    # a stiffness of a linear spring
+    hooke = source(n=1.5) | {"models": "lammps-coeff-restitution-hooke"}
+    export = impact.export("lammps", source=hooke, at={"K": 1e6}, code_version="22Jul2025")
+    assert (export.model, export.parameters["k_n"]) == ("lammps-coeff-restitution-hooke", 1e6)
+    with pytest.raises(ConfigError, match='did you mean "hertz"'):
+        impact.export("lammps", source=config | {"models": "hetrz"})
 
 
 def test_the_stiffness_of_lammps_hertz_is_per_root_of_the_effective_radius() -> None:
@@ -198,7 +249,7 @@ def test_every_law_of_a_code_is_in_the_list(cli: Run, name: str) -> None:
         (("--to", "lammps", "--dt", "0"), "--dt: got 0, expected a finite number > 0"),
         (("--to", "lammps", "--code-version", "new"), '--code-version: got "new", expected the date of a release'),
         (
-            ("--to", "lammps", "--code-version", "29Aug2019"),
+            ("--to", "lammps", "--model", "lammps-coeff-restitution-hertz", "--code-version", "29Aug2019"),
             "has no coeff_restitution, expected 20240601 or later",
         ),
         (
@@ -207,6 +258,11 @@ def test_every_law_of_a_code_is_in_the_list(cli: Run, name: str) -> None:
         ),
         (("--to", "liggghts", "--at", "e=0.01"), "e: got 0.01, expected 0.05 < e <= 1"),
         (("--to", "liggghts", "--at", "K=1e8"), "expected a material, not K"),
+        *(
+            (("--to", "lammps", "--code-version", version), f'--code-version: got "{version}", expected the date')
+            for version in ("31Feb2025", "99Foo2025", "20259999", "2025.99.99")
+        ),
+        (("--to", "chrono", "--code-version", f"9.{'9' * 5000}"), "expected a release, such as 10.0.0"),
         (
             ("--to", "yade", "--code-version", "new"),
             '--code-version: got "new", expected a release such as 2023.02a',
@@ -224,6 +280,202 @@ def test_bad_input_is_one_line(cli: Run, words: tuple[str, ...], message: str) -
     assert done.returncode == 2
     assert message in done.stderr
     assert done.stderr.count("\n") == 1
+
+
+# ---- text of the caller is no code
+
+HOSTILE = (
+    '\nopen("PWNED", "w")\n#',
+    "\rPWNED",
+    '"PWNED',
+    "'PWNED",
+    "-->PWNED<!--",
+    "*/PWNED",
+    "#PWNED",
+    "%PWNED",
+    "\x1b[31mPWNED",
+    "\u2028PWNED",
+    "\u202ePWNED",
+    "\\\nPWNED",
+    " &\nPWNED",
+    "$(PWNED)",
+)
+
+
+@pytest.mark.parametrize("name", CODES)
+def test_a_release_with_text_that_would_be_code_is_refused(name: str) -> None:
+    release = CODES[name].newest
+    for version in ("", " ", "x" * 60, "9" * 5000, *HOSTILE, *(release + hostile for hostile in HOSTILE)):
+        with pytest.raises(UsageError, match=r"^--code-version: got [ -~…]*$"):
+            impact.export(name, at={"e": 0.6}, code_version=version)
+
+
+@pytest.mark.parametrize("name", CODES)
+def test_of_the_texts_of_a_caller_only_the_release_is_written(name: str) -> None:
+    """Neither the title of a config, nor the name of a material; in the lines and in the script."""
+    code = CODES[name]
+    hostile = "".join(HOSTILE)
+    sweep = BALLS | {"e": 0.6, "material1": hostile, "material2": hostile}
+    config = {"title": hostile, "models": default_law(name), "materials": {hostile: SOFT}, "sweep": sweep}
+    for script in (False, True) if code.script is not None else (False,):
+        text = impact.export(
+            name, source=config, at=OWN_PARAMETERS.get(name), code_version=code.newest, script=script
+        ).text
+        assert code.newest in text.partition("\n")[0]
+        assert "PWNED" not in text
+        assert text.replace("\n", "").isprintable()
+
+
+@pytest.mark.parametrize("name", CODES)
+def test_a_comment_stays_a_comment_whatever_its_text(name: str) -> None:
+    for begin, end in {CODES[name].comment, ("# ", "")}:
+        for line, hostile in zip(comment_lines(HOSTILE, begin, end), HOSTILE, strict=True):
+            assert line.isprintable(), hostile
+            assert line.startswith(begin)
+            assert line.endswith(end)
+            # XML allows no "--" in a comment
+            assert not end or "--" not in line.removeprefix(begin).removesuffix(end)
+
+
+def test_a_release_that_would_be_code_is_one_line(cli: Run) -> None:
+    done = cli(
+        "export", "--to", "mujoco", "--at", "e=0.6", "--script", "--code-version", "4.0\x1b\nopen('x', 'w')\n#"
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == (
+        "--code-version: got \"4.0\\x1b\\x0aopen('x', 'w')\\x0a#\", expected a release, such as 4.0.0\n"
+    )
+
+
+@pytest.mark.parametrize("reported", ["4.0.0\\nopen('PWNED')", "4.0.0\\033[31m", "4.0.0 -->"])
+def test_a_release_that_a_program_reports_is_refused_too(tmp_path: Path, reported: str) -> None:
+    python = write_program(tmp_path / "python", f'printf "{reported}"')
+    with pytest.raises(UsageError, match=r"^version of [ -~]*: got [ -~]*, expected a release, such as 4.0.0$"):
+        impact.export("mujoco", at={"e": 0.6}, program=str(python))
+
+
+# ---- a program that stands in for LAMMPS: it reports a release, and runs a script by other commands
+
+RELEASE = 'case $1 in -help) echo "Parallel Simulator - 22 Jul 2025"; exit;; esac\n'
+LAMMPS = ("export", "--to", "lammps", "--at", "e=0.6", "--at", "v1=1", "--verify", "--program")
+
+
+def lammps_that_prints(folder: Path, values: Sequence[object]) -> Path:
+    """A program that prints one restitution after the other."""
+    (folder / "values").write_text("".join(f"{value}\n" for value in values), encoding="utf-8")
+    run = 'cd "${0%/*}"; echo "e_out = $(head -n 1 values)"; sed -i 1d values'
+    return write_program(folder / "lmp", RELEASE + run)
+
+
+def predicted_restitutions(folder: Path) -> list[float]:
+    """What --verify predicts at the four phases."""
+    program = lammps_that_prints(folder, [0.5] * 4)
+    verification = impact.export(
+        "lammps", at={"e": 0.6, "v1": 1.0}, verify=True, program=str(program)
+    ).verification
+    assert verification is not None
+    assert verification.measured == (0.5,) * 4
+    return list(verification.predicted)
+
+
+def test_verify_exits_with_0_for_the_predicted_restitutions_and_with_1_for_others(
+    cli: Run, tmp_path: Path
+) -> None:
+    predicted = predicted_restitutions(tmp_path)
+    agreeing = cli(*LAMMPS, lammps_that_prints(tmp_path, predicted))
+    assert (agreeing.returncode, agreeing.stderr) == (0, "")
+    assert agreeing.stdout.splitlines()[-1] == "agrees: largest difference 0, uncertainty 1e-09"
+    predicted[2] += 1e-8
+    differing = cli(*LAMMPS, lammps_that_prints(tmp_path, predicted))
+    assert (differing.returncode, differing.stderr) == (1, "")
+    assert differing.stdout.splitlines()[-1] == "DIFFERS: largest difference 1e-08, uncertainty 1e-09"
+
+
+@pytest.mark.parametrize("value", ["nan", "-nan", "inf"])
+@pytest.mark.parametrize("phase", range(4))
+def test_a_restitution_that_is_no_number_differs_at_any_phase(tmp_path: Path, phase: int, value: str) -> None:
+    predicted = [*predicted_restitutions(tmp_path)]
+    program = lammps_that_prints(tmp_path, [*predicted[:phase], value, *predicted[phase + 1 :]])
+    verification = impact.export(
+        "lammps", at={"e": 0.6, "v1": 1.0}, verify=True, program=str(program)
+    ).verification
+    assert verification is not None
+    assert not verification.agrees
+    assert f"at the phase {(phase + 0.5) / 4} of dt" in verification.not_numbers
+
+
+def test_verify_exits_with_1_and_names_the_phase_of_a_restitution_that_is_no_number(
+    cli: Run, tmp_path: Path
+) -> None:
+    predicted = predicted_restitutions(tmp_path)
+    program = lammps_that_prints(tmp_path, [predicted[0], "nan", "nan", "nan"])
+    done = cli(*LAMMPS, program)
+    assert (done.returncode, done.stderr) == (1, "")
+    assert done.stdout.splitlines()[-1].startswith(
+        "DIFFERS: at the phase 0.375 of dt = 6.31676e-06 s e_out is nan, "
+    )
+    lammps_that_prints(tmp_path, [predicted[0], "nan", "nan", "nan"])
+    data = json.loads(cli(*LAMMPS, program, "--json").stdout)["verification"]
+    assert (data["agrees"], data["rows"][1]["measured"]) == (False, None)
+
+
+def test_a_code_without_a_scheme_that_measures_no_number_differs(tmp_path: Path) -> None:
+    """The stand-in of a Python with openseespy; nothing is extrapolated from what is no number."""
+    python = write_program(tmp_path / "python", 'case $1 in -c) echo 3.7.1.2;; *) echo "e_out = nan";; esac')
+    at = {"e": 0.6, "v1": 1.0}
+    verification = impact.export("opensees", at=at, verify=True, program=str(python)).verification
+    assert verification is not None
+    assert not verification.agrees
+    assert len(verification.measured) == 12
+    assert verification.not_numbers.startswith("at the phase 0.125 of dt")
+
+
+@pytest.mark.parametrize(
+    ("run", "message"),
+    [
+        ("echo e_out = abc", "ended with exit code 0: e_out = abc"),
+        ("echo e_out = 0.6; echo more", "ended with exit code 0: more"),
+        ("", "ended with exit code 0: no output"),
+        ("echo e_out = 0.6; exit 3", "ended with exit code 3: e_out = 0.6"),
+        (
+            "echo 'ERROR: no\033[31m such fix' >&2; echo last >&2; exit 1",
+            "exit code 1: ERROR: no\\x1b[31m such fix",
+        ),
+        ("printf 'e_out = \\377'", "ended with exit code 0: e_out = "),
+        ("kill -9 $$", "ended with exit code -9: no output"),
+        ("yes", "stopped after it printed 64 MiB"),
+        ("yes >&2", "stopped after it printed 64 MiB"),
+    ],
+)
+def test_a_script_that_fails_is_one_line(cli: Run, tmp_path: Path, run: str, message: str) -> None:
+    done = cli(*LAMMPS, write_program(tmp_path / "lmp", RELEASE + run))
+    assert (done.returncode, done.stdout) == (2, "")
+    assert message in done.stderr
+    assert done.stderr.count("\n") == 1
+    # LAMMPS of a few thousand bytes or of gigabytes takes the same memory
+    assert done.memory < 500 * 2**20
+
+
+def test_a_script_that_does_not_end_is_stopped(tmp_path: Path) -> None:
+    """With what a wrapper has started."""
+    command = ["/bin/sh", "-c", "sleep 60 & echo $! > pid; wait"]
+    with pytest.raises(subprocess.SubprocessError, match=r"^stopped after 0\.5 s$"):
+        run_program(command, str(tmp_path), 0.5)
+    pid = (tmp_path / "pid").read_text(encoding="utf-8").strip()
+    status = Path("/proc", pid, "stat")
+    assert not status.exists() or status.read_text(encoding="utf-8").split()[2] == "Z"
+
+
+@pytest.mark.parametrize("reported", ["31 Feb 2025", "99 Foo 2025"])
+def test_a_program_that_reports_no_release_is_one_line(cli: Run, tmp_path: Path, reported: str) -> None:
+    lmp = write_program(tmp_path / "lmp", f'echo "Parallel Simulator - {reported}"')
+    done = cli("export", "--to", "lammps", "--at", "e=0.6", "--program", lmp)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == (
+        f'version of {lmp}: got "{reported}", expected the date of a release, such as 22Jul2025\n'
+    )
+    listed = cli("export", "--list", "--json", PATH=f"{tmp_path}:{os.environ['PATH']}")
+    assert [code["installed"] for code in json.loads(listed.stdout) if code["code"] == "lammps"] == [None]
 
 
 EXAMPLES = re.findall(

@@ -34,7 +34,7 @@ def export(
             "--model",
             metavar="KEY",
             autocompletion=complete_model,
-            help="A law that the code has. \\[default: the first of the source, else of --list, that its release has]",
+            help="A law that the code has. \\[default: the first of the source or of --list that its release has]",
         ),
     ] = None,
     at: AtOption = None,

@@ -170,12 +170,9 @@ def _header(problem: ExportProblem, collision: Collision, row: TimestepRow) -> l
     if code.scheme is None:
         header.append(f"{steps}: what the code's scheme delivers there is not predicted")
     else:
-        header.append(
-            f"{steps}: {UNSTABLE} ({code.scheme})"
-            if math.isnan(row.e_mean)
-            else f"{steps}: mean e {decimals(row.e_mean)}, {decimals(row.e_least)} to {decimals(row.e_largest)} by the "
-            f"phase in the step ({code.scheme})"
-        )
+        spread = f"{decimals(row.e_least)} to {decimals(row.e_largest)} by the phase in the step"
+        delivered = UNSTABLE if math.isnan(row.e_mean) else f"mean e {decimals(row.e_mean)}, {spread}"
+        header.append(f"{steps}: {delivered} ({code.scheme})")
         if row.e_to_ask == row.e_to_ask:
             header.append(f"a mean of {number(problem.wanted)} at this dt: ask for e = {decimals(row.e_to_ask)}")
         # where the continuous law delivers another e, no step does what is advised

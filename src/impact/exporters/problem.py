@@ -155,10 +155,14 @@ def prepare_export(
     UsageError : the code has no such law, or no damping gives the e
     ConfigError : an input is not allowed
     """
-    plugins, laws = Plugins(()), tuple(code.laws)
-    models = () if source is None else models_of_source(source, overrides, plugins, at)
-    key = law_of_code(code, model, version) if model is not None else first_law(code, models or laws, version)
-    newest_default = "" if model is not None or models else first_law(code, laws, code.newest)
+    plugins, laws, missing = Plugins(()), tuple(code.laws), ""
+    if model is not None:
+        key = law_of_code(code, model, version)
+    elif source is not None and (models := models_of_source(source, overrides, plugins)):
+        key = first_law(code, models, version)
+    else:
+        key, newest = (first_law(code, laws, release) for release in (version, code.newest))
+        missing = "" if key == newest else newest
     law = find(key)
     at, solved = dict(at), ""
     if "e" in at and "e" not in law.quantities:
@@ -186,5 +190,5 @@ def prepare_export(
         peak=collision["peak_indentation"],
         config=config,
         solved=solved,
-        missing="" if newest_default == key else newest_default,
+        missing=missing,
     )

@@ -48,9 +48,7 @@ def version_of(program: str) -> str | None:
 
 def read_version(text: str) -> str:
     if not re.fullmatch(r"\d{4}\.\d{2}[a-z]?", text):
-        raise UsageError(
-            f'got "{safe_text(text)}", expected a release such as 2023.02a, or its year and month'
-        )
+        raise UsageError(f'got "{safe_text(text)}", expected a release such as 2023.02a, or its year and month')
     return text
 
 
