@@ -172,13 +172,14 @@ def prepare_export(
         solved = f"{key}.{parameter}"
         if solved in at:
             raise UsageError(f"--at: got e and {solved}, expected one of the two")
-        wanted = at.pop("e")
         changes = [*placeholder_override(law, unknown_of(law, parameter)), *overrides]
         config, _ = single_point(source, changes, plugins, key, at)
-        result = solve_input(config, plugins, unknown_of(law, parameter), {"e_out": wanted})  # type: ignore[dict-item]
+        del at["e"]
+        wanted = float(config.scalars["e"])
+        result = solve_input(config, plugins, unknown_of(law, parameter), {"e_out": wanted})
         if not result.roots:
             least, most = map(number, result.attainable)
-            raise UsageError(f"--at e={wanted}: {key} delivers {least} to {most} at any {parameter}")
+            raise UsageError(f"--at e={number(wanted)}: {key} delivers {least} to {most} at any {parameter}")
         at[solved] = result.roots[0].value
     config, _ = single_point(source, overrides, plugins, key, at)
     fixed, collision = fixed_step_law(config, PHASES, code.scheme)
