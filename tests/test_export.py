@@ -131,6 +131,23 @@ def test_liggghts_takes_the_properties_of_each_type_and_pair() -> None:
 
 
 @pytest.mark.parametrize(
+    ("moduli", "expected"),
+    [
+        ((5e6, 1e9), []),
+        ((4.9e6, 1e9), ["soft_particles"]),
+        ((1e9, 4.9e6), ["soft_particles"]),
+        ((5e6, 1.1e9), ["hard_particles"]),
+        ((1.1e9, 4.9e6), ["soft_particles", "hard_particles"]),
+    ],
+)
+def test_liggghts_is_told_of_moduli_outside_its_range(moduli: tuple[float, float], expected: list[str]) -> None:
+    config = source("first", "second")
+    config["materials"] = {name: {"E": E, "nu": 0.3} for name, E in zip(("first", "second"), moduli, strict=True)}
+    lines = impact.export("liggghts", default_law("liggghts"), source=config, code_version="3.8.0").lines
+    assert [line.split() for line in lines if "_particles" in line] == [[name, "yes"] for name in expected]
+
+
+@pytest.mark.parametrize(
     ("version", "key"), [("2011.05", "yade-en-pulling"), ("2022.01a", "yade-en-clamped"), ("2023.02a", "yade-en")]
 )
 def test_the_law_of_en_depends_on_the_version_of_yade(version: str, key: str) -> None:
@@ -143,6 +160,11 @@ def test_yade_gets_twice_the_spring_and_dashpot_of_the_contact_for_each_ball() -
         "yade", "yade-viscoelastic", source=source(), at={"K": 1e6, "yade-viscoelastic.C": 300.0}
     )
     assert (export.parameters["kn"], export.parameters["cn"]) == (2e6, 600.0)
+
+
+def test_an_e_of_zero_is_the_critical_damping_of_yade() -> None:
+    export = impact.export("yade", "yade-betan", source=source("soft", "soft", e=0.0))
+    assert export.parameters["betan"] == 1.0
 
 
 def test_opensees_gets_the_effective_mass_and_the_damping_of_its_documentation() -> None:
@@ -214,6 +236,32 @@ def test_what_is_delivered_at_dt_is_that_of_timestep() -> None:
     assert export.at_dt == row
 
 
+def test_an_unstable_step_delivers_no_restitution(cli: Run) -> None:
+    """The scheme then gives an e of thousands."""
+    done = cli("export", "--to", "lammps", "--at", "e=0.6", "--dt", "0.1", "--code-version", "22Jul2025")
+    assert done.returncode == 0
+    assert "steps per contact: unstable at 400 of 400 phases, the step is too long for the scheme" in done.stdout
+    assert "mean e" not in done.stdout
+    assert "advised: dt <= 1" in done.stdout
+    assert done.stderr.startswith("warning: dt = 0.1 s: unstable at 400 of 400 phases")
+    row = impact.export("lammps", at={"e": 0.6}, dt=0.1).at_dt
+    assert all(math.isnan(e) for e in (row.e_mean, row.e_least, row.e_largest))
+
+
+def test_an_e_in_percent_is_solved_for() -> None:
+    export = impact.export("lammps", "lammps-velocity-hooke", at={"e": "60 %"}, code_version="22Jul2025")
+    assert export.e_continuous == pytest.approx(0.6, abs=1e-9)
+
+
+def test_the_axes_of_a_source_take_their_first_values_and_the_header_says_so() -> None:
+    config = source("soft", "soft", v1=[1.0, 2.0], e=[0.4, 0.5])
+    export = impact.export(
+        "lammps", default_law("lammps"), source=config, at={"v1": 2.0}, code_version="22Jul2025"
+    )
+    assert export.e == 0.4
+    assert "first value of each axis of the source: e; --at chooses another" in export.header
+
+
 def test_the_json_has_the_names_of_the_contract(cli: Run) -> None:
     data = json.loads(cli("export", "--to", "mujoco", "--at", "e=0.6", "--json").stdout)
     assert {"code", "version", "model", "e_continuous", "contact_time", "e_at_dt", "parameters", "lines"} <= set(
@@ -255,6 +303,12 @@ def test_every_law_of_a_code_is_in_the_list(cli: Run, name: str) -> None:
         (
             ("--to", "lammps", "--verify", "--program", "/nowhere"),
             '"/nowhere": no LAMMPS, pair style granular there',
+        ),
+        (("--to", "lammps", "-o", ""), ".: is not a regular file, and is not modified"),
+        (("--to", "lammps", "-o", "/nowhere/in.balls"), "the folder /nowhere does not exist"),
+        *(
+            (("--to", "mujoco", "--at", f"e={e}"), f"--at e={shown}: sweep.e: got ")
+            for e, shown in (("abc", "abc"), ("2", "2.0"), ("nan", "nan"), ("\x1b[31m", "\\x1b[31m"))
         ),
         (("--to", "liggghts", "--at", "e=0.01"), "e: got 0.01, expected 0.05 < e <= 1"),
         (("--to", "liggghts", "--at", "K=1e8"), "expected a material, not K"),
@@ -391,8 +445,7 @@ def test_verify_exits_with_0_for_the_predicted_restitutions_and_with_1_for_other
     assert differing.stdout.splitlines()[-1] == "DIFFERS: largest difference 1e-08, uncertainty 1e-09"
 
 
-@pytest.mark.parametrize("value", ["nan", "-nan", "inf"])
-@pytest.mark.parametrize("phase", range(4))
+@pytest.mark.parametrize(("phase", "value"), enumerate(["nan", "inf", "-nan", "nan"]))
 def test_a_restitution_that_is_no_number_differs_at_any_phase(tmp_path: Path, phase: int, value: str) -> None:
     predicted = [*predicted_restitutions(tmp_path)]
     program = lammps_that_prints(tmp_path, [*predicted[:phase], value, *predicted[phase + 1 :]])

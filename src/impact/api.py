@@ -13,7 +13,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from .atomic import atomic_write
 from .comparison.bless import bless as bless
 from .comparison.compare import compare as compare
 from .comparison.tolerances import Tolerances
@@ -760,13 +759,16 @@ def export(
     from .exporters.problem import prepare_export
     from .exporters.verify import choose_version
 
+    if output is not None:
+        check_output(
+            Path(output), overwrite=overwrite, source=Path(source) if isinstance(source, str | Path) else None
+        )
     code = find_code(to)
     found, version = choose_version(code, program, code_version, verify=verify)
     problem = prepare_export(code, model, version, source, at or {}, overrides)
     result = write_export(problem, dt, found if verify else None, with_script=script)
     if output is not None:
-        with atomic_write(Path(output), overwrite=overwrite) as sink:
-            sink.write(result.text.encode())
+        write_file(Path(output), result.text.encode(), overwrite=overwrite)
     return result
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from .._version import __version__
-from ..contact.timestep import MAX_RESTITUTION
+from ..contact.status import Status
 from ..errors import UsageError
 from ..formatting import decimals, number, quantity
 from ..inverse.timestep import TimestepRow, needed_steps, time_steps, timestep_rows
@@ -23,7 +23,6 @@ STEPS_PER_CONTACT = 50.0
 ADVISED_TOL = 0.01
 # a continuous law that delivers another e than it is asked for, by more than this, is warned about
 ASKED_TOL = 0.005
-UNSTABLE = "unstable, the step is too long for the scheme"
 # the longest line of a comment
 MAX_COMMENT = 1000
 
@@ -39,8 +38,8 @@ class Export:
     scheme : name of the code's fixed-step scheme, see `impact.contact.timestep.SCHEMES`; None if unknown here
     e : the e that is asked for; NaN for a law without one
     e_continuous, contact_time : of the continuous law [-, s]
-    at_dt : what the code delivers at its time step; its restitutions are NaN without a scheme, and where the
-        step is too long for it
+    at_dt : what the code delivers at its time step; its restitutions are NaN without a scheme, and where a
+        collision fails
     parameters : by the code's own names, in its units and conventions
     header : what a comment above the lines says
     lines : to paste
@@ -113,8 +112,8 @@ def write_export(problem: ExportProblem, dt: float | None, program: str | None, 
             f"{key} delivers {number(problem.e_continuous)} where e = {wanted} is asked for; impact solve "
             f"--model {key} --for e --target e_out={wanted} finds the e to ask for"
         )
-    if code.scheme is not None and math.isnan(at_dt.e_mean):
-        warnings.append(f"dt = {quantity(dt, 's')}: {UNSTABLE} ({code.scheme})")
+    if at_dt.failed:
+        warnings.append(f"dt = {quantity(dt, 's')}: {_failure(problem, at_dt)}")
     header = _header(problem, collision, at_dt)
     script = None
     if with_script and code.script is not None:
@@ -139,14 +138,18 @@ def write_export(problem: ExportProblem, dt: float | None, program: str | None, 
 
 
 def _row(problem: ExportProblem, dt: float) -> TimestepRow:
-    """What the code delivers at a time step [s]; NaN without a scheme, and where it is unstable."""
+    """What the code delivers at a time step [s]; NaN without a scheme."""
     if problem.code.scheme is None:
         nan = math.nan
         return TimestepRow(dt, problem.law.contact_time / dt, nan, nan, nan, nan)
     (row,) = timestep_rows(problem.law, [dt])
-    if row.e_largest <= MAX_RESTITUTION:
-        return row
-    return replace(row, e_mean=math.nan, e_least=math.nan, e_largest=math.nan, e_to_ask=math.nan)
+    return row
+
+
+def _failure(problem: ExportProblem, row: TimestepRow) -> str:
+    """Why the code delivers no restitution at a time step, in words."""
+    status = row.status.replace("_", " ")
+    return f"{status} at {row.failed} of {problem.law.phases} phases, {Status[row.status.upper()].meaning}"
 
 
 def _header(problem: ExportProblem, collision: Collision, row: TimestepRow) -> list[str]:
@@ -158,6 +161,8 @@ def _header(problem: ExportProblem, collision: Collision, row: TimestepRow) -> l
     ]
     if problem.missing:
         header.append(f"release {problem.version} lacks the default law of {code.newest}, {problem.missing}")
+    if problem.first:
+        header.append(f"first value of each axis of the source: {', '.join(problem.first)}; --at chooses another")
     if problem.solved:
         name = problem.solved.rpartition(".")[2]
         header.append(f"{name} = {collision[name]!r} gives the e that is wanted")
@@ -171,7 +176,7 @@ def _header(problem: ExportProblem, collision: Collision, row: TimestepRow) -> l
         header.append(f"{steps}: what the code's scheme delivers there is not predicted")
     else:
         spread = f"{decimals(row.e_least)} to {decimals(row.e_largest)} by the phase in the step"
-        delivered = UNSTABLE if math.isnan(row.e_mean) else f"mean e {decimals(row.e_mean)}, {spread}"
+        delivered = _failure(problem, row) if row.failed else f"mean e {decimals(row.e_mean)}, {spread}"
         header.append(f"{steps}: {delivered} ({code.scheme})")
         if row.e_to_ask == row.e_to_ask:
             header.append(f"a mean of {number(problem.wanted)} at this dt: ask for e = {decimals(row.e_to_ask)}")

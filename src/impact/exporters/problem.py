@@ -39,6 +39,7 @@ class ExportProblem:
     e_continuous, peak : restitution [-] and peak indentation [m] of the continuous law
     config : the config of the impact
     solved : the parameter that was solved for, with the wanted e; "" for none
+    first : names of axes of the source that are at their first value
     missing : the default law of the newest release, if none was asked for and this one has another; else ""
     """
 
@@ -49,6 +50,7 @@ class ExportProblem:
     peak: float
     config: Config
     solved: str
+    first: tuple[str, ...]
     missing: str
 
     @property
@@ -181,7 +183,7 @@ def prepare_export(
             least, most = map(number, result.attainable)
             raise UsageError(f"--at e={number(wanted)}: {key} delivers {least} to {most} at any {parameter}")
         at[solved] = result.roots[0].value
-    config, _ = single_point(source, overrides, plugins, key, at)
+    config, first = single_point(source, overrides, plugins, key, at)
     fixed, collision = fixed_step_law(config, PHASES, code.scheme)
     return ExportProblem(
         code=code,
@@ -191,5 +193,6 @@ def prepare_export(
         peak=collision["peak_indentation"],
         config=config,
         solved=solved,
+        first=first,
         missing=missing,
     )

@@ -83,6 +83,9 @@ def parameters(collision: Collision) -> dict[str, float | str]:
 
 def linear_damping(e: float) -> float:
     """The damping ratio of a linear spring and dashpot that ends at zero indentation, see `yade-betan`."""
+    if e == 0.0:
+        # the limit
+        return 1.0
     logarithm = math.log(e)
     return -logarithm / math.hypot(math.pi, logarithm)
 
