@@ -445,7 +445,7 @@ def test_verify_exits_with_0_for_the_predicted_restitutions_and_with_1_for_other
     assert differing.stdout.splitlines()[-1] == "DIFFERS: largest difference 1e-08, uncertainty 1e-09"
 
 
-@pytest.mark.parametrize(("phase", "value"), enumerate(["nan", "inf", "-nan", "nan"]))
+@pytest.mark.parametrize(("phase", "value"), list(enumerate(["nan", "inf", "-nan", "nan"])))
 def test_a_restitution_that_is_no_number_differs_at_any_phase(tmp_path: Path, phase: int, value: str) -> None:
     predicted = [*predicted_restitutions(tmp_path)]
     program = lammps_that_prints(tmp_path, [*predicted[:phase], value, *predicted[phase + 1 :]])
