@@ -162,7 +162,7 @@ def _header(problem: ExportProblem, collision: Collision, row: TimestepRow) -> l
     if problem.missing:
         header.append(f"release {problem.version} lacks the default law of {code.newest}, {problem.missing}")
     if problem.first:
-        header.append(f"first value of each axis of the source: {', '.join(problem.first)}; --at chooses another")
+        header.append(f"first value of each axis of the source: {', '.join(problem.first)}")
     if problem.solved:
         name = problem.solved.rpartition(".")[2]
         header.append(f"{name} = {collision[name]!r} gives the e that is wanted")
