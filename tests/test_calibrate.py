@@ -179,13 +179,14 @@ def test_the_best_config_gives_the_predictions(cli: Run, tmp_path: Path) -> None
 def test_the_law_that_made_the_data_is_ranked_first_in_nine_of_ten_sets() -> None:
     """Or within 2 of the least AICc; 200 sets of 20 points of three laws, within four standard errors."""
     from impact.config.load import read_config
-    from impact.inverse.calibrate import fitted_names, prediction
+    from impact.config.measurements import fitted_parameters
+    from impact.inverse.calibrate import prediction
     from impact.inverse.fit import Bounds, DataPoints, Problem, fit_all
 
     speeds = np.geomspace(0.1, 3.0, 20)
     config = read_config(FOLDER / "drops.toml", purpose="calibrate")
     models = [model for model in config.models if model.key != "hunt-crossley-1975"]
-    names = {model.key: fitted_names(config, model) for model in models}
+    names = {model.key: fitted_parameters(config.fits, model) for model in models}
     functions = {
         model.key: prediction(config, model, names[model.key], {"v1": speeds.tolist()}, speeds.size)
         for model in models
