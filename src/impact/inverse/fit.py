@@ -320,7 +320,10 @@ def minimize(
         loss=problem.data.loss,
         max_nfev=MAX_EVALUATIONS,
     )
-    return Estimate(full(result.x), 2.0 * float(result.cost), excess, bool(result.success))
+    # the solver stays inside the bounds, and a parameter at a bound is on it
+    nearest = np.round(result.x)
+    part = np.where(np.abs(result.x - nearest) <= AT_BOUND, nearest, result.x)
+    return Estimate(full(part), 2.0 * float(result.cost), excess, bool(result.success))
 
 
 def _minimize_with_excess(

@@ -168,9 +168,8 @@ def fit_notes(dataset: xr.Dataset) -> list[str]:
         and dataset.attrs.get("loss", "linear") == "linear"
     ):
         notes.append(
-            f"the best law is rejected (p < {REJECTED_P:g}): no law here is right, or standard deviations are too "
-            'small (noise = "excess", with a column specimen where specimens differ), or a value is an outlier '
-            '(loss = "huber")'
+            f"the best law is rejected (p < {REJECTED_P:g}): try other laws, "
+            'noise = "excess" with a column specimen where specimens differ, or loss = "huber" against outliers'
         )
     if residuals := largest_residuals(dataset):
         parts = [f"{residual.place} ({decimals(residual.standardized, 1)})" for residual in residuals]
