@@ -1170,7 +1170,8 @@ def plot(
     height : height of the figure [in], or a length; by default it depends on the kind
     style : a style sheet of matplotlib, or the name of one; rcParams changed by the user are respected in any case
     title : write the title and the conditions
-    labels : texts by the name of an axis, the key of a law, "reference" or "title"
+    labels : texts by the name of an axis, of a variable whose name is beside its curve, the key of a law,
+        "reference" or "title"
     equations : name the laws with the numbers of their equations in the paper
     ax : axes of an existing figure to draw into, one for each panel, in the style of that figure
     plugins : plug-in models that the result was computed with, needed to draw a loop, a history or an impulse
@@ -1248,7 +1249,8 @@ def plot_to_files(
 ) -> PlotFiles:
     """Draw a stored result into a file for each kind of picture.
 
-    Kinds that the result does not have the data for are left out; it is an error if none can be drawn.
+    Kinds that the result does not have the data for are left out; it is an error if none can be drawn. Where a
+    motion at the point `sel` is drawn too, a kind that `sel` leaves no axis is drawn over the whole axis.
 
     Parameters
     ----------
@@ -1278,7 +1280,8 @@ def plot_to_files(
     ['r.png']
     """
     from .plots.data import check_table, encode_table, read_points
-    from .plots.kinds import Choice, check_kind, default_kind, draw
+    from .plots.kinds import Choice, check_kind, data_of_kinds, default_kind, draw, label_keys
+    from .plots.labels import check_labels
     from .plots.style import check_picture, length, save_figure
 
     choice = Choice(x, y, variable, sel, models, log, equations)
@@ -1308,12 +1311,15 @@ def plot_to_files(
         kinds = [default_kind(dataset)]
         pictures = dict.fromkeys(kinds, pictures[""])
         tables = dict.fromkeys(kinds, tables[""]) if tables else {}
+    of_kinds, left_out = data_of_kinds(kinds, dataset, choice, _histories_of(dataset, choice, plugins))
+    if of_kinds:
+        check_labels(labels or {}, label_keys(of_kinds.values(), title=title))
     drawn: dict[str, PlotData] = {}
-    left_out: dict[str, str] = {}
-    for kind in kinds:
+    for kind, plot_data in of_kinds.items():
+        keys = label_keys([plot_data], title=title)
+        of_picture = {key: text for key, text in (labels or {}).items() if key in keys}
         try:
-            plot_data = get_plot_data(dataset, kind, choice, plugins)
-            figure = draw(plot_data, *size, style=style, title=title, labels=labels, points=measured)
+            figure = draw(plot_data, *size, style=style, title=title, labels=of_picture, points=measured)
             table = encode_table(plot_data, tables[kind].suffix.lower(), data_form) if tables else b""
         except UsageError as error:
             left_out[kind] = str(error)
@@ -1333,10 +1339,15 @@ def get_plot_data(
     """The data of a picture; see `plot`."""
     from .plots.kinds import plot_data_of
 
+    return plot_data_of(kind, dataset, choice, _histories_of(dataset, choice, plugins))
+
+
+def _histories_of(
+    dataset: xr.Dataset, choice: Choice, plugins: Sequence[ForceModel | str | Path]
+) -> Callable[[], list[xr.Dataset]]:
+    """A function that integrates the chosen point of a result again."""
     plugin_set = read_plugins(plugins)
-    return plot_data_of(
-        kind, dataset, choice, lambda: histories(dataset, choice.models, choice.sel or {}, plugin_set)
-    )
+    return lambda: histories(dataset, choice.models, choice.sel or {}, plugin_set)
 
 
 def materials() -> dict[str, dict[str, float | str]]:
