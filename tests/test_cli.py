@@ -18,6 +18,7 @@ import xarray as xr
 from rich.cells import cell_len
 
 import impact
+from impact.plots.data import read_points
 
 from .conftest import ROOT, WIDE, Run
 from .fork_server import ForkServer, abandoned_pipe, printed_on_terminal
@@ -494,6 +495,26 @@ def test_hostile_names_in_a_file_are_escaped(cli: Run, tmp_path: Path) -> None:
         assert not re.search("[\x1b\x07\u202e]", done.stdout + done.stderr), words
     done = cli("models", name)
     assert (done.returncode, "\x1b" in done.stderr) == (2, False)
+
+
+def test_a_history_is_a_table_or_a_result_as_its_name_says(cli: Run, tmp_path: Path) -> None:
+    for name in ("h.h5", "h.csv"):
+        done = cli("run", "--at", "e=0.5", "--times", "50", "--history", name, cwd=tmp_path)
+        assert (done.returncode, done.stderr) == (0, f"{name}: 50 points in time\n")
+    history = impact.load(tmp_path / "h.h5")
+    heading, *_ = (tmp_path / "h.csv").read_text(encoding="utf-8").splitlines()
+    assert heading == "t [s],delta [m],v [m/s],F [N],x1 [m],x2 [m],v1 [m/s],v2 [m/s]"
+    columns = read_points(tmp_path / "h.csv").columns
+    assert columns.keys() == history.variables.keys() - {"model"}
+    for name, values in columns.items():
+        np.testing.assert_array_equal(values, history[name].values)
+    assert cli("plot", "h.h5", "-k", "history", "--points", "h.csv", cwd=tmp_path).returncode == 0
+    (tmp_path / "h.png").unlink()
+    for name in ("h.png", "h.txt", "h"):
+        refused = cli("run", "--model", "nothing", "--history", name, cwd=tmp_path)
+        words = f"--history {name}: expected a name that ends in .h5, .hdf5, .nc or .csv\n"
+        assert (refused.returncode, refused.stdout, refused.stderr) == (2, "", words)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["h.csv", "h.h5"]
 
 
 def test_run_of_a_failed_point(cli: Run, tmp_path: Path) -> None:
