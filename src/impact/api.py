@@ -807,7 +807,10 @@ def extend(
     plugins: Sequence[ForceModel | str | Path] = (),
     max_points: int = MAX_POINTS,
 ) -> xr.Dataset:
-    """Add values to the axes of a stored result, or models to it, and integrate only the new trajectories.
+    """Add values to the axes of a stored result, or models to it, and integrate only what it does not hold.
+
+    A result of layout "factored" holds trajectories, which new points may share; one of layout "full" has
+    values alone, and all trajectories of the new points are integrated.
 
     Parameters
     ----------
@@ -862,8 +865,8 @@ def extend_to_file(
 
     Returns
     -------
-    SweepOutcome : counts of points by status, largest errors, first failed points; `integrated` counts the new
-        trajectories
+    SweepOutcome : counts of points by status, largest errors, first failed points; `integrated` counts the
+        trajectories that were integrated
 
     Raises
     ------
@@ -878,7 +881,7 @@ def extend_to_file(
     """
     target = Path(result if output is None else output)
     with backend or nullcontext(SERIAL) as integrator:
-        outcome, integrated = extend_result(
+        outcome = extend_result(
             Path(result),
             target,
             overrides,
@@ -892,7 +895,7 @@ def extend_to_file(
         )
     if should_stop():
         raise UnfinishedError(f"{safe_text(str(target))} is complete")
-    return replace(outcome, integrated=integrated)
+    return outcome
 
 
 def expand(
