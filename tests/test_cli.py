@@ -410,12 +410,46 @@ def test_the_catalogue(cli: Run) -> None:
     page = cli("models", "ismail-stronge-2008").stdout
     assert "plastic loss factor" in page
     assert "seen in Gharib and Hurmuzlu (2012), equation (43)" in page
+    for words in ("The columns e=... show the delivered", "The column core shows what integrates", " entries: "):
+        assert words in cli("models", COLUMNS="200").stdout
+
+
+def test_a_model_is_described_in_full(cli: Run) -> None:
+    longest = sorted(impact.models().values(), key=lambda model: len(str(model.evidence)) + len(model.equation))
+    for model in longest[-3:]:
+        words = cli("models", model.key).stdout.split()
+        for text in (model.equation, model.reference, str(model.evidence)):
+            # a long line is broken between words
+            assert " ".join(text.split()) in " ".join(words)
+
+
+def test_common_materials_are_listed_with_units_and_sources(cli: Run) -> None:
+    headings, *rows = cli("materials").stdout.splitlines()
+    assert headings.split("  ")[0] == "material"
+    assert re.split(" {2,}", headings.strip())[1:] == [
+        "E [GPa]", "nu [-]", "rho [kg/m3]", "yield_strength [MPa]", "what", "source"
+    ]  # fmt: skip
+    for name, record in impact.materials().items():
+        assert any(row.startswith(f"{name} ") for row in rows)
+        numbers = [record["E"] / 1e9, record["nu"], record["rho"], record.get("yield_strength", np.nan) / 1e6]
+        heading, printed, *_ = cli("materials", name).stdout.splitlines()
+        cells = [np.nan if word == "–" else float(word) for word in printed.split()[1:5]]
+        np.testing.assert_allclose(cells, numbers, rtol=1e-5)
+        assert heading.startswith("material")
+    assert json.loads(cli("materials", "glass", "--json").stdout) == {"glass": impact.materials()["glass"]}
+    refused = cli("materials", "glas")
+    assert (refused.returncode, refused.stderr) == (2, 'no material "glas"; did you mean "glass"?\n')
 
 
 def test_info(cli: Run, stored: Path) -> None:
     page = cli("info", stored).stdout
     for words in ("model 3 × e 101", "closed_form_error", "301 ok, 2 limit", "0 … 1, 101 values"):
         assert words in page
+    names = [line.split(" ")[0] for line in page.split("\n\n")[0].splitlines() if line[:1].strip()]
+    assert names[:5] == ["file", "title", "dimensions", "points", "layout"]
+    # texts of each model are no values of an input
+    assert not {"equation", "reference", "doi", "year"} & {*names}
+    assert names.count("title") == 1
     printed = json.loads(cli("info", stored, "--json").stdout)
     assert printed["dimensions"] == {"model": 3, "e": 101}
     assert printed["attributes"]["config"].startswith("#:schema")
