@@ -1101,6 +1101,10 @@ def check_model(model: ForceModel) -> list[Finding]:
     -------
     list of Finding : the clause, the largest deviation, its bound, and whether the clause holds
 
+    Warns
+    -----
+    UserWarning : a formula raised an error, with its file, line and text
+
     >>> import impact
     >>> all(finding.holds for finding in impact.check_model(impact.models()["bilinear"]))
     True
