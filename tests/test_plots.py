@@ -728,7 +728,7 @@ def test_kinds_that_do_not_apply_are_reported_and_others_drawn(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a-restitution.svg"]
 
 
-def test_the_point_of_a_motion_leaves_the_axes_of_other_pictures(
+def test_a_value_for_one_picture_leaves_the_axes_of_others(
     cli: Run, coarse: xr.Dataset, coarse_file: Path, wide: xr.Dataset, tmp_path: Path
 ) -> None:
     words = ["-k", "error", "-k", "loop", "-k", "final-velocities", "--sel", "e=0.5"]
@@ -750,7 +750,14 @@ def test_the_point_of_a_motion_leaves_the_axes_of_other_pictures(
     files = impact.plot_to_files(tmp_path / "wide.h5", kinds=kinds, sel={"e": 0.6, "v1": 2.0})
     assert files.plot_data["restitution"].panels[0].x_name == "m1"  # type: ignore[union-attr]
     assert files.plot_data["restitution"].not_drawn == ()
-    # without a motion a selection is one of the picture, and leaves it no axis
+    # a value for a curve leaves a map its axes
+    impact.save(wide.isel({"m1": 0, "material2": 0, "ismail-stronge-2008.gamma": 0}), tmp_path / "plane.h5")
+    files = impact.plot_to_files(tmp_path / "plane.h5", kinds=("map", "restitution"), sel={"v1": 2.0})
+    assert [plot_data.not_drawn for plot_data in files.plot_data.values()] == [
+        ("--sel v1=2.0, a point on its axis",),
+        (),
+    ]
+    # a selection for no picture is an error
     alone = cli("plot", coarse_file, "-k", "error", "-k", "restitution", "--sel", "e=0.5", cwd=tmp_path)
     assert alone.returncode == 2
     assert alone.stderr.startswith("this result has no numeric axis left to draw over")

@@ -1256,8 +1256,8 @@ def plot_to_files(
 ) -> PlotFiles:
     """Draw a stored result into a file for each kind of picture.
 
-    Kinds that the result does not have the data for are left out; it is an error if none can be drawn. Where a
-    motion at the point `sel` is drawn too, a kind that `sel` leaves no axis is drawn over the whole axis.
+    Kinds that the result does not have the data for are left out; it is an error if none can be drawn. Of
+    several kinds, one that `sel` leaves no axis, while another is drawn, is drawn over the whole axis.
 
     Parameters
     ----------

@@ -127,9 +127,9 @@ def plot(
 ) -> None:
     """Plot a stored result: by default the final-velocity comparison, Figure 6 of the paper.
 
-    loop, history and impulse integrate one point of the result again; --sel selects it. Other kinds in the same
-    call that this leaves no axis are drawn over the whole axis.
-    With several kinds, those that do not apply are reported with the reason.
+    loop, history and impulse integrate one point of the result again; --sel selects it.
+    Of several kinds, those that --sel leaves no axis are drawn over the whole axis, and those that do not apply
+    are reported with the reason.
     """
     from .. import api
 

@@ -138,22 +138,23 @@ def data_of_kinds(
 ) -> tuple[dict[str, PlotData], dict[str, str]]:
     """The data of several pictures by kind, and the reasons why other kinds cannot be drawn.
 
-    Where a motion is drawn, the selected values are its point: other kinds that they leave no axis ignore them.
-    For the parameters see `plot_data_of`.
+    Where the selected values are for one of the pictures, such as the point of a loop, others that they leave no
+    axis ignore them. For the parameters see `plot_data_of`.
     """
     data: dict[str, PlotData] = {}
-    left_out: dict[str, str] = {}
-    for kind in sorted(kinds, key=lambda kind: kind not in MOTION_KINDS):
+    reasons: dict[str, str] = {}
+    for kind in kinds:
         try:
             data[kind] = plot_data_of(kind, dataset, choice, histories)
         except UsageError as error:
-            left_out[kind] = str(error)
-            if kind not in MOTION_KINDS and not data.keys().isdisjoint(MOTION_KINDS):
-                with suppress(UsageError):
-                    data[kind] = _over_selected_axes(kind, dataset, choice)
+            reasons[kind] = str(error)
+    if data and choice.sel:
+        for kind in reasons.keys() - {*MOTION_KINDS}:
+            with suppress(UsageError):
+                data[kind] = _over_selected_axes(kind, dataset, choice)
     return (
         {kind: data[kind] for kind in kinds if kind in data},
-        {kind: left_out[kind] for kind in kinds if kind not in data},
+        {kind: reason for kind, reason in reasons.items() if kind not in data},
     )
 
 
