@@ -100,4 +100,5 @@ def _indices_from_means(means: Array) -> Array:
     first, change, total = np.split(means[..., :-2], 3, axis=-1)
     explained = np.concatenate([first - mean[..., None] * change, total], axis=-1)
     variance = (square - mean * mean)[..., None]
-    return np.divide(explained, variance, out=np.zeros_like(explained), where=variance > 0.0)
+    indices: Array = np.divide(explained, variance, out=np.zeros_like(explained), where=variance > 0.0)
+    return indices
