@@ -557,7 +557,8 @@ def timestep(
 
     Returns
     -------
-    TimestepResult : a row for each step, those of `steps_per_contact` first, and the number of steps needed
+    TimestepResult : a row for each step, those of `steps_per_contact` first, and the number of steps needed; a row
+        at which the collision fails at some phase has a status and no restitution
 
     Raises
     ------
@@ -673,7 +674,7 @@ def sensitivity(
 
     Raises
     ------
-    ConfigError : with one line for each problem; there is no design, or its n is no power of two
+    ConfigError : with one line for each problem; there is no design, or its n is no power of two from 2 on
     UsageError, StoreError : there is no such output, or the file exists or cannot be written
 
     The peak force of Hertz' law is proportional to K^0.4 v^1.2:
