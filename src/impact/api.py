@@ -557,7 +557,8 @@ def timestep(
 
     Returns
     -------
-    TimestepResult : a row for each step, those of `steps_per_contact` first, and the number of steps needed
+    TimestepResult : a row for each step, those of `steps_per_contact` first, and the number of steps needed; a row
+        at which the collision fails at some phase has a status and no restitution
 
     Raises
     ------
@@ -673,7 +674,7 @@ def sensitivity(
 
     Raises
     ------
-    ConfigError : with one line for each problem; there is no design, or its n is no power of two
+    ConfigError : with one line for each problem; there is no design, or its n is no power of two from 2 on
     UsageError, StoreError : there is no such output, or the file exists or cannot be written
 
     The peak force of Hertz' law is proportional to K^0.4 v^1.2:
@@ -687,18 +688,47 @@ def sensitivity(
     >>> study["first"].values.round(2).tolist()
     [[0.56, 0.43]]
     """
+    (result,) = sensitivities(
+        source,
+        of=[of],
+        output=output,
+        overwrite=overwrite,
+        overrides=overrides,
+        plugins=plugins,
+        max_points=max_points,
+        execute=execute,
+    )
+    return result
+
+
+def sensitivities(
+    source: str | Path | Mapping[str, object],
+    *,
+    of: Sequence[str],
+    output: str | Path | None,
+    overwrite: bool,
+    overrides: Sequence[str],
+    plugins: Sequence[ForceModel | str | Path],
+    max_points: int,
+    execute: Callable[[Plan], xr.Dataset],
+) -> list[xr.Dataset]:
+    """The `sensitivity` of several outputs, whose points are computed once; one of them may be written."""
     # its modules import scipy.stats, which other functions do without
     from .uncertainty.sensitivity import check_output_name, sensitivity_of, sensitivity_plan
 
-    check_output_name(of)
+    for name in of:
+        check_output_name(name)
+    if output is not None and len(of) > 1:
+        raise UsageError(f"--output: got {len(of)} outputs (--of), expected one for a file")
     name = safe_text(str(source)) if isinstance(source, str | Path) else "config"
     plan = sensitivity_plan(prepare(source, overrides, plugins, max_points), of, max_points, name)
     if output is not None:
         check_output(Path(output), overwrite=overwrite)
-    result = sensitivity_of(plan, of, execute)
+    swept = execute(plan)
+    results = [sensitivity_of(plan, of_study, swept) for of_study in of]
     if output is not None:
-        save(result, output, overwrite=overwrite)
-    return result
+        save(results[0], output, overwrite=overwrite)
+    return results
 
 
 def export(
