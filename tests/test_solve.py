@@ -91,7 +91,11 @@ def test_several_roots_are_all_found() -> None:
 
 @pytest.mark.parametrize(
     ("wanted", "roots"),
-    [(0.64, [1.46682e-4, 1.62186e-4]), (0.6395, [1.48783e-4, 1.60035e-4]), (0.642, [1.4134150e-4, 1.6772915e-4])],
+    [
+        (0.64, [1.46682e-4, 1.62186e-4]),
+        pytest.param(0.6395, [1.48783e-4, 1.60035e-4], marks=pytest.mark.slow),
+        pytest.param(0.642, [1.4134150e-4, 1.6772915e-4], marks=pytest.mark.slow),
+    ],
 )
 def test_both_roots_beside_a_minimum_between_two_values_of_the_scan_are_found(
     wanted: float, roots: list[float]
@@ -105,7 +109,11 @@ def test_both_roots_beside_a_minimum_between_two_values_of_the_scan_are_found(
 
 @pytest.mark.parametrize(
     ("wanted", "roots"),
-    [(573.0, [361.680, 387.604]), (600.0, [201.263755, 538.515748]), (572.8, [])],
+    [
+        (573.0, [361.680, 387.604]),
+        pytest.param(600.0, [201.263755, 538.515748], marks=pytest.mark.slow),
+        (572.8, []),
+    ],
 )
 def test_the_least_peak_force_of_a_dashpot_is_right_to_six_digits(wanted: float, roots: list[float]) -> None:
     result = impact.solve("kelvin-voigt", "C", {"peak_force": wanted}, at={"K": 1e6, "n": 1.0})

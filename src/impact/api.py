@@ -556,7 +556,8 @@ def timestep(
 
     Returns
     -------
-    TimestepResult : a row for each step, those of `steps_per_contact` first, and the number of steps needed
+    TimestepResult : a row for each step, those of `steps_per_contact` first, and the number of steps needed; a row
+        at which the collision fails at some phase has a status and no restitution
 
     Raises
     ------
@@ -672,7 +673,7 @@ def sensitivity(
 
     Raises
     ------
-    ConfigError : with one line for each problem; there is no design, or its n is no power of two
+    ConfigError : with one line for each problem; there is no design, or its n is no power of two from 2 on
     UsageError, StoreError : there is no such output, or the file exists or cannot be written
 
     The peak force of Hertz' law is proportional to K^0.4 v^1.2:
@@ -686,18 +687,47 @@ def sensitivity(
     >>> study["first"].values.round(2).tolist()
     [[0.56, 0.43]]
     """
+    (result,) = sensitivities(
+        source,
+        of=[of],
+        output=output,
+        overwrite=overwrite,
+        overrides=overrides,
+        plugins=plugins,
+        max_points=max_points,
+        execute=execute,
+    )
+    return result
+
+
+def sensitivities(
+    source: str | Path | Mapping[str, object],
+    *,
+    of: Sequence[str],
+    output: str | Path | None,
+    overwrite: bool,
+    overrides: Sequence[str],
+    plugins: Sequence[ForceModel | str | Path],
+    max_points: int,
+    execute: Callable[[Plan], xr.Dataset],
+) -> list[xr.Dataset]:
+    """The `sensitivity` of several outputs, whose points are computed once; one of them may be written."""
     # its modules import scipy.stats, which other functions do without
     from .uncertainty.sensitivity import check_output_name, sensitivity_of, sensitivity_plan
 
-    check_output_name(of)
+    for name in of:
+        check_output_name(name)
+    if output is not None and len(of) > 1:
+        raise UsageError(f"--output: got {len(of)} outputs (--of), expected one for a file")
     name = safe_text(str(source)) if isinstance(source, str | Path) else "config"
     plan = sensitivity_plan(prepare(source, overrides, plugins, max_points), of, max_points, name)
     if output is not None:
         check_output(Path(output), overwrite=overwrite)
-    result = sensitivity_of(plan, of, execute)
+    swept = execute(plan)
+    results = [sensitivity_of(plan, of_study, swept) for of_study in of]
     if output is not None:
-        save(result, output, overwrite=overwrite)
-    return result
+        save(results[0], output, overwrite=overwrite)
+    return results
 
 
 def export(
@@ -811,7 +841,10 @@ def extend(
     plugins: Sequence[ForceModel | str | Path] = (),
     max_points: int = MAX_POINTS,
 ) -> xr.Dataset:
-    """Add values to the axes of a stored result, or models to it, and integrate only the new trajectories.
+    """Add values to the axes of a stored result, or models to it, and integrate only what it does not hold.
+
+    A result of layout "factored" holds trajectories, which new points may share; one of layout "full" has
+    values alone, and all trajectories of the new points are integrated.
 
     Parameters
     ----------
@@ -866,8 +899,8 @@ def extend_to_file(
 
     Returns
     -------
-    SweepOutcome : counts of points by status, largest errors, first failed points; `integrated` counts the new
-        trajectories
+    SweepOutcome : counts of points by status, largest errors, first failed points; `integrated` counts the
+        trajectories that were integrated
 
     Raises
     ------
@@ -882,7 +915,7 @@ def extend_to_file(
     """
     target = Path(result if output is None else output)
     with backend or nullcontext(SERIAL) as integrator:
-        outcome, integrated = extend_result(
+        outcome = extend_result(
             Path(result),
             target,
             overrides,
@@ -896,7 +929,7 @@ def extend_to_file(
         )
     if should_stop():
         raise UnfinishedError(f"{safe_text(str(target))} is complete")
-    return replace(outcome, integrated=integrated)
+    return outcome
 
 
 def expand(
@@ -1102,6 +1135,10 @@ def check_model(model: ForceModel) -> list[Finding]:
     -------
     list of Finding : the clause, the largest deviation, its bound, and whether the clause holds
 
+    Warns
+    -----
+    UserWarning : a formula raised an error, with its file, line and text
+
     >>> import impact
     >>> all(finding.holds for finding in impact.check_model(impact.models()["bilinear"]))
     True
@@ -1174,7 +1211,8 @@ def plot(
     height : height of the figure [in], or a length; by default it depends on the kind
     style : a style sheet of matplotlib, or the name of one; rcParams changed by the user are respected in any case
     title : write the title and the conditions
-    labels : texts by the name of an axis, the key of a law, "reference" or "title"
+    labels : texts by the name of an axis, of a variable whose name is beside its curve, the key of a law,
+        "reference" or "title"
     equations : name the laws with the numbers of their equations in the paper
     ax : axes of an existing figure to draw into, one for each panel, in the style of that figure
     plugins : plug-in models that the result was computed with, needed to draw a loop, a history or an impulse
@@ -1252,7 +1290,8 @@ def plot_to_files(
 ) -> PlotFiles:
     """Draw a stored result into a file for each kind of picture.
 
-    Kinds that the result does not have the data for are left out; it is an error if none can be drawn.
+    Kinds that the result does not have the data for are left out; it is an error if none can be drawn. Of
+    several kinds, one that `sel` leaves no axis, while another is drawn, is drawn over the whole axis.
 
     Parameters
     ----------
@@ -1282,7 +1321,8 @@ def plot_to_files(
     ['r.png']
     """
     from .plots.data import check_table, encode_table, read_points
-    from .plots.kinds import Choice, check_kind, default_kind, draw
+    from .plots.kinds import Choice, check_kind, data_of_kinds, default_kind, draw, label_keys
+    from .plots.labels import check_labels
     from .plots.style import check_picture, length, save_figure
 
     choice = Choice(x, y, variable, sel, models, log, equations)
@@ -1312,12 +1352,15 @@ def plot_to_files(
         kinds = [default_kind(dataset)]
         pictures = dict.fromkeys(kinds, pictures[""])
         tables = dict.fromkeys(kinds, tables[""]) if tables else {}
+    of_kinds, left_out = data_of_kinds(kinds, dataset, choice, _histories_of(dataset, choice, plugins))
+    if of_kinds:
+        check_labels(labels or {}, label_keys(of_kinds.values(), title=title))
     drawn: dict[str, PlotData] = {}
-    left_out: dict[str, str] = {}
-    for kind in kinds:
+    for kind, plot_data in of_kinds.items():
+        keys = label_keys([plot_data], title=title)
+        of_picture = {key: text for key, text in (labels or {}).items() if key in keys}
         try:
-            plot_data = get_plot_data(dataset, kind, choice, plugins)
-            figure = draw(plot_data, *size, style=style, title=title, labels=labels, points=measured)
+            figure = draw(plot_data, *size, style=style, title=title, labels=of_picture, points=measured)
             table = encode_table(plot_data, tables[kind].suffix.lower(), data_form) if tables else b""
         except UsageError as error:
             left_out[kind] = str(error)
@@ -1337,10 +1380,15 @@ def get_plot_data(
     """The data of a picture; see `plot`."""
     from .plots.kinds import plot_data_of
 
+    return plot_data_of(kind, dataset, choice, _histories_of(dataset, choice, plugins))
+
+
+def _histories_of(
+    dataset: xr.Dataset, choice: Choice, plugins: Sequence[ForceModel | str | Path]
+) -> Callable[[], list[xr.Dataset]]:
+    """A function that integrates the chosen point of a result again."""
     plugin_set = read_plugins(plugins)
-    return plot_data_of(
-        kind, dataset, choice, lambda: histories(dataset, choice.models, choice.sel or {}, plugin_set)
-    )
+    return lambda: histories(dataset, choice.models, choice.sel or {}, plugin_set)
 
 
 def materials() -> dict[str, dict[str, float | str]]:

@@ -71,7 +71,8 @@ class SolveResult:
     status : "ok" for one root, "several_roots", "at_bound" where the only root is the least or largest allowed
         value, "no_root"
     roots : in ascending order; over a range of inputs, the best value
-    attainable : the least and the largest value of the target over all values that were tried, to six digits
+    attainable : the least and the largest value of the target over the scan and its refined extrema, or over a
+        range of inputs at the best value, to six digits
     over : the conditions of a range of inputs, each with its e_out and the target variable; None without a range
     """
 

@@ -160,7 +160,8 @@ def timestep_rows(law: FixedStepLaw, dt: Sequence[float]) -> tuple[TimestepRow, 
     """What a law delivers at steps dt [s], and the e to ask for."""
     steps = np.array(dt)
     result = law.collide(steps)
-    delivered, statuses = (field.reshape(steps.size, law.phases) for field in (result.e_out, result.status))
+    delivered = result.e_out.reshape(steps.size, law.phases)
+    statuses = result.status.reshape(steps.size, law.phases)
     to_ask = e_to_ask(law, steps)
     return tuple(
         TimestepRow(

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
@@ -28,11 +29,11 @@ from ..results.calibration import (
     FIT_STATUSES,
     calibration_title,
     describe_data,
+    fit_notes,
     fit_rows,
-    unidentified_notes,
 )
 from ..results.kinds import is_calibration, is_sensitivity
-from ..results.plausibility import material_notes, result_notes
+from ..results.plausibility import depth_summary, material_notes, result_notes
 from ..results.ranking import Ranking, ranking
 from ..results.replay_command import describe_point
 from ..results.schema import count_points, exponents_of, is_input
@@ -68,7 +69,8 @@ def page(dataset: xr.Dataset, get_plot_data: Callable[[str, Choice], PlotData]) 
     """
     if "model" not in dataset.dims:
         raise UsageError("got a time history, expected the result of a sweep")
-    summary = summarize(dataset, MAX_FAILED)
+    summary, depths = summarize(dataset, MAX_FAILED), depth_summary(dataset)
+    summary = replace(summary, deep=depths.deep, deepest=depths.deepest)
     fits = _fits_section(dataset) if is_calibration(dataset) else None
     studies = list(_studies(dataset)) if is_sensitivity(dataset) else []
     ranked, headline = (None, "") if fits or studies else _rank_models(dataset)
@@ -120,7 +122,7 @@ def _fits_section(dataset: xr.Dataset) -> dict[str, Any]:
     return {
         "headings": list(FIT_HEADINGS),
         "rows": [[row[0] or "″", *row[1:]] for row in fit_rows(dataset)],
-        "notes": unidentified_notes(dataset),
+        "notes": fit_notes(dataset),
         "statuses": [f"{name}: {meaning}" for name, meaning in FIT_STATUSES.items() if name != "ok"],
     }
 
