@@ -51,6 +51,7 @@ def test_the_law_is_the_first_of_the_source_that_the_code_has() -> None:
     config = source("soft", "soft") | {"models": ["gonthier-2004", hooke, hertz]}
     assert impact.export("lammps", source=config, code_version="22Jul2025").model == hooke
     assert impact.export("lammps", hertz, source=config, code_version="22Jul2025").model == hertz
+    assert impact.export("lammps", overrides=[f'models="{hooke}"'], code_version="22Jul2025").model == hooke
     with pytest.raises(UsageError, match="has none of the laws gonthier-2004"):
         impact.export("lammps", source=config | {"models": "gonthier-2004"})
 

@@ -160,7 +160,7 @@ def prepare_export(
     plugins, laws, missing = Plugins(()), tuple(code.laws), ""
     if model is not None:
         key = law_of_code(code, model, version)
-    elif source is not None and (models := models_of_source(source, overrides, plugins)):
+    elif models := models_of_source(source, overrides, plugins):
         key = first_law(code, models, version)
     else:
         key, newest = (first_law(code, laws, release) for release in (version, code.newest))

@@ -410,8 +410,9 @@ def models_of_source(source: ConfigSource, overrides: Sequence[str], plugins: Pl
     read, _ = _config_reader(source, overrides, plugins)
     if isinstance(source, str | Path) and not is_result(Path(source)):
         data = parse_document(read_text(Path(source)), str(source))
-    elif isinstance(source, Mapping) and not isinstance(source, xr.Dataset):
-        data = dict(source)
+    elif source is None or (isinstance(source, Mapping) and not isinstance(source, xr.Dataset)):
+        # the models of the starter config are no selection
+        data = dict(source or {})
     else:
         return tuple(model.key for model in read(()).models)
     selection = apply_overrides(data, overrides)[0].get("models")
