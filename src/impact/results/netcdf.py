@@ -27,6 +27,7 @@ from ..config.tables import Output
 from ..errors import ResultError
 from ..text import safe_text
 from .expand import check_memory
+from .hdf5_structure import ReadBytes, check_object
 from .schema import SCHEMA_VERSION
 from .seal import USER_BLOCK_BYTES
 from .validation import TABLE_VARIABLES, is_name
@@ -213,19 +214,22 @@ class StoredArray(BackendArray):
                 self._checked.add(corner)
 
 
-def read_variables(file: h5py.File) -> tuple[dict[str, xr.Variable], dict[str, object], tuple[str, ...]]:
-    """Variables, attributes, and names that are not part of a result, of a file with a valid seal.
+def read_variables(
+    file: h5py.File, read: ReadBytes
+) -> tuple[dict[str, xr.Variable], dict[str, object], tuple[str, ...]]:
+    """Variables, attributes, and names that are not part of a result, of a file with a valid seal and root.
 
     Numbers are read when they are indexed, as they are stored: attributes for scales, fill values and times are
-    ignored.
+    ignored. `read` reads the same file, see `impact.results.hdf5_structure`.
 
     Raises
     ------
     ResultError : its structure is not that of a result
     """
     _check_schema_version(file)
-    datasets = {name: h5py.Dataset(dataset) for name, dataset in _open_datasets(file).items()}
-    dims = _check_sizes(file, datasets)
+    opened, stored_chunks = _open_datasets(file, read)
+    datasets = {name: h5py.Dataset(dataset) for name, dataset in opened.items()}
+    dims = _check_sizes(file, datasets, stored_chunks)
     accepted = {name: dataset for name, dataset in datasets.items() if is_name(name)}
     # a dimension without coordinates is a dataset in the file as well
     unknown = [
@@ -269,12 +273,16 @@ def _check_schema_version(file: h5py.File) -> None:
         raise ResultError(f"has schema version {version}, this program reads {SCHEMA_VERSION}")
 
 
-def _open_datasets(file: h5py.File) -> dict[str, h5d.DatasetID]:
-    """The datasets of the file, by name; only hard links, each to another object, are followed."""
+def _open_datasets(file: h5py.File, read: ReadBytes) -> tuple[dict[str, h5d.DatasetID], dict[str, int | None]]:
+    """The datasets of the file and the numbers of their stored chunks, by name.
+
+    Only hard links, each to another object, are followed, after a check of the object.
+    """
     root = file.id
     if root.get_num_objs() > MAX_DATASETS:
         raise _unreadable(f"more than {MAX_DATASETS:,} datasets")
     datasets: dict[str, h5d.DatasetID] = {}
+    stored_chunks: dict[str, int | None] = {}
     objects = set()
     for link in root:
         name = link.decode(errors="surrogateescape")
@@ -282,15 +290,18 @@ def _open_datasets(file: h5py.File) -> dict[str, h5d.DatasetID]:
         if info.type != h5l.TYPE_HARD:
             raise _unreadable("not a hard link", name)
         objects.add(info.u)
+        stored_chunks[name] = check_object(read, info.u, name)
         datasets[name] = h5o.open(root, link)
         if not isinstance(datasets[name], h5d.DatasetID):
             raise _unreadable("not a dataset", name)
     if len(objects) < len(datasets):
         raise _unreadable("a dataset with two names")
-    return datasets
+    return datasets, stored_chunks
 
 
-def _check_sizes(file: h5py.File, datasets: Mapping[str, h5py.Dataset]) -> dict[str, tuple[str, ...]]:
+def _check_sizes(
+    file: h5py.File, datasets: Mapping[str, h5py.Dataset], stored_chunks: Mapping[str, int | None]
+) -> dict[str, tuple[str, ...]]:
     """The dimensions of each dataset, after a check that the file itself holds all data."""
     size = file.id.get_filesize()
     chunks = compressed = plain = text = 0
@@ -311,7 +322,7 @@ def _check_sizes(file: h5py.File, datasets: Mapping[str, h5py.Dataset]) -> dict[
     missing = [
         name
         for name, dataset in datasets.items()
-        if dataset.chunks and dataset.id.get_num_chunks() != _count_chunks(dataset)
+        if dataset.chunks and stored_chunks[name] != _count_chunks(dataset)
     ]
     if missing:
         raise _unreadable("declares data that the file does not contain", missing[0])

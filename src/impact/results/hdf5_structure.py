@@ -1,0 +1,186 @@
+"""Check the structures of an HDF5 file that the HDF5 library follows recursively, before it reads them.
+
+In a malicious file a node of a B-tree may have itself as a child; the library then recurses until the process is
+killed. Files of this program have only a few of the structures of the format (version 3 of its specification):
+new-style groups, and chunks that are indexed by a B-tree of version 1. All others are refused, and a structure that
+could contain a cycle is followed here first. Addresses are relative to the end of the user block.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from ..errors import ResultError
+from ..text import safe_text
+from .seal import HDF5_MAGIC, USER_BLOCK_BYTES
+
+# returns bytes of a file: `read(address, size)`
+ReadBytes = Callable[[int, int], bytes]
+
+UNDEFINED = 2**64 - 1
+# limits that are far above every result
+MAX_HEADER_BYTES = 2**22
+MAX_B_TREE_2_DEPTH = 2
+MAX_CHUNK_ENTRIES = 64  # of a node; fixed by superblocks of version 0
+# types of messages in the header of an object
+LINK_INFO, EXTERNAL_FILES, LAYOUT, CONTINUATION, SYMBOL_TABLE, ATTRIBUTE_INFO = 0x02, 0x07, 0x08, 0x10, 0x11, 0x15
+IS_SHARED = 2  # flag of a message that is stored elsewhere
+CHUNKED = 2
+
+# versions, sizes of offsets and lengths, base address, driver, root object and what is cached of it
+SUPERBLOCK = struct.Struct("<8sB4xBB9xQ16xQ8xQI")
+# signature, address of the B-tree of huge objects, sizes of the first and the largest direct blocks, rows of blocks
+FRACTAL_HEAP = struct.Struct("<4s18xQ80x2xQQ2x2xQH")
+B_TREE_2 = struct.Struct("<4s8xH")
+# signature, type, level, number of entries
+B_TREE_1 = struct.Struct("<4sBBH16x")
+
+
+def byte_reader(file: Any) -> ReadBytes:
+    """A function that reads bytes of a file behind its user block."""
+
+    def read(address: int, size: int) -> bytes:
+        file.seek(USER_BLOCK_BYTES + address)
+        content = file.read(size)
+        if len(content) < size:
+            raise ValueError
+        return content
+
+    return read
+
+
+def check_root(read: ReadBytes) -> None:
+    """Refuse a file whose superblock or root group is not as this program writes them.
+
+    Raises
+    ------
+    ResultError : for that reason
+    """
+    try:
+        magic, version, *sizes, base, driver, root, cached = SUPERBLOCK.unpack(read(0, SUPERBLOCK.size))
+        expected = (HDF5_MAGIC, 0, [8, 8], USER_BLOCK_BYTES, UNDEFINED, 0)
+        if (magic, version, sizes, base, driver, cached) != expected:
+            raise ValueError
+    except (ValueError, OverflowError, OSError, struct.error):
+        raise ResultError("is not a readable result (not an HDF5 file as this program writes it)") from None
+    check_object(read, root)
+
+
+def check_object(read: ReadBytes, address: int, name: str = "") -> int | None:
+    """Refuse an object with a structure that this program does not write, or that could contain a cycle.
+
+    Parameters
+    ----------
+    read : reads the file
+    address : of the header of the object
+    name : of the object, for the message
+
+    Returns
+    -------
+    int or None : the number of stored chunks of a dataset in chunks
+
+    Raises
+    ------
+    ResultError : for that reason
+    """
+    chunks = None
+    try:
+        for kind, flags, body in _messages(read, address):
+            if flags & IS_SHARED or kind == SYMBOL_TABLE:
+                raise ValueError
+            if kind in (LINK_INFO, ATTRIBUTE_INFO):
+                _check_dense_storage(read, body, 8 if kind == LINK_INFO else 2)
+            elif kind == LAYOUT:
+                chunks = _count_stored_chunks(read, body)
+    except (ValueError, OverflowError, OSError, struct.error, IndexError):
+        what = f"{safe_text(name, 40)}{': ' if name else ''}a structure that this program does not write"
+        raise ResultError(f"is not a readable result ({what})") from None
+    return chunks
+
+
+def _messages(read: ReadBytes, address: int) -> Iterator[tuple[int, int, bytes]]:
+    """The messages of the header of an object: type, flags, content."""
+    head = read(address, 16)
+    is_second_version = head[:4] == b"OHDR"
+    if is_second_version:
+        flags = head[5]
+        # times and limits of attributes are optional
+        at = address + 6 + (16 if flags & 0x20 else 0) + (4 if flags & 0x10 else 0)
+        width = 1 << (flags & 3)
+        blocks = [(at + width, int.from_bytes(read(at, width), "little"))]
+        prefix = struct.Struct("<BHB2x" if flags & 4 else "<BHB")
+    elif head[0] == 1:
+        blocks, prefix = [(address + 16, struct.unpack_from("<I", head, 8)[0])], struct.Struct("<HHB3x")
+    else:
+        raise ValueError
+    starts, total = set(), 0
+    while blocks:
+        start, size = blocks.pop()
+        total += size
+        if start in starts or total > MAX_HEADER_BYTES:
+            raise ValueError
+        starts.add(start)
+        content, at = read(start, size), 0
+        while at + prefix.size <= size:
+            kind, length, flags = prefix.unpack_from(content, at)
+            at += prefix.size + length
+            body = content[at - length : at]
+            if kind == CONTINUATION:
+                start_of_next, size_of_next = struct.unpack_from("<QQ", body)
+                # a signature and a checksum
+                frame = (4, 8) if is_second_version else (0, 0)
+                blocks.append((start_of_next + frame[0], size_of_next - frame[1]))
+            yield kind, flags, body
+
+
+def _check_dense_storage(read: ReadBytes, body: bytes, order_bytes: int) -> None:
+    """Check the heap and the B-trees of many links or attributes: shallow, so that following them ends soon."""
+    flags = body[1]
+    heap, *trees = struct.unpack_from("<QQQ" if flags & 2 else "<QQ", body, 2 + (order_bytes if flags & 1 else 0))
+    if heap != UNDEFINED:
+        signature, tree, smallest, largest, _, rows = FRACTAL_HEAP.unpack(read(heap, FRACTAL_HEAP.size))
+        # more rows would have blocks of blocks
+        if signature != b"FRHP" or not 0 < smallest <= largest or rows > math.log2(largest / smallest) + 2:
+            raise ValueError
+        trees.append(tree)
+    for tree in trees:
+        if tree != UNDEFINED:
+            signature, depth = B_TREE_2.unpack(read(tree, B_TREE_2.size))
+            if signature != b"BTHD" or depth > MAX_B_TREE_2_DEPTH:
+                raise ValueError
+
+
+def _count_stored_chunks(read: ReadBytes, layout: bytes) -> int | None:
+    """The number of chunks in the B-tree of a dataset, which must be a tree; None without chunks."""
+    version, kind = layout[:2]
+    if version != 3:
+        raise ValueError
+    if kind != CHUNKED:
+        return None
+    rank, root = struct.unpack_from("<BQ", layout, 2)
+    if root == UNDEFINED:
+        return 0
+    key_bytes = 8 + 8 * rank
+    chunks, count, addresses, nodes = 0, 1, {root}, [(root, -1)]
+    while nodes:
+        address, expected_level = nodes.pop()
+        signature, kind, level, entries = B_TREE_1.unpack(read(address, B_TREE_1.size))
+        is_expected = expected_level in (-1, level)
+        if (signature, kind) != (b"TREE", 1) or not is_expected or not 0 < entries <= MAX_CHUNK_ENTRIES:
+            raise ValueError
+        if level == 0:
+            chunks += entries
+            continue
+        content = read(address + B_TREE_1.size, entries * (key_bytes + 8))
+        children = [
+            int.from_bytes(content[at : at + 8], "little") for at in range(key_bytes, len(content), key_bytes + 8)
+        ]
+        nodes.extend((child, level - 1) for child in children)
+        addresses.update(children)
+        count += len(children)
+        if len(addresses) < count:
+            raise ValueError
+    return chunks
