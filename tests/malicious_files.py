@@ -478,8 +478,8 @@ def _hide_old_groups(path: Path) -> None:
 def _continue_a_header_in_itself(path: Path) -> None:
     """Let the continuation of an object header contain a continuation in itself."""
     with h5py.File(path, "r+") as file:
-        # unlike the variables, its header has no checksum
-        other = file.create_dataset("other", data=np.zeros(9))
+        # unlike the variables, its header has no checksum; the header after it prevents that it grows
+        other, _ = (file.create_dataset(name, data=np.zeros(9)) for name in ("other", "more"))
         for name in "xyz":
             other.attrs[name] = np.zeros(20)
         address = h5o.get_info(other.id).addr
@@ -535,7 +535,9 @@ def _add_bifurcating_links(path: Path, depth: int = 40) -> None:
     in_leaf = (node_bytes - 10) // record_bytes
     below, width, child = in_leaf, 0, leaf
     for _ in range(depth):
-        pointer = struct.pack("<QB", child, n if child == leaf else 1) + (total if width else 0).to_bytes(width, "little")
+        pointer = struct.pack("<QB", child, n if child == leaf else 1) + (total if width else 0).to_bytes(
+            width, "little"
+        )
         node = b"BTIN\x00\x05" + record + 2 * pointer
         child = len(content) - USER_BLOCK
         content += (node + struct.pack("<I", _jenkins(node))).ljust(node_bytes, b"\0")
@@ -576,6 +578,7 @@ CYCLES: dict[str, tuple[CreateFile, str]] = {
     "a hidden group is its own child": (_hide_old_groups, WRONG_STRUCTURE),
     "a header continues in itself": (_continue_a_header_in_itself, WRONG_STRUCTURE),
     "2^40 links in 40 nodes": (_add_bifurcating_links, WRONG_STRUCTURE),
+    "links that are listed twice": (partial(_add_bifurcating_links, depth=1), WRONG_STRUCTURE),
     **{
         f"chunks in {name}": (partial(_add_newer_index, **options), WRONG_STRUCTURE)
         for name, options in {

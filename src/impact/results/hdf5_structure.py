@@ -1,9 +1,10 @@
 """Check the structures of an HDF5 file that the HDF5 library follows recursively, before it reads them.
 
-In a malicious file a node of a B-tree may have itself as a child; the library then recurses until the process is
-killed. Files of this program have only a few of the structures of the format (version 3 of its specification):
-new-style groups, and chunks that are indexed by a B-tree of version 1. All others are refused, and a structure that
-could contain a cycle is followed here first. Addresses are relative to the end of the user block.
+In a malicious file a node of a B-tree may have itself as a child, or a B-tree more records than it declares; the
+library then recurses until the process is killed, or writes beyond its memory. Files of this program have only a
+few of the structures of the format (version 3 of its specification): groups of the second version, and chunks that
+are indexed by a B-tree of version 1. All others are refused, and these are followed here first. Addresses are
+relative to the end of the user block.
 """
 
 from __future__ import annotations
@@ -23,18 +24,20 @@ ReadBytes = Callable[[int, int], bytes]
 UNDEFINED = 2**64 - 1
 # limits that are far above every result
 MAX_HEADER_BYTES = 2**22
-MAX_B_TREE_2_DEPTH = 2
+MAX_B_TREE_2_DEPTH = 4
 MAX_CHUNK_ENTRIES = 64  # of a node; fixed by superblocks of version 0
 # types of messages in the header of an object
-LINK_INFO, EXTERNAL_FILES, LAYOUT, CONTINUATION, SYMBOL_TABLE, ATTRIBUTE_INFO = 0x02, 0x07, 0x08, 0x10, 0x11, 0x15
+LINK_INFO, LAYOUT, CONTINUATION, SYMBOL_TABLE, ATTRIBUTE_INFO = 0x02, 0x08, 0x10, 0x11, 0x15
 IS_SHARED = 2  # flag of a message that is stored elsewhere
 CHUNKED = 2
 
 # versions, sizes of offsets and lengths, base address, driver, root object and what is cached of it
 SUPERBLOCK = struct.Struct("<8sB4xBB9xQ16xQ8xQI")
-# signature, address of the B-tree of huge objects, sizes of the first and the largest direct blocks, rows of blocks
-FRACTAL_HEAP = struct.Struct("<4s18xQ80x2xQQ2x2xQH")
-B_TREE_2 = struct.Struct("<4s8xH")
+# signature, bytes of filters, address of the B-tree of huge objects, sizes of the first and the largest direct
+# blocks, rows of blocks
+FRACTAL_HEAP = struct.Struct("<4s3xH13xQ80x2xQQ2x2x8xH")
+# signature, bytes of a node and of a record, depth, address of the root, its records, all records
+B_TREE_2 = struct.Struct("<4s2xIHH2xQHQ")
 # signature, type, level, number of entries
 B_TREE_1 = struct.Struct("<4sBBH16x")
 
@@ -44,7 +47,7 @@ def byte_reader(file: Any) -> ReadBytes:
 
     def read(address: int, size: int) -> bytes:
         file.seek(USER_BLOCK_BYTES + address)
-        content = file.read(size)
+        content: bytes = file.read(size)
         if len(content) < size:
             raise ValueError
         return content
@@ -95,7 +98,7 @@ def check_object(read: ReadBytes, address: int, name: str = "") -> int | None:
                 _check_dense_storage(read, body, 8 if kind == LINK_INFO else 2)
             elif kind == LAYOUT:
                 chunks = _count_stored_chunks(read, body)
-    except (ValueError, OverflowError, OSError, struct.error, IndexError):
+    except (ValueError, OverflowError, OSError, struct.error, IndexError, ZeroDivisionError):
         what = f"{safe_text(name, 40)}{': ' if name else ''}a structure that this program does not write"
         raise ResultError(f"is not a readable result ({what})") from None
     return chunks
@@ -137,20 +140,63 @@ def _messages(read: ReadBytes, address: int) -> Iterator[tuple[int, int, bytes]]
 
 
 def _check_dense_storage(read: ReadBytes, body: bytes, order_bytes: int) -> None:
-    """Check the heap and the B-trees of many links or attributes: shallow, so that following them ends soon."""
+    """Check the heap and the B-trees of many links or attributes."""
     flags = body[1]
     heap, *trees = struct.unpack_from("<QQQ" if flags & 2 else "<QQ", body, 2 + (order_bytes if flags & 1 else 0))
+    # the library allocates memory for the number of records of one tree, and fills it from the other
+    if len({_count_records(read, tree) for tree in trees}) > 1:
+        raise ValueError
     if heap != UNDEFINED:
-        signature, tree, smallest, largest, _, rows = FRACTAL_HEAP.unpack(read(heap, FRACTAL_HEAP.size))
+        signature, filters, tree, smallest, largest, rows = FRACTAL_HEAP.unpack(read(heap, FRACTAL_HEAP.size))
         # more rows would have blocks of blocks
-        if signature != b"FRHP" or not 0 < smallest <= largest or rows > math.log2(largest / smallest) + 2:
+        if signature != b"FRHP" or filters or rows > math.log2(largest / smallest) + 2:
             raise ValueError
-        trees.append(tree)
-    for tree in trees:
-        if tree != UNDEFINED:
-            signature, depth = B_TREE_2.unpack(read(tree, B_TREE_2.size))
-            if signature != b"BTHD" or depth > MAX_B_TREE_2_DEPTH:
+        _count_records(read, tree)
+
+
+def _count_records(read: ReadBytes, address: int) -> int:
+    """The number of records in a B-tree of version 2, which must be a tree with the numbers that it declares."""
+    if address == UNDEFINED:
+        return 0
+    signature, node_bytes, record_bytes, depth, root, records, total = B_TREE_2.unpack(
+        read(address, B_TREE_2.size)
+    )
+    if signature != b"BTHD" or depth > MAX_B_TREE_2_DEPTH:
+        raise ValueError
+    # numbers take as many bytes as the largest number of records in a node, or below it, needs
+    limits = [(node_bytes - 10) // record_bytes]
+    below, widths = limits[0], [0]
+    for _ in range(depth):
+        pointer_bytes = 8 + _width(limits[0]) + widths[-1]
+        limits.append((node_bytes - 10 - pointer_bytes) // (record_bytes + pointer_bytes))
+        below = (limits[-1] + 1) * below + limits[-1]
+        widths.append(_width(below))
+    addresses = set()
+
+    def count(address: int, level: int, records: int) -> int:
+        content = read(address, node_bytes)
+        if content[:4] != (b"BTIN" if level else b"BTLF") or records > limits[level] or address in addresses:
+            raise ValueError
+        addresses.add(address)
+        at, counted = 6 + records * record_bytes, records
+        for _ in range(records + 1 if level else 0):
+            (child,) = struct.unpack_from("<Q", content, at)
+            middle, end = at + 8 + _width(limits[0]), at + 8 + _width(limits[0]) + widths[level - 1]
+            records_of_child = int.from_bytes(content[at + 8 : middle], "little")
+            below_child = count(child, level - 1, records_of_child)
+            if level > 1 and below_child != int.from_bytes(content[middle:end], "little"):
                 raise ValueError
+            counted, at = counted + below_child, end
+        return counted
+
+    if (count(root, depth, records) if root != UNDEFINED else 0) != total:
+        raise ValueError
+    return int(total)
+
+
+def _width(number: int) -> int:
+    """The bytes that a number needs."""
+    return (number.bit_length() + 7) // 8
 
 
 def _count_stored_chunks(read: ReadBytes, layout: bytes) -> int | None:
