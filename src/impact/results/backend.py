@@ -317,7 +317,12 @@ def _read_dataset(file: h5py.File, read: ReadBytes) -> tuple[xr.Dataset, Traject
 
     arrays = {name: StoredArray(name, file[name]) for name in table_names}
     sizes = {name: array.shape[0] for name, array in arrays.items()}
-    trajectory_table = stored_table(stored, sizes, lambda name, part: arrays[name].read((part,)))
+    trajectory_table = stored_table(
+        stored,
+        sizes,
+        lambda name, part: arrays[name].read((part,)),
+        lambda name, rows: arrays[name].take(rows),
+    )
     quantities = witness_variables(stored)
     check_witnesses(trajectory_table, quantities, stored)
     template = stored.drop_vars(witnesses).drop_attrs(deep=False)

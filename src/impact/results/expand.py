@@ -35,6 +35,8 @@ from .slabs import ORIGINAL_DIMS, VARIES_ALONG, aligned_slabs, slabs
 
 # a law's rule of K is evaluated as a whole, and stored in a file, up to this many values
 MAX_STIFFNESS_VALUES = 10**6
+# rows that are read one by one: fewer than one of this many
+FEW_ROWS = 100
 # magnitudes within these limits are far from overflow and underflow, whatever the rounding
 SAFE_MAGNITUDES = (1e-250, 1e250)
 # at most this many bytes are computed or read by one indexing operation
@@ -50,17 +52,23 @@ class TrajectoryRows:
     maps : by model, the trajectory of each cell
     read : returns the trajectories of a model from a start to a stop: `read(model, start, stop)`
     segment : how many trajectories are read at a time, at most
+    pick : returns a few trajectories of a model by their row numbers, which increase; None if trajectories are read
+        in segments only
     """
 
     maps: Sequence[TrajectoryMap]
     read: Callable[[int, int, int], CollisionResult]
     segment: int = RANGE_TRAJECTORIES
+    pick: Callable[[int, NDArray[np.intp]], CollisionResult] | None = None
     # all trajectories of the model that was read last, if its cells share them
     _whole: dict[int, CollisionResult] = field(default_factory=dict)
 
     def take(self, model: int, rows: NDArray[np.intp]) -> CollisionResult:
         """Trajectories of a model by their row numbers; arrays of the shape of `rows`."""
         trajectory_map = self.maps[model]
+        if self.pick is not None and model not in self._whole and rows.size < trajectory_map.count // FEW_ROWS:
+            distinct, position = np.unique(rows, return_inverse=True)
+            return self.pick(model, distinct).take(position.reshape(rows.shape))
         if not trajectory_map.is_shared:
             flat = self._segments(model, rows.reshape(-1))
             return flat.take(np.arange(rows.size).reshape(rows.shape))

@@ -38,6 +38,8 @@ N_WITNESSES = 1_000
 # tolerance of a witness, relative to the scale that `compare` uses for its variable
 WITNESS_TOLERANCE = 1e-12
 SLAB_ROWS = 2**16
+# by the bits of a status, whether it is one
+IS_STATUS = np.isin(np.arange(2**8), STATUSES)
 # fields of a law in the JSON attribute `laws`, and their types
 LAW_FIELD_TYPES: Mapping[str, type] = {
     "parameters": list,
@@ -50,6 +52,7 @@ LAW_FIELD_TYPES: Mapping[str, type] = {
 }
 
 ReadVariable = Callable[[str, slice], NDArray[Any]]
+TakeRows = Callable[[str, NDArray[np.intp]], NDArray[Any]]
 
 
 @dataclass(frozen=True)
@@ -225,7 +228,9 @@ def _unravel_cells(inputs: Inputs, cells: NDArray[np.int64]) -> Index:
     return tuple(reversed(index))
 
 
-def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: ReadVariable) -> TrajectoryTable:
+def stored_table(
+    dataset: xr.Dataset, sizes: Mapping[str, int], read: ReadVariable, take: TakeRows
+) -> TrajectoryTable:
     """The trajectory table of a factored file.
 
     Parameters
@@ -233,6 +238,7 @@ def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: ReadVariab
     dataset : coordinates and attributes of the file
     sizes : lengths of the variables of the table
     read : returns a slice of a variable of the table: `read(name, slice)`
+    take : returns a few values of it at increasing positions: `take(name, rows)`
 
     Raises
     ------
@@ -286,14 +292,20 @@ def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: ReadVariab
         part = slice(starts[model] + start, starts[model] + stop)
         return CollisionResult(**{name: read(f"trajectory_{name}", part) for name in TABLE_COLUMNS})
 
-    return TrajectoryTable(inputs, tuple(stored), tuple(maps), TrajectoryRows(maps, read_rows), tuple(rules))
+    def pick_rows(model: int, rows: NDArray[np.intp]) -> CollisionResult:
+        return CollisionResult(
+            **{name: take(f"trajectory_{name}", starts[model] + rows) for name in TABLE_COLUMNS}
+        )
+
+    rows = TrajectoryRows(maps, read_rows, pick=pick_rows)
+    return TrajectoryTable(inputs, tuple(stored), tuple(maps), rows, tuple(rules))
 
 
 def _check_trajectory_statuses(rows: int, read: ReadVariable) -> None:
     """Refuse unknown statuses, since the computed ones would be unknown as well."""
     for first in range(0, rows, SLAB_ROWS):
         values = read("trajectory_status", slice(first, min(first + SLAB_ROWS, rows)))
-        if values.dtype != np.int8 or not np.isin(np.unique(values), STATUSES).all():
+        if values.dtype != np.int8 or not IS_STATUS[values.view(np.uint8)].all():
             raise ValueError
 
 

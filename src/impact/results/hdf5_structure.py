@@ -24,7 +24,7 @@ ReadBytes = Callable[[int, int], bytes]
 UNDEFINED = 2**64 - 1
 # limits that are far above every result
 MAX_HEADER_BYTES = 2**22
-MAX_B_TREE_2_DEPTH = 4
+MAX_NODE_BYTES, MAX_B_TREE_2_DEPTH = 2**16, 4
 MAX_CHUNK_ENTRIES = 64  # of a node; fixed by superblocks of version 0
 # types of messages in the header of an object
 LINK_INFO, LAYOUT, CONTINUATION, SYMBOL_TABLE, ATTRIBUTE_INFO = 0x02, 0x08, 0x10, 0x11, 0x15
@@ -161,7 +161,7 @@ def _count_records(read: ReadBytes, address: int) -> int:
     signature, node_bytes, record_bytes, depth, root, records, total = B_TREE_2.unpack(
         read(address, B_TREE_2.size)
     )
-    if signature != b"BTHD" or depth > MAX_B_TREE_2_DEPTH:
+    if signature != b"BTHD" or depth > MAX_B_TREE_2_DEPTH or node_bytes > MAX_NODE_BYTES:
         raise ValueError
     # numbers take as many bytes as the largest number of records in a node, or below it, needs
     limits = [(node_bytes - 10) // record_bytes]

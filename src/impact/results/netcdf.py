@@ -17,7 +17,7 @@ import h5netcdf
 import h5py
 import numpy as np
 import xarray as xr
-from h5py import h5a, h5d, h5l, h5o, h5t, h5z
+from h5py import h5a, h5d, h5l, h5o, h5s, h5t, h5z
 from numpy.typing import NDArray
 from xarray.backends import BackendArray
 from xarray.core import indexing
@@ -187,17 +187,47 @@ class StoredArray(BackendArray):
         ResultError : they cannot be read
         MemoryError : they take more memory than `check_memory` allows
         """
-        positions = [np.atleast_1d(np.arange(size)[part]) for size, part in zip(self.shape, key, strict=True)]
-        check_memory(self.name, tuple(part.size for part in positions), self.dtype)
+        # an array of all positions would take longer than to read a few values
+        positions = [
+            range(size)[part] if isinstance(part, slice) else np.atleast_1d(part)
+            for size, part in zip(self.shape, key, strict=True)
+        ]
+        return self._read(tuple(map(len, positions)), positions, lambda: np.asarray(self.dataset[key]))
+
+    def take(self, rows: NDArray[np.intp]) -> NDArray[Any]:
+        """Read a few values of a variable with one axis, at increasing positions.
+
+        Raises
+        ------
+        ResultError, MemoryError : see `read`
+        """
+
+        def read_points() -> NDArray[Any]:
+            values, space = np.empty(rows.size, self.dtype), self.dataset.id.get_space()
+            # a list of positions as a key of h5py takes ten times as long
+            space.select_elements(rows[:, np.newaxis].astype(np.uint64))
+            self.dataset.id.read(h5s.create_simple(values.shape), space, values)
+            return values
+
+        return self._read((rows.size,), [rows], read_points)
+
+    def _read(
+        self,
+        shape: tuple[int, ...],
+        positions: Sequence[range | NDArray[np.intp]],
+        read: Callable[[], NDArray[Any]],
+    ) -> NDArray[Any]:
+        """Read values of a shape at some positions along each axis, after the checks of memory and of chunks."""
+        check_memory(self.name, shape, self.dtype)
         try:
             self._check_chunks(positions)
-            return np.asarray(self.dataset[key])
+            return read()
         except (OSError, RuntimeError, ValueError, zlib.error) as error:
             path = safe_text(str(self.dataset.file.filename)) if self.dataset else "the result"
             reason = f"{safe_text(self.name, 40)}: {safe_text(str(error), 80)}"
             raise ResultError(f"{path}: is not a readable result ({reason})") from error
 
-    def _check_chunks(self, positions: Sequence[NDArray[np.intp]]) -> None:
+    def _check_chunks(self, positions: Sequence[range | NDArray[np.intp]]) -> None:
         """Check that the chunks of some values decompress to exactly their declared size.
 
         HDF5 decompresses a chunk to any size, and reads beyond the end of a chunk that is too short.
@@ -206,7 +236,8 @@ class StoredArray(BackendArray):
             return
         chunks = self.dataset.chunks
         size = math.prod(chunks) * self.dtype.itemsize
-        for corner in product(*(np.unique(p // c * c).tolist() for p, c in zip(positions, chunks, strict=True))):
+        starts = (np.unique(np.asarray(p) // c * c).tolist() for p, c in zip(positions, chunks, strict=True))
+        for corner in product(*starts):
             if corner not in self._checked:
                 unfiltered, packed = self.dataset.id.read_direct_chunk(corner)
                 if unfiltered or len(zlib.decompressobj().decompress(packed, size + 1)) != size:
