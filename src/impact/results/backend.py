@@ -28,7 +28,7 @@ from .netcdf import StoredArray, open_for_writing, read_variables
 from .schema import SCHEMA
 from .seal import MAGIC, check_seal, write_seal
 from .slabs import slabs
-from .validation import TABLE_VARIABLES, is_quantity, schema_violation
+from .validation import FACTORED_ATTRIBUTES, TABLE_VARIABLES, is_quantity, schema_violation
 
 DEFAULT_OUTPUT = Output()
 # larger results are not loaded into memory
@@ -326,7 +326,7 @@ def _read_dataset(file: h5py.File, read: ReadBytes) -> tuple[xr.Dataset, Traject
     quantities = witness_variables(stored)
     check_witnesses(trajectory_table, quantities, stored)
     template = stored.drop_vars(witnesses).drop_attrs(deep=False)
-    dataset_attributes = {name: value for name, value in attributes.items() if name not in ("axes", "laws")}
+    dataset_attributes = {name: value for name, value in attributes.items() if name not in FACTORED_ATTRIBUTES}
     dataset = lazy_dataset(template.assign_attrs(dataset_attributes), trajectory_table, quantities)
     dataset.encoding = {"layout": "factored"}
     return dataset, trajectory_table, unknown

@@ -30,6 +30,7 @@ from ..contact.status import Status
 from ..engine.build_impacts import Stiffness, build_impacts, has_stiffness_rule
 from ..engine.plan import Index, Inputs, Plan, dimensions, owner_of
 from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryMap, axes_of_arrays, even_size, probe_index
+from .attributes import SummaryRecord
 from .schema import SchemaVariable, attributes_of
 from .slabs import ORIGINAL_DIMS, VARIES_ALONG, aligned_slabs, slabs
 
@@ -52,8 +53,8 @@ class TrajectoryRows:
     maps : by model, the trajectory of each cell
     read : returns the trajectories of a model from a start to a stop: `read(model, start, stop)`
     segment : how many trajectories are read at a time, at most
-    pick : returns a few trajectories of a model by their row numbers, which increase; None if trajectories are read
-        in segments only
+    pick : returns a few trajectories of a model by their increasing row numbers; None if trajectories are read in
+        segments only
     """
 
     maps: Sequence[TrajectoryMap]
@@ -102,6 +103,7 @@ class TrajectoryTable:
     maps : by model, the trajectory of each cell
     rows : the trajectories
     stiffness : K of each law that has a rule for it but no formula (a law of a file); None otherwise
+    summary : of all points, if the file contains one
     """
 
     inputs: Inputs
@@ -109,6 +111,7 @@ class TrajectoryTable:
     maps: tuple[TrajectoryMap, ...]
     rows: TrajectoryRows
     stiffness: tuple[Stiffness | None, ...]
+    summary: SummaryRecord | None = None
 
     @cached_property
     def checks(self) -> tuple[frozenset[str], ...]:
@@ -295,6 +298,15 @@ class ExpandedArray(BackendArray):
                 )
         selected = tuple(0 if isinstance(part, int | np.integer) else slice(None) for part in key)
         return np.asarray(values[selected])
+
+
+def summary_of_variable(variable: xr.Variable) -> SummaryRecord | None:
+    """The summary in the file of a variable, if it has one and the variable is not a selection."""
+    data = variable._data
+    if not isinstance(data, indexing.LazilyIndexedArray) or not isinstance(data.array, ExpandedArray):
+        return None
+    is_whole = data.shape == data.array.shape and all(part == slice(None) for part in data.key.tuple)
+    return data.array.table.summary if is_whole else None
 
 
 def _without_dummy_axis(values: NDArray[Any], where: tuple[slice, ...]) -> NDArray[Any]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+import operator
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -23,14 +24,14 @@ from ..contact.formula import Formula
 from ..contact.materials import Material
 from ..contact.model import Law, Parameter
 from ..contact.simulate import TABLE_COLUMNS, CollisionResult
-from ..contact.status import STATUSES
+from ..contact.status import STATUSES, Status
 from ..engine.build_impacts import Stiffness, has_stiffness_rule, mass_at, values_at
 from ..engine.plan import Index, Inputs
 from ..engine.trajectories import TrajectoryMap
 from ..errors import ResultError, UsageError
 from ..formatting import number
 from ..text import safe_text
-from .attributes import read_attribute
+from .attributes import SummaryRecord, read_attribute
 from .expand import MAX_STIFFNESS_VALUES, TrajectoryRows, TrajectoryTable, expand, whole_stiffness
 from .schema import SCHEMA, SchemaVariable, attributes_of, derived_names, is_input, scale_of
 
@@ -298,7 +299,26 @@ def stored_table(
         )
 
     rows = TrajectoryRows(maps, read_rows, pick=pick_rows)
-    return TrajectoryTable(inputs, tuple(stored), tuple(maps), rows, tuple(rules))
+    summary = read_attribute(dataset.attrs, "summary") or None
+    if summary is not None:
+        _check_summary(summary, [*laws], inputs.shape)
+    return TrajectoryTable(inputs, tuple(stored), tuple(maps), rows, tuple(rules), summary)
+
+
+def _check_summary(summary: SummaryRecord, keys: Sequence[str], shape: tuple[int, ...]) -> None:
+    """Refuse a summary of other statuses, models or points than the result has."""
+    statuses = {*summary.status, *(status for status, _, _ in summary.failed_at)}
+    models = {
+        *(key for _, key, _ in summary.failed_at),
+        *(key for worst in summary.worst.values() for key in worst),
+    }
+    indices = [index for _, _, index in summary.failed_at]
+    if (
+        not statuses <= {status.name.lower() for status in Status}
+        or not models <= {*keys}
+        or any(len(index) != len(shape) or any(map(operator.ge, index, shape)) for index in indices)
+    ):
+        raise ResultError("is not a readable result (summary: does not fit its axes and models)")
 
 
 def _check_trajectory_statuses(rows: int, read: ReadVariable) -> None:
