@@ -616,6 +616,14 @@ NOT_JSON = "not JSON of the expected type"
 WRONG_LAWS = "laws: not those of its models"
 WRONG_GRID = "axes: not those of its grid"
 WRONG_WITNESSES = "its witnesses have other values"
+SUMMARY = {"status": {"ok": 8}, "not_evaluated": 0, "worst": {}, "failed_at": [], "extremes": {}}
+
+
+def _set_summary(file: h5py.File, **entries: object) -> None:
+    _set_attribute(file, "", "summary", np.bytes_(json.dumps(SUMMARY | entries).encode()))
+
+
+WRONG_SUMMARY = "summary: not that of its points"
 # defects of a factored file
 FACTORED: dict[str, tuple[ChangeFile, str]] = {
     "laws of text": (lambda f: _set_attribute(f, "", "laws", np.bytes_(b"x")), NOT_JSON),
@@ -652,6 +660,20 @@ FACTORED: dict[str, tuple[ChangeFile, str]] = {
     "an axis less": (lambda f: _change_json(f, "axes", lambda axes: axes[:1]), "does not lie along one axis"),
     "axes in another order": (lambda f: _change_json(f, "axes", lambda axes: axes[::-1]), WRONG_WITNESSES),
     "axes without an end": (lambda f: _set_attribute(f, "", "axes", np.bytes_(b"[" * 100_000)), NOT_JSON),
+    "a summary of text": (lambda f: _set_attribute(f, "", "summary", np.bytes_(b"x")), NOT_JSON),
+    "a summary in a list": (lambda f: _set_attribute(f, "", "summary", np.bytes_(b"[]")), NOT_JSON),
+    "a summary of fewer points than none": (partial(_set_summary, status={"ok": 9, "limit": -1}), NOT_JSON),
+    "a summary of other points": (partial(_set_summary, status={"ok": 9}), WRONG_SUMMARY),
+    "a summary of an unknown status": (partial(_set_summary, status={"good": 8}), WRONG_SUMMARY),
+    "a summary of another model": (partial(_set_summary, worst={"e_error": {"hertz": 1.0}}), WRONG_SUMMARY),
+    "a summary of a point that is not there": (
+        partial(_set_summary, failed_at=[["max_steps", "bilinear", [0, 2]]]),
+        WRONG_SUMMARY,
+    ),
+    "a summary of a point along one axis": (
+        partial(_set_summary, failed_at=[["max_steps", "bilinear", [0]]]),
+        WRONG_SUMMARY,
+    ),
     "materials in a list": (lambda f: _set_attribute(f, "", "materials", np.bytes_(b"[]")), "materials: not JSON"),
     "no materials": (lambda f: _set_attribute(f, "", "materials", np.bytes_(b"{}")), "not a readable result"),
     "a material of text": (

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from xarray.backends import BackendEntrypoint
 
 from ..atomic import Sink, atomic_write
+from ..config.files import RESULT_MAGIC
 from ..config.tables import Output
 from ..errors import ResultError, UnfinishedError, UsageError
 from ..text import safe_text
@@ -26,7 +27,7 @@ from .factored import check_witnesses, stored_table, witness_variables
 from .hdf5_structure import ReadBytes, byte_reader, check_root
 from .netcdf import StoredArray, open_for_writing, read_variables
 from .schema import SCHEMA
-from .seal import MAGIC, check_seal, write_seal
+from .seal import check_seal, write_seal
 from .slabs import slabs
 from .validation import FACTORED_ATTRIBUTES, TABLE_VARIABLES, is_quantity, schema_violation
 
@@ -353,6 +354,6 @@ class ImpactBackend(BackendEntrypoint):
             if not path.is_file():
                 return False
             with path.open("rb") as file:
-                return file.read(len(MAGIC)) == MAGIC
+                return file.read(len(RESULT_MAGIC)) == RESULT_MAGIC
         except (OSError, TypeError, ValueError):
             return False

@@ -33,7 +33,7 @@ from ..formatting import number
 from ..text import safe_text
 from .attributes import SummaryRecord, read_attribute
 from .expand import MAX_STIFFNESS_VALUES, TrajectoryRows, TrajectoryTable, expand, whole_stiffness
-from .schema import SCHEMA, SchemaVariable, attributes_of, derived_names, is_input, scale_of
+from .schema import SCHEMA, SchemaVariable, attributes_of, count_points, derived_names, is_input, scale_of
 
 N_WITNESSES = 1_000
 # tolerance of a witness, relative to the scale that `compare` uses for its variable
@@ -301,11 +301,11 @@ def stored_table(
     rows = TrajectoryRows(maps, read_rows, pick=pick_rows)
     summary = read_attribute(dataset.attrs, "summary") or None
     if summary is not None:
-        _check_summary(summary, [*laws], inputs.shape)
+        _check_summary(summary, dataset, inputs.shape)
     return TrajectoryTable(inputs, tuple(stored), tuple(maps), rows, tuple(rules), summary)
 
 
-def _check_summary(summary: SummaryRecord, keys: Sequence[str], shape: tuple[int, ...]) -> None:
+def _check_summary(summary: SummaryRecord, dataset: xr.Dataset, shape: tuple[int, ...]) -> None:
     """Refuse a summary of other statuses, models or points than the result has."""
     statuses = {*summary.status, *(status for status, _, _ in summary.failed_at)}
     models = {
@@ -313,12 +313,14 @@ def _check_summary(summary: SummaryRecord, keys: Sequence[str], shape: tuple[int
         *(key for worst in summary.worst.values() for key in worst),
     }
     indices = [index for _, _, index in summary.failed_at]
+    points = sum(summary.status.values()) + summary.not_evaluated
     if (
         not statuses <= {status.name.lower() for status in Status}
-        or not models <= {*keys}
+        or not models <= {*dataset["model"].values.tolist()}
         or any(len(index) != len(shape) or any(map(operator.ge, index, shape)) for index in indices)
+        or ("witness_status" in dataset and points != count_points(dataset.coords.to_dataset()))
     ):
-        raise ResultError("is not a readable result (summary: does not fit its axes and models)")
+        raise ResultError("is not a readable result (summary: not that of its points)")
 
 
 def _check_trajectory_statuses(rows: int, read: ReadVariable) -> None:
