@@ -305,7 +305,7 @@ def summary_of_variable(variable: xr.Variable) -> SummaryRecord | None:
     data = variable._data
     if not isinstance(data, indexing.LazilyIndexedArray) or not isinstance(data.array, ExpandedArray):
         return None
-    is_whole = data.shape == data.array.shape and all(part == slice(None) for part in data.key.tuple)
+    is_whole = all(isinstance(part, slice) and part == slice(None) for part in data.key.tuple)
     return data.array.table.summary if is_whole else None
 
 

@@ -87,14 +87,14 @@ def _matches_value(values: np.ndarray, value: float | str) -> Mask:
 
 
 def _nearest_values(name: str, values: np.ndarray, value: float | str) -> str:
-    """A clause with the values of an axis if they are few, the two that are nearest to a number, or the first."""
+    """A clause with the values of an axis if they are few, the next ones to a number, or the first."""
     number = _as_number(value) if values.dtype.kind in NUMBER_DTYPE_KINDS else None
     if number is None or np.isnan(number) or values.size <= MAX_LISTED_VALUES:
         shown = ", ".join(map(label, values[:MAX_LISTED_VALUES].tolist()))
         return f"{name} is {shown}{', ...' if values.size > MAX_LISTED_VALUES else ''}"
     distinct = np.unique(values)
-    with np.errstate(invalid="ignore"):
-        nearest = np.sort(distinct[np.argsort(np.abs(distinct - number), kind="stable")[:2]])
+    below = int(np.clip(np.searchsorted(distinct, number) - 1, 0, max(distinct.size - 2, 0)))
+    nearest = distinct[below : below + 2]
     return f"the nearest are {' and '.join(map(label, nearest.tolist()))}"
 
 

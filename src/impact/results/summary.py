@@ -275,9 +275,9 @@ def _stored_summary(
         points=has_status * (sum(counts.values()) + record.not_evaluated),
         counts=counts if has_status else {},
         worst={
-            name: {keys.index(key): _from_json(largest) for key, largest in by_model.items()}
-            for name, by_model in record.worst.items()
-            if name in names
+            name: {keys.index(key): _from_json(largest) for key, largest in record.worst[name].items()}
+            for name in names
+            if name in record.worst
         },
         failed_at=[
             (Status[name.upper()], keys.index(key), tuple(index))
