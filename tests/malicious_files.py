@@ -503,6 +503,23 @@ def _continue_a_header_in_itself(path: Path) -> None:
     path.write_bytes(content)
 
 
+def _add_type_in_itself(path: Path, holder: str) -> None:
+    """Add an attribute with a type that is stored in another object, which says that it is stored in itself."""
+    kind = np.dtype([(name, "f8") for name in "abc"])
+    with h5py.File(path, "r+") as file:
+        file["other"] = kind
+        file[holder].attrs.create("x", np.zeros(1, kind), dtype=file["other"])
+        address = h5o.get_info(file["other"].id).addr
+        del file["other"]
+    content = bytearray(path.read_bytes())
+    # the header of the object has no checksum; its first message is the type
+    message = address + USER_BLOCK + 16
+    shared, in_an_object = 2, struct.pack("<BBQ", 3, 2, address)
+    content[message + 4] = shared
+    content[message + 8 : message + 8 + len(in_an_object)] = in_an_object
+    path.write_bytes(content)
+
+
 def _jenkins(content: bytes) -> int:
     """The checksum of HDF5, "lookup3" by Bob Jenkins."""
 
@@ -577,6 +594,8 @@ CYCLES: dict[str, tuple[CreateFile, str]] = {
     "a group is its own child": (_store_with_old_groups, "not an HDF5 file as this program writes it"),
     "a hidden group is its own child": (_hide_old_groups, WRONG_STRUCTURE),
     "a header continues in itself": (_continue_a_header_in_itself, WRONG_STRUCTURE),
+    "a type of a variable is stored in itself": (partial(_add_type_in_itself, holder="v1_post"), WRONG_STRUCTURE),
+    "a type of the file is stored in itself": (partial(_add_type_in_itself, holder="/"), WRONG_STRUCTURE),
     "2^40 links in 40 nodes": (_add_bifurcating_links, WRONG_STRUCTURE),
     "links that are listed twice": (partial(_add_bifurcating_links, depth=1), WRONG_STRUCTURE),
     **{

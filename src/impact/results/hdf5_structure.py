@@ -1,6 +1,6 @@
 """Check the structures of an HDF5 file that the HDF5 library follows recursively, before it reads them.
 
-In a malicious file a node of a B-tree may have itself as a child, or a B-tree more records than it declares; the
+In a malicious file a B-tree, a header or a type may contain itself, or a B-tree more records than it declares; the
 library then recurses until the process is killed, or writes beyond its memory. Files of this program have only a
 few of the structures of the format (version 3 of its specification): groups of the second version, and chunks that
 are indexed by a B-tree of version 1. All others are refused, and these are followed here first. Addresses are
@@ -9,6 +9,7 @@ relative to the end of the user block.
 
 from __future__ import annotations
 
+import itertools
 import math
 import struct
 from collections.abc import Callable, Iterator
@@ -27,15 +28,17 @@ MAX_HEADER_BYTES = 2**22
 MAX_NODE_BYTES, MAX_B_TREE_2_DEPTH = 2**16, 4
 MAX_CHUNK_ENTRIES = 64  # of a node; fixed by superblocks of version 0
 # types of messages in the header of an object
-LINK_INFO, LAYOUT, CONTINUATION, SYMBOL_TABLE, ATTRIBUTE_INFO = 0x02, 0x08, 0x10, 0x11, 0x15
+LINK_INFO, LAYOUT, ATTRIBUTE, CONTINUATION, SYMBOL_TABLE, ATTRIBUTE_INFO = 0x02, 0x08, 0x0C, 0x10, 0x11, 0x15
 IS_SHARED = 2  # flag of a message that is stored elsewhere
+IS_STORED_ELSEWHERE = 3  # flags of the type and the shape of an attribute
 CHUNKED = 2
+IN_BLOCK, HUGE = 0, 1  # where an object of a heap is stored
 
 # versions, sizes of offsets and lengths, base address, driver, root object and what is cached of it
 SUPERBLOCK = struct.Struct("<8sB4xBB9xQ16xQ8xQI")
-# signature, bytes of filters, address of the B-tree of huge objects, sizes of the first and the largest direct
-# blocks, rows of blocks
-FRACTAL_HEAP = struct.Struct("<4s3xH13xQ80x2xQQ2x2x8xH")
+# signature, bytes of filters, address of the B-tree of huge objects; blocks in a row, sizes of the first and the
+# largest blocks, bits of an offset, address of the root, rows of blocks
+FRACTAL_HEAP = struct.Struct("<4s3xH13xQ80xHQQH2xQH")
 # signature, bytes of a node and of a record, depth, address of the root, its records, all records
 B_TREE_2 = struct.Struct("<4s2xIHH2xQHQ")
 # signature, type, level, number of entries
@@ -95,7 +98,9 @@ def check_object(read: ReadBytes, address: int, name: str = "") -> int | None:
             if flags & IS_SHARED or kind == SYMBOL_TABLE:
                 raise ValueError
             if kind in (LINK_INFO, ATTRIBUTE_INFO):
-                _check_dense_storage(read, body, 8 if kind == LINK_INFO else 2)
+                _check_dense_storage(read, body, kind)
+            elif kind == ATTRIBUTE:
+                _check_attribute(body)
             elif kind == LAYOUT:
                 chunks = _count_stored_chunks(read, body)
     except (ValueError, OverflowError, OSError, struct.error, IndexError, ZeroDivisionError):
@@ -139,28 +144,56 @@ def _messages(read: ReadBytes, address: int) -> Iterator[tuple[int, int, bytes]]
             yield kind, flags, body
 
 
-def _check_dense_storage(read: ReadBytes, body: bytes, order_bytes: int) -> None:
-    """Check the heap and the B-trees of many links or attributes."""
-    flags = body[1]
-    heap, *trees = struct.unpack_from("<QQQ" if flags & 2 else "<QQ", body, 2 + (order_bytes if flags & 1 else 0))
-    # the library allocates memory for the number of records of one tree, and fills it from the other
-    if len({_count_records(read, tree) for tree in trees}) > 1:
+def _check_attribute(head: bytes) -> None:
+    """Refuse an attribute whose type or shape is stored elsewhere, from the first bytes of its message."""
+    if not 1 <= head[0] <= 3 or (head[0] > 1 and head[1] & IS_STORED_ELSEWHERE):
         raise ValueError
-    if heap != UNDEFINED:
-        signature, filters, tree, smallest, largest, rows = FRACTAL_HEAP.unpack(read(heap, FRACTAL_HEAP.size))
-        # more rows would have blocks of blocks
-        if signature != b"FRHP" or filters or rows > math.log2(largest / smallest) + 2:
-            raise ValueError
-        _count_records(read, tree)
 
 
-def _count_records(read: ReadBytes, address: int) -> int:
-    """The number of records in a B-tree of version 2, which must be a tree with the numbers that it declares."""
-    if address == UNDEFINED:
-        return 0
-    signature, node_bytes, record_bytes, depth, root, records, total = B_TREE_2.unpack(
-        read(address, B_TREE_2.size)
+def _check_dense_storage(read: ReadBytes, body: bytes, kind: int) -> None:
+    """Check the heap and the B-trees of many links or attributes."""
+    flags, order_bytes = body[1], 8 if kind == LINK_INFO else 2
+    heap, *trees = struct.unpack_from("<QQQ" if flags & 2 else "<QQ", body, 2 + (order_bytes if flags & 1 else 0))
+    indices = [_records(read, tree) for tree in trees if tree != UNDEFINED]
+    # the library allocates memory for the number of records of one tree, and fills it from the other
+    if len({len(records) for records in indices}) > 1:
+        raise ValueError
+    if heap == UNDEFINED:
+        return
+    signature, filters, tree, width, smallest, largest, bits, root, rows = FRACTAL_HEAP.unpack(
+        read(heap, FRACTAL_HEAP.size)
     )
+    # more rows would have blocks of blocks
+    if signature != b"FRHP" or filters or rows > math.log2(largest / smallest) + 2:
+        raise ValueError
+    huge = _records(read, tree) if tree != UNDEFINED else []
+    if kind == LINK_INFO:
+        return
+    offset_bytes = (bits + 7) // 8
+    blocks = [(root, smallest)]
+    if rows:
+        start, children = root + 13 + offset_bytes, width * rows
+        addresses = struct.unpack(f"<{children}Q", read(start, 8 * children))
+        blocks = [(address, smallest << max(n // width - 1, 0)) for n, address in enumerate(addresses)]
+    for record in itertools.chain(*indices):
+        place, offset = record[0] >> 4, int.from_bytes(record[1 : 1 + offset_bytes], "little")
+        if place == IN_BLOCK:
+            for address, size in blocks:
+                if offset < size:
+                    _check_attribute(read(address + offset, 2))
+                    break
+                offset -= size
+            else:
+                raise ValueError
+        elif place != HUGE:
+            raise ValueError
+    for record in huge:
+        _check_attribute(read(int.from_bytes(record[:8], "little"), 2))
+
+
+def _records(read: ReadBytes, address: int) -> list[bytes]:
+    """The records of a B-tree of version 2, which must be a tree with as many records as it declares."""
+    signature, node_bytes, record_bytes, depth, root, n_root, total = B_TREE_2.unpack(read(address, B_TREE_2.size))
     if signature != b"BTHD" or depth > MAX_B_TREE_2_DEPTH or node_bytes > MAX_NODE_BYTES:
         raise ValueError
     # numbers take as many bytes as the largest number of records in a node, or below it, needs
@@ -171,27 +204,30 @@ def _count_records(read: ReadBytes, address: int) -> int:
         limits.append((node_bytes - 10 - pointer_bytes) // (record_bytes + pointer_bytes))
         below = (limits[-1] + 1) * below + limits[-1]
         widths.append(_width(below))
-    addresses = set()
+    addresses: set[int] = set()
+    records: list[bytes] = []
 
-    def count(address: int, level: int, records: int) -> int:
+    def follow(address: int, level: int, n: int) -> None:
         content = read(address, node_bytes)
-        if content[:4] != (b"BTIN" if level else b"BTLF") or records > limits[level] or address in addresses:
+        if content[:4] != (b"BTIN" if level else b"BTLF") or n > limits[level] or address in addresses:
             raise ValueError
         addresses.add(address)
-        at, counted = 6 + records * record_bytes, records
-        for _ in range(records + 1 if level else 0):
+        records.extend(content[6 + i * record_bytes : 6 + (i + 1) * record_bytes] for i in range(n))
+        at = 6 + n * record_bytes
+        for _ in range(n + 1 if level else 0):
             (child,) = struct.unpack_from("<Q", content, at)
             middle, end = at + 8 + _width(limits[0]), at + 8 + _width(limits[0]) + widths[level - 1]
-            records_of_child = int.from_bytes(content[at + 8 : middle], "little")
-            below_child = count(child, level - 1, records_of_child)
-            if level > 1 and below_child != int.from_bytes(content[middle:end], "little"):
+            before = len(records)
+            follow(child, level - 1, int.from_bytes(content[at + 8 : middle], "little"))
+            if level > 1 and len(records) - before != int.from_bytes(content[middle:end], "little"):
                 raise ValueError
-            counted, at = counted + below_child, end
-        return counted
+            at = end
 
-    if (count(root, depth, records) if root != UNDEFINED else 0) != total:
+    if root != UNDEFINED:
+        follow(root, depth, n_root)
+    if len(records) != total:
         raise ValueError
-    return int(total)
+    return records
 
 
 def _width(number: int) -> int:
