@@ -2,8 +2,8 @@
 
 Sweeps a law into factored files in a temporary folder: 100, 4 million and 10^7 distinct trajectories, which many
 points share. For each file the table shows the CPU time of a SHA-256, of `impact info`, of `impact.load` and of
-`impact expand --sel` with a value that the file does not have, and its ratio to the limit: twice the SHA-256 plus the
-same command on the smallest file. They run in turn; the best of the repeats counts, and a command ends after
+`impact expand --sel` with a value that the file does not have, and its ratio to the limit: twice the SHA-256 plus
+the same command on the smallest file. They run in turn; the best of the repeats counts, and a command ends after
 `--limit` seconds. With `--against`, the commands of another source tree run in the same rounds on the same files.
 
     python scripts/bench_open.py [--repeat 3] [--limit 60] [--against OTHER/src]
