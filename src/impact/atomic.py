@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import fcntl
 import io
 import os
 import re
@@ -19,6 +18,11 @@ from typing import Any
 
 from .errors import StoreError, UsageError
 from .text import safe_text
+
+try:
+    import fcntl
+except ImportError:  # Windows: files are not locked, and none is removed
+    fcntl = None  # type: ignore[assignment]
 
 # errors of opening or syncing a folder on file systems where files can still be written and synced
 UNSYNCABLE_ERRNOS = {
@@ -102,14 +106,15 @@ class Sink(io.RawIOBase):
 
     def lock(self) -> None:
         """Mark the file as in use until `unlock` or the end of the process, where files can be locked."""
-        with contextlib.suppress(OSError):
+        with contextlib.suppress(OSError, AttributeError):
             fcntl.flock(self._file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
 
     def unlock(self) -> None:
         """Let readers lock the file; a recent time of change protects it until it has its final name."""
-        with contextlib.suppress(OSError):
+        with contextlib.suppress(OSError, AttributeError):
+            operation = fcntl.LOCK_UN
             os.utime(self._file.fileno())
-            fcntl.flock(self._file.fileno(), fcntl.LOCK_UN)
+            fcntl.flock(self._file.fileno(), operation)
 
     def sync(self) -> None:
         """Flush everything to the disk.
@@ -187,7 +192,7 @@ def _remove_stale_parts(path: Path) -> None:
     # a folder may be writable and not readable
     with contextlib.suppress(OSError):
         for part in [part for part in path.parent.iterdir() if name.fullmatch(part.name)]:
-            with contextlib.suppress(OSError):
+            with contextlib.suppress(OSError, AttributeError):
                 status = part.lstat()
                 if stat.S_ISREG(status.st_mode) and time.time() - status.st_mtime > MIN_STALE_S:
                     with part.open("rb") as file:
