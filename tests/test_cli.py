@@ -607,7 +607,7 @@ def test_an_internal_error_is_one_line_and_a_report(forked: ForkServer, tmp_path
     code = (
         "import tempfile, impact.api as api\n"
         "def broken(*a, **k): raise ZeroDivisionError('of our own')\n"
-        "api.load = broken\n"
+        "api.info = broken\n"
         f"tempfile.tempdir = {str(tmp_path)!r}\n"
     )
     done = forked("info", stored, code=code)

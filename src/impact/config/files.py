@@ -30,12 +30,12 @@ LONG_KEY = re.compile(rf"(?<![\w.-])(?:{_PART}[ \t]*+\.[ \t]*+){{{MAX_KEY_PARTS 
 def file_hint(path: Path, content: bytes) -> str:
     """What a file is that something else was expected of, and what to do with it; empty if unknown.
 
-    >>> file_hint(Path("c.toml"), b"")
+    >>> file_hint(Path("c.toml"), b"[sweep]")
     'is a config, not a result; sweep it first: impact sweep c.toml -o RESULT.h5'
     """
     if content.startswith(RESULT_MAGIC):
         return "is a result, not a text file; impact info, plot, rerun, extend and expand read results"
-    if path.suffix.lower() == ".toml" or re.search(rb"^\s*\[sweep\]", content, re.MULTILINE):
+    if re.search(rb"^\s*(\[\s*sweep\b|sweep\s*[.=]|models\s*=)", content, re.MULTILINE):
         return f"is a config, not a result; sweep it first: impact sweep {safe_text(path.name)} -o RESULT.h5"
     if path.suffix.lower() == ".csv":
         return (

@@ -18,6 +18,8 @@ from .schema import SCHEMA_VERSION
 
 # bytes at the start of an HDF5 file that the format leaves to applications: its "user block"
 USER_BLOCK_BYTES = 512
+# bytes of another file by which its kind is recognised
+HINT_BYTES = 2**16
 HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 SWEEP_AGAIN = "sweep its config again: impact sweep CONFIG.toml -o RESULT --overwrite"
 
@@ -55,7 +57,7 @@ def check_seal(path: Path) -> str:
                 f"is of schema version 1, or no result of impact; expected version {SCHEMA_VERSION}: {SWEEP_AGAIN}"
             )
         if not header.startswith(RESULT_MAGIC):
-            hint = file_hint(path, header)
+            hint = file_hint(path, header + file.read(HINT_BYTES))
             raise ResultError(
                 hint or "is not a readable result (it does not begin with the header of a sealed file)"
             )
