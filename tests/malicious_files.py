@@ -18,7 +18,7 @@ from typing import Any
 
 import h5py
 import numpy as np
-from h5py import h5a, h5d, h5p, h5s, h5t, h5z
+from h5py import h5a, h5d, h5o, h5p, h5s, h5t, h5z
 from scipy.io import netcdf_file
 
 from impact.results.seal import write_seal
@@ -33,6 +33,7 @@ NO_SEAL = "does not begin with the header of a sealed file"
 WRONG_CHUNK = "a chunk of unexpected size"
 WRONG_AXES = "its axes are not those of the file"
 WRONG_ATTRIBUTE = "an attribute of unexpected type or size"
+WRONG_STRUCTURE = "a structure that this program does not write"
 CreateFile = Callable[[Path], object]
 ChangeFile = Callable[[h5py.File], object]
 
@@ -239,14 +240,14 @@ CHANGES: dict[str, tuple[ChangeFile, str]] = {
     "soft link": (_replace_by_soft_link, "not a hard link"),
     "dangling link": (lambda f: f.__setitem__("other", h5py.SoftLink("/nowhere")), "not a hard link"),
     "second name": (lambda f: f.__setitem__("other", f["v1_post"]), "a dataset with two names"),
-    "a group": (lambda f: f.create_group("other"), "not a dataset"),
-    "3,000 groups": (_nest_groups, "not a dataset"),
+    "a group": (lambda f: f.create_group("other"), WRONG_STRUCTURE),
+    "3,000 groups": (_nest_groups, WRONG_STRUCTURE),
     "a type": (lambda f: f.__setitem__("other", np.dtype("f8")), "not a dataset"),
     "100,000 links": (_add_many_links, "more than 1,000 datasets"),
     "external storage": (partial(_store_externally, name="v1_post"), UNSUPPORTED_STORAGE),
     "external storage of another": (partial(_store_externally, name="other"), UNSUPPORTED_STORAGE),
-    "virtual": (partial(_add_virtual, source="secret.h5"), UNSUPPORTED_STORAGE),
-    "virtual without source": (partial(_add_virtual, source="nowhere.h5"), UNSUPPORTED_STORAGE),
+    "virtual": (partial(_add_virtual, source="secret.h5"), WRONG_STRUCTURE),
+    "virtual without source": (partial(_add_virtual, source="nowhere.h5"), WRONG_STRUCTURE),
     "growing": (
         partial(replace_variable, name="v1_post", maxshape=(None, None, None), chunks=True),
         UNSUPPORTED_STORAGE,
@@ -407,6 +408,206 @@ PATCHES: dict[str, tuple[CreateFile, str]] = {
     ),
 }
 
+USER_BLOCK = 512
+# (position, level) of a node of a B-tree in the bytes of a file
+Node = tuple[int, int]
+
+
+def _set_child(content: bytearray, node: Node, child: int, target: Node) -> None:
+    """Set the address of a child of a node in the B-tree of the chunks of a dataset with one axis."""
+    key_bytes = 24
+    struct.pack_into("<Q", content, node[0] + 24 + key_bytes + child * (key_bytes + 8), target[0] - USER_BLOCK)
+
+
+def _set_level(content: bytearray, node: Node, level: int) -> None:
+    content[node[0] + 5] = level
+
+
+def _change_chunk_tree(path: Path, change: Callable[[bytearray, Node, list[Node]], object]) -> None:
+    """Add a dataset of 100 chunks, and change the B-tree of these: `change(content, root, leaves)`."""
+    with h5py.File(path, "r+") as file:
+        file.create_dataset("other", data=np.arange(100.0), chunks=(1,))
+    content = bytearray(path.read_bytes())
+    nodes = [(match.start(), content[match.start() + 5]) for match in re.finditer(b"TREE\x01", content)]
+    (root,) = (node for node in nodes if node[1] == 1)
+    change(content, root, [node for node in nodes if node[1] == 0])
+    path.write_bytes(content)
+
+
+def _make_two_nodes_parents_of_each_other(content: bytearray, root: Node, leaves: list[Node]) -> None:
+    _set_level(content, leaves[0], 1)
+    _set_child(content, leaves[0], 0, root)
+
+
+def _make_a_leaf_its_own_child(content: bytearray, _: Node, leaves: list[Node]) -> None:
+    _set_level(content, leaves[0], 1)
+    _set_child(content, leaves[0], 0, leaves[0])
+
+
+def _close_a_loop_over_three_levels(content: bytearray, root: Node, leaves: list[Node]) -> None:
+    _set_level(content, root, 2)
+    _set_level(content, leaves[0], 1)
+    _set_child(content, leaves[0], 0, leaves[1])
+    _set_child(content, leaves[1], 0, root)
+
+
+def _store_with_old_groups(path: Path) -> None:
+    """Store the objects in a group of the first version, whose B-tree has itself as a child."""
+    old = path.rename(path.with_name("old.h5"))
+    with h5py.File(old) as source, h5py.File(path, "w", userblock_size=USER_BLOCK, track_order=False) as file:
+        for name in source:
+            source.copy(name, file)
+        for name, value in source.attrs.items():
+            file.attrs.create(name, value)
+    old.unlink()
+    content = bytearray(path.read_bytes())
+    node = content.index(b"TREE\x00")
+    content[node + 5] = 1
+    struct.pack_into("<Q", content, node + 32, node - USER_BLOCK)
+    path.write_bytes(content)
+
+
+def _hide_old_groups(path: Path) -> None:
+    """The same, and the superblock says that nothing is known of the root group."""
+    _store_with_old_groups(path)
+    content = bytearray(path.read_bytes())
+    struct.pack_into("<I", content, USER_BLOCK + 72, 0)
+    path.write_bytes(content)
+
+
+def _continue_a_header_in_itself(path: Path) -> None:
+    """Let the continuation of an object header contain a continuation in itself."""
+    with h5py.File(path, "r+") as file:
+        # unlike the variables, its header has no checksum; the header after it prevents that it grows
+        other, _ = (file.create_dataset(name, data=np.zeros(9)) for name in ("other", "more"))
+        for name in "xyz":
+            other.attrs[name] = np.zeros(20)
+        address = h5o.get_info(other.id).addr
+    content = bytearray(path.read_bytes())
+
+    def messages(start: int, size: int) -> dict[int, int]:
+        """The messages of a block: the position of each by its type."""
+        positions, at = {}, start + USER_BLOCK
+        while at + 8 <= start + size + USER_BLOCK:
+            kind, length = struct.unpack_from("<HH", content, at)
+            positions[kind] = at
+            at += 8 + length
+        return positions
+
+    continuation, attribute = 0x10, 0x0C
+    (size,) = struct.unpack_from("<I", content, address + USER_BLOCK + 8)
+    block = struct.unpack_from("<QQ", content, messages(address + 16, size)[continuation] + 8)
+    position = messages(*block)[attribute]
+    struct.pack_into("<H", content, position, continuation)
+    struct.pack_into("<QQ", content, position + 8, *block)
+    path.write_bytes(content)
+
+
+def _add_type_in_itself(path: Path, holder: str) -> None:
+    """Add an attribute with a type that is stored in another object, which says that it is stored in itself."""
+    kind = np.dtype([(name, "f8") for name in "abc"])
+    with h5py.File(path, "r+") as file:
+        file["other"] = kind
+        file[holder].attrs.create("x", np.zeros(1, kind), dtype=file["other"])
+        address = h5o.get_info(file["other"].id).addr
+        del file["other"]
+    content = bytearray(path.read_bytes())
+    # the header of the object has no checksum; its first message is the type
+    message = address + USER_BLOCK + 16
+    shared, in_an_object = 2, struct.pack("<BBQ", 3, 2, address)
+    content[message + 4] = shared
+    content[message + 8 : message + 8 + len(in_an_object)] = in_an_object
+    path.write_bytes(content)
+
+
+def _jenkins(content: bytes) -> int:
+    """The checksum of HDF5, "lookup3" by Bob Jenkins."""
+
+    def rotated(x: int, k: int) -> int:
+        return (x << k | x >> 32 - k) & mask
+
+    mask, size = 2**32 - 1, len(content)
+    a = b = c = (0xDEADBEEF + size) & mask
+    while size > 12:
+        x, y, z = struct.unpack_from("<III", content, len(content) - size)
+        a, b, c, size = a + x & mask, b + y & mask, c + z & mask, size - 12
+        for k in (4, 6, 8, 16, 19, 4):
+            a, c = (a - c & mask) ^ rotated(c, k), c + b & mask
+            a, b, c = b, c, a
+    x, y, z = struct.unpack("<III", content[len(content) - size :].ljust(12, b"\0"))
+    a, b, c = a + x & mask, b + y & mask, c + z & mask
+    for k in (14, 11, 25, 16, 4, 14, 24):
+        c = (c ^ b) - rotated(b, k) & mask
+        a, b, c = b, c, a
+    return b if size else c
+
+
+def _add_bifurcating_links(path: Path, depth: int = 40) -> None:
+    """Index the links by a B-tree of 2^depth leaves in a few nodes: both children of a node are the same."""
+    content = bytearray(path.read_bytes())
+    (header,) = (match.start() for match in re.finditer(b"BTHD\x00\x05", content))
+    node_bytes, record_bytes, _, _, _, leaf, n, total = struct.unpack_from("<IHHBBQHQ", content, header + 6)
+    record = bytes(content[leaf + USER_BLOCK + 6 :][:record_bytes])
+    # numbers take as many bytes as the largest number of records below a node needs
+    in_leaf = (node_bytes - 10) // record_bytes
+    below, width, child = in_leaf, 0, leaf
+    for _ in range(depth):
+        pointer = struct.pack("<QB", child, n if child == leaf else 1) + (total if width else 0).to_bytes(
+            width, "little"
+        )
+        node = b"BTIN\x00\x05" + record + 2 * pointer
+        child = len(content) - USER_BLOCK
+        content += (node + struct.pack("<I", _jenkins(node))).ljust(node_bytes, b"\0")
+        records = (node_bytes - 10 - len(pointer)) // (record_bytes + len(pointer))
+        below = ((records + 1) * below + records) % 2**64
+        width = (below.bit_length() + 7) // 8
+    struct.pack_into("<HBBQHQ", content, header + 12, depth, 100, 40, child, 1, total)
+    struct.pack_into("<I", content, header + 34, _jenkins(bytes(content[header : header + 34])))
+    struct.pack_into("<Q", content, USER_BLOCK + 40, len(content))
+    path.write_bytes(content)
+
+
+def _add_newer_index(path: Path, **options: object) -> None:
+    """Add a dataset whose chunks have an index of a later version of HDF5."""
+    with h5py.File(path, "r+", libver="latest") as file:
+        file.create_dataset("other", data=np.arange(100.0), **options)
+
+
+# structures that the HDF5 library follows for ever, or until its stack overflows
+CYCLES: dict[str, tuple[CreateFile, str]] = {
+    **{
+        name: (partial(_change_chunk_tree, change=change), WRONG_STRUCTURE)
+        for name, change in {
+            "a node is its first child": lambda content, root, _: _set_child(content, root, 0, root),
+            "a node is its last child": lambda content, root, _: _set_child(content, root, 1, root),
+            "two nodes are children of each other": _make_two_nodes_parents_of_each_other,
+            "a leaf is its own child": _make_a_leaf_its_own_child,
+            "a loop over three levels": _close_a_loop_over_three_levels,
+            "a node is two children": lambda content, root, leaves: [
+                _set_child(content, root, child, leaves[0]) for child in (0, 1)
+            ],
+            "a node with too many children": lambda content, root, _: struct.pack_into(
+                "<H", content, root[0] + 6, 65_535
+            ),
+        }.items()
+    },
+    "a group is its own child": (_store_with_old_groups, "not an HDF5 file as this program writes it"),
+    "a hidden group is its own child": (_hide_old_groups, WRONG_STRUCTURE),
+    "a header continues in itself": (_continue_a_header_in_itself, WRONG_STRUCTURE),
+    "a type of a variable is stored in itself": (partial(_add_type_in_itself, holder="v1_post"), WRONG_STRUCTURE),
+    "a type of the file is stored in itself": (partial(_add_type_in_itself, holder="/"), WRONG_STRUCTURE),
+    "2^40 links in 40 nodes": (_add_bifurcating_links, WRONG_STRUCTURE),
+    "links that are listed twice": (partial(_add_bifurcating_links, depth=1), WRONG_STRUCTURE),
+    **{
+        f"chunks in {name}": (partial(_add_newer_index, **options), WRONG_STRUCTURE)
+        for name, options in {
+            "a fixed array": {"chunks": (1,)},
+            "an extensible array": {"chunks": (1,), "maxshape": (None,)},
+            "one piece": {"chunks": (100,)},
+        }.items()
+    },
+}
+
 # defects that impact does not read
 HARMLESS: dict[str, CreateFile] = {
     "references of 34 GB": _enlarge_references,
@@ -434,6 +635,14 @@ NOT_JSON = "not JSON of the expected type"
 WRONG_LAWS = "laws: not those of its models"
 WRONG_GRID = "axes: not those of its grid"
 WRONG_WITNESSES = "its witnesses have other values"
+SUMMARY = {"status": {"ok": 8}, "not_evaluated": 0, "worst": {}, "failed_at": [], "extremes": {}}
+
+
+def _set_summary(file: h5py.File, **entries: object) -> None:
+    _set_attribute(file, "", "summary", np.bytes_(json.dumps(SUMMARY | entries).encode()))
+
+
+WRONG_SUMMARY = "summary: not that of its points"
 # defects of a factored file
 FACTORED: dict[str, tuple[ChangeFile, str]] = {
     "laws of text": (lambda f: _set_attribute(f, "", "laws", np.bytes_(b"x")), NOT_JSON),
@@ -470,6 +679,20 @@ FACTORED: dict[str, tuple[ChangeFile, str]] = {
     "an axis less": (lambda f: _change_json(f, "axes", lambda axes: axes[:1]), "does not lie along one axis"),
     "axes in another order": (lambda f: _change_json(f, "axes", lambda axes: axes[::-1]), WRONG_WITNESSES),
     "axes without an end": (lambda f: _set_attribute(f, "", "axes", np.bytes_(b"[" * 100_000)), NOT_JSON),
+    "a summary of text": (lambda f: _set_attribute(f, "", "summary", np.bytes_(b"x")), NOT_JSON),
+    "a summary in a list": (lambda f: _set_attribute(f, "", "summary", np.bytes_(b"[]")), NOT_JSON),
+    "a summary of fewer points than none": (partial(_set_summary, status={"ok": 9, "limit": -1}), NOT_JSON),
+    "a summary of other points": (partial(_set_summary, status={"ok": 9}), WRONG_SUMMARY),
+    "a summary of an unknown status": (partial(_set_summary, status={"good": 8}), WRONG_SUMMARY),
+    "a summary of another model": (partial(_set_summary, worst={"e_error": {"hertz": 1.0}}), WRONG_SUMMARY),
+    "a summary of a point that is not there": (
+        partial(_set_summary, failed_at=[["max_steps", "bilinear", [0, 2]]]),
+        WRONG_SUMMARY,
+    ),
+    "a summary of a point along one axis": (
+        partial(_set_summary, failed_at=[["max_steps", "bilinear", [0]]]),
+        WRONG_SUMMARY,
+    ),
     "materials in a list": (lambda f: _set_attribute(f, "", "materials", np.bytes_(b"[]")), "materials: not JSON"),
     "no materials": (lambda f: _set_attribute(f, "", "materials", np.bytes_(b"{}")), "not a readable result"),
     "a material of text": (

@@ -6,6 +6,7 @@ import itertools
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -661,7 +662,7 @@ def test_an_internal_error_is_one_line_and_a_report(forked: ForkServer, tmp_path
     code = (
         "import tempfile, impact.api as api\n"
         "def broken(*a, **k): raise ZeroDivisionError('of our own')\n"
-        "api.load = broken\n"
+        "api.info = broken\n"
         f"tempfile.tempdir = {str(tmp_path)!r}\n"
     )
     done = forked("info", stored, code=code)
@@ -770,3 +771,60 @@ def test_a_tolerance_in_percent(cli: Run, stored: Path) -> None:
     percent, fraction = (cli("recommend", stored, "--tol", word, "--json").stdout for word in ("5%", "0.05"))
     assert percent == fraction
     assert json.loads(percent)["tol"] == 0.05
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        (
+            ("plot", "c.toml"),
+            "c.toml: is a config, not a result; sweep it first: impact sweep c.toml -o RESULT.h5",
+        ),
+        (
+            ("recommend", "c.txt"),
+            "c.txt: is a config, not a result; sweep it first: impact sweep c.txt -o RESULT.h5",
+        ),
+        (
+            ("plot", "data.csv"),
+            "data.csv: is a CSV file, not a result; impact plot RESULT.h5 --points data.csv draws its points",
+        ),
+        (
+            ("sweep", "small.h5", "-o", "out.h5"),
+            "small.h5: is a result, not a text file; impact info, plot, rerun, extend and expand read results",
+        ),
+        (
+            ("plot", "small.h5", "--points", "small.h5"),
+            "small.h5: is a result, not a text file; impact info, plot, rerun, extend and expand read results",
+        ),
+    ],
+)
+def test_a_file_of_another_kind_is_named(
+    cli: Run, small: Path, stored: Path, tmp_path: Path, words: tuple[str, ...], line: str
+) -> None:
+    for name in ("c.toml", "c.txt"):
+        shutil.copy(small, tmp_path / name)
+    shutil.copy(stored, tmp_path / "small.h5")
+    (tmp_path / "data.csv").write_text("v1,e\n1,0.5\n", encoding="utf-8")
+    result = cli(*words, cwd=tmp_path)
+    assert (result.returncode, result.stdout, result.stderr) == (2, "", f"{line}\n")
+
+
+@pytest.mark.parametrize(
+    ("value", "nearest"),
+    [
+        ("0.5", "0.496 and 0.506"),
+        ("-3", "0.001 and 0.011"),
+        ("1e300", "0.991 and 1.001"),
+        ("inf", "0.991 and 1.001"),
+    ],
+)
+def test_a_value_that_is_not_in_a_result_is_reported_with_the_nearest(
+    cli: Run, small: Path, tmp_path: Path, value: str, nearest: str
+) -> None:
+    speeds = [round(0.001 + 0.01 * n, 3) for n in range(101)]
+    speeds = [0.496 if speed == 0.501 else 0.506 if speed == 0.511 else speed for speed in speeds]
+    impact.sweep_to_file(small, tmp_path / "out.h5", overrides=[f"sweep.v1={speeds}"])
+    for words in (("expand", "out.h5", "-o", "part.h5"), ("plot", "out.h5"), ("recommend", "out.h5")):
+        refused = cli(*words, "--sel", f"v1={value}", cwd=tmp_path)
+        message = f"no v1 = {float(value)} in this result; the nearest are {nearest}\n"
+        assert (refused.returncode, refused.stdout, refused.stderr) == (2, "", message)

@@ -20,6 +20,7 @@ from impact.results.backend import open_result
 from .fork_server import CompletedCommand, ForkServer
 from .malicious_files import (
     CHANGES,
+    CYCLES,
     FACTORED,
     HARMLESS,
     INVALID_LAW_VALUES,
@@ -180,6 +181,25 @@ def test_a_message_about_witnesses_names_the_version_of_the_file_and_of_the_prog
     seal(path)
     with pytest.raises(ResultError, match=re.escape(f"written by impact 0.0.7, this is {impact.__version__}")):
         impact.load(path)
+
+
+@pytest.mark.parametrize("name", CYCLES)
+def test_a_structure_that_contains_itself_is_refused_before_hdf5_follows_it(
+    forked: ForkServer, small: Path, tmp_path: Path, name: str
+) -> None:
+    # in another process, which HDF5 would kill
+    path, (change, message) = tmp_path / "bad.h5", CYCLES[name]
+    shutil.copy(small, path)
+    change(path)
+    seal(path)
+    completed = forked("info", path.name, cwd=path.parent)
+    assert not completed.timed_out
+    assert (completed.returncode, completed.stdout) == (2, ""), completed
+    (line,) = completed.stderr.splitlines()
+    assert line.startswith("bad.h5: is not a readable result (")
+    assert message in line
+    assert completed.seconds < MAX_CPU_S
+    assert completed.memory < MAX_MEMORY_BYTES
 
 
 QUICK_KEYS = ("axes",)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import fcntl
 import functools
 import json
 import os
@@ -23,6 +24,7 @@ import xarray as xr
 
 import impact
 from impact.api import prepare
+from impact.atomic import atomic_write
 from impact.engine.executors import choose_backend
 from impact.errors import ResultError, StoreError, UnfinishedError, UsageError
 from impact.results import sweep as sweep_module
@@ -290,6 +292,53 @@ def test_a_folder_that_cannot_be_synced_is_a_note(
     with pytest.warns(UserWarning, match=r"folders cannot be synced here \(Invalid argument\)"):
         impact.save(figure6, tmp_path / "out.h5")
     assert impact.load(tmp_path / "out.h5").identical(figure6)
+
+
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EIO])
+def test_an_error_after_the_rename_says_that_the_file_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int
+) -> None:
+    fsync = os.fsync
+
+    def fsync_files_only(descriptor: int) -> None:
+        if stat.S_ISDIR(os.fstat(descriptor).st_mode):
+            raise OSError(number, os.strerror(number))
+        fsync(descriptor)
+
+    path = tmp_path / "out.csv"
+    path.write_bytes(b"old")
+    monkeypatch.setattr(os, "fsync", fsync_files_only)
+    with pytest.raises(StoreError, match=r"out\.csv: written, but its name may not be on the disk: ") as caught:
+        write_file(path, b"new", overwrite=True)
+    assert "not written" not in str(caught.value)
+    assert path.read_bytes() == b"new"
+    assert [p.name for p in tmp_path.iterdir()] == ["out.csv"]
+
+
+def test_a_write_removes_what_killed_writes_of_the_same_output_left(tmp_path: Path) -> None:
+    stale = [f"out.csv.{token}.part" for token in ("0123abcd", "00000000")]
+    other = ["out.csv.part", "out.csv.12345.part", "out.csv.0123ABCD.part", "other.csv.0123abcd.part"]
+    for name in [*stale, *other, "out.csv.11111111.part"]:
+        (tmp_path / name).write_bytes(b"half")
+        os.utime(tmp_path / name, (0, 0))
+    # of a process that writes it now, and of one that has just begun
+    (tmp_path / "out.csv.22222222.part").write_bytes(b"half")
+    with (tmp_path / "out.csv.11111111.part").open("rb") as live:
+        fcntl.flock(live, fcntl.LOCK_EX)
+        write_file(tmp_path / "out.csv", b"whole", overwrite=False)
+    rest = {*other, "out.csv", "out.csv.11111111.part", "out.csv.22222222.part"}
+    assert {path.name for path in tmp_path.iterdir()} == rest
+
+
+def test_a_write_leaves_the_file_that_another_process_writes(tmp_path: Path) -> None:
+    path = tmp_path / "out.csv"
+    with atomic_write(path, overwrite=True) as sink:
+        (part,) = tmp_path.iterdir()
+        sink.write(b"first")
+        os.utime(part, (0, 0))
+        write_file(path, b"second", overwrite=True)
+        assert path.read_bytes() == b"second"
+    assert path.read_bytes() == b"first"
 
 
 UNREADABLE = """

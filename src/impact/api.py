@@ -1167,7 +1167,11 @@ def info(result: xr.Dataset | str | Path) -> dict[str, Any]:
     >>> impact.info(impact.sweep("configs/figure6.toml"))["status"]
     {'ok': 301, 'limit': 2}
     """
-    return describe(load(result) if isinstance(result, str | Path) else result)
+    if isinstance(result, str | Path):
+        # not loaded, so that a summary in the file is used
+        with open_result(result) as opened:
+            return describe(opened)
+    return describe(result)
 
 
 def plot(

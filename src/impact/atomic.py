@@ -6,7 +6,9 @@ import contextlib
 import errno
 import io
 import os
+import re
 import stat
+import time
 import warnings
 from collections.abc import Iterator
 from functools import cache
@@ -16,6 +18,11 @@ from typing import Any
 
 from .errors import StoreError, UsageError
 from .text import safe_text
+
+try:
+    import fcntl
+except ImportError:  # Windows: files are not locked, and none is removed
+    fcntl = None  # type: ignore[assignment]
 
 # errors of opening or syncing a folder on file systems where files can still be written and synced
 UNSYNCABLE_ERRNOS = {
@@ -27,6 +34,8 @@ UNSYNCABLE_ERRNOS = {
     errno.ENOSYS,
     errno.EISDIR,
 }
+# age of a temporary file from which on it may be left by a process that was killed
+MIN_STALE_S = 60.0
 
 
 class Sink(io.RawIOBase):
@@ -95,6 +104,18 @@ class Sink(io.RawIOBase):
         with contextlib.suppress(OSError):
             os.fchmod(descriptor, stat.S_IMODE(replaced.st_mode))
 
+    def lock(self) -> None:
+        """Mark the file as in use until `unlock` or the end of the process, where files can be locked."""
+        with contextlib.suppress(OSError, AttributeError):
+            fcntl.flock(self._file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+    def unlock(self) -> None:
+        """Let readers lock the file; a recent time of change protects it until it has its final name."""
+        with contextlib.suppress(OSError, AttributeError):
+            operation = fcntl.LOCK_UN
+            os.utime(self._file.fileno())
+            fcntl.flock(self._file.fileno(), operation)
+
     def sync(self) -> None:
         """Flush everything to the disk.
 
@@ -123,16 +144,19 @@ def atomic_write(path: Path, *, overwrite: bool, part: Path | None = None) -> It
     ----------
     path : the file
     overwrite : whether it may replace another file
-    part : the temporary name; by default a unique one
+    part : the temporary name; by default a unique one, and files that killed processes left under such names are
+        removed
 
     Raises
     ------
     UsageError : the file was created by another process meanwhile, and `overwrite` is not set
-    StoreError : the disk is full or failed; no file is left under either name
+    StoreError : the disk is full or failed; no file is left under either name, unless the message says that the
+        file is written
     """
     shown = safe_text(str(path))
     try:
         if part is None:
+            _remove_stale_parts(path)
             part = path.with_name(f"{path.name}.{token_hex(4)}.part")
         else:
             # a file left under this name may be a link, or a hard link to a complete result
@@ -141,18 +165,39 @@ def atomic_write(path: Path, *, overwrite: bool, part: Path | None = None) -> It
         try:
             if overwrite:
                 sink.inherit(path)
+            sink.lock()
             yield sink
             sink.sync()
+            sink.unlock()
             _publish(part, path, overwrite=overwrite)
         finally:
             sink.close()
             with contextlib.suppress(FileNotFoundError):
                 part.unlink()
-        sync_folder(path.parent)
     except FileExistsError:
         raise UsageError(f"{shown}: was created by another process, and is not modified") from None
     except OSError as error:
         raise StoreError(f"{shown}: not written: {error.strerror}") from error
+    try:
+        sync_folder(path.parent)
+    except OSError as error:
+        raise StoreError(
+            f"{shown}: written, but its name may not be on the disk: {error.strerror}; a power cut may undo it"
+        ) from error
+
+
+def _remove_stale_parts(path: Path) -> None:
+    """Remove temporary files of an output that a killed process left: old, and locked by no process."""
+    name = re.compile(re.escape(path.name) + r"\.[0-9a-f]{8}\.part")
+    # a folder may be writable and not readable
+    with contextlib.suppress(OSError):
+        for part in [part for part in path.parent.iterdir() if name.fullmatch(part.name)]:
+            with contextlib.suppress(OSError, AttributeError):
+                status = part.lstat()
+                if stat.S_ISREG(status.st_mode) and time.time() - status.st_mtime > MIN_STALE_S:
+                    with part.open("rb") as file:
+                        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                        part.unlink()
 
 
 def sync_folder(folder: Path) -> None:

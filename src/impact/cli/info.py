@@ -37,12 +37,14 @@ def info(
 ) -> None:
     """Show the axes, variables, largest errors and provenance of a file."""
     from .. import api
+    from ..results.backend import open_result
 
-    dataset = api.load(file)
-    if as_json:
-        print(dump(api.info(dataset)))
-    else:
-        print_info(dataset, file)
+    # not loaded, so that a summary in the file is used
+    with open_result(file) as dataset:
+        if as_json:
+            print(dump(api.info(dataset)))
+        else:
+            print_info(dataset, file)
 
 
 def print_info(dataset: xr.Dataset, path: Path) -> None:

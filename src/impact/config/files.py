@@ -21,8 +21,27 @@ MAX_OVERRIDE_LENGTH = 4_000_000  # characters of the value of an override
 MAX_DEPTH = 8  # levels of nested tables and lists; the deepest key needs 5
 MAX_JSON_LENGTH = 64_000_000  # characters of a mapping as JSON, which may hold all values of its axes
 MAX_KEY_PARTS = 64  # dots of a key: TOML parsers take quadratic time for longer ones
+# first bytes of a result
+RESULT_MAGIC = b"impact result\n"
 _PART = rf"""(?:{BARE_KEY}|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""
 LONG_KEY = re.compile(rf"(?<![\w.-])(?:{_PART}[ \t]*+\.[ \t]*+){{{MAX_KEY_PARTS + 1}}}")
+
+
+def file_hint(path: Path, content: bytes) -> str:
+    """What a file is that something else was expected of, and what to do with it; empty if unknown.
+
+    >>> file_hint(Path("c.toml"), b"[sweep]")
+    'is a config, not a result; sweep it first: impact sweep c.toml -o RESULT.h5'
+    """
+    if content.startswith(RESULT_MAGIC):
+        return "is a result, not a text file; impact info, plot, rerun, extend and expand read results"
+    if re.search(rb"^\s*(\[\s*sweep\b|sweep\s*[.=]|models\s*=)", content, re.MULTILINE):
+        return f"is a config, not a result; sweep it first: impact sweep {safe_text(path.name)} -o RESULT.h5"
+    if path.suffix.lower() == ".csv":
+        return (
+            f"is a CSV file, not a result; impact plot RESULT.h5 --points {safe_text(path.name)} draws its points"
+        )
+    return ""
 
 
 def read_text(path: Path, kind: str = "TOML", most: int = MAX_CONFIG_BYTES) -> str:
@@ -41,6 +60,8 @@ def read_text(path: Path, kind: str = "TOML", most: int = MAX_CONFIG_BYTES) -> s
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise ConfigError([f"{name}: cannot be read: {safe_text(reason)}"]) from None
+    if content.startswith(RESULT_MAGIC):
+        raise ConfigError([f"{name}: {file_hint(path, content)}"])
     if len(content) > most:
         raise ConfigError([f"{name}: larger than {most:,} bytes"])
     try:

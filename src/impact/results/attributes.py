@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
+from pydantic import BaseModel, ConfigDict, NonNegativeInt, TypeAdapter, ValidationError
 
 from ..errors import ResultError
 from ..text import safe_text
@@ -22,6 +22,28 @@ class PluginRecord(BaseModel):
     package: str | None = None
 
 
+class SummaryRecord(BaseModel):
+    """The summary of all points that a large factored file contains; numbers that are NaN are null.
+
+    Parameters
+    ----------
+    status : number of points by name of the status
+    not_evaluated : number of points whose status was not evaluated
+    worst : the largest absolute value of each error, by key of the model
+    failed_at : the first points that failed: name of the status, key of the model, index along the axes
+    extremes : the smallest and the largest value of each variable, and the number of points without a value; null
+        if not evaluated
+    """
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+    status: dict[str, NonNegativeInt]
+    not_evaluated: NonNegativeInt
+    worst: dict[str, dict[str, float | None]]
+    failed_at: list[tuple[str, str, list[NonNegativeInt]]]
+    extremes: dict[str, tuple[float | None, float | None, NonNegativeInt] | None]
+
+
 ATTRIBUTE_TYPES: Mapping[str, Any] = {
     "axes": list[str],
     "config_set": list[str],
@@ -34,6 +56,7 @@ ATTRIBUTE_TYPES: Mapping[str, Any] = {
     "materials": dict[str, dict[str, Any]],
     "packages": dict[str, Any],
     "plugins": dict[str, PluginRecord],
+    "summary": SummaryRecord,
     "tolerances": dict[str, Any],
 }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import stat
 import warnings
@@ -17,16 +18,18 @@ from numpy.typing import NDArray
 from xarray.backends import BackendEntrypoint
 
 from ..atomic import Sink, atomic_write
+from ..config.files import RESULT_MAGIC
 from ..config.tables import Output
 from ..errors import ResultError, UnfinishedError, UsageError
 from ..text import safe_text
 from .expand import TrajectoryTable, in_memory, lazy_dataset
 from .factored import check_witnesses, stored_table, witness_variables
+from .hdf5_structure import ReadBytes, byte_reader, check_root
 from .netcdf import StoredArray, open_for_writing, read_variables
 from .schema import SCHEMA
-from .seal import MAGIC, check_seal, write_seal
+from .seal import check_seal, write_seal
 from .slabs import slabs
-from .validation import TABLE_VARIABLES, is_quantity, schema_violation
+from .validation import FACTORED_ATTRIBUTES, TABLE_VARIABLES, is_quantity, schema_violation
 
 DEFAULT_OUTPUT = Output()
 # larger results are not loaded into memory
@@ -193,8 +196,10 @@ def save_with_attributes(source: Path, path: Path, attributes: Mapping[str, str]
 def check_readable(sink: Sink, path: Path) -> None:
     """Refuse a file that `open_result` would refuse, before it gets its name."""
     try:
+        read = byte_reader(sink)
+        check_root(read)
         with h5py.File(sink, "r") as file:
-            read_variables(file)
+            read_variables(file, read)
     except ResultError as error:
         raise UsageError(f"{safe_text(str(path))}: could not be read again: {error}") from None
 
@@ -223,29 +228,32 @@ def open_with_table(path: str | Path) -> tuple[xr.Dataset, TrajectoryTable | Non
     """Open a result, and the trajectory table of a factored file."""
     path = Path(path)
     shown = safe_text(str(path))
-    try:
-        seal = check_seal(path)
-        # opened by its path: a signal that arrives while h5py calls a Python stream is lost
-        file = h5py.File(path, "r", driver="sec2")
-    except ResultError as error:
-        raise ResultError(f"{shown}: {error}") from None
-    except OSError as error:
-        raise ResultError(f"{shown}: is not a readable result ({safe_text(str(error), 80)})") from error
-    try:
-        dataset, table, unknown = _read_dataset(file)
-        violation = schema_violation(dataset)
-        if violation:
-            raise ResultError(f"is not a readable result ({violation})")
-    except ResultError as error:
-        file.close()
-        raise _with_file_name(shown, error) from None
-    except MemoryError:
-        file.close()
-        raise
-    except Exception as error:
-        file.close()
-        # h5py and xarray raise almost any exception on a malformed file
-        raise ResultError(f"{shown}: is not a readable result ({safe_text(str(error), 80)})") from error
+    with contextlib.ExitStack() as opened:
+        try:
+            seal = check_seal(path)
+            read = byte_reader(opened.enter_context(path.open("rb")))
+            check_root(read)
+            # opened by its path: a signal that arrives while h5py calls a Python stream is lost
+            file = h5py.File(path, "r", driver="sec2")
+        except ResultError as error:
+            raise ResultError(f"{shown}: {error}") from None
+        except OSError as error:
+            raise ResultError(f"{shown}: is not a readable result ({safe_text(str(error), 80)})") from error
+        try:
+            dataset, table, unknown = _read_dataset(file, read)
+            violation = schema_violation(dataset)
+            if violation:
+                raise ResultError(f"is not a readable result ({violation})")
+        except ResultError as error:
+            file.close()
+            raise _with_file_name(shown, error) from None
+        except MemoryError:
+            file.close()
+            raise
+        except Exception as error:
+            file.close()
+            # h5py and xarray raise almost any exception on a malformed file
+            raise ResultError(f"{shown}: is not a readable result ({safe_text(str(error), 80)})") from error
     if unknown:
         names = safe_text(", ".join(unknown))
         warnings.warn(f"{shown}: ignored variables that are not part of a result: {names}", stacklevel=2)
@@ -293,9 +301,9 @@ def load(path: str | Path) -> xr.Dataset:
             raise ResultError(f"{shown}: is not a readable result ({safe_text(str(error), 80)})") from error
 
 
-def _read_dataset(file: h5py.File) -> tuple[xr.Dataset, TrajectoryTable | None, tuple[str, ...]]:
+def _read_dataset(file: h5py.File, read: ReadBytes) -> tuple[xr.Dataset, TrajectoryTable | None, tuple[str, ...]]:
     """The dataset in a file, its trajectory table if it has one, and names that are not part of a result."""
-    variables, attributes, unknown = read_variables(file)
+    variables, attributes, unknown = read_variables(file, read)
     dims = {name: tuple(map(str, variable.dims)) for name, variable in variables.items()}
     coordinate_names = [name for name in variables if not is_quantity(name, dims[name])]
     table_names = {name for name in variables if name in TABLE_VARIABLES}
@@ -310,11 +318,16 @@ def _read_dataset(file: h5py.File) -> tuple[xr.Dataset, TrajectoryTable | None, 
 
     arrays = {name: StoredArray(name, file[name]) for name in table_names}
     sizes = {name: array.shape[0] for name, array in arrays.items()}
-    trajectory_table = stored_table(stored, sizes, lambda name, part: arrays[name].read((part,)))
+    trajectory_table = stored_table(
+        stored,
+        sizes,
+        lambda name, part: arrays[name].read((part,)),
+        lambda name, rows: arrays[name].take(rows),
+    )
     quantities = witness_variables(stored)
     check_witnesses(trajectory_table, quantities, stored)
     template = stored.drop_vars(witnesses).drop_attrs(deep=False)
-    dataset_attributes = {name: value for name, value in attributes.items() if name not in ("axes", "laws")}
+    dataset_attributes = {name: value for name, value in attributes.items() if name not in FACTORED_ATTRIBUTES}
     dataset = lazy_dataset(template.assign_attrs(dataset_attributes), trajectory_table, quantities)
     dataset.encoding = {"layout": "factored"}
     return dataset, trajectory_table, unknown
@@ -341,6 +354,6 @@ class ImpactBackend(BackendEntrypoint):
             if not path.is_file():
                 return False
             with path.open("rb") as file:
-                return file.read(len(MAGIC)) == MAGIC
+                return file.read(len(RESULT_MAGIC)) == RESULT_MAGIC
         except (OSError, TypeError, ValueError):
             return False

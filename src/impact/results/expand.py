@@ -30,11 +30,14 @@ from ..contact.status import Status
 from ..engine.build_impacts import Stiffness, build_impacts, has_stiffness_rule
 from ..engine.plan import Index, Inputs, Plan, dimensions, owner_of
 from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryMap, axes_of_arrays, even_size, probe_index
+from .attributes import SummaryRecord
 from .schema import SchemaVariable, attributes_of
 from .slabs import ORIGINAL_DIMS, VARIES_ALONG, aligned_slabs, slabs
 
 # a law's rule of K is evaluated as a whole, and stored in a file, up to this many values
 MAX_STIFFNESS_VALUES = 10**6
+# rows that are read one by one: fewer than one of this many
+FEW_ROWS = 100
 # magnitudes within these limits are far from overflow and underflow, whatever the rounding
 SAFE_MAGNITUDES = (1e-250, 1e250)
 # at most this many bytes are computed or read by one indexing operation
@@ -50,17 +53,23 @@ class TrajectoryRows:
     maps : by model, the trajectory of each cell
     read : returns the trajectories of a model from a start to a stop: `read(model, start, stop)`
     segment : how many trajectories are read at a time, at most
+    pick : returns a few trajectories of a model by their increasing row numbers; None if trajectories are read in
+        segments only
     """
 
     maps: Sequence[TrajectoryMap]
     read: Callable[[int, int, int], CollisionResult]
     segment: int = RANGE_TRAJECTORIES
+    pick: Callable[[int, NDArray[np.intp]], CollisionResult] | None = None
     # all trajectories of the model that was read last, if its cells share them
     _whole: dict[int, CollisionResult] = field(default_factory=dict)
 
     def take(self, model: int, rows: NDArray[np.intp]) -> CollisionResult:
         """Trajectories of a model by their row numbers; arrays of the shape of `rows`."""
         trajectory_map = self.maps[model]
+        if self.pick is not None and model not in self._whole and rows.size < trajectory_map.count // FEW_ROWS:
+            distinct, position = np.unique(rows, return_inverse=True)
+            return self.pick(model, distinct).take(position.reshape(rows.shape))
         if not trajectory_map.is_shared:
             flat = self._segments(model, rows.reshape(-1))
             return flat.take(np.arange(rows.size).reshape(rows.shape))
@@ -94,6 +103,7 @@ class TrajectoryTable:
     maps : by model, the trajectory of each cell
     rows : the trajectories
     stiffness : K of each law that has a rule for it but no formula (a law of a file); None otherwise
+    summary : of all points, if the file contains one
     """
 
     inputs: Inputs
@@ -101,6 +111,7 @@ class TrajectoryTable:
     maps: tuple[TrajectoryMap, ...]
     rows: TrajectoryRows
     stiffness: tuple[Stiffness | None, ...]
+    summary: SummaryRecord | None = None
 
     @cached_property
     def checks(self) -> tuple[frozenset[str], ...]:
@@ -287,6 +298,15 @@ class ExpandedArray(BackendArray):
                 )
         selected = tuple(0 if isinstance(part, int | np.integer) else slice(None) for part in key)
         return np.asarray(values[selected])
+
+
+def summary_of_variable(variable: xr.Variable) -> SummaryRecord | None:
+    """The summary in the file of a variable, if it has one and the variable is not a selection."""
+    data = variable._data
+    if not isinstance(data, indexing.LazilyIndexedArray) or not isinstance(data.array, ExpandedArray):
+        return None
+    is_whole = all(isinstance(part, slice) and part == slice(None) for part in data.key.tuple)
+    return data.array.table.summary if is_whole else None
 
 
 def _without_dummy_axis(values: NDArray[Any], where: tuple[slice, ...]) -> NDArray[Any]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+import operator
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -23,21 +24,23 @@ from ..contact.formula import Formula
 from ..contact.materials import Material
 from ..contact.model import Law, Parameter
 from ..contact.simulate import TABLE_COLUMNS, CollisionResult
-from ..contact.status import STATUSES
+from ..contact.status import STATUSES, Status
 from ..engine.build_impacts import Stiffness, has_stiffness_rule, mass_at, values_at
 from ..engine.plan import Index, Inputs
 from ..engine.trajectories import TrajectoryMap
 from ..errors import ResultError, UsageError
 from ..formatting import number
 from ..text import safe_text
-from .attributes import read_attribute
+from .attributes import SummaryRecord, read_attribute
 from .expand import MAX_STIFFNESS_VALUES, TrajectoryRows, TrajectoryTable, expand, whole_stiffness
-from .schema import SCHEMA, SchemaVariable, attributes_of, derived_names, is_input, scale_of
+from .schema import SCHEMA, SchemaVariable, attributes_of, count_points, derived_names, is_input, scale_of
 
 N_WITNESSES = 1_000
 # tolerance of a witness, relative to the scale that `compare` uses for its variable
 WITNESS_TOLERANCE = 1e-12
 SLAB_ROWS = 2**16
+# by the bits of a status, whether it is one
+IS_STATUS = np.isin(np.arange(2**8), STATUSES)
 # fields of a law in the JSON attribute `laws`, and their types
 LAW_FIELD_TYPES: Mapping[str, type] = {
     "parameters": list,
@@ -50,6 +53,7 @@ LAW_FIELD_TYPES: Mapping[str, type] = {
 }
 
 ReadVariable = Callable[[str, slice], NDArray[Any]]
+TakeRows = Callable[[str, NDArray[np.intp]], NDArray[Any]]
 
 
 @dataclass(frozen=True)
@@ -225,7 +229,9 @@ def _unravel_cells(inputs: Inputs, cells: NDArray[np.int64]) -> Index:
     return tuple(reversed(index))
 
 
-def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: ReadVariable) -> TrajectoryTable:
+def stored_table(
+    dataset: xr.Dataset, sizes: Mapping[str, int], read: ReadVariable, take: TakeRows
+) -> TrajectoryTable:
     """The trajectory table of a factored file.
 
     Parameters
@@ -233,6 +239,7 @@ def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: ReadVariab
     dataset : coordinates and attributes of the file
     sizes : lengths of the variables of the table
     read : returns a slice of a variable of the table: `read(name, slice)`
+    take : returns a few values of it at increasing positions: `take(name, rows)`
 
     Raises
     ------
@@ -286,14 +293,41 @@ def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: ReadVariab
         part = slice(starts[model] + start, starts[model] + stop)
         return CollisionResult(**{name: read(f"trajectory_{name}", part) for name in TABLE_COLUMNS})
 
-    return TrajectoryTable(inputs, tuple(stored), tuple(maps), TrajectoryRows(maps, read_rows), tuple(rules))
+    def pick_rows(model: int, rows: NDArray[np.intp]) -> CollisionResult:
+        return CollisionResult(
+            **{name: take(f"trajectory_{name}", starts[model] + rows) for name in TABLE_COLUMNS}
+        )
+
+    rows = TrajectoryRows(maps, read_rows, pick=pick_rows)
+    summary = read_attribute(dataset.attrs, "summary") or None
+    if summary is not None:
+        _check_summary(summary, dataset, inputs.shape)
+    return TrajectoryTable(inputs, tuple(stored), tuple(maps), rows, tuple(rules), summary)
+
+
+def _check_summary(summary: SummaryRecord, dataset: xr.Dataset, shape: tuple[int, ...]) -> None:
+    """Refuse a summary of other statuses, models or points than the result has."""
+    statuses = {*summary.status, *(status for status, _, _ in summary.failed_at)}
+    models = {
+        *(key for _, key, _ in summary.failed_at),
+        *(key for worst in summary.worst.values() for key in worst),
+    }
+    indices = [index for _, _, index in summary.failed_at]
+    points = sum(summary.status.values()) + summary.not_evaluated
+    if (
+        not statuses <= {status.name.lower() for status in Status}
+        or not models <= {*dataset["model"].values.tolist()}
+        or any(len(index) != len(shape) or any(map(operator.ge, index, shape)) for index in indices)
+        or ("witness_status" in dataset and points != count_points(dataset.coords.to_dataset()))
+    ):
+        raise ResultError("is not a readable result (summary: not that of its points)")
 
 
 def _check_trajectory_statuses(rows: int, read: ReadVariable) -> None:
     """Refuse unknown statuses, since the computed ones would be unknown as well."""
     for first in range(0, rows, SLAB_ROWS):
         values = read("trajectory_status", slice(first, min(first + SLAB_ROWS, rows)))
-        if values.dtype != np.int8 or not np.isin(np.unique(values), STATUSES).all():
+        if values.dtype != np.int8 or not IS_STATUS[values.view(np.uint8)].all():
             raise ValueError
 
 

@@ -17,7 +17,7 @@ import h5netcdf
 import h5py
 import numpy as np
 import xarray as xr
-from h5py import h5a, h5d, h5l, h5o, h5t, h5z
+from h5py import h5a, h5d, h5l, h5o, h5s, h5t, h5z
 from numpy.typing import NDArray
 from xarray.backends import BackendArray
 from xarray.core import indexing
@@ -27,6 +27,7 @@ from ..config.tables import Output
 from ..errors import ResultError
 from ..text import safe_text
 from .expand import check_memory
+from .hdf5_structure import ReadBytes, check_object
 from .schema import SCHEMA_VERSION
 from .seal import USER_BLOCK_BYTES
 from .validation import TABLE_VARIABLES, is_name
@@ -186,17 +187,47 @@ class StoredArray(BackendArray):
         ResultError : they cannot be read
         MemoryError : they take more memory than `check_memory` allows
         """
-        positions = [np.atleast_1d(np.arange(size)[part]) for size, part in zip(self.shape, key, strict=True)]
-        check_memory(self.name, tuple(part.size for part in positions), self.dtype)
+        # an array of all positions would take longer than to read a few values
+        positions = [
+            range(size)[part] if isinstance(part, slice) else np.atleast_1d(part)
+            for size, part in zip(self.shape, key, strict=True)
+        ]
+        return self._read(tuple(map(len, positions)), positions, lambda: np.asarray(self.dataset[key]))
+
+    def take(self, rows: NDArray[np.intp]) -> NDArray[Any]:
+        """Read a few values of a variable with one axis, at increasing positions.
+
+        Raises
+        ------
+        ResultError, MemoryError : see `read`
+        """
+
+        def read_points() -> NDArray[Any]:
+            values, space = np.empty(rows.size, self.dtype), self.dataset.id.get_space()
+            # a list of positions as a key of h5py takes ten times as long
+            space.select_elements(rows[:, np.newaxis].astype(np.uint64))
+            self.dataset.id.read(h5s.create_simple(values.shape), space, values)
+            return values
+
+        return self._read((rows.size,), [rows], read_points)
+
+    def _read(
+        self,
+        shape: tuple[int, ...],
+        positions: Sequence[range | NDArray[np.intp]],
+        read: Callable[[], NDArray[Any]],
+    ) -> NDArray[Any]:
+        """Read values of a shape at some positions along each axis, after the checks of memory and of chunks."""
+        check_memory(self.name, shape, self.dtype)
         try:
             self._check_chunks(positions)
-            return np.asarray(self.dataset[key])
+            return read()
         except (OSError, RuntimeError, ValueError, zlib.error) as error:
             path = safe_text(str(self.dataset.file.filename)) if self.dataset else "the result"
             reason = f"{safe_text(self.name, 40)}: {safe_text(str(error), 80)}"
             raise ResultError(f"{path}: is not a readable result ({reason})") from error
 
-    def _check_chunks(self, positions: Sequence[NDArray[np.intp]]) -> None:
+    def _check_chunks(self, positions: Sequence[range | NDArray[np.intp]]) -> None:
         """Check that the chunks of some values decompress to exactly their declared size.
 
         HDF5 decompresses a chunk to any size, and reads beyond the end of a chunk that is too short.
@@ -205,7 +236,8 @@ class StoredArray(BackendArray):
             return
         chunks = self.dataset.chunks
         size = math.prod(chunks) * self.dtype.itemsize
-        for corner in product(*(np.unique(p // c * c).tolist() for p, c in zip(positions, chunks, strict=True))):
+        starts = (np.unique(np.asarray(p) // c * c).tolist() for p, c in zip(positions, chunks, strict=True))
+        for corner in product(*starts):
             if corner not in self._checked:
                 unfiltered, packed = self.dataset.id.read_direct_chunk(corner)
                 if unfiltered or len(zlib.decompressobj().decompress(packed, size + 1)) != size:
@@ -213,19 +245,22 @@ class StoredArray(BackendArray):
                 self._checked.add(corner)
 
 
-def read_variables(file: h5py.File) -> tuple[dict[str, xr.Variable], dict[str, object], tuple[str, ...]]:
-    """Variables, attributes, and names that are not part of a result, of a file with a valid seal.
+def read_variables(
+    file: h5py.File, read: ReadBytes
+) -> tuple[dict[str, xr.Variable], dict[str, object], tuple[str, ...]]:
+    """Variables, attributes, and names that are not part of a result, of a file with a valid seal and root.
 
     Numbers are read when they are indexed, as they are stored: attributes for scales, fill values and times are
-    ignored.
+    ignored. `read` reads the same file, see `impact.results.hdf5_structure`.
 
     Raises
     ------
     ResultError : its structure is not that of a result
     """
     _check_schema_version(file)
-    datasets = {name: h5py.Dataset(dataset) for name, dataset in _open_datasets(file).items()}
-    dims = _check_sizes(file, datasets)
+    opened, stored_chunks = _open_datasets(file, read)
+    datasets = {name: h5py.Dataset(dataset) for name, dataset in opened.items()}
+    dims = _check_sizes(file, datasets, stored_chunks)
     accepted = {name: dataset for name, dataset in datasets.items() if is_name(name)}
     # a dimension without coordinates is a dataset in the file as well
     unknown = [
@@ -269,12 +304,16 @@ def _check_schema_version(file: h5py.File) -> None:
         raise ResultError(f"has schema version {version}, this program reads {SCHEMA_VERSION}")
 
 
-def _open_datasets(file: h5py.File) -> dict[str, h5d.DatasetID]:
-    """The datasets of the file, by name; only hard links, each to another object, are followed."""
+def _open_datasets(file: h5py.File, read: ReadBytes) -> tuple[dict[str, h5d.DatasetID], dict[str, int | None]]:
+    """The datasets of the file and the numbers of their stored chunks, by name.
+
+    Only hard links, each to another object, are followed, after a check of the object.
+    """
     root = file.id
     if root.get_num_objs() > MAX_DATASETS:
         raise _unreadable(f"more than {MAX_DATASETS:,} datasets")
     datasets: dict[str, h5d.DatasetID] = {}
+    stored_chunks: dict[str, int | None] = {}
     objects = set()
     for link in root:
         name = link.decode(errors="surrogateescape")
@@ -282,15 +321,18 @@ def _open_datasets(file: h5py.File) -> dict[str, h5d.DatasetID]:
         if info.type != h5l.TYPE_HARD:
             raise _unreadable("not a hard link", name)
         objects.add(info.u)
+        stored_chunks[name] = check_object(read, info.u, name)
         datasets[name] = h5o.open(root, link)
         if not isinstance(datasets[name], h5d.DatasetID):
             raise _unreadable("not a dataset", name)
     if len(objects) < len(datasets):
         raise _unreadable("a dataset with two names")
-    return datasets
+    return datasets, stored_chunks
 
 
-def _check_sizes(file: h5py.File, datasets: Mapping[str, h5py.Dataset]) -> dict[str, tuple[str, ...]]:
+def _check_sizes(
+    file: h5py.File, datasets: Mapping[str, h5py.Dataset], stored_chunks: Mapping[str, int | None]
+) -> dict[str, tuple[str, ...]]:
     """The dimensions of each dataset, after a check that the file itself holds all data."""
     size = file.id.get_filesize()
     chunks = compressed = plain = text = 0
@@ -311,7 +353,7 @@ def _check_sizes(file: h5py.File, datasets: Mapping[str, h5py.Dataset]) -> dict[
     missing = [
         name
         for name, dataset in datasets.items()
-        if dataset.chunks and dataset.id.get_num_chunks() != _count_chunks(dataset)
+        if dataset.chunks and stored_chunks[name] != _count_chunks(dataset)
     ]
     if missing:
         raise _unreadable("declares data that the file does not contain", missing[0])

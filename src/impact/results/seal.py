@@ -12,12 +12,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from ..config.files import RESULT_MAGIC, file_hint
 from ..errors import ResultError
 from .schema import SCHEMA_VERSION
 
 # bytes at the start of an HDF5 file that the format leaves to applications: its "user block"
 USER_BLOCK_BYTES = 512
-MAGIC = b"impact result\n"
+# bytes of another file by which its kind is recognised
+HINT_BYTES = 2**16
 HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 SWEEP_AGAIN = "sweep its config again: impact sweep CONFIG.toml -o RESULT --overwrite"
 
@@ -28,7 +30,9 @@ def render_header(seal: str) -> bytes:
     >>> render_header("0" * 64)[:24], len(render_header("0" * 64))
     (b'impact result\\nschema 2\\ns', 512)
     """
-    return MAGIC + f"schema {SCHEMA_VERSION}\nsha256 {seal}\n".encode().ljust(USER_BLOCK_BYTES - len(MAGIC), b"\0")
+    return RESULT_MAGIC + f"schema {SCHEMA_VERSION}\nsha256 {seal}\n".encode().ljust(
+        USER_BLOCK_BYTES - len(RESULT_MAGIC), b"\0"
+    )
 
 
 def write_seal(file: Any) -> str:
@@ -52,9 +56,12 @@ def check_seal(path: Path) -> str:
             raise ResultError(
                 f"is of schema version 1, or no result of impact; expected version {SCHEMA_VERSION}: {SWEEP_AGAIN}"
             )
-        if not header.startswith(MAGIC):
-            raise ResultError("is not a readable result (it does not begin with the header of a sealed file)")
-        version = header[len(MAGIC) :].partition(b"\n")[0].removeprefix(b"schema ")
+        if not header.startswith(RESULT_MAGIC):
+            hint = file_hint(path, header + file.read(HINT_BYTES))
+            raise ResultError(
+                hint or "is not a readable result (it does not begin with the header of a sealed file)"
+            )
+        version = header[len(RESULT_MAGIC) :].partition(b"\n")[0].removeprefix(b"schema ")
         if version.isdigit() and int(version) != SCHEMA_VERSION and len(version) < 5:
             raise ResultError(
                 f"has schema version {int(version)}, this program reads {SCHEMA_VERSION}; {SWEEP_AGAIN}"
@@ -70,7 +77,7 @@ def is_result(path: Path) -> bool:
     if not path.is_file():
         return False
     with path.open("rb") as file:
-        return file.read(len(MAGIC)).startswith((MAGIC, HDF5_MAGIC))
+        return file.read(len(RESULT_MAGIC)).startswith((RESULT_MAGIC, HDF5_MAGIC))
 
 
 @contextmanager

@@ -22,6 +22,8 @@ SELECTION_RTOL = 1e-9
 # relative tolerance of equal labels: powers and logarithms of ranges differ in their last bits between processors
 LABEL_RTOL = 1e-12
 NUMBER_DTYPE_KINDS = "fiu"
+# values of an axis that a message lists
+MAX_LISTED_VALUES = 8
 
 Labels = NDArray[Any]
 IndexArray = NDArray[np.intp]
@@ -64,9 +66,8 @@ def select(dataset: xr.Dataset, sel: Mapping[str, float | str]) -> xr.Dataset:
         if dim in masks and same.any():
             same &= masks[dim]
         if not same.any():
-            shown = ", ".join(label(value_of_axis) for value_of_axis in values[:8].tolist())
-            has = safe_text(shown + (", ..." if values.size > 8 else ""))
-            raise UsageError(f"no {safe_text(f'{name} = {value}')} in this result; {safe_text(name)} is {has}")
+            shown = safe_text(_nearest_values(name, values, value))
+            raise UsageError(f"no {safe_text(f'{name} = {value}')} in this result; {shown}")
         masks[dim] = same
     return dataset.isel({dim: _matching_positions(dataset[dim], same) for dim, same in masks.items()})
 
@@ -83,6 +84,18 @@ def _matches_value(values: np.ndarray, value: float | str) -> Mask:
         return np.asarray(values.astype(str) == str(value))
     number = _as_number(value)
     return np.asarray(np.isclose(values, np.nan if number is None else number, rtol=SELECTION_RTOL, atol=0.0))
+
+
+def _nearest_values(name: str, values: np.ndarray, value: float | str) -> str:
+    """A clause with the values of an axis if they are few, the next ones to a number, or the first."""
+    number = _as_number(value) if values.dtype.kind in NUMBER_DTYPE_KINDS else None
+    if number is None or np.isnan(number) or values.size <= MAX_LISTED_VALUES:
+        shown = ", ".join(map(label, values[:MAX_LISTED_VALUES].tolist()))
+        return f"{name} is {shown}{', ...' if values.size > MAX_LISTED_VALUES else ''}"
+    distinct = np.unique(values)
+    below = int(np.clip(np.searchsorted(distinct, number) - 1, 0, max(distinct.size - 2, 0)))
+    nearest = distinct[below : below + 2]
+    return f"the nearest are {' and '.join(map(label, nearest.tolist()))}"
 
 
 def _as_number(value: float | str) -> float | None:

@@ -12,6 +12,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ..contact.status import FIRST_FAILURE, Status
+from .attributes import SummaryRecord
+from .expand import TrajectoryTable, expand, summary_of_variable
 from .kinds import is_calibration, is_sensitivity
 from .schema import count_points, parts_of_models
 from .slabs import MAX_SUMMARY_POINTS, distinct_points, is_computed, slabs
@@ -121,8 +123,18 @@ def summarize(
         along each axis on which the status does not vary
     max_points : limit for a computed variable of one model
     """
-    summary = Summary(max_failed_at=max_failed_at)
     names = [name for name in ("status", *ERROR_VARIABLES) if name in dataset]
+    record = _common_record(dataset, names)
+    if (
+        record is not None
+        and max_points == MAX_SUMMARY_POINTS
+        and (
+            # it lists all failures, or as many as required
+            len(record.failed_at) < MAX_FAILED_AT or max_failed_at <= MAX_FAILED_AT
+        )
+    ):
+        return _stored_summary(record, dataset, names, max_failed_at)
+    summary = Summary(max_failed_at=max_failed_at)
     for model, of_model in enumerate(parts_of_models(dataset)):
         for name in names:
             variable, weight = distinct_points(of_model, name)
@@ -139,9 +151,21 @@ def summarize(
 class Extremes(NamedTuple):
     """The smallest and the largest finite value, NaN if there is none, and the number of other values."""
 
-    smallest: float
-    largest: float
-    missing: int
+    smallest: float = math.nan
+    largest: float = math.nan
+    missing: int = 0
+
+    def add(self, values: NDArray[Any], weight: int) -> Extremes:
+        """The extremes of more values, each of which counts as often as `weight`."""
+        smallest, largest = values.min(), values.max()
+        missing = 0
+        if not (np.isfinite(smallest) and np.isfinite(largest)):
+            finite = values[np.isfinite(values)]
+            missing = weight * (values.size - finite.size)
+            smallest, largest = (finite.min(), finite.max()) if finite.size else (np.nan, np.nan)
+        return Extremes(
+            float(np.fmin(self.smallest, smallest)), float(np.fmax(self.largest, largest)), self.missing + missing
+        )
 
 
 def extremes_of(dataset: xr.Dataset, name: str) -> Extremes | None:
@@ -149,21 +173,128 @@ def extremes_of(dataset: xr.Dataset, name: str) -> Extremes | None:
 
     None for a computed variable that varies over more than `MAX_SUMMARY_POINTS` points of all models together.
     """
+    record = summary_of_variable(dataset.variables[name])
+    if record is not None and name in record.extremes:
+        stored = record.extremes[name]
+        return stored and Extremes(_from_json(stored[0]), _from_json(stored[1]), stored[2])
+    parts = _distinct_parts(dataset, name)
+    if parts is None:
+        return None
+    extremes = Extremes()
+    for variable, weight in parts:
+        for where in slabs(variable.sizes):
+            extremes = extremes.add(variable.isel(where).values, weight)
+    return extremes
+
+
+def _distinct_parts(dataset: xr.Dataset, name: str) -> list[tuple[xr.Variable, int]] | None:
+    """The distinct points of a variable of each model, and their weights; None if they are too many."""
     of_models = parts_of_models(dataset) if "model" in dataset.variables[name].dims else (dataset,)
     parts = [distinct_points(part, name) for part in of_models]
     evaluations = sum(variable.size for variable, _ in parts)
-    if evaluations > MAX_SUMMARY_POINTS and is_computed(dataset.variables[name]):
-        return None
-    smallest, largest, missing = math.nan, math.nan, 0
-    for variable, weight in parts:
-        for where in slabs(variable.sizes):
-            values = variable.isel(where).values
-            finite = values[np.isfinite(values)]
-            missing += weight * (values.size - finite.size)
-            if finite.size:
-                smallest = float(np.fmin(smallest, finite.min()))
-                largest = float(np.fmax(largest, finite.max()))
-    return Extremes(smallest, largest, missing)
+    return None if evaluations > MAX_SUMMARY_POINTS and is_computed(dataset.variables[name]) else parts
+
+
+def summarize_table(dataset: xr.Dataset, table: TrajectoryTable) -> tuple[Summary, dict[str, Extremes | None]]:
+    """The results of `summarize` and of `extremes_of` for all variables of a table that is not in a file yet.
+
+    Variables that vary along the same axes are evaluated together: they share most of the computation.
+
+    Parameters
+    ----------
+    dataset : see `impact.results.expand.lazy_dataset`
+    table : of the sweep
+    """
+    summary, extremes = Summary(), dict[str, Extremes | None]()
+    axes = [axis.name for axis in table.inputs.axes]
+    # by model and by the sizes of the axes along which they vary: the weight of a point, and names of variables
+    groups: dict[tuple[int, tuple[int, ...]], tuple[int, list[str]]] = {}
+    for name in map(str, dataset.data_vars):
+        parts = _distinct_parts(dataset, name)
+        extremes[name] = None if parts is None else Extremes()
+        of_models = parts or [distinct_points(part, name) for part in parts_of_models(dataset)]
+        for model, (variable, weight) in enumerate(of_models):
+            is_judged = name == "status" or name in ERROR_VARIABLES
+            if parts is not None or (is_judged and variable.size <= MAX_SUMMARY_POINTS):
+                sizes = tuple(variable.sizes[axis] for axis in axes)
+                groups.setdefault((model, sizes), (weight, []))[1].append(name)
+            elif name == "status":
+                summary.points += weight * variable.size
+                summary.not_counted += weight * variable.size
+    for (model, shape), (weight, names) in sorted(groups.items(), key=lambda item: item[0]):
+        for slab in slabs(dict(enumerate(shape))):
+            where = tuple(slab.values())
+            size = tuple(part.stop - part.start for part in where)
+            values = {
+                name: np.broadcast_to(
+                    np.asarray(array, dataset[name].dtype).reshape(array.shape if where else ()), size
+                )
+                for name, array in expand(table, model, table.inputs.index(where), names).items()
+            }
+            summary.add(values, model, [part.start for part in where], weight=weight)
+            for name, array in values.items():
+                so_far = extremes[name]
+                extremes[name] = so_far and so_far.add(array, weight)
+    return summary, extremes
+
+
+def summary_record(
+    summary: Summary, extremes: Mapping[str, Extremes | None], dataset: xr.Dataset
+) -> SummaryRecord:
+    """The summary of a result as it is stored."""
+    keys = dataset["model"].values.tolist()
+    return SummaryRecord(
+        status=counts_by_name(summary.counts),
+        not_evaluated=summary.not_counted,
+        worst={
+            name: {key: _to_json(largest) for key, largest in by_model.items()}
+            for name, by_model in worst_by_model(summary, dataset).items()
+        },
+        failed_at=[(status.name.lower(), keys[model], [*index]) for status, model, index in summary.failed_at],
+        extremes={
+            name: of_all and (_to_json(of_all.smallest), _to_json(of_all.largest), of_all.missing)
+            for name, of_all in extremes.items()
+        },
+    )
+
+
+def _common_record(dataset: xr.Dataset, names: Sequence[str]) -> SummaryRecord | None:
+    """The summary in the file of some variables, if it has one and none of them is a selection."""
+    records = [summary_of_variable(dataset.variables[name]) for name in names]
+    return records[0] if records and all(record is records[0] for record in records) else None
+
+
+def _stored_summary(
+    record: SummaryRecord, dataset: xr.Dataset, names: Sequence[str], max_failed_at: int
+) -> Summary:
+    """The summary of some variables, as stored in the file of a dataset."""
+    keys = dataset["model"].values.tolist()
+    counts = {Status[name.upper()]: count for name, count in record.status.items()}
+    has_status = "status" in names
+    return Summary(
+        points=has_status * (sum(counts.values()) + record.not_evaluated),
+        counts=counts if has_status else {},
+        worst={
+            name: {keys.index(key): _from_json(largest) for key, largest in record.worst[name].items()}
+            for name in names
+            if name in record.worst
+        },
+        failed_at=[
+            (Status[name.upper()], keys.index(key), tuple(index))
+            for name, key, index in record.failed_at
+            if has_status
+        ][:max_failed_at],
+        max_failed_at=max_failed_at,
+        not_counted=has_status * record.not_evaluated,
+    )
+
+
+def _to_json(value: float) -> float | None:
+    return None if math.isnan(value) else value
+
+
+def _from_json(value: float | None) -> float:
+    return math.nan if value is None else value
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,7 @@ from .expand import TrajectoryTable, expanded_slabs, in_memory, lazy_dataset, ta
 from .factored import check_factored, factored_template, table_values
 from .netcdf import MAX_LABEL_BYTES, encode_text, is_text
 from .schema import SchemaVariable, dataset_template, plan_coordinates, stored_variables
-from .summary import Summary, SweepOutcome, summarize
+from .summary import Summary, SweepOutcome, summarize, summarize_table, summary_record
 from .validation import is_name
 
 # approximate bytes of a result besides its values
@@ -343,13 +343,18 @@ def store_result(
 
     is_full = plan.layout == "full"
     template = whole if is_full else factored_template(whole, table, variables)
+    if not is_full:
+        whole = lazy_dataset(whole, table, variables)
+        if plan.stored_points <= NO_CHECKPOINT_POINTS:
+            summary = _summarize_points(table, variables)
+        else:
+            # stored, since a reader would take long to compute it
+            summary, extremes = summarize_table(whole, table)
+            record = summary_record(summary, extremes, whole)
+            template = template.assign_attrs(summary=record.model_dump_json())
     with atomic_write(output, overwrite=overwrite, part=part) as sink:
         seal = write_sealed(sink, template, full() if is_full else factored(), plan.config.output)
         check_readable(sink, output)
-    if not is_full:
-        whole = lazy_dataset(whole, table, variables)
-        is_small = plan.stored_points <= NO_CHECKPOINT_POINTS
-        summary = _summarize_points(table, variables) if is_small else summarize(whole)
     whole.encoding = {"source": str(output), "seal": seal, "layout": plan.layout}
     return SweepOutcome(whole, summary, at.of_trajectories)
 

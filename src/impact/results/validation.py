@@ -80,7 +80,7 @@ def is_quantity(name: str, axes: tuple[str, ...]) -> bool:
 TEXT_ATTRIBUTES = ("title", "config", "config_set", "fingerprint", "impact_version", "packages", "plugins")
 NUMBER_ATTRIBUTES = ("rtol", "max_steps")
 # attributes of factored files, which a dataset does not have
-FACTORED_ATTRIBUTES = ("laws", "axes")
+FACTORED_ATTRIBUTES = ("laws", "axes", "summary")
 # statuses that are checked at a time
 STATUS_SLAB_POINTS = 2**22
 # by name of a variable of a result
