@@ -231,6 +231,25 @@ def test_the_action_installs_and_compares(tmp_path: Path) -> None:
     assert failed.stdout.startswith(start)
 
 
+def test_the_action_executes_no_module_of_the_checkout(tmp_path: Path) -> None:
+    (tmp_path / "contact.toml").write_text(CONTACT, encoding="utf-8")
+    imported = tmp_path / "imported"
+    for name in ("pip", "impact", "typer", "numpy"):
+        (tmp_path / f"{name}.py").write_text(f"open({str(imported)!r}, 'w')\n", encoding="utf-8")
+    run([sys.executable, "-m", "pip"], tmp_path)
+    assert imported.exists()
+    imported.unlink()
+    # pip finds no package and fails; the other steps do not need it
+    inputs = {"config": "contact.toml", "baseline": "impact-new.h5", "plot": "", "version": "0"}
+    (name, script, variables), *others = action_steps(inputs)
+    assert name == "Install impact"
+    assert run(["bash", "-c", script], tmp_path, PYTHONPATH="", PIP_NO_INDEX="1", **variables).returncode == 1
+    for _, script, variables in others:
+        done = run(["bash", "-c", script], tmp_path, GITHUB_STEP_SUMMARY="", **variables)
+        assert done.returncode == 0, done.stderr
+    assert not imported.exists()
+
+
 @pytest.mark.slow
 def test_the_action_sweeps_and_reports_a_difference(tmp_path: Path) -> None:
     (tmp_path / "contact.toml").write_text(CONTACT, encoding="utf-8")
