@@ -78,7 +78,8 @@ def test_a_stored_config_needs_no_file(folder: Path) -> None:
         ("v1 [m/s], e_out\n1, nan\n", "drops.csv:2: e_out: got nan, expected a number from 0 to 1"),
         ("v1 [m/s], e_out\n1,\n", "drops.csv:2: e_out:"),
         ("v1 [m/s], eout\n1, 0.5\n", 'drops.csv:1: eout: no such input or output; did you mean "e_out"?'),
-        ("v1 [m/s], e_out, sigma\n1, 0.5, 0\n", "drops.csv:2: sigma: got 0.0, expected a number > 0"),
+        ("v1 [m/s], e_out, sigma\n1, 0.5, 0\n", "drops.csv:2: sigma: got 0.0, expected a number >= 1e-30"),
+        ("v1 [m/s], e_out, sigma\n1, 0.5, 1e-160\n", "drops.csv:2: sigma: got 1e-160, expected a number >= 1e-30"),
         ("v1 [m/s], m1 [kg], e_out\n1, 1, 0.5\n", "drops.csv:1: m1: set together with sweep.m1"),
         ("v1 [m/s]\n1\n", "no column of an output"),
     ],
@@ -100,6 +101,11 @@ def test_a_wrong_table_is_refused_with_its_line(folder: Path, cli: Run, csv: str
         ('"1 us"', '"1 kg"', "model.kuwabara-kono-1987.A.fit"),
         ('m1 = "2.7 g"', "m1 = [1.0, 2.0]", "sweep.m1: got an axis"),
         ('file = "drops.csv"', 'file = "drops.csv"\nnoise = "white"', "data.noise"),
+        (
+            'file = "drops.csv"',
+            'file = "drops.csv"\nsigma = 1e-320',
+            "data.sigma: got 1e-320, expected a number >= 1e-30",
+        ),
         ('file = "drops.csv"', 'noise = "scale"', "data: got neither file nor columns"),
     ],
 )

@@ -30,12 +30,15 @@ def read_text(path: Path, kind: str = "TOML", most: int = MAX_CONFIG_BYTES) -> s
 
     Raises
     ------
-    ConfigError : it is not a regular file, cannot be read, is too large or is not UTF-8
+    ConfigError : it is not a regular file, is empty, cannot be read, is too large or is not UTF-8
     """
     name = safe_text(str(path))
     try:
         if path.exists() and not path.is_file():
             raise ConfigError([f"{name}: not a regular file, expected a {kind} file"])
+        # also a file of the system such as /proc/kmsg, of which reading might never end
+        if path.stat().st_size == 0:
+            raise ConfigError([f"{name}: empty, expected a {kind} file"])
         with path.open("rb") as file:
             content = file.read(most + 1)
     except (OSError, ValueError) as error:

@@ -221,8 +221,12 @@ class Output:
     ] = "auto"
 
 
-def _is_positive(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and 0.0 < value < math.inf
+# least standard deviation, in SI: squares of residuals over smaller ones overflow
+MIN_SIGMA = 1e-30
+
+
+def _is_deviation(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and MIN_SIGMA <= value < math.inf
 
 
 def _sigma(value: object) -> object:
@@ -232,13 +236,13 @@ def _sigma(value: object) -> object:
         raise value_error(
             'got a fit, expected noise = "scale", which estimates sigma, or "excess", which adds to it'
         )
-    if not all(isinstance(element, str) or _is_positive(element) for element in deviations):
+    if not all(isinstance(element, str) or _is_deviation(element) for element in deviations):
         raise mismatch_error(value, SIGMA_EXPECTED)
     return value
 
 
-SIGMA_EXPECTED = "a number > 0 in the unit of the output, or a list of one for each point"
-_Sigma: Any = Annotated[float, Field(gt=0.0)] | str
+SIGMA_EXPECTED = f"a number >= {MIN_SIGMA:g} in the unit of the output, or a list of one for each point"
+_Sigma: Any = Annotated[float, Field(ge=MIN_SIGMA)] | str
 
 
 def _data_schema(schema: dict[str, Any]) -> None:
