@@ -358,6 +358,13 @@ def _file_columns(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, str, str |
                 yield path, file, None
 
 
+def named_files(data: Mapping[str, Any]) -> list[str]:
+    """The names of all CSV files in the plain data of a config."""
+    names = [as_table(data.get("sweep")).get("cases"), as_table(data.get("data")).get("file")]
+    names += [file for _, file, _ in _file_columns(data)]
+    return list(dict.fromkeys(name for name in names if isinstance(name, str)))
+
+
 def expand_cases(
     data: Mapping[str, Any], models: Mapping[str, ForceModel]
 ) -> tuple[dict[str, Any], dict[str, str], list[ConfigProblem]]:
