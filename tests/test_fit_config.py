@@ -98,6 +98,11 @@ def test_a_wrong_table_is_refused_with_its_line(folder: Path, cli: Run, csv: str
         ("[0.05, 1]", "[1, 0.05]", "sweep.e.fit"),
         ("[0.05, 1]", "[0.05, 1.5]", "sweep.e.fit"),
         ("[0.05, 1]", "[0.05]", "sweep.e.fit"),
+        (
+            '"1 us", "1 ms"',
+            '"1e-200 s", "1e200 s"',
+            "A.fit: got 1e-200 to 1e+200, expected bounds that are closer",
+        ),
         ('"1 us"', '"1 kg"', "model.kuwabara-kono-1987.A.fit"),
         ('m1 = "2.7 g"', "m1 = [1.0, 2.0]", "sweep.m1: got an axis"),
         ('file = "drops.csv"', 'file = "drops.csv"\nnoise = "white"', "data.noise"),
