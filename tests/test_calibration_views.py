@@ -46,7 +46,11 @@ def test_without_a_varied_input_the_values_are_over_their_number() -> None:
     fit = impact.calibrate(FOLDER / "hdpe.toml", overrides=['models=["anagnostopoulos-1988"]', *QUICK])
     values, residuals = impact.plot(fit).axes
     assert residuals.get_xlabel() == "Number of the measured value"
-    assert values.containers[0].lines[0].get_xdata().tolist() == list(range(1, 51))
+    (bars,) = values.containers
+    assert bars.lines[0].get_xdata().tolist() == list(range(1, 51))
+    # with noise "scale" and no sigma, the standard deviation is that of the values
+    lengths = np.diff([segment[:, 1] for segment in bars.lines[2][0].get_segments()]).ravel()
+    np.testing.assert_allclose(lengths, 2.0 * fit["measured"].values.std(ddof=1), rtol=1e-6)
 
 
 def test_the_table_of_a_picture_has_curves_residuals_and_measured_values(

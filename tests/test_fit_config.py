@@ -74,14 +74,25 @@ def test_a_stored_config_needs_no_file(folder: Path) -> None:
         ("v1 [s], e_out\n1, 0.5\n", "drops.csv:1: v1: got [s], expected"),
         ("v1 [m/s], e_out [%]\n1, 50\n", "drops.csv:1: e_out: got [%], expected a fraction"),
         ("v1 [m/s], e_out\n1, 60%\n", "drops.csv:2: e_out: got"),
-        ("v1 [m/s], e_out\n1, 0.5\n2, 1.2\n", "drops.csv:3: e_out: got 1.2, expected a number from 0 to 1"),
-        ("v1 [m/s], e_out\n1, nan\n", "drops.csv:2: e_out: got nan, expected a number from 0 to 1"),
+        (
+            "v1 [m/s], e_out\n1, 0.5\n2, 60\n3, 55\n",
+            'drops.csv:3: e_out: got "60", expected a fraction, such as 0.6',
+        ),
+        ("v1 [m/s], e_out\n1, -0.6\n", "drops.csv:2: e_out: got -0.6, expected a number from -0.5 to 1.5"),
+        ("v1 [m/s], e_out\n1, nan\n", "drops.csv:2: e_out: got nan, expected a number from -0.5 to 1.5"),
         ("v1 [m/s], e_out\n1,\n", "drops.csv:2: e_out:"),
         ("v1 [m/s], eout\n1, 0.5\n", 'drops.csv:1: eout: no such input or output; did you mean "e_out"?'),
         ("v1 [m/s], e_out, sigma\n1, 0.5, 0\n", "drops.csv:2: sigma: got 0.0, expected a number >= 1e-30"),
         ("v1 [m/s], e_out, sigma\n1, 0.5, 1e-160\n", "drops.csv:2: sigma: got 1e-160, expected a number >= 1e-30"),
         ("v1 [m/s], m1 [kg], e_out\n1, 1, 0.5\n", "drops.csv:1: m1: set together with sweep.m1"),
         ("v1 [m/s]\n1\n", "no column of an output"),
+        (
+            "e_out, sigma, specimen\n0.5, 0.1, a\n0.4, 0.1,\n",
+            "drops.csv:3: specimen: got nothing, expected the name",
+        ),
+        ("e_out, sigma, specimen\n0.5, 0.1, a\n0.4, 0.1, a\n", "data: got one specimen, expected at least two"),
+        ("e_out, specimen\n0.5, a\n0.4, b\n", "standard deviations, expected a column sigma or the key sigma"),
+        ("v1 [m/s], e_out, specimn\n1, 0.5, a\n", 'specimn: no such input or output; did you mean "specimen"?'),
     ],
 )
 def test_a_wrong_table_is_refused_with_its_line(folder: Path, cli: Run, csv: str, message: str) -> None:
@@ -112,6 +123,8 @@ def test_a_wrong_table_is_refused_with_its_line(folder: Path, cli: Run, csv: str
             "data.sigma: got 1e-320, expected a number >= 1e-30",
         ),
         ('file = "drops.csv"', 'noise = "scale"', "data: got neither file nor columns"),
+        ('file = "drops.csv"', 'file = "drops.csv"\nloss = "square"', "data.loss"),
+        ('file = "drops.csv"', 'file = "drops.csv"\nloss = "huber"\nnoise = "scale"', "data.loss"),
     ],
 )
 def test_a_wrong_config_is_refused_with_its_line(folder: Path, old: str, new: str, message: str) -> None:

@@ -184,6 +184,7 @@ FIT_VALUES: dict[str, Any] = {
     "e": st.fixed_dictionaries({"fit": st.lists(DATA_NUMBERS, max_size=3) | DATA_NUMBERS}, optional={"x9": st.just(1)}),
     "sigma": DATA_NUMBERS | st.lists(DATA_NUMBERS, max_size=3) | st.just({"fit": [0, 1]}),
     "noise": st.sampled_from(["given", "scale", "excess", "normal", 1]),
+    "loss": st.sampled_from(["linear", "huber", "cauchy", "square", 1]),
     "file": st.sampled_from(["drops.csv", 1, ["drops.csv"]]),
     "lines": st.lists(st.integers(-1, 9), max_size=3) | DATA_NUMBERS,
     "columns": st.dictionaries(st.sampled_from(["v1", "e_out"]), DATA_NUMBERS | st.lists(DATA_NUMBERS, max_size=3), max_size=2),
@@ -201,7 +202,8 @@ BEYOND_DATA += (
     "without standard deviations",
     "set together with",
     'got "',
-    "number from 0 to 1",
+    "number from -0.5 to 1.5",
+    "expected a fraction",
     "missing, expected",
 )
 

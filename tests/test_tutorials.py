@@ -31,7 +31,7 @@ def test_a_tutorial_prints_what_its_commands_print(
         (tmp_path / path).symlink_to(ROOT / path)
     done = cli(*shlex.split(command), cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    assert_same_output(done.stdout, printed, rel=1e-6, abs=1e-9)
+    assert_same_output(done.stdout, printed)
 
 
 def test_the_commands_of_a_figure_for_a_paper(cli: Run, tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -57,9 +58,13 @@ def calibrate(
             exits.print_line(f"{safe_text(str(path))}: written")
 
 
+# numbers of a law in JSON
+CRITERIA = ("chi2_reduced", "p_value", "excess", "aicc", "weight", "loo")
+
+
 def calibration_json(result: xr.Dataset) -> dict[str, Any]:
     """A calibration as plain data, the best law first; parameters by config path."""
-    from ..results.calibration import fit_status
+    from ..results.calibration import fit_status, largest_residuals
 
     models, paths = [], json.loads(result.attrs["fit_paths"])
     for rank, key in enumerate(map(str, result["model"].values), 1):
@@ -81,15 +86,15 @@ def calibration_json(result: xr.Dataset) -> dict[str, Any]:
                 "status": fit_status(law),
                 "parameters": parameters,
                 "determined": [group for group in str(law["determined"].item()).split("; ") if group],
-                **{name: float(law[name]) for name in ("chi2_reduced", "excess", "aicc", "weight", "loo")},
+                **{name: float(law[name]) for name in CRITERIA},
             }
         )
-    return {"models": models}
+    return {"models": models, "largest_residuals": [asdict(residual) for residual in largest_residuals(result)]}
 
 
 def print_fits(result: xr.Dataset) -> None:
-    """Print a row for each law and parameter, the best law first, and what the data do not determine."""
-    from ..results.calibration import FIT_HEADINGS, describe_data, fit_rows, unidentified_notes
+    """Print a row for each law and parameter, the best law first, and what to know besides."""
+    from ..results.calibration import FIT_HEADINGS, describe_data, fit_notes, fit_rows
 
     out = console(sys.stdout)
     out.print(cell(describe_data(result)), soft_wrap=True)
@@ -99,5 +104,5 @@ def print_fits(result: xr.Dataset) -> None:
     for row in fit_rows(result):
         rows.add_row(*map(cell, row))
     out.print(rows)
-    for note in unidentified_notes(result):
+    for note in fit_notes(result):
         out.print(cell(note), soft_wrap=True)

@@ -91,9 +91,11 @@ def _data_faults(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
             if bounds[0][name] != bounds[1][name]:
                 text = f"bounds of {name}: {bounds[0][name]}, in BASELINE {bounds[1][name]}"
                 faults.append(Fault("physics config", name, safe_text(text)))
-    if new.attrs.get("noise") != baseline.attrs.get("noise"):
-        text = f"noise is {new.attrs.get('noise')}, in BASELINE {baseline.attrs.get('noise')}"
-        faults.append(Fault("physics config", "noise", safe_text(text)))
+    # version 1.0 had no other loss
+    for key, default in (("noise", None), ("loss", "linear")):
+        a, b = (dataset.attrs.get(key, default) for dataset in (new, baseline))
+        if a != b:
+            faults.append(Fault("physics config", key, safe_text(f"{key} is {a}, in BASELINE {b}")))
     of_points = [
         {str(name): v for name, v in dataset.coords.items() if v.dims == ("point",)} for dataset in (new, baseline)
     ]

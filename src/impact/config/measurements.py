@@ -29,14 +29,17 @@ from .cases import (
 from .files import as_table, set_value
 from .grid import name_of, path_of
 from .quantities import MAX_PROBLEMS, ConfigProblem, KeyPath, Quantity, show, suggest, value_error
-from .tables import MATERIAL_KEYS, MIN_SIGMA, NOISES, quantity_at
+from .tables import LOSSES, MATERIAL_KEYS, MIN_SIGMA, NOISES, quantity_at
 
 Noise = Literal["given", "scale", "excess"]
+Loss = Literal["linear", "huber", "cauchy"]
 
-SIGMA = "sigma"
+SIGMA, SPECIMEN = "sigma", "specimen"
+SPECIMEN_EXPECTED = "got nothing, expected the name of a specimen"
 _ANY: dict[str, Any] = {}
 _POSITIVE: dict[str, Any] = {"least": 0.0, "above": True}
-_FRACTION: dict[str, Any] = {"least": 0.0, "most": 1.0}
+# a measured fraction may be below 0 or above 1 by its noise; a value that is farther off is no fraction
+_FRACTION: dict[str, Any] = {"least": -0.5, "most": 1.5}
 # the outputs that can be measured, with the interval of their values
 MEASURED_OUTPUTS = {
     name: Quantity(UNITS[name], "measured", **interval)
@@ -69,6 +72,8 @@ class Measurements:
     sigma : their standard deviations, by the name of the output; without the outputs that have none
     noise : "given", the standard deviations as they are; "scale", times a common factor, which also stands for
         the standard deviation of an output without one; or "excess", with a variance between specimens added
+    specimens : the specimen of each point, for the noise "excess"; empty where each point has its own
+    loss : how a residual counts
     """
 
     file: str
@@ -77,13 +82,15 @@ class Measurements:
     outputs: Mapping[str, tuple[float, ...]]
     sigma: Mapping[str, tuple[float, ...]]
     noise: Noise
+    specimens: tuple[str, ...] = ()
+    loss: Loss = "linear"
 
 
 @dataclass(frozen=True)
 class _DataColumn:
-    """What a column holds: values of an input or an output, by its name, or standard deviations of an output."""
+    """What a column holds: values of an input or an output, standard deviations of an output, or specimens."""
 
-    kind: Literal["input", "output", "sigma"]
+    kind: Literal["input", "output", "sigma", "specimen"]
     name: str
     quantity: Quantity
 
@@ -134,6 +141,8 @@ def _column_of(name: str, outputs: Sequence[str], models: Mapping[str, ForceMode
     """What the column with a name holds; `outputs` are the outputs that have a column."""
     if name in MEASURED_OUTPUTS:
         return _DataColumn("output", name, MEASURED_OUTPUTS[name])
+    if name == SPECIMEN:
+        return _DataColumn("specimen", name, Quantity("1", "name of a specimen"))
     if name == SIGMA or name.removeprefix(f"{SIGMA}_") in MEASURED_OUTPUTS:
         if name == SIGMA and len(outputs) > 1:
             expected = " or ".join(f"{SIGMA}_{output}" for output in outputs)
@@ -151,7 +160,7 @@ def _column_of(name: str, outputs: Sequence[str], models: Mapping[str, ForceMode
         if path[0] != "sweep":
             raise value_error(unknown_input_message(name, models)) from None
         inputs = [key for key in input_names() if key not in MATERIAL_KEYS]
-        choices = [*MEASURED_OUTPUTS, SIGMA, *inputs, *(f"{SIGMA}_{output}" for output in outputs)]
+        choices = [*MEASURED_OUTPUTS, SIGMA, SPECIMEN, *inputs, *(f"{SIGMA}_{output}" for output in outputs)]
         raise value_error(f"no such input or output; {suggest(name, choices)}") from None
     if quantity is None:
         raise value_error("got names of materials, expected numbers; all points have the materials of [sweep]")
@@ -202,7 +211,15 @@ def _read_values(
     values: dict[str, list[float | str]] = {}
     for name, column in columns.items():
         shown, unit, expected_unit = safe_text(name, 60), units[name], column.quantity.unit
-        percent = [(line, cell) for line, cell in table.cells[name] if "%" in cell]
+        if column.kind == SPECIMEN:
+            values[name] = [cell.strip() for _, cell in table.cells[name]]
+            problems += [
+                f"{table.name}:{line}: {shown}: {SPECIMEN_EXPECTED}"
+                for line, cell in table.cells[name]
+                if not cell.strip()
+            ]
+            continue
+        percent = [(line, cell) for line, cell in table.cells[name] if _is_in_percent(cell, column.quantity)]
         if _is_percent(unit):
             expected = f'a fraction: divide the column by 100 and write "{shown}"'
             problems.append(f"{table.name}:1: {shown}: got [{safe_text(unit)}], expected {expected}")
@@ -210,7 +227,8 @@ def _read_values(
             expected = f'one in brackets, such as "{shown} [{expected_unit}]"'
             problems.append(f"{table.name}:1: {shown}: got no unit, expected {expected}")
         elif percent:
-            problems += [f"{table.name}:{line}: {shown}: {_percent_message(cell)}" for line, cell in percent]
+            # the first stands for the whole column
+            problems += [f"{table.name}:{line}: {shown}: {_percent_message(cell)}" for line, cell in percent[:1]]
         else:
             try:
                 values[name] = column_values(replace(table, units=units), name, column.quantity, n)
@@ -223,6 +241,16 @@ def _read_values(
 
 def _is_percent(unit: str) -> bool:
     return unit.lower() in ("%", "percent", "pct", "per cent")
+
+
+def _is_in_percent(element: object, quantity: Quantity) -> bool:
+    """Whether a value has the sign %, or is too large for a fraction."""
+    if isinstance(element, str) and "%" in element:
+        return True
+    try:
+        return quantity.most == _FRACTION["most"] and float(element) > quantity.most  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError):
+        return False
 
 
 def _percent_message(text: str) -> str:
@@ -268,7 +296,12 @@ def expand_measurements(
                 ((*path, name), f"got {len(elements)} values, expected {n_points}, as in the first column")
             )
     values: dict[str, tuple[float, ...]] = {}
+    specimens: tuple[str, ...] = ()
     for name, column in columns.items():
+        if column.kind == SPECIMEN:
+            specimens = tuple(element if isinstance(element, str) else f"{element:g}" for element in lists[name])
+            problems += [((*path, name, index), SPECIMEN_EXPECTED) for index, s in enumerate(specimens) if not s]
+            continue
         values[name], value_problems = _read_list(lists[name], (*path, name), column.quantity, n)
         problems += value_problems
     lines = table.get("lines")
@@ -290,9 +323,12 @@ def expand_measurements(
             ]
         sigma[first] = deviations
         problems += sigma_problems
-    noise = table.get("noise", "given" if sigma else "scale")
-    problems += _noise_problems(noise, list(outputs), list(sigma))
-    if problems or noise not in NOISES:
+    noise = table.get("noise", "excess" if specimens else "given" if sigma else "scale")
+    loss = table.get("loss", "linear")
+    problems += _noise_problems(noise, list(outputs), list(sigma), specimens)
+    if loss != "linear" and noise != "given":
+        problems.append((("data", "loss"), f'got {show(loss)} with noise = "{noise}", expected noise = "given"'))
+    if problems or noise not in NOISES or loss not in LOSSES:
         return dict(data), None, problems[:MAX_PROBLEMS]
     measurements = Measurements(
         file=str(table.get("file", "")),
@@ -301,6 +337,8 @@ def expand_measurements(
         outputs=outputs,
         sigma={name: sigma[name] for name in outputs if name in sigma},
         noise=noise,
+        specimens=specimens,
+        loss=loss,
     )
     for name, column_of_input in measurements.inputs.items():
         data, _ = set_value(data, path_of(name), column_of_input[0])
@@ -315,8 +353,9 @@ def _read_list(
     problems: list[ConfigProblem] = []
     for index, element in enumerate(elements):
         try:
-            if isinstance(element, str) and "%" in element:
-                raise value_error(_percent_message(element))
+            if _is_in_percent(element, quantity):
+                problems.append(((*path, index), _percent_message(str(element))))
+                break
             values.append(quantity.read(element, n))
         except PydanticCustomError as error:
             problems.append(((*path, index), error.message()))
@@ -345,15 +384,24 @@ def _is_text(value: object, path: KeyPath) -> bool:
     return isinstance(value[index] if isinstance(value, list) and isinstance(index, int) else value, str)
 
 
-def _noise_problems(noise: object, outputs: Sequence[str], with_sigma: Sequence[str]) -> list[ConfigProblem]:
-    """Problems of outputs without the standard deviation that the kind of noise needs."""
+def _noise_problems(
+    noise: object, outputs: Sequence[str], with_sigma: Sequence[str], specimens: Sequence[str]
+) -> list[ConfigProblem]:
+    """Problems of the noise with the outputs, with those that have standard deviations, and with the specimens."""
+    path: KeyPath = ("data", "noise")
+    if noise == "excess" and len(outputs) > 1:
+        return [(path, f'got "excess" with {len(outputs)} outputs, expected one, whose unit the deviation has')]
+    if specimens and noise != "excess":
+        return [(path, f'got {show(noise)} with a column {SPECIMEN}, expected "excess" or no such column')]
+    if specimens and len({*specimens}) < 2:
+        return [(("data",), f"got one specimen, expected at least two in the column {SPECIMEN}")]
     missing = [name for name in outputs if name not in with_sigma]
     if missing and len(outputs) > 1:
         expected = f"a column {SIGMA}_{missing[0]}: each of several outputs needs one"
         return [(("data",), f"got no standard deviation of {missing[0]}, expected {expected}")]
     if missing and noise in ("given", "excess"):
         expected = f'a column {SIGMA} or the key {SIGMA}, or noise = "scale"'
-        return [(("data", "noise"), f'got "{noise}" without standard deviations, expected {expected}')]
+        return [(path, f'got "{noise}" without standard deviations, expected {expected}')]
     return []
 
 
@@ -365,13 +413,19 @@ def fitted_parameters(fits: Mapping[str, tuple[float, float]], model: ForceModel
     fits : bounds by config name
     model : the law
     """
-    uses_e = "e" in with_base_quantities(model.quantities)
-    return tuple(
-        name
-        for name in fits
-        if (path_of(name)[0] != "model" or path_of(name)[1] == model.key)
-        and (uses_e or name not in ("e", "alpha"))
-    )
+    used = with_base_quantities(model.quantities)
+
+    def is_used(name: str) -> bool:
+        table, *keys = path_of(name)
+        if name in ("e", "alpha"):
+            return "e" in used
+        if name == "n":
+            return model.exponent is None
+        if keys[-1] == "yield_strength":
+            return bool(used & {"yield_strength1", "yield_strength2"})
+        return table != "model" or keys[0] == model.key
+
+    return tuple(filter(is_used, fits))
 
 
 def count_problems(

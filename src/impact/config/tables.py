@@ -57,6 +57,7 @@ MAX_SOLVER_STEPS = 10**9
 CORES = ("auto", "numpy", "numba")
 INTEGRATORS = (EXACT, *SCHEMES)
 NOISES = ("given", "scale", "excess")
+LOSSES = ("linear", "huber", "cauchy")
 DESIGN_METHODS = ("sobol", "lhs", "halton", "random")
 MAX_SAMPLES = 2**22
 MODELS_EXPECTED = 'a model, or a list of models; "all" are all'
@@ -270,7 +271,11 @@ class Data(Table):
     noise: Annotated[Any, ReadAs(Literal[NOISES]), known_name("a kind of noise", lambda info: NOISES)] = Field(
         None,
         description="the standard deviations are given, have a common factor (scale), or an excess variance is "
-        "added to theirs; given by default where there are any, otherwise scale",
+        "added to theirs; excess by default with a column of specimens, given with standard deviations, "
+        "otherwise scale",
+    )
+    loss: Annotated[Any, ReadAs(Literal[LOSSES]), known_name("a loss", lambda info: LOSSES)] = Field(
+        None, description="how a residual counts: squared (linear), or less beyond one standard deviation"
     )
     sigma: Annotated[
         Any, PlainValidator(_sigma, json_schema_input_type=_Sigma | Annotated[list[_Sigma], Field(min_length=1)])

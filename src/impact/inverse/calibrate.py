@@ -15,6 +15,8 @@ from ..array_types import Array
 from ..config.files import toml_key, toml_text
 from ..config.grid import Axis, path_of
 from ..config.load import Config, parse_config
+from ..config.measurements import fitted_parameters
+from ..config.quantities import Quantity
 from ..config.tables import quantity_at
 from ..contact.model import ForceModel
 from ..contact.outputs import collide
@@ -26,12 +28,14 @@ from ..engine.plan import Inputs, Plan, is_foreign
 from ..engine.plugins import Plugins
 from ..results.calibration import FIT_STATUSES, calibration_template
 from .batch import VectorFunction
-from .fit import Bounds, DataPoints, Fit, Problem, fit_all, squared_quantile
+from .fit import Bounds, DataPoints, Fit, Problem, fit_all, half_widths
 
 # points of the curve of each law over an input
 CURVE_POINTS = 101
 # the curve is spaced logarithmically if the largest value of the input is larger by this factor
 LOG_CURVE_RATIO = 30.0
+# variables of a calibration that are fields of a fit
+FIT_VARIABLES = ("chi2_reduced", "p_value", "excess", "aicc", "loo", "predicted", "residual", "loo_residual")
 # denominators of the exponents of a group of parameters
 MAX_DENOMINATOR = 12
 
@@ -70,37 +74,27 @@ class Calibration:
 
     @property
     def ranked(self) -> list[str]:
-        """The keys of the laws, best first: by AICc, those whose fit has a defect last."""
+        """The keys of the laws, best first: by AICc, those without one last, by chi2.
 
-        def order(key: str) -> tuple[bool, bool, float, float]:
+        A law at a bound is ranked by what it reaches there: a wider search can only improve it.
+        """
+
+        def order(key: str) -> list[float]:
             fit = self.laws[key].fit
-            return (
-                fit.status != "ok",
-                math.isnan(fit.aicc),
-                0.0 if math.isnan(fit.aicc) else fit.aicc,
-                math.inf if math.isnan(fit.chi2_reduced) else fit.chi2_reduced,
-            )
+            return [math.inf if math.isnan(value) else value for value in (fit.aicc, fit.chi2_reduced)]
 
         return sorted(self.laws, key=order)
 
     @property
     def weights(self) -> dict[str, float]:
-        """Akaike weights of the laws whose fit has no defect; 0 for the others."""
-        fits = {key: law.fit for key, law in self.laws.items()}
-        usable = {key: fit.aicc for key, fit in fits.items() if fit.status == "ok" and fit.aicc == fit.aicc}
-        least = min(usable.values(), default=0.0)
-        likelihood = {key: math.exp(-0.5 * (aicc - least)) for key, aicc in usable.items()}
+        """Akaike weights of the laws; 0 for those without an AICc."""
+        criteria = {key: law.fit.aicc for key, law in self.laws.items()}
+        least = min((aicc for aicc in criteria.values() if not math.isnan(aicc)), default=0.0)
+        likelihood = {
+            key: np.exp(-0.5 * np.nan_to_num(aicc - least, nan=np.inf)) for key, aicc in criteria.items()
+        }
         total = sum(likelihood.values())
-        return {key: likelihood.get(key, 0.0) / total if total else 0.0 for key in fits}
-
-
-def fitted_names(config: Config, model: ForceModel) -> tuple[str, ...]:
-    """The config names of the parameters that are fitted for a law."""
-    return tuple(
-        name
-        for name in config.fits
-        if not is_foreign([name], model.key) and (name != "e" or "e" in model.quantities)
-    )
+        return {key: float(value / total) if total else 0.0 for key, value in likelihood.items()}
 
 
 def prediction(
@@ -142,7 +136,11 @@ def prediction(
             core=core,
             names=outputs,
         )
-        return np.concatenate([collisions[name].reshape(len(rows), points) for name in outputs], axis=1)
+        # a law on which no column has an effect has one trajectory
+        shape = len(rows) * points
+        return np.concatenate(
+            [np.broadcast_to(collisions[name], shape).reshape(-1, points) for name in outputs], axis=1
+        )
 
     return predict
 
@@ -183,11 +181,12 @@ def fit_laws(config: Config) -> dict[str, FittedLaw]:
     sigma = np.concatenate(
         [np.asarray(data.sigma.get(name, np.ones(len(column))), float) for name, column in data.outputs.items()]
     )
-    names = {model.key: fitted_names(config, model) for model in config.models}
+    specimens = np.unique(data.specimens, return_inverse=True)[1] if data.specimens else None
+    points = DataPoints(values, sigma, data.noise, specimens, data.loss)
+    names = {model.key: fitted_parameters(config.fits, model) for model in config.models}
     problems, functions = [], {}
     for model in config.models:
-        least, most = np.array([config.fits[name] for name in names[model.key]]).reshape(-1, 2).T
-        problems.append(Problem(model.key, Bounds(least, most), DataPoints(values, sigma, data.noise)))
+        problems.append(Problem(model.key, _bounds(config, names[model.key]), points))
         functions[model.key] = prediction(config, model, names[model.key], data.inputs, len(data.lines))
     fits = fit_all(problems, functions)
     varied = varied_input(data.inputs)
@@ -195,6 +194,14 @@ def fit_laws(config: Config) -> dict[str, FittedLaw]:
         model.key: FittedLaw(names[model.key], fit, _curve(config, model, names[model.key], fit, problem, varied))
         for model, problem, fit in zip(config.models, problems, fits, strict=True)
     }
+
+
+def _bounds(config: Config, names: Sequence[str]) -> Bounds:
+    """The bounds of parameters, which are limits of the physics where they are ends of the allowed values."""
+    least, most = np.array([config.fits[name] for name in names]).reshape(-1, 2).T
+    quantities = [_quantity(config, name) for name in names]
+    ends = [[quantity.least for quantity in quantities], [quantity.most for quantity in quantities]]
+    return Bounds(least, most, np.array([least, most]) == np.array(ends))
 
 
 def varied_input(inputs: Mapping[str, Sequence[float]]) -> tuple[str, Array]:
@@ -229,8 +236,7 @@ def _curve(
     slopes = (values[1:] - values[0]) / (rows[1:] - rows[0]).diagonal()[:, None]
     half = np.full(values.shape[1], np.nan)
     if np.isfinite(fit.covariance).all() and problem.is_determined:
-        variance = np.einsum("pi,pq,qi->i", slopes, fit.covariance, slopes)
-        half = np.sqrt(squared_quantile(problem) * np.maximum(variance, 0.0))
+        half = half_widths(fit.covariance, fit.covariance_deviation, slopes.T)
     return np.stack([values[0], values[0] - half, values[0] + half]).reshape(3, outputs, grid.size)
 
 
@@ -263,15 +269,15 @@ def determined_groups(config: Config, model: ForceModel, names: Sequence[str], f
             names[number].rpartition(".")[2]: Fraction(float(power)).limit_denominator(MAX_DENOMINATOR)
             for number, power in zip(involved.tolist(), row, strict=True)
         }
-        units = [_unit(config, model, names[number]) for number in involved.tolist()]
+        units = [_quantity(config, names[number]).unit for number in involved.tolist()]
         groups.append(_product(_completion(list(powers.values()), units, config, model) | powers))
     return groups
 
 
-def _unit(config: Config, model: ForceModel, name: str) -> str:
-    quantity = quantity_at(path_of(name), {m.key: m for m in config.models})
+def _quantity(config: Config, name: str) -> Quantity:
+    quantity = quantity_at(path_of(name), {model.key: model for model in config.models})
     assert quantity is not None
-    return quantity.unit
+    return quantity
 
 
 def _completion(
@@ -389,13 +395,8 @@ def calibration_dataset(calibration: Calibration, plugins: Plugins) -> xr.Datase
         "covariance": covariance,
         "identifiable": identifiable,
         "fit_status": np.array([list(FIT_STATUSES).index(fit.status) for fit in fits], np.int8),
-        "chi2_reduced": np.array([fit.chi2_reduced for fit in fits]),
-        "excess": np.array([fit.excess for fit in fits]),
-        "aicc": np.array([fit.aicc for fit in fits]),
         "weight": np.array([weights[key] for key in keys]),
-        "loo": np.array([fit.loo for fit in fits]),
-        "predicted": np.array([fit.predicted for fit in fits]),
-        "residual": np.array([fit.residual for fit in fits]),
+        **{name: np.array([getattr(fit, name) for fit in fits]) for name in FIT_VARIABLES},
     }
     if calibration.varied[0]:
         curve, lower, upper = np.stack([calibration.laws[key].curve for key in keys], axis=1)

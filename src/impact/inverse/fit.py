@@ -1,4 +1,12 @@
-"""Least-squares fits: parameters, profile-likelihood intervals, information criteria, identifiability."""
+"""Least-squares fits: parameters, profile-likelihood intervals, information criteria, identifiability.
+
+The errors of measurements are normal. With noise "excess" those of one specimen share a deviation: a linear mixed
+model, whose covariance is V = diag(sigma^2) + tau^2 Z Z^T, where Z has a column of ones and zeros for each
+specimen. Laws are compared by the largest likelihood of the parameters and tau. Estimates and intervals have tau
+from the restricted likelihood, since the largest likelihood underestimates it, and quantiles of Student's t with
+Satterthwaite's degrees of freedom. The formulas are derived here; tests compare them with closed forms of linear
+regression and with simulations.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +25,9 @@ from ..array_types import Array, Mask
 from .batch import Evaluate, VectorFunction, run_together
 
 Noise: TypeAlias = Literal["given", "scale", "excess"]
-FitStatus: TypeAlias = Literal["ok", "at_bound", "not_converged", "too_few_points", "no_prediction"]
+# how a residual counts, see `scipy.optimize.least_squares`
+Loss: TypeAlias = Literal["linear", "huber", "cauchy"]
+FitStatus: TypeAlias = Literal["ok", "at_bound", "not_converged", "too_few_points", "no_prediction", "at_limit"]
 
 T = TypeVar("T")
 
@@ -39,10 +49,14 @@ SINGULAR = 1e-5
 # share of a parameter in such a direction from which on it is not identified
 INVOLVED = 1e-3
 CONFIDENCE = 0.95
+# a fit that leaves a smaller share of a point free passes through it, and the point has no residual without it
+LEVERAGE_LEFT = 1e-9
 # bracketing steps of an end of a profile interval, and its relative accuracy
 MAX_BRACKETS, PROFILE_XTOL = 30, 1e-6
-# iterations of the excess variance
-MAX_EXCESS_ITERATIONS = 50
+# iterations of the excess deviation and of the parameters with it, and when they end
+MAX_EXCESS_ITERATIONS, EXCESS_TOLERANCE, COARSE_EXCESS_TOLERANCE = 50, 1e-10, 1e-6
+# excess variances that are tried first, in units of the largest deviation of a specimen squared
+TRIED_EXCESS = np.concatenate([[0.0], np.geomspace(1e-8, 10.0, 64)])
 
 
 @dataclass(frozen=True)
@@ -51,10 +65,14 @@ class Bounds:
 
     The solver works with u in [0, 1]: linear between the bounds, or logarithmic where they are positive and far
     apart.
+
+    `is_limit` has shape (2, p): whether the least, and whether the largest value is an end of the allowed values
+    of the parameter, not only of the search; None if none is.
     """
 
     least: Array
     most: Array
+    is_limit: Mask | None = None
 
     @property
     def is_log(self) -> Mask:
@@ -85,17 +103,48 @@ class Bounds:
 
 @dataclass(frozen=True)
 class DataPoints:
-    """Measured values with their standard deviations, each of shape (n,)."""
+    """Measured values with their standard deviations, each of shape (n,).
+
+    `specimens` are the numbers, from 0, of the specimens of the points, shape (n,); None if each point has its
+    own.
+    """
 
     values: Array
     sigma: Array
     noise: Noise
+    specimens: NDArray[np.intp] | None = None
+    loss: Loss = "linear"
 
     def without(self, point: int) -> DataPoints:
         """The measurements without one: its standard deviation is infinite."""
         sigma = self.sigma.copy()
         sigma[point] = np.inf
         return replace(self, sigma=sigma)
+
+    def specimen_sums(self, values: Array) -> Array:
+        """The sums over the points of each specimen, shape (..., n) to (..., specimens)."""
+        if self.specimens is None:
+            return values
+        sums = np.zeros((*values.shape[:-1], int(self.specimens.max()) + 1))
+        np.add.at(sums.T, self.specimens, values.T)
+        return sums
+
+    def at_points(self, values: Array) -> Array:
+        """Values of specimens at their points, shape (..., specimens) to (..., n)."""
+        return values if self.specimens is None else values[..., self.specimens]
+
+    @cached_property
+    def precision(self) -> Array:
+        """The sum of 1/sigma^2 over the points of each specimen, shape (specimens,)."""
+        return self.specimen_sums(self.sigma**-2.0)
+
+    def whiten(self, scaled: Array, excess: float) -> Array:
+        """Independent residuals with a variance of 1: V^(-1/2) r, shape (..., n), from r/sigma."""
+        if excess == 0.0:
+            return scaled
+        p = self.precision
+        reduction = (1.0 - 1.0 / np.sqrt(1.0 + excess**2 * p)) / np.where(p > 0.0, p, 1.0)
+        return scaled - self.at_points(reduction * self.specimen_sums(scaled / self.sigma)) / self.sigma
 
 
 @dataclass(frozen=True)
@@ -105,13 +154,14 @@ class Estimate:
     Parameters
     ----------
     u : in units of the bounds, shape (p,)
-    chi2 : sum of squared residuals over the variances
+    objective : sum of squared residuals over the variances, or of their loss; with noise "excess" minus twice the
+        logarithm of the likelihood, without a constant
     excess : standard deviation between specimens, added to those of the measurements
     converged : whether the solver met its tolerance
     """
 
     u: Array
-    chi2: float
+    objective: float
     excess: float
     converged: bool
 
@@ -122,12 +172,13 @@ class Fit:
 
     Parameters
     ----------
-    status : "ok", "at_bound", "not_converged", "too_few_points", or "no_prediction" where the model has no result
-        at a point
+    status : "ok"; "at_limit" where a parameter is at an end of its allowed values, "at_bound" at one of the search
+        alone; "not_converged", "too_few_points", or "no_prediction" where the model has no result at a point
     estimate : parameters, shape (p,)
     lower, upper : ends of the intervals of 95 % by profile likelihood, shape (p,); NaN where a parameter is not
         identified; a bound where the interval reaches it
     covariance : of the parameters, shape (p, p), in the linear approximation
+    covariance_deviation : its standard deviation, as far as the noise is estimated; see `half_widths`
     identifiable : whether the measurements determine each parameter, shape (p,)
     unidentified : directions in the logarithms of the parameters (in units of the bounds for those that may be
         negative or zero) that do not change the prediction, shape (k, p)
@@ -135,9 +186,13 @@ class Fit:
     jacobian : derivatives of the predictions by the parameters, shape (n, p)
     chi2_reduced : chi2 over the degrees of freedom; with noise "scale" the variance of the points in units of the
         given variances
+    p_value : probability of a larger chi2; NaN where the noise is estimated from the residuals
     excess : see `Estimate`
     aicc : corrected information criterion of Akaike; NaN with too few points
-    loo : root mean square of the residuals of each point in the fit without it, in standard deviations
+    loo : root mean square of the residuals of each point in the fit without it, in units of its given standard
+        deviation
+    loo_residual : the residuals of each point in the fit without it, in their own standard deviations and in the
+        linear approximation, shape (n,)
     """
 
     status: FitStatus
@@ -145,15 +200,18 @@ class Fit:
     lower: Array
     upper: Array
     covariance: Array
+    covariance_deviation: Array
     identifiable: Mask
     unidentified: Array
     predicted: Array
     residual: Array
     jacobian: Array
     chi2_reduced: float
+    p_value: float
     excess: float
     aicc: float
     loo: float
+    loo_residual: Array
 
 
 @dataclass(frozen=True)
@@ -182,17 +240,17 @@ class Problem:
         """Predictions of rows u, shape (k, p) to (k, n)."""
         return evaluate(self.key, self.bounds.values(u))
 
-    def residuals(self, evaluate: Evaluate, u: Array, sigma: Array) -> Array:
-        """Residuals of rows u in standard deviations, shape (k, n)."""
-        difference = (self.predict(evaluate, u) - self.data.values) / sigma
-        return np.where(np.isfinite(difference), difference, NO_PREDICTION)
+    def residuals(self, evaluate: Evaluate, u: Array, excess: float = 0.0) -> Array:
+        """Independent residuals of rows u in standard deviations, shape (k, n)."""
+        difference = (self.predict(evaluate, u) - self.data.values) / self.data.sigma
+        return self.data.whiten(np.where(np.isfinite(difference), difference, NO_PREDICTION), excess)
 
-    def slopes(self, evaluate: Evaluate, u: Array, free: NDArray[np.intp], sigma: Array) -> Array:
+    def slopes(self, evaluate: Evaluate, u: Array, free: NDArray[np.intp], excess: float) -> Array:
         """Derivatives of the residuals by the free ones of u, shape (n, len(free)), in one evaluation."""
         low, high = np.maximum(u[free] - STEP, 0.0), np.minimum(u[free] + STEP, 1.0)
         rows = np.tile(u, (2 * free.size, 1))
         rows[np.arange(free.size), free], rows[free.size + np.arange(free.size), free] = low, high
-        below, above = np.split(self.residuals(evaluate, rows, sigma), 2)
+        below, above = np.split(self.residuals(evaluate, rows, excess), 2)
         slopes: Array = (above - below).T / (high - low)
         return slopes
 
@@ -203,7 +261,7 @@ def scan(problem: Problem, evaluate: Evaluate) -> Array:
         return np.zeros((1, 0))
     # the sequence begins at 0; half a cell away from it, no bound is tried
     u = qmc.Sobol(problem.count, scramble=False).random(TRIED) + 0.5 / TRIED
-    cost = (problem.residuals(evaluate, u, problem.data.sigma) ** 2).sum(axis=1)
+    cost = (problem.residuals(evaluate, u) ** 2).sum(axis=1)
     best: Array = u[np.argsort(cost, kind="stable")[:STARTS]]
     return best
 
@@ -215,9 +273,10 @@ def minimize(
     *,
     fixed: int | None = None,
     excess: float | None = None,
+    taken: Array | None = None,
     tolerance: float = SOLVER_TOLERANCE,
 ) -> Estimate:
-    """The local minimum of chi2 from a start.
+    """The local minimum of the objective from a start.
 
     Parameters
     ----------
@@ -225,11 +284,12 @@ def minimize(
     start : u, shape (p,)
     fixed : a parameter that stays at its start; None for none
     excess : standard deviation between specimens; None to find it, if the noise asks for it
+    taken : see `ExcessLikelihood`, for its restricted likelihood
     tolerance : of the solver, relative
     """
     if problem.data.noise == "excess" and excess is None:
-        return _minimize_with_excess(problem, evaluate, start)
-    sigma = np.hypot(problem.data.sigma, excess or 0.0)
+        return _minimize_with_excess(problem, evaluate, start, fixed, taken, tolerance)
+    excess = excess or 0.0
     free = np.array([number for number in range(problem.count) if number != fixed], np.intp)
 
     def full(part: Array) -> Array:
@@ -238,14 +298,16 @@ def minimize(
         return u
 
     def residuals(part: Array) -> Array:
-        (values,) = problem.residuals(evaluate, full(part)[None, :], sigma)
+        (values,) = problem.residuals(evaluate, full(part)[None, :], excess)
         return np.asarray(values)
 
     if not free.size:
-        return Estimate(start, float(np.sum(residuals(start[free]) ** 2)), excess or 0.0, True)
+        return Estimate(
+            start, float(LOSS_DERIVATIVES[problem.data.loss](residuals(start[free]))[0].sum()), excess, True
+        )
 
     def slopes(part: Array) -> Array:
-        return problem.slopes(evaluate, full(part), free, sigma)
+        return problem.slopes(evaluate, full(part), free, excess)
 
     result = least_squares(
         residuals,
@@ -255,62 +317,126 @@ def minimize(
         xtol=tolerance,
         ftol=tolerance,
         gtol=tolerance,
+        loss=problem.data.loss,
         max_nfev=MAX_EVALUATIONS,
     )
-    return Estimate(full(result.x), 2.0 * float(result.cost), excess or 0.0, bool(result.success))
+    # the solver stays inside the bounds, and a parameter at a bound is on it
+    nearest = np.round(result.x)
+    part = np.where(np.abs(result.x - nearest) <= AT_BOUND, nearest, result.x)
+    return Estimate(full(part), 2.0 * float(result.cost), excess, bool(result.success))
 
 
-def _minimize_with_excess(problem: Problem, evaluate: Evaluate, start: Array) -> Estimate:
-    """The minimum with the excess variance that makes chi2 the degrees of freedom (Paule and Mandel)."""
-    freedom = problem.data.values.size - problem.count
-    best = minimize(problem, evaluate, start, excess=0.0)
-    if best.chi2 <= freedom:
-        return best
-
-    def excess_of(estimate: Estimate) -> float:
-        squares = problem.residuals(evaluate, estimate.u[None, :], np.ones(1))[0] ** 2
-
-        def surplus(variance: float) -> float:
-            return float((squares / (problem.data.sigma**2 + variance)).sum()) - freedom
-
-        return math.sqrt(brentq(surplus, 0.0, float(squares.sum()), xtol=1e-300, rtol=1e-14))
-
+def _minimize_with_excess(
+    problem: Problem, evaluate: Evaluate, start: Array, fixed: int | None, taken: Array | None, tolerance: float
+) -> Estimate:
+    """The minimum over the parameters and the excess deviation, each in turn: their information is independent."""
+    is_coarse = tolerance >= COARSE_TOLERANCE
+    accuracy = COARSE_EXCESS_TOLERANCE if is_coarse else EXCESS_TOLERANCE
+    best = Estimate(start, math.inf, -1.0, False)
     for _ in range(MAX_EXCESS_ITERATIONS):
-        excess = excess_of(best)
-        before, best = best, minimize(problem, evaluate, best.u, excess=excess)
-        if abs(best.excess - before.excess) <= 1e-10 * best.excess:
-            return best
-    return replace(best, converged=False)
+        (scaled,) = problem.residuals(evaluate, best.u[None, :])
+        likelihood = ExcessLikelihood(problem.data, scaled, taken)
+        excess = likelihood.best()
+        if abs(excess - best.excess) <= accuracy * excess:
+            return replace(best, objective=likelihood.objective(best.excess**2))
+        best = minimize(problem, evaluate, best.u, fixed=fixed, excess=excess, tolerance=tolerance)
+    return replace(best, objective=likelihood.objective(best.excess**2), converged=False)
 
 
-def profile_end(
-    problem: Problem, evaluate: Evaluate, best: Estimate, parameter: int, direction: int, rise: float, width: float
-) -> float:
-    """The u of a parameter at which the least chi2 over the others has risen by `rise`; at most a bound, 0 or 1.
+class ExcessLikelihood:
+    """The likelihood of residuals as a function of the excess variance.
 
     Parameters
     ----------
-    problem, evaluate : see `minimize`
+    data : the measurements
+    scaled : residuals over the given standard deviations, shape (n,)
+    taken : orthonormal directions of `scaled` that the parameters take up, shape (n, r), for the restricted
+        likelihood; None for the likelihood
+    """
+
+    def __init__(self, data: DataPoints, scaled: Array, taken: Array | None = None) -> None:
+        self.squares = float(scaled @ scaled)
+        self.precision = data.precision
+        self.deviation = data.specimen_sums(scaled / data.sigma)
+        directions = np.zeros((0, scaled.size)) if taken is None else taken.T
+        self.taken = data.specimen_sums(directions / data.sigma)
+
+    def objective(self, variance: float) -> float:
+        """Minus twice the logarithm of the likelihood, without the part that sigma alone determines."""
+        growth = 1.0 + variance * self.precision
+        _, determinant = np.linalg.slogdet(self._left(growth, variance))
+        squares = self.squares - float((variance * self.deviation**2 / growth).sum())
+        return squares + float(np.log(growth).sum()) + float(determinant)
+
+    def slope(self, variance: float) -> float:
+        """The derivative of the objective by the variance."""
+        growth = 1.0 + variance * self.precision
+        change = np.linalg.solve(self._left(growth, variance), (self.taken / growth**2) @ self.taken.T)
+        return float((self.precision / growth - (self.deviation / growth) ** 2).sum() - np.trace(change))
+
+    def _left(self, growth: Array, variance: float) -> Array:
+        """Q^T V^(-1) Q in units of the given variances, where Q are the directions taken."""
+        left: Array = np.eye(len(self.taken)) - (variance / growth * self.taken) @ self.taken.T
+        return left
+
+    def best(self) -> float:
+        """The standard deviation between specimens of the largest likelihood."""
+        largest = (self.deviation / np.where(self.precision > 0.0, self.precision, 1.0)) ** 2
+        tried = TRIED_EXCESS * largest.max()
+        number = int(np.argmin([self.objective(variance) for variance in tried]))
+        low, high = tried[max(number - 1, 0)], tried[min(number + 1, tried.size - 1)]
+        if not self.slope(low) < 0.0 < self.slope(high):
+            return math.sqrt(tried[number])
+        return math.sqrt(brentq(self.slope, low, high, xtol=1e-300, rtol=1e-14))
+
+
+def _huber(z: Array) -> tuple[Array, Array, Array]:
+    size = np.abs(z)
+    return np.where(size <= 1.0, z**2, 2.0 * size - 1.0), np.clip(z, -1.0, 1.0), np.where(size <= 1.0, 1.0, 0.0)
+
+
+# the loss of residuals, half its derivative, and half its second derivative
+LOSS_DERIVATIVES: Mapping[str, Callable[[Array], tuple[Array, Array, Array]]] = {
+    "linear": lambda z: (z**2, z, np.ones_like(z)),
+    "huber": _huber,
+    "cauchy": lambda z: (np.log1p(z**2), z / (1.0 + z**2), (1.0 - z**2) / (1.0 + z**2) ** 2),
+}
+
+
+def profile_end(
+    problem: Problem,
+    evaluate: Evaluate,
+    best: Estimate,
+    parameter: int,
+    direction: int,
+    rise: float,
+    width: float,
+    taken: Array | None = None,
+) -> float:
+    """The u of a parameter at which the least objective over the others has risen by `rise`; at most a bound.
+
+    Parameters
+    ----------
+    problem, evaluate, taken : see `minimize`
     best : the minimum
     parameter, direction : which parameter, and -1 for the lower and 1 for the upper end
-    rise : of chi2
+    rise : of the objective
     width : expected distance from the minimum, in u
     """
     bound = 0.0 if direction < 0 else 1.0
     centre = float(best.u[parameter])
-    others = best.u
+    # brentq asks again for values that it has seen, and a search from another start may end elsewhere
+    known = {centre: (-rise, best.u)}
 
     def surplus(value: float) -> float:
-        nonlocal others
-        start = others.copy()
-        start[parameter] = value
-        estimate = minimize(
-            problem, evaluate, start, fixed=parameter, excess=best.excess, tolerance=COARSE_TOLERANCE
-        )
-        others = estimate.u
-        return estimate.chi2 - best.chi2 - rise
+        if value not in known:
+            start = known[min(known, key=lambda other: abs(other - value))][1].copy()
+            start[parameter] = value
+            estimate = minimize(problem, evaluate, start, fixed=parameter, taken=taken, tolerance=COARSE_TOLERANCE)
+            known[value] = estimate.objective - best.objective - rise, estimate.u
+        return known[value][0]
 
-    inner, outer = centre, centre
+    inner = centre
     for number in range(MAX_BRACKETS):
         outer = centre + direction * width * 1.5**number
         is_bound = (outer - bound) * direction >= 0.0
@@ -318,7 +444,7 @@ def profile_end(
         if surplus(outer) > 0.0:
             return float(brentq(surplus, inner, outer, xtol=PROFILE_XTOL * width, rtol=1e-12))
         if is_bound:
-            return bound
+            break
         inner = outer
     return bound
 
@@ -367,61 +493,133 @@ def find_unidentified(jacobian: Array) -> Array:
     return unidentified
 
 
-def information(problem: Problem, best: Estimate) -> float:
-    """AICc, of the likelihood with normal errors; NaN with too few points."""
+def directions_taken(jacobian: Array) -> Array:
+    """Orthonormal combinations of points that the parameters take up, shape (n, r), from derivatives (n, p)."""
+    left, sizes, _ = np.linalg.svd(jacobian, full_matrices=False)
+    taken: Array = left[:, sizes > SINGULAR * sizes.max(initial=0.0)]
+    return taken
+
+
+def information(problem: Problem, objective: float) -> float:
+    """AICc, of the largest likelihood with normal errors; NaN with too few points.
+
+    With a loss, its sum takes the place of the squares.
+    """
     data = problem.data
     n, parameters = data.values.size, problem.count + (data.noise != "given")
     if n - parameters - 1 <= 0:
         return math.nan
-    variance = data.sigma**2 + best.excess**2
     # with a scale, that of the largest likelihood
-    misfit = n * math.log(max(best.chi2, 1e-300) / n) + n if data.noise == "scale" else best.chi2
-    twice = misfit + float(np.log(2.0 * np.pi * variance).sum())
+    misfit = n * math.log(max(objective, 1e-300) / n) + n if data.noise == "scale" else objective
+    twice = misfit + float(np.log(2.0 * np.pi * data.sigma**2).sum())
     return 2.0 * parameters + twice + 2.0 * parameters * (parameters + 1) / (n - parameters - 1)
 
 
-def variance_scale(problem: Problem, best: Estimate) -> float:
-    """The factor of all variances, which noise "scale" finds from the misfit."""
-    freedom = problem.data.values.size - problem.count
-    return best.chi2 / freedom if problem.data.noise == "scale" else 1.0
+def degrees_of_freedom(variance: Array, deviation: Array) -> Array:
+    """Satterthwaite's degrees of freedom of variances with these standard deviations, at least 1."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        freedom = np.where(deviation > 0.0, 2.0 * (variance / deviation) ** 2, np.inf)
+    return np.maximum(freedom, 1.0)
 
 
-def squared_quantile(problem: Problem) -> float:
-    """The square of the distance of an end of an interval of 95 % in standard deviations."""
-    if problem.data.noise == "given":
-        return float(chi2.ppf(CONFIDENCE, 1))
-    return float(t.ppf(0.5 + CONFIDENCE / 2, problem.data.values.size - problem.count)) ** 2
+def t_quantile(freedom: Array) -> Array:
+    """The distance of an end of an interval of 95 % from the estimate, in standard deviations."""
+    return np.asarray(t.ppf(0.5 + CONFIDENCE / 2, freedom))
+
+
+def half_widths(covariance: Array, covariance_deviation: Array, directions: Array) -> Array:
+    """Half the widths of intervals of 95 % of linear functions of the parameters, shape (k,).
+
+    Parameters
+    ----------
+    covariance, covariance_deviation : see `Fit`
+    directions : gradients of the functions, shape (k, p)
+    """
+    variance, deviation = (
+        np.maximum(np.einsum("kp,pq,kq->k", directions, matrix, directions), 0.0)
+        for matrix in (covariance, covariance_deviation)
+    )
+    widths: Array = t_quantile(degrees_of_freedom(variance, deviation)) * np.sqrt(variance)
+    return widths
 
 
 def best_of(estimates: Sequence[Estimate]) -> Estimate:
-    """The estimate with the least chi2; of equal ones, one that converged."""
-    least = min(estimate.chi2 for estimate in estimates)
-    near = [estimate for estimate in estimates if estimate.chi2 <= least * (1.0 + 1e-9) + 1e-12]
+    """The estimate with the least objective; of equal ones, one that converged."""
+    least = min(estimate.objective for estimate in estimates)
+    near = [estimate for estimate in estimates if estimate.objective <= least + 1e-9 * abs(least) + 1e-12]
     return min(near, key=lambda estimate: not estimate.converged)
 
 
 @dataclass(frozen=True)
 class _Minimum:
-    """A minimum, with the predictions and their derivatives there."""
+    """A minimum, with the predictions and their derivatives there.
+
+    `objective` is that of the largest likelihood; with noise "excess" the minimum is that of the restricted one.
+    """
 
     problem: Problem
+    objective: float
     best: Estimate
     predicted: Array
     jacobian: Array
 
-    @property
-    def sigma(self) -> Array:
-        return np.hypot(self.problem.data.sigma, self.best.excess)
+    @cached_property
+    def scaled_jacobian(self) -> Array:
+        """The derivatives in given standard deviations, shape (n, p)."""
+        return np.where(np.isfinite(self.jacobian), self.jacobian, 0.0) / self.problem.data.sigma[:, None]
+
+    @cached_property
+    def scaled_residual(self) -> Array:
+        """Predicted minus measured in given standard deviations, shape (n,)."""
+        data = self.problem.data
+        scaled = (self.predicted - data.values) / data.sigma
+        return np.where(np.isfinite(scaled), scaled, NO_PREDICTION)
+
+    @cached_property
+    def white_jacobian(self) -> Array:
+        """The derivatives of the independent residuals, shape (n, p)."""
+        return self.problem.data.whiten(self.scaled_jacobian.T, self.best.excess).T
+
+    @cached_property
+    def white_residual(self) -> Array:
+        """Independent residuals, shape (n,)."""
+        return self.problem.data.whiten(self.scaled_residual, self.best.excess)
 
     @cached_property
     def unidentified(self) -> Array:
         """See `Fit`."""
-        return find_unidentified(self._weighted * log_slopes(self.problem, self.best.u))
+        return find_unidentified(self.white_jacobian * log_slopes(self.problem, self.best.u))
 
     @property
     def identifiable(self) -> Mask:
         identifiable: Mask = ~np.any(np.abs(self.unidentified) > INVOLVED, axis=0)
         return identifiable
+
+    @property
+    def freedom(self) -> int:
+        return self.problem.data.values.size - self.problem.count
+
+    @cached_property
+    def variance_factors(self) -> tuple[float, float]:
+        """The factors of the covariance and of the rise of the objective that the residuals give.
+
+        With noise "scale" that of the variances; with a loss, those of M-estimates from the means of its squared
+        first and of its second derivative.
+        """
+        data = self.problem.data
+        if data.noise == "scale":
+            return (self.best.objective / max(self.freedom, 1),) * 2
+        if data.loss == "linear":
+            return 1.0, 1.0
+        _, slope, curvature = LOSS_DERIVATIVES[data.loss](self.white_residual)
+        squares, mean = float(slope @ slope) / max(self.freedom, 1), float(curvature.mean())
+        return (squares / mean**2, squares / mean) if mean > 0.0 else (math.nan, math.nan)
+
+    @cached_property
+    def inverse(self) -> Array:
+        """(J^T V^(-1) J)^(-1) without the directions that are not identified, shape (p, p)."""
+        information = self.white_jacobian.T @ self.white_jacobian
+        return np.asarray(np.linalg.pinv(information, rcond=SINGULAR**2, hermitian=True), float)
 
     @cached_property
     def covariance(self) -> Array:
@@ -429,26 +627,66 @@ class _Minimum:
         covariance = np.full((self.problem.count,) * 2, np.nan)
         if self.problem.is_determined:
             where = np.ix_(self.identifiable, self.identifiable)
-            inverse = np.linalg.pinv(self._weighted.T @ self._weighted, rcond=SINGULAR**2, hermitian=True)
-            covariance[where] = (variance_scale(self.problem, self.best) * inverse)[where]
+            covariance[where] = (self.variance_factors[0] * self.inverse)[where]
         return covariance
 
-    @property
-    def _weighted(self) -> Array:
-        """The derivatives in standard deviations."""
-        return np.where(np.isfinite(self.jacobian), self.jacobian, 0.0) / self.sigma[:, None]
+    @cached_property
+    def covariance_deviation(self) -> Array:
+        """Standard deviation of the covariance of u, shape (p, p)."""
+        data = self.problem.data
+        if data.noise == "scale" or data.loss != "linear":
+            return self.covariance * math.sqrt(2.0 / max(self.freedom, 1))
+        if data.noise == "given":
+            return np.zeros_like(self.covariance)
+        # J^T V^(-1) Z, and the diagonal of Z^T V^(-1) Z
+        growth = 1.0 + self.best.excess**2 * data.precision
+        cross = data.specimen_sums(self.scaled_jacobian.T / data.sigma) / growth
+        diagonal = data.precision / growth
+        product, leverage = cross @ cross.T @ self.inverse, np.einsum("pg,pq,qg->g", cross, self.inverse, cross)
+        # half of this is the information of the restricted likelihood about the variance between specimens
+        information = float((diagonal**2 - 2.0 * diagonal * leverage).sum() + np.trace(product @ product))
+        deviation: Array = self.inverse @ product * math.sqrt(2.0 / max(information, 1e-300))
+        return deviation
+
+    @cached_property
+    def taken(self) -> Array | None:
+        """See `ExcessLikelihood`."""
+        return directions_taken(self.scaled_jacobian) if self.problem.data.noise == "excess" else None
 
     def end_tasks(self) -> list[Callable[[Evaluate], tuple[int, int, float]]]:
         """Find both ends of the interval of each parameter that has a variance."""
         tasks: list[Callable[[Evaluate], tuple[int, int, float]]] = []
-        for parameter in np.flatnonzero(np.diag(self.covariance) > 0.0).tolist():
-            quantile = squared_quantile(self.problem)
-            width = math.sqrt(quantile * self.covariance[parameter, parameter])
-            rise = quantile * variance_scale(self.problem, self.best)
-            tasks += [
-                partial(_end, self.problem, self.best, parameter, direction, rise, width) for direction in (-1, 1)
-            ]
+        variances = np.diag(self.covariance)
+        freedom = degrees_of_freedom(variances, np.diag(self.covariance_deviation))
+        quantiles, best = t_quantile(freedom), self.best
+        rises = quantiles**2 * self.variance_factors[1]
+        if self.taken is not None:
+            likelihood = ExcessLikelihood(self.problem.data, self.scaled_residual, self.taken)
+            best = replace(best, objective=likelihood.objective(best.excess**2))
+            # minus twice a likelihood that is profiled over a variance, at a quantile of Student's t
+            finite = np.isfinite(freedom)
+            rises[finite] = freedom[finite] * np.log1p(rises[finite] / freedom[finite])
+        for parameter in np.flatnonzero(variances > 0.0).tolist():
+            width = float(quantiles[parameter] * math.sqrt(variances[parameter]))
+            end = partial(_end, self.problem, best, self.taken, parameter, float(rises[parameter]), width)
+            tasks += [partial(end, direction) for direction in (-1, 1)]
         return tasks
+
+    @cached_property
+    def loo_residual(self) -> Array:
+        """See `Fit`: (V^(-1) r)_i over the root of P_ii; P = V^(-1) - V^(-1) J C J^T V^(-1) with the inverse C."""
+        data, excess = self.problem.data, self.best.excess
+        precision = excess**2 / (1.0 + excess**2 * data.precision)
+        leverage = data.whiten(self.white_jacobian.T, excess)
+        left = 1.0 - data.at_points(precision) / data.sigma**2
+        left = left - np.einsum("pn,pq,qn->n", leverage, self.inverse, leverage)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            residual = -data.whiten(self.white_residual, excess) / np.sqrt(left)
+            if data.noise == "scale":
+                # the scale of the fit without the point
+                residual = residual / math.sqrt(self.variance_factors[0])
+                residual = residual * np.sqrt((self.freedom - 1.0) / (self.freedom - residual**2))
+        return np.where(left > LEVERAGE_LEFT, residual, np.nan)
 
     def leave_one_out_tasks(self) -> list[Callable[[Evaluate], float]]:
         """Predict each point by the fit without it."""
@@ -462,25 +700,26 @@ class _Minimum:
         for parameter, direction, u in ends:
             (lower if direction < 0 else upper)[parameter] = u
         slope = problem.bounds.slope(best.u)
-        freedom = problem.data.values.size - problem.count
-        left_out = (
-            (problem.data.values - np.array(predictions)) / self.sigma if predictions else np.array([np.nan])
-        )
+        data, squares = problem.data, float(self.white_residual @ self.white_residual)
+        left_out = (data.values - np.array(predictions)) / data.sigma if predictions else np.array([np.nan])
         return Fit(
             status=self._status(),
             estimate=problem.bounds.values(best.u),
             lower=problem.bounds.values(lower),
             upper=problem.bounds.values(upper),
             covariance=self.covariance * np.outer(slope, slope),
+            covariance_deviation=self.covariance_deviation * np.outer(slope, slope),
             identifiable=self.identifiable,
             unidentified=self.unidentified,
             predicted=self.predicted,
-            residual=problem.data.values - self.predicted,
+            residual=data.values - self.predicted,
             jacobian=self.jacobian / slope,
-            chi2_reduced=best.chi2 / freedom if freedom > 0 else math.nan,
+            chi2_reduced=squares / self.freedom if self.freedom > 0 else math.nan,
+            p_value=float(chi2.sf(squares, self.freedom)) if data.noise == "given" else math.nan,
             excess=best.excess,
-            aicc=information(problem, best),
+            aicc=information(problem, self.objective),
             loo=float(np.sqrt(np.mean(left_out**2))),
+            loo_residual=self.loo_residual if problem.is_determined else np.full(data.values.size, np.nan),
         )
 
     def _status(self) -> FitStatus:
@@ -490,8 +729,11 @@ class _Minimum:
             return "too_few_points"
         if not self.best.converged:
             return "not_converged"
-        at_bound = (np.minimum(self.best.u, 1.0 - self.best.u) <= AT_BOUND) & self.identifiable
-        return "at_bound" if at_bound.any() else "ok"
+        at_bound = (np.stack([self.best.u, 1.0 - self.best.u]) <= AT_BOUND) & self.identifiable
+        if not at_bound.any():
+            return "ok"
+        is_limit = self.problem.bounds.is_limit
+        return "at_bound" if is_limit is None or (at_bound & ~is_limit).any() else "at_limit"
 
 
 def fit_all(
@@ -517,8 +759,7 @@ def fit_all(
     )
     best = [best_of(estimates) for estimates in minima]
     pairs = list(zip(problems, best, strict=True))
-    jacobians = run_together(functions, [partial(_final_jacobian, *pair) for pair in pairs])
-    found = [_Minimum(*pair, *jacobian) for pair, jacobian in zip(pairs, jacobians, strict=True)]
+    found = run_together(functions, [partial(_minimum, *pair) for pair in pairs])
     ends = _run_each(functions, [minimum.end_tasks() for minimum in found])
     left_out = _run_each(functions, [minimum.leave_one_out_tasks() if leave_one_out else [] for minimum in found])
     return [minimum.result(*parts) for minimum, parts in zip(found, zip(ends, left_out, strict=True), strict=True)]
@@ -539,14 +780,27 @@ def _minimize(problem: Problem, start: Array, evaluate: Evaluate) -> Estimate:
     return minimize(problem, evaluate, start)
 
 
-def _final_jacobian(problem: Problem, best: Estimate, evaluate: Evaluate) -> tuple[Array, Array]:
-    return final_jacobian(problem, evaluate, best.u)
+def _minimum(problem: Problem, best: Estimate, evaluate: Evaluate) -> _Minimum:
+    """The minimum of a problem, from that of the likelihood."""
+    minimum = _Minimum(problem, best.objective, best, *final_jacobian(problem, evaluate, best.u))
+    if minimum.taken is None:
+        return minimum
+    restricted = minimize(problem, evaluate, best.u, taken=minimum.taken)
+    return _Minimum(problem, best.objective, restricted, *final_jacobian(problem, evaluate, restricted.u))
 
 
 def _end(
-    problem: Problem, best: Estimate, parameter: int, direction: int, rise: float, width: float, evaluate: Evaluate
+    problem: Problem,
+    best: Estimate,
+    taken: Array | None,
+    parameter: int,
+    rise: float,
+    width: float,
+    direction: int,
+    evaluate: Evaluate,
 ) -> tuple[int, int, float]:
-    return parameter, direction, profile_end(problem, evaluate, best, parameter, direction, rise, width)
+    end = profile_end(problem, evaluate, best, parameter, direction, rise, width, taken)
+    return parameter, direction, end
 
 
 def _prediction_without(problem: Problem, best: Estimate, point: int, evaluate: Evaluate) -> float:

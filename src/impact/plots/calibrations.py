@@ -93,7 +93,7 @@ def _panels(data: xr.Dataset, name: str, varied: str, choice: Choice, best: floa
         # a difference between the best law and others; a law alone has none
         difference = float(law["aicc"]) - best
         remark = status.replace("_", " ")
-        if status == "ok":
+        if status in ("ok", "at_limit"):
             remark = f"ΔAICc = {decimals(difference, 1)}" if np.isfinite(difference) else ""
         label = ", ".join(filter(None, (model_label(law, numbered=choice.equations), remark)))
         if varied:

@@ -28,8 +28,8 @@ from ..results.calibration import (
     FIT_STATUSES,
     calibration_title,
     describe_data,
+    fit_notes,
     fit_rows,
-    unidentified_notes,
 )
 from ..results.kinds import is_calibration, is_sensitivity
 from ..results.plausibility import material_notes, result_notes
@@ -120,7 +120,7 @@ def _fits_section(dataset: xr.Dataset) -> dict[str, Any]:
     return {
         "headings": list(FIT_HEADINGS),
         "rows": [[row[0] or "″", *row[1:]] for row in fit_rows(dataset)],
-        "notes": unidentified_notes(dataset),
+        "notes": fit_notes(dataset),
         "statuses": [f"{name}: {meaning}" for name, meaning in FIT_STATUSES.items() if name != "ok"],
     }
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -18,15 +18,17 @@ from ..contact.model import ForceModel
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins
 from ..formatting import decimals, number
+from ..text import safe_text
 from .schema import SCHEMA, coordinate_attributes, plan_coordinates, provenance_attributes
 
 # what became of a fit; its number is its position
 FIT_STATUSES = {
     "ok": "the solver met its tolerance inside the bounds",
-    "at_bound": "a parameter stands at a bound",
+    "at_bound": "a parameter is at a bound of the search: wider bounds would fit better",
     "not_converged": "the solver did not meet its tolerance",
     "too_few_points": "there are not more points than parameters",
     "no_prediction": "the law has no result at a point",
+    "at_limit": "a parameter is at an end of its allowed values, where its interval ends too",
 }
 
 
@@ -36,12 +38,14 @@ class CalibrationVariable:
 
     A difference is judged in units of `scale`: the value and its interval; the standard deviations of two
     parameters; the value; the value, or 1 if that is larger; or the largest measured value of the output.
+    Version 1.0 did not store the variables with `is_new`.
     """
 
     dims: tuple[str, ...]
     unit: str
     meaning: str
     scale: Literal["exact", "itself + interval", "deviations", "itself", "max(1, itself)", "measured"]
+    is_new: bool = False
 
 
 _OF_PARAMETER = ("model", "parameter")
@@ -66,28 +70,43 @@ CALIBRATION_VARIABLES = {
     "chi2_reduced": CalibrationVariable(
         ("model",), "1", "squared residuals in variances per degree of freedom", "max(1, itself)"
     ),
+    "p_value": CalibrationVariable(
+        ("model",), "1", "probability of a larger chi2 by the noise alone", "max(1, itself)", is_new=True
+    ),
     "excess": CalibrationVariable(
         ("model",), "SI", "standard deviation between specimens, besides that of the measurements", "itself"
     ),
     "aicc": CalibrationVariable(("model",), "1", "corrected information criterion of Akaike", "max(1, itself)"),
-    "weight": CalibrationVariable(
-        ("model",), "1", "Akaike weight among the laws whose fit has no defect", "max(1, itself)"
-    ),
+    "weight": CalibrationVariable(("model",), "1", "Akaike weight among the laws", "max(1, itself)"),
     "loo": CalibrationVariable(
-        ("model",), "1", "root mean square of leave-one-out residuals, in standard deviations", "max(1, itself)"
+        ("model",),
+        "1",
+        "root mean square of leave-one-out residuals in given standard deviations; in SI units without one",
+        "max(1, itself)",
     ),
     "predicted": CalibrationVariable(("model", "point"), "SI", "output of the law at the point", "measured"),
     "residual": CalibrationVariable(("model", "point"), "SI", "measured minus predicted", "measured"),
+    "loo_residual": CalibrationVariable(
+        ("model", "point"),
+        "1",
+        "residual of the point in the fit without it, in its own standard deviations",
+        "max(1, itself)",
+        is_new=True,
+    ),
     "curve": CalibrationVariable(_OF_CURVE, "SI", "output of the law over the varied input", "measured"),
     "curve_lower": CalibrationVariable(_OF_CURVE, "SI", "lower end of the band of 95 % of the curve", "measured"),
     "curve_upper": CalibrationVariable(_OF_CURVE, "SI", "upper end of the band of 95 % of the curve", "measured"),
 }
 # coordinates besides those of models and inputs; those that are text
-CALIBRATION_TEXTS = frozenset({"parameter", "other_parameter", "output_name", "output", "determined"})
+CALIBRATION_TEXTS = frozenset({"parameter", "other_parameter", "output_name", "output", "determined", "specimen"})
 CALIBRATION_COORDINATES = CALIBRATION_TEXTS | {"point", "grid", "measured", "sigma", "line"}
 
 
-FIT_HEADINGS = ("law", "parameter", "estimate", "95 %", "chi2/dof", "AICc", "weight", "loo", "status")
+# probability of chi2 below which a law is called rejected
+REJECTED_P = 1e-3
+# residuals that are named
+NAMED_RESIDUALS = 3
+FIT_HEADINGS = ("law", "parameter", "estimate", "95 %", "chi2/dof", "p", "AICc", "weight", "loo", "status")
 
 
 def fit_status(law: xr.Dataset) -> str:
@@ -102,6 +121,7 @@ def fit_rows(dataset: xr.Dataset) -> list[tuple[str, ...]]:
         law = dataset.sel(model=key)
         quality = (
             number(float(law["chi2_reduced"]), 3),
+            number(float(law["p_value"]), 2) if "p_value" in law and np.isfinite(law["p_value"]) else "–",
             decimals(float(law["aicc"]), 1),
             decimals(float(law["weight"]), 3),
             number(float(law["loo"]), 3),
@@ -136,6 +156,79 @@ def unidentified_notes(dataset: xr.Dataset) -> list[str]:
             only = f"only {groups} is determined" if groups else "the data do not determine them"
             notes.append(f"{key}: {short}: {only}")
     return notes
+
+
+def fit_notes(dataset: xr.Dataset) -> list[str]:
+    """What a reader has to know besides the table, in words: one line for each."""
+    best = dataset.isel(model=0)
+    notes = [*_noise_notes(dataset)]
+    if (
+        "p_value" in best
+        and float(best["p_value"]) < REJECTED_P
+        and dataset.attrs.get("loss", "linear") == "linear"
+    ):
+        notes.append(
+            f"the best law is rejected (p < {REJECTED_P:g}): try other laws, "
+            'noise = "excess" with a column specimen where specimens differ, or loss = "huber" against outliers'
+        )
+    if residuals := largest_residuals(dataset):
+        parts = [f"{residual.place} ({decimals(residual.standardized, 1)})" for residual in residuals]
+        notes.append(
+            f"largest residuals of {best['model'].item()}, each in the fit without the point and in its standard "
+            f"deviations: {', '.join(parts)}"
+        )
+    return notes + unidentified_notes(dataset)
+
+
+def _noise_notes(dataset: xr.Dataset) -> Iterator[str]:
+    """What the noise "excess" without specimens means."""
+    if dataset.attrs["noise"] != "excess" or "specimen" in dataset.coords:
+        return
+    yield "without a column specimen, each measured value has an excess deviation of its own"
+    inputs = [
+        np.asarray(coordinate.values)
+        for name, coordinate in dataset.coords.items()
+        if coordinate.dims == ("point",) and name not in CALIBRATION_COORDINATES
+    ]
+    rows = list(zip(*inputs, strict=True)) or [()] * dataset.sizes["point"]
+    repeated = sum(rows.count(row) > 1 for row in rows)
+    if repeated:
+        yield (
+            f"{repeated} of {len(rows)} points repeat the inputs of another: name their specimens in a column "
+            "specimen if they share a deviation, as the intervals are too short otherwise"
+        )
+
+
+@dataclass(frozen=True)
+class Residual:
+    """The residual of a measured value in the fit without it, in its own standard deviations, and where it is."""
+
+    place: str
+    output: str
+    measured: float
+    standardized: float
+
+
+def largest_residuals(dataset: xr.Dataset) -> list[Residual]:
+    """The largest residuals of the best law in the fits without the point, the largest first."""
+    if "loo_residual" not in dataset:
+        return []
+    best = dataset.isel(model=0)
+    residuals = np.nan_to_num(np.asarray(best["loo_residual"].values, float))
+    largest = np.argsort(-np.abs(residuals), kind="stable")[:NAMED_RESIDUALS]
+    file = safe_text(str(dataset.attrs["data_file"]))
+    several = len({*map(str, best["output"].values)}) > 1
+    return [
+        Residual(
+            (f"{file}:{int(point['line'])}" if file else f"value {int(point['line'])}")
+            + (f" {point['output'].item()}" if several else ""),
+            str(point["output"].item()),
+            float(point["measured"]),
+            float(point["loo_residual"]),
+        )
+        for point in (best.isel(point=number) for number in largest.tolist())
+        if np.isfinite(point["loo_residual"])
+    ]
 
 
 def calibration_title(dataset: xr.Dataset) -> str:
@@ -188,6 +281,8 @@ def calibration_template(
             {"long_name": "standard deviation of the measured value"},
         ),
     }
+    if data.specimens:
+        new["specimen"] = ("point", list(data.specimens), {"long_name": "specimen of the measured value"})
     for name, column in data.inputs.items():
         new[name] = ("point", np.tile(column, len(outputs)), coordinate_attributes(plan, name))
     sizes = {"model": len(models), "parameter": len(parameters), "other_parameter": len(parameters)}
@@ -216,6 +311,7 @@ def calibration_template(
             )
     attributes = provenance_attributes(plan) | {
         "noise": data.noise,
+        "loss": data.loss,
         "data_file": data.file,
         "varied": name,
         "fit_paths": json.dumps([".".join(map(str, path_of(name))) for name in parameters]),

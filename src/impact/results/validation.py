@@ -189,7 +189,7 @@ def _calibration_violations(dataset: xr.Dataset) -> Iterator[str]:
     grid = bool(dataset.attrs.get("varied"))
     for name, variable in CALIBRATION_VARIABLES.items():
         dims = variable.dims
-        if "grid" in dims and not grid:
+        if ("grid" in dims and not grid) or (variable.is_new and name not in dataset):
             continue
         if name not in dataset or dataset[name].dims != dims:
             found = "none" if name not in dataset else ", ".join(map(str, dataset[name].dims)) or "no axes"
