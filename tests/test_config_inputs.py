@@ -236,6 +236,10 @@ def test_a_file_of_the_system_that_never_ends_is_not_read(forked: ForkServer, tm
     for name, kind in (("/proc/kmsg", "TOML"), ("x.toml", "CSV")):
         done = forked("sweep", "--dry-run", name, cwd=tmp_path, limit=20)
         assert (done.returncode, done.stderr) == (2, f"/proc/kmsg: empty, expected a {kind} file\n")
+    done = forked("info", "/proc/kmsg", limit=20)
+    assert done.returncode == 2
+    assert done.stderr.startswith("/proc/kmsg: is empty")
+    assert forked("run", "/proc/kmsg", limit=20).returncode == 2
 
 
 @pytest.mark.parametrize(

@@ -67,7 +67,7 @@ def check_seal(path: Path) -> str:
 
 def is_result(path: Path) -> bool:
     """Whether a file begins like a result of this schema version or of version 1."""
-    if not path.is_file():
+    if not path.is_file() or not path.stat().st_size:
         return False
     with path.open("rb") as file:
         return file.read(len(MAGIC)).startswith((MAGIC, HDF5_MAGIC))
@@ -78,6 +78,9 @@ def open_regular_file(path: Path) -> Iterator[BinaryIO]:
     """A regular file, opened for reading."""
     if not path.is_file():
         raise ResultError("is not a regular file" if path.exists() else "does not exist")
+    # also a file of the system such as /proc/kmsg, of which reading might never end
+    if not path.stat().st_size:
+        raise ResultError("is empty: it does not begin with the header of a sealed file")
     with path.open("rb") as file:
         yield file
 
