@@ -141,7 +141,8 @@ be read again.
 
 ## Time history (`impact run --history`)
 
-All variables have the dimension `t` [s], the time since first contact.
+All variables have the dimension `t` [s], the time since first contact. A file whose name ends in `.h5`, `.hdf5` or
+`.nc` is netCDF-4; in a file `.csv` they are columns, with the unit in the heading, such as `v1 [m/s]`.
 
 | variable | unit | meaning |
 |---|---|---|

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
+from scipy.optimize import brentq
 
 import impact
 from impact.contact.closed_forms.adhesive import jkr_root
@@ -116,6 +118,47 @@ def test_the_edinburgh_law_agrees_with_the_time_steps_of_liggghts(n, k2, chi, ga
     # with n = 1 and without surface energy it is the bilinear law
     if gamma == 0.0 and n == 1.0:
         assert contact["e_out"][0] == pytest.approx(np.sqrt(1 / k2), abs=1e-9)
+
+
+def edinburgh_by_quadrature(n: float, K: float, k2: float, gamma: float, R: float, m: float, v0: float) -> float:
+    """The restitution by the equation of the catalogue with χ = 1, for two balls of one radius."""
+    peak = ((n + 1) / 2 * m * v0**2 / K) ** (1 / (n + 1))
+    plastic = (1 - 1 / k2) ** (1 / n) * peak
+    a = np.sqrt(R**2 - (R - plastic / 2) ** 2)
+    pull, limit = 1.5 * np.pi * gamma * a, K * k2 * plastic**n / 2
+    d = plastic / 2 if pull > limit else (plastic**n - pull / (K * k2)) ** (1 / n)
+    k_a = min(pull, limit) / d
+
+    def force(x: float) -> float:
+        return max(K * k2 * (x**n - plastic**n), -k_a * x)
+
+    meeting = brentq(lambda x: K * k2 * (x**n - plastic**n) + k_a * x, 0.0, peak, xtol=1e-18)
+    work = quad(force, 0.0, meeting, epsrel=1e-12)[0] + quad(force, meeting, peak, epsrel=1e-12)[0]
+    return float(np.sqrt(max(2 * work / (m * v0**2), 0.0)))
+
+
+@pytest.mark.parametrize(
+    ("n", "K", "k2", "gamma", "e_out"),
+    [
+        (1.5, 3.162e7, 2.0, 24848.94, 0.213703),
+        # just beyond the limit of f, where d is half of the permanent indentation and e jumps
+        (1.5, 3.162e7, 2.0, 24848.95, 0.0),
+        (1.5, 3.162e7, 2.0, 5e4, 0.0),
+        (2.0, 3.162e7, 1.5, 5e4, 0.549263),
+        (1.25, 1e6, 2.0, 5e6, 0.340371),
+        # with n = 1 both values of d are the same
+        (1.0, 1e6, 2.0, 1e9, 0.5),
+    ],
+)
+def test_the_edinburgh_law_is_its_equation_where_the_adhesion_is_limited(
+    n: float, K: float, k2: float, gamma: float, e_out: float
+) -> None:
+    parameters = {"k2": k2, "gamma": gamma, "adhesion_exponent": 1.0}
+    contact = struck("liggghts-edinburgh", n, v1=1.0, m1=1.0, m2=1.0, K=K, R1=0.02, R2=0.02, parameters=parameters)
+    assert contact["e_out"][0] == pytest.approx(e_out, abs=1e-6)
+    assert contact["e_out"][0] == pytest.approx(edinburgh_by_quadrature(n, K, k2, gamma, 0.02, 0.5, 1.0), abs=1e-9)
+    equation = " ".join(find("liggghts-edinburgh").equation.split())
+    assert "d = δₚ/2 where f is limited to k₂ δₚⁿ/2, else (δₚⁿ − f/k₂)^(1/n)" in equation
 
 
 def test_the_edinburgh_law_sticks_at_low_speed_and_releases_at_zero_indentation():

@@ -27,6 +27,15 @@ def test_a_name_of_the_page_exists(name: str) -> None:
         assert hasattr(import_module(module), attribute), name
 
 
+def test_outputs_and_pictures_are_defined_where_the_page_says() -> None:
+    start = PAGE.partition("## Where to start")[2]
+    outputs, schema = import_module("impact.contact.outputs"), import_module("impact.results.schema")
+    assert {*outputs.OUTPUTS} <= outputs.FORMULAS.keys() & outputs.UNITS.keys()
+    assert {*outputs.OUTPUTS} <= {variable.name for variable in schema.SCHEMA}
+    for name in ("outputs.FORMULAS", "outputs.UNITS", "schema.SCHEMA", "kinds.KINDS", "figures.FIGURES"):
+        assert f".{name}`" in start
+
+
 def test_the_list_of_modules_is_fresh_and_complete() -> None:
     assert architecture_page(PAGE) == PAGE, "run `make docs`"
     listed = set(re.findall(r"^- `([\w/]+)`: ", PAGE, re.MULTILINE))

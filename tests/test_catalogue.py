@@ -1,6 +1,7 @@
 """The laws agree with published errors and limits, their closed forms, and an independent integration."""
 
 import functools
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -25,6 +26,7 @@ from impact.contact.models import catalogue, find
 from impact.contact.outputs import collide
 from impact.contact.scaling import delivered
 from impact.contact.status import Status
+from impact.exporters.codes import CODES
 
 from .problems import table1_impacts
 
@@ -506,3 +508,14 @@ def test_calibrated_damping_delivers_the_requested_restitution(key, n):
         find(key).release == "gap" and find(key).velocity_coordinate == "force" and find(key).unloading is None
     )
     assert np.abs(outputs["e_out"] / e - 1.0).max() <= (1e-6 if decays else 1e-9)
+
+
+def test_the_versions_in_a_title_include_the_one_that_was_run():
+    """The scripts of a code were run with all of its laws but older ones, which are not the first."""
+    for code in CODES.values():
+        versions = re.search(r"\((\d+\.[\d.]+) to ([\d.]+)\)", find(next(iter(code.laws))).title)
+        run = re.search(r"were run in \D*(\d+(\.\d+)+)", code.tested)
+        if versions and run:
+            oldest, newest, tested = ([*map(int, text.split("."))] for text in (*versions.groups(), run[1]))
+            assert oldest <= tested <= newest, code.name
+    assert find("mujoco-solref").title.endswith("(since 2.1)")

@@ -18,6 +18,7 @@ import xarray as xr
 from rich.cells import cell_len
 
 import impact
+from impact.plots.data import read_points
 
 from .conftest import ROOT, WIDE, Run
 from .fork_server import ForkServer, abandoned_pipe, printed_on_terminal
@@ -409,12 +410,46 @@ def test_the_catalogue(cli: Run) -> None:
     page = cli("models", "ismail-stronge-2008").stdout
     assert "plastic loss factor" in page
     assert "seen in Gharib and Hurmuzlu (2012), equation (43)" in page
+    for words in ("The columns e=... show the delivered", "The column core shows what integrates", " entries: "):
+        assert words in cli("models", COLUMNS="200").stdout
+
+
+def test_a_model_is_described_in_full(cli: Run) -> None:
+    longest = sorted(impact.models().values(), key=lambda model: len(str(model.evidence)) + len(model.equation))
+    for model in longest[-3:]:
+        words = cli("models", model.key).stdout.split()
+        for text in (model.equation, model.reference, str(model.evidence)):
+            # a long line is broken between words
+            assert " ".join(text.split()) in " ".join(words)
+
+
+def test_common_materials_are_listed_with_units_and_sources(cli: Run) -> None:
+    headings, *rows = cli("materials").stdout.splitlines()
+    assert headings.split("  ")[0] == "material"
+    assert re.split(" {2,}", headings.strip())[1:] == [
+        "E [GPa]", "nu [-]", "rho [kg/m3]", "yield_strength [MPa]", "what", "source"
+    ]  # fmt: skip
+    for name, record in impact.materials().items():
+        assert any(row.startswith(f"{name} ") for row in rows)
+        numbers = [record["E"] / 1e9, record["nu"], record["rho"], record.get("yield_strength", np.nan) / 1e6]
+        heading, printed, *_ = cli("materials", name).stdout.splitlines()
+        cells = [np.nan if word == "–" else float(word) for word in printed.split()[1:5]]
+        np.testing.assert_allclose(cells, numbers, rtol=1e-5)
+        assert heading.startswith("material")
+    assert json.loads(cli("materials", "glass", "--json").stdout) == {"glass": impact.materials()["glass"]}
+    refused = cli("materials", "glas")
+    assert (refused.returncode, refused.stderr) == (2, 'no material "glas"; did you mean "glass"?\n')
 
 
 def test_info(cli: Run, stored: Path) -> None:
     page = cli("info", stored).stdout
     for words in ("model 3 × e 101", "closed_form_error", "301 ok, 2 limit", "0 … 1, 101 values"):
         assert words in page
+    names = [line.split(" ")[0] for line in page.split("\n\n")[0].splitlines() if line[:1].strip()]
+    assert names[:5] == ["file", "title", "dimensions", "points", "layout"]
+    # texts of each model are no values of an input
+    assert not {"equation", "reference", "doi", "year"} & {*names}
+    assert names.count("title") == 1
     printed = json.loads(cli("info", stored, "--json").stdout)
     assert printed["dimensions"] == {"model": 3, "e": 101}
     assert printed["attributes"]["config"].startswith("#:schema")
@@ -494,6 +529,26 @@ def test_hostile_names_in_a_file_are_escaped(cli: Run, tmp_path: Path) -> None:
         assert not re.search("[\x1b\x07\u202e]", done.stdout + done.stderr), words
     done = cli("models", name)
     assert (done.returncode, "\x1b" in done.stderr) == (2, False)
+
+
+def test_a_history_is_a_table_or_a_result_as_its_name_says(cli: Run, tmp_path: Path) -> None:
+    for name in ("h.h5", "h.csv"):
+        done = cli("run", "--at", "e=0.5", "--times", "50", "--history", name, cwd=tmp_path)
+        assert (done.returncode, done.stderr) == (0, f"{name}: 50 points in time\n")
+    history = impact.load(tmp_path / "h.h5")
+    heading, *_ = (tmp_path / "h.csv").read_text(encoding="utf-8").splitlines()
+    assert heading == "t [s],delta [m],v [m/s],F [N],x1 [m],x2 [m],v1 [m/s],v2 [m/s]"
+    columns = read_points(tmp_path / "h.csv").columns
+    assert columns.keys() == history.variables.keys() - {"model"}
+    for name, values in columns.items():
+        np.testing.assert_array_equal(values, history[name].values)
+    assert cli("plot", "h.h5", "-k", "history", "--points", "h.csv", cwd=tmp_path).returncode == 0
+    (tmp_path / "h.png").unlink()
+    for name in ("h.png", "h.txt", "h"):
+        refused = cli("run", "--model", "nothing", "--history", name, cwd=tmp_path)
+        words = f"--history {name}: expected a name that ends in .h5, .hdf5, .nc or .csv\n"
+        assert (refused.returncode, refused.stdout, refused.stderr) == (2, "", words)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["h.csv", "h.h5"]
 
 
 def test_run_of_a_failed_point(cli: Run, tmp_path: Path) -> None:

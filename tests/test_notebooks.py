@@ -7,6 +7,9 @@ from pathlib import Path
 
 import nbformat
 import pytest
+import xarray as xr
+
+import impact
 
 from .conftest import ROOT
 
@@ -22,6 +25,19 @@ def test_there_is_a_notebook_for_each_question_and_each_has_its_pictures() -> No
         shown = texts(nbformat.read(path, as_version=4))
         assert ["picture"] in shown, path.name
         assert path.stat().st_size < 500_000, path.name
+
+
+def test_the_notebook_of_figure_6_describes_the_lines_of_its_picture(figure6: xr.Dataset) -> None:
+    text = (NOTEBOOKS / "figure6.ipynb").read_text(encoding="utf-8")
+    assert (
+        "thick black lines are the solution by impulse and momentum; a line with markers is that of a law" in text
+    )
+    (axes,) = impact.plot(figure6).axes
+    for line in axes.lines:
+        is_reference = line.get_label() == "_Impulse-momentum"
+        assert (line.get_color() == "black", line.get_linestyle() == "-") == (is_reference, is_reference)
+        assert (line.get_marker() == "None") == is_reference
+        assert is_reference == (line.get_linewidth() == max(line.get_linewidth() for line in axes.lines))
 
 
 @pytest.mark.slow

@@ -80,8 +80,7 @@ def test_the_largest_error_of_a_claim_is_the_printed_number(claim: list[str]) ->
     if float(printed) < 1e-9:
         assert max_error < float(printed) < 100 * max_error
     else:
-        # the page rounds up
-        assert float(printed) - 1e-4 < max_error < float(printed)
+        assert f"{max_error:.4f}" == printed
 
 
 def test_restitution_is_independent_of_masses_speeds_and_materials() -> None:

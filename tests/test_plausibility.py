@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import html
 import json
+import math
+import re
 import tomllib
 from pathlib import Path
 
@@ -105,3 +108,52 @@ def test_the_report_has_the_notes() -> None:
     page = impact.report(impact.sweep(config))
     assert "<p>Note: materials.steel.E: got 210 Pa; did you mean 210 GPa?</p>" in page
     assert "<p>Note: none of 2 points is an impact: v1 &lt;= v2, the balls do not approach</p>" in page
+
+
+MANY_AXES = {
+    "models": ["hertz", "gharib-hurmuzlu-2012", "kelvin-voigt"],
+    "solver": {"rtol": 1e-4},
+    "sweep": {
+        "e": [0.2, 0.8],
+        "v1": [1.0, 50.0, 400.0],
+        "m1": [1.0, 0.001],
+        "m2": [2.0, math.inf],
+        "R2": [0.01, math.inf],
+        "zip": [["m2", "R2"]],
+        "material1": ["steel", "rubber"],
+        "material2": "steel",
+    },
+    "model": {"kelvin-voigt": {"C": [10.0, 100.0]}},
+    "materials": {
+        "steel": {"E": 210.0, "nu": 0.3, "rho": 7850.0},
+        "rubber": {"E": 5e6, "nu": 0.45, "rho": [900.0, 1200.0]},
+    },
+}
+
+
+def notes_of(page: str) -> list[str]:
+    """The notes of a report."""
+    return [html.unescape(note) for note in re.findall("<p>Note: (.*?)</p>", page)]
+
+
+@pytest.mark.parametrize("layout", ["full", "factored"])
+def test_the_report_has_every_note_of_the_sweep(cli: Run, tmp_path: Path, layout: str) -> None:
+    (tmp_path / "c.json").write_text(json.dumps(MANY_AXES), encoding="utf-8")
+    done = cli("sweep", "c.json", "-o", "r.h5", "--set", f"output.layout={layout}", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    printed = [line.removeprefix("note: ") for line in done.stderr.splitlines() if line.startswith("note: ")]
+    assert [line.partition(" at ")[0] for line in printed] == [
+        "c.json: materials.steel.E: got 210 Pa; did you mean 210 GPa?",
+        LIMIT,
+    ]
+    result = impact.load(tmp_path / "r.h5")
+    assert notes_of(impact.report(result)) == [line.removeprefix("c.json: ") for line in printed]
+    # a part of a result has the number of its own points
+    single = {"e": 0, "v1": 2, "m1": 1, "m2": 0, "material1": 1, "materials.rubber.rho": 1, "kelvin-voigt.C": 0}
+    part = result.isel(single)
+    depth = part["peak_indentation"].values / np.cbrt(3 * 0.001 / (4 * np.pi * 1200.0))
+    note = f"{LIMIT} at {(depth > 0.1).sum()} of 3 points, at most {depth.max():.0%}; {SMALL}"
+    assert notes_of(impact.report(part))[1:] == [note]
+    # without the values, or what the radii follow from, there is none
+    assert len(notes_of(impact.report(result.drop_vars("peak_indentation")))) == 1
+    assert notes_of(impact.report(result.assign_attrs(materials="{}"))) == []

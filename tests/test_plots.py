@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import hashlib
+import json
 import shutil
 import subprocess
 import sys
@@ -549,7 +550,7 @@ def test_labels_titles_and_sizes_are_chosen(coarse: xr.Dataset) -> None:
     bare = impact.plot(coarse, title=False)
     assert bare.texts == []
     assert bare.get_figheight() < impact.plot(coarse).get_figheight()
-    loop = impact.plot(coarse, kind="loop", sel={"e": 0.5}, labels={"delta": "Overlap", "v1": "not here"})
+    loop = impact.plot(coarse, kind="loop", sel={"e": 0.5}, labels={"delta": "Overlap"})
     assert loop.axes[0].get_xlabel() == "Overlap (µm)"
 
 
@@ -722,13 +723,68 @@ def test_kinds_that_do_not_apply_are_reported_and_others_drawn(
     first, second = drawn.stderr.splitlines()
     assert first.startswith("a-restitution.svg: ")
     assert second.startswith("map is not drawn: map needs two axes")
-    # --sel applies to every kind: no axis is left to draw the error over
-    drawn = cli("plot", coarse_file, "-k", "loop", "-k", "error", "--sel", "e=0.5", "-o", "b.svg", cwd=tmp_path)
-    assert drawn.returncode == 0
-    assert "error is not drawn: this result has no numeric axis left to draw over" in drawn.stderr
     none = cli("plot", coarse_file, "-k", "map", "-k", "validity", "-o", "c.svg", cwd=tmp_path)
     assert (none.returncode, len(none.stderr.splitlines())) == (2, 2)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a-restitution.svg", "b-loop.svg"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a-restitution.svg"]
+
+
+def test_a_value_for_one_picture_leaves_the_axes_of_others(
+    cli: Run, coarse: xr.Dataset, coarse_file: Path, wide: xr.Dataset, tmp_path: Path
+) -> None:
+    words = ["-k", "error", "-k", "loop", "-k", "final-velocities", "--sel", "e=0.5"]
+    drawn = cli("plot", coarse_file, *words, "-o", "a.svg", "--json", cwd=tmp_path)
+    assert (drawn.returncode, sorted(path.name for path in tmp_path.iterdir())) == (
+        0,
+        ["a-error.svg", "a-final-velocities.svg", "a-loop.svg"],
+    )
+    first, second, third = drawn.stderr.splitlines()
+    assert first.endswith("; without --sel e=0.5, a point on its axis")
+    assert "e = 0.5" in second
+    assert third.endswith("; without --sel e=0.5, a point on its axis")
+    # the picture is that of the call without a selection
+    (panel,) = json.loads(drawn.stdout)["final-velocities"]["panels"]
+    assert panel["curves"][0]["x"] == coarse["e"].values.tolist()
+    # a selection that leaves a picture an axis applies to it too
+    impact.save(wide, tmp_path / "wide.h5")
+    kinds = ("loop", "restitution", "map")
+    files = impact.plot_to_files(tmp_path / "wide.h5", kinds=kinds, sel={"e": 0.6, "v1": 2.0})
+    assert files.plot_data["restitution"].panels[0].x_name == "m1"  # type: ignore[union-attr]
+    assert files.plot_data["restitution"].not_drawn == ()
+    # a value for a curve leaves a map its axes
+    impact.save(wide.isel({"m1": 0, "material2": 0, "ismail-stronge-2008.gamma": 0}), tmp_path / "plane.h5")
+    files = impact.plot_to_files(tmp_path / "plane.h5", kinds=("map", "restitution"), sel={"v1": 2.0})
+    assert [plot_data.not_drawn for plot_data in files.plot_data.values()] == [
+        ("--sel v1=2.0, a point on its axis",),
+        (),
+    ]
+    # a selection for no picture is an error
+    alone = cli("plot", coarse_file, "-k", "error", "-k", "restitution", "--sel", "e=0.5", cwd=tmp_path)
+    assert alone.returncode == 2
+    assert alone.stderr.startswith("this result has no numeric axis left to draw over")
+
+
+def test_a_label_is_drawn_in_one_of_the_pictures_or_refused(
+    cli: Run, coarse: xr.Dataset, coarse_file: Path, tmp_path: Path
+) -> None:
+    labels = {"v1_post": "ball A", "v2_post": "ball B", "v_post": "Speed"}
+    (axes,) = impact.plot(coarse, labels=labels).axes
+    assert axes.get_ylabel() == "Speed (m/s)"
+    assert {"ball A", "ball B"} <= {text.get_text() for text in axes.texts}
+    known = "known: e, gharib-hurmuzlu-2012, lankarani-nikravesh-1990, lankarani-nikravesh-1994, reference, title"
+    for key in ("v", "e_out", "v1", "hertz", "m1", "delta"):
+        with pytest.raises(UsageError) as caught:
+            impact.plot(coarse, labels={key: "X"})
+        words = f'--label: nothing in the picture is called "{key}"; {known}, v1_post, v2_post, v_post'
+        assert str(caught.value) == words
+        refused = cli("plot", coarse_file, "--label", f"{key}=X", "-o", "a.svg", cwd=tmp_path)
+        assert (refused.returncode, refused.stderr) == (2, f"{words}\n")
+    with pytest.raises(UsageError, match="nothing in the picture is called"):
+        impact.plot(coarse, title=False, labels={"title": "X"})
+    # each label is that of one of two pictures
+    labels = ["--label", "e_error=Signed", "--label", "e_out=Delivered"]
+    drawn = cli("plot", coarse_file, "-k", "error", "-k", "restitution", *labels, "-o", "b.svg", cwd=tmp_path)
+    assert (drawn.returncode, len(drawn.stderr.splitlines())) == (0, 2)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["b-error.svg", "b-restitution.svg"]
 
 
 def test_the_command_draws_what_python_draws(cli: Run, coarse_file: Path, tmp_path: Path) -> None:

@@ -91,6 +91,41 @@ def test_the_check_of_a_law_reports_each_clause(cli: Run, tmp_path: Path) -> Non
     assert "gains: has no oracle" in done.stderr
 
 
+RAISING = """\
+from impact import ForceModel
+
+def force(elastic, v):
+    return elastic * (1 + strength * v)
+
+def branch(elastic, v):
+    return elastic if v > 0 else 0 * elastic
+
+RAISING = ForceModel("raising", "Raising", 2026, "F", "", force=force)
+BRANCHING = ForceModel("branching", "Branching", 2026, "F", "", force=branch)
+"""
+REASONS = [
+    "raising.py:4: model raising: NameError: name 'strength' is not defined",
+    "raising.py:7: model branching: ValueError: The truth value of an array with more than one element is "
+    "ambiguous. Use a.any() or a.all(); formulas work on arrays: use np.where instead of if",
+]
+
+
+def test_the_check_of_a_law_that_raises_gives_the_line_and_the_text(cli: Run, tmp_path: Path) -> None:
+    path = tmp_path / "raising.py"
+    path.write_text(RAISING, encoding="utf-8")
+    models = impact.models(plugins=[path])
+    for key, reason in zip(("raising", "branching"), REASONS, strict=True):
+        with pytest.warns(UserWarning, match=r"^raising\.py:") as caught:
+            findings = impact.check_model(models[key])
+        assert [str(warning.message) for warning in caught] == [reason]
+        assert not all(finding.holds for finding in findings)
+    done = cli("models", "--check", "raising.py", cwd=tmp_path)
+    assert done.returncode == 1
+    assert [line for line in done.stderr.splitlines() if line.startswith("note: ")] == [
+        f"note: {reason}" for reason in REASONS
+    ]
+
+
 def test_an_unknown_argument_of_a_formula_is_an_error_when_the_file_is_loaded(cli: Run, tmp_path: Path) -> None:
     (tmp_path / "misspelt.py").write_text(
         BROKEN.replace("lambda elastic, v:", "lambda elastc, v:"), encoding="utf-8"

@@ -52,6 +52,7 @@ def fair_and_exact_file(fair_and_exact: xr.Dataset, tmp_path_factory: pytest.Tem
 
 
 def stored(tmp_path: Path, result: xr.Dataset) -> Path:
+    tmp_path.mkdir(exist_ok=True)
     impact.save(result, tmp_path / "results.h5")
     return tmp_path / "results.h5"
 
@@ -320,6 +321,11 @@ def test_a_long_ranking_is_shortened_in_the_table_only(cli: Run, tmp_path: Path)
     assert sum(line.startswith("model-") for line in lines) == 30
     assert lines[-1] == "and 12 more (--json has all)"
     assert len(json.loads(cli("recommend", path, "--json").stdout)["models"]) == 42
+    for count, last in ((31, "and 1 more (--json has all)"), (30, "model-29 ")):
+        few = stored(tmp_path / f"{count}", many.isel(model=slice(count)))
+        lines = cli("recommend", few).stdout.splitlines()
+        assert sum(line.startswith("model-") for line in lines) == 30
+        assert lines[-1].startswith(last)
 
 
 def test_strings_of_a_file_are_escaped_on_the_terminal(cli: Run, tmp_path: Path) -> None:

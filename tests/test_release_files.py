@@ -70,10 +70,17 @@ def test_the_paper_cites_what_its_bibliography_has_and_states_numbers_of_the_cat
     counts = re.search(r"The (\d+) entries are (\d+) seen", read("docs/models.md"))
     assert counts is not None
     assert f"Of the {counts[1]} entries the formulas of {counts[2]} were read" in re.sub(r"\s+", " ", paper)
-    for number in ("0.0132", "0.0182", "0.663"):
+    for number in ("0.0132", "0.0181", "0.663"):
         assert number in read("docs/paper.md")
+        assert number in paper
     for number in ("1,840", "11,950", "20,246"):
         assert number in read("docs/performance.md")
+
+
+def test_a_config_of_the_docs_counts_the_values_of_its_file() -> None:
+    count = re.match(r"# (\d+) measured restitutions of two HDPE beads", read("docs/calibrate/hdpe.toml"))
+    assert count is not None
+    assert int(count[1]) == len(read("docs/calibrate/hdpe.csv").split()) - 1
 
 
 def test_the_page_on_stability_lists_the_exit_codes_and_the_schema_version() -> None:

@@ -328,6 +328,9 @@ def test_a_study_is_stored_drawn_and_reported(cli: Run, tmp_path: Path) -> None:
     figure = impact.plot(study)
     widths = [bar.get_width() for bar in figure.axes[0].patches]
     np.testing.assert_allclose(widths, [*study["first"][0], *study["total"][0]])
+    axes = impact.plot(study, labels={"K": "Stiffness", "v1": "Speed", "index": "Share"}).axes[-1]
+    names = {tick.get_text() for tick in axes.get_yticklabels()}
+    assert (names, axes.get_xlabel()) == ({"Stiffness", "Speed"}, "Share")
     assert cli("plot", "s.h5", cwd=tmp_path).returncode == 0
     assert cli("report", "s.h5", "-o", "s.html", cwd=tmp_path).returncode == 0
     page = (tmp_path / "s.html").read_text(encoding="utf-8")

@@ -804,7 +804,10 @@ def extend(
     plugins: Sequence[ForceModel | str | Path] = (),
     max_points: int = MAX_POINTS,
 ) -> xr.Dataset:
-    """Add values to the axes of a stored result, or models to it, and integrate only the new trajectories.
+    """Add values to the axes of a stored result, or models to it, and integrate only what it does not hold.
+
+    A result of layout "factored" holds trajectories, which new points may share; one of layout "full" has
+    values alone, and all trajectories of the new points are integrated.
 
     Parameters
     ----------
@@ -859,8 +862,8 @@ def extend_to_file(
 
     Returns
     -------
-    SweepOutcome : counts of points by status, largest errors, first failed points; `integrated` counts the new
-        trajectories
+    SweepOutcome : counts of points by status, largest errors, first failed points; `integrated` counts the
+        trajectories that were integrated
 
     Raises
     ------
@@ -876,7 +879,7 @@ def extend_to_file(
     target = Path(result if output is None else output)
     check_outputs([target], plugins, overwrite=True)
     with backend or nullcontext(SERIAL) as integrator:
-        outcome, integrated = extend_result(
+        outcome = extend_result(
             Path(result),
             target,
             overrides,
@@ -890,7 +893,7 @@ def extend_to_file(
         )
     if should_stop():
         raise UnfinishedError(f"{safe_text(str(target))} is complete")
-    return replace(outcome, integrated=integrated)
+    return outcome
 
 
 def expand(
@@ -1096,6 +1099,10 @@ def check_model(model: ForceModel) -> list[Finding]:
     -------
     list of Finding : the clause, the largest deviation, its bound, and whether the clause holds
 
+    Warns
+    -----
+    UserWarning : a formula raised an error, with its file, line and text
+
     >>> import impact
     >>> all(finding.holds for finding in impact.check_model(impact.models()["bilinear"]))
     True
@@ -1168,7 +1175,8 @@ def plot(
     height : height of the figure [in], or a length; by default it depends on the kind
     style : a style sheet of matplotlib, or the name of one; rcParams changed by the user are respected in any case
     title : write the title and the conditions
-    labels : texts by the name of an axis, the key of a law, "reference" or "title"
+    labels : texts by the name of an axis, of a variable whose name is beside its curve, the key of a law,
+        "reference" or "title"
     equations : name the laws with the numbers of their equations in the paper
     ax : axes of an existing figure to draw into, one for each panel, in the style of that figure
     plugins : plug-in models that the result was computed with, needed to draw a loop, a history or an impulse
@@ -1246,7 +1254,8 @@ def plot_to_files(
 ) -> PlotFiles:
     """Draw a stored result into a file for each kind of picture.
 
-    Kinds that the result does not have the data for are left out; it is an error if none can be drawn.
+    Kinds that the result does not have the data for are left out; it is an error if none can be drawn. Of
+    several kinds, one that `sel` leaves no axis, while another is drawn, is drawn over the whole axis.
 
     Parameters
     ----------
@@ -1276,7 +1285,8 @@ def plot_to_files(
     ['r.png']
     """
     from .plots.data import check_table, encode_table, read_points
-    from .plots.kinds import Choice, check_kind, default_kind, draw
+    from .plots.kinds import Choice, check_kind, data_of_kinds, default_kind, draw, label_keys
+    from .plots.labels import check_labels
     from .plots.style import check_picture, length, save_figure
 
     choice = Choice(x, y, variable, sel, models, log, equations)
@@ -1304,12 +1314,15 @@ def plot_to_files(
         kinds = [default_kind(dataset)]
         pictures = dict.fromkeys(kinds, pictures[""])
         tables = dict.fromkeys(kinds, tables[""]) if tables else {}
+    of_kinds, left_out = data_of_kinds(kinds, dataset, choice, _histories_of(dataset, choice, plugins))
+    if of_kinds:
+        check_labels(labels or {}, label_keys(of_kinds.values(), title=title))
     drawn: dict[str, PlotData] = {}
-    left_out: dict[str, str] = {}
-    for kind in kinds:
+    for kind, plot_data in of_kinds.items():
+        keys = label_keys([plot_data], title=title)
+        of_picture = {key: text for key, text in (labels or {}).items() if key in keys}
         try:
-            plot_data = get_plot_data(dataset, kind, choice, plugins)
-            figure = draw(plot_data, *size, style=style, title=title, labels=labels, points=measured)
+            figure = draw(plot_data, *size, style=style, title=title, labels=of_picture, points=measured)
             table = encode_table(plot_data, tables[kind].suffix.lower(), data_form) if tables else b""
         except UsageError as error:
             left_out[kind] = str(error)
@@ -1329,10 +1342,15 @@ def get_plot_data(
     """The data of a picture; see `plot`."""
     from .plots.kinds import plot_data_of
 
+    return plot_data_of(kind, dataset, choice, _histories_of(dataset, choice, plugins))
+
+
+def _histories_of(
+    dataset: xr.Dataset, choice: Choice, plugins: Sequence[ForceModel | str | Path]
+) -> Callable[[], list[xr.Dataset]]:
+    """A function that integrates the chosen point of a result again."""
     plugin_set = read_plugins(plugins)
-    return plot_data_of(
-        kind, dataset, choice, lambda: histories(dataset, choice.models, choice.sel or {}, plugin_set)
-    )
+    return lambda: histories(dataset, choice.models, choice.sel or {}, plugin_set)
 
 
 def materials() -> dict[str, dict[str, float | str]]:

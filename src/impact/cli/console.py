@@ -32,18 +32,18 @@ def table(*headings: str) -> Table:
     return rows
 
 
-def cell(value: Any) -> Text:
-    """A value as plain text, with control characters escaped and without markup."""
-    return Text(safe_text(number(value)))
+def cell(value: Any, limit: int = 200) -> Text:
+    """A value as plain text of at most `limit` characters, with control characters escaped and without markup."""
+    return Text(safe_text(number(value), limit))
 
 
-def print_rows(rows: Mapping[str, Any]) -> None:
-    """Print names and values, one per line."""
+def print_rows(rows: Mapping[str, Any], limit: int = 200) -> None:
+    """Print names and values of at most `limit` characters, one per line."""
     grid = Table.grid(padding=(0, 2))
     grid.add_column(no_wrap=True)
     grid.add_column(overflow="fold")
     for name, value in rows.items():
-        grid.add_row(cell(name), cell(value))
+        grid.add_row(cell(name), cell(value, limit))
     console(sys.stdout).print(grid)
 
 

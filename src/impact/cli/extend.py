@@ -74,7 +74,7 @@ def extend(
     quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Add values to the axes of a result; only new trajectories are integrated."""
+    """Add values to the axes of a result; only what it does not hold is integrated."""
     with exits.catch_signals() as should_stop:
         from .. import api
         from ..progress_display import progress_bar
@@ -95,5 +95,7 @@ def extend(
                 should_stop=should_stop,
             )
     if not quiet:
-        exits.print_line(f"{outcome.integrated:,} of {outcome.trajectories:,} trajectories were integrated for it")
+        reason = "; layout full holds none of them" if outcome.extended_layout == "full" else ""
+        count = f"{outcome.integrated:,} of {outcome.trajectories:,} trajectories were integrated for it"
+        exits.print_line(count + reason)
     summary.conclude(outcome, output or result, quiet=quiet, as_json=as_json, allow_failed=allow_failed)

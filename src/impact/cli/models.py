@@ -29,6 +29,8 @@ E_VALUES = (0.1, 0.3, 0.5, 0.7, 0.9)
 E_WIDTH, EQUATION_WIDTH, DOMAIN_WIDTH, CORE_WIDTH = 8, 32, 26, 7
 # exponents for which the compiled core is reported
 COMPILED_AT = (1.0, 1.5, 2.0, 2.5, 3.0)
+# characters of a text about one model, which may be a plug-in
+MAX_TEXT = 2000
 
 
 def models(
@@ -204,7 +206,7 @@ def _print_model(model: ForceModel) -> None:
     delivered = _delivered(model)
     if delivered:
         rows["delivers"] = ", ".join(f"{decimals(out)} for e = {e}" for e, out in delivered.items())
-    print_rows({name: text for name, text in rows.items() if text})
+    print_rows({name: text for name, text in rows.items() if text}, MAX_TEXT)
 
 
 def _parameter(parameter: Parameter) -> str:

@@ -103,7 +103,8 @@ def plot(
         typer.Option(
             "--label",
             metavar="KEY=TEXT",
-            help="Text for an axis (its name), a law (its key), reference or title; may be repeated.",
+            help="Text for an axis, the name beside a curve (both by name), a law (its key), reference or title; "
+            "may be repeated.",
         ),
     ] = None,
     equations: Annotated[
@@ -127,7 +128,8 @@ def plot(
     """Plot a stored result: by default the final-velocity comparison, Figure 6 of the paper.
 
     loop, history and impulse integrate one point of the result again; --sel selects it.
-    With several kinds, those that do not apply are reported with the reason.
+    Of several kinds, those that --sel leaves no axis are drawn over the whole axis, and those that do not apply
+    are reported with the reason.
     """
     from .. import api
 

@@ -19,6 +19,9 @@ from .params import parse_whole_number
 if TYPE_CHECKING:
     from ..api import Impact
 
+# files of a time history: netCDF-4, which is HDF5, and a table
+HISTORY_SUFFIXES = (".h5", ".hdf5", ".nc", ".csv")
+
 
 def run(
     source: SourceArgument = None,
@@ -35,7 +38,8 @@ def run(
     sets: SetOption = None,
     plugins: PluginOption = None,
     history: Annotated[
-        Path | None, typer.Option("--history", metavar="FILE", help="Write the time history to this file.")
+        Path | None,
+        typer.Option("--history", metavar="FILE", help="Write the time history: .h5, .hdf5, .nc or .csv."),
     ] = None,
     times: Annotated[
         int | None,
@@ -52,6 +56,7 @@ def run(
     """Run one impact: inputs, outputs and estimated errors."""
     from .. import api
     from ..contact.status import FIRST_FAILURE
+    from ..plots.data import encode_history
     from ..results import backend
 
     if times is not None and history is None:
@@ -59,6 +64,10 @@ def run(
     if history is not None:
         for path in (source, *(plugins or ())):
             backend.check_output(history, overwrite=overwrite, source=path)
+        if history.suffix.lower() not in HISTORY_SUFFIXES:
+            *most, last = HISTORY_SUFFIXES
+            expected = f"expected a name that ends in {', '.join(most)} or {last}"
+            raise UsageError(f"--history {safe_text(str(history))}: {expected}")
     impact = api.run(
         source, model=model, at=dict(at or ()), overrides=sets or (), plugins=plugins or (), times=times
     )
@@ -71,7 +80,10 @@ def run(
     if history is not None:
         if impact.history is None:
             raise UsageError(f"no history to store: {impact.why_no_history}")
-        api.save(impact.history, history, overwrite=overwrite)
+        if history.suffix.lower() == ".csv":
+            backend.write_file(history, encode_history(impact.history), overwrite=overwrite)
+        else:
+            api.save(impact.history, history, overwrite=overwrite)
         exits.print_line(f"{safe_text(str(history))}: {impact.history.sizes['t']} points in time")
 
 

@@ -40,9 +40,6 @@ COLLAPSE = {
     "not": "every point is integrated (solver.collapse = false)",
 }
 
-# seconds from which on a dry run prints what a cluster would take
-CLUSTER_MIN_S = 60.0
-
 
 def sweep(
     config: Annotated[Path, typer.Argument(help="The sweep, a TOML file; `impact init` writes one.")],
@@ -98,7 +95,11 @@ def sweep(
                 raise UsageError(
                     f"--shard {safe_text(shard)}: got --dry-run as well, which estimates the whole sweep"
                 )
-            _print_estimate(api.estimate(config, jobs=max(jobs, threads), **inputs), as_json=as_json)
+            expected = api.estimate(config, jobs=max(jobs, threads), **inputs)
+            if as_json:
+                print(dump(asdict(expected)))
+            else:
+                _print_estimate(expected, on_cluster=bool(scheduler or scheduler_file))
             if should_stop():
                 raise UnfinishedError("nothing was written")
             return
@@ -129,11 +130,8 @@ def _print_shard(done: ShardProgress, output: Path, *, quiet: bool, as_json: boo
         )
 
 
-def _print_estimate(expected: Estimate, *, as_json: bool) -> None:
+def _print_estimate(expected: Estimate, *, on_cluster: bool) -> None:
     """Print points, trajectories per model, bytes and time of a sweep on stdout."""
-    if as_json:
-        print(dump(asdict(expected)))
-        return
     out = console(sys.stdout)
     rows = table("model", "points", "cells", "trajectories", "how the points collapse")
     rows.columns[-1].justify = "left"
@@ -147,9 +145,10 @@ def _print_estimate(expected: Estimate, *, as_json: bool) -> None:
     total = f"{expected.points:,} points from {expected.trajectories:,} trajectories"
     time = f"{_duration(expected.seconds)} by {expected.core} and what the disk takes"
     out.print(f"{total}, {size}, {time}; nothing was written")
-    if expected.seconds >= CLUSTER_MIN_S:
-        many = ", ".join(f"{_duration(seconds)} by {count:,}" for count, seconds in expected.by_workers.items())
-        out.print(f"on a cluster: {expected.wire:,} bytes over the wire; {many} workers; more are of no use")
+    if on_cluster:
+        *few, most = (f"{_duration(seconds)} by {count:,}" for count, seconds in expected.by_workers.items())
+        times = "; ".join([*few, f"{most} workers, the most that can be kept busy"])
+        out.print(f"dask workers: {times}; {expected.wire:,} bytes are sent to them and back")
 
 
 def _duration(seconds: float) -> str:

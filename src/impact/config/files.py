@@ -168,6 +168,15 @@ def toml_key(name: str) -> str:
     return name if re.fullmatch(BARE_KEY, name) else toml_text(name)
 
 
+def override_text(path: KeyPath, value: object) -> str:
+    """An override that sets a value.
+
+    >>> override_text(("materials", "steel.2", "E"), [2e11])
+    'materials."steel.2".E=[200000000000.0]'
+    """
+    return f"{'.'.join(toml_key(str(part)) for part in path)}={toml_text(value)}"
+
+
 def apply_overrides(
     data: dict[str, Any], overrides: Sequence[str]
 ) -> tuple[dict[str, Any], dict[KeyPath, tuple[int, KeyPath]], list[str]]:

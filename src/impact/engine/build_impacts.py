@@ -44,10 +44,7 @@ def build_impacts(inputs: Inputs, model: Law, index: Index, stiffness: Stiffness
     v1, v2 = value("v1"), value("v2")
     m1, m2 = (mass_at(inputs, ball, index) for ball in "12")
     E1, E2, nu1, nu2 = (of_material(ball, key) for key in ("E", "nu") for ball in "12")
-    R1, R2 = (
-        value(f"R{ball}") if f"R{ball}" in names else sphere_radius(mass, of_material(ball, "rho"))
-        for ball, mass in (("1", m1), ("2", m2))
-    )
+    R1, R2 = (radius_at(inputs, ball, index, mass) for ball, mass in (("1", m1), ("2", m2)))
     n = value("n") if model.exponent is None else np.full_like(missing, model.exponent)
     with np.errstate(all="ignore"):
         stiffness_name = f"{model.key}.K"
@@ -141,6 +138,18 @@ def mass_at(inputs: Inputs, ball: str, index: Index) -> Array:
     if np.isnan(mass).any():
         raise ModelError(f"m{ball}: missing, expected m{ball}, or R{ball} and the density rho of its material")
     return mass
+
+
+def radius_at(inputs: Inputs, ball: str, index: Index, mass: Array) -> Array:
+    """The radius of a ball, "1" or "2", at cells [m]; if the config has none, that of a sphere of its mass."""
+    if f"R{ball}" in inputs.names():
+        return values_at(inputs, f"R{ball}", index)
+    return sphere_radius(mass, property_at(inputs, ball, "rho", index))
+
+
+def smaller_radius_at(inputs: Inputs, index: Index) -> Array:
+    """The radius of the smaller ball at cells [m]; NaN where it is unknown."""
+    return np.fmin(*(radius_at(inputs, ball, index, mass_at(inputs, ball, index)) for ball in "12"))
 
 
 def restitution_at(inputs: Inputs, index: Index) -> Array:

@@ -189,9 +189,13 @@ class CurveData:
 
     @property
     def names(self) -> set[str]:
-        """The axes and models whose text a user can replace."""
-        axes = {name for panel in self.panels for name in (panel.x_name, panel.y_name)}
-        return axes | {curve.model for panel in self.panels for curve in panel.curves if curve.model}
+        """The axes, variables with a name beside their curves, and models whose text a user can replace."""
+        all_curves = [curve for panel in self.panels for curve in panel.curves]
+        return {
+            *(name for panel in self.panels for name in (panel.x_name, panel.y_name)),
+            *(curve.variable for curve in all_curves if curve.end),
+            *(curve.model or "reference" for curve in all_curves),
+        }
 
 
 def velocity_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
@@ -383,7 +387,7 @@ def draw_curves(
     ----------
     plot_data : the curves
     all_axes : axes of each panel
-    labels : texts that replace those of axes and laws, by name
+    labels : texts that replace those of axes, variables and laws, by name
     points : measured points
 
     Returns
@@ -415,7 +419,7 @@ def draw_curves(
         _label_axes(axes, panel, labels, last=axes is all_axes[-1] or len(all_axes) == 1)
         for mark in panel.marks:
             _draw_mark(axes, mark)
-        _label_curve_ends(axes, panel.curves)
+        _label_curve_ends(axes, panel.curves, labels)
         _label_guides(axes, [curve for curve in panel.curves if curve.is_guide and curve.case])
     return [(artist, name) for name, artist in (entries | band).items()]
 
@@ -524,7 +528,7 @@ def _draw_mark(axes: Axes, mark: Mark) -> None:
     )
 
 
-def _label_curve_ends(axes: Axes, curves: Sequence[Curve]) -> None:
+def _label_curve_ends(axes: Axes, curves: Sequence[Curve], labels: Mapping[str, str]) -> None:
     """Write names beside the last points: where several end together, one is below and the others above."""
     ends: dict[str, tuple[float, float]] = {}
     for curve in curves:
@@ -537,7 +541,7 @@ def _label_curve_ends(axes: Axes, curves: Sequence[Curve]) -> None:
         near = [other for other, _ in ordered if abs(other - y) < 0.06 * (high - low)]
         aside = (-8 if rank == 0 else 8) if len(near) > 1 else 0
         axes.annotate(
-            symbol(name),
+            labels.get(name, symbol(name)),
             ends[name],
             (6, aside),
             textcoords="offset points",

@@ -1,4 +1,4 @@
-"""The data of a picture as a table, and measured points from a table."""
+"""The data of a picture and a time history as a table, and measured points from a table."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..config.cases import COLUMN_HEADER, CsvTable, column_values, read_csv
 from ..config.quantities import Quantity, show
 from ..config.tables import SWEEP_QUANTITIES
 from ..errors import ConfigError, UsageError, did_you_mean
-from ..formatting import number
+from ..formatting import heading, number
 from ..results.schema import HISTORY_VARIABLES, SCHEMA, plain_unit
 from ..text import safe_text
 
@@ -80,6 +80,20 @@ def encode_table(plot_data: PlotData, suffix: str, form: str = "wide") -> bytes:
             needs = 'needs pyarrow, which is not installed: pip install "impact-sweep[parquet]"'
             raise UsageError(f"--data: .parquet {needs}") from None
         return buffer.getvalue()
+    return _csv_bytes(frame)
+
+
+def encode_history(history: xr.Dataset) -> bytes:
+    """A time history as the bytes of a CSV table: columns with their units, and all digits.
+
+    `read_points` reads it again.
+    """
+    frame = history.drop_vars("model").to_dataframe().reset_index()
+    units = {name: plain_unit(str(history[name].attrs["units"])) for name in frame.columns}
+    return _csv_bytes(frame.rename(columns={name: heading(name, unit=unit) for name, unit in units.items()}))
+
+
+def _csv_bytes(frame: pd.DataFrame) -> bytes:
     return str(frame.to_csv(index=False, lineterminator="\n")).encode()
 
 

@@ -5,8 +5,9 @@ The command line reads the names of the kinds at every start, so this module imp
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -132,6 +133,52 @@ def plot_data_of(
     return functions[kind](dataset, choice)
 
 
+def data_of_kinds(
+    kinds: Sequence[str], dataset: xr.Dataset, choice: Choice, histories: Callable[[], Sequence[xr.Dataset]]
+) -> tuple[dict[str, PlotData], dict[str, str]]:
+    """The data of several pictures by kind, and the reasons why other kinds cannot be drawn.
+
+    Where the selected values are for one of the pictures, such as the point of a loop, others that they leave no
+    axis ignore them. For the parameters see `plot_data_of`.
+    """
+    data: dict[str, PlotData] = {}
+    reasons: dict[str, str] = {}
+    for kind in kinds:
+        try:
+            data[kind] = plot_data_of(kind, dataset, choice, histories)
+        except UsageError as error:
+            reasons[kind] = str(error)
+    if data and choice.sel:
+        for kind in reasons.keys() - {*MOTION_KINDS}:
+            with suppress(UsageError):
+                data[kind] = _over_selected_axes(kind, dataset, choice)
+    return (
+        {kind: data[kind] for kind in kinds if kind in data},
+        {kind: reason for kind, reason in reasons.items() if kind not in data},
+    )
+
+
+def _over_selected_axes(kind: str, dataset: xr.Dataset, choice: Choice) -> PlotData:
+    """The data of a picture over axes at which a value is selected: over all their values.
+
+    Raises
+    ------
+    UsageError : see `plot_data_of`
+    """
+    whole = plot_data_of(kind, dataset, replace(choice, sel=None), list)
+    drawn = {dataset[name].dims for name in whole.names if name in dataset.coords}
+    sel = dict(choice.sel or {})
+    ignored = [name for name in sel if name in dataset.coords and dataset[name].dims in drawn]
+    remarks = tuple(f"--sel {name}={sel.pop(name)}, a point on its axis" for name in ignored)
+    plot_data = plot_data_of(kind, dataset, replace(choice, sel=sel), list)
+    return replace(plot_data, not_drawn=(*plot_data.not_drawn, *remarks))
+
+
+def label_keys(pictures: Iterable[PlotData], *, title: bool) -> set[str]:
+    """The names in some pictures whose text a user can replace."""
+    return {*({"title"} if title else ()), *(name for plot_data in pictures for name in plot_data.names)}
+
+
 def draw(
     plot_data: PlotData,
     width: float | str | None = None,
@@ -152,7 +199,7 @@ def draw(
         the user changed it, else 7.1 in, and the height suits what is drawn
     style : see `impact.plots.style.styled`
     title : write the title and the conditions
-    labels : see `impact.plots.labels.checked_labels`
+    labels : see `impact.plots.labels.check_labels`
     points : measured points, see `impact.plots.data.read_points`; only curves have them
     ax : the user's axes to draw into, one for each panel
 
@@ -163,12 +210,13 @@ def draw(
     from . import curves, maps, uncertainty
     from .data import Points as Measured
     from .data import read_points
-    from .labels import checked_labels, escape_mathtext, pretty_conditions
+    from .labels import check_labels, escape_mathtext, pretty_conditions
     from .layout import Picture
     from .style import default_size, length, styled
 
     width, height = length(width, "--width"), length(height, "--height")
-    chosen = checked_labels(labels or {}, plot_data.names)
+    chosen = labels or {}
+    check_labels(chosen, label_keys([plot_data], title=title))
     measured = points if points is None or isinstance(points, Measured) else read_points(points)
     if measured is not None and not isinstance(plot_data, curves.CurveData):
         raise UsageError(f"{measured.source}: measured points are drawn over curves only")

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from functools import cache
 
 from matplotlib.axis import Axis
 from matplotlib.mathtext import MathTextParser
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from ..contact.models import catalogue
-from ..errors import UsageError, did_you_mean
+from ..errors import UsageError
 from ..formatting import scaled_unit, typographic
-from ..results.schema import HISTORY_VARIABLES, SCHEMA, is_input
 from ..text import safe_text, with_year
 from .slices import NO_BREAK
 
@@ -91,35 +89,28 @@ def escape_mathtext(text: str) -> str:
     return text.replace("$", r"\$")
 
 
-def checked_labels(labels: Mapping[str, str], shown: set[str]) -> dict[str, str]:
-    """The labels that a user chose for names of a picture.
+def check_labels(labels: Mapping[str, str], shown: Collection[str]) -> None:
+    """Check the labels that a user chose for names of a picture.
 
     Parameters
     ----------
     labels : texts, which may have mathtext, by the name of an axis or a variable, the key of a law, "reference" or
         "title"
-    shown : the names in the picture; other names of the program are ignored
+    shown : the names in the picture, or in one of several
 
     Raises
     ------
     UsageError : there is no such name, or a text is not valid mathtext
     """
-    shown_names = {*shown, "reference", "title"}
-    elsewhere = {
-        *(variable.name for variable in SCHEMA),
-        *(name for name, _, _ in HISTORY_VARIABLES),
-        *catalogue(),
-    }
     for key, text in labels.items():
-        if key not in shown_names and key not in elsewhere and not is_input(key):
-            names = did_you_mean(key, sorted(shown_names))
-            raise UsageError(f'--label: nothing in the picture is called "{safe_text(key)}"; {names}')
+        if key not in shown:
+            known = safe_text(", ".join(sorted(shown)), 800)
+            raise UsageError(f'--label: nothing in the picture is called "{safe_text(key)}"; known: {known}')
         try:
             MathTextParser("path").parse(text)
         except ValueError as error:
             reason = safe_text(str(error).strip().splitlines()[-1])
             raise UsageError(f"--label {safe_text(f'{key}={text}')}: is not valid mathtext: {reason}") from None
-    return dict(labels)
 
 
 def axis_text(meaning: str, name: str, unit: str, labels: Mapping[str, str]) -> str:

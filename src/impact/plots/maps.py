@@ -116,7 +116,8 @@ class MapData:
     @property
     def names(self) -> set[str]:
         """The axes, variable and models whose text a user can replace."""
-        return {self.x, self.y, self.variable, *(panel.model for panel in self.panels if panel.model)}
+        variable = () if self.closest else (self.variable,)
+        return {self.x, self.y, *variable, *(panel.model or "reference" for panel in self.panels)}
 
     def table(self) -> dict[str, Sequence[object]]:
         """The values by name of a column, one column per model; x varies slowest."""

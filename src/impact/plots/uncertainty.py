@@ -189,8 +189,8 @@ class BarData:
 
     @property
     def names(self) -> set[str]:
-        """The axes and models whose text a user can replace."""
-        return {"index", *(panel.model for panel in self.panels)}
+        """The axis, inputs and models whose text a user can replace."""
+        return {"index", *self.inputs, *(panel.model for panel in self.panels)}
 
 
 def sensitivity_bars(dataset: xr.Dataset, choice: Choice) -> BarData:
@@ -264,7 +264,8 @@ def draw_bars(plot_data: BarData, all_axes: Sequence[Axes], labels: Mapping[str,
             )
             entries.setdefault(name, bars.patches[0])
         axes.set_title(labels.get(panel.model) or pretty_conditions(panel.label), loc="left", fontsize="medium")
-        axes.set_yticks(positions, [symbol(name) if "." not in name else name for name in plot_data.inputs])
+        inputs = [labels.get(name) or (symbol(name) if "." not in name else name) for name in plot_data.inputs]
+        axes.set_yticks(positions, inputs)
         axes.set_xlim(left=min(0.0, axes.get_xlim()[0]))
         axes.axvline(0.0, color="black", linewidth=0.8)
         axes.grid(visible=False, axis="y")

@@ -17,7 +17,7 @@ from ..engine.plan import owner_of
 from ..errors import ImpactError
 from ..formatting import label
 from ..plots.curves import MAX_RESTITUTIONS, STEP_AXES
-from ..plots.kinds import WIDTHS, Choice, draw
+from ..plots.kinds import MAP_KINDS, WIDTHS, Choice, draw
 from ..plots.style import encoded
 from ..results.kinds import is_calibration, is_sensitivity
 from ..results.schema import columns_along, is_input, plain_unit
@@ -42,7 +42,6 @@ FIGURES = {
     "sensitivity": "First-order and total Sobol indices of the uncertain inputs, with intervals of 95 %.",
     "loop": "Force over indentation at one point: the area of a loop is the energy loss.",
 }
-MAP_KINDS = ("map", "validity")
 # points that are searched for the first one with an answer, at which the figures are drawn
 MAX_SEARCHED = 2**18
 

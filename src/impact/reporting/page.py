@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
@@ -32,7 +33,7 @@ from ..results.calibration import (
     fit_rows,
 )
 from ..results.kinds import is_calibration, is_sensitivity
-from ..results.plausibility import material_notes, result_notes
+from ..results.plausibility import depth_summary, material_notes, result_notes
 from ..results.ranking import Ranking, ranking
 from ..results.replay_command import describe_point
 from ..results.schema import count_points, exponents_of, is_input
@@ -68,7 +69,8 @@ def page(dataset: xr.Dataset, get_plot_data: Callable[[str, Choice], PlotData]) 
     """
     if "model" not in dataset.dims:
         raise UsageError("got a time history, expected the result of a sweep")
-    summary = summarize(dataset, MAX_FAILED)
+    summary, depths = summarize(dataset, MAX_FAILED), depth_summary(dataset)
+    summary = replace(summary, deep=depths.deep, deepest=depths.deepest)
     fits = _fits_section(dataset) if is_calibration(dataset) else None
     studies = list(_studies(dataset)) if is_sensitivity(dataset) else []
     ranked, headline = (None, "") if fits or studies else _rank_models(dataset)

@@ -1,4 +1,4 @@
-"""Extend a result by values of its axes or by models; only new trajectories are integrated."""
+"""Extend a result by values of its axes or by models; what it holds is not integrated again."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from .._version import __version__
+from ..config.files import override_text
 from ..config.grid import MAX_POINTS, Axis, path_of
 from ..config.tables import CORES
 from ..contact.simulate import CollisionResult
@@ -50,7 +51,7 @@ def extend(
     backend: Backend = SERIAL,
     on_progress: ProgressCallback = lambda progress: None,
     should_stop: Callable[[], bool] = never_stop,
-) -> tuple[SweepOutcome, int]:
+) -> SweepOutcome:
     """Add values to the axes of a result, or models to it.
 
     Parameters
@@ -65,7 +66,8 @@ def extend(
     Returns
     -------
     The extended result, with the same variables and coordinates as a single sweep of its config, and the number of
-    trajectories that were integrated for it.
+    trajectories that were integrated for it. A result of layout `full` holds values of points and no trajectories:
+    those of all new points are integrated, also where a point of the result had the same one.
 
     Raises
     ------
@@ -117,7 +119,8 @@ def extend(
             should_stop=should_stop,
             extension=extension,
         )
-    return outcome, sum(n_integrated.values())
+    layout = "full" if table is None else "factored"
+    return replace(outcome, integrated=sum(n_integrated.values()), extended_layout=layout)
 
 
 def _check_whole(before: xr.Dataset, old: Plan, name: str) -> None:
@@ -146,11 +149,11 @@ def _extended_plan(
         if len(axis.columns) == 1 and not axis.numbered and not has_all_old_values:
             new_values = (value for value in axis.columns[name] if value not in old_values.tolist())
             values = [*old_values.tolist(), *new_values]
-            appended_overrides.append(f"{'.'.join(map(str, path_of(name)))}={_toml_array(values)}")
+            appended_overrides.append(override_text(path_of(name), values))
     missing = [model.key for model in old.models if model not in config.models]
     if missing:
         keys = [*(model.key for model in old.models), *(m.key for m in config.models if m not in old.models)]
-        appended_overrides.append(f"models={json.dumps(keys)}")
+        appended_overrides.append(override_text(("models",), keys))
     if appended_overrides:
         config = stored_config(before.attrs, [*overrides, *appended_overrides], plugins, str(source), max_points)
     return Plan(config, plugins.of(config.models))
@@ -159,12 +162,6 @@ def _extended_plan(
 def _has_value(inputs: Inputs, name: str) -> bool:
     """Whether an axis or a scalar, which may be a property of a material, had a value."""
     return inputs.values(name).item(0) is not None
-
-
-def _toml_array(values: Sequence[object]) -> str:
-    return (
-        "[" + ", ".join(json.dumps(v, ensure_ascii=False) if isinstance(v, str) else repr(v) for v in values) + "]"
-    )
 
 
 def _check_changes(old: Plan, new: Plan, name: str) -> None:
@@ -245,8 +242,6 @@ def _axis_positions(axis: Axis, old: Inputs, name: str) -> _AxisPositions:
     size = max(map(len, columns))
     before = [*zip(*(values * size if len(values) == 1 else values for values in columns), strict=True)]
     rows = [*zip(*axis.columns.values(), strict=True)]
-    if {old.axes[axis_number].numbered for axis_number in axes} - {axis.numbered}:
-        raise UsageError(f"{name}: the points of {safe_text(axis.name)} had other labels; sweep the new config")
     if axes and axis.numbered:
         # a case keeps its number: the cases of the result come first, unchanged
         changed = [number for number, row in enumerate(before) if rows[number : number + 1] != [row]]

@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from ..contact.status import Status
+from ..engine.build_impacts import smaller_radius_at
+from ..engine.trajectories import axes_of_arrays, probe_index
+from ..errors import ModelError, ResultError
 from ..formatting import number
 from ..text import safe_text
+from .factored import read_inputs
+from .schema import parts_of_models
+from .slabs import MAX_SUMMARY_POINTS, is_computed, over_varying_dims, slabs
 from .summary import MAX_SMALL_INDENTATION, Summary
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # Young's moduli outside these limits are probably in another unit: gels have 1e3 Pa, diamond has 1e12 Pa
 MIN_MODULUS_PA, MAX_MODULUS_PA = 1e3, 1e13
@@ -48,3 +59,31 @@ def result_notes(summary: Summary) -> Iterator[str]:
             f"peak indentation above {limit} at {many}, at most {summary.deepest:.0%}; Hertz theory assumes small "
             "indentation"
         )
+
+
+def depth_summary(dataset: xr.Dataset) -> Summary:
+    """The numbers `deep` and `deepest` of a result, which a sweep counts and a file does not hold.
+
+    The radii follow from the coordinates. A model of more than `MAX_SUMMARY_POINTS` computed points is left out.
+    """
+    summary = Summary()
+    axes = [str(dim) for dim in dataset.sizes if dim != "model"]
+    try:
+        inputs = read_inputs(dataset.assign_attrs(axes=json.dumps(axes)))
+        varied = axes_of_arrays([smaller_radius_at(inputs, probe_index(inputs))])
+    except (ResultError, ModelError, KeyError):
+        # a part of a result, or one that was changed, may lack what the radii follow from
+        return summary
+    radius_dims = [axis.name for number, axis in enumerate(inputs.axes) if number in varied]
+    for model, part in enumerate(parts_of_models(dataset) if "peak_indentation" in dataset else ()):
+        points, weight = over_varying_dims(part, ["peak_indentation"], *radius_dims)
+        dims = [axis.name for axis in inputs.axes if axis.name in points.dims]
+        depth = points.variables["peak_indentation"].transpose(*dims)
+        if depth.size > MAX_SUMMARY_POINTS and is_computed(depth):
+            continue
+        for where in slabs(depth.sizes):
+            radius = smaller_radius_at(inputs, inputs.index([where.get(a.name, slice(1)) for a in inputs.axes]))
+            absent = tuple(number for number, axis in enumerate(inputs.axes) if axis.name not in dims)
+            values = {"peak_indentation": depth.isel(where).values}
+            summary.add(values, model, (), radius.squeeze(absent) if inputs.axes else radius, weight)
+    return summary

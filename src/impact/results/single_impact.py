@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import re
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -14,7 +13,7 @@ from pathlib import Path
 import xarray as xr
 
 from .._version import __version__
-from ..config.files import toml_text
+from ..config.files import override_text
 from ..config.grid import Axis, path_of
 from ..config.load import Config, parse_config, read_config
 from ..config.tables import MATERIAL_QUANTITIES, SWEEP_QUANTITIES, model_quantities
@@ -350,14 +349,14 @@ def single_point(
     """
     read, parted = _config_reader(source, overrides, plugins)
     # each override, and the option that messages name instead
-    option_names = {} if model is None else {f"models={json.dumps([model])}": f"--model {model}"}
+    option_names = {} if model is None else {override_text(("models",), [model]): f"--model {model}"}
     for name, values in (over or {}).items():
-        option_names[f"{_override_path(name)}={toml_text(values)}"] = f"--over {name}"
+        option_names[override_text(path_of(name), values)] = f"--over {name}"
     values = dict(at or {})
 
     def with_values() -> dict[str, str]:
         """The overrides, and those of all values of `at`."""
-        by_override = {f"{_override_path(k)}={_toml_value(v)}": f"--at {k}={v}" for k, v in values.items()}
+        by_override = {override_text(path_of(k), v): f"--at {k}={v}" for k, v in values.items()}
         return {**option_names, **by_override}
 
     fixed_exponent = model is not None and find(model, plugins.models).exponent is not None
@@ -386,7 +385,7 @@ def single_point(
         if name not in inputs and name not in SWEEP_QUANTITIES and name != f"{config.models[0].key}.K":
             raise UsageError(f'no input "{safe_text(name)}" here; {did_you_mean(name, inputs)}')
         if name not in together:
-            option_names[f"{_override_path(name)}={_toml_value(value)}"] = f"--at {name}={value}"
+            option_names[override_text(path_of(name), value)] = f"--at {name}={value}"
     config = _read_with_option_names(read, option_names)
 
     scalars = dict(config.scalars)
@@ -405,7 +404,7 @@ def models_of_source(
     """The keys of the models that a source of `single_point` selects; none where its config cannot be read."""
     read, _ = _config_reader(source, overrides, plugins)
     try:
-        config = read([f"{_override_path(name)}={_toml_value(value)}" for name, value in at.items()])
+        config = read([override_text(path_of(name), value) for name, value in at.items()])
     except ConfigError:
         return ()
     return tuple(model.key for model in config.models)
@@ -458,20 +457,6 @@ def _position_on_axis(axis: Axis, at: Mapping[str, float | str]) -> int:
             return position
     requested = ", ".join(f"{name} = {value}" for name, value in at.items() if name in columns)
     raise UsageError(f"{safe_text(requested)}: not on the zipped axis {axis.name}; these values vary together")
-
-
-def _override_path(name: str) -> str:
-    """The path of an input in an override, as TOML writes it.
-
-    >>> _override_path("v1"), _override_path("bilinear.K"), _override_path("materials.soft steel.E")
-    ('sweep.v1', 'model.bilinear.K', 'materials."soft steel".E')
-    """
-    parts = map(str, path_of(name))
-    return ".".join(part if re.fullmatch("[A-Za-z0-9_-]+", part) else _toml_value(part) for part in parts)
-
-
-def _toml_value(value: float | str) -> str:
-    return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
 
 
 def _is_valid(read: ReadConfig, option_names: Mapping[str, str]) -> bool:

@@ -178,6 +178,7 @@ class SweepOutcome:
     is_new : whether the file was written now; False if it held this sweep already
     integrated : how many trajectories were integrated now; None if not counted
     repeated_blocks : number of blocks that several shards have
+    extended_layout : layout of the result that was extended; only "factored" stores trajectories to reuse
     """
 
     dataset: xr.Dataset
@@ -186,6 +187,7 @@ class SweepOutcome:
     is_new: bool = True
     integrated: int | None = None
     repeated_blocks: int = 0
+    extended_layout: str | None = None
 
 
 def describe(dataset: xr.Dataset) -> dict[str, Any]:

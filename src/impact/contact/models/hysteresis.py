@@ -198,9 +198,12 @@ CARVALHO_MARTINS_2019 = hysteresis(
     "model. Mech. Mach. Theory 139, 174",
     doi="10.1016/j.mechmachtheory.2019.03.028",
     evidence=Evidence(
-        "not verified",
+        "seen",
+        "jgerstmayr/EXUDYN, docs/RST/items/ObjectContactSphereSphere.rst @7de98d35, impactModel 2, and "
+        "main/src/Objects/CObjectContactSphereSphere.cpp @e4b8e513",
         doi="two public bibliographies (2026)",
-        note="the formula agrees with the exact law to 5e-4 above e = 0.45",
+        note="EXUDYN takes it for e > 1/3, below that gonthier-2004; the paper was not seen; the formula agrees "
+        "with the exact law to 5e-4 above e = 0.45",
     ),
     chi=lambda e: 1.5 * (1 - e) * (11 - e) / (1 + 9 * e),
 )

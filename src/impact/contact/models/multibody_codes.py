@@ -346,7 +346,7 @@ MUJOCO_EVIDENCE = Evidence(
 
 MUJOCO_SOLREF = ForceModel(
     key="mujoco-solref",
-    title="MuJoCo solref, standard format (2.1 to 3.12)",
+    title="MuJoCo solref, standard format (since 2.1)",
     year=2014,
     equation="F = m(δ/(τ ζ)² + 2 δ̇/τ), to F = 0",
     reference=MUJOCO_REFERENCE,
