@@ -85,6 +85,10 @@ def test_a_stored_config_needs_no_file(folder: Path) -> None:
         ("v1 [m/s], e_out, sigma\n1, 0.5, 0\n", "drops.csv:2: sigma: got 0.0, expected a number >= 1e-30"),
         ("v1 [m/s], e_out, sigma\n1, 0.5, 1e-160\n", "drops.csv:2: sigma: got 1e-160, expected a number >= 1e-30"),
         ("v1 [m/s], m1 [kg], e_out\n1, 1, 0.5\n", "drops.csv:1: m1: set together with sweep.m1"),
+        (
+            "v1 [m/s], peak_force [N]\n1, 1e308\n",
+            'drops.csv:2: peak_force: got "1e308 N", expected a number > 0 and <= 1e+100',
+        ),
         ("v1 [m/s]\n1\n", "no column of an output"),
         (
             "e_out, sigma, specimen\n0.5, 0.1, a\n0.4, 0.1,\n",

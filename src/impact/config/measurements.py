@@ -36,8 +36,9 @@ Loss = Literal["linear", "huber", "cauchy"]
 
 SIGMA, SPECIMEN = "sigma", "specimen"
 SPECIMEN_EXPECTED = "got nothing, expected the name of a specimen"
-_ANY: dict[str, Any] = {}
-_POSITIVE: dict[str, Any] = {"least": 0.0, "above": True}
+# squares of values beyond 1e100, in standard deviations of at least MIN_SIGMA, overflow
+_ANY: dict[str, Any] = {"least": -1e100, "most": 1e100}
+_POSITIVE: dict[str, Any] = {"least": 0.0, "above": True, "most": 1e100}
 # a measured fraction may be below 0 or above 1 by its noise; a value that is farther off is no fraction
 _FRACTION: dict[str, Any] = {"least": -0.5, "most": 1.5}
 # the outputs that can be measured, with the interval of their values
