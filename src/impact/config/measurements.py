@@ -29,16 +29,15 @@ from .cases import (
 from .files import as_table, set_value
 from .grid import name_of, path_of
 from .quantities import MAX_PROBLEMS, ConfigProblem, KeyPath, Quantity, show, suggest, value_error
-from .tables import LOSSES, MATERIAL_KEYS, MIN_SIGMA, NOISES, quantity_at
+from .tables import LOSSES, MATERIAL_KEYS, MAX_MEASURED, MIN_SIGMA, NOISES, quantity_at
 
 Noise = Literal["given", "scale", "excess"]
 Loss = Literal["linear", "huber", "cauchy"]
 
 SIGMA, SPECIMEN = "sigma", "specimen"
 SPECIMEN_EXPECTED = "got nothing, expected the name of a specimen"
-# squares of values beyond 1e100, in standard deviations of at least MIN_SIGMA, overflow
-_ANY: dict[str, Any] = {"least": -1e100, "most": 1e100}
-_POSITIVE: dict[str, Any] = {"least": 0.0, "above": True, "most": 1e100}
+_ANY: dict[str, Any] = {"least": -MAX_MEASURED, "most": MAX_MEASURED}
+_POSITIVE: dict[str, Any] = {"least": 0.0, "above": True, "most": MAX_MEASURED}
 # a measured fraction may be below 0 or above 1 by its noise; a value that is farther off is no fraction
 _FRACTION: dict[str, Any] = {"least": -0.5, "most": 1.5}
 # the outputs that can be measured, with the interval of their values
@@ -151,7 +150,9 @@ def _column_of(name: str, outputs: Sequence[str], models: Mapping[str, ForceMode
         output = name.removeprefix(f"{SIGMA}_") if name != SIGMA else next(iter(outputs), "e_out")
         if outputs and output not in outputs:
             raise value_error(f"got no column {output}, expected one beside its standard deviation")
-        return _DataColumn("sigma", output, Quantity(UNITS[output], "standard deviation", least=MIN_SIGMA))
+        return _DataColumn(
+            "sigma", output, Quantity(UNITS[output], "standard deviation", least=MIN_SIGMA, most=MAX_MEASURED)
+        )
     if not name:
         raise value_error("got a column without a name, expected that of an input or an output")
     path = path_of(name)
@@ -370,7 +371,7 @@ def _read_sigma(value: object, output: str, n_points: int) -> tuple[tuple[float,
     path: KeyPath = ("data", "sigma")
     if isinstance(value, list) and len(value) != n_points:
         return (), [(path, f"got {len(value)} values, expected {n_points}, one for each point")]
-    quantity = Quantity(UNITS[output], "standard deviation", least=MIN_SIGMA)
+    quantity = Quantity(UNITS[output], "standard deviation", least=MIN_SIGMA, most=MAX_MEASURED)
     elements = value if isinstance(value, list) else [value]
     deviations, problems = _read_list(elements, path, quantity, None)
     if not isinstance(value, list):

@@ -222,12 +222,12 @@ class Output:
     ] = "auto"
 
 
-# least standard deviation, in SI: squares of residuals over smaller ones overflow
-MIN_SIGMA = 1e-30
+# least standard deviation and largest measured value, in SI: squares of their ratio overflow beyond them
+MIN_SIGMA, MAX_MEASURED = 1e-30, 1e100
 
 
 def _is_deviation(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and MIN_SIGMA <= value < math.inf
+    return isinstance(value, int | float) and not isinstance(value, bool) and MIN_SIGMA <= value <= MAX_MEASURED
 
 
 def _sigma(value: object) -> object:
@@ -242,8 +242,9 @@ def _sigma(value: object) -> object:
     return value
 
 
-SIGMA_EXPECTED = f"a number >= {MIN_SIGMA:g} in the unit of the output, or a list of one for each point"
-_Sigma: Any = Annotated[float, Field(ge=MIN_SIGMA)] | str
+_SIGMA_INTERVAL = f"a number from {MIN_SIGMA:g} to {MAX_MEASURED:g}"
+SIGMA_EXPECTED = f"{_SIGMA_INTERVAL} in the unit of the output, or a list of one for each point"
+_Sigma: Any = Annotated[float, Field(ge=MIN_SIGMA, le=MAX_MEASURED)] | str
 
 
 def _data_schema(schema: dict[str, Any]) -> None:
