@@ -73,6 +73,13 @@ def default_law(code: str) -> str:
     return next(iter(CODES[code].laws))
 
 
+def write_program(path: Path, script: str) -> Path:
+    """Write a shell script as a program, and return its path."""
+    path.write_text(f"#!/bin/sh\n{script}\n", encoding="utf-8")
+    path.chmod(0o755)
+    return path
+
+
 @pytest.fixture(scope="session")
 def forked() -> Iterator[ForkServer]:
     """Run the program hundreds of times: processes of a server that has imported what they need."""
@@ -91,13 +98,35 @@ def sweeps(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SweepServer]:
 
 
 @pytest.fixture(scope="session")
+def silent_programs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with programs of the codes that laws are exported to, which print nothing."""
+    from impact.exporters.codes import CODES
+
+    folder = tmp_path_factory.mktemp("silent")
+    for program in {code.program for code in CODES.values()} - {"", "python"}:
+        write_program(folder / program, "")
+    return folder
+
+
+@pytest.fixture(autouse=True)
+def no_installed_codes(
+    request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch, silent_programs: Path
+) -> None:
+    """No test depends on the codes that are installed here, but for those that run them."""
+    if request.node.get_closest_marker("peers") is None:
+        monkeypatch.setenv("PATH", str(silent_programs), prepend=os.pathsep)
+
+
+@pytest.fixture(scope="session")
 def cli(forked: ForkServer) -> Run:
     """Run the program in a process of its own, begun anew where the interpreter reads its environment."""
 
     def run(
         *words: str | Path, cwd: Path = ROOT, **environment: str
     ) -> CompletedCommand | subprocess.CompletedProcess[str]:
-        if environment.keys() <= {"COLUMNS", "NO_COLOR"}:
+        # the server may have been started with another path
+        environment = {"PATH": os.environ["PATH"], **environment}
+        if environment.keys() <= {"COLUMNS", "NO_COLOR", "PATH"}:
             return forked(*words, cwd=cwd, limit=120, **environment)
         return subprocess.run(
             [sys.executable, "-m", "impact", *map(str, words)],

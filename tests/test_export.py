@@ -6,20 +6,34 @@ import json
 import math
 import re
 import shlex
+import subprocess
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 import impact
-from impact.errors import UsageError
+from impact.errors import ConfigError, UsageError
+from impact.exporters.code import run_program
 from impact.exporters.codes import CODES
+from impact.exporters.export import comment_lines
+from impact.exporters.problem import first_law
+from impact.exporters.verify import installed_version
 
-from .conftest import ROOT, Run, default_law
+from .conftest import ROOT, Run, default_law, write_program
 
 # two balls whose effective mass is 0.75 kg and whose effective radius is 0.03 m
 BALLS = {"v1": 1.0, "v2": 0.0, "m1": 1.0, "m2": 3.0, "R1": 0.04, "R2": 0.12}
 SOFT = {"E": 1e9, "nu": 0.3}
 HARD = {"E": 5e9, "nu": 0.2}
+# parameters of default laws that have no default
+OWN_PARAMETERS = {
+    "simbody": {"simbody-hunt-crossley.c": 0.3},
+    "modelica": {"modelica-elastogap.d": 1e3},
+    "adams": {"adams-impact.c": 1e3, "adams-impact.d": 1e-5},
+    "simscape": {"simscape-contact.b": 1e3, "simscape-contact.w": 1e-5},
+}
 
 
 def source(*materials: str, **values: float) -> dict[str, object]:
@@ -35,10 +49,48 @@ def source(*materials: str, **values: float) -> dict[str, object]:
 def test_the_law_is_the_first_of_the_source_that_the_code_has() -> None:
     hooke, hertz = "lammps-coeff-restitution-hooke", "lammps-coeff-restitution-hertz"
     config = source("soft", "soft") | {"models": ["gonthier-2004", hooke, hertz]}
-    assert impact.export("lammps", source=config).model == hooke
-    assert impact.export("lammps", hertz, source=config).model == hertz
+    assert impact.export("lammps", source=config, code_version="22Jul2025").model == hooke
+    assert impact.export("lammps", hertz, source=config, code_version="22Jul2025").model == hertz
+    assert impact.export("lammps", overrides=[f'models="{hooke}"'], code_version="22Jul2025").model == hooke
     with pytest.raises(UsageError, match="has none of the laws gonthier-2004"):
         impact.export("lammps", source=config | {"models": "gonthier-2004"})
+
+
+def test_the_default_law_is_the_first_that_the_installed_release_has(cli: Run, tmp_path: Path) -> None:
+    """LAMMPS of 2021, which Debian has, lacks the damping of the default law; the header says so."""
+    lmp = write_program(tmp_path / "lmp", 'echo "Massively Parallel Simulator - 29 Sep 2021 - Update 2"')
+    done = cli("export", "--to", "lammps", "--at", "e=0.6", "--at", "v1=1", "--dt", "5e-6", "--program", lmp)
+    assert done.returncode == 0
+    assert "\n# law: lammps-tsuji-without-root, " in done.stdout
+    assert (
+        "\n# release 20210929 lacks the default law of 20250722, lammps-coeff-restitution-hertz\n" in done.stdout
+    )
+    assert "use --model lammps-coeff-restitution-hertz" not in done.stderr
+    models = ["lammps-coeff-restitution-hooke", "lammps-velocity-hooke"]
+    config = source("soft", "soft") | {"models": models, "model": {models[1]: {"C": 10.0}}}
+    assert impact.export("lammps", source=config, program=str(lmp)).model == models[1]
+    with pytest.raises(UsageError, match="LAMMPS 20210929 has no coeff_restitution, expected 20240601 or later"):
+        impact.export("lammps", source=config | {"models": models[0]}, program=str(lmp))
+
+
+@pytest.mark.parametrize("name", CODES)
+def test_the_default_law_of_the_newest_release_is_the_first_of_the_list(name: str) -> None:
+    code = CODES[name]
+    assert first_law(code, list(code.laws), code.newest) == default_law(name)
+
+
+def test_a_config_that_is_not_valid_is_not_exported_with_another_law() -> None:
+    viscoelastic = "lammps-viscoelastic-hertz"
+    config = source("soft", "soft") | {"models": viscoelastic}
+    with pytest.raises(ConfigError, match="eta: missing"):
+        impact.export("lammps", source=config)
+    assert impact.export("lammps", source=config, at={"e": 0.6}).model == viscoelastic
+    # a stiffness of a linear spring
+    hooke = source(n=1.5) | {"models": "lammps-coeff-restitution-hooke"}
+    export = impact.export("lammps", source=hooke, at={"K": 1e6}, code_version="22Jul2025")
+    assert (export.model, export.parameters["k_n"]) == ("lammps-coeff-restitution-hooke", 1e6)
+    with pytest.raises(ConfigError, match='did you mean "hertz"'):
+        impact.export("lammps", source=config | {"models": "hetrz"})
 
 
 def test_the_stiffness_of_lammps_hertz_is_per_root_of_the_effective_radius() -> None:
@@ -80,6 +132,23 @@ def test_liggghts_takes_the_properties_of_each_type_and_pair() -> None:
 
 
 @pytest.mark.parametrize(
+    ("moduli", "expected"),
+    [
+        ((5e6, 1e9), []),
+        ((4.9e6, 1e9), ["soft_particles"]),
+        ((1e9, 4.9e6), ["soft_particles"]),
+        ((5e6, 1.1e9), ["hard_particles"]),
+        ((1.1e9, 4.9e6), ["soft_particles", "hard_particles"]),
+    ],
+)
+def test_liggghts_is_told_of_moduli_outside_its_range(moduli: tuple[float, float], expected: list[str]) -> None:
+    config = source("first", "second")
+    config["materials"] = {name: {"E": E, "nu": 0.3} for name, E in zip(("first", "second"), moduli, strict=True)}
+    lines = impact.export("liggghts", default_law("liggghts"), source=config, code_version="3.8.0").lines
+    assert [line.split() for line in lines if "_particles" in line] == [[name, "yes"] for name in expected]
+
+
+@pytest.mark.parametrize(
     ("version", "key"), [("2011.05", "yade-en-pulling"), ("2022.01a", "yade-en-clamped"), ("2023.02a", "yade-en")]
 )
 def test_the_law_of_en_depends_on_the_version_of_yade(version: str, key: str) -> None:
@@ -92,6 +161,11 @@ def test_yade_gets_twice_the_spring_and_dashpot_of_the_contact_for_each_ball() -
         "yade", "yade-viscoelastic", source=source(), at={"K": 1e6, "yade-viscoelastic.C": 300.0}
     )
     assert (export.parameters["kn"], export.parameters["cn"]) == (2e6, 600.0)
+
+
+def test_an_e_of_zero_is_the_critical_damping_of_yade() -> None:
+    export = impact.export("yade", "yade-betan", source=source("soft", "soft", e=0.0))
+    assert export.parameters["betan"] == 1.0
 
 
 def test_opensees_gets_the_effective_mass_and_the_damping_of_its_documentation() -> None:
@@ -153,7 +227,8 @@ def test_a_tsuji_before_the_factor_is_another_law_and_warned_about() -> None:
 
 
 def test_a_law_of_the_catalogue_is_exported_under_the_name_of_the_code() -> None:
-    assert impact.export("lammps", "tsuji-1992").model == "lammps-coeff-restitution-hertz"
+    export = impact.export("lammps", "tsuji-1992", code_version="22Jul2025")
+    assert export.model == "lammps-coeff-restitution-hertz"
 
 
 def test_what_is_delivered_at_dt_is_that_of_timestep() -> None:
@@ -161,6 +236,32 @@ def test_what_is_delivered_at_dt_is_that_of_timestep() -> None:
     export = impact.export("lammps", at=at, dt=2e-5, code_version="22Jul2025")
     (row,) = impact.timestep("lammps-coeff-restitution-hertz", at=at, dt=[2e-5]).rows
     assert export.at_dt == row
+
+
+def test_an_unstable_step_delivers_no_restitution(cli: Run) -> None:
+    """The scheme then gives an e of thousands."""
+    done = cli("export", "--to", "lammps", "--at", "e=0.6", "--dt", "0.1", "--code-version", "22Jul2025")
+    assert done.returncode == 0
+    assert "steps per contact: unstable at 400 of 400 phases, the step is too long for the scheme" in done.stdout
+    assert "mean e" not in done.stdout
+    assert "advised: dt <= 1" in done.stdout
+    assert done.stderr.startswith("warning: dt = 0.1 s: unstable at 400 of 400 phases")
+    row = impact.export("lammps", at={"e": 0.6}, dt=0.1).at_dt
+    assert all(math.isnan(e) for e in (row.e_mean, row.e_least, row.e_largest))
+
+
+def test_an_e_in_percent_is_solved_for() -> None:
+    export = impact.export("lammps", "lammps-velocity-hooke", at={"e": "60 %"}, code_version="22Jul2025")
+    assert export.e_continuous == pytest.approx(0.6, abs=1e-9)
+
+
+def test_the_axes_of_a_source_take_their_first_values_and_the_header_says_so() -> None:
+    config = source("soft", "soft", v1=[1.0, 2.0], e=[0.4, 0.5])
+    export = impact.export(
+        "lammps", default_law("lammps"), source=config, at={"v1": 2.0}, code_version="22Jul2025"
+    )
+    assert export.e == 0.4
+    assert "first value of each axis of the source: e" in export.header
 
 
 def test_the_json_has_the_names_of_the_contract(cli: Run) -> None:
@@ -198,15 +299,26 @@ def test_every_law_of_a_code_is_in_the_list(cli: Run, name: str) -> None:
         (("--to", "lammps", "--dt", "0"), "--dt: got 0, expected a finite number > 0"),
         (("--to", "lammps", "--code-version", "new"), '--code-version: got "new", expected the date of a release'),
         (
-            ("--to", "lammps", "--code-version", "29Aug2019"),
+            ("--to", "lammps", "--model", "lammps-coeff-restitution-hertz", "--code-version", "29Aug2019"),
             "has no coeff_restitution, expected 20240601 or later",
         ),
         (
             ("--to", "lammps", "--verify", "--program", "/nowhere"),
             '"/nowhere": no LAMMPS, pair style granular there',
         ),
+        (("--to", "lammps", "-o", ""), ".: is not a regular file, and is not modified"),
+        (("--to", "lammps", "-o", "/nowhere/in.balls"), "the folder /nowhere does not exist"),
+        *(
+            (("--to", "mujoco", "--at", f"e={e}"), f"--at e={shown}: sweep.e: got ")
+            for e, shown in (("abc", "abc"), ("2", "2.0"), ("nan", "nan"), ("\x1b[31m", "\\x1b[31m"))
+        ),
         (("--to", "liggghts", "--at", "e=0.01"), "e: got 0.01, expected 0.05 < e <= 1"),
         (("--to", "liggghts", "--at", "K=1e8"), "expected a material, not K"),
+        *(
+            (("--to", "lammps", "--code-version", version), f'--code-version: got "{version}", expected the date')
+            for version in ("31Feb2025", "99Foo2025", "20259999", "2025.99.99")
+        ),
+        (("--to", "chrono", "--code-version", f"9.{'9' * 5000}"), "expected a release, such as 10.0.0"),
         (
             ("--to", "yade", "--code-version", "new"),
             '--code-version: got "new", expected a release such as 2023.02a',
@@ -224,6 +336,200 @@ def test_bad_input_is_one_line(cli: Run, words: tuple[str, ...], message: str) -
     assert done.returncode == 2
     assert message in done.stderr
     assert done.stderr.count("\n") == 1
+
+
+# ---- text of the caller is no code
+
+HOSTILE = (
+    '\nopen("PWNED", "w")\n#',
+    "\rPWNED",
+    '"PWNED',
+    "'PWNED",
+    "-->PWNED<!--",
+    "*/PWNED",
+    "#PWNED",
+    "%PWNED",
+    "\x1b[31mPWNED",
+    "\u2028PWNED",
+    "\u202ePWNED",
+    "\\\nPWNED",
+    " &\nPWNED",
+    "$(PWNED)",
+)
+
+
+@pytest.mark.parametrize("name", CODES)
+def test_a_release_with_text_that_would_be_code_is_refused(name: str) -> None:
+    release = CODES[name].newest
+    for version in ("", " ", "x" * 60, "9" * 5000, *HOSTILE, *(release + hostile for hostile in HOSTILE)):
+        with pytest.raises(UsageError, match=r"^--code-version: got [ -~…]*$"):
+            impact.export(name, at={"e": 0.6}, code_version=version)
+
+
+@pytest.mark.parametrize("name", CODES)
+def test_of_the_texts_of_a_caller_only_the_release_is_written(name: str) -> None:
+    """Neither the title of a config, nor the name of a material; in the lines and in the script."""
+    code = CODES[name]
+    hostile = "".join(HOSTILE)
+    sweep = BALLS | {"e": 0.6, "material1": hostile, "material2": hostile}
+    config = {"title": hostile, "models": default_law(name), "materials": {hostile: SOFT}, "sweep": sweep}
+    for script in (False, True) if code.script is not None else (False,):
+        text = impact.export(
+            name, source=config, at=OWN_PARAMETERS.get(name), code_version=code.newest, script=script
+        ).text
+        assert code.newest in text.partition("\n")[0]
+        assert "PWNED" not in text
+        assert text.replace("\n", "").isprintable()
+
+
+@pytest.mark.parametrize("name", CODES)
+def test_a_comment_stays_a_comment_whatever_its_text(name: str) -> None:
+    for begin, end in {CODES[name].comment, ("# ", "")}:
+        for line, hostile in zip(comment_lines(HOSTILE, begin, end), HOSTILE, strict=True):
+            assert line.isprintable(), hostile
+            assert line.startswith(begin)
+            assert line.endswith(end)
+            # XML allows no "--" in a comment
+            assert not end or "--" not in line.removeprefix(begin).removesuffix(end)
+
+
+def test_a_release_that_would_be_code_is_one_line(cli: Run) -> None:
+    done = cli(
+        "export", "--to", "mujoco", "--at", "e=0.6", "--script", "--code-version", "4.0\x1b\nopen('x', 'w')\n#"
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == (
+        "--code-version: got \"4.0\\x1b\\x0aopen('x', 'w')\\x0a#\", expected a release, such as 4.0.0\n"
+    )
+
+
+@pytest.mark.parametrize("reported", ["4.0.0\\nopen('PWNED')", "4.0.0\\033[31m", "4.0.0 -->"])
+def test_a_release_that_a_program_reports_is_refused_too(tmp_path: Path, reported: str) -> None:
+    python = write_program(tmp_path / "python", f'printf "{reported}"')
+    with pytest.raises(UsageError, match=r"^version of [ -~]*: got [ -~]*, expected a release, such as 4.0.0$"):
+        impact.export("mujoco", at={"e": 0.6}, program=str(python))
+
+
+# ---- a program that stands in for LAMMPS: it reports a release, and runs a script by other commands
+
+RELEASE = 'case $1 in -help) echo "Parallel Simulator - 22 Jul 2025"; exit;; esac\n'
+LAMMPS = ("export", "--to", "lammps", "--at", "e=0.6", "--at", "v1=1", "--verify", "--program")
+
+
+def lammps_that_prints(folder: Path, values: Sequence[object]) -> Path:
+    """A program that prints one restitution after the other."""
+    (folder / "values").write_text("".join(f"{value}\n" for value in values), encoding="utf-8")
+    run = 'cd "${0%/*}"; echo "e_out = $(head -n 1 values)"; sed -i 1d values'
+    return write_program(folder / "lmp", RELEASE + run)
+
+
+def predicted_restitutions(folder: Path) -> list[float]:
+    """What --verify predicts at the four phases."""
+    program = lammps_that_prints(folder, [0.5] * 4)
+    verification = impact.export(
+        "lammps", at={"e": 0.6, "v1": 1.0}, verify=True, program=str(program)
+    ).verification
+    assert verification is not None
+    assert verification.measured == (0.5,) * 4
+    return list(verification.predicted)
+
+
+def test_verify_exits_with_0_for_the_predicted_restitutions_and_with_1_for_others(
+    cli: Run, tmp_path: Path
+) -> None:
+    predicted = predicted_restitutions(tmp_path)
+    agreeing = cli(*LAMMPS, lammps_that_prints(tmp_path, predicted))
+    assert (agreeing.returncode, agreeing.stderr) == (0, "")
+    assert agreeing.stdout.splitlines()[-1] == "agrees: largest difference 0, uncertainty 1e-09"
+    predicted[2] += 1e-8
+    differing = cli(*LAMMPS, lammps_that_prints(tmp_path, predicted))
+    assert (differing.returncode, differing.stderr) == (1, "")
+    assert differing.stdout.splitlines()[-1] == "DIFFERS: largest difference 1e-08, uncertainty 1e-09"
+
+
+@pytest.mark.parametrize(("phase", "value"), list(enumerate(["nan", "inf", "-nan", "nan"])))
+def test_a_restitution_that_is_no_number_differs_at_any_phase(tmp_path: Path, phase: int, value: str) -> None:
+    predicted = [*predicted_restitutions(tmp_path)]
+    program = lammps_that_prints(tmp_path, [*predicted[:phase], value, *predicted[phase + 1 :]])
+    verification = impact.export(
+        "lammps", at={"e": 0.6, "v1": 1.0}, verify=True, program=str(program)
+    ).verification
+    assert verification is not None
+    assert not verification.agrees
+    assert f"at the phase {(phase + 0.5) / 4} of dt" in verification.not_numbers
+
+
+def test_verify_exits_with_1_and_names_the_phase_of_a_restitution_that_is_no_number(
+    cli: Run, tmp_path: Path
+) -> None:
+    predicted = predicted_restitutions(tmp_path)
+    program = lammps_that_prints(tmp_path, [predicted[0], "nan", "nan", "nan"])
+    done = cli(*LAMMPS, program)
+    assert (done.returncode, done.stderr) == (1, "")
+    assert done.stdout.splitlines()[-1].startswith(
+        "DIFFERS: at the phase 0.375 of dt = 6.31676e-06 s e_out is nan, "
+    )
+    lammps_that_prints(tmp_path, [predicted[0], "nan", "nan", "nan"])
+    data = json.loads(cli(*LAMMPS, program, "--json").stdout)["verification"]
+    assert (data["agrees"], data["rows"][1]["measured"]) == (False, None)
+
+
+def test_a_code_without_a_scheme_that_measures_no_number_differs(tmp_path: Path) -> None:
+    """The stand-in of a Python with openseespy; nothing is extrapolated from what is no number."""
+    python = write_program(tmp_path / "python", 'case $1 in -c) echo 3.7.1.2;; *) echo "e_out = nan";; esac')
+    at = {"e": 0.6, "v1": 1.0}
+    verification = impact.export("opensees", at=at, verify=True, program=str(python)).verification
+    assert verification is not None
+    assert not verification.agrees
+    assert len(verification.measured) == 12
+    assert verification.not_numbers.startswith("at the phase 0.125 of dt")
+
+
+@pytest.mark.parametrize(
+    ("run", "message"),
+    [
+        ("echo e_out = abc", "ended with exit code 0: e_out = abc"),
+        ("echo e_out = 0.6; echo more", "ended with exit code 0: more"),
+        ("", "ended with exit code 0: no output"),
+        ("echo e_out = 0.6; exit 3", "ended with exit code 3: e_out = 0.6"),
+        (
+            "echo 'ERROR: no\033[31m such fix' >&2; echo last >&2; exit 1",
+            "exit code 1: ERROR: no\\x1b[31m such fix",
+        ),
+        ("printf 'e_out = \\377'", "ended with exit code 0: e_out = "),
+        ("kill -9 $$", "ended with exit code -9: no output"),
+        ("yes", "stopped after it printed 64 MiB"),
+        ("yes >&2", "stopped after it printed 64 MiB"),
+    ],
+)
+def test_a_script_that_fails_is_one_line(cli: Run, tmp_path: Path, run: str, message: str) -> None:
+    done = cli(*LAMMPS, write_program(tmp_path / "lmp", RELEASE + run))
+    assert (done.returncode, done.stdout) == (2, "")
+    assert message in done.stderr
+    assert done.stderr.count("\n") == 1
+    # LAMMPS of a few thousand bytes or of gigabytes takes the same memory
+    assert done.memory < 500 * 2**20
+
+
+def test_a_script_that_does_not_end_is_stopped(tmp_path: Path) -> None:
+    """With what a wrapper has started."""
+    command = ["/bin/sh", "-c", "sleep 60 & echo $! > pid; wait"]
+    with pytest.raises(subprocess.SubprocessError, match=r"^stopped after 0\.5 s$"):
+        run_program(command, str(tmp_path), 0.5)
+    pid = (tmp_path / "pid").read_text(encoding="utf-8").strip()
+    status = Path("/proc", pid, "stat")
+    assert not status.exists() or status.read_text(encoding="utf-8").split()[2] == "Z"
+
+
+@pytest.mark.parametrize("reported", ["31 Feb 2025", "99 Foo 2025"])
+def test_a_program_that_reports_no_release_is_one_line(cli: Run, tmp_path: Path, reported: str) -> None:
+    lmp = write_program(tmp_path / "lmp", f'echo "Parallel Simulator - {reported}"')
+    done = cli("export", "--to", "lammps", "--at", "e=0.6", "--program", lmp)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == (
+        f'version of {lmp}: got "{reported}", expected the date of a release, such as 22Jul2025\n'
+    )
+    assert installed_version(replace(CODES["lammps"], program=str(lmp))) is None
 
 
 EXAMPLES = re.findall(

@@ -424,5 +424,6 @@ def test_a_law_without_known_radii_gets_finite_numbers() -> None:
     """The radii that are taken for it are those of a script."""
     source = {"models": "hertz", "sweep": {"v1": V0, "v2": 0.0, "m1": M1, "m2": M2, "e": 0.5, "K": 1e9}}
     for name in ("lammps", "chrono"):
-        values = impact.export(name, default_law(name), source=source).parameters.values()
+        release = CODES[name].newest
+        values = impact.export(name, default_law(name), source=source, code_version=release).parameters.values()
         assert all(math.isfinite(value) for value in values if isinstance(value, float))

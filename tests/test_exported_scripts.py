@@ -18,10 +18,10 @@ import impact
 from impact.errors import UsageError
 from impact.exporters.code import Code
 from impact.exporters.codes import CODES
-from impact.exporters.problem import prepare_export
+from impact.exporters.problem import law_of_code, prepare_export
 from impact.exporters.verify import choose_version, verify
 
-from .conftest import Run
+from .conftest import Run, default_law
 from .test_peers import ENTRIES, MATERIALS, PYTHON, WITHOUT_PEER, by_impact, config_of
 
 pytestmark = pytest.mark.peers
@@ -43,11 +43,12 @@ EXPORTED = {
 }
 
 
-def code_and_version(name: str) -> tuple[Code, str, str]:
-    """A code, the program that runs its scripts, and its version; skips the test where it is not installed."""
+def code_and_version(name: str, key: str) -> tuple[Code, str, str]:
+    """A code, the program that runs its scripts, and its version; skips the test where it has no such law."""
     code = CODES[name]
     try:
         program, version = choose_version(code, PROGRAMS.get(code.program), None, verify=True)
+        law_of_code(code, key, version)
     except UsageError as error:
         pytest.skip(str(error))
     assert program is not None
@@ -58,7 +59,7 @@ def code_and_version(name: str) -> tuple[Code, str, str]:
 def test_an_exported_script_measures_the_predicted_restitution(
     name: str, key: str, record_property: Callable[[str, object], None]
 ) -> None:
-    code, program, version = code_and_version(name)
+    code, program, version = code_and_version(name, key)
     entry = EXPORTED[name, key]
     steps = COARSE_STEPS if code.scheme is not None else (float(entry.code.steps_per_contact),)
     differences, uncertainties = [], []
@@ -114,7 +115,7 @@ PLANTED = (
 
 @pytest.mark.parametrize(("name", "key", "old", "new"), PLANTED)
 def test_an_error_in_a_template_is_found(name: str, key: str, old: str, new: str) -> None:
-    code, program, version = code_and_version(name)
+    code, program, version = code_and_version(name, key)
     entry = EXPORTED[name, key]
     problem = prepare_export(code, key, version, config_of(key, entry.collisions[0]), {}, ())
     original = code.script
@@ -134,7 +135,7 @@ def test_an_error_in_a_template_is_found(name: str, key: str, old: str, new: str
 @pytest.mark.parametrize("materials", [("soft", "hard"), ("hard", "hard")], ids="-".join)
 def test_lammps_mixes_two_materials_as_the_law_does(materials: tuple[str, str]) -> None:
     """With the moduli of two atom types in hertz/material; other codes are in `EXPORTED`."""
-    _, program, _ = code_and_version("lammps")
+    _, program, _ = code_and_version("lammps", "lammps-coeff-restitution-hertz")
     sweep = {"v1": 1.0, "m1": 1.0, "m2": 3.0, "R1": 0.05, "R2": 0.08, "e": 0.5}
     source = {
         "models": "lammps-coeff-restitution-hertz",
@@ -156,8 +157,9 @@ def test_every_law_of_a_code_with_scripts_is_run_or_has_a_reason() -> None:
 
 def test_verify_exits_with_0_where_the_code_agrees_and_with_1_where_it_differs(cli: Run, tmp_path: Path) -> None:
     """The code that differs is the real one, behind a program that changes the restitution in its input."""
-    _, program, _ = code_and_version("lammps")
-    words = ("export", "--to", "lammps", "--at", "e=0.6", "--verify", "--program")
+    key = "lammps-coeff-restitution-hertz"
+    _, program, _ = code_and_version("lammps", key)
+    words = ("export", "--to", "lammps", "--model", key, "--at", "e=0.6", "--verify", "--program")
     agreeing = cli(*words, program)
     assert (agreeing.returncode, agreeing.stderr) == (0, "")
     assert "agrees" in agreeing.stdout
@@ -171,7 +173,7 @@ def test_verify_exits_with_0_where_the_code_agrees_and_with_1_where_it_differs(c
 
 @pytest.mark.parametrize(("name", "words"), [("lammps", ("-in",)), ("mujoco", ()), ("drake", ())])
 def test_a_script_runs_in_an_empty_folder(cli: Run, tmp_path: Path, name: str, words: tuple[str, ...]) -> None:
-    code, program, version = code_and_version(name)
+    code, program, version = code_and_version(name, default_law(name))
     file = tmp_path / f"two_balls{code.suffix}"
     assert cli("export", "--to", name, "--at", "e=0.6", "--script", "-o", file).returncode == 0
     done = subprocess.run(

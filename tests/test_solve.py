@@ -6,11 +6,14 @@ import json
 import math
 import re
 import shlex
+from collections.abc import Callable
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 import impact
+from impact.errors import UsageError
 
 from .conftest import ROOT, Run
 
@@ -22,6 +25,7 @@ BEADS = {
     "sweep": {"v1": 1.0, "m1": MASS, "m2": MASS, "R1": RADIUS, "R2": RADIUS, "material": "bead"},
     "materials": {"bead": {"E": 65e9, "nu": 0.22, "rho": 2500.0}},
 }
+Array = NDArray[np.float64]
 VISCOELASTIC = "lammps-viscoelastic-hertz"
 
 
@@ -85,6 +89,120 @@ def test_several_roots_are_all_found() -> None:
     assert np.subtract(1.0, values) == pytest.approx([abs(1.0 - values[0]), -abs(1.0 - values[0])], abs=1e-8)
 
 
+@pytest.mark.parametrize(
+    ("wanted", "roots"),
+    [
+        (0.64, [1.46682e-4, 1.62186e-4]),
+        pytest.param(0.6395, [1.48783e-4, 1.60035e-4], marks=pytest.mark.slow),
+        pytest.param(0.642, [1.4134150e-4, 1.6772915e-4], marks=pytest.mark.slow),
+    ],
+)
+def test_both_roots_beside_a_minimum_between_two_values_of_the_scan_are_found(
+    wanted: float, roots: list[float]
+) -> None:
+    """The least e_out is 0.6389431042, at d = 1.543805e-4 m; that of the scan is 0.640553."""
+    result = impact.solve("muthukumar-2003", "d", {"e_out": wanted}, at={"e": 0.5, "v1": 1.0})
+    assert result.status == "several_roots"
+    assert [root.value for root in result.roots] == pytest.approx(roots, rel=5e-6)
+    assert result.attainable == (0.638943, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "roots"),
+    [
+        (573.0, [361.680, 387.604]),
+        pytest.param(600.0, [201.263755, 538.515748], marks=pytest.mark.slow),
+        (572.8, []),
+    ],
+)
+def test_the_least_peak_force_of_a_dashpot_is_right_to_six_digits(wanted: float, roots: list[float]) -> None:
+    result = impact.solve("kelvin-voigt", "C", {"peak_force": wanted}, at={"K": 1e6, "n": 1.0})
+    assert [root.value for root in result.roots] == pytest.approx(roots, rel=2e-6)
+    assert result.attainable[0] == 572.845
+
+
+def law_of(damping: Callable[[Array], Array]) -> impact.ForceModel:
+    """A linear contact whose dashpot is a function of a number p from 0 to 3."""
+    return impact.ForceModel(
+        key="damped",
+        title="Damping by a function",
+        year=2026,
+        equation="F = K δ + c(p) δ̇",
+        reference="",
+        force=lambda K, x, v, c: K * x + c * v,
+        coefficients={"c": lambda p: damping(p)},
+        parameters=(impact.Parameter("p", "1", "a number", default=0.5, least=0.0, most=3.0),),
+        exponent=1.0,
+    )
+
+
+def test_the_ends_of_an_interval_that_gives_the_target_are_the_roots() -> None:
+    law = law_of(lambda p: 0.4 * np.maximum(np.abs(p - 1.5) - 0.6213, 0.0))
+    result = impact.solve("damped", "p", {"e_out": 1.0}, plugins=[law])
+    assert result.status == "several_roots"
+    assert [root.value for root in result.roots] == pytest.approx([1.5 - 0.6213, 1.5 + 0.6213], abs=1e-6)
+
+
+def test_a_jump_across_the_target_is_neither_a_root_nor_an_extremum() -> None:
+    law = law_of(lambda p: np.where(p < 1.2345, 0.1 * p, 0.6 - 0.1 * p))
+    result = impact.solve("damped", "p", {"e_out": 0.65}, plugins=[law])
+    assert result.status == "no_root"
+    # the damping just after the jump is the largest
+    least = linear_restitution((0.6 - 0.12345) / 2.0)
+    assert result.attainable == pytest.approx((least, 1.0), abs=1e-6)
+
+
+def test_an_extremum_that_touches_the_target_is_one_root() -> None:
+    law = law_of(lambda p: 0.2 + 0.4 * (p - 1.0) ** 2)
+    largest = linear_restitution(0.1)
+    result = impact.solve("damped", "p", {"e_out": largest}, plugins=[law])
+    assert result.status == "ok"
+    assert result.roots[0].value == pytest.approx(1.0, abs=1e-4)
+
+
+def test_a_value_that_fails_hides_no_root_between_its_neighbours() -> None:
+    """One value of the scan needs more steps than a scan takes."""
+    result = impact.solve("bordbar-hyppanen-2007", "C", {"e_out": 0.9972}, at={"v1": 1.0})
+    assert [root.e_out for root in result.roots] == pytest.approx([0.9972], abs=1e-9)
+
+
+def test_the_stiffness_for_a_contact_time_is_that_of_the_closed_form() -> None:
+    """Hertz' contact time is 3.2181 (m²/(K² v))^0.2."""
+    at = {"m1": 1.0, "m2": 1.0, "v1": 2.0, "v2": 0.0}
+    (root,) = impact.solve("hertz", "K", {"contact_time": 1e-3}, at=at).roots
+    factor = 1.25**0.4 * 4.0 * math.sqrt(math.pi) * math.gamma(0.4) / (5.0 * math.gamma(0.9))
+    mass, speed = 0.5, 2.0
+    assert factor == pytest.approx(3.2181, abs=1e-4)
+    assert root.value == pytest.approx(math.sqrt((factor / 1e-3) ** 5 * mass**2 / speed), rel=1e-8)
+
+
+def test_the_best_value_over_a_range_is_that_of_the_best_of_several_basins() -> None:
+    """The scan is nearer to the worse one, at p = 1."""
+    law = law_of(lambda p: np.minimum(0.01 + 0.1 * np.abs(p - 1.0), 3.0 * np.abs(p - 2.0025)))
+    result = impact.solve("damped", "p", {"e_out": 1.0}, over={"v1": [1.0, 2.0]}, plugins=[law])
+    assert result.roots[0].value == pytest.approx(2.0025, abs=1e-6)
+    assert result.attainable == pytest.approx((1.0, 1.0), abs=1e-6)
+
+
+@pytest.mark.parametrize("target", [{}, {"e_out": 0.5, "peak_force": 100.0}])
+def test_a_target_is_one_output(target: dict[str, float]) -> None:
+    with pytest.raises(UsageError, match=f"got {len(target)} targets, expected one"):
+        impact.solve("mujoco-solref", "dampratio", target)
+
+
+def test_the_command_ends_well_without_a_root(cli: Run) -> None:
+    done = cli("solve", "--model", "gharib-hurmuzlu-2012", "--for", "e", "--target", "e_out=0.6")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "no value of e gives e_out = 0.6; e_out is from 0 to 0.593624" in done.stdout
+
+
+def test_a_range_of_toml_is_a_range_of_the_option(cli: Run) -> None:
+    words = ("solve", "--model", "hunt-crossley-1975", "--for", "e", "--target", "e_out=0.6", "--over")
+    printed = [cli(*words, over).stdout for over in ("v1=0.1:3:3", "v1={linspace=[0.1, 3, 3]}")]
+    assert printed[0].startswith("e = 0.")
+    assert printed[0] == printed[1]
+
+
 @pytest.mark.slow
 def test_one_value_over_a_range_of_speeds_has_equal_distances_at_both_ends() -> None:
     speeds = {"linspace": [0.1, 3.0, 5]}
@@ -121,7 +239,7 @@ def test_json_of_the_command(cli: Run) -> None:
 def test_the_page_prints_what_the_commands_print(cli: Run) -> None:
     page = (ROOT / "docs" / "solve.md").read_text(encoding="utf-8")
     examples = re.findall(r"\$ impact (.*)\n((?:.+\n)+?)```", page)
-    assert len(examples) == 4
+    assert len(examples) == 5
     for command, printed in examples:
         assert cli(*shlex.split(command)).stdout == printed
 

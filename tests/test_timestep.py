@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 import shlex
 
@@ -125,8 +126,50 @@ def test_json_of_the_command(cli: Run) -> None:
         20.0,
         pytest.approx(printed["contact_time"] / 1e-6),
     ]
-    assert printed["rows"][0].keys() == {"dt", "steps_per_contact", "e_mean", "e_least", "e_largest", "e_to_ask"}
+    restitutions = {"e_mean", "e_least", "e_largest", "e_to_ask"}
+    assert printed["rows"][0].keys() == {"dt", "steps_per_contact", "status", "failed"} | restitutions
     assert printed["needed"].keys() == {"tol", "steps_per_contact", "dt"}
+
+
+@pytest.mark.parametrize("steps", [0.5, 1.0, 2.0, 3.0])
+def test_a_step_has_the_status_and_the_failures_of_a_sweep(steps: float) -> None:
+    """At two steps per contact some phases rebound faster than twice their approach, and others do not."""
+    phases = 40
+    (row,) = impact.timestep(LINEAR, at={"e": 0.5}, steps_per_contact=[steps], phases=phases).rows
+    swept = impact.sweep(
+        {
+            "models": LINEAR,
+            "sweep": {
+                "e": 0.5,
+                "v1": 1.0,
+                "m1": 1.0,
+                "m2": 1.0,
+                "K": 1e6,
+                "n": 1.0,
+                "steps_per_contact": steps,
+                "phase": ((np.arange(phases) + 0.5) / phases).tolist(),
+            },
+            "solver": {"integrator": "kick-drift"},
+        }
+    ).isel(model=0)
+    failed = swept["status"].values >= 10
+    assert row.failed == failed.sum()
+    assert (row.status, math.isnan(row.e_mean)) == (("unstable", True) if failed.any() else ("ok", False))
+    assert row.e_mean == pytest.approx(swept["e_out"].mean("phase", skipna=False).item(), rel=1e-9, nan_ok=True)
+
+
+def test_a_step_that_is_too_long_is_no_restitution_and_ends_with_exit_code_3(cli: Run) -> None:
+    words = ("timestep", "--model", LINEAR, "--at", "e=0.5", "--steps-per-contact", "1", "--tol", "1%")
+    table, printed = cli(*words), cli(*words, "--json")
+    assert (table.returncode, printed.returncode) == (3, 3)
+    assert "unstable        –          –         –" in table.stdout
+    assert "338 of 400 phases fail at 1 steps per contact; the step is too long" in table.stdout
+    result = json.loads(printed.stdout)
+    (row,) = result["rows"]
+    assert (row["status"], row["failed"]) == ("unstable", 338)
+    assert {row[name] for name in ("e_mean", "e_least", "e_largest", "e_to_ask")} == {None}
+    # a step that fails keeps no phase within the tolerance
+    assert result["needed"]["steps_per_contact"] == 74
 
 
 def test_the_page_prints_what_the_commands_print(cli: Run) -> None:

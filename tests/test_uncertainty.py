@@ -15,7 +15,10 @@ import xarray as xr
 from scipy import stats
 
 import impact
+from impact.config.design import unit_samples
+from impact.config.tables import Design
 from impact.errors import ConfigError, UsageError
+from impact.uncertainty.indices import Indices, indices_of, mixed_rows
 
 from .conftest import ROOT, Run, assert_same_output
 
@@ -77,6 +80,128 @@ def test_indices_are_those_of_the_closed_forms(of: str) -> None:
     assert "sample" not in study.dims
 
 
+def hunt_crossley(c: np.ndarray, v1: np.ndarray) -> np.ndarray:
+    """The restitution of F = K δⁿ (1 + 3/2 c δ̇): b - ln(1 + b) = -b e - ln(1 - b e) with b = 3/2 c v1."""
+    b = 1.5 * c * v1
+    least, most = np.zeros_like(b), np.minimum(1.0, 1.0 / b)
+    with np.errstate(divide="ignore"):
+        for _ in range(50):
+            e = 0.5 * (least + most)
+            is_less = -b * e - np.log1p(-b * e) < b - np.log1p(b)
+            least, most = np.where(is_less, e, least), np.where(is_less, most, e)
+    return e
+
+
+SIMBODY_ENDS = {"c": (0.01, 3.0), "v1": (0.05, 3.0)}
+
+
+def by_quadrature() -> tuple[np.ndarray, np.ndarray]:
+    """First-order and total indices of the restitution of Hunt and Crossley, which is not additive."""
+    x, weights = np.polynomial.legendre.leggauss(200)
+    c, v1 = (least + 0.5 * (1.0 + x) * (most - least) for least, most in SIMBODY_ENDS.values())
+    e, weights = hunt_crossley(c[:, None], v1), 0.5 * weights
+    mean = weights @ e @ weights
+    alone = np.array([weights @ (e @ weights - mean) ** 2, weights @ (weights @ e - mean) ** 2])
+    variance = weights @ (e - mean) ** 2 @ weights
+    return alone / variance, 1.0 - alone[::-1] / variance
+
+
+def test_indices_of_inputs_that_act_together_are_those_of_a_quadrature() -> None:
+    c, v1 = ({"uniform": list(ends)} for ends in SIMBODY_ENDS.values())
+    config = {
+        "models": "simbody-hunt-crossley",
+        "design": {"n": 2**13},
+        "sweep": {"v1": v1, "m1": 1.0, "m2": 1.0, "K": 1e6},
+        "model": {"simbody-hunt-crossley": {"c": c}},
+    }
+    study = impact.sensitivity(config).isel(model=0)
+    first, total = by_quadrature()
+    np.testing.assert_allclose([first, total], [[0.5216, 0.4539], [0.5461, 0.4784]], atol=1e-4)
+    paths = ["model.simbody-hunt-crossley.c", "sweep.v1"]
+    np.testing.assert_allclose(study["first"].sel(input=paths), first, atol=2e-3)
+    np.testing.assert_allclose(study["total"].sel(input=paths), total, atol=2e-3)
+
+
+def product_of_powers(*factors: np.ndarray) -> np.ndarray:
+    return np.prod([x**power for x, power in zip(factors, POWERS["peak_force"], strict=True)], axis=0)
+
+
+CASES = {"hertz": (product_of_powers, ENDS), "hunt-crossley": (hunt_crossley, SIMBODY_ENDS)}
+
+
+def indices_of_case(case: str, design: Design, seed: int | None) -> tuple[Indices, np.ndarray]:
+    """The indices of a closed form, and its values."""
+    law, ends = CASES[case]
+    u = unit_samples(design, 2 * len(ends))
+    rows = mixed_rows(*np.split(u, 2, axis=1))
+    of_inputs = zip(rows.T, ends.values(), strict=True)
+    values = law(*(least + of_input * (most - least) for of_input, (least, most) in of_inputs))
+    values = values.reshape(1, len(ends) + 2, design.n)
+    return indices_of(values, seed), values
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("n", [64, 128, 256])
+@pytest.mark.parametrize("case", CASES)
+def test_intervals_of_random_samples_hold_the_index_in_95_percent_of_200_cases(case: str, n: int) -> None:
+    exact = closed_form("peak_force") if case == "hertz" else by_quadrature()
+    holds = []
+    for seed in range(200):
+        indices, _ = indices_of_case(case, Design(method="random", n=n, seed=seed), seed)
+        first = (indices.first_lower[0] <= exact[0]) & (exact[0] <= indices.first_upper[0])
+        total = (indices.total_lower[0] <= exact[1]) & (exact[1] <= indices.total_upper[0])
+        holds.append([first, total])
+    # four standard errors of a share of 0.95
+    assert np.abs(np.mean(holds, axis=0) - 0.95).max() <= 4.0 * math.sqrt(0.95 * 0.05 / 200)
+
+
+def test_indices_are_those_of_scipy() -> None:
+    indices, values = indices_of_case("hunt-crossley", Design(n=256), None)
+    a, b, *mixed = values[0]
+    of_scipy = stats.sobol_indices(func={"f_A": a, "f_B": b, "f_AB": np.array(mixed)[:, None]}, n=256)
+    np.testing.assert_allclose(indices.first[0], of_scipy.first_order, rtol=1e-12)
+    np.testing.assert_allclose(indices.total[0], of_scipy.total_order, rtol=1e-12)
+    assert np.isnan(indices.first_lower).all()
+
+
+def test_one_uncertain_input_explains_the_whole_variance() -> None:
+    config = hertz(n=2**10)
+    config["sweep"] |= {"m1": 1.0, "K": 1e6}
+    study = impact.sensitivity(config, of="peak_force").isel(model=0)
+    assert study["input"].values.tolist() == ["sweep.v1"]
+    assert (study["first"].item(), study["total"].item()) == pytest.approx((1.0, 1.0), abs=1e-3)
+    # an index is not above 1, and so is no end of its interval
+    assert study["first_upper"].item() == study["total_upper"].item() == 1.0
+
+
+def test_inputs_that_change_nothing_are_named_and_few_samples_are_noted(cli: Run, tmp_path: Path) -> None:
+    (tmp_path / "c.toml").write_text(TEXT)
+    words = ("sensitivity", "c.toml", "--set", "sweep.e.uniform=[0.3, 0.6]", "--set", "models='tsuji-1992'")
+    printed = cli(*words, "--set", "design.n=32", cwd=tmp_path).stdout
+    assert "; it does not depend on sweep.v1, sweep.K; the intervals need at least 64 samples\n" in printed
+    (row,) = [line for line in printed.splitlines() if line.startswith("sweep.")]
+    assert row.startswith("sweep.e ")
+
+
+def test_several_outputs_of_one_run_have_the_studies_of_each(cli: Run, tmp_path: Path) -> None:
+    (tmp_path / "c.toml").write_text(TEXT)
+    changes = ["sweep.e=0.6", "models='kuwabara-kono-1987'", "model.kuwabara-kono-1987.A=5e-4", "design.n=16"]
+    words = ("sensitivity", "c.toml", *(word for change in changes for word in ("--set", change)))
+    outputs = ("peak_force", "e_out")
+    both = [word for of in outputs for word in ("--of", of)]
+    studies = json.loads(cli(*words, *both, "--json", cwd=tmp_path).stdout)
+    assert [study["of"] for study in studies] == list(outputs)
+    for study in studies:
+        alone = impact.sensitivity(tmp_path / "c.toml", of=study["of"], overrides=changes).isel(model=0)
+        assert study["mean"] == alone["mean"].item()
+        assert [row["total"] for row in study["indices"]] == alone["total"].values.tolist()
+    printed = cli(*words, *both, cwd=tmp_path).stdout
+    assert [line.partition(":")[0] for line in printed.splitlines() if ": mean " in line] == list(outputs)
+    done = cli(*words, *both, "-o", "s.h5", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (2, "--output: got 2 outputs (--of), expected one for a file\n")
+    assert not (tmp_path / "s.h5").exists()
+
+
 def test_mean_and_quantiles_of_a_study_are_those_of_the_samples() -> None:
     study = impact.sensitivity(hertz(n=2**12), of="peak_force").isel(model=0)
     exact = MEAN_FACTOR["peak_force"] * math.prod(
@@ -115,6 +240,8 @@ def test_a_latin_hypercube_has_a_sample_in_each_stratum() -> None:
         assert sorted(strata.tolist()) == list(range(100)), name
 
 
+# the largest rank correlation of two inputs: four standard errors of 1,024 samples, or less
+METHODS = {"sobol": 0.02, "halton": 0.02, "lhs": 0.125, "random": 0.125}
 DISTRIBUTIONS: dict[str, tuple[dict[str, Any], Any]] = {
     "v1": ({"uniform": ["1 km/h", "2 m/s"]}, stats.uniform(1 / 3.6, 2.0 - 1 / 3.6)),
     "K": ({"normal": [1.0, 0.1]}, stats.norm(1.0, 0.1)),
@@ -124,15 +251,19 @@ DISTRIBUTIONS: dict[str, tuple[dict[str, Any], Any]] = {
 }
 
 
-@pytest.mark.parametrize("method", ["sobol", "lhs", "halton", "random"])
-def test_samples_have_their_distribution(method: str) -> None:
+@pytest.mark.parametrize(("method", "largest_correlation"), METHODS.items())
+def test_samples_have_their_distribution_and_are_not_correlated(method: str, largest_correlation: float) -> None:
     config = hertz(method, n=1024)
     config["sweep"] = {name: value for name, (value, _) in DISTRIBUTIONS.items()}
     swept = impact.sweep(config)
     for name, (_, distribution) in DISTRIBUTIONS.items():
         assert swept[name].dims == ("sample",)
-        assert stats.kstest(swept[name].values, distribution.cdf).pvalue > 1e-3, name
+        distance = stats.kstest(swept[name].values, distribution.cdf)
+        # a standard deviation that is wrong by a tenth has a distance of 0.02
+        assert distance.pvalue > 1e-3 if method == "random" else distance.statistic < 0.01, name
     assert swept["v2"].ndim == 0
+    correlations = stats.spearmanr(np.column_stack([swept[name].values for name in DISTRIBUTIONS])).statistic
+    assert np.abs(correlations - np.eye(len(DISTRIBUTIONS))).max() < largest_correlation
 
 
 def test_empirical_values_come_from_a_file_with_a_unit(tmp_path: Path) -> None:
@@ -242,6 +373,23 @@ def test_a_wrong_design_is_one_line_with_its_place(change: str, message: str, tm
         impact.sweep(tmp_path / "c.toml", overrides=[change])
     (line,) = refused.value.problems
     assert message in line
+
+
+@pytest.mark.parametrize("design", ["{}", "{ m = 4 }", '{ method = "lhs" }'])
+def test_a_design_without_a_number_of_samples_is_one_line(design: str, cli: Run, tmp_path: Path) -> None:
+    (tmp_path / "c.toml").write_text(TEXT.replace("[design]\nn = 64\n", f"design = {design}\n"))
+    words = "c.toml:3: design.n: missing, expected the number of samples; a power of two for sobol, such as 1024\n"
+    for command in (("sweep", "c.toml"), ("sweep", "c.toml", "--dry-run"), ("sensitivity", "c.toml")):
+        done = cli(*command, cwd=tmp_path)
+        assert done.returncode == 2
+        assert words in done.stderr
+
+
+def test_one_sample_has_no_index(cli: Run, tmp_path: Path) -> None:
+    (tmp_path / "c.toml").write_text(TEXT)
+    done = cli("sensitivity", "c.toml", "--set", "design.n=1", cwd=tmp_path)
+    expected = "c.toml: design.n: got 1, expected a power of two from 2 on for Sobol indices: 2 or 4\n"
+    assert (done.returncode, done.stderr) == (2, expected)
 
 
 def test_distributions_and_the_table_design_need_each_other(tmp_path: Path) -> None:

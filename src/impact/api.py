@@ -13,7 +13,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from .atomic import atomic_write
 from .comparison.bless import bless as bless
 from .comparison.compare import compare as compare
 from .comparison.tolerances import Tolerances
@@ -556,7 +555,8 @@ def timestep(
 
     Returns
     -------
-    TimestepResult : a row for each step, those of `steps_per_contact` first, and the number of steps needed
+    TimestepResult : a row for each step, those of `steps_per_contact` first, and the number of steps needed; a row
+        at which the collision fails at some phase has a status and no restitution
 
     Raises
     ------
@@ -670,7 +670,7 @@ def sensitivity(
 
     Raises
     ------
-    ConfigError : with one line for each problem; there is no design, or its n is no power of two
+    ConfigError : with one line for each problem; there is no design, or its n is no power of two from 2 on
     UsageError, StoreError : there is no such output, or the file exists or cannot be written
 
     The peak force of Hertz' law is proportional to K^0.4 v^1.2:
@@ -684,17 +684,46 @@ def sensitivity(
     >>> study["first"].values.round(2).tolist()
     [[0.56, 0.43]]
     """
+    (result,) = sensitivities(
+        source,
+        of=[of],
+        output=output,
+        overwrite=overwrite,
+        overrides=overrides,
+        plugins=plugins,
+        max_points=max_points,
+        execute=execute,
+    )
+    return result
+
+
+def sensitivities(
+    source: str | Path | Mapping[str, object],
+    *,
+    of: Sequence[str],
+    output: str | Path | None,
+    overwrite: bool,
+    overrides: Sequence[str],
+    plugins: Sequence[ForceModel | str | Path],
+    max_points: int,
+    execute: Callable[[Plan], xr.Dataset],
+) -> list[xr.Dataset]:
+    """The `sensitivity` of several outputs, whose points are computed once; one of them may be written."""
     # its modules import scipy.stats, which other functions do without
     from .uncertainty.sensitivity import check_output_name, sensitivity_of, sensitivity_plan
 
-    check_output_name(of)
+    for name in of:
+        check_output_name(name)
+    if output is not None and len(of) > 1:
+        raise UsageError(f"--output: got {len(of)} outputs (--of), expected one for a file")
     name = safe_text(str(source)) if isinstance(source, str | Path) else "config"
     plan = sensitivity_plan(prepare(source, overrides, plugins, max_points), of, max_points, name)
     check_outputs([output], [source, *plugins, *plan.config.files], overwrite=overwrite)
-    result = sensitivity_of(plan, of, execute)
+    swept = execute(plan)
+    results = [sensitivity_of(plan, of_study, swept) for of_study in of]
     if output is not None:
-        save(result, output, overwrite=overwrite)
-    return result
+        save(results[0], output, overwrite=overwrite)
+    return results
 
 
 def export(
@@ -717,12 +746,13 @@ def export(
     Parameters
     ----------
     to : name of the code, see `export_codes`
-    model : a law that the code has, by its key; by default the first one of the source that the code has, or the
-        first one of `export_codes` without a source
+    model : a law that the code has, by its key; by default the first one of the source, or without a source the
+        first one of `export_codes`, that the release of the code has
     source, overrides : see `solve`
     at : values of inputs by config name; an e for a law that takes none is reached by its damping parameter
     dt : time step [s]; by default the contact time of the continuous law over 50
-    code_version : release of the code; by default that of the program, or else the newest known one
+    code_version : release of the code, letters, digits, spaces and `._+()-`; by default that of the program, or
+        else the newest known one
     script : write a complete input with two balls that prints the e that it measures
     verify : run such inputs at four phases, and compare their e with the prediction
     program : what runs scripts, such as the file of lmp, or of a Python with the code's package; by default found
@@ -742,7 +772,8 @@ def export(
     What LAMMPS takes for a restitution of 0.6:
 
     >>> import impact
-    >>> export = impact.export("lammps", "lammps-coeff-restitution-hooke", at={"e": 0.6, "K": 1e6})
+    >>> law, at = "lammps-coeff-restitution-hooke", {"e": 0.6, "K": 1e6}
+    >>> export = impact.export("lammps", law, at=at, code_version="22Jul2025")
     >>> export.lines[1]
     'pair_coeff      * * hooke 1000000.0 0.6 damping coeff_restitution tangential linear_nohistory 0.0 0.0'
     >>> round(export.at_dt.e_mean, 4)
@@ -754,14 +785,17 @@ def export(
     from .exporters.problem import prepare_export
     from .exporters.verify import choose_version
 
+    if output is not None:
+        check_output(
+            Path(output), overwrite=overwrite, source=Path(source) if isinstance(source, str | Path) else None
+        )
     code = find_code(to)
     found, version = choose_version(code, program, code_version, verify=verify)
     problem = prepare_export(code, model, version, source, at or {}, overrides)
     check_outputs([output], [source, *problem.config.files], overwrite=overwrite)
     result = write_export(problem, dt, found if verify else None, with_script=script)
     if output is not None:
-        with atomic_write(Path(output), overwrite=overwrite) as sink:
-            sink.write(result.text.encode())
+        write_file(Path(output), result.text.encode(), overwrite=overwrite)
     return result
 
 

@@ -34,7 +34,7 @@ def export(
             "--model",
             metavar="KEY",
             autocompletion=complete_model,
-            help="A law that the code has. \\[default: the first of the source that it has, else of --list]",
+            help="A law that the code has. \\[default: the first of the source or of --list that its release has]",
         ),
     ] = None,
     at: AtOption = None,
@@ -173,8 +173,9 @@ def _print_verification(result: Export, verification: Verification) -> None:
     out.print(rows)
     out.print()
     word = "agrees" if verification.agrees else "DIFFERS"
-    line = f"{word}: largest difference {number(verification.difference, 2)}"
-    out.print(cell(f"{line}, uncertainty {number(verification.uncertainty, 2)}"), soft_wrap=True)
+    largest = f"largest difference {number(verification.difference, 2)}"
+    line = f"{word}: {verification.not_numbers or largest}, uncertainty {number(verification.uncertainty, 2)}"
+    out.print(cell(line), soft_wrap=True)
 
 
 def _print_codes(as_json: bool) -> None:

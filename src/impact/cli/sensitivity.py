@@ -33,11 +33,14 @@ if TYPE_CHECKING:
 def sensitivity(
     config: Annotated[Path, typer.Argument(help="A TOML file with \\[design] and distributions.")],
     of: Annotated[
-        str,
+        list[str] | None,
         typer.Option(
-            "--of", metavar="OUTPUT", autocompletion=complete_output, help="The output, such as peak_force."
+            "--of",
+            metavar="OUTPUT",
+            autocompletion=complete_output,
+            help="The output, such as peak_force; may be repeated. \\[default: e_out]",
         ),
-    ] = "e_out",
+    ] = None,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="The result file. \\[default: none]")
     ] = None,
@@ -54,7 +57,10 @@ def sensitivity(
     """Find which uncertain input matters: Sobol indices of an output, its mean and quantiles.
 
     Intervals are those of 95 % by bootstrap. For d uncertain inputs, n (d + 2) points are computed.
+
+    Of several outputs each has its own tables, and --json is a list.
     """
+    outputs = list(dict.fromkeys(of or ["e_out"]))
     with exits.catch_signals() as should_stop:
         from .. import api
         from ..engine.executors import choose_backend
@@ -66,9 +72,9 @@ def sensitivity(
             with progress_bar(exits.print_line, quiet=quiet) as on_progress:
                 return api.execute(plan, backend, on_progress, should_stop)
 
-        result = api.sensitivity(
+        results = api.sensitivities(
             config,
-            of=of,
+            of=outputs,
             output=output,
             overwrite=overwrite,
             overrides=sets or (),
@@ -77,17 +83,21 @@ def sensitivity(
             execute=run_plan,
         )
     if as_json:
-        print(dump(sensitivity_json(result)))
+        studies = [study for result in results for study in studies_json(result)]
+        print(dump(studies[0] if len(studies) == 1 else studies))
     else:
-        print_studies(result)
+        for position, result in enumerate(results):
+            if position:
+                print()
+            print_studies(result)
     if output is not None:
         exits.print_line(f"{safe_text(str(output))}: written")
-    if int(result["failed"].sum()) and not allow_failed:
+    if any(int(result["failed"].sum()) for result in results) and not allow_failed:
         raise typer.Exit(exits.EXIT_POINTS_FAILED)
 
 
-def sensitivity_json(result: xr.Dataset) -> Any:
-    """A study as plain data; a list of them where there are several models or points of other axes."""
+def studies_json(result: xr.Dataset) -> list[dict[str, Any]]:
+    """The study of each model at each point of the other axes as plain data."""
     from ..results.attributes import read_attribute
     from ..results.sensitivity import HALF, iterate_studies
 
@@ -114,7 +124,7 @@ def sensitivity_json(result: xr.Dataset) -> Any:
                 ],
             }
         )
-    return studies[0] if len(studies) == 1 else studies
+    return studies
 
 
 def print_studies(result: xr.Dataset) -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..formatting import decimals, number, quantity
+from . import exits
 from .completion import complete_scheme
 from .console import cell, console, dump, table
 from .options import AtOption, JsonOption, ModelKeyOption, PluginOption, SetOption, SourceArgument
@@ -74,6 +75,8 @@ def timestep(
     The restitution depends on the phase, the part of a step in which the contact begins.
 
     The table has its mean, least and largest value over all phases.
+
+    If a phase fails, its step has none of them, and the exit code is 3.
     """
     from .. import api
 
@@ -92,7 +95,9 @@ def timestep(
     if as_json:
         print(dump(timestep_json(result)))
     else:
-        _print_table(result, tol)
+        _print_table(result, phases, tol)
+    if any(row.failed for row in result.rows):
+        raise typer.Exit(exits.EXIT_POINTS_FAILED)
 
 
 def timestep_json(result: TimestepResult) -> dict[str, Any]:
@@ -108,8 +113,10 @@ def timestep_json(result: TimestepResult) -> dict[str, Any]:
     }
 
 
-def _print_table(result: TimestepResult, tol: float | None) -> None:
-    """Print the continuous law, a line for each step, and the number of steps that is needed."""
+def _print_table(result: TimestepResult, phases: int, tol: float | None) -> None:
+    """Print the continuous law, a line for each step, the steps that fail, and the number of steps needed."""
+    from ..contact.status import Status
+
     out = console(sys.stdout)
     asked = "" if result.e != result.e else f"e = {number(result.e)}, "
     contact = quantity(result.contact_time, "s")
@@ -122,9 +129,16 @@ def _print_table(result: TimestepResult, tol: float | None) -> None:
     rows = table("steps per contact", "dt [s]", "e mean", "e least", "e largest", "e to ask")
     rows.columns[0].justify = "right"
     for row in result.rows:
-        values = map(decimals, (row.e_mean, row.e_least, row.e_largest, row.e_to_ask))
-        rows.add_row(number(row.steps_per_contact), number(row.dt), *values)
+        mean, *others = map(decimals, (row.e_mean, row.e_least, row.e_largest, row.e_to_ask))
+        shown = row.status if row.failed else mean
+        rows.add_row(number(row.steps_per_contact), number(row.dt), shown, *others)
     out.print(rows)
+    failures = [row for row in result.rows if row.failed]
+    if failures:
+        out.print()
+    for row in failures:
+        count = f"{row.failed} of {phases} phases fail at {number(row.steps_per_contact)} steps per contact"
+        out.print(cell(f"{count}; {Status[row.status.upper()].meaning}"), soft_wrap=True)
     if tol is not None:
         out.print()
         if result.needed is None:

@@ -32,6 +32,7 @@ EXPECTED_BY_KEY = {
     "models": MODELS_EXPECTED,
     **{name: f"{quantity.expected}: {quantity.meaning}" for name, quantity in MATERIAL_QUANTITIES.items()},
     **{name: str(info.description) for name, info in Column.model_fields.items()},
+    "n": f"the number of {Design.model_fields['n'].description}, such as 1024",
 }
 # other words that users may write for a key
 KEY_SYNONYMS = {

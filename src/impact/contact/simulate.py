@@ -22,7 +22,7 @@ from .piecewise import in_parts
 from .powers import distinct_values
 from .scaling import LawValues, chi_of, exact_restitution, with_coefficients, with_units
 from .status import LIMIT, STATUS_OK, Status
-from .timestep import EXACT, MAX_CONTACTS, MAX_RESTITUTION, FixedStepResult, collide_at_fixed_step
+from .timestep import EXACT, MAX_CONTACTS, FixedStepResult, collide_at_fixed_step
 from .velocity_coordinates import VelocityCoordinate, is_strong
 
 # the status that belongs to each termination, by its number; no trajectory ends running
@@ -345,11 +345,8 @@ def _put_fixed_steps(
 ) -> None:
     """Write collisions at a fixed step to their positions; `is_limited` where the user limits the steps."""
     unfinished = np.where(is_limited, np.int8(Status.MAX_STEPS), np.int8(Status.NOT_SEPARATED))
-    status = np.where(fixed.status == Status.NOT_SEPARATED, unfinished, fixed.status)
-    is_unstable = (status == STATUS_OK) & (fixed.e_out > MAX_RESTITUTION)
-    result.status[where] = np.where(is_unstable, np.int8(Status.UNSTABLE), status)
-    result.e_out[where] = np.where(is_unstable, np.nan, fixed.e_out)
-    for name in ("peak", "permanent", "force", "approach_work", "restitution_work", "steps"):
+    result.status[where] = np.where(fixed.status == Status.NOT_SEPARATED, unfinished, fixed.status)
+    for name in ("e_out", "peak", "permanent", "force", "approach_work", "restitution_work", "steps"):
         getattr(result, name)[where] = getattr(fixed, name)
     result.contact_time[where] = fixed.steps * step
 

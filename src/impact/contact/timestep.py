@@ -333,17 +333,19 @@ def _run(contacts: _Contacts) -> FixedStepResult:
         has_ended = going & ((contacts.x <= contacts.residual) | ~is_finite)
         is_over = has_ended | (contacts.limit <= step)
         if is_over.any():
-            ended, ended_well = copy(contacts), is_finite[has_ended]
+            ended = copy(contacts)
             ended.keep(has_ended)
             rows = ended.rows
-            result.e_out[rows] = np.where(ended_well, -ended.u, np.nan)
+            status = np.where(-ended.u > MAX_RESTITUTION, Status.UNSTABLE, Status.OK)
+            status[~is_finite[has_ended]] = Status.NOT_FINITE
+            result.e_out[rows] = np.where(status == Status.OK, -ended.u, np.nan)
             result.peak[rows] = ended.peak
             result.permanent[rows] = ended.residual
             result.force[rows] = ended.largest_force
             result.approach_work[rows] = ended.approach_work
             result.restitution_work[rows] = ended.restitution_work()
             result.steps[rows] = step
-            result.status[rows] = np.where(ended_well, Status.OK, Status.NOT_FINITE)
+            result.status[rows] = status
             going &= ~is_over
             if not going.any():
                 break

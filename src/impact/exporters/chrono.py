@@ -48,9 +48,9 @@ def read_version(text: str) -> str:
     """
     match = re.fullmatch(r"v?(\d+\.\d+(\.\d+)?)", text)
     if match is None:
-        raise UsageError(f'--code-version: got "{safe_text(text)}", expected a release, such as 9.0.1')
+        raise UsageError(f'got "{safe_text(text)}", expected a release, such as 9.0.1')
     if version_numbers(match[1]) < OLDEST:
-        raise UsageError(f"--code-version: got {match[1]}, expected 6.0.0 or later: older releases were not read")
+        raise UsageError(f"got {match[1]}, expected 6.0.0 or later: older releases were not read")
     return match[1]
 
 

@@ -2,23 +2,35 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
+import os
+import re
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
+from typing import IO
 
 from ..contact.model import ForceModel
 from ..errors import UsageError
 from ..formatting import number
+from ..text import safe_text
 
 Parameters = Mapping[str, float | str]
+# releases as codes write them; the text becomes part of a comment in the lines and the script
+RELEASE = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+() -]{0,49}")
 # time that a program has to report its version
 VERSION_TIMEOUT_S = 60
+# a program that prints more than the first is stopped; of its output, the end is kept
+MAX_OUTPUT_BYTES, KEPT_OUTPUT_BYTES = 2**26, 2**20
+POLL_INTERVAL_S = 0.05
 
 
 @dataclass(frozen=True)
@@ -129,8 +141,10 @@ class Code:
         time step is not predicted
     uncertainty : largest difference of e between the code and the map of its scheme
     rough : the same by law, where the code itself finds the damping only roughly
-    entry : the entry of the catalogue that holds in a version, from the key of another one and the version
-    read_version : a version as the user writes it, in the form in which versions are compared
+    entry : the entry of the catalogue that holds in a version, from the key of another one and the version; raises
+        a UsageError where the version has none
+    read_version : a version as the user or the program writes it, in the form in which versions are compared;
+        raises a UsageError for any other text. Use `release`
     comment : what begins and ends a comment among the lines
     notes : remarks on a law: mixing of two materials, thresholds, clamps, versions
     warnings : what a user has to know before using the lines
@@ -138,7 +152,7 @@ class Code:
     suffix : of the file of a script
     program : what runs a script; "" without one
     install : how to get it
-    version_of : the version that a program runs; None if the program or the code is missing
+    version_of : the version that a program reports, as it writes it; None if the program or the code is missing
     command : the command that runs a script, from the program and the file
     """
 
@@ -165,6 +179,25 @@ class Code:
     version_of: Callable[[str], str | None] = lambda program: None
     command: Callable[[str, str], Sequence[str]] = lambda program, file: (program, file)
 
+    def release(self, text: str, origin: str) -> str:
+        """A version in the form in which versions are compared, and that is safe in a comment of any code.
+
+        Parameters
+        ----------
+        text : as the user or the program writes it
+        origin : what the message about a wrong text begins with
+
+        Raises
+        ------
+        UsageError : it is not a release
+        """
+        try:
+            if RELEASE.fullmatch(text) is None:
+                raise UsageError(f'got "{safe_text(text, 50)}", expected a release, such as {self.newest}')
+            return self.read_version(text)
+        except UsageError as error:
+            raise UsageError(f"{origin}: {error}") from None
+
     def uncertainty_of(self, key: str) -> float:
         """The largest difference of e that is no disagreement, of a law."""
         return self.rough.get(key, self.uncertainty)
@@ -190,26 +223,44 @@ def output_of(command: Sequence[str]) -> str | None:
     with tempfile.TemporaryDirectory(prefix="impact-version-") as folder:
         try:
             return run_program(command, folder, VERSION_TIMEOUT_S).stdout
-        except (OSError, subprocess.TimeoutExpired):
+        except (OSError, subprocess.SubprocessError):
             return None
 
 
 def run_program(command: Sequence[str], folder: str, timeout_s: float) -> subprocess.CompletedProcess[str]:
-    """Run a command in a folder, without input, and return what it prints.
+    """Run a command in a folder, without input, and return the end of what it prints.
+
+    Its output goes through files, whose size is watched, so that it takes no memory.
 
     Raises
     ------
-    OSError, subprocess.TimeoutExpired : it cannot be started, or takes longer
+    OSError, subprocess.SubprocessError : it cannot be started, takes longer, or prints more than MAX_OUTPUT_BYTES
     """
-    return subprocess.run(
-        command,
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=timeout_s,
-        stdin=subprocess.DEVNULL,
-    )
+    deadline = time.monotonic() + timeout_s
+    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
+        process = subprocess.Popen(
+            command, cwd=folder, stdin=subprocess.DEVNULL, stdout=out, stderr=err, start_new_session=True
+        )
+        try:
+            while process.poll() is None:
+                if time.monotonic() > deadline:
+                    raise subprocess.SubprocessError(f"stopped after {number(timeout_s)} s")
+                if any(os.fstat(file.fileno()).st_size > MAX_OUTPUT_BYTES for file in (out, err)):
+                    raise subprocess.SubprocessError(f"stopped after it printed {MAX_OUTPUT_BYTES >> 20} MiB")
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    process.wait(POLL_INTERVAL_S)
+        except BaseException:
+            # also what a wrapper has started
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+            raise
+        return subprocess.CompletedProcess(command, process.returncode, _end_of(out), _end_of(err))
+
+
+def _end_of(file: IO[bytes]) -> str:
+    """The last KEPT_OUTPUT_BYTES of a file."""
+    file.seek(max(0, os.fstat(file.fileno()).st_size - KEPT_OUTPUT_BYTES))
+    return file.read(KEPT_OUTPUT_BYTES).decode("utf-8", errors="replace")
 
 
 def python_package_version(package: str) -> Callable[[str], str | None]:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from .._version import __version__
+from ..contact.status import Status
 from ..errors import UsageError
 from ..formatting import decimals, number, quantity
 from ..inverse.timestep import TimestepRow, needed_steps, time_steps, timestep_rows
+from ..text import safe_text
 from .code import Collision, Parameters
 from .problem import ExportProblem
 from .verify import Verification, verify
@@ -19,6 +23,8 @@ STEPS_PER_CONTACT = 50.0
 ADVISED_TOL = 0.01
 # a continuous law that delivers another e than it is asked for, by more than this, is warned about
 ASKED_TOL = 0.005
+# the longest line of a comment
+MAX_COMMENT = 1000
 
 
 @dataclass(frozen=True)
@@ -32,7 +38,8 @@ class Export:
     scheme : name of the code's fixed-step scheme, see `impact.contact.timestep.SCHEMES`; None if unknown here
     e : the e that is asked for; NaN for a law without one
     e_continuous, contact_time : of the continuous law [-, s]
-    at_dt : what the code delivers at its time step; its restitutions are NaN without a scheme
+    at_dt : what the code delivers at its time step; its restitutions are NaN without a scheme, and where a
+        collision fails
     parameters : by the code's own names, in its units and conventions
     header : what a comment above the lines says
     lines : to paste
@@ -63,8 +70,18 @@ class Export:
         """The script, or the header as a comment and the lines."""
         if self.script is not None:
             return self.script
-        begin, end = self.comment
-        return "\n".join([*(f"{begin}{line}{end}" for line in self.header), *self.lines]) + "\n"
+        return "\n".join([*comment_lines(self.header, *self.comment), *self.lines]) + "\n"
+
+
+def comment_lines(lines: Iterable[str], begin: str = "# ", end: str = "") -> list[str]:
+    r"""Lines as comments of a code: no text in a line ends its comment.
+
+    >>> comment_lines(["a\nb"], "// "), comment_lines(["a --> b"], "<!-- ", " -->")
+    (['// a\\x0ab'], ['<!-- a - -> b -->'])
+    """
+    shown = (safe_text(line, MAX_COMMENT) for line in lines)
+    # XML has no "--" in a comment
+    return [f"{begin}{re.sub('-(?=-)', '- ', line) if end else line}{end}" for line in shown]
 
 
 def write_export(problem: ExportProblem, dt: float | None, program: str | None, *, with_script: bool) -> Export:
@@ -95,11 +112,12 @@ def write_export(problem: ExportProblem, dt: float | None, program: str | None, 
             f"{key} delivers {number(problem.e_continuous)} where e = {wanted} is asked for; impact solve "
             f"--model {key} --for e --target e_out={wanted} finds the e to ask for"
         )
+    if at_dt.failed:
+        warnings.append(f"dt = {quantity(dt, 's')}: {_failure(problem, at_dt)}")
     header = _header(problem, collision, at_dt)
     script = None
     if with_script and code.script is not None:
-        comment = "".join(f"# {line}\n" for line in header)
-        script = comment + code.script(collision, parameters)
+        script = "\n".join([*comment_lines(header), code.script(collision, parameters)])
     return Export(
         code=code.name,
         version=problem.version,
@@ -128,6 +146,12 @@ def _row(problem: ExportProblem, dt: float) -> TimestepRow:
     return row
 
 
+def _failure(problem: ExportProblem, row: TimestepRow) -> str:
+    """Why the code delivers no restitution at a time step, in words."""
+    status = row.status.replace("_", " ")
+    return f"{status} at {row.failed} of {problem.law.phases} phases, {Status[row.status.upper()].meaning}"
+
+
 def _header(problem: ExportProblem, collision: Collision, row: TimestepRow) -> list[str]:
     """What a comment above the lines says."""
     code, law = problem.code, problem.law
@@ -135,6 +159,10 @@ def _header(problem: ExportProblem, collision: Collision, row: TimestepRow) -> l
         f"{code.title}, {problem.version}; written by impact {__version__}",
         f"law: {problem.model.key}, {problem.model.equation}",
     ]
+    if problem.missing:
+        header.append(f"release {problem.version} lacks the default law of {code.newest}, {problem.missing}")
+    if problem.first:
+        header.append(f"first value of each axis of the source: {', '.join(problem.first)}")
     if problem.solved:
         name = problem.solved.rpartition(".")[2]
         header.append(f"{name} = {collision[name]!r} gives the e that is wanted")
@@ -147,10 +175,9 @@ def _header(problem: ExportProblem, collision: Collision, row: TimestepRow) -> l
     if code.scheme is None:
         header.append(f"{steps}: what the code's scheme delivers there is not predicted")
     else:
-        header.append(
-            f"{steps}: mean e {decimals(row.e_mean)}, {decimals(row.e_least)} to {decimals(row.e_largest)} by the "
-            f"phase in the step ({code.scheme})"
-        )
+        spread = f"{decimals(row.e_least)} to {decimals(row.e_largest)} by the phase in the step"
+        delivered = _failure(problem, row) if row.failed else f"mean e {decimals(row.e_mean)}, {spread}"
+        header.append(f"{steps}: {delivered} ({code.scheme})")
         if row.e_to_ask == row.e_to_ask:
             header.append(f"a mean of {number(problem.wanted)} at this dt: ask for e = {decimals(row.e_to_ask)}")
         # where the continuous law delivers another e, no step does what is advised

@@ -42,6 +42,12 @@ STRENGTH = {
 ROOT_SINCE = "20260729"
 # the first releases with coeff_restitution and with limit_damping, by month
 COEFF_RESTITUTION_SINCE, LIMIT_SINCE = "20240601", "20210408"
+# the forms of a date, and how `datetime` calls them
+DATES = (
+    (r"^(\d{4})(\d\d)(\d\d)$", "%Y %m %d"),
+    (r"(\d{1,2}) ?([A-Z][a-z]{2})[a-z]* ?(\d{4})", "%d %b %Y"),
+    (r"^(\d{4})[.-](\d{1,2})[.-](\d{1,2})", "%Y %m %d"),
+)
 TWO_BALLS = """\
 units           si
 atom_style      sphere
@@ -73,28 +79,37 @@ def read_version(text: str) -> str:
     >>> read_version("22 Jul 2025"), read_version("stable_29Aug2024_update1"), read_version("2025.7.22.4.0")
     ('20250722', '20240829', '20250722')
     """
-    if re.fullmatch(r"\d{8}", text):
-        return text
-    if match := re.search(r"(\d{1,2}) ?([A-Z][a-z]{2})[a-z]* ?(\d{4})", text):
-        return datetime.strptime(" ".join(match.groups()), "%d %b %Y").strftime("%Y%m%d")
-    if match := re.match(r"(\d{4})[.-](\d{1,2})[.-](\d{1,2})", text):
-        return "".join(part.zfill(2) for part in match.groups())
-    raise UsageError(f'--code-version: got "{safe_text(text)}", expected the date of a release, such as 22Jul2025')
+    for pattern, form in DATES:
+        if match := re.search(pattern, text):
+            try:
+                return datetime.strptime(" ".join(match.groups()), form).date().isoformat().replace("-", "")
+            except ValueError:
+                # a day that no month has, or a month that no year has
+                break
+    raise UsageError(f'got "{safe_text(text)}", expected the date of a release, such as 22Jul2025')
 
 
 def version_of(program: str) -> str | None:
     """The date of the release that a program is."""
     match = re.search(r"Simulator - (\d+ \w+ \d+)", output_of([program, "-help"]) or "")
-    return read_version(match[1]) if match else None
+    return match[1] if match else None
 
 
 def entry(key: str, version: str) -> str:
-    """The tsuji of a version: with the factor √2 or without it.
+    """The tsuji of a version, with the factor √2 or without it, and any other law that the version has.
 
     >>> entry("lammps-tsuji", "20250722"), entry("lammps-tsuji-without-root-limit", "20260901")
     ('lammps-tsuji-without-root', 'lammps-tsuji-limit')
+
+    Raises
+    ------
+    UsageError : an option of the law is of a later release
     """
-    if OPTIONS[key][1] != "tsuji":
+    _, damping, limit = OPTIONS[key]
+    for name, since in (("coeff_restitution", COEFF_RESTITUTION_SINCE), ("limit_damping", LIMIT_SINCE)):
+        if name in (damping, limit.strip()) and version < since:
+            raise UsageError(f"--code-version: LAMMPS {version} has no {name}, expected {since} or later")
+    if damping != "tsuji":
         return key
     stem = key.removesuffix("-limit").removesuffix("-without-root")
     return stem + ("" if version >= ROOT_SINCE else "-without-root") + ("-limit" if key.endswith("-limit") else "")
@@ -103,7 +118,6 @@ def entry(key: str, version: str) -> str:
 def parameters(collision: Collision) -> dict[str, float | str]:
     """The numbers of pair_coeff; of hertz, k_n is K/√R*."""
     spring, damping, _ = OPTIONS[collision.model.key]
-    check_version(collision)
     strength = STRENGTH[damping]
     last: dict[str, float | str] = {"e" if strength == "e" else "eta_n0": collision[strength]}
     if spring == "hertz" and collision.has_materials:
@@ -112,16 +126,6 @@ def parameters(collision: Collision) -> dict[str, float | str]:
         )
     k = collision["K"] if spring == "hooke" else collision["K"] / math.sqrt(collision.effective_radius)
     return {"k_n": k, **last}
-
-
-def check_version(collision: Collision) -> None:
-    """Refuse options that a release does not have."""
-    _, damping, limit = OPTIONS[collision.model.key]
-    for name, since in (("coeff_restitution", COEFF_RESTITUTION_SINCE), ("limit_damping", LIMIT_SINCE)):
-        if name in (damping, limit.strip()) and collision.version < since:
-            raise UsageError(
-                f"--code-version: LAMMPS {collision.version} has no {name}, expected {since} or later"
-            )
 
 
 def lines(collision: Collision, parameters: Parameters) -> list[str]:
@@ -180,9 +184,14 @@ def notes(collision: Collision) -> list[str]:
 
 def warnings(collision: Collision) -> list[str]:
     if OPTIONS[collision.model.key][1] == "tsuji" and collision.version < ROOT_SINCE:
+        other = (
+            "use --model lammps-coeff-restitution-hertz"
+            if collision.version >= COEFF_RESTITUTION_SINCE
+            else f"releases since {COEFF_RESTITUTION_SINCE} have coeff_restitution"
+        )
         return [
             f"damping tsuji of LAMMPS {collision.version} lacks the factor sqrt(2) of pull request 5113 (July "
-            "2026): where e = 0.5 is asked for, hertz delivers 0.616; use --model lammps-coeff-restitution-hertz"
+            f"2026): where e = 0.5 is asked for, hertz delivers 0.616; {other}"
         ]
     return []
 

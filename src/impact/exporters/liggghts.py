@@ -51,9 +51,9 @@ def version_of(program: str) -> str | None:
 
 def read_version(text: str) -> str:
     if not re.fullmatch(r"\d+\.\d+\.\d+", text):
-        raise UsageError(f'--code-version: got "{safe_text(text)}", expected a release such as 3.8.0')
+        raise UsageError(f'got "{safe_text(text)}", expected a release such as 3.8.0')
     if tuple(map(int, text.split("."))) < (3, 0, 0):
-        raise UsageError(f"--code-version: got {text}, expected 3.0.0 or later, whose laws were read")
+        raise UsageError(f"got {text}, expected 3.0.0 or later, whose laws were read")
     return text
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -38,6 +39,8 @@ class ExportProblem:
     e_continuous, peak : restitution [-] and peak indentation [m] of the continuous law
     config : the config of the impact
     solved : the parameter that was solved for, with the wanted e; "" for none
+    first : names of axes of the source that are at their first value
+    missing : the default law of the newest release, if none was asked for and this one has another; else ""
     """
 
     code: Code
@@ -47,6 +50,8 @@ class ExportProblem:
     peak: float
     config: Config
     solved: str
+    first: tuple[str, ...]
+    missing: str
 
     @property
     def model(self) -> ForceModel:
@@ -86,25 +91,25 @@ def input_values(impact: Impacts) -> dict[str, float]:
     return {name: float(impact.quantity(name)[0]) for name in names}
 
 
-def law_of_code(code: Code, model: str | None, version: str) -> str:
+def law_of_code(code: Code, model: str, version: str) -> str:
     """The key of a code's law for a key of the catalogue, in a version of the code.
 
     Parameters
     ----------
     code : the code
-    model : one of its laws, or a law of the catalogue that it has under a name of its own; None for its default
+    model : one of its laws, or a law of the catalogue that it has under a name of its own
     version : of the code
 
     Raises
     ------
-    UsageError : the code has no such law
+    UsageError : the code, or this version of it, has no such law
 
     >>> from impact.exporters.codes import find_code
     >>> law_of_code(find_code("lammps"), "tsuji-1992", "20250722")
     'lammps-coeff-restitution-hertz'
     """
     keys = list(code.laws)
-    key = keys[0] if model is None else model
+    key = model
     if key not in keys:
         wanted = find(key)
         same = [k for k in keys if (find(k).same_as or k) == (wanted.same_as or wanted.key)]
@@ -114,19 +119,27 @@ def law_of_code(code: Code, model: str | None, version: str) -> str:
     return code.entry(key, version)
 
 
-def _first_common(code: Code, models: Sequence[str]) -> str | None:
-    """The first of some models that a code has, or None if there are no models.
+def first_law(code: Code, models: Sequence[str], version: str) -> str:
+    """The law of a code for the first of some models that a version of it has.
 
     Raises
     ------
-    UsageError : the code has none of them
+    UsageError : the code, or this version of it, has none of them
+
+    >>> from impact.exporters.codes import find_code
+    >>> lammps = find_code("lammps")
+    >>> [first_law(lammps, tuple(lammps.laws), version) for version in ("20250722", "20210929")]
+    ['lammps-coeff-restitution-hertz', 'lammps-tsuji-without-root']
     """
     laws = {find(key).same_as or key for key in code.laws}
     common = [key for key in models if (find(key).same_as or key) in laws]
-    if models and not common:
+    if not common:
         shown = ", ".join(models[:3]) + (f" and {len(models) - 3} more" if len(models) > 3 else "")
         raise UsageError(f"{code.title} has none of the laws {safe_text(shown)}; --model names one of its own")
-    return next(iter(common), None)
+    for key in common:
+        with contextlib.suppress(UsageError):
+            return law_of_code(code, key, version)
+    return law_of_code(code, common[0], version)
 
 
 def prepare_export(
@@ -144,10 +157,15 @@ def prepare_export(
     UsageError : the code has no such law, or no damping gives the e
     ConfigError : an input is not allowed
     """
-    if model is None and source is not None:
-        model = _first_common(code, models_of_source(source, overrides, Plugins(()), at))
-    key = law_of_code(code, model, version)
-    law, plugins = find(key), Plugins(())
+    plugins, laws, missing = Plugins(()), tuple(code.laws), ""
+    if model is not None:
+        key = law_of_code(code, model, version)
+    elif models := models_of_source(source, overrides, plugins):
+        key = first_law(code, models, version)
+    else:
+        key, newest = (first_law(code, laws, release) for release in (version, code.newest))
+        missing = "" if key == newest else newest
+    law = find(key)
     at, solved = dict(at), ""
     if "e" in at and "e" not in law.quantities:
         if key not in code.damping:
@@ -156,15 +174,16 @@ def prepare_export(
         solved = f"{key}.{parameter}"
         if solved in at:
             raise UsageError(f"--at: got e and {solved}, expected one of the two")
-        wanted = at.pop("e")
         changes = [*placeholder_override(law, unknown_of(law, parameter)), *overrides]
         config, _ = single_point(source, changes, plugins, key, at)
-        result = solve_input(config, plugins, unknown_of(law, parameter), {"e_out": wanted})  # type: ignore[dict-item]
+        del at["e"]
+        wanted = float(config.scalars["e"])
+        result = solve_input(config, plugins, unknown_of(law, parameter), {"e_out": wanted})
         if not result.roots:
             least, most = map(number, result.attainable)
-            raise UsageError(f"--at e={wanted}: {key} delivers {least} to {most} at any {parameter}")
+            raise UsageError(f"--at e={number(wanted)}: {key} delivers {least} to {most} at any {parameter}")
         at[solved] = result.roots[0].value
-    config, _ = single_point(source, overrides, plugins, key, at)
+    config, first = single_point(source, overrides, plugins, key, at)
     fixed, collision = fixed_step_law(config, PHASES, code.scheme)
     return ExportProblem(
         code=code,
@@ -174,4 +193,6 @@ def prepare_export(
         peak=collision["peak_indentation"],
         config=config,
         solved=solved,
+        first=first,
+        missing=missing,
     )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import math
 import re
 import subprocess
 import tempfile
@@ -12,6 +14,7 @@ import numpy as np
 
 from ..array_types import Array
 from ..errors import UsageError
+from ..formatting import number, quantity
 from ..text import safe_text
 from .code import Code, run_program
 from .problem import ExportProblem
@@ -32,7 +35,7 @@ class Verification:
     program : that ran the scripts
     dt : time steps [s], one for each row
     phases : phases of a step, one for each row; NaN for an extrapolation to dt = 0 of the mean over the phases
-    measured, predicted : the restitution by the code and by this program
+    measured, predicted : the restitution by the code and by this program; one that is no number differs
     uncertainty : the largest difference that is no disagreement
     """
 
@@ -45,18 +48,37 @@ class Verification:
 
     @property
     def difference(self) -> float:
-        """The largest difference between measured and predicted."""
-        return max(abs(a - b) for a, b in zip(self.measured, self.predicted, strict=True))
+        """The largest difference between measured and predicted; NaN if one of them is no number."""
+        with np.errstate(invalid="ignore"):
+            return float(np.abs(np.subtract(self.measured, self.predicted)).max())
 
     @property
     def agrees(self) -> bool:
         return self.difference <= self.uncertainty
 
+    @property
+    def not_numbers(self) -> str:
+        """The first row whose measured or predicted restitution is no number, in words; "" for none."""
+        rows = zip(self.dt, self.phases, self.measured, self.predicted, strict=True)
+        for dt, phase, measured, predicted in rows:
+            if not (math.isfinite(measured) and math.isfinite(predicted)):
+                where = f"at the phase {number(phase)} of dt = {quantity(dt, 's')}"
+                return f"{where} e_out is {measured}, predicted {number(predicted)}"
+        return ""
+
 
 def installed_version(code: Code) -> str | None:
-    """The version of a code that is installed here."""
-    program = code.find_program(None)
-    return None if program is None else code.version_of(program)
+    """The version of a code that is installed here; None also for a program that reports no release."""
+    program = code.find_program(None) if code.program else None
+    with contextlib.suppress(UsageError):
+        return None if program is None else _version_of(code, program)
+    return None
+
+
+def _version_of(code: Code, program: str) -> str | None:
+    """The version that a program reports, in the form in which versions are compared."""
+    text = code.version_of(program)
+    return None if text is None else code.release(text, f"version of {safe_text(program)}")
 
 
 def choose_version(
@@ -75,18 +97,18 @@ def choose_version(
     UsageError : scripts are to be run, and the code is not installed or has another version
     """
     if version is not None:
-        version = code.read_version(version)
+        version = code.release(version, "--code-version")
         if not verify:
             return None, version
     if not code.program and (verify or program is not None):
         raise UsageError(f"--verify: no script for {code.title}: {code.tested}")
     found = code.find_program(program) if code.program else None
-    installed = None if found is None else code.version_of(found)
+    installed = None if found is None else _version_of(code, found)
     if installed is None and (verify or program is not None):
         name = "" if program is None else f'"{safe_text(program)}": '
         raise UsageError(f"{name}no {code.title} there; {code.install}, or --program FILE")
     if verify and version is not None and version != installed:
-        raise UsageError(f"--code-version: got {safe_text(version)}, but {installed} is what --verify runs")
+        raise UsageError(f"--code-version: got {version}, but {installed} is what --verify runs")
     return found, version or installed or code.newest
 
 
@@ -102,17 +124,25 @@ def run_script(code: Code, program: str, script: str) -> float:
         Path(folder, file).write_text(script, encoding="utf-8")
         try:
             done = run_program(code.command(program, file), folder, TIMEOUT_S)
-        except (OSError, subprocess.TimeoutExpired) as error:
-            raise UsageError(f"--verify: {safe_text(str(error), 300)}") from None
-    last = (done.stdout.strip().splitlines() or [""])[-1]
-    match = re.fullmatch(r"e_out = (\S+)", last)
-    if done.returncode or match is None:
+        except (OSError, subprocess.SubprocessError) as error:
+            raise UsageError(f"--verify: {code.title}: {safe_text(str(error), 300)}") from None
+    e_out = _restitution((done.stdout.strip().splitlines() or [""])[-1])
+    if done.returncode or e_out is None:
         lines = (done.stderr.strip() or done.stdout.strip() or "no output").splitlines()
         error_lines = [line for line in lines if "error" in line.lower()] or lines[-1:]
         raise UsageError(
             f"--verify: {code.title} ended with exit code {done.returncode}: {safe_text(error_lines[0], 300)}"
         )
-    return float(match[1])
+    return e_out
+
+
+def _restitution(line: str) -> float | None:
+    """The restitution that a line says, also nan or inf; None if it says none."""
+    match = re.fullmatch(r"e_out = (\S+)", line)
+    try:
+        return float(match[1]) if match else None
+    except ValueError:
+        return None
 
 
 def verify(problem: ExportProblem, program: str, dt: float) -> Verification:
@@ -120,7 +150,8 @@ def verify(problem: ExportProblem, program: str, dt: float) -> Verification:
 
     Without a scheme, they are run at dt, dt/2 and dt/4, the mean over the phases is extrapolated to a step of
     zero, and compared with the continuous law. The uncertainty is then the difference of the extrapolations from
-    dt and dt/2, and from dt/2 and dt/4, and half the spread over the phases at dt/4.
+    dt and dt/2, and from dt/2 and dt/4, and half the spread over the phases at dt/4. Where a script measures no
+    number, nothing is extrapolated.
 
     Raises
     ------
@@ -132,7 +163,7 @@ def verify(problem: ExportProblem, program: str, dt: float) -> Verification:
     measured = np.array(
         [[_measure(problem, program, dt, phase) for phase in phases.tolist()] for dt in steps.tolist()]
     )
-    if code.scheme is None:
+    if code.scheme is None and np.isfinite(measured).all():
         value, uncertainty = extrapolate(measured)
         return Verification(
             program=program,
@@ -142,11 +173,15 @@ def verify(problem: ExportProblem, program: str, dt: float) -> Verification:
             predicted=(problem.e_continuous,),
             uncertainty=max(uncertainty, FLOOR, code.uncertainty_of(problem.model.key)),
         )
-    predicted = problem.law.with_phases(PHASES).restitution(steps)
+    predicted = (
+        np.full(measured.shape, problem.e_continuous)
+        if code.scheme is None
+        else problem.law.with_phases(PHASES).restitution(steps)
+    )
     return Verification(
         program=program,
-        dt=(dt,) * PHASES,
-        phases=tuple(phases.tolist()),
+        dt=tuple(np.repeat(steps, PHASES).tolist()),
+        phases=tuple(np.tile(phases, steps.size).tolist()),
         measured=tuple(measured.ravel().tolist()),
         predicted=tuple(predicted.ravel().tolist()),
         uncertainty=code.uncertainty_of(problem.model.key),

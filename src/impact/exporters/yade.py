@@ -48,9 +48,7 @@ def version_of(program: str) -> str | None:
 
 def read_version(text: str) -> str:
     if not re.fullmatch(r"\d{4}\.\d{2}[a-z]?", text):
-        raise UsageError(
-            f'--code-version: got "{safe_text(text)}", expected a release such as 2023.02a, or its year and month'
-        )
+        raise UsageError(f'got "{safe_text(text)}", expected a release such as 2023.02a, or its year and month')
     return text
 
 
@@ -85,6 +83,9 @@ def parameters(collision: Collision) -> dict[str, float | str]:
 
 def linear_damping(e: float) -> float:
     """The damping ratio of a linear spring and dashpot that ends at zero indentation, see `yade-betan`."""
+    if e == 0.0:
+        # the limit
+        return 1.0
     logarithm = math.log(e)
     return -logarithm / math.hypot(math.pi, logarithm)
 

@@ -40,6 +40,10 @@ SCAN_RTOL, SCAN_MAX_STEPS = 1e-7, 400
 SCAN_TOLERANCE = 1e-3
 # a value of the scan is a root within this multiple of the tolerance of the integration
 TARGET_TOLERANCE = 10.0
+# a smaller difference of neighbours of the scan is no extremum
+SCAN_NOISE = 1e-6
+# an extremum is refined until the output differs by less, relative to itself; absolute for a restitution
+EXTREMUM_TOLERANCE = 1e-10
 # a refined root is a jump of the output if it is farther from the target
 REFINED_TOLERANCE = 1e-7
 
@@ -67,7 +71,8 @@ class SolveResult:
     status : "ok" for one root, "several_roots", "at_bound" where the only root is the least or largest allowed
         value, "no_root"
     roots : in ascending order; over a range of inputs, the best value
-    attainable : the least and the largest value of the target over all values that were tried, to six digits
+    attainable : the least and the largest value of the target over the scan and its refined extrema, or over a
+        range of inputs at the best value, to six digits
     over : the conditions of a range of inputs, each with its e_out and the target variable; None without a range
     """
 
@@ -133,9 +138,9 @@ def check_target(target: Mapping[str, float]) -> tuple[str, float]:
 def solve_input(config: Config, plugins: Plugins, unknown: Parameter, target: Mapping[str, float]) -> SolveResult:
     """Find the values of an input of a law that give a target.
 
-    Without an axis in the config: all roots, by a scan over the allowed values and Chandrupatla's method between
-    neighbours on different sides of the target. With an axis: the value for which the largest distance
-    from the target over that axis is least.
+    Without an axis in the config: all roots, by a scan over the allowed values, whose interior extrema are
+    refined, and Chandrupatla's method between neighbours on different sides of the target. With an axis: the value
+    for which the largest distance from the target over that axis is least.
 
     Parameters
     ----------
@@ -261,25 +266,38 @@ def _all_roots(problem: _Problem, wanted: float) -> SolveResult:
     values = problem.target_values(scan, is_scan=True)
     if np.isnan(values).all():
         problem.raise_failure(scan)
+    # a value at which the integration fails, often for want of steps, hides no root between its neighbours
+    scan, values = scan[~np.isnan(values)], values[~np.isnan(values)]
     scale = 1.0 if problem.variable.startswith("e_") else abs(wanted)
-    near = np.abs(values - wanted) <= SCAN_TOLERANCE * scale
-    if near.any():
-        values[near] = problem.target_values(scan[near])
-    distance = values - wanted
     tolerance = TARGET_TOLERANCE * problem.config.solver.rtol * scale
+    is_exact = np.abs(values - wanted) <= SCAN_TOLERANCE * scale
+    is_exact[[values.argmin(), values.argmax()]] = True
+    exact = problem.target_values(scan[is_exact])
+    values[is_exact] = np.where(np.isnan(exact), values[is_exact], exact)
+    scan, values = _with_extrema(problem, scan, values, np.abs(values - wanted) <= tolerance)
+    distance = values - wanted
     reached = np.abs(distance) <= tolerance
     bounds = {problem.unknown.least, problem.unknown.most}
-    roots = _ends_of_runs(reached, scan, bounds)
-    between = (distance[:-1] * distance[1:] < 0.0) & ~reached[:-1] & ~reached[1:]
-    if between.any():
+    roots, ends = _runs(reached, scan, bounds)
+    between = np.flatnonzero((distance[:-1] * distance[1:] < 0.0) & ~reached[:-1] & ~reached[1:])
+    left = np.concatenate([between, np.array(ends, np.intp)])
+    if left.size:
+        is_end = np.arange(left.size) >= between.size
+
+        def function(x: Array, is_end: Mask) -> Array:
+            of_x = problem.target_values(x) - wanted
+            return np.where(is_end, np.abs(of_x) - tolerance, of_x)
+
         refined = elementwise.find_root(
-            lambda x: problem.target_values(x) - wanted,
-            (scan[:-1][between], scan[1:][between]),
+            function,
+            (scan[left], scan[left + 1]),
+            args=(is_end,),
             tolerances={"xatol": 0.0, "xrtol": 4.0 * np.finfo(float).eps, "fatol": 0.0, "frtol": 0.0},
         )
-        # where the output jumps across the target there is no root
+        # where the output jumps across the target there is no root; an end of an interval may be a jump
         is_root = np.abs(refined.f_x) <= max(tolerance, REFINED_TOLERANCE * scale)
-        roots += refined.x[is_root].tolist()
+        inside = np.where(refined.f_bracket[0] <= 0.0, *refined.bracket)
+        roots += refined.x[is_root & ~is_end].tolist() + inside[is_end].tolist()
     roots.sort()
     e_out = problem.evaluate(np.array(roots))["e_out"].values.tolist() if roots else []
     status: SolveStatus = "no_root" if not roots else "several_roots" if len(roots) > 1 else "ok"
@@ -288,19 +306,59 @@ def _all_roots(problem: _Problem, wanted: float) -> SolveResult:
     return _result(problem, wanted, status, map(Root, roots, e_out), values)
 
 
+def _with_extrema(problem: _Problem, scan: Array, values: Array, reached: Mask) -> tuple[Array, Array]:
+    """The scan and its values with each interior extremum refined, except those that reach the target."""
+    is_restitution = problem.variable.startswith("e_")
+    size = np.ones_like(values) if is_restitution else np.abs(values)
+    minima, maxima = _minima(values, size), _minima(-values, size)
+    at, sign = np.append(minima, maxima), np.repeat([1.0, -1.0], [minima.size, maxima.size])
+    at, sign = at[~reached[at]], sign[~reached[at]]
+    if not at.size:
+        return scan, values
+    refined = elementwise.find_minimum(
+        lambda x, *signs: signs[0] * problem.target_values(x),
+        (scan[at - 1], scan[at], scan[at + 1]),
+        args=(sign,),
+        tolerances={"fatol": EXTREMUM_TOLERANCE * is_restitution, "frtol": EXTREMUM_TOLERANCE},
+    )
+    is_found = np.isfinite(refined.f_x)
+    scan, first = np.unique(np.concatenate([refined.x[is_found], scan]), return_index=True)
+    return scan, np.concatenate([(sign * refined.f_x)[is_found], values])[first]
+
+
+def _minima(values: Array, size: Array) -> NDArray[np.intp]:
+    """The positions of the interior minima of a scan; differences that are small beside `size` are noise."""
+    rises = np.stack([values[:-2], values[2:]]) - values[1:-1]
+    return 1 + np.flatnonzero((rises.min(axis=0) >= 0.0) & (rises.max(axis=0) > SCAN_NOISE * size[1:-1]))
+
+
 def _extremes(values: Array) -> tuple[float, float]:
     """The least and the largest value that are not NaN, to the digits of the scan."""
     return float(f"{np.nanmin(values):.6g}"), float(f"{np.nanmax(values):.6g}")
 
 
-def _ends_of_runs(reached: Mask, scan: Array, bounds: set[float]) -> list[float]:
-    """The ends of each run of neighbouring values that reach the target; of a run at a bound, the bound alone."""
+def _runs(reached: Mask, scan: Array, bounds: set[float]) -> tuple[list[float], list[int]]:
+    """The runs of neighbouring values that reach the target.
+
+    Returns
+    -------
+    roots : single values; of a run at a bound the bound alone; the end of a run that is the end of the scan
+    ends : for each other end of a run, the position of the left one of the two values that it is between
+    """
     edges = np.flatnonzero(np.diff(np.concatenate([[False], reached, [False]]))).reshape(-1, 2)
     roots: list[float] = []
+    ends: list[int] = []
     for first, after in edges.tolist():
-        ends = {float(scan[first]), float(scan[after - 1])}
-        roots += sorted(ends & bounds)[:1] or sorted(ends)
-    return roots
+        at_bound = sorted({float(scan[first]), float(scan[after - 1])} & bounds)
+        if at_bound or after - first == 1:
+            roots.append(at_bound[0] if at_bound else float(scan[first]))
+            continue
+        for end, left in ((first, first - 1), (after - 1, after - 1)):
+            if 0 <= left < scan.size - 1:
+                ends.append(left)
+            else:
+                roots.append(float(scan[end]))
+    return roots, ends
 
 
 def _best_over_axis(problem: _Problem, wanted: float) -> SolveResult:
@@ -317,19 +375,22 @@ def _best_over_axis(problem: _Problem, wanted: float) -> SolveResult:
 
     scan = problem.scan_values()
     distances = largest_distance(scan, is_scan=True)
-    best = int(np.argmin(distances))
-    if not np.isfinite(distances[best]):
+    is_finite = np.isfinite(distances)
+    if not is_finite.any():
         problem.raise_failure(np.repeat(scan, axis.size), np.tile(conditions, scan.size))
-    value = float(scan[best])
-    neighbours = float(scan[max(best - 1, 0)]), float(scan[min(best + 1, scan.size - 1)])
-    refined = minimize_scalar(
-        lambda x: float(largest_distance(np.array([x]))[0]),
-        bounds=neighbours,
-        method="bounded",
-        options={"xatol": 1e-12 * max(map(abs, neighbours))},
-    )
-    if refined.fun < distances[best]:
-        value = float(refined.x)
+    scan, distances = scan[is_finite], distances[is_finite]
+    candidates = []
+    # the least distance is at an end of the scan, or in one of its basins
+    for at in {int(distances.argmin()), *_minima(distances, distances).tolist()}:
+        neighbours = float(scan[max(at - 1, 0)]), float(scan[min(at + 1, scan.size - 1)])
+        refined = minimize_scalar(
+            lambda x: float(largest_distance(np.array([x]))[0]),
+            bounds=neighbours,
+            method="bounded",
+            options={"xatol": 1e-12 * max(map(abs, neighbours))},
+        )
+        candidates += [(float(distances[at]), float(scan[at])), (float(refined.fun), float(refined.x))]
+    value = min(candidates)[1]
     outputs = problem.evaluate(np.full(axis.size, value), conditions)
     inputs = {name: column for name, column in axis.columns.items() if not isinstance(column[0], str)}
     over = tuple(

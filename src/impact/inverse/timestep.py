@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import elementwise
 
 from ..array_types import Array
@@ -15,11 +16,12 @@ from ..contact.impacts import Impacts
 from ..contact.model import ForceModel
 from ..contact.outputs import collide
 from ..contact.scaling import dimensionless_values
-from ..contact.status import Status
+from ..contact.status import FIRST_FAILURE, Status
 from ..contact.timestep import (
     KICK_DRIFT,
     MAX_CONTACTS,
     MAX_STEPS_PER_CONTACT,
+    FixedStepResult,
     check_scheme,
     collide_at_fixed_step,
     default_scheme,
@@ -48,6 +50,9 @@ class TimestepRow:
     e_mean, e_least, e_largest : restitution over the phases; NaN if a collision fails
     e_to_ask : the e to ask for at this dt, so that the mean is the e wanted; NaN for a law without an e, or if
         there is none
+    status : "ok", or what most of the collisions that fail have in common, such as "unstable": a name of
+        `impact.contact.status.Status`, as the point of a sweep has it
+    failed : number of phases at which the collision fails
     """
 
     dt: float
@@ -56,6 +61,8 @@ class TimestepRow:
     e_least: float
     e_largest: float
     e_to_ask: float
+    status: str = Status.OK.name.lower()
+    failed: int = 0
 
 
 @dataclass(frozen=True)
@@ -123,7 +130,11 @@ class FixedStepLaw:
         return replace(self, phases=phases)
 
     def restitution(self, dt: Array, e: Array | None = None) -> Array:
-        """The delivered restitution at steps dt [s], shape (k,), over all phases, shape (k, phases).
+        """The delivered restitution at steps dt [s] over all phases, shape (k, phases); see `collide`."""
+        return self.collide(dt, e).e_out.reshape(dt.size, self.phases)
+
+    def collide(self, dt: Array, e: Array | None = None) -> FixedStepResult:
+        """The collisions at steps dt [s], each over all phases, shape (k phases,).
 
         Parameters
         ----------
@@ -140,16 +151,17 @@ class FixedStepLaw:
             values["e"] = np.repeat(e, self.phases)
         step = np.repeat(dt / self.impact.time[0], self.phases)
         max_steps = math.ceil(MAX_CONTACTS * max(self.contact_time / float(dt.min()), 1.0))
-        result = collide_at_fixed_step(
+        return collide_at_fixed_step(
             self.model, float(self.impact.n[0]), values, step, np.tile(phase, dt.size), max_steps, self.scheme
         )
-        return result.e_out.reshape(dt.size, self.phases)
 
 
 def timestep_rows(law: FixedStepLaw, dt: Sequence[float]) -> tuple[TimestepRow, ...]:
     """What a law delivers at steps dt [s], and the e to ask for."""
     steps = np.array(dt)
-    delivered = law.restitution(steps)
+    result = law.collide(steps)
+    delivered = result.e_out.reshape(steps.size, law.phases)
+    statuses = result.status.reshape(steps.size, law.phases)
     to_ask = e_to_ask(law, steps)
     return tuple(
         TimestepRow(
@@ -159,9 +171,17 @@ def timestep_rows(law: FixedStepLaw, dt: Sequence[float]) -> tuple[TimestepRow, 
             e_least=float(e.min()),
             e_largest=float(e.max()),
             e_to_ask=float(to_ask[row]),
+            status=_shared_status(statuses[row]).name.lower(),
+            failed=int(np.count_nonzero(statuses[row] >= FIRST_FAILURE)),
         )
         for row, e in enumerate(delivered)
     )
+
+
+def _shared_status(statuses: NDArray[np.int8]) -> Status:
+    """The most frequent status of the collisions that fail; OK if none fails."""
+    failures = statuses[statuses >= FIRST_FAILURE]
+    return Status(int(np.bincount(failures).argmax())) if failures.size else Status.OK
 
 
 def e_to_ask(law: FixedStepLaw, dt: Array) -> Array:

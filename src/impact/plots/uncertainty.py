@@ -253,7 +253,8 @@ def draw_bars(plot_data: BarData, all_axes: Sequence[Axes], labels: Mapping[str,
     for axes, panel in zip(all_axes, plot_data.panels, strict=True):
         for offset, (index, name) in zip((0.5, -0.5), BARS.items(), strict=True):
             values = np.asarray(panel.values[index])
-            ends = np.abs(np.array([panel.lower[index], panel.upper[index]]) - values)
+            # an estimate may be outside of its interval, which ends at 0 or 1
+            ends = np.maximum([values - panel.lower[index], panel.upper[index] - values], 0.0)
             bars = axes.barh(
                 positions + offset * BAR_HEIGHT,
                 values,

@@ -13,16 +13,16 @@ from pathlib import Path
 import xarray as xr
 
 from .._version import __version__
-from ..config.files import override_text
+from ..config.files import apply_overrides, override_text, parse_document, read_text
 from ..config.grid import Axis, path_of
 from ..config.load import Config, parse_config, read_config
-from ..config.tables import MATERIAL_QUANTITIES, SWEEP_QUANTITIES, model_quantities
+from ..config.tables import MATERIAL_QUANTITIES, SWEEP_QUANTITIES, expand_models, model_quantities
 from ..contact.force_expressions import returning, stiffer
 from ..contact.history import History, follow
 from ..contact.impacts import Impacts
 from ..contact.materials import Material
 from ..contact.model import ForceModel
-from ..contact.models import find
+from ..contact.models import catalogue, find
 from ..contact.outputs import collide
 from ..contact.status import Status
 from ..contact.timestep import EXACT
@@ -398,16 +398,28 @@ def single_point(
     return replace(config, axes=kept, scalars=scalars, models=config.models[:1]), tuple(first)
 
 
-def models_of_source(
-    source: ConfigSource, overrides: Sequence[str], plugins: Plugins, at: Mapping[str, float | str]
-) -> tuple[str, ...]:
-    """The keys of the models that a source of `single_point` selects; none where its config cannot be read."""
+def models_of_source(source: ConfigSource, overrides: Sequence[str], plugins: Plugins) -> tuple[str, ...]:
+    """The keys of the models that a source of `single_point` selects; none where it selects no models.
+
+    Its other values may not be valid yet: a parameter may be missing that is given or solved for later.
+
+    Raises
+    ------
+    ConfigError : it cannot be read, or selects what is no model
+    """
     read, _ = _config_reader(source, overrides, plugins)
-    try:
-        config = read([override_text(path_of(name), value) for name, value in at.items()])
-    except ConfigError:
+    if isinstance(source, str | Path) and not is_result(Path(source)):
+        data = parse_document(read_text(Path(source)), str(source))
+    elif source is None or (isinstance(source, Mapping) and not isinstance(source, xr.Dataset)):
+        # the models of the starter config are no selection
+        data = dict(source or {})
+    else:
+        return tuple(model.key for model in read(()).models)
+    selection = apply_overrides(data, overrides)[0].get("models")
+    if selection is None:
         return ()
-    return tuple(model.key for model in config.models)
+    models, problems = expand_models(selection, catalogue(plugins.models))
+    return tuple(model.key for model in (read(()).models if problems else models))
 
 
 def _config_reader(

@@ -1,25 +1,30 @@
-"""Sobol indices of a function from its values at the rows of two sample matrices, with bootstrap intervals."""
+"""Sobol indices of a function from its values at the rows of two sample matrices, with bootstrap intervals.
+
+The estimators are those of Saltelli and others (2010), Computer Physics Communications 181, 259-270, which
+`scipy.stats.sobol_indices` has too. Both are functions of means over the rows, so that a resample of the bootstrap
+is a product of a matrix of counts with the columns that are averaged.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.stats import bootstrap, sobol_indices
 
 from ..array_types import Array
 
-# resamples of the bootstrap, and its level
-RESAMPLES, CONFIDENCE = 200, 0.95
+# resamples of the bootstrap, and its level; with 200 the ends are so uncertain that fewer intervals hold the index
+RESAMPLES, CONFIDENCE = 1000, 0.95
+# numbers in a block of resamples
+MAX_BLOCK = 2**22
 
 
 @dataclass(frozen=True)
 class Indices:
     """First-order and total indices of several outputs, each of shape (outputs, inputs).
 
-    The ends of their intervals of 95 % are NaN where no bootstrap was asked for.
+    The ends of their intervals of 95 % are from 0 to 1, as the indices are, while an estimate may lie outside.
+    They are NaN where no bootstrap was asked for.
     """
 
     first: Array
@@ -46,11 +51,11 @@ def mixed_rows(a: Array, b: Array) -> Array:
 
 
 def indices_of(values: Array, seed: int | None = None) -> Indices:
-    """Sobol indices by the estimators of Saltelli and others (2010), as scipy.stats has them.
+    """Sobol indices, with intervals by the percentiles of a bootstrap over the rows.
 
     Parameters
     ----------
-    values : at the rows of `mixed_rows`, shape (outputs, inputs + 2, n), where n is a power of two
+    values : at the rows of `mixed_rows`, shape (outputs, inputs + 2, n)
     seed : of the bootstrap; None for no intervals
 
     >>> a, b = np.random.default_rng(1).random((2, 4096, 2))
@@ -59,31 +64,41 @@ def indices_of(values: Array, seed: int | None = None) -> Indices:
     array([[0.5, 0.5]])
     """
     outputs, blocks, n = values.shape
-
-    def estimate(rows: NDArray[np.integer[Any]]) -> Array:
-        """First-order and total indices from some of the n rows, shape (2, outputs, inputs)."""
-        chosen = values[..., rows]
-        of_blocks: dict[Literal["f_A", "f_B", "f_AB"], Array] = {
-            "f_A": chosen[:, 0],
-            "f_B": chosen[:, 1],
-            "f_AB": chosen[:, 2:].transpose(1, 0, 2),
-        }
-        result = sobol_indices(func=of_blocks, n=n)
-        pair = np.stack([result.first_order, result.total_order])
-        return np.asarray(pair.reshape(2, outputs, blocks - 2))
-
-    first, total = estimate(np.arange(n))
-    lower = upper = np.full((2, *first.shape), np.nan)
+    inputs = blocks - 2
+    estimates = np.empty((outputs, 2 * inputs))
+    resampled = np.empty((outputs, 0 if seed is None else RESAMPLES, 2 * inputs))
+    for output in range(outputs):
+        estimates[output] = _indices_from_means(_columns(values[output]).mean(axis=1))
+    # not the random numbers of the samples, which have the same seed
+    random = np.random.default_rng(None if seed is None else [seed, 1])
+    step = max(MAX_BLOCK // n, 1)
+    for start in range(0, resampled.shape[1], step):
+        drawn = [random.integers(0, n, n) for _ in range(start, min(start + step, RESAMPLES))]
+        counts = np.stack([np.bincount(rows, minlength=n) for rows in drawn]) / n
+        for output in range(outputs):
+            means = counts @ _columns(values[output]).T
+            resampled[output, start : start + step] = _indices_from_means(means)
+    lower = upper = np.full_like(estimates, np.nan)
     if seed is not None:
-        random = np.random.default_rng(seed)
-        interval = bootstrap(
-            (np.arange(n),),
-            estimate,
-            method="percentile",
-            n_resamples=RESAMPLES,
-            confidence_level=CONFIDENCE,
-            rng=random,
-            batch=1,
-        ).confidence_interval
-        lower, upper = (np.asarray(end).reshape(lower.shape) for end in (interval.low, interval.high))
-    return Indices(first, total, lower[0], upper[0], lower[1], upper[1])
+        ends = 0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE
+        lower, upper = np.clip(np.quantile(resampled, ends, axis=1), 0.0, 1.0)
+    pairs = (np.split(array, 2, axis=1) for array in (estimates, lower, upper))
+    (first, total), (first_lower, total_lower), (first_upper, total_upper) = pairs
+    return Indices(first, total, first_lower, first_upper, total_lower, total_upper)
+
+
+def _columns(values: Array) -> Array:
+    """The columns whose means give the indices of one output, shape (3 inputs + 2, n)."""
+    a, b, *_ = mixed = values - values[:2].mean()
+    change = mixed[2:] - a
+    return np.concatenate([b * change, change, 0.5 * change**2, [0.5 * (a * a + b * b), 0.5 * (a + b)]])
+
+
+def _indices_from_means(means: Array) -> Array:
+    """First-order and total indices, shape (..., 2 inputs); zero where the output does not vary."""
+    *_, square, mean = np.moveaxis(means, -1, 0)
+    first, change, total = np.split(means[..., :-2], 3, axis=-1)
+    explained = np.concatenate([first - mean[..., None] * change, total], axis=-1)
+    variance = (square - mean * mean)[..., None]
+    indices: Array = np.divide(explained, variance, out=np.zeros_like(explained), where=variance > 0.0)
+    return indices

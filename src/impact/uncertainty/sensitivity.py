@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -33,13 +33,13 @@ def check_output_name(of: str) -> None:
         raise UsageError(f'--of: no output "{safe_text(of)}"; {did_you_mean(of, outputs)}')
 
 
-def sensitivity_plan(plan: Plan, of: str, max_points: int, name: str) -> Plan:
-    """The plan of all points that the indices of an output need: n (inputs + 2) for each n of the design.
+def sensitivity_plan(plan: Plan, of: Sequence[str], max_points: int, name: str) -> Plan:
+    """The plan of all points that the indices of outputs need: n (inputs + 2) for each n of the design.
 
     Parameters
     ----------
     plan : of a config with a design
-    of : the output
+    of : the outputs
     max_points : the largest number of points
     name : of the config, for messages
 
@@ -54,7 +54,10 @@ def sensitivity_plan(plan: Plan, of: str, max_points: int, name: str) -> Plan:
         raise ConfigError(
             [f"{name}: got no uncertain input, expected a design and distributions, such as {example}"]
         )
-    if problem := power_of_two_problem(config.design.n, "for Sobol indices"):
+    problem = power_of_two_problem(config.design.n, "for Sobol indices")
+    if config.design.n == 1:
+        problem = "got 1, expected a power of two from 2 on for Sobol indices: 2 or 4"
+    if problem:
         raise ConfigError([f"{name}: design.n: {problem}"])
     names = list(config.distributions)
     models = {model.key: model for model in config.models}
@@ -67,7 +70,7 @@ def sensitivity_plan(plan: Plan, of: str, max_points: int, name: str) -> Plan:
     rows = mixed_rows(*(np.column_stack([drawn[key] for key in names]) for drawn, _ in parts))
     columns = dict(zip(names, (tuple(column) for column in rows.T.tolist()), strict=True))
     axes = tuple(replace(axis, columns=columns) if axis.name == SAMPLE else axis for axis in config.axes)
-    output = replace(config.output, variables=(of,), dtype="float64", chunks={})
+    output = replace(config.output, variables=tuple(of), dtype="float64", chunks={})
     whole = replace(plan, config=replace(config, axes=axes, output=output))
     if whole.points > max_points:
         got = f"{whole.points:,} points, {len(names) + 2} for each sample"
@@ -76,22 +79,23 @@ def sensitivity_plan(plan: Plan, of: str, max_points: int, name: str) -> Plan:
     return whole
 
 
-def sensitivity_of(plan: Plan, of: str, execute: Callable[[Plan], xr.Dataset]) -> xr.Dataset:
+def sensitivity_of(plan: Plan, of: str, swept: xr.Dataset) -> xr.Dataset:
     """The sensitivity of an output, as a dataset; see `impact.sensitivity`.
 
     Parameters
     ----------
     plan : as `sensitivity_plan` returns it
-    of : the output
-    execute : runs the plan
+    of : one of its outputs
+    swept : the result of the plan
     """
+    plan = replace(plan, config=replace(plan.config, output=replace(plan.config.output, variables=(of,))))
     config = plan.config
     assert config.design is not None
     inputs, n = list(config.distributions), config.design.n
-    swept = execute(plan)[of].transpose("model", ..., SAMPLE)
-    others = [str(dim) for dim in swept.dims if dim not in ("model", SAMPLE)]
-    shape = [swept.sizes["model"], *(swept.sizes[dim] for dim in others)]
-    values = np.asarray(swept.values, float).reshape(-1, len(inputs) + 2, n)
+    outputs = swept[of].transpose("model", ..., SAMPLE)
+    others = [str(dim) for dim in outputs.dims if dim not in ("model", SAMPLE)]
+    shape = [outputs.sizes["model"], *(outputs.sizes[dim] for dim in others)]
+    values = np.asarray(outputs.values, float).reshape(-1, len(inputs) + 2, n)
     result = sensitivity_template(plan, of, others)
     found = _statistics(values, config)
     return result.assign(
@@ -109,7 +113,8 @@ def sensitivity_of(plan: Plan, of: str, execute: Callable[[Plan], xr.Dataset]) -
 def _statistics(values: Array, config: Config) -> dict[str, Array]:
     """Mean, standard deviation, quantiles and indices of outputs, from values of shape (outputs, inputs + 2, n).
 
-    They are NaN for an output with a failed sample; the indices are NaN for one that is constant.
+    They are NaN for an output with a failed sample; the indices are NaN for one that is constant, and zero for an
+    input that changes it by no more than errors of the integration.
     """
     assert config.design is not None
     outputs, blocks, n = values.shape
@@ -117,7 +122,10 @@ def _statistics(values: Array, config: Config) -> dict[str, Array]:
     independent = values[:, :2].reshape(outputs, -1)
     mean, deviation = independent.mean(axis=1), independent.std(axis=1, ddof=1)
     largest = np.abs(independent).max(axis=1)
-    varies = deviation > CONSTANT_FACTOR * config.solver.rtol * largest
+    resolution = CONSTANT_FACTOR * config.solver.rtol * largest
+    varies = deviation > resolution
+    changes = np.abs(values[:, 2:] - values[:, :1]).max(axis=2) > resolution[:, None]
+    values = np.concatenate([values[:, :2], np.where(changes[..., None], values[:, 2:], values[:, :1])], axis=1)
     found = {
         "failed": failed,
         "mean": mean,
