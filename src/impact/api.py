@@ -785,10 +785,8 @@ def export(
     from .exporters.problem import prepare_export
     from .exporters.verify import choose_version
 
-    if output is not None:
-        check_output(
-            Path(output), overwrite=overwrite, source=Path(source) if isinstance(source, str | Path) else None
-        )
+    # before a program is run
+    check_outputs([output], [source], overwrite=overwrite)
     code = find_code(to)
     found, version = choose_version(code, program, code_version, verify=verify)
     problem = prepare_export(code, model, version, source, at or {}, overrides)
