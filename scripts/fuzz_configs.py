@@ -33,7 +33,7 @@ from types import FrameType
 import impact
 from impact.api import prepare
 from impact.config.load import read_config
-from impact.errors import ConfigError
+from impact.errors import ConfigError, Interruption
 
 ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT))
@@ -119,7 +119,7 @@ class Outcomes:
         print(f"config {self.failures[-1]}", file=sys.stderr, flush=True)
 
 
-class TooSlowError(BaseException):
+class TooSlowError(Interruption):
     """The limit of CPU time is exceeded."""
 
 
