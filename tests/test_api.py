@@ -248,13 +248,14 @@ class _Panic(BaseException):
     """As extensions written in Rust raise it."""
 
 
-def test_an_exception_of_any_class_is_an_error_of_the_model() -> None:
+@pytest.mark.parametrize("error", [_Panic, GeneratorExit, SystemExit])
+def test_an_exception_of_any_class_is_an_error_of_the_model(error: type[BaseException]) -> None:
     def panics(elastic: Any) -> Any:
-        raise _Panic("called `Option::unwrap()` on a `None` value")
+        raise error("called `Option::unwrap()` on a `None` value")
 
     texts = {"key": "panics", "title": "", "year": 1, "equation": "", "reference": ""}
     law = impact.ForceModel(**texts, force=panics)  # type: ignore[arg-type]
-    with pytest.warns(UserWarning, match="model panics: _Panic: called"):
+    with pytest.warns(UserWarning, match=f"model panics: {error.__name__}: called"):
         status = impact.sweep({"models": ["panics", "hertz"], "sweep": SWEEP, "solver": COARSE}, plugins=[law])[
             "status"
         ].values

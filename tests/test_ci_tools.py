@@ -64,7 +64,7 @@ options = ["-q", "-p", "no:cacheprovider", "-W", "error"]
 select = "(test_config or test_mapping) and not overrides"
 blessed = pytest.main([*options, "-k", select, "--impact-bless", "a reason"])
 print("SECOND RUN", flush=True)
-os.unlink("tests/baselines/test_contact-test_mapping_exact-hysteresis.h5")
+os.unlink("tests/baselines/test_contact-test_mapping_exact-hysteresis-36eb58d3.h5")
 checked = pytest.main([*options, "-k", "not of_a_result and not tolerance"])
 raise SystemExit(10 * blessed + checked)
 """
@@ -116,7 +116,10 @@ def test_the_fixture_compares_with_baselines_and_writes_them(project: Path, entr
     assert done.returncode == 1, done.stdout
     written, _, checked = done.stdout.partition("SECOND RUN\n")
     baseline = project / "baselines" / "contact.h5"
-    names = ["test_contact-test_mapping_exact-hysteresis.h5", "test_contact-test_mapping_hertz.h5"]
+    names = [
+        "test_contact-test_mapping_exact-hysteresis-36eb58d3.h5",
+        "test_contact-test_mapping_hertz-41773356.h5",
+    ]
     paths = [baseline, *(project / "tests" / "baselines" / name for name in names)]
     assert re.findall(r"^written: (.*)$", written, re.MULTILINE) == [str(paths[i]) for i in (0, 2, 1)]
     assert b"a reason" in baseline.read_bytes()
@@ -137,6 +140,77 @@ def test_the_fixture_compares_with_baselines_and_writes_them(project: Path, entr
         assert text in checked, checked
     # the failures are short: no line of the package itself
     assert "src/impact" not in checked
+
+
+SAME_NAMES = """
+import pytest
+
+def check(impact_regression, e):
+    sweep = {"e": [e], "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6e9}
+    impact_regression({"models": ["tsuji-1992"], "sweep": sweep, "solver": {"rtol": 1e-4}})
+
+def test_x(impact_regression):
+    check(impact_regression, 0.2)
+
+class TestA:
+    def test_x(self, impact_regression):
+        check(impact_regression, 0.3)
+
+    def test_own(self, impact_regression):
+        check(impact_regression, 0.5)
+
+NAMES = ["a/b", "a_b", "A_B"]
+
+@pytest.mark.parametrize("name", NAMES)
+def test_p(impact_regression, name):
+    check(impact_regression, 0.6 + 0.1 * NAMES.index(name))
+
+def test_LONG(impact_regression):
+    check(impact_regression, 0.9)
+""".replace("LONG", 240 * "q")
+OLD_AND_NEW_NAMES = """
+import os
+import pytest
+options = ["-q", "-p", "no:cacheprovider", "-W", "error", "tests/test_same.py"]
+codes = [pytest.main([*options, "--impact-bless", "a reason"])]
+os.chdir("tests/baselines")
+names = sorted(os.listdir())
+for name in names:
+    if "TestA-test_own" in name:
+        os.rename(name, "test_same-test_own.h5")
+    elif "TestA-test_x" in name:
+        os.unlink(name)
+    elif "test_p_a_b" in name:
+        os.rename(name, "test_same-test_p_a_b.h5")
+os.chdir("../..")
+print("WITH OLD NAMES", flush=True)
+codes.append(pytest.main([*options, "-k", "not qqq"]))
+options[-1] += "::TestA::test_own"
+codes.append(pytest.main(options))
+print(names, list(map(int, codes)))
+"""
+
+
+def test_every_test_has_a_baseline_of_its_own(project: Path, entry_points: Path) -> None:
+    (project / "tests" / "test_same.py").write_text(SAME_NAMES, encoding="utf-8")
+    python_path = os.pathsep.join([str(ROOT / "src"), str(entry_points)])
+    done = run([sys.executable, "-c", OLD_AND_NEW_NAMES], project, PYTHONPATH=python_path, COLUMNS="200")
+    assert not done.returncode, done.stdout + done.stderr
+    names, codes = re.findall(r"(\[[^\]]*\])", done.stdout.splitlines()[-1])
+    assert codes == "[0, 1, 1]", done.stdout
+    # also where upper and lower case are the same
+    assert len({name.lower() for name in names.split(", ")}) == 7
+    assert "'test_same-test_x.h5'" in names
+    old_names = done.stdout.partition("WITH OLD NAMES\n")[2]
+    folder = project / "tests" / "baselines"
+    # only one test can have the first; the others may be those of several tests
+    assert re.search(
+        rf"old name, to be renamed: mv {folder}/test_same-test_own.h5 {folder}/\S*-TestA-\S*h5", old_names
+    )
+    assert old_names.count("old name, to be renamed") == 1
+    assert re.search(r"^3 failed, 3 passed", old_names, re.MULTILINE)
+    for name in ("test_x", "test_p_a_b", "test_own"):
+        assert f"/test_same-{name}.h5 may be that of another test" in old_names
 
 
 @pytest.mark.slow
@@ -229,6 +303,25 @@ def test_the_action_installs_and_compares(tmp_path: Path) -> None:
     assert failed.returncode == 1
     start = "::error file=baseline.h5,title=impact compare::not equal: physics config (K)"
     assert failed.stdout.startswith(start)
+
+
+def test_the_action_executes_no_module_of_the_checkout(tmp_path: Path) -> None:
+    (tmp_path / "contact.toml").write_text(CONTACT, encoding="utf-8")
+    imported = tmp_path / "imported"
+    for name in ("pip", "impact", "typer", "numpy"):
+        (tmp_path / f"{name}.py").write_text(f"open({str(imported)!r}, 'w')\n", encoding="utf-8")
+    run([sys.executable, "-m", "pip"], tmp_path)
+    assert imported.exists()
+    imported.unlink()
+    # pip finds no package and fails; the other steps do not need it
+    inputs = {"config": "contact.toml", "baseline": "impact-new.h5", "plot": "", "version": "0"}
+    (name, script, variables), *others = action_steps(inputs)
+    assert name == "Install impact"
+    assert run(["bash", "-c", script], tmp_path, PYTHONPATH="", PIP_NO_INDEX="1", **variables).returncode == 1
+    for _, script, variables in others:
+        done = run(["bash", "-c", script], tmp_path, GITHUB_STEP_SUMMARY="", **variables)
+        assert done.returncode == 0, done.stderr
+    assert not imported.exists()
 
 
 @pytest.mark.slow

@@ -781,8 +781,8 @@ def test_a_tolerance_in_percent(cli: Run, stored: Path) -> None:
             "c.toml: is a config, not a result; sweep it first: impact sweep c.toml -o RESULT.h5",
         ),
         (
-            ("recommend", "c.txt"),
-            "c.txt: is a config, not a result; sweep it first: impact sweep c.txt -o RESULT.h5",
+            ("recommend", "c.toml"),
+            "c.toml: is a config, not a result; sweep it first: impact sweep c.toml -o RESULT.h5",
         ),
         (
             ("plot", "data.csv"),
@@ -801,8 +801,7 @@ def test_a_tolerance_in_percent(cli: Run, stored: Path) -> None:
 def test_a_file_of_another_kind_is_named(
     cli: Run, small: Path, stored: Path, tmp_path: Path, words: tuple[str, ...], line: str
 ) -> None:
-    for name in ("c.toml", "c.txt"):
-        shutil.copy(small, tmp_path / name)
+    shutil.copy(small, tmp_path / "c.toml")
     shutil.copy(stored, tmp_path / "small.h5")
     (tmp_path / "data.csv").write_text("v1,e\n1,0.5\n", encoding="utf-8")
     result = cli(*words, cwd=tmp_path)
@@ -828,3 +827,46 @@ def test_a_value_that_is_not_in_a_result_is_reported_with_the_nearest(
         refused = cli(*words, "--sel", f"v1={value}", cwd=tmp_path)
         message = f"no v1 = {float(value)} in this result; the nearest are {nearest}\n"
         assert (refused.returncode, refused.stdout, refused.stderr) == (2, "", message)
+
+
+READ_FILES = {
+    "v1.csv": "v1 [m/s]\n1.0\n1.2\n",
+    "drops.csv": "v1 [m/s],e_out,sigma\n1,0.5,0.01\n2,0.5,0.01\n",
+    "law.py": "from impact import hysteresis\n"
+    "MINE = hysteresis('mine', title='', year=1, equation='', reference='', chi=lambda e: 1 - e)\n",
+    "c.toml": 'models = "mujoco-solref"\n[sweep]\nv1 = { file = "v1.csv", column = "v1" }\n'
+    "m1 = 1\nm2 = 1\nn = 1\n",
+    "u.toml": 'models = "hertz"\n[design]\nn = 8\n[sweep]\nv1 = { empirical = "v1.csv" }\n'
+    "m1 = { uniform = [1, 2] }\nm2 = 1\nK = 1e6\n",
+    "f.toml": 'models = "anagnostopoulos-1988"\n[data]\nfile = "drops.csv"\n[sweep]\n'
+    "m1 = 1\nm2 = 1\nK = 1e6\nn = 1\ne = { fit = [0.1, 1] }\n",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("words", "outputs"),
+    [
+        ("sweep c.toml --plugin law.py -o", "c.toml v1.csv law.py"),
+        ("sensitivity u.toml --plugin law.py -o", "u.toml v1.csv law.py"),
+        ("calibrate f.toml --plugin law.py -o", "f.toml drops.csv law.py"),
+        ("calibrate f.toml --plugin law.py --best", "f.toml drops.csv law.py"),
+        ("export c.toml --to mujoco -o", "c.toml v1.csv"),
+    ],
+)
+def test_no_command_replaces_a_file_that_it_reads(
+    forked: ForkServer, tmp_path: Path, words: str, outputs: str
+) -> None:
+    for name, content in READ_FILES.items():
+        (tmp_path / name).write_text(content, encoding="utf-8")
+    for name in outputs.split():
+        done = forked(*words.split(), name, "--overwrite", cwd=tmp_path)
+        assert (done.returncode, done.stderr) == (2, f"{name}: is the file to be read, and is not modified\n")
+    assert {path.name: path.read_text(encoding="utf-8") for path in tmp_path.iterdir()} == READ_FILES
+
+
+def test_two_outputs_cannot_be_one_file(forked: ForkServer, tmp_path: Path) -> None:
+    for name, content in READ_FILES.items():
+        (tmp_path / name).write_text(content, encoding="utf-8")
+    done = forked("calibrate", "f.toml", "-o", "x", "--best", "x", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (2, "x: is named for two outputs\n")
+    assert not (tmp_path / "x").exists()

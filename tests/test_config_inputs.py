@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,9 @@ import impact
 from impact.config.load import Config, parse_config, read_config
 from impact.contact.materials import Material
 from impact.errors import ConfigError
+from impact.plots.data import read_points
+
+from .fork_server import ForkServer
 
 TEXT = """\
 models = ["hertz", "kelvin-voigt"]
@@ -163,6 +167,19 @@ BAD_CSV = [
     ("v1,m1" + C + "1,1\n1,1,1,1\n",
      ["cases.csv:2: got 2 values, expected 3, one for each column",
       "cases.csv:3: got 4 values, expected 3, one for each column"]),
+    ("v1,m1" + C + "1,1\n1,2\n1,3\n1\n",
+     ["cases.csv:2: got 2 values, expected 3, one for each column; also on 2 other lines",
+      "cases.csv:5: got 1 values, expected 3, one for each column"]),
+    ("Probe;v1 [cm/s];e\n" + "1;2,5;0,8\n" * 36,
+     ['cases.csv:1: got columns separated by ";", expected ",", and a point in numbers, such as 0.5']),
+    ("v1\te\n1\t2\n",
+     [r'cases.csv:1: got columns separated by "\x09", expected ",", and a point in numbers, such as 0.5']),
+    ("# drop tests\nv1,m1\n1,1\n", ["cases.csv:1: got a comment, expected the names of the columns"]),
+    ("v1,m1\n1,1\n# end\n", ["cases.csv:3: got a comment, expected 2 values, one for each column"]),
+    ("v1 (cm/s),m1 (furlog),m3 (kg)\n1,1,1\n",
+     ['cases.csv:1: v1 (cm/s): got round brackets, expected "v1 [cm/s]"',
+      'cases.csv:1: m1 (furlog): got round brackets, expected "m1 [kg]"']),
+    ("", ["cases.csv: empty, expected a CSV file"]),
     ("v1,m1" + C, ["cases.csv: got 1 lines, expected a line of names and at least one of values"]),
     ('v1,m1\n"1,2\n', ["cases.csv:2: not CSV: unexpected end of data"]),
     (b"v1\n\xff\n", ["cases.csv:2: not UTF-8: byte 0xff"]),
@@ -175,6 +192,54 @@ def test_a_wrong_table_of_cases_is_an_error_with_line_and_column(
     tmp_path: Path, csv: str | bytes, lines: list[str]
 ) -> None:
     assert refused(tmp_path, csv) == lines
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "TOKEN=SECRET1\nKEY=SECRET2\n",
+        "SECRET1,SECRET1\n1,SECRET2\n",
+        "SECRET1\nSECRET2,2\n",
+        "SECRET1\n5 SECRET2\n",
+    ],
+)
+def test_no_message_contains_a_file_without_a_known_column(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("env").write_text(content, encoding="utf-8")
+    guessed = {"file": "env", "column": content.splitlines()[0]}
+    balls = {"v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 1e9}
+    tables: list[dict[str, object]] = [
+        {"sweep": {"cases": "env"}},
+        {"sweep": {**balls, "v1": {"file": "env", "column": "SECRET"}}},
+        {"sweep": {**balls, "v1": guessed}},
+        {"sweep": {"v1": 1.0, "m1": 1.0, "m2": 1.0, "material1": guessed, "material2": "steel"}},
+        {"sweep": {**balls, "v1": {"empirical": "env"}}, "design": {"n": 8}},
+        {"sweep": {**balls, "K": {"fit": [1e5, 1e7]}}, "data": {"file": "env"}},
+    ]
+    for table in tables:
+        with pytest.raises(ConfigError) as error:
+            read_config({"models": "hertz", **table}, purpose="calibrate" if "data" in table else "sweep")
+        lines = [line for line in error.value.problems if line.startswith("env")]
+        assert lines
+        # the config contains the guessed name itself
+        assert not re.search("SECRET[12]", "".join(lines).replace(f'got "{guessed["column"]}"', ""))
+    with pytest.raises(ConfigError, match=r"^env:") as error:
+        read_points("env")
+    assert "SECRET" not in str(error.value)
+
+
+@pytest.mark.skipif(not Path("/proc/kmsg").exists(), reason="needs Linux")
+def test_a_file_of_the_system_that_never_ends_is_not_read(forked: ForkServer, tmp_path: Path) -> None:
+    (tmp_path / "x.toml").write_text(CASES.replace("cases.csv", "/proc/kmsg"), encoding="utf-8")
+    for name, kind in (("/proc/kmsg", "TOML"), ("x.toml", "CSV")):
+        done = forked("sweep", "--dry-run", name, cwd=tmp_path, limit=20)
+        assert (done.returncode, done.stderr) == (2, f"/proc/kmsg: empty, expected a {kind} file\n")
+    done = forked("info", "/proc/kmsg", limit=20)
+    assert done.returncode == 2
+    assert done.stderr.startswith("/proc/kmsg: is empty")
+    assert forked("run", "/proc/kmsg", limit=20).returncode == 2
 
 
 @pytest.mark.parametrize(
@@ -235,3 +300,17 @@ def test_every_built_in_material_has_a_source_and_can_be_used() -> None:
     for name, record in impact.materials().items():
         assert record["source"]
         assert read_config({"models": "hertz", "sweep": {"v1": 1, "R1": 1, "m2": 1, "material": name}}).models
+
+
+def test_the_message_about_a_column_with_round_brackets_shows_square_ones(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("drops.csv").write_text("Geschwindigkeit (cm/s)\n1\n", encoding="utf-8")
+    column = {"file": "drops.csv", "column": "Geschwindigkeit"}
+    with pytest.raises(ConfigError) as error:
+        read_config({"models": "hertz", "sweep": {"v1": column, "m1": 1.0, "m2": 1.0, "K": 1e9}})
+    assert error.value.problems[-1] == (
+        'drops.csv:1: got "Geschwindigkeit", expected one of its columns; a unit is in square brackets: '
+        '"Geschwindigkeit [UNIT]"'
+    )

@@ -82,8 +82,19 @@ def test_a_stored_config_needs_no_file(folder: Path) -> None:
         ("v1 [m/s], e_out\n1, nan\n", "drops.csv:2: e_out: got nan, expected a number from -0.5 to 1.5"),
         ("v1 [m/s], e_out\n1,\n", "drops.csv:2: e_out:"),
         ("v1 [m/s], eout\n1, 0.5\n", 'drops.csv:1: eout: no such input or output; did you mean "e_out"?'),
-        ("v1 [m/s], e_out, sigma\n1, 0.5, 0\n", "drops.csv:2: sigma: got 0.0, expected a number > 0"),
+        (
+            "v1 [m/s], e_out, sigma\n1, 0.5, 0\n",
+            "drops.csv:2: sigma: got 0.0, expected a number from 1e-30 to 1e+100",
+        ),
+        (
+            "v1 [m/s], e_out, sigma\n1, 0.5, 1e-160\n",
+            "drops.csv:2: sigma: got 1e-160, expected a number from 1e-30 to 1e+100",
+        ),
         ("v1 [m/s], m1 [kg], e_out\n1, 1, 0.5\n", "drops.csv:1: m1: set together with sweep.m1"),
+        (
+            "v1 [m/s], peak_force [N]\n1, 1e308\n",
+            'drops.csv:2: peak_force: got "1e308 N", expected a number > 0 and <= 1e+100',
+        ),
         ("v1 [m/s]\n1\n", "no column of an output"),
         (
             "e_out, sigma, specimen\n0.5, 0.1, a\n0.4, 0.1,\n",
@@ -108,9 +119,19 @@ def test_a_wrong_table_is_refused_with_its_line(folder: Path, cli: Run, csv: str
         ("[0.05, 1]", "[1, 0.05]", "sweep.e.fit"),
         ("[0.05, 1]", "[0.05, 1.5]", "sweep.e.fit"),
         ("[0.05, 1]", "[0.05]", "sweep.e.fit"),
+        (
+            '"1 us", "1 ms"',
+            '"1e-200 s", "1e200 s"',
+            "A.fit: got 1e-200 to 1e+200, expected bounds that are closer",
+        ),
         ('"1 us"', '"1 kg"', "model.kuwabara-kono-1987.A.fit"),
         ('m1 = "2.7 g"', "m1 = [1.0, 2.0]", "sweep.m1: got an axis"),
         ('file = "drops.csv"', 'file = "drops.csv"\nnoise = "white"', "data.noise"),
+        (
+            'file = "drops.csv"',
+            'file = "drops.csv"\nsigma = 1e-320',
+            "data.sigma: got 1e-320, expected a number from 1e-30 to 1e+100",
+        ),
         ('file = "drops.csv"', 'noise = "scale"', "data: got neither file nor columns"),
         ('file = "drops.csv"', 'file = "drops.csv"\nloss = "square"', "data.loss"),
         ('file = "drops.csv"', 'file = "drops.csv"\nloss = "huber"\nnoise = "scale"', "data.loss"),

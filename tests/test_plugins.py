@@ -177,6 +177,7 @@ BAD = {
              'bad.py: model mine-2026: year: got "x", expected a year, such as 2026'),
     "exit": ("import sys\nsys.exit(0)\n", "bad.py:2: SystemExit: 0; expected a file that only declares"),
     "quit": ("raise SystemExit\n", "bad.py:1: SystemExit; expected"),
+    "generator": ("raise GeneratorExit()\n", "bad.py:1: GeneratorExit"),
     "controls": ("raise ValueError('\\x1b[31m\\u202e\\n[red]')\n",
                  r"bad.py:1: ValueError: \x1b[31m\u202e\x0a[red]"),
 }  # fmt: skip

@@ -37,7 +37,7 @@ from .engine.progress import Progress, ProgressCallback
 from .engine.trajectories import check_count
 from .errors import ImpactError as ImpactError
 from .errors import UnfinishedError, UsageError, did_you_mean
-from .results.backend import check_output, open_result, write_file
+from .results.backend import check_outputs, open_result, write_file
 from .results.backend import load as load
 from .results.backend import save as save
 from .results.extend import extend as extend_result
@@ -259,9 +259,7 @@ def sweep_to_file(
         if should_stop():
             raise UnfinishedError(f"{shown} already contains this sweep")
         return replace(outcome, is_new=False)
-    for path in (source, *plugins):
-        if isinstance(path, str | Path):
-            check_output(output, overwrite=overwrite, source=Path(path))
+    check_outputs([output], [source, *plugins, *plan.config.files], overwrite=overwrite)
     with backend or nullcontext(SERIAL) as integrator:
         outcome = sweep_into(
             output,
@@ -372,6 +370,7 @@ def merge(
     ...     impact.merge([shard.folder for shard in shards], output).summary.points
     303
     """
+    check_outputs([output], plugins, overwrite=overwrite)
     outcome, repeated = merge_shards(
         [Path(folder) for folder in folders],
         Path(output),
@@ -628,9 +627,7 @@ def calibrate(
     plugin_set = read_plugins(plugins)
     read = Path(source) if isinstance(source, str) else source
     config = read_config(read, overrides, plugin_set.models, purpose="calibrate")
-    for path in (output, best):
-        if path is not None:
-            check_output(Path(path), overwrite=overwrite)
+    check_outputs([output, best], [source, *plugins, *config.files], overwrite=overwrite)
     of_config = plugin_set.of(config.models)
     calibration = calibrate_config(config, of_config, jobs)
     result = calibration_dataset(calibration, of_config)
@@ -721,8 +718,7 @@ def sensitivities(
         raise UsageError(f"--output: got {len(of)} outputs (--of), expected one for a file")
     name = safe_text(str(source)) if isinstance(source, str | Path) else "config"
     plan = sensitivity_plan(prepare(source, overrides, plugins, max_points), of, max_points, name)
-    if output is not None:
-        check_output(Path(output), overwrite=overwrite)
+    check_outputs([output], [source, *plugins, *plan.config.files], overwrite=overwrite)
     swept = execute(plan)
     results = [sensitivity_of(plan, of_study, swept) for of_study in of]
     if output is not None:
@@ -789,13 +785,12 @@ def export(
     from .exporters.problem import prepare_export
     from .exporters.verify import choose_version
 
-    if output is not None:
-        check_output(
-            Path(output), overwrite=overwrite, source=Path(source) if isinstance(source, str | Path) else None
-        )
+    # before a program is run
+    check_outputs([output], [source], overwrite=overwrite)
     code = find_code(to)
     found, version = choose_version(code, program, code_version, verify=verify)
     problem = prepare_export(code, model, version, source, at or {}, overrides)
+    check_outputs([output], [source, *problem.config.files], overwrite=overwrite)
     result = write_export(problem, dt, found if verify else None, with_script=script)
     if output is not None:
         write_file(Path(output), result.text.encode(), overwrite=overwrite)
@@ -914,6 +909,7 @@ def extend_to_file(
     3
     """
     target = Path(result if output is None else output)
+    check_outputs([target], plugins, overwrite=True)
     with backend or nullcontext(SERIAL) as integrator:
         outcome = extend_result(
             Path(result),
@@ -971,7 +967,7 @@ def expand(
     3
     """
     output, shown = Path(output), safe_text(str(result))
-    check_output(output, overwrite=overwrite, source=Path(result))
+    check_outputs([output], [result], overwrite=overwrite)
     opened = open_result(result)
     require_sweep(opened, "expand")
     dataset = select(opened, sel or {})
@@ -1347,9 +1343,7 @@ def plot_to_files(
     # the default depends on the result, which is read after the paths are checked
     pictures = {kind: path_of(kind, output) for kind in kinds or [""]}
     tables = {kind: path_of(kind, data) for kind in pictures} if data is not None else {}
-    for path in (*pictures.values(), *tables.values()):
-        for source in (result, *([Path(points)] if points else [])):
-            check_output(path, overwrite=overwrite, source=source)
+    check_outputs([*pictures.values(), *tables.values()], [result, points], overwrite=overwrite)
     measured = None if points is None else read_points(points)
     dataset = load(result)
     if not kinds:
@@ -1474,9 +1468,7 @@ def report(
         output = Path(output)
         if output.suffix.lower() not in (".html", ".htm"):
             raise UsageError(f"{safe_text(str(output))}: expected a name that ends in .html")
-        for path in (dataset, *plugins):
-            if isinstance(path, str | Path):
-                check_output(output, overwrite=overwrite, source=Path(path))
+        check_outputs([output], [dataset, *plugins], overwrite=overwrite)
     result = load(dataset) if isinstance(dataset, str | Path) else dataset
     text = page(result, lambda kind, choice: get_plot_data(result, kind, choice, plugins))
     if output is not None:

@@ -69,8 +69,9 @@ class Interruption(BaseException):
     """A signal ends the program at once; the message contains the finished work that is kept."""
 
 
-# exceptions that a plug-in does not cause, even if they are raised while it runs
-NOT_OF_A_PLUGIN = (KeyboardInterrupt, GeneratorExit, MemoryError, Interruption)
+# exceptions that a plug-in does not cause, even if they are raised while it runs; Python raises KeyboardInterrupt
+# for Ctrl-C inside the function that is running, so that one raised by a plug-in cannot be distinguished from it
+NOT_OF_A_PLUGIN = (KeyboardInterrupt, MemoryError, Interruption)
 
 
 def did_you_mean(word: str, choices: Sequence[str]) -> str:

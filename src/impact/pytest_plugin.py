@@ -6,6 +6,7 @@ package when a test uses the fixture, so that other test runs do not wait for it
 
 from __future__ import annotations
 
+import hashlib
 import os
 import re
 import shlex
@@ -23,8 +24,10 @@ if TYPE_CHECKING:
     from .comparison.verdict import Verdict
     from .contact.model import ForceModel
 
-# the property of a test that brings its written baselines to the summary, also from workers of pytest-xdist
-WRITTEN = "impact baseline"
+# the properties of a test that bring its baselines to the summary, also from workers of pytest-xdist
+WRITTEN, OLD_NAME = "impact baseline", "impact baseline with an old name"
+COLLECTED = pytest.StashKey[list[pytest.Item]]()
+MAX_NAME_LENGTH = 150  # of a default baseline without .h5; file systems allow 255 bytes
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -44,20 +47,26 @@ def pytest_configure(config: pytest.Config) -> None:
         raise pytest.UsageError(f'--impact-bless: got "{reason}", expected the reason for the change')
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Keep all tests, also those that -k deselects: they may have a baseline of the same old name."""
+    config.stash[COLLECTED] = list(items)
+
+
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Print which baselines were written."""
-    written = [
-        value
+    """Print which baselines were written, and how to rename those with an old name."""
+    lines = [
+        f"written: {value}" if name == WRITTEN else f"old name, to be renamed: {value}"
         for reports in terminalreporter.stats.values()
         for report in reports
         if getattr(report, "when", "") == "call"
         for name, value in report.user_properties
-        if name == WRITTEN
+        if name in (WRITTEN, OLD_NAME)
     ]
-    if written:
+    if lines:
         terminalreporter.section("baselines of impact")
-        for path in dict.fromkeys(written):
-            terminalreporter.line(f"written: {path}")
+        for line in dict.fromkeys(lines):
+            terminalreporter.line(line)
 
 
 @pytest.fixture
@@ -99,7 +108,7 @@ class ImpactRegression:
         ----------
         source : a config, as a mapping or the path of a TOML file, which is swept; or a result, as a dataset or
             the path of its file
-        baseline : the file of the baseline; by default baselines/FILE-TEST.h5, from the names of the test
+        baseline : the file of the baseline; by default baselines/FILE-TEST.h5, see `baseline_name`
         tol, subset : see `impact.compare`
         overrides, plugins : of the sweep, see `impact.sweep`
         allow_failed : write a baseline even if some of its points failed
@@ -132,13 +141,19 @@ class ImpactRegression:
         """The verdict, and why the test fails, or an empty text."""
         import impact
 
-        path = self._path(baseline) if baseline is not None else self._default_baseline()
+        path = self._path(baseline if baseline is not None else f"baselines/{baseline_name(self.request.node)}")
         reason = self.request.config.getoption("--impact-bless")
         new = self._result_file(source, overrides, plugins)
         if reason is not None:
             return self._bless(new, path, reason, tol=tol, subset=subset, allow_failed=allow_failed), ""
-        if reason is None and not path.exists():
-            return None, f"{path}: no baseline\n{self._hint('first baseline')}"
+        if not path.exists():
+            old = self._path(f"baselines/{_old_name(self.request.node)}")
+            if baseline is not None or not old.exists() or self._is_shared(old):
+                shared = f"; {old} may be that of another test" if baseline is None and old.exists() else ""
+                return None, f"{path}: no baseline{shared}\n{self._hint('first baseline')}"
+            command = shlex.join(["mv", str(old), str(path)])
+            self.request.node.user_properties.append((OLD_NAME, command))
+            path = old
         verdict = impact.compare(new, path, tol=tol, subset=subset)
         if verdict.equal:
             return verdict, ""
@@ -192,12 +207,36 @@ class ImpactRegression:
         """A path relative to the folder of the test file, whatever the working directory is."""
         return Path(os.path.normpath(self.request.path.parent / path))
 
-    def _default_baseline(self) -> Path:
-        """The path of the baseline that belongs to the name of the test."""
-        name = f"{self.request.path.stem}-{self.request.node.name}"
-        return self._path("baselines") / (re.sub(r"[^\w.=+-]+", "_", name).strip("_") + ".h5")
+    def _is_shared(self, old: Path) -> bool:
+        """Whether another test may have a baseline of this old name."""
+        if any("::" in word for word in self.request.config.args):
+            # not all tests of the file were collected
+            return True
+        items = self.request.config.stash.get(COLLECTED, [])
+        return sum(item.path == self.request.path and _old_name(item) == old.name for item in items) != 1
 
     def _hint(self, reason: str) -> str:
         """How to accept the new result."""
         test = shlex.quote(self.request.node.nodeid)
         return f'to accept the new result: pytest {test} --impact-bless "{reason}"'
+
+
+def baseline_name(item: pytest.Item) -> str:
+    """The name of the default baseline of a test: FILE-TEST.h5, or FILE-CLASS-TEST-HASH.h5.
+
+    The hash of the file's name, the classes and the test with its parameters makes the name unique, also where a
+    file system does not distinguish upper and lower case. A function with a short name in lower case needs none.
+    """
+    names = [node.name for node in item.listchain() if isinstance(node, pytest.Class)]
+    parts = [item.path.stem, *names, item.name]
+    plain = "-".join(parts)
+    readable = re.sub(r"[^\w.=+-]+", "_", plain, flags=re.ASCII).strip("_")[:MAX_NAME_LENGTH]
+    if readable == plain and not names and re.fullmatch(r"[a-z0-9_]+", item.name):
+        return f"{readable}.h5"
+    digest = hashlib.sha256("::".join(parts).encode()).hexdigest()[:8]
+    return f"{readable}-{digest}.h5"
+
+
+def _old_name(item: pytest.Item) -> str:
+    """The name of the default baseline up to version 1.0.0, without classes, which several tests might share."""
+    return re.sub(r"[^\w.=+-]+", "_", f"{item.path.stem}-{item.name}").strip("_") + ".h5"

@@ -9,14 +9,17 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from pydantic_core import PydanticCustomError
 
 from ..contact.model import ForceModel
+from ..contact.outputs import UNITS
 from ..errors import ConfigError
 from ..text import safe_text
 from .files import MAX_OVERRIDE_LENGTH, as_table, read_text, set_value, toml_key, toml_text
@@ -26,6 +29,7 @@ from .tables import MATERIAL_KEYS, MATERIAL_QUANTITIES, SWEEP_QUANTITIES, model_
 
 MAX_CSV_BYTES = 2_000_000  # size of a CSV file, whose values a result stores
 COLUMN_HEADER = re.compile(r"\s*(.*?)\s*(?:\[\s*(.*?)\s*\])?\s*", re.DOTALL)
+ROUND_BRACKETS = re.compile(r"(.*\S)\s*\(\s*(.*?)\s*\)", re.DOTALL)
 
 
 @dataclass(frozen=True)
@@ -37,19 +41,31 @@ class CsvTable:
     name : of the file, for messages
     units : unit of each column, in brackets in its header; empty for SI
     cells : line and text of each cell, by column
+    is_known : whether a column has the name of an input or an output. Otherwise it may be any file, such as one
+        with passwords, that a config of unknown origin names: messages contain nothing of it
     """
 
     name: str
     units: Mapping[str, str]
     cells: Mapping[str, list[tuple[int, str]]]
+    is_known: bool = True
 
 
-def read_csv(path: Path) -> CsvTable:
+def read_csv(
+    path: Path, quantity_of: Callable[[str], Quantity | None], *, with_any_names: bool = False
+) -> CsvTable:
     """The columns of a CSV file.
+
+    Parameters
+    ----------
+    path : the file
+    quantity_of : the quantity of a column by its name, or KeyError for an unknown name
+    with_any_names : accept a file in which no column has a known name
 
     Raises
     ------
-    ConfigError : the file cannot be read, is too large, has no rows, or has rows of another length than the header
+    ConfigError : the file cannot be read, is too large, has no rows or no known names, or has rows of another
+        length than the header
     """
     name = safe_text(str(path))
     rows = csv.reader(io.StringIO(read_text(path, "CSV", MAX_CSV_BYTES), newline=""), strict=True)
@@ -60,17 +76,30 @@ def read_csv(path: Path) -> CsvTable:
     if len(lines) < 2:
         raise ConfigError([f"{name}: got {len(lines)} lines, expected a line of names and at least one of values"])
     first, header = lines[0]
-    units: dict[str, str] = {}
-    problems = []
-    for cell in header:
-        match = COLUMN_HEADER.fullmatch(cell)
-        assert match is not None
-        if match[1] in units:
-            problems.append(f"{name}:{first}: got {show(match[1])} twice, expected each column once")
-        units[match[1]] = match[2] or ""
-    for line, row in lines[1:]:
-        if len(row) != len(header):
-            problems.append(f"{name}:{line}: got {len(row)} values, expected {len(header)}, one for each column")
+    location = f"{name}:{first}"
+    if header[0].lstrip().startswith("#"):
+        raise ConfigError([f"{location}: got a comment, expected the names of the columns"])
+    separator = next((mark for mark in ";\t" if mark in header[0]), "")
+    if len(header) == 1 and separator:
+        got = f'columns separated by {show(separator)}, expected ","'
+        raise ConfigError([f"{location}: got {got}, and a point in numbers, such as 0.5"])
+    matches = [match for match in map(COLUMN_HEADER.fullmatch, header) if match is not None]
+    units = {match[1]: match[2] or "" for match in matches}
+    with_square_brackets = {column: _with_square_brackets(column, quantity_of) for column in units}
+    is_known = any(_is_known(column, quantity_of) or with_square_brackets[column] for column in units)
+    if not (is_known or with_any_names):
+        expected = "names of inputs or outputs, such as v1 [m/s] or e_out"
+        raise ConfigError([f"{location}: got no known column, expected {expected}"])
+    problems = [
+        f"{location}: {safe_text(column, 60)}: got round brackets, expected {show(expected)}"
+        for column, expected in with_square_brackets.items()
+        if expected
+    ]
+    for column, count in Counter(match[1] for match in matches).items():
+        if count > 1:
+            got = f"{show(column) if is_known else 'a name'} {'twice' if count == 2 else f'{count} times'}"
+            problems.append(f"{location}: got {got}, expected each column once")
+    problems += _length_problems(name, lines[1:], len(header))
     if problems:
         raise ConfigError(problems[:MAX_PROBLEMS])
     columns = zip(*(row for _, row in lines[1:]), strict=True)
@@ -79,7 +108,57 @@ def read_csv(path: Path) -> CsvTable:
         name,
         units,
         {key: list(zip(numbers, cells, strict=True)) for key, cells in zip(units, columns, strict=True)},
+        is_known,
     )
+
+
+def _is_known(column: str, quantity_of: Callable[[str], Quantity | None]) -> bool:
+    """Whether a column has the name of an input or an output."""
+    try:
+        quantity_of(column)
+    except KeyError:
+        return False
+    return True
+
+
+def _with_square_brackets(column: str, quantity_of: Callable[[str], Quantity | None]) -> str:
+    """The header with its unit in square brackets, if it is in round ones and the name is known; else empty."""
+    match = ROUND_BRACKETS.fullmatch(column)
+    if match is None or not _is_known(match[1], quantity_of):
+        return ""
+    quantity, unit = quantity_of(match[1]), match[2]
+    try:
+        if quantity is not None:
+            Quantity(quantity.unit, "").read(f"1 {unit}")
+    except PydanticCustomError:
+        unit = quantity.unit if quantity is not None else unit
+    return f"{match[1]} [{unit}]"
+
+
+def _length_problems(name: str, lines: list[tuple[int, list[str]]], n_columns: int) -> list[str]:
+    """A problem for each wrong number of values in a row, with its first line, and for a comment."""
+    expected = f"expected {n_columns}, one for each column"
+    problems: list[str] = []
+    first_lines: dict[int, list[int]] = {}
+    for line, row in lines:
+        if len(row) != n_columns and row[0].lstrip().startswith("#"):
+            problems.append(f"{name}:{line}: got a comment, {expected.replace(',', ' values,')}")
+        elif len(row) != n_columns:
+            first_lines.setdefault(len(row), []).append(line)
+    for n_values, (line, *others) in first_lines.items():
+        also = f"; also on {len(others)} other line{'s' * (len(others) > 1)}" if others else ""
+        problems.append(f"{name}:{line}: got {n_values} values, {expected}{also}")
+    return problems
+
+
+def column_quantity(name: str, models: Mapping[str, ForceModel]) -> Quantity | None:
+    """The quantity of a column that has the name of an output or an input; None for names of materials.
+
+    Raises
+    ------
+    KeyError : there is no such output or input
+    """
+    return Quantity(UNITS[name], "output") if name in UNITS else quantity_at(path_of(name), models)
 
 
 def column_values(table: CsvTable, column: str, quantity: Quantity | None, n: float | None) -> list[float | str]:
@@ -89,6 +168,8 @@ def column_values(table: CsvTable, column: str, quantity: Quantity | None, n: fl
     ------
     ConfigError : with a line for the unit, or for each cell that the quantity does not allow
     """
+    if not table.is_known:
+        return _values_of_unknown(table, column, quantity, n)
     cells, unit, shown = table.cells[column], table.units[column], safe_text(column, 60)
     if quantity is not None and unit:
         try:
@@ -107,6 +188,21 @@ def column_values(table: CsvTable, column: str, quantity: Quantity | None, n: fl
                 break
     if problems:
         raise ConfigError(problems)
+    return values
+
+
+def _values_of_unknown(
+    table: CsvTable, column: str, quantity: Quantity | None, n: float | None
+) -> list[float | str]:
+    """The numbers of a column of a table without known names; problems contain nothing of the file."""
+    if quantity is None:
+        raise ConfigError([f"{table.name}:1: got no known column, expected such as material1 or v1 [m/s]"])
+    values: list[float | str] = []
+    for line, cell in table.cells[column]:
+        try:
+            values.append(_cell_value(cell.strip(), table.units[column], quantity, n))
+        except PydanticCustomError:
+            raise ConfigError([f"{table.name}:{line}: expected {quantity.expected}"]) from None
     return values
 
 
@@ -145,16 +241,18 @@ def inline_files(
     -------
     The new data, overrides that do the same, and problems. The name of a file that cannot be read is not replaced.
     """
-    files: dict[str, CsvTable] = {}
+    files: dict[tuple[str, bool], CsvTable] = {}
     overrides: list[str] = []
     problems: list[str] = []
 
-    def open_csv(file: str) -> CsvTable:
+    def open_csv(file: str, *, with_any_names: bool = False) -> CsvTable:
         if folder is None:
             raise ConfigError([f"{safe_text(file)}: not read; a stored config contains values, not file names"])
-        if file not in files:
-            files[file] = read_csv(folder / file)
-        return files[file]
+        key = (file, with_any_names)
+        if key not in files:
+            of_column = partial(column_quantity, models=models)
+            files[key] = read_csv(folder / file, of_column, with_any_names=with_any_names)
+        return files[key]
 
     def store_values(path: KeyPath, value: object) -> None:
         nonlocal data
@@ -169,14 +267,16 @@ def inline_files(
             problems += error.problems
     for path, file, column in list(_file_columns(data)):
         try:
-            table = open_csv(file)
+            table = open_csv(file, with_any_names=True)
             is_sample = column is None
             if column is None:
                 # the only column, or that of the input
                 column = next(iter(table.units)) if len(table.units) == 1 else name_of(path)
             if column not in table.units:
-                expected = f"one of its columns; {suggest(column, list(table.units))}"
-                raise ConfigError([f"{table.name}:1: got {show(column)}, expected {expected}"])
+                known = f"; {suggest(column, list(table.units))}" if table.is_known else ""
+                if any(name.startswith(f"{column} (") for name in table.units):
+                    known = f'; a unit is in square brackets: "{safe_text(column, 60)} [UNIT]"'
+                raise ConfigError([f"{table.name}:1: got {show(column)}, expected one of its columns{known}"])
             values = column_values(table, column, quantity_at(path, models), n)
             store_values(path, {"empirical": values} if is_sample else values)
         except ConfigError as error:
@@ -256,6 +356,13 @@ def _file_columns(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, str, str |
                 yield path, file, column
             case {"empirical": str(file), **others} if not others:
                 yield path, file, None
+
+
+def named_files(data: Mapping[str, Any]) -> list[str]:
+    """The names of all CSV files in the plain data of a config."""
+    names = [as_table(data.get("sweep")).get("cases"), as_table(data.get("data")).get("file")]
+    names += [file for _, file, _ in _file_columns(data)]
+    return list(dict.fromkeys(name for name in names if isinstance(name, str)))
 
 
 def expand_cases(

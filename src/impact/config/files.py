@@ -30,12 +30,12 @@ LONG_KEY = re.compile(rf"(?<![\w.-])(?:{_PART}[ \t]*+\.[ \t]*+){{{MAX_KEY_PARTS 
 def file_hint(path: Path, content: bytes) -> str:
     """What a file is that something else was expected of, and what to do with it; empty if unknown.
 
-    >>> file_hint(Path("c.toml"), b"[sweep]")
+    >>> file_hint(Path("c.toml"), b"")
     'is a config, not a result; sweep it first: impact sweep c.toml -o RESULT.h5'
     """
     if content.startswith(RESULT_MAGIC):
         return "is a result, not a text file; impact info, plot, rerun, extend and expand read results"
-    if re.search(rb"^\s*(\[\s*sweep\b|sweep\s*[.=]|models\s*=)", content, re.MULTILINE):
+    if path.suffix.lower() == ".toml":
         return f"is a config, not a result; sweep it first: impact sweep {safe_text(path.name)} -o RESULT.h5"
     if path.suffix.lower() == ".csv":
         return (
@@ -49,12 +49,15 @@ def read_text(path: Path, kind: str = "TOML", most: int = MAX_CONFIG_BYTES) -> s
 
     Raises
     ------
-    ConfigError : it is not a regular file, cannot be read, is too large or is not UTF-8
+    ConfigError : it is not a regular file, is empty, cannot be read, is too large or is not UTF-8
     """
     name = safe_text(str(path))
     try:
         if path.exists() and not path.is_file():
             raise ConfigError([f"{name}: not a regular file, expected a {kind} file"])
+        # also a file of the system such as /proc/kmsg, of which reading might never end
+        if path.stat().st_size == 0:
+            raise ConfigError([f"{name}: empty, expected a {kind} file"])
         with path.open("rb") as file:
             content = file.read(most + 1)
     except (OSError, ValueError) as error:

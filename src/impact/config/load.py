@@ -19,7 +19,7 @@ from ..contact.numba.dispatch import is_installed
 from ..contact.outputs import BY_DEFAULT
 from ..contact.timestep import EXACT
 from ..errors import ConfigError
-from .cases import expand_cases, inline_files
+from .cases import expand_cases, inline_files, named_files
 from .design import design_problems, distribution_paths, draw_columns, unit_samples
 from .files import (
     apply_overrides,
@@ -114,6 +114,7 @@ class Config:
     data : the measurements to which they are fitted; None for a sweep
     design : how the samples of uncertain inputs are drawn; None without any
     distributions : of the uncertain inputs, by config name; their drawn values are an axis
+    files : the CSV files that were read
     """
 
     title: str
@@ -129,6 +130,7 @@ class Config:
     data: Measurements | None = None
     design: Design | None = None
     distributions: Mapping[str, Distribution] = field(default_factory=dict)
+    files: tuple[Path, ...] = field(default=(), repr=False, compare=False)
 
 
 def read_config(
@@ -223,6 +225,7 @@ class _Reader:
             if text is None:
                 text = json.dumps(source_data, separators=(",", ":"), default=str)
             n = read_exponent(as_table(data.get("sweep")))
+            files = tuple((self.folder or Path()) / file for file in named_files(data))
             data, file_overrides, file_problems = inline_files(data, self.folder, self.models, n)
             data, data_overrides, data_problems = inline_measurements(data, self.folder, self.models, n)
             file_problems += data_problems
@@ -231,7 +234,7 @@ class _Reader:
             if text is not None and not text.lstrip().startswith("{"):
                 locations = replace(locations, lines=key_lines(text))
             raise ConfigError([*problem_lines(problems, locations), *file_problems, *override_problems])
-        return config
+        return replace(config, files=files)
 
     def _build_config(
         self, data: Mapping[str, Any], text: str, overrides: Sequence[str]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -16,6 +17,7 @@ from ..formatting import number
 from ..text import safe_text
 from .cases import (
     CsvTable,
+    column_quantity,
     column_values,
     contains_path,
     input_names,
@@ -27,15 +29,15 @@ from .cases import (
 from .files import as_table, set_value
 from .grid import name_of, path_of
 from .quantities import MAX_PROBLEMS, ConfigProblem, KeyPath, Quantity, show, suggest, value_error
-from .tables import LOSSES, MATERIAL_KEYS, NOISES, quantity_at
+from .tables import LOSSES, MATERIAL_KEYS, MAX_MEASURED, MIN_SIGMA, NOISES, quantity_at
 
 Noise = Literal["given", "scale", "excess"]
 Loss = Literal["linear", "huber", "cauchy"]
 
 SIGMA, SPECIMEN = "sigma", "specimen"
 SPECIMEN_EXPECTED = "got nothing, expected the name of a specimen"
-_ANY: dict[str, Any] = {}
-_POSITIVE: dict[str, Any] = {"least": 0.0, "above": True}
+_ANY: dict[str, Any] = {"least": -MAX_MEASURED, "most": MAX_MEASURED}
+_POSITIVE: dict[str, Any] = {"least": 0.0, "above": True, "most": MAX_MEASURED}
 # a measured fraction may be below 0 or above 1 by its noise; a value that is farther off is no fraction
 _FRACTION: dict[str, Any] = {"least": -0.5, "most": 1.5}
 # the outputs that can be measured, with the interval of their values
@@ -148,7 +150,9 @@ def _column_of(name: str, outputs: Sequence[str], models: Mapping[str, ForceMode
         output = name.removeprefix(f"{SIGMA}_") if name != SIGMA else next(iter(outputs), "e_out")
         if outputs and output not in outputs:
             raise value_error(f"got no column {output}, expected one beside its standard deviation")
-        return _DataColumn("sigma", output, Quantity(UNITS[output], "standard deviation", **_POSITIVE))
+        return _DataColumn(
+            "sigma", output, Quantity(UNITS[output], "standard deviation", least=MIN_SIGMA, most=MAX_MEASURED)
+        )
     if not name:
         raise value_error("got a column without a name, expected that of an input or an output")
     path = path_of(name)
@@ -176,7 +180,8 @@ def inline_measurements(
     if folder is None:
         return dict(data), [], [f"{safe_text(file)}: not read; a stored config contains values, not file names"]
     try:
-        values, lines = _read_values(read_csv(folder / file), data, models, n)
+        table_of_file = read_csv(folder / file, partial(column_quantity, models=models))
+        values, lines = _read_values(table_of_file, data, models, n)
         stored: dict[KeyPath, object] = {("data", "columns"): values, ("data", "lines"): lines}
         overrides = [values_override(path, value) for path, value in stored.items()]
     except ConfigError as error:
@@ -366,7 +371,7 @@ def _read_sigma(value: object, output: str, n_points: int) -> tuple[tuple[float,
     path: KeyPath = ("data", "sigma")
     if isinstance(value, list) and len(value) != n_points:
         return (), [(path, f"got {len(value)} values, expected {n_points}, one for each point")]
-    quantity = Quantity(UNITS[output], "standard deviation", **_POSITIVE)
+    quantity = Quantity(UNITS[output], "standard deviation", least=MIN_SIGMA, most=MAX_MEASURED)
     elements = value if isinstance(value, list) else [value]
     deviations, problems = _read_list(elements, path, quantity, None)
     if not isinstance(value, list):

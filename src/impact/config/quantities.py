@@ -366,6 +366,10 @@ class FitRange(Table):
         least, most = self.fit
         if least >= most:
             raise located_errors([(("fit",), f"got {least:g} to {most:g}, expected {FIT_FORM} with least < most")])
+        if not math.isfinite(most - least) or (least > 0.0 and not math.isfinite(most / least)):
+            raise located_errors(
+                [(("fit",), f"got {least:g} to {most:g}, expected bounds that are closer together")]
+            )
         return self
 
     @property

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import field
 from fnmatch import fnmatchcase
@@ -222,8 +221,12 @@ class Output:
     ] = "auto"
 
 
-def _is_positive(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and 0.0 < value < math.inf
+# least standard deviation and largest measured value, in SI: squares of their ratio overflow beyond them
+MIN_SIGMA, MAX_MEASURED = 1e-30, 1e100
+
+
+def _is_deviation(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and MIN_SIGMA <= value <= MAX_MEASURED
 
 
 def _sigma(value: object) -> object:
@@ -233,13 +236,14 @@ def _sigma(value: object) -> object:
         raise value_error(
             'got a fit, expected noise = "scale", which estimates sigma, or "excess", which adds to it'
         )
-    if not all(isinstance(element, str) or _is_positive(element) for element in deviations):
+    if not all(isinstance(element, str) or _is_deviation(element) for element in deviations):
         raise mismatch_error(value, SIGMA_EXPECTED)
     return value
 
 
-SIGMA_EXPECTED = "a number > 0 in the unit of the output, or a list of one for each point"
-_Sigma: Any = Annotated[float, Field(gt=0.0)] | str
+_SIGMA_INTERVAL = f"a number from {MIN_SIGMA:g} to {MAX_MEASURED:g}"
+SIGMA_EXPECTED = f"{_SIGMA_INTERVAL} in the unit of the output, or a list of one for each point"
+_Sigma: Any = Annotated[float, Field(ge=MIN_SIGMA, le=MAX_MEASURED)] | str
 
 
 def _data_schema(schema: dict[str, Any]) -> None:

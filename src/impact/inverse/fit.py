@@ -143,8 +143,12 @@ class DataPoints:
         if excess == 0.0:
             return scaled
         p = self.precision
-        reduction = (1.0 - 1.0 / np.sqrt(1.0 + excess**2 * p)) / np.where(p > 0.0, p, 1.0)
-        return scaled - self.at_points(reduction * self.specimen_sums(scaled / self.sigma)) / self.sigma
+        shrink = 1.0 / np.sqrt(1.0 + excess**2 * p)
+        if self.specimens is None:
+            return scaled * shrink
+        # what the points of a specimen share gets smaller
+        shared = self.specimen_sums(scaled / self.sigma) / np.where(p > 0.0, p, 1.0)
+        return scaled - self.at_points((1.0 - shrink) * shared) / self.sigma
 
 
 @dataclass(frozen=True)
@@ -355,33 +359,31 @@ class ExcessLikelihood:
     """
 
     def __init__(self, data: DataPoints, scaled: Array, taken: Array | None = None) -> None:
-        self.squares = float(scaled @ scaled)
-        self.precision = data.precision
-        self.deviation = data.specimen_sums(scaled / data.sigma)
-        directions = np.zeros((0, scaled.size)) if taken is None else taken.T
-        self.taken = data.specimen_sums(directions / data.sigma)
+        self.data, self.scaled = data, scaled
+        self.taken = np.zeros((0, scaled.size)) if taken is None else taken.T
+        self.deviation, self.taken_sums = (data.specimen_sums(z / data.sigma) for z in (scaled, self.taken))
 
     def objective(self, variance: float) -> float:
         """Minus twice the logarithm of the likelihood, without the part that sigma alone determines."""
-        growth = 1.0 + variance * self.precision
-        _, determinant = np.linalg.slogdet(self._left(growth, variance))
-        squares = self.squares - float((variance * self.deviation**2 / growth).sum())
-        return squares + float(np.log(growth).sum()) + float(determinant)
+        white = self.data.whiten(self.scaled, math.sqrt(variance))
+        growth = 1.0 + variance * self.data.precision
+        sign, determinant = np.linalg.slogdet(self._left(variance))
+        return float(white @ white + np.log(growth).sum() + determinant) if sign > 0.0 else math.inf
 
     def slope(self, variance: float) -> float:
         """The derivative of the objective by the variance."""
-        growth = 1.0 + variance * self.precision
-        change = np.linalg.solve(self._left(growth, variance), (self.taken / growth**2) @ self.taken.T)
-        return float((self.precision / growth - (self.deviation / growth) ** 2).sum() - np.trace(change))
+        growth = 1.0 + variance * self.data.precision
+        change = np.linalg.pinv(self._left(variance)) @ (self.taken_sums / growth**2) @ self.taken_sums.T
+        return float((self.data.precision / growth - (self.deviation / growth) ** 2).sum() - np.trace(change))
 
-    def _left(self, growth: Array, variance: float) -> Array:
+    def _left(self, variance: float) -> Array:
         """Q^T V^(-1) Q in units of the given variances, where Q are the directions taken."""
-        left: Array = np.eye(len(self.taken)) - (variance / growth * self.taken) @ self.taken.T
-        return left
+        white = self.data.whiten(self.taken, math.sqrt(variance))
+        return white @ white.T
 
     def best(self) -> float:
         """The standard deviation between specimens of the largest likelihood."""
-        largest = (self.deviation / np.where(self.precision > 0.0, self.precision, 1.0)) ** 2
+        largest = (self.deviation / np.where(self.data.precision > 0.0, self.data.precision, 1.0)) ** 2
         tried = TRIED_EXCESS * largest.max()
         number = int(np.argmin([self.objective(variance) for variance in tried]))
         low, high = tried[max(number - 1, 0)], tried[min(number + 1, tried.size - 1)]

@@ -149,11 +149,12 @@ def read_points(points: str | Path | pd.DataFrame | xr.Dataset) -> Points:
     ------
     ConfigError : the file cannot be read, or a name, a unit or a number is invalid
     """
-    table = read_csv(Path(points)) if isinstance(points, str | Path) else _csv_table(points)
     quantities = _column_quantities()
+    is_file = isinstance(points, str | Path)
+    table = read_csv(Path(points), quantities.__getitem__) if is_file else _csv_table(points)
     for column in table.units:
         if column not in quantities:
-            location = f"{table.name}:1: " if isinstance(points, str | Path) else f"{table.name}: "
+            location = f"{table.name}:1: " if is_file else f"{table.name}: "
             raise ConfigError([f"{location}got {show(column)}; {did_you_mean(column, sorted(quantities))}"])
     units, previous = dict(table.units), ""
     for column in table.units:

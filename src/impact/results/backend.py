@@ -66,6 +66,28 @@ def check_output(path: Path, *, overwrite: bool, source: Path | None = None) -> 
         raise UsageError(f"{shown}: exists; give another name, or overwrite it (--overwrite)")
 
 
+def check_outputs(outputs: Iterable[str | Path | None], inputs: Iterable[object], *, overwrite: bool) -> None:
+    """Refuse outputs that cannot be written, or that are a file which the command reads.
+
+    Parameters
+    ----------
+    outputs : the files to write; None for an output that is not wanted
+    inputs : what is read; other values than paths, such as mappings and models, are no files
+    overwrite : whether the outputs may exist
+
+    Raises
+    ------
+    UsageError : see `check_output`; or two outputs are the same file
+    """
+    paths = [Path(output) for output in outputs if output is not None]
+    sources: list[Path | None] = [Path(source) for source in inputs if isinstance(source, str | Path)]
+    for path in paths:
+        for source in sources or [None]:
+            check_output(path, overwrite=overwrite, source=source)
+    for path in {path for path in paths if paths.count(path) > 1}:
+        raise UsageError(f"{safe_text(str(path))}: is named for two outputs")
+
+
 def _check_name_length(path: Path) -> None:
     """Refuse a name that is too long for the temporary files beside it, such as RESULT.12345678.part."""
     try:

@@ -18,8 +18,6 @@ from .schema import SCHEMA_VERSION
 
 # bytes at the start of an HDF5 file that the format leaves to applications: its "user block"
 USER_BLOCK_BYTES = 512
-# bytes of another file by which its kind is recognised
-HINT_BYTES = 2**16
 HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 SWEEP_AGAIN = "sweep its config again: impact sweep CONFIG.toml -o RESULT --overwrite"
 
@@ -57,10 +55,8 @@ def check_seal(path: Path) -> str:
                 f"is of schema version 1, or no result of impact; expected version {SCHEMA_VERSION}: {SWEEP_AGAIN}"
             )
         if not header.startswith(RESULT_MAGIC):
-            hint = file_hint(path, header + file.read(HINT_BYTES))
-            raise ResultError(
-                hint or "is not a readable result (it does not begin with the header of a sealed file)"
-            )
+            no_result = "is not a readable result (it does not begin with the header of a sealed file)"
+            raise ResultError(file_hint(path, header) or no_result)
         version = header[len(RESULT_MAGIC) :].partition(b"\n")[0].removeprefix(b"schema ")
         if version.isdigit() and int(version) != SCHEMA_VERSION and len(version) < 5:
             raise ResultError(
@@ -74,7 +70,7 @@ def check_seal(path: Path) -> str:
 
 def is_result(path: Path) -> bool:
     """Whether a file begins like a result of this schema version or of version 1."""
-    if not path.is_file():
+    if not path.is_file() or not path.stat().st_size:
         return False
     with path.open("rb") as file:
         return file.read(len(RESULT_MAGIC)).startswith((RESULT_MAGIC, HDF5_MAGIC))
@@ -85,6 +81,9 @@ def open_regular_file(path: Path) -> Iterator[BinaryIO]:
     """A regular file, opened for reading."""
     if not path.is_file():
         raise ResultError("is not a regular file" if path.exists() else "does not exist")
+    # also a file of the system such as /proc/kmsg, of which reading might never end
+    if not path.stat().st_size:
+        raise ResultError("is empty: it does not begin with the header of a sealed file")
     with path.open("rb") as file:
         yield file
 
