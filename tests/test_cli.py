@@ -259,7 +259,7 @@ def test_run_repeats_a_point_of_a_result(cli: Run, tmp_path: Path) -> None:
         (["run", "absent.toml"], "absent.toml: cannot be read: No such file or directory"),
         (["models", "herz"], 'no model "herz"; did you mean "hertz"?'),
         (["info", "absent.h5"], "absent.h5: does not exist"),
-        (["info", "pyproject.toml"], "pyproject.toml: is not a readable result"),
+        (["info", "pyproject.toml"], "pyproject.toml: is a TOML file, not a result"),
         (["plot", "absent.h5"], "absent.h5: does not exist"),
         (["init", "README.md"], "README.md: exists; give another name, or overwrite it (--overwrite)"),
         (["swep"], "impact: No such command 'swep'. Did you mean 'sweep'?; see impact -h"),
@@ -778,11 +778,11 @@ def test_a_tolerance_in_percent(cli: Run, stored: Path) -> None:
     [
         (
             ("plot", "c.toml"),
-            "c.toml: is a config, not a result; sweep it first: impact sweep c.toml -o RESULT.h5",
+            "c.toml: is a TOML file, not a result; sweep a config first: impact sweep c.toml -o RESULT.h5",
         ),
         (
             ("recommend", "c.toml"),
-            "c.toml: is a config, not a result; sweep it first: impact sweep c.toml -o RESULT.h5",
+            "c.toml: is a TOML file, not a result; sweep a config first: impact sweep c.toml -o RESULT.h5",
         ),
         (
             ("plot", "data.csv"),

@@ -31,12 +31,14 @@ def file_hint(path: Path, content: bytes) -> str:
     """What a file is that something else was expected of, and what to do with it; empty if unknown.
 
     >>> file_hint(Path("c.toml"), b"")
-    'is a config, not a result; sweep it first: impact sweep c.toml -o RESULT.h5'
+    'is a TOML file, not a result; sweep a config first: impact sweep c.toml -o RESULT.h5'
     """
     if content.startswith(RESULT_MAGIC):
         return "is a result, not a text file; impact info, plot, rerun, extend and expand read results"
     if path.suffix.lower() == ".toml":
-        return f"is a config, not a result; sweep it first: impact sweep {safe_text(path.name)} -o RESULT.h5"
+        return (
+            f"is a TOML file, not a result; sweep a config first: impact sweep {safe_text(path.name)} -o RESULT.h5"
+        )
     if path.suffix.lower() == ".csv":
         return (
             f"is a CSV file, not a result; impact plot RESULT.h5 --points {safe_text(path.name)} draws its points"
