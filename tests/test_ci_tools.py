@@ -191,6 +191,7 @@ print(names, list(map(int, codes)))
 """
 
 
+@pytest.mark.slow
 def test_every_test_has_a_baseline_of_its_own(project: Path, entry_points: Path) -> None:
     (project / "tests" / "test_same.py").write_text(SAME_NAMES, encoding="utf-8")
     python_path = os.pathsep.join([str(ROOT / "src"), str(entry_points)])
@@ -305,6 +306,7 @@ def test_the_action_installs_and_compares(tmp_path: Path) -> None:
     assert failed.stdout.startswith(start)
 
 
+@pytest.mark.slow
 def test_the_action_executes_no_module_of_the_checkout(tmp_path: Path) -> None:
     (tmp_path / "contact.toml").write_text(CONTACT, encoding="utf-8")
     imported = tmp_path / "imported"

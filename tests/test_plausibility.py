@@ -136,7 +136,8 @@ def notes_of(page: str) -> list[str]:
     return [html.unescape(note) for note in re.findall("<p>Note: (.*?)</p>", page)]
 
 
-@pytest.mark.parametrize("layout", ["full", pytest.param("factored", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("layout", ["full", "factored"])
 def test_the_report_has_every_note_of_the_sweep(cli: Run, tmp_path: Path, layout: str) -> None:
     (tmp_path / "c.json").write_text(json.dumps(MANY_AXES), encoding="utf-8")
     done = cli("sweep", "c.json", "-o", "r.h5", "--set", f"output.layout={layout}", cwd=tmp_path)

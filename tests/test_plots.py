@@ -728,6 +728,7 @@ def test_kinds_that_do_not_apply_are_reported_and_others_drawn(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a-restitution.svg"]
 
 
+@pytest.mark.slow
 def test_a_value_for_one_picture_leaves_the_axes_of_others(
     cli: Run, coarse: xr.Dataset, coarse_file: Path, wide: xr.Dataset, tmp_path: Path
 ) -> None:

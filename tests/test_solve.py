@@ -112,7 +112,7 @@ def test_both_roots_beside_a_minimum_between_two_values_of_the_scan_are_found(
     [
         (573.0, [361.680, 387.604]),
         pytest.param(600.0, [201.263755, 538.515748], marks=pytest.mark.slow),
-        (572.8, []),
+        pytest.param(572.8, [], marks=pytest.mark.slow),
     ],
 )
 def test_the_least_peak_force_of_a_dashpot_is_right_to_six_digits(wanted: float, roots: list[float]) -> None:
@@ -143,6 +143,7 @@ def test_the_ends_of_an_interval_that_gives_the_target_are_the_roots() -> None:
     assert [root.value for root in result.roots] == pytest.approx([1.5 - 0.6213, 1.5 + 0.6213], abs=1e-6)
 
 
+@pytest.mark.slow
 def test_a_jump_across_the_target_is_neither_a_root_nor_an_extremum() -> None:
     law = law_of(lambda p: np.where(p < 1.2345, 0.1 * p, 0.6 - 0.1 * p))
     result = impact.solve("damped", "p", {"e_out": 0.65}, plugins=[law])
@@ -152,6 +153,7 @@ def test_a_jump_across_the_target_is_neither_a_root_nor_an_extremum() -> None:
     assert result.attainable == pytest.approx((least, 1.0), abs=1e-6)
 
 
+@pytest.mark.slow
 def test_an_extremum_that_touches_the_target_is_one_root() -> None:
     law = law_of(lambda p: 0.2 + 0.4 * (p - 1.0) ** 2)
     largest = linear_restitution(0.1)
@@ -160,6 +162,7 @@ def test_an_extremum_that_touches_the_target_is_one_root() -> None:
     assert result.roots[0].value == pytest.approx(1.0, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_a_value_that_fails_hides_no_root_between_its_neighbours() -> None:
     """One value of the scan needs more steps than a scan takes."""
     result = impact.solve("bordbar-hyppanen-2007", "C", {"e_out": 0.9972}, at={"v1": 1.0})
@@ -176,6 +179,7 @@ def test_the_stiffness_for_a_contact_time_is_that_of_the_closed_form() -> None:
     assert root.value == pytest.approx(math.sqrt((factor / 1e-3) ** 5 * mass**2 / speed), rel=1e-8)
 
 
+@pytest.mark.slow
 def test_the_best_value_over_a_range_is_that_of_the_best_of_several_basins() -> None:
     """The scan is nearer to the worse one, at p = 1."""
     law = law_of(lambda p: np.minimum(0.01 + 0.1 * np.abs(p - 1.0), 3.0 * np.abs(p - 2.0025)))
@@ -196,6 +200,7 @@ def test_the_command_ends_well_without_a_root(cli: Run) -> None:
     assert "no value of e gives e_out = 0.6; e_out is from 0 to 0.593624" in done.stdout
 
 
+@pytest.mark.slow
 def test_a_range_of_toml_is_a_range_of_the_option(cli: Run) -> None:
     words = ("solve", "--model", "hunt-crossley-1975", "--for", "e", "--target", "e_out=0.6", "--over")
     printed = [cli(*words, over).stdout for over in ("v1=0.1:3:3", "v1={linspace=[0.1, 3, 3]}")]

@@ -298,6 +298,7 @@ def test_a_result_says_how_its_samples_were_drawn(tmp_path: Path) -> None:
     assert design["distributions"] == {"v1": {"normal": [1.0, 0.05]}, "K": {"lognormal": [2e6, 1.2]}}
 
 
+@pytest.mark.slow
 def test_samples_are_an_axis_for_every_command(cli: Run, tmp_path: Path) -> None:
     (tmp_path / "c.toml").write_text(TEXT)
 
