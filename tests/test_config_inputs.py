@@ -238,7 +238,10 @@ def test_a_file_of_the_system_that_never_ends_is_not_read(forked: ForkServer, tm
         assert (done.returncode, done.stderr) == (2, f"/proc/kmsg: empty, expected a {kind} file\n")
     done = forked("info", "/proc/kmsg", limit=20)
     assert done.returncode == 2
-    assert done.stderr == "/proc/kmsg: is not a readable result (it is empty)\n"
+    assert (
+        done.stderr
+        == "/proc/kmsg: is not a readable result (empty: it does not begin with the header of a sealed file)\n"
+    )
     assert forked("run", "/proc/kmsg", limit=20).returncode == 2
 
 

@@ -83,7 +83,7 @@ def open_regular_file(path: Path) -> Iterator[BinaryIO]:
         raise ResultError("is not a regular file" if path.exists() else "does not exist")
     # also a file of the system such as /proc/kmsg, of which reading might never end
     if not path.stat().st_size:
-        raise ResultError("is not a readable result (it is empty)")
+        raise ResultError("is not a readable result (empty: it does not begin with the header of a sealed file)")
     with path.open("rb") as file:
         yield file
 
