@@ -846,9 +846,9 @@ READ_FILES = {
 @pytest.mark.parametrize(
     ("words", "outputs"),
     [
-        ("sweep c.toml --plugin law.py -o", "c.toml v1.csv law.py"),
-        ("sensitivity u.toml --plugin law.py -o", "u.toml v1.csv law.py"),
-        ("calibrate f.toml --plugin law.py -o", "f.toml drops.csv law.py"),
+        pytest.param("sweep c.toml --plugin law.py -o", "c.toml v1.csv law.py", marks=pytest.mark.slow),
+        pytest.param("sensitivity u.toml --plugin law.py -o", "u.toml v1.csv law.py", marks=pytest.mark.slow),
+        pytest.param("calibrate f.toml --plugin law.py -o", "f.toml drops.csv law.py", marks=pytest.mark.slow),
         ("calibrate f.toml --plugin law.py --best", "f.toml drops.csv law.py"),
         ("export c.toml --to mujoco -o", "c.toml v1.csv"),
     ],

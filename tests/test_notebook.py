@@ -92,6 +92,7 @@ def controls_of(box: Any) -> tuple[dict[str, Any], Any, Any]:
     return {control.description: control for control in controls.children}, picture, message
 
 
+@pytest.mark.slow
 def test_controls_draw_what_they_select() -> None:
     result = impact.sweep(TWO_AXES)
     controls, picture, message = controls_of(impact.explore(result))

@@ -57,6 +57,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 def test_the_commands_of_the_page(cli: Run, folder: Path) -> None:
     (commands,) = blocks("sh")
     for line in commands.splitlines():

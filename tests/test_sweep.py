@@ -243,6 +243,7 @@ def test_only_the_undamaged_result_of_the_same_sweep_is_recognized_as_finished(b
 # ---- processes and other executors
 
 
+@pytest.mark.slow
 def test_two_processes_with_a_plug_in_write_the_same_bytes_as_one(blocks: Path) -> None:
     plugin = blocks.parent / "plugin.py"
     plugin.write_text(PLUGIN, encoding="utf-8")

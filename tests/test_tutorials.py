@@ -34,6 +34,7 @@ def test_a_tutorial_prints_what_its_commands_print(
     assert_same_output(done.stdout, printed)
 
 
+@pytest.mark.slow
 def test_the_commands_of_a_figure_for_a_paper(cli: Run, tmp_path: Path) -> None:
     text = (DOCS / "tutorials" / "paper.md").read_text(encoding="utf-8")
     (config,) = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
