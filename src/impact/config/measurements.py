@@ -247,11 +247,13 @@ def _is_percent(unit: str) -> bool:
 
 def _is_in_percent(element: object, quantity: Quantity) -> bool:
     """Whether a value has the sign %, or is too large for a fraction."""
-    if isinstance(element, str) and "%" in element:
+    if not isinstance(element, str | int | float):
+        return False
+    if "%" in str(element):
         return True
     try:
-        return quantity.most == _FRACTION["most"] and float(element) > quantity.most  # type: ignore[arg-type]
-    except (TypeError, ValueError, OverflowError):
+        return quantity.most == _FRACTION["most"] and float(element) > quantity.most
+    except (ValueError, OverflowError):
         return False
 
 

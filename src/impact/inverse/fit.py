@@ -761,10 +761,10 @@ def fit_all(
     )
     best = [best_of(estimates) for estimates in minima]
     pairs = list(zip(problems, best, strict=True))
-    found = run_together(functions, [partial(_minimum, *pair) for pair in pairs])
-    ends = _run_each(functions, [minimum.end_tasks() for minimum in found])
-    left_out = _run_each(functions, [minimum.leave_one_out_tasks() if leave_one_out else [] for minimum in found])
-    return [minimum.result(*parts) for minimum, parts in zip(found, zip(ends, left_out, strict=True), strict=True)]
+    fitted = run_together(functions, [partial(_minimum, *pair) for pair in pairs])
+    ends = _run_each(functions, [minimum.end_tasks() for minimum in fitted])
+    left_out = _run_each(functions, [minimum.leave_one_out_tasks() if leave_one_out else [] for minimum in fitted])
+    return [minimum.result(*parts) for minimum, parts in zip(fitted, zip(ends, left_out, strict=True), strict=True)]
 
 
 def _run_each(
