@@ -761,10 +761,10 @@ def fit_all(
     )
     best = [best_of(estimates) for estimates in minima]
     pairs = list(zip(problems, best, strict=True))
-    fitted = run_together(functions, [partial(_minimum, *pair) for pair in pairs])
-    ends = _run_each(functions, [minimum.end_tasks() for minimum in fitted])
-    left_out = _run_each(functions, [minimum.leave_one_out_tasks() if leave_one_out else [] for minimum in fitted])
-    return [minimum.result(*parts) for minimum, parts in zip(fitted, zip(ends, left_out, strict=True), strict=True)]
+    fits = run_together(functions, [partial(_minimum, *pair) for pair in pairs])
+    ends = _run_each(functions, [minimum.end_tasks() for minimum in fits])
+    left_out = _run_each(functions, [minimum.leave_one_out_tasks() if leave_one_out else [] for minimum in fits])
+    return [minimum.result(*parts) for minimum, parts in zip(fits, zip(ends, left_out, strict=True), strict=True)]
 
 
 def _run_each(
