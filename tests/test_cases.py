@@ -9,8 +9,7 @@ from typing import Any
 
 import pytest
 import xarray as xr
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 import impact
 from impact.api import execute, prepare

@@ -13,8 +13,7 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 import impact
 from impact.config.load import Config, Output, Solver, parse_config, read_config

@@ -7,8 +7,7 @@ import tomllib
 import numpy as np
 import pytest
 import xarray as xr
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 import impact
 from impact.api import prepare

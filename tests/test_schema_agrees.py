@@ -14,8 +14,7 @@ from typing import Any
 
 import jsonschema
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, given, settings, strategies as st
 
 from impact.config.load import json_schema, parse_config, read_config
 from impact.config.quantities import DISTRIBUTION_FORMS

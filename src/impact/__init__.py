@@ -2,107 +2,102 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from ._version import __version__ as __version__
 
 if TYPE_CHECKING:
     from .api import (
-        bless,
-        calibrate,
-        check_model,
-        compare,
-        estimate,
-        expand,
-        explore,
-        export,
-        export_codes,
-        extend,
-        extend_to_file,
-        info,
-        init,
-        load,
-        materials,
-        merge,
-        models,
-        plot,
-        plot_to_files,
-        recommend,
-        report,
-        rerun,
-        run,
-        save,
-        schema,
-        sensitivity,
-        solve,
-        sweep,
-        sweep_shard,
-        sweep_to_file,
-        timestep,
+        calibrate as calibrate,
+        check_model as check_model,
+        estimate as estimate,
+        expand as expand,
+        explore as explore,
+        export as export,
+        export_codes as export_codes,
+        extend as extend,
+        extend_to_file as extend_to_file,
+        info as info,
+        init as init,
+        materials as materials,
+        merge as merge,
+        models as models,
+        plot as plot,
+        plot_to_files as plot_to_files,
+        recommend as recommend,
+        report as report,
+        rerun as rerun,
+        run as run,
+        schema as schema,
+        sensitivity as sensitivity,
+        solve as solve,
+        sweep as sweep,
+        sweep_shard as sweep_shard,
+        sweep_to_file as sweep_to_file,
+        timestep as timestep,
     )
-    from .comparison.verdict import Verdict
-    from .contact.evidence import Evidence
-    from .contact.model import ForceModel, Parameter
-    from .contact.models.hysteresis import hysteresis
-    from .contact.powers import power
-    from .errors import ImpactError
-    from .progress_display import progress_bar
+    from .comparison.bless import bless as bless
+    from .comparison.compare import compare as compare
+    from .comparison.verdict import Verdict as Verdict
+    from .contact.evidence import Evidence as Evidence
+    from .contact.model import ForceModel as ForceModel, Parameter as Parameter
+    from .contact.models.hysteresis import hysteresis as hysteresis
+    from .contact.powers import power as power
+    from .errors import ImpactError as ImpactError
+    from .progress_display import progress_bar as progress_bar
+    from .results.backend import load as load, save as save
 
-__all__ = [
-    "Evidence",
-    "ForceModel",
-    "ImpactError",
-    "Parameter",
-    "Verdict",
-    "bless",
-    "calibrate",
-    "check_model",
-    "compare",
-    "estimate",
-    "expand",
-    "explore",
-    "export",
-    "export_codes",
-    "extend",
-    "extend_to_file",
-    "hysteresis",
-    "info",
-    "init",
-    "load",
-    "materials",
-    "merge",
-    "models",
-    "plot",
-    "plot_to_files",
-    "power",
-    "progress_bar",
-    "recommend",
-    "report",
-    "rerun",
-    "run",
-    "save",
-    "schema",
-    "sensitivity",
-    "solve",
-    "sweep",
-    "sweep_shard",
-    "sweep_to_file",
-    "timestep",
-]
+# the module of each public name, which is imported on first use: `import impact` and `impact --help` need no numpy
+_MODULES = {
+    "Evidence": "contact.evidence",
+    "ForceModel": "contact.model",
+    "ImpactError": "errors",
+    "Parameter": "contact.model",
+    "Verdict": "comparison.verdict",
+    "bless": "comparison.bless",
+    "calibrate": "api",
+    "check_model": "api",
+    "compare": "comparison.compare",
+    "estimate": "api",
+    "expand": "api",
+    "explore": "api",
+    "export": "api",
+    "export_codes": "api",
+    "extend": "api",
+    "extend_to_file": "api",
+    "hysteresis": "contact.models.hysteresis",
+    "info": "api",
+    "init": "api",
+    "load": "results.backend",
+    "materials": "api",
+    "merge": "api",
+    "models": "api",
+    "plot": "api",
+    "plot_to_files": "api",
+    "power": "contact.powers",
+    "progress_bar": "progress_display",
+    "recommend": "api",
+    "report": "api",
+    "rerun": "api",
+    "run": "api",
+    "save": "results.backend",
+    "schema": "api",
+    "sensitivity": "api",
+    "solve": "api",
+    "sweep": "api",
+    "sweep_shard": "api",
+    "sweep_to_file": "api",
+    "timestep": "api",
+}
+__all__ = list(_MODULES)
 
+if not TYPE_CHECKING:
 
-def __getattr__(name: str) -> Any:
-    # loads the submodules on first use: `import impact` and `impact --help` need neither numpy nor more
-    if name == "progress_bar":
-        # rich is not needed otherwise
-        from .progress_display import progress_bar
-
-        return progress_bar
-    if name in __all__:
-        from . import api
-
-        return getattr(api, name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    def __getattr__(name: str) -> Any:
+        if name not in _MODULES:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        return getattr(import_module(f".{_MODULES[name]}", __name__), name)
 
 
 def __dir__() -> list[str]:

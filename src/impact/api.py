@@ -23,8 +23,7 @@ from .config.load import json_schema, read_config
 
 # a name imported "as itself" is public, see `impact.__all__`
 from .contact.evidence import Evidence as Evidence
-from .contact.model import ForceModel as ForceModel
-from .contact.model import Parameter as Parameter
+from .contact.model import ForceModel as ForceModel, Parameter as Parameter
 from .contact.models import catalogue, find
 from .contact.models.hysteresis import hysteresis as hysteresis
 from .contact.powers import power as power
@@ -35,11 +34,8 @@ from .engine.plan import Plan
 from .engine.plugins import Plugins, read_plugins
 from .engine.progress import Progress, ProgressCallback
 from .engine.trajectories import check_count
-from .errors import ImpactError as ImpactError
-from .errors import UnfinishedError, UsageError, did_you_mean
-from .results.backend import check_outputs, open_result, write_file
-from .results.backend import load as load
-from .results.backend import save as save
+from .errors import ImpactError as ImpactError, UnfinishedError, UsageError, did_you_mean
+from .results.backend import check_outputs, load as load, open_result, save as save, write_file
 from .results.extend import extend as extend_result
 from .results.kinds import is_calibration, require_sweep
 from .results.plausibility import material_notes
@@ -47,11 +43,8 @@ from .results.provenance import config_of_part, stored_config
 from .results.ranking import Ranking, ranking
 from .results.replay_command import command_start
 from .results.selection import model_positions, select
-from .results.shards import Shard, ShardProgress
-from .results.shards import merge as merge_shards
-from .results.shards import sweep_shard as write_shard
-from .results.single_impact import STARTER_CONFIG, histories, run_single_impact, single_point
-from .results.single_impact import Impact as Impact
+from .results.shards import Shard, ShardProgress, merge as merge_shards, sweep_shard as write_shard
+from .results.single_impact import STARTER_CONFIG, Impact as Impact, histories, run_single_impact, single_point
 from .results.summary import SweepOutcome, describe
 from .results.sweep import find_finished, sweep_in_memory, sweep_into
 from .text import html_table, safe_text

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import impact
+
 from ..text import safe_text
 from . import exits
 from .console import cell, console, dump, table
@@ -38,9 +40,8 @@ def calibrate(
 
     Intervals are those of 95 % by profile likelihood. A parameter that the data do not determine has none.
     """
-    from .. import api
 
-    result = api.calibrate(
+    result = impact.calibrate(
         config,
         output=output,
         best=best,

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+import impact
+
 from ..errors import ImpactError, UsageError
 from ..text import safe_text
 from . import exits
@@ -58,12 +60,11 @@ def compare(
     plot: PlotOption = None,
 ) -> None:
     """Compare a result with a baseline: exit 0 if equal, 1 if not (the first line says why), 2 on an error."""
-    from .. import api
     from ..comparison import formats
 
     _check_plot(plot, new, baseline)
     try:
-        verdict = api.compare(new, baseline, tol=dict(tol or ()) or None, subset=subset)
+        verdict = impact.compare(new, baseline, tol=dict(tol or ()) or None, subset=subset)
     except ImpactError as error:
         _print_report(formats.report_of_error(str(new), str(baseline), str(error)), format)
         raise
@@ -80,14 +81,13 @@ def bless(
     ] = False,
 ) -> None:
     """Show how a result differs from its baseline, then replace the baseline by it."""
-    from .. import api
 
     def show(verdict: Verdict) -> None:
         print_verdict(verdict)
         sys.stdout.flush()
 
     try:
-        verdict = api.bless(
+        verdict = impact.bless(
             new, baseline, reason=reason, tol=dict(tol or ()) or None, allow_failed=allow_failed, show=show
         )
     except (BrokenPipeError, SystemExit):
@@ -110,17 +110,18 @@ def rerun(
 ) -> None:
     """Repeat a sweep or a calibration from its result alone, and compare the new values with the stored ones."""
     with exits.catch_signals() as should_stop:
-        from .. import api
         from ..comparison import formats
         from ..progress_display import progress_bar
 
         def run_plan(plan: Plan) -> xr.Dataset:
             with progress_bar(exits.print_line, quiet=quiet) as on_progress:
-                return api.execute(plan, on_progress=on_progress, should_stop=should_stop)
+                from ..api import execute
+
+                return execute(plan, on_progress=on_progress, should_stop=should_stop)
 
         _check_plot(plot, result)
         try:
-            verdict = api.rerun(
+            verdict = impact.rerun(
                 result,
                 plugins=plugins or (),
                 tol=dict(tol or ()) or None,

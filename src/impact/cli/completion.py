@@ -11,6 +11,8 @@ from typing import Any
 
 import typer
 
+import impact
+
 
 def complete_model(incomplete: str) -> list[str]:
     """The keys of models, of those in installed packages too."""
@@ -122,13 +124,12 @@ def _inputs(context: typer.Context) -> list[str]:
 
 
 def _axes(context: typer.Context) -> list[str]:
-    from .. import api
     from ..errors import ImpactError
 
     # an option without its value yet leaves the arguments unparsed
     for path in filter(None, (context.params.get("result"), *context.args)):
         try:
-            return [str(name) for name in api.load(path).dims if name != "model"]
+            return [str(name) for name in impact.load(path).dims if name != "model"]
         except (OSError, ImpactError):
             continue
     return []

@@ -8,6 +8,8 @@ from typing import Annotated
 
 import typer
 
+import impact
+
 from ..text import safe_text
 from . import exits
 from .options import OverwriteOption
@@ -18,9 +20,8 @@ def init(
     overwrite: OverwriteOption = False,
 ) -> None:
     """Write a commented starter config, ready to sweep."""
-    from .. import api
 
-    api.init(path, overwrite=overwrite)
+    impact.init(path, overwrite=overwrite)
     exits.print_line(f"{safe_text(str(path))}: written; next: impact sweep {safe_text(str(path))}")
 
 
@@ -29,9 +30,8 @@ def schema(
     overwrite: OverwriteOption = False,
 ) -> None:
     """Print the JSON Schema of a config, for completion and validation in editors."""
-    from .. import api
 
-    json_schema = api.schema(output, overwrite=overwrite)
+    json_schema = impact.schema(output, overwrite=overwrite)
     if output is None:
         print(json.dumps(json_schema, indent=2, ensure_ascii=False))
     else:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import impact
+
 from ..errors import UsageError
 from ..formatting import decimals, number
 from ..text import safe_text
@@ -79,14 +81,13 @@ def export(
 
     With --verify, exit 1 if the code delivers another e, exit 2 if it is not installed.
     """
-    from .. import api
 
     if show_codes:
         _print_codes(as_json)
         return exits.EXIT_OK
     if to is None:
         raise UsageError("--to: expected a code; impact export --list shows them")
-    result = api.export(
+    result = impact.export(
         to,
         model,
         source=source,
@@ -180,9 +181,8 @@ def _print_verification(result: Export, verification: Verification) -> None:
 
 def _print_codes(as_json: bool) -> None:
     """Print the codes, the laws of each, and what was run."""
-    from .. import api
 
-    codes = api.export_codes()
+    codes = impact.export_codes()
     if as_json:
         print(dump(codes))
         return

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+import impact
+
 from ..text import safe_text
 from . import exits
 from .executor_options import ExecutorOptions
@@ -36,9 +38,7 @@ def expand(
 ) -> None:
     """Write all values of a result, or of a part of it, as netCDF for programs that do not use impact."""
     with exits.catch_signals() as should_stop:
-        from .. import api
-
-        points = api.expand(
+        points = impact.expand(
             result,
             output,
             sel=dict(sel or ()),
@@ -76,13 +76,12 @@ def extend(
 ) -> None:
     """Add values to the axes of a result; only what it does not hold is integrated."""
     with exits.catch_signals() as should_stop:
-        from .. import api
         from ..progress_display import progress_bar
         from . import summary
 
         executor = ExecutorOptions(jobs, threads)
         with progress_bar(exits.print_line, quiet=quiet) as on_progress:
-            outcome = api.extend_to_file(
+            outcome = impact.extend_to_file(
                 result,
                 sets,
                 output=output,

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import impact
+
 from ..formatting import label, number
 from .console import cell, console, dump, print_rows, table
 from .options import JsonOption
@@ -36,20 +38,18 @@ def info(
     as_json: JsonOption = False,
 ) -> None:
     """Show the axes, variables, largest errors and provenance of a file."""
-    from .. import api
     from ..results.backend import open_result
 
     # not loaded, so that a summary in the file is used
     with open_result(file) as dataset:
         if as_json:
-            print(dump(api.info(dataset)))
+            print(dump(impact.info(dataset)))
         else:
             print_info(dataset, file)
 
 
 def print_info(dataset: xr.Dataset, path: Path) -> None:
     """Print the contents of a file of any size; "–" where a summary would evaluate too many points."""
-    from .. import api
     from ..results.attributes import read_attribute
     from ..results.kinds import is_calibration, is_sensitivity
     from ..results.schema import exponents_of, plain_unit
@@ -57,7 +57,7 @@ def print_info(dataset: xr.Dataset, path: Path) -> None:
     from .sensitivity import print_studies
     from .summary import worst_errors
 
-    description = api.info(dataset)
+    description = impact.info(dataset)
     attributes = dataset.attrs
     sizes = " × ".join(f"{name} {size}" for name, size in description["dimensions"].items())
     rows: dict[str, Any] = {"file": path, "title": attributes.get("title", ""), "dimensions": sizes}

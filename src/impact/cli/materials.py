@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+import impact
+
 from ..errors import UsageError, did_you_mean
 from ..text import safe_text
 from .console import dump
@@ -21,9 +23,8 @@ def materials(
     as_json: JsonOption = False,
 ) -> None:
     """List common materials, which need no table in a config: E, nu, rho, yield strength, source."""
-    from .. import api
 
-    catalogue = api.materials()
+    catalogue = impact.materials()
     if name is not None and name not in catalogue:
         raise UsageError(f'no material "{safe_text(name)}"; {did_you_mean(name, list(catalogue))}')
     shown = catalogue if name is None else {name: catalogue[name]}

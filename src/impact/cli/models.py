@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import impact
+
 from ..formatting import decimals, number
 from ..text import with_year
 from . import exits
@@ -64,7 +66,6 @@ def models(
     as_json: JsonOption = False,
 ) -> None:
     """List the contact force models: equations, references, domains, delivered restitution."""
-    from .. import api
     from ..contact.models import find
     from ..engine.plugins import read_plugins
 
@@ -77,7 +78,7 @@ def models(
         return
     is_pattern = key is None or search is not None or key.startswith("family:") or bool({*"*?["} & {*key})
     if is_pattern:
-        chosen = list(api.models(plugins or (), pattern=key or "*", family=family, search=search).values())
+        chosen = list(impact.models(plugins or (), pattern=key or "*", family=family, search=search).values())
     else:
         chosen = [find(str(key), read_plugins(plugins or ()).models)]
     if as_json:
@@ -239,9 +240,7 @@ def _check_contract(models: Sequence[ForceModel], *, as_json: bool) -> None:
     """Print the outcome of every clause of the contract; exit 1 if one fails."""
     from rich.text import Text
 
-    from .. import api
-
-    findings_by_model = [(model, api.check_model(model)) for model in models]
+    findings_by_model = [(model, impact.check_model(model)) for model in models]
     broken = [finding for _, findings in findings_by_model for finding in findings if not finding.holds]
     if as_json:
         print(

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+import impact
+
 from ..errors import UsageError
 from ..plots.kinds import KINDS, WIDTHS
 from ..text import safe_text
@@ -131,9 +133,8 @@ def plot(
     Of several kinds, those that --sel leaves no axis are drawn over the whole axis, and those that do not apply
     are reported with the reason.
     """
-    from .. import api
 
-    files = api.plot_to_files(
+    files = impact.plot_to_files(
         result,
         output,
         kinds=kind or (),

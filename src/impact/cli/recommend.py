@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import impact
+
 from .console import dump
 from .options import JsonOption, ModelOption, ResultArgument, SelectOption
 from .params import parse_number
@@ -31,9 +33,8 @@ def recommend(
     as_json: JsonOption = False,
 ) -> None:
     """Rank the models of a result by the error of their restitution over the swept range."""
-    from .. import api
 
-    ranking = api.recommend(api.load(result), tol=tol, sel=dict(sel or ()), models=model)
+    ranking = impact.recommend(impact.load(result), tol=tol, sel=dict(sel or ()), models=model)
     if as_json:
         print(dump(ranking_json(ranking)))
     else:

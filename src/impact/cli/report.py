@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+import impact
+
 from ..text import safe_text
 from . import exits
 from .options import OverwriteOption, PluginOption
@@ -24,10 +26,9 @@ def report(
 
     The page is a single file. It needs no network and runs no scripts.
     """
-    from .. import api
 
     output = output or result.with_suffix(".html")
-    page = api.report(result, output=output, overwrite=overwrite, plugins=plugin or ())
+    page = impact.report(result, output=output, overwrite=overwrite, plugins=plugin or ())
     figures = page.count("<figure>")
     size = f"{len(page.encode()) / 1000:,.0f} kB"
     exits.print_line(f"{safe_text(str(output))}: {figures} figure{'' if figures == 1 else 's'}, {size}")

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import impact
+
 from ..errors import UsageError
 from ..text import safe_text
 from . import exits
@@ -54,7 +56,6 @@ def run(
     as_json: JsonOption = False,
 ) -> None:
     """Run one impact: inputs, outputs and estimated errors."""
-    from .. import api
     from ..contact.status import FIRST_FAILURE
     from ..plots.data import encode_history
     from ..results import backend
@@ -68,39 +69,39 @@ def run(
             *most, last = HISTORY_SUFFIXES
             expected = f"expected a name that ends in {', '.join(most)} or {last}"
             raise UsageError(f"--history {safe_text(str(history))}: {expected}")
-    impact = api.run(
+    result = impact.run(
         source, model=model, at=dict(at or ()), overrides=sets or (), plugins=plugins or (), times=times
     )
     if as_json:
-        print(dump(run_json(impact)))
+        print(dump(run_json(result)))
     else:
-        print_rows(impact.rows())
-    if impact.status >= FIRST_FAILURE:
+        print_rows(result.rows())
+    if result.status >= FIRST_FAILURE:
         raise typer.Exit(exits.EXIT_POINTS_FAILED)
     if history is not None:
-        if impact.history is None:
-            raise UsageError(f"no history to store: {impact.why_no_history}")
+        if result.history is None:
+            raise UsageError(f"no history to store: {result.why_no_history}")
         if history.suffix.lower() == ".csv":
-            backend.write_file(history, encode_history(impact.history), overwrite=overwrite)
+            backend.write_file(history, encode_history(result.history), overwrite=overwrite)
         else:
-            api.save(impact.history, history, overwrite=overwrite)
-        exits.print_line(f"{safe_text(str(history))}: {impact.history.sizes['t']} points in time")
+            impact.save(result.history, history, overwrite=overwrite)
+        exits.print_line(f"{safe_text(str(history))}: {result.history.sizes['t']} points in time")
 
 
-def run_json(impact: Impact) -> dict[str, Any]:
+def run_json(result: Impact) -> dict[str, Any]:
     """One impact as plain data."""
     return {
-        "model": impact.model.key,
-        "inputs": dict(impact.point),
-        "first_value_of": list(impact.first),
-        "integrator": impact.integrator,
-        "exponent": impact.exponent,
-        "closing_speed": impact.closing_speed,
-        "outputs": {**impact.values, "status": impact.status.name.lower()},
-        "materials": {name: asdict(material) for name, material in impact.materials.items()},
-        "derived": dict(impact.derived),
-        "damping": impact.damping,
-        "e_kinematic": impact.e_kinematic,
-        "e_kinetic": impact.e_kinetic,
-        "e_energetic": impact.e_energetic,
+        "model": result.model.key,
+        "inputs": dict(result.point),
+        "first_value_of": list(result.first),
+        "integrator": result.integrator,
+        "exponent": result.exponent,
+        "closing_speed": result.closing_speed,
+        "outputs": {**result.values, "status": result.status.name.lower()},
+        "materials": {name: asdict(material) for name, material in result.materials.items()},
+        "derived": dict(result.derived),
+        "damping": result.damping,
+        "e_kinematic": result.e_kinematic,
+        "e_kinetic": result.e_kinetic,
+        "e_energetic": result.e_energetic,
     }

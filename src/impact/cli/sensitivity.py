@@ -62,7 +62,6 @@ def sensitivity(
     """
     outputs = list(dict.fromkeys(of or ["e_out"]))
     with exits.catch_signals() as should_stop:
-        from .. import api
         from ..engine.executors import choose_backend
         from ..progress_display import progress_bar
 
@@ -70,9 +69,13 @@ def sensitivity(
 
         def run_plan(plan: Plan) -> xr.Dataset:
             with progress_bar(exits.print_line, quiet=quiet) as on_progress:
-                return api.execute(plan, backend, on_progress, should_stop)
+                from ..api import execute
 
-        results = api.sensitivities(
+                return execute(plan, backend, on_progress, should_stop)
+
+        from ..api import sensitivities
+
+        results = sensitivities(
             config,
             of=outputs,
             output=output,

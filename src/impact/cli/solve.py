@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import impact
+
 from ..formatting import number, quantity
 from .completion import complete_input, complete_target, complete_unknown
 from .console import cell, console, dump
@@ -65,9 +67,8 @@ def solve(
 
     With --over it is one value: that with the least largest distance from the target over the range.
     """
-    from .. import api
 
-    result = api.solve(
+    result = impact.solve(
         model,
         name,
         dict([target]),

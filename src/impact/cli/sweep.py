@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import impact
+
 from ..errors import UnfinishedError, UsageError
 from ..text import safe_text
 from . import exits
@@ -75,7 +77,6 @@ def sweep(
 ) -> None:
     """Run every model over a sweep and store post-impact velocities and their errors."""
     with exits.catch_signals() as should_stop:
-        from .. import api
         from ..progress_display import progress_bar
         from . import summary
 
@@ -95,7 +96,7 @@ def sweep(
                 raise UsageError(
                     f"--shard {safe_text(shard)}: got --dry-run as well, which estimates the whole sweep"
                 )
-            expected = api.estimate(config, jobs=max(jobs, threads), **inputs)
+            expected = impact.estimate(config, jobs=max(jobs, threads), **inputs)
             if as_json:
                 print(dump(asdict(expected)))
             else:
@@ -107,9 +108,9 @@ def sweep(
         with progress_bar(exits.print_line, quiet=quiet) as on_progress:
             inputs |= {"backend": backend, "on_progress": on_progress, "should_stop": should_stop}
             if shard is not None:
-                done = api.sweep_shard(config, shard, output, overwrite=overwrite, **inputs)
+                done = impact.sweep_shard(config, shard, output, overwrite=overwrite, **inputs)
             else:
-                outcome = api.sweep_to_file(config, output, resume=resume, overwrite=overwrite, **inputs)
+                outcome = impact.sweep_to_file(config, output, resume=resume, overwrite=overwrite, **inputs)
     if shard is not None:
         _print_shard(done, output, quiet=quiet, as_json=as_json)
     else:
@@ -171,12 +172,11 @@ def merge(
 ) -> None:
     """Join the shards of a sweep into its result; the work folders are not deleted."""
     with exits.catch_signals() as should_stop:
-        from .. import api
         from ..progress_display import progress_bar
         from . import summary
 
         with progress_bar(exits.print_line, quiet=quiet) as on_progress:
-            outcome = api.merge(
+            outcome = impact.merge(
                 folders,
                 output,
                 plugins=plugins or (),

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import impact
+
 from ..formatting import decimals, number, quantity
 from . import exits
 from .completion import complete_scheme
@@ -78,9 +80,8 @@ def timestep(
 
     If a phase fails, its step has none of them, and the exit code is 3.
     """
-    from .. import api
 
-    result = api.timestep(
+    result = impact.timestep(
         model,
         source=source,
         at=dict(at or ()),

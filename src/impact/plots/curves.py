@@ -17,8 +17,7 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from ..errors import UsageError
-from ..formatting import heading
-from ..formatting import label as number_label
+from ..formatting import heading, label as number_label
 from ..results.schema import plain_unit
 from ..text import safe_text
 from .data import MEASURED

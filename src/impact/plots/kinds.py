@@ -208,8 +208,7 @@ def draw(
     UsageError : an option is invalid, or does not apply to the picture
     """
     from . import curves, maps, uncertainty
-    from .data import Points as Measured
-    from .data import read_points
+    from .data import Points as Measured, read_points
     from .labels import check_labels, escape_mathtext, pretty_conditions
     from .layout import Picture
     from .style import default_size, length, styled

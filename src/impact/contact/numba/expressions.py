@@ -7,8 +7,7 @@ Formulas of the NumPy back end are `shared` with it.
 from __future__ import annotations
 
 from ...ode import events, maximum, rk45
-from ...ode.tableau import A as FRACTIONS
-from ...ode.tableau import E as DIFFERENCES
+from ...ode.tableau import A as FRACTIONS, E as DIFFERENCES
 from .. import force_expressions, motion, velocity_coordinates
 from .dispatch import END_AT_GAP, END_AT_NO_FORCE, END_AT_PEAK, EQ_DAMPED, EQ_DRAGGED, EQ_FORCE, EQ_LOG, EQ_SPRING
 from .simd_math import exponential, inlined, shared, whole_power
