@@ -13,12 +13,12 @@ import impact
 from impact.api import prepare
 from impact.config.load import read_config
 from impact.contact.impacts import Impacts
+from impact.contact.variables import BY_DEFAULT
 from impact.engine import trajectories as trajectories_module
 from impact.engine.build_impacts import build_impacts
 from impact.engine.plan import Plan
 from impact.engine.trajectories import trajectory_maps
 from impact.results.estimate import estimate
-from impact.results.schema import SCHEMA
 
 from .conftest import ROOT
 
@@ -103,7 +103,7 @@ def sweep_with_plugins(config: dict[str, object], *overrides: str) -> xr.Dataset
 
 
 def assert_same_bits(first: xr.Dataset, second: xr.Dataset) -> None:
-    for name in (variable.name for variable in SCHEMA if variable.by_default):
+    for name in BY_DEFAULT:
         assert first[name].values.tobytes() == second[name].values.tobytes(), name
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from pydantic import ValidationError
 
-from ..contact.outputs import BY_DEFAULT
+from ..contact.variables import BY_DEFAULT
 from .quantities import MAX_PROBLEMS, ConfigProblem, KeyPath, Names, Numbers, Quantity, Range, show, suggest
 
 # default limit of the points of all models together

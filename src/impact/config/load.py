@@ -16,8 +16,8 @@ from ..contact.materials import Material
 from ..contact.model import ForceModel
 from ..contact.models import catalogue
 from ..contact.numba.dispatch import is_installed
-from ..contact.outputs import BY_DEFAULT
 from ..contact.timestep import EXACT
+from ..contact.variables import BY_DEFAULT
 from ..errors import ConfigError
 from .cases import expand_cases, inline_files, named_files
 from .design import design_problems, distribution_paths, draw_columns, unit_samples

@@ -26,7 +26,6 @@ from ..plots.kinds import Choice
 from ..results.attributes import read_attribute
 from ..results.calibration import (
     FIT_HEADINGS,
-    FIT_STATUSES,
     calibration_title,
     describe_data,
     fit_notes,
@@ -36,7 +35,7 @@ from ..results.kinds import is_calibration, is_sensitivity
 from ..results.plausibility import depth_summary, material_notes, result_notes
 from ..results.ranking import Ranking, ranking
 from ..results.replay_command import describe_point
-from ..results.schema import count_points, exponents_of, is_input
+from ..results.schema import FIT_STATUSES, count_points, exponents_of, is_input
 from ..results.sensitivity import INDEX_HEADINGS, describe_design, describe_study, index_rows, iterate_studies
 from ..results.slabs import MAX_SUMMARY_POINTS, is_large
 from ..results.summary import Summary, extremes_of, summarize

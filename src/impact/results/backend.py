@@ -20,13 +20,13 @@ from xarray.backends import BackendEntrypoint
 from ..atomic import Sink, atomic_write
 from ..config.files import RESULT_MAGIC
 from ..config.tables import Output
+from ..contact.variables import OUTPUTS
 from ..errors import ResultError, UnfinishedError, UsageError
 from ..text import safe_text
 from .expand import TrajectoryTable, in_memory, lazy_dataset
 from .factored import check_witnesses, stored_table, witness_variables
 from .hdf5_structure import ReadBytes, byte_reader, check_root
 from .netcdf import StoredArray, open_for_writing, read_variables
-from .schema import SCHEMA
 from .seal import check_seal, write_seal
 from .slabs import slabs
 from .validation import FACTORED_ATTRIBUTES, TABLE_VARIABLES, is_quantity, schema_violation
@@ -310,9 +310,9 @@ def load(path: str | Path) -> xr.Dataset:
                 return dataset.load()
             # all variables of a slab together: they share most of the computation
             variables = [
-                replace(variable, dtype=dataset[variable.name].dtype.str[1:])
-                for variable in SCHEMA
-                if variable.name in dataset
+                replace(variable, dtype=dataset[name].dtype.str[1:])
+                for name, variable in OUTPUTS.items()
+                if name in dataset
             ]
             return in_memory(dataset, table, variables)
         except MemoryError:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ..atomic import atomic_write
 from ..contact.impacts import Impacts
 from ..contact.simulate import TABLE_COLUMNS, CollisionResult
+from ..contact.variables import Variable
 from ..engine.checkpoint import WorkFolder, open_work_folder, partial_file_of, remove_work_folder, work_folder_of
 from ..engine.execute import FindReused, integrate_ranges, never_stop, with_core
 from ..engine.executors import SERIAL, Backend
@@ -36,7 +37,7 @@ from .backend import MAX_LOADED_BYTES, check_output, check_readable, open_result
 from .expand import TrajectoryTable, expanded_slabs, in_memory, lazy_dataset, table_of
 from .factored import check_factored, factored_template, table_values
 from .netcdf import MAX_LABEL_BYTES, encode_text, is_text
-from .schema import SchemaVariable, dataset_template, plan_coordinates, stored_variables
+from .schema import dataset_template, plan_coordinates, stored_variables
 from .summary import Summary, SweepOutcome, summarize, summarize_table, summary_record
 from .validation import is_name
 
@@ -359,7 +360,7 @@ def store_result(
     return SweepOutcome(whole, summary, at.of_trajectories)
 
 
-def _summarize_points(table: TrajectoryTable, variables: Sequence[SchemaVariable]) -> Summary:
+def _summarize_points(table: TrajectoryTable, variables: Sequence[Variable]) -> Summary:
     """Summarize a trajectory table point by point; unlike `summarize` this has the radii."""
     summary = Summary()
     for model, where, impacts, values in expanded_slabs(table, variables):
