@@ -19,6 +19,7 @@ from ..engine.plan import owner_of
 from ..errors import UsageError
 from ..formatting import label, number, percentage
 from ..text import html_table, safe_text
+from .kinds import require_sweep
 from .replay_command import describe_point
 from .schema import columns_along, foreign_dims, own_dims
 from .selection import model_positions, select
@@ -161,14 +162,15 @@ class Ranking:
         return html_table(self.headings, (ranked.row for ranked in self.models), self.headline)
 
 
-def ranking(
+def recommend(
     dataset: xr.Dataset,
+    *,
     tol: float = 0.01,
     sel: Mapping[str, float | str] | None = None,
     models: Sequence[str] | None = None,
     max_points: int = MAX_RANKED_POINTS,
 ) -> Ranking:
-    """Rank the models of a result by how well they deliver the target restitution.
+    """Rank the models of a result by the error of their restitution, over all points of the sweep.
 
     The criterion is |e_out - e| at all points with a target e and an impact. A point that failed, or whose target
     e is below 0 (1 - alpha v0 < 0), counts as not within the tolerance. The values of a model's own parameters are
@@ -179,16 +181,26 @@ def ranking(
     Parameters
     ----------
     dataset : a result
-    tol : tolerance of |e_out - e|
-    sel : values of axes, by name
+    tol : largest accepted |e_out - e|
+    sel : values of axes, such as `{"m2": 1.0}`; by default all values of an axis are ranked
     models : keys of the models to rank; by default all
-    max_points : limit of the points to evaluate of a lazy result
+    max_points : limit of the different points of a result that is computed when it is read
+
+    Returns
+    -------
+    Ranking : the models, the best first; `ranking.best` are those within the tolerance at all points
 
     Raises
     ------
-    UsageError : the result has no target e, lacks a model or value that is selected, or has too many points; or
-        tol is not positive
+    UsageError : the result has no requested e, or lacks what the arguments select, or has too many points; tol is
+        not a positive finite number
+
+    >>> import impact
+    >>> result = impact.sweep("configs/figure6.toml")
+    >>> print(impact.recommend(result, models=["gharib-hurmuzlu-2012"]).headline)
+    no model gives e within 0.01 everywhere; gharib-hurmuzlu-2012 is nearest: 25.7% of 101 points
     """
+    require_sweep(dataset, "recommend")
     _check_rankable(dataset, tol)
     chosen = model_positions(models, dataset) if models else range(dataset.sizes["model"])
     selected = select(dataset[list(RANKED_VARIABLES)], sel or {})
