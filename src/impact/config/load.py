@@ -233,7 +233,7 @@ class _Reader:
         if config is None or override_problems or file_problems:
             if text is not None and not text.lstrip().startswith("{"):
                 locations = replace(locations, lines=key_lines(text))
-            raise ConfigError([*problem_lines(problems, locations), *file_problems, *override_problems])
+            raise ConfigError(*problem_lines(problems, locations), *file_problems, *override_problems)
         return replace(config, files=files)
 
     def _build_config(

@@ -237,7 +237,7 @@ def _read_values(
             except ConfigError as error:
                 problems += error.problems
     if problems:
-        raise ConfigError(problems[:MAX_PROBLEMS])
+        raise ConfigError(*problems[:MAX_PROBLEMS])
     return values, [line for line, _ in next(iter(table.cells.values()))]
 
 
