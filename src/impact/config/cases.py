@@ -22,7 +22,7 @@ from ..contact.model import ForceModel
 from ..contact.outputs import UNITS
 from ..errors import ConfigError
 from ..text import safe_text
-from .files import MAX_OVERRIDE_LENGTH, as_table, read_text, set_value, toml_key, toml_text
+from .files import as_table, override_text, read_text, set_value
 from .grid import name_of, path_of
 from .quantities import MAX_PROBLEMS, ConfigProblem, KeyPath, Quantity, mismatch_error, show, suggest
 from .tables import MATERIAL_KEYS, MATERIAL_QUANTITIES, SWEEP_QUANTITIES, model_quantities, quantity_at
@@ -256,7 +256,7 @@ def inline_files(
 
     def store_values(path: KeyPath, value: object) -> None:
         nonlocal data
-        overrides.append(values_override(path, value))
+        overrides.append(override_text(path, value))
         data, _ = set_value(data, path, value)
 
     cases = as_table(data.get("sweep")).get("cases")
@@ -284,19 +284,6 @@ def inline_files(
         except KeyError:
             continue  # an unknown key is reported with the others
     return dict(data), overrides, list(dict.fromkeys(problems))
-
-
-def values_override(path: KeyPath, value: object) -> str:
-    """The override that sets the values of a file.
-
-    Raises
-    ------
-    ConfigError : it is too long
-    """
-    text = f"{'.'.join(toml_key(str(part)) for part in path)}={toml_text(value)}"
-    if len(text) > MAX_OVERRIDE_LENGTH:
-        raise ConfigError(f"{path[-1]}: larger than {MAX_OVERRIDE_LENGTH:,} characters")
-    return text
 
 
 def _read_cases(

@@ -191,13 +191,45 @@ def toml_key(name: str) -> str:
     return name if re.fullmatch(BARE_KEY, name) else toml_text(name)
 
 
+def toml_path(path: KeyPath) -> str:
+    """A dotted TOML key.
+
+    >>> toml_path(("materials", "steel.2", "E"))
+    'materials."steel.2".E'
+    """
+    return ".".join(toml_key(str(part)) for part in path)
+
+
+def toml_document(tables: Mapping[KeyPath, Mapping[str, object]]) -> str:
+    """A TOML text with a table of values at each path; those at the path () come first, without a header.
+
+    >>> print(toml_document({(): {"title": "a"}, ("model", "hertz"): {"K": 1e6}}), end="")
+    title = "a"
+    <BLANKLINE>
+    [model.hertz]
+    K = 1000000.0
+    """
+    blocks = []
+    for path, values in tables.items():
+        header = [f"[{toml_path(path)}]"] if path else []
+        blocks.append([*header, *(f"{toml_key(name)} = {toml_text(value)}" for name, value in values.items())])
+    return "\n\n".join(map("\n".join, blocks)) + "\n"
+
+
 def override_text(path: KeyPath, value: object) -> str:
     """An override that sets a value.
+
+    Raises
+    ------
+    ConfigError : it is too long
 
     >>> override_text(("materials", "steel.2", "E"), [2e11])
     'materials."steel.2".E=[200000000000.0]'
     """
-    return f"{'.'.join(toml_key(str(part)) for part in path)}={toml_text(value)}"
+    text = f"{toml_path(path)}={toml_text(value)}"
+    if len(text) > MAX_OVERRIDE_LENGTH:
+        raise ConfigError([f"{path[-1]}: larger than {MAX_OVERRIDE_LENGTH:,} characters"])
+    return text
 
 
 def apply_overrides(
