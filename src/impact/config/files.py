@@ -228,7 +228,7 @@ def override_text(path: KeyPath, value: object) -> str:
     """
     text = f"{toml_path(path)}={toml_text(value)}"
     if len(text) > MAX_OVERRIDE_LENGTH:
-        raise ConfigError([f"{path[-1]}: larger than {MAX_OVERRIDE_LENGTH:,} characters"])
+        raise ConfigError(f"{path[-1]}: larger than {MAX_OVERRIDE_LENGTH:,} characters")
     return text
 
 
