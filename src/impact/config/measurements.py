@@ -24,9 +24,8 @@ from .cases import (
     input_values,
     read_csv,
     unknown_input_message,
-    values_override,
 )
-from .files import as_table, set_value
+from .files import as_table, override_text, set_value
 from .grid import name_of, path_of
 from .quantities import MAX_PROBLEMS, ConfigProblem, KeyPath, Quantity, show, suggest, value_error
 from .tables import LOSSES, MATERIAL_KEYS, MAX_MEASURED, MIN_SIGMA, NOISES, quantity_at
@@ -183,7 +182,7 @@ def inline_measurements(
         table_of_file = read_csv(folder / file, partial(column_quantity, models=models))
         values, lines = _read_values(table_of_file, data, models, n)
         stored: dict[KeyPath, object] = {("data", "columns"): values, ("data", "lines"): lines}
-        overrides = [values_override(path, value) for path, value in stored.items()]
+        overrides = [override_text(path, value) for path, value in stored.items()]
     except ConfigError as error:
         return dict(data), [], list(error.problems)
     for path, value in stored.items():
@@ -237,7 +236,7 @@ def _read_values(
             except ConfigError as error:
                 problems += error.problems
     if problems:
-        raise ConfigError(problems[:MAX_PROBLEMS])
+        raise ConfigError(*problems[:MAX_PROBLEMS])
     return values, [line for line, _ in next(iter(table.cells.values()))]
 
 
