@@ -29,6 +29,8 @@ from .slabs import Slab, distinct_points, is_computed, over_varying_dims, slabs,
 MAX_RANKED_POINTS = 2**30
 # combinations of the values of a law's own parameters
 MAX_PARAMETER_COMBINATIONS = 2**24
+# accepted |e_out - e|
+DEFAULT_TOL = 0.01
 RANKED_VARIABLES = ("e_error", "status")
 # ranges of e that a table lists
 MAX_RANGES = 8
@@ -165,10 +167,9 @@ class Ranking:
 def recommend(
     dataset: xr.Dataset,
     *,
-    tol: float = 0.01,
+    tol: float = DEFAULT_TOL,
     sel: Mapping[str, float | str] | None = None,
     models: Sequence[str] | None = None,
-    max_points: int = MAX_RANKED_POINTS,
 ) -> Ranking:
     """Rank the models of a result by the error of their restitution, over all points of the sweep.
 
@@ -184,7 +185,6 @@ def recommend(
     tol : largest accepted |e_out - e|
     sel : values of axes, such as `{"m2": 1.0}`; by default all values of an axis are ranked
     models : keys of the models to rank; by default all
-    max_points : limit of the different points of a result that is computed when it is read
 
     Returns
     -------
@@ -201,26 +201,41 @@ def recommend(
     no model gives e within 0.01 everywhere; gharib-hurmuzlu-2012 is nearest: 25.7% of 101 points
     """
     require_sweep(dataset, "recommend")
-    _check_rankable(dataset, tol)
+    return rank_models(rankable_parts(dataset, sel or {}, models), tol)
+
+
+def rankable_parts(
+    dataset: xr.Dataset,
+    sel: Mapping[str, float | str],
+    models: Sequence[str] | None,
+    max_points: int = MAX_RANKED_POINTS,
+) -> list[xr.Dataset]:
+    """Select the part of each model to rank; refuse a result that lacks a target e or has too many points."""
+    _check_rankable(dataset)
     chosen = model_positions(models, dataset) if models else range(dataset.sizes["model"])
-    selected = select(dataset[list(RANKED_VARIABLES)], sel or {})
-    by_model = [_select_model(selected, position) for position in chosen]
-    evaluated = [_reduce_dims(of_model)[0] for of_model in by_model if is_computed(of_model.variables["e_error"])]
-    points = sum(math.prod(of_model.sizes.values()) for of_model in evaluated)
+    selected = select(dataset[list(RANKED_VARIABLES)], sel)
+    parts = [_select_model(selected, position) for position in chosen]
+    evaluated = [_reduce_dims(part)[0] for part in parts if is_computed(part.variables["e_error"])]
+    points = sum(math.prod(part.sizes.values()) for part in evaluated)
     if points > max_points:
         raise UsageError(
             f"got {points:,} different points to rank, expected at most {max_points:,}; select values of axes"
         )
-    ranked = [_rank_model(of_model, tol) for of_model in by_model]
+    return parts
+
+
+def rank_models(parts: Sequence[xr.Dataset], tol: float) -> Ranking:
+    """Rank models by their parts of a result; refuse parts without any point to rank."""
+    if not 0.0 < tol < math.inf:
+        raise UsageError(f"tol: got {tol:g}, expected a positive finite number")
+    ranked = [_rank_model(part, tol) for part in parts]
     if not any(model.points for model in ranked):
         raise UsageError("nothing to rank: no point has both a requested e and an impact")
     return Ranking(tol, tuple(sorted(ranked, key=_rank_key)))
 
 
-def _check_rankable(dataset: xr.Dataset, tol: float) -> None:
-    """Refuse a dataset or a tolerance by which models cannot be ranked."""
-    if not 0.0 < tol < math.inf:
-        raise UsageError(f"tol: got {tol:g}, expected a positive finite number")
+def _check_rankable(dataset: xr.Dataset) -> None:
+    """Refuse a dataset by which models cannot be ranked."""
     if "t" in dataset.dims:
         raise UsageError("got a time history, expected the result of a sweep")
     if "model" not in dataset.dims:
