@@ -13,14 +13,13 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ..array_types import Mask
-from ..config.grid import path_of
+from ..config.input_names import InputName
 from ..contact.status import FIRST_FAILURE, Status
-from ..engine.plan import owner_of
 from ..errors import UsageError
 from ..formatting import label, number, percentage
 from ..text import html_table, safe_text
 from .replay_command import describe_point
-from .schema import columns_along, foreign_dims, own_dims
+from .schema import columns_along, foreign_dims
 from .selection import model_positions, select
 from .slabs import Slab, distinct_points, is_computed, over_varying_dims, slabs, varying_dims
 
@@ -299,10 +298,16 @@ def _best_parameters(of_model: xr.Dataset, parameter_dims: Sequence[Hashable], t
     return dict(zip(parameter_dims, (int(at) for at in np.unravel_index(best, shape)), strict=True))
 
 
+def _varies_parameters(of_model: xr.Dataset, dim: Hashable) -> bool:
+    """Whether only parameters of the model, and perhaps of others, vary along a dimension."""
+    models = {InputName.parse(name).model for name in columns_along(of_model, dim)}
+    return str(of_model["model"].item()) in models and "" not in models
+
+
 def _rank_model(of_model: xr.Dataset, tol: float) -> Ranked:
     """The rank of a model, from its e_error and status and from the target e."""
     key = str(of_model["model"].item())
-    parameter_dims = [dim for dim in own_dims(of_model, key) if dim in of_model.variables["e_error"].dims]
+    parameter_dims = [dim for dim in of_model.variables["e_error"].dims if _varies_parameters(of_model, dim)]
     best = _best_parameters(of_model, parameter_dims, tol) if parameter_dims else {}
     chosen = _swept_inputs(of_model, best)
     of_model = of_model.isel(best)
@@ -345,7 +350,7 @@ def _rank_model(of_model: xr.Dataset, tol: float) -> Ranked:
             **chosen,
             "e": float(asked_there),
         }
-    parameters = {".".join(map(str, path_of(name))): chosen[name] for name in chosen if owner_of(name) == key}
+    parameters = {name.config_key: chosen[str(name)] for name in map(InputName.parse, chosen) if name.model == key}
     served = _served_ranges(e.values, asked_at, missed_at) if along_one else None
     return Ranked(
         key,
@@ -397,7 +402,7 @@ def _swept_inputs(of_model: xr.Dataset, positions: Mapping[Hashable, int]) -> di
         name: variables[name].values[position].item()
         for dim, position in positions.items()
         for name in dict.fromkeys([str(dim), *columns_along(of_model, dim)])
-        if owner_of(name) in ("", key)
+        if InputName.parse(name).applies_to(key)
     }
 
 
