@@ -1361,7 +1361,7 @@ def plot_to_files(
             write_file(tables[kind], table, overwrite=overwrite)
         drawn[kind] = plot_data
     if not drawn:
-        raise UsageError("\n".join(dict.fromkeys(left_out.values())))
+        raise UsageError(*dict.fromkeys(left_out.values()))
     return PlotFiles({kind: pictures[kind] for kind in drawn}, drawn, left_out)
 
 

@@ -22,7 +22,7 @@ from ..contact.model import ForceModel
 from ..contact.outputs import UNITS
 from ..errors import ConfigError
 from ..text import safe_text
-from .files import MAX_OVERRIDE_LENGTH, as_table, read_text, set_value, toml_key, toml_text
+from .files import as_table, override_text, read_text, set_value
 from .input_names import InputName, input_values
 from .quantities import MAX_PROBLEMS, ConfigProblem, KeyPath, Quantity, mismatch_error, show, suggest
 
@@ -71,24 +71,24 @@ def read_csv(
     try:
         lines = [(rows.line_num, row) for row in rows if row]
     except csv.Error as error:
-        raise ConfigError([f"{name}:{rows.line_num}: not CSV: {safe_text(str(error))}"]) from None
+        raise ConfigError(f"{name}:{rows.line_num}: not CSV: {safe_text(str(error))}") from None
     if len(lines) < 2:
-        raise ConfigError([f"{name}: got {len(lines)} lines, expected a line of names and at least one of values"])
+        raise ConfigError(f"{name}: got {len(lines)} lines, expected a line of names and at least one of values")
     first, header = lines[0]
     location = f"{name}:{first}"
     if header[0].lstrip().startswith("#"):
-        raise ConfigError([f"{location}: got a comment, expected the names of the columns"])
+        raise ConfigError(f"{location}: got a comment, expected the names of the columns")
     separator = next((mark for mark in ";\t" if mark in header[0]), "")
     if len(header) == 1 and separator:
         got = f'columns separated by {show(separator)}, expected ","'
-        raise ConfigError([f"{location}: got {got}, and a point in numbers, such as 0.5"])
+        raise ConfigError(f"{location}: got {got}, and a point in numbers, such as 0.5")
     matches = [match for match in map(COLUMN_HEADER.fullmatch, header) if match is not None]
     units = {match[1]: match[2] or "" for match in matches}
     with_square_brackets = {column: _with_square_brackets(column, quantity_of) for column in units}
     is_known = any(_is_known(column, quantity_of) or with_square_brackets[column] for column in units)
     if not (is_known or with_any_names):
         expected = "names of inputs or outputs, such as v1 [m/s] or e_out"
-        raise ConfigError([f"{location}: got no known column, expected {expected}"])
+        raise ConfigError(f"{location}: got no known column, expected {expected}")
     problems = [
         f"{location}: {safe_text(column, 60)}: got round brackets, expected {show(expected)}"
         for column, expected in with_square_brackets.items()
@@ -100,7 +100,7 @@ def read_csv(
             problems.append(f"{location}: got {got}, expected each column once")
     problems += _length_problems(name, lines[1:], len(header))
     if problems:
-        raise ConfigError(problems[:MAX_PROBLEMS])
+        raise ConfigError(*problems[:MAX_PROBLEMS])
     columns = zip(*(row for _, row in lines[1:]), strict=True)
     numbers = [line for line, _ in lines[1:]]
     return CsvTable(
@@ -175,7 +175,7 @@ def column_values(table: CsvTable, column: str, quantity: Quantity | None, n: fl
             Quantity(quantity.unit, "").read(f"1 {unit}", n)
         except PydanticCustomError as error:
             expected = error.message().partition(", expected ")[2]
-            raise ConfigError([f"{table.name}:1: {shown}: got [{safe_text(unit)}], expected {expected}"]) from None
+            raise ConfigError(f"{table.name}:1: {shown}: got [{safe_text(unit)}], expected {expected}") from None
     values: list[float | str] = []
     problems: list[str] = []
     for line, cell in cells:
@@ -186,7 +186,7 @@ def column_values(table: CsvTable, column: str, quantity: Quantity | None, n: fl
             if len(problems) >= MAX_PROBLEMS:
                 break
     if problems:
-        raise ConfigError(problems)
+        raise ConfigError(*problems)
     return values
 
 
@@ -195,13 +195,13 @@ def _values_of_unknown(
 ) -> list[float | str]:
     """The numbers of a column of a table without known names; problems contain nothing of the file."""
     if quantity is None:
-        raise ConfigError([f"{table.name}:1: got no known column, expected such as material1 or v1 [m/s]"])
+        raise ConfigError(f"{table.name}:1: got no known column, expected such as material1 or v1 [m/s]")
     values: list[float | str] = []
     for line, cell in table.cells[column]:
         try:
             values.append(_cell_value(cell.strip(), table.units[column], quantity, n))
         except PydanticCustomError:
-            raise ConfigError([f"{table.name}:{line}: expected {quantity.expected}"]) from None
+            raise ConfigError(f"{table.name}:{line}: expected {quantity.expected}") from None
     return values
 
 
@@ -246,7 +246,7 @@ def inline_files(
 
     def open_csv(file: str, *, with_any_names: bool = False) -> CsvTable:
         if folder is None:
-            raise ConfigError([f"{safe_text(file)}: not read; a stored config contains values, not file names"])
+            raise ConfigError(f"{safe_text(file)}: not read; a stored config contains values, not file names")
         key = (file, with_any_names)
         if key not in files:
             of_column = partial(column_quantity, models=models)
@@ -255,7 +255,7 @@ def inline_files(
 
     def store_values(path: KeyPath, value: object) -> None:
         nonlocal data
-        overrides.append(values_override(path, value))
+        overrides.append(override_text(path, value))
         data, _ = set_value(data, path, value)
 
     cases = as_table(data.get("sweep")).get("cases")
@@ -275,7 +275,7 @@ def inline_files(
                 known = f"; {suggest(column, list(table.units))}" if table.is_known else ""
                 if any(header.startswith(f"{column} (") for header in table.units):
                     known = f'; a unit is in square brackets: "{safe_text(column, 60)} [UNIT]"'
-                raise ConfigError([f"{table.name}:1: got {show(column)}, expected one of its columns{known}"])
+                raise ConfigError(f"{table.name}:1: got {show(column)}, expected one of its columns{known}")
             values = column_values(table, column, name.quantity(models), n)
             store_values(name.path, {"empirical": values} if is_sample else values)
         except ConfigError as error:
@@ -283,19 +283,6 @@ def inline_files(
         except KeyError:
             continue  # an unknown key is reported with the others
     return dict(data), overrides, list(dict.fromkeys(problems))
-
-
-def values_override(path: KeyPath, value: object) -> str:
-    """The override that sets the values of a file.
-
-    Raises
-    ------
-    ConfigError : it is too long
-    """
-    text = f"{'.'.join(toml_key(str(part)) for part in path)}={toml_text(value)}"
-    if len(text) > MAX_OVERRIDE_LENGTH:
-        raise ConfigError([f"{path[-1]}: larger than {MAX_OVERRIDE_LENGTH:,} characters"])
-    return text
 
 
 def _read_cases(
@@ -316,7 +303,7 @@ def _read_cases(
                 f"{table.name}:1: {safe_text(column, 60)}: {InputName.parse(column).unknown_message(models)}"
             )
     if problems:
-        raise ConfigError(problems)
+        raise ConfigError(*problems)
     return values
 
 

@@ -24,12 +24,11 @@ from .design import design_problems, distribution_paths, draw_columns, unit_samp
 from .files import (
     apply_overrides,
     as_table,
+    override_text,
     parse_document,
     read_override,
     read_text,
     to_plain_data,
-    toml_key,
-    toml_text,
 )
 from .grid import MAX_POINTS, Axis, build_grid, chunk_problems
 from .input_names import InputName
@@ -233,7 +232,7 @@ class _Reader:
         if config is None or override_problems or file_problems:
             if text is not None and not text.lstrip().startswith("{"):
                 locations = replace(locations, lines=key_lines(text))
-            raise ConfigError([*problem_lines(problems, locations), *file_problems, *override_problems])
+            raise ConfigError(*problem_lines(problems, locations), *file_problems, *override_problems)
         return replace(config, files=files)
 
     def _build_config(
@@ -357,7 +356,7 @@ def _library_overrides(data: Mapping[str, Any], overrides: Sequence[str]) -> lis
     paths = [path for path, _ in map(read_override, overrides) if path[:1] == ("materials",)]
     names = dict.fromkeys(str(path[1]) for path in paths if len(path) > 2)
     return [
-        _material_override(name, library()[name])
+        override_text(("materials", name), library()[name])
         for name in names
         if _is_from_library(name, data) and ("materials", name) not in paths
     ]
@@ -366,11 +365,6 @@ def _library_overrides(data: Mapping[str, Any], overrides: Sequence[str]) -> lis
 def _is_from_library(name: str, data: Mapping[str, Any]) -> bool:
     """Whether a material is in the library, and no table of the config replaces it."""
     return name in library() and name not in as_table(data.get("materials"))
-
-
-def _material_override(name: str, properties: Mapping[str, object]) -> str:
-    """The override that defines a material."""
-    return f"materials.{toml_key(name)}={toml_text(dict(properties))}"
 
 
 def _add_library_materials(data: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
@@ -388,7 +382,7 @@ def _add_library_materials(data: Mapping[str, Any]) -> tuple[dict[str, Any], lis
         if _is_from_library(name, data) and isinstance(data.get("materials", {}), dict)
     }
     extended = {**data, "materials": {**data.get("materials", {}), **materials}} if materials else dict(data)
-    return extended, [_material_override(name, properties) for name, properties in materials.items()]
+    return extended, [override_text(("materials", name), properties) for name, properties in materials.items()]
 
 
 def _remove_invalid(data: Mapping[str, Any], paths: Sequence[KeyPath]) -> dict[str, Any]:

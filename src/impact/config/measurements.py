@@ -21,9 +21,8 @@ from .cases import (
     column_values,
     contains_path,
     read_csv,
-    values_override,
 )
-from .files import as_table, set_value
+from .files import as_table, override_text, set_value
 from .input_names import InputName, input_values
 from .quantities import MAX_PROBLEMS, ConfigProblem, KeyPath, Quantity, show, suggest, value_error
 from .tables import LOSSES, MAX_MEASURED, MIN_SIGMA, NOISES, SWEEP_QUANTITIES
@@ -185,7 +184,7 @@ def inline_measurements(
         table_of_file = read_csv(folder / file, partial(column_quantity, models=models))
         values, lines = _read_values(table_of_file, data, models, n)
         stored: dict[KeyPath, object] = {("data", "columns"): values, ("data", "lines"): lines}
-        overrides = [values_override(path, value) for path, value in stored.items()]
+        overrides = [override_text(path, value) for path, value in stored.items()]
     except ConfigError as error:
         return dict(data), [], list(error.problems)
     for path, value in stored.items():
@@ -239,7 +238,7 @@ def _read_values(
             except ConfigError as error:
                 problems += error.problems
     if problems:
-        raise ConfigError(problems[:MAX_PROBLEMS])
+        raise ConfigError(*problems[:MAX_PROBLEMS])
     return values, [line for line, _ in next(iter(table.cells.values()))]
 
 

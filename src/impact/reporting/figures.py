@@ -80,7 +80,7 @@ def figures_of(
             # title and conditions are in the caption; the figure is narrow, so that its text is legible on a phone
             figure = draw(replace(plot_data, title="", conditions=""), WIDTHS["single"])
         except ImpactError as error:
-            reasons.append(f"The figure {kind} is left out: {'; '.join(str(error).splitlines())}")
+            reasons.append(f"The figure {kind} is left out: {'; '.join(error.problems)}")
             continue
         # transparent, because the page may be dark
         for background in (figure.patch, *(axes.patch for axes in figure.axes)):

@@ -197,7 +197,7 @@ def merge(
     where, n_repeated = _locate_ranges([*records], plan, blocks, counter, should_stop)
     missing = [part for part in blocks if part.number not in where]
     if missing:
-        raise UsageError("\n".join(_missing_shards(output, missing, records)))
+        raise UsageError(*_missing_shards(output, missing, records))
     table = table_of(plan, maps, range_reader(maps, lambda number: reload_range(where[number], blocks[number])))
     try:
         return store_result(output, plan, table, None, overwrite, counter, should_stop), n_repeated

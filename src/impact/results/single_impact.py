@@ -485,7 +485,7 @@ def _read_with_option_names(read: ReadConfig, option_names: Mapping[str, str]) -
         return read(list(option_names))
     except ConfigError as error:
         names = {f"--set {override}:": f"{name}:" for override, name in option_names.items()}
-        raise ConfigError([_with_option_name(line, names) for line in error.problems]) from None
+        raise ConfigError(*(_with_option_name(line, names) for line in error.problems)) from None
 
 
 def _with_option_name(line: str, names: Mapping[str, str]) -> str:

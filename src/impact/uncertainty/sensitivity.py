@@ -53,13 +53,13 @@ def sensitivity_plan(plan: Plan, of: Sequence[str], max_points: int, name: str) 
     if config.design is None:
         example = "[design] n = 1024 and v1 = { normal = [1.0, 0.05] }"
         raise ConfigError(
-            [f"{name}: got no uncertain input, expected a design and distributions, such as {example}"]
+            f"{name}: got no uncertain input, expected a design and distributions, such as {example}"
         )
     problem = power_of_two_problem(config.design.n, "for Sobol indices")
     if config.design.n == 1:
         problem = "got 1, expected a power of two from 2 on for Sobol indices: 2 or 4"
     if problem:
-        raise ConfigError([f"{name}: design.n: {problem}"])
+        raise ConfigError(f"{name}: design.n: {problem}")
     names = list(config.distributions)
     models = {model.key: model for model in config.models}
     quantities = {key: q for key in names if (q := InputName.parse(key).quantity(models)) is not None}
@@ -67,9 +67,8 @@ def sensitivity_plan(plan: Plan, of: Sequence[str], max_points: int, name: str) 
     parts = [draw_columns(config.distributions, quantities, part) for part in np.split(u, 2, axis=1)]
     problems = dict(problem for _, of_part in parts for problem in of_part.items())
     if problems:
-        raise ConfigError(
-            [f"{name}: {path_text(InputName.parse(key).path)}: {text}" for key, text in problems.items()]
-        )
+        paths = {key: path_text(InputName.parse(key).path) for key in problems}
+        raise ConfigError(*(f"{name}: {paths[key]}: {text}" for key, text in problems.items()))
     rows = mixed_rows(*(np.column_stack([drawn[key] for key in names]) for drawn, _ in parts))
     columns = dict(zip(names, (tuple(column) for column in rows.T.tolist()), strict=True))
     axes = tuple(replace(axis, columns=columns) if axis.name == SAMPLE else axis for axis in config.axes)
