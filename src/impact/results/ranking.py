@@ -201,6 +201,8 @@ def recommend(
     no model gives e within 0.01 everywhere; gharib-hurmuzlu-2012 is nearest: 25.7% of 101 points
     """
     require_sweep(dataset, "recommend")
+    if not 0.0 < tol < math.inf:
+        raise UsageError(f"tol: got {tol:g}, expected a positive finite number")
     return rank_models(rankable_parts(dataset, sel or {}, models), tol)
 
 
@@ -226,8 +228,6 @@ def rankable_parts(
 
 def rank_models(parts: Sequence[xr.Dataset], tol: float) -> Ranking:
     """Rank models by their parts of a result; refuse parts without any point to rank."""
-    if not 0.0 < tol < math.inf:
-        raise UsageError(f"tol: got {tol:g}, expected a positive finite number")
     ranked = [_rank_model(part, tol) for part in parts]
     if not any(model.points for model in ranked):
         raise UsageError("nothing to rank: no point has both a requested e and an impact")
