@@ -14,10 +14,10 @@ from ..contact.timestep import EXACT
 from ..errors import UsageError
 from ..formatting import number
 from ..results.attributes import read_attribute
-from ..results.backend import load
 from ..results.kinds import is_calibration, require_sweep
 from ..results.replay_command import command_start
 from ..results.schema import MODEL_METADATA, SCHEMA, SCHEMA_VERSION, is_case
+from ..results.xarray_backend import load
 from ..text import safe_text
 from .align import MODEL_COORDINATES, align
 from .calibrations import compare_calibrations

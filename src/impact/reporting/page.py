@@ -34,7 +34,7 @@ from ..results.calibration import (
 )
 from ..results.kinds import is_calibration, is_sensitivity
 from ..results.plausibility import depth_summary, material_notes, result_notes
-from ..results.ranking import Ranking, ranking
+from ..results.ranking import DEFAULT_TOL, Ranking, rank_models, rankable_parts
 from ..results.replay_command import describe_point
 from ..results.schema import count_points, exponents_of
 from ..results.sensitivity import INDEX_HEADINGS, describe_design, describe_study, index_rows, iterate_studies
@@ -228,7 +228,7 @@ def _spacing(values: NDArray[Any]) -> str:
 def _rank_models(dataset: xr.Dataset) -> tuple[Ranking | None, str]:
     """The ranking of the models, None if they cannot be ranked, and the answer in a sentence."""
     try:
-        ranked = ranking(dataset, max_points=MAX_SUMMARY_POINTS)
+        ranked = rank_models(rankable_parts(dataset, {}, None, MAX_SUMMARY_POINTS), DEFAULT_TOL)
     except UsageError as error:
         return None, f"The models are not ranked: {error}."
     return ranked, re.sub("^no ", "No ", f"{ranked.headline}.")

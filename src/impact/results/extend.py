@@ -28,13 +28,13 @@ from ..engine.trajectories import TrajectoryMap, TrajectoryRange, check_count, c
 from ..errors import ResultError, UsageError
 from ..text import safe_text
 from .attributes import read_attribute
-from .backend import open_with_table
-from .expand import TrajectoryTable
 from .kinds import require_sweep
 from .provenance import stored_config
 from .selection import IndexArray, match_labels
 from .summary import SweepOutcome
 from .sweep import Extension, SlabValues, sweep_into
+from .trajectory_table import TrajectoryTable
+from .xarray_backend import open_with_table
 
 # statuses that are assigned before integration
 CHECKED_STATUSES = (Status.NO_IMPACT, Status.INVALID_PARAMETER, Status.OUT_OF_RANGE)

@@ -33,8 +33,8 @@ from ..errors import ResultError, UsageError
 from ..formatting import number
 from ..text import safe_text
 from .attributes import SummaryRecord, read_attribute
-from .expand import MAX_STIFFNESS_VALUES, TrajectoryRows, TrajectoryTable, expand, whole_stiffness
 from .schema import SCHEMA, SchemaVariable, attributes_of, count_points, derived_names, scale_of
+from .trajectory_table import MAX_STIFFNESS_VALUES, TrajectoryRows, TrajectoryTable, expand, whole_stiffness
 
 N_WITNESSES = 1_000
 # tolerance of a witness, relative to the scale that `compare` uses for its variable

@@ -18,6 +18,7 @@ from ..contact.status import FIRST_FAILURE, Status
 from ..errors import UsageError
 from ..formatting import label, number, percentage
 from ..text import html_table, safe_text
+from .kinds import require_sweep
 from .replay_command import describe_point
 from .schema import columns_along, foreign_dims
 from .selection import model_positions, select
@@ -27,6 +28,8 @@ from .slabs import Slab, distinct_points, is_computed, over_varying_dims, slabs,
 MAX_RANKED_POINTS = 2**30
 # combinations of the values of a law's own parameters
 MAX_PARAMETER_COMBINATIONS = 2**24
+# accepted |e_out - e|
+DEFAULT_TOL = 0.01
 RANKED_VARIABLES = ("e_error", "status")
 # ranges of e that a table lists
 MAX_RANGES = 8
@@ -160,14 +163,14 @@ class Ranking:
         return html_table(self.headings, (ranked.row for ranked in self.models), self.headline)
 
 
-def ranking(
+def recommend(
     dataset: xr.Dataset,
-    tol: float = 0.01,
+    *,
+    tol: float = DEFAULT_TOL,
     sel: Mapping[str, float | str] | None = None,
     models: Sequence[str] | None = None,
-    max_points: int = MAX_RANKED_POINTS,
 ) -> Ranking:
-    """Rank the models of a result by how well they deliver the target restitution.
+    """Rank the models of a result by the error of their restitution, over all points of the sweep.
 
     The criterion is |e_out - e| at all points with a target e and an impact. A point that failed, or whose target
     e is below 0 (1 - alpha v0 < 0), counts as not within the tolerance. The values of a model's own parameters are
@@ -178,36 +181,60 @@ def ranking(
     Parameters
     ----------
     dataset : a result
-    tol : tolerance of |e_out - e|
-    sel : values of axes, by name
+    tol : largest accepted |e_out - e|
+    sel : values of axes, such as `{"m2": 1.0}`; by default all values of an axis are ranked
     models : keys of the models to rank; by default all
-    max_points : limit of the points to evaluate of a lazy result
+
+    Returns
+    -------
+    Ranking : the models, the best first; `ranking.best` are those within the tolerance at all points
 
     Raises
     ------
-    UsageError : the result has no target e, lacks a model or value that is selected, or has too many points; or
-        tol is not positive
+    UsageError : the result has no requested e, or lacks what the arguments select, or has too many points; tol is
+        not a positive finite number
+
+    >>> import impact
+    >>> result = impact.sweep("configs/figure6.toml")
+    >>> print(impact.recommend(result, models=["gharib-hurmuzlu-2012"]).headline)
+    no model gives e within 0.01 everywhere; gharib-hurmuzlu-2012 is nearest: 25.7% of 101 points
     """
-    _check_rankable(dataset, tol)
+    require_sweep(dataset, "recommend")
+    if not 0.0 < tol < math.inf:
+        raise UsageError(f"tol: got {tol:g}, expected a positive finite number")
+    return rank_models(rankable_parts(dataset, sel or {}, models), tol)
+
+
+def rankable_parts(
+    dataset: xr.Dataset,
+    sel: Mapping[str, float | str],
+    models: Sequence[str] | None,
+    max_points: int = MAX_RANKED_POINTS,
+) -> list[xr.Dataset]:
+    """Select the part of each model to rank; refuse a result that lacks a target e or has too many points."""
+    _check_rankable(dataset)
     chosen = model_positions(models, dataset) if models else range(dataset.sizes["model"])
-    selected = select(dataset[list(RANKED_VARIABLES)], sel or {})
-    by_model = [_select_model(selected, position) for position in chosen]
-    evaluated = [_reduce_dims(of_model)[0] for of_model in by_model if is_computed(of_model.variables["e_error"])]
-    points = sum(math.prod(of_model.sizes.values()) for of_model in evaluated)
+    selected = select(dataset[list(RANKED_VARIABLES)], sel)
+    parts = [_select_model(selected, position) for position in chosen]
+    evaluated = [_reduce_dims(part)[0] for part in parts if is_computed(part.variables["e_error"])]
+    points = sum(math.prod(part.sizes.values()) for part in evaluated)
     if points > max_points:
         raise UsageError(
             f"got {points:,} different points to rank, expected at most {max_points:,}; select values of axes"
         )
-    ranked = [_rank_model(of_model, tol) for of_model in by_model]
+    return parts
+
+
+def rank_models(parts: Sequence[xr.Dataset], tol: float) -> Ranking:
+    """Rank models by their parts of a result; refuse parts without any point to rank."""
+    ranked = [_rank_model(part, tol) for part in parts]
     if not any(model.points for model in ranked):
         raise UsageError("nothing to rank: no point has both a requested e and an impact")
     return Ranking(tol, tuple(sorted(ranked, key=_rank_key)))
 
 
-def _check_rankable(dataset: xr.Dataset, tol: float) -> None:
-    """Refuse a dataset or a tolerance by which models cannot be ranked."""
-    if not 0.0 < tol < math.inf:
-        raise UsageError(f"tol: got {tol:g}, expected a positive finite number")
+def _check_rankable(dataset: xr.Dataset) -> None:
+    """Refuse a dataset by which models cannot be ranked."""
     if "t" in dataset.dims:
         raise UsageError("got a time history, expected the result of a sweep")
     if "model" not in dataset.dims:

@@ -34,11 +34,11 @@ from ..engine.plugins import Plugins
 from ..errors import ConfigError, UsageError, did_you_mean
 from ..formatting import number, quantity
 from ..text import html_table, safe_text
-from .backend import open_result
 from .kinds import require_sweep
 from .provenance import changed_plugins, check_plugins, stored_config, unknown_plugins
 from .schema import HISTORY_VARIABLES, SCHEMA, SCHEMA_VERSION, is_case, plain_unit
 from .seal import is_result
+from .xarray_backend import open_result
 
 STARTER_CONFIG = files("impact") / "config" / "starter.toml"
 

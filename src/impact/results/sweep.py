@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ..atomic import atomic_write
+from ..atomic import atomic_write, check_output
 from ..config.input_names import InputName
 from ..contact.impacts import Impacts
 from ..contact.simulate import TABLE_COLUMNS, CollisionResult
@@ -33,13 +33,13 @@ from ..engine.trajectories import (
 )
 from ..errors import ResultError, StoreError, UnfinishedError, UsageError
 from ..text import safe_text
-from .backend import MAX_LOADED_BYTES, check_output, check_readable, open_result, write_sealed
-from .expand import TrajectoryTable, expanded_slabs, in_memory, lazy_dataset, table_of
 from .factored import check_factored, factored_template, table_values
 from .netcdf import MAX_LABEL_BYTES, encode_text, is_text
 from .schema import SchemaVariable, dataset_template, plan_coordinates, stored_variables
 from .summary import Summary, SweepOutcome, summarize, summarize_table, summary_record
+from .trajectory_table import TrajectoryTable, expanded_slabs, in_memory, lazy_dataset, table_of
 from .validation import is_name
+from .xarray_backend import MAX_LOADED_BYTES, check_readable, open_result, write_sealed
 
 # approximate bytes of a result besides its values
 OVERHEAD_BYTES = 2**16
