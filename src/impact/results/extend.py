@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from .._version import __version__
 from ..config.files import override_text
-from ..config.grid import MAX_POINTS, Axis, path_of
+from ..config.grid import MAX_POINTS, Axis
+from ..config.input_names import InputName
 from ..config.tables import CORES
 from ..contact.simulate import CollisionResult
 from ..contact.status import STATUS_OK, Status
@@ -149,7 +150,7 @@ def _extended_plan(
         if len(axis.columns) == 1 and not axis.numbered and not has_all_old_values:
             new_values = (value for value in axis.columns[name] if value not in old_values.tolist())
             values = [*old_values.tolist(), *new_values]
-            appended_overrides.append(override_text(path_of(name), values))
+            appended_overrides.append(override_text(InputName.parse(name).path, values))
     missing = [model.key for model in old.models if model not in config.models]
     if missing:
         keys = [*(model.key for model in old.models), *(m.key for m in config.models if m not in old.models)]
