@@ -118,9 +118,9 @@ def _parameters(context: typer.Context) -> list[str]:
 
 
 def _inputs(context: typer.Context) -> list[str]:
-    from ..config.input_names import SWEEP_INPUTS
+    from ..config.cases import input_names
 
-    return [*SWEEP_INPUTS, *_parameters(context)]
+    return [*input_names(), *_parameters(context)]
 
 
 def _axes(context: typer.Context) -> list[str]:
