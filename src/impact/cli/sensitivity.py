@@ -62,17 +62,16 @@ def sensitivity(
     """
     outputs = list(dict.fromkeys(of or ["e_out"]))
     with exits.catch_signals() as should_stop:
-        from ..engine.executors import choose_executor
+        from ..engine.executors import choose_backend
         from ..progress_display import progress_bar
 
-        executor = choose_executor(jobs, threads)
+        backend = choose_backend(jobs, threads)
 
         def run_plan(plan: Plan) -> xr.Dataset:
             with progress_bar(exits.print_line, quiet=quiet) as on_progress:
-                from ..engine.run import Run
-                from ..results.sweep import sweep_in_memory
+                from ..api import execute
 
-                return sweep_in_memory(plan, Run(executor, on_progress=on_progress, should_stop=should_stop))
+                return execute(plan, backend, on_progress, should_stop)
 
         from ..api import sensitivities
 

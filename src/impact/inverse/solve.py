@@ -13,12 +13,14 @@ from scipy.optimize import elementwise, minimize_scalar
 
 from ..array_types import Array, Mask
 from ..config.grid import Axis
+from ..config.input_names import InputName
 from ..config.load import Config, Output
 from ..contact.model import ForceModel, Parameter
 from ..contact.status import Status
 from ..contact.timestep import EXACT
 from ..contact.units import with_numbers
 from ..engine.build_impacts import build_impacts
+from ..engine.execute import never_stop
 from ..engine.plan import Inputs, Plan
 from ..engine.plugins import Plugins
 from ..errors import UsageError, did_you_mean
@@ -202,7 +204,10 @@ class _Problem:
     ) -> xr.Dataset:
         """The outputs at some values, along the dimension `trial`; NaN where the integration fails."""
         at = np.zeros(values.size, np.intp) if conditions is None else conditions
-        return sweep_in_memory(self.plan(values, at, is_scan=is_scan)).isel(model=0)
+        result = sweep_in_memory(
+            self.plan(values, at, is_scan=is_scan), on_progress=lambda progress: None, should_stop=never_stop
+        )
+        return result.isel(model=0)
 
     def target_values(
         self, values: Array, conditions: NDArray[np.intp] | None = None, *, is_scan: bool = False
@@ -235,7 +240,7 @@ class _Problem:
 
     def unit(self) -> str:
         """The SI unit of the unknown, with numbers for the names in its exponents."""
-        numbers = {name.rpartition(".")[2]: v for name, v in self.config.scalars.items() if isinstance(v, float)}
+        numbers = {InputName.parse(name).key: v for name, v in self.config.scalars.items() if isinstance(v, float)}
         exponent = {} if self.model.exponent is None else {"n": self.model.exponent}
         return with_numbers(self.unknown.unit, {**numbers, **exponent})
 

@@ -13,15 +13,14 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ..array_types import Mask
-from ..config.grid import path_of
+from ..config.input_names import InputName
 from ..contact.status import FIRST_FAILURE, Status
-from ..engine.plan import owner_of
 from ..errors import UsageError
 from ..formatting import label, number, percentage
 from ..text import html_table, safe_text
 from .kinds import require_sweep
 from .replay_command import describe_point
-from .schema import columns_along, foreign_dims, own_dims
+from .schema import columns_along, foreign_dims
 from .selection import model_positions, select
 from .slabs import Slab, distinct_points, is_computed, over_varying_dims, slabs, varying_dims
 
@@ -201,6 +200,8 @@ def recommend(
     no model gives e within 0.01 everywhere; gharib-hurmuzlu-2012 is nearest: 25.7% of 101 points
     """
     require_sweep(dataset, "recommend")
+    if not 0.0 < tol < math.inf:
+        raise UsageError(f"tol: got {tol:g}, expected a positive finite number")
     return rank_models(rankable_parts(dataset, sel or {}, models), tol)
 
 
@@ -226,8 +227,6 @@ def rankable_parts(
 
 def rank_models(parts: Sequence[xr.Dataset], tol: float) -> Ranking:
     """Rank models by their parts of a result; refuse parts without any point to rank."""
-    if not 0.0 < tol < math.inf:
-        raise UsageError(f"tol: got {tol:g}, expected a positive finite number")
     ranked = [_rank_model(part, tol) for part in parts]
     if not any(model.points for model in ranked):
         raise UsageError("nothing to rank: no point has both a requested e and an impact")
@@ -326,10 +325,16 @@ def _best_parameters(of_model: xr.Dataset, parameter_dims: Sequence[Hashable], t
     return dict(zip(parameter_dims, (int(at) for at in np.unravel_index(best, shape)), strict=True))
 
 
+def _varies_parameters(of_model: xr.Dataset, dim: Hashable) -> bool:
+    """Whether only parameters of the model, and perhaps of others, vary along a dimension."""
+    models = {InputName.parse(name).model for name in columns_along(of_model, dim)}
+    return str(of_model["model"].item()) in models and "" not in models
+
+
 def _rank_model(of_model: xr.Dataset, tol: float) -> Ranked:
     """The rank of a model, from its e_error and status and from the target e."""
     key = str(of_model["model"].item())
-    parameter_dims = [dim for dim in own_dims(of_model, key) if dim in of_model.variables["e_error"].dims]
+    parameter_dims = [dim for dim in of_model.variables["e_error"].dims if _varies_parameters(of_model, dim)]
     best = _best_parameters(of_model, parameter_dims, tol) if parameter_dims else {}
     chosen = _swept_inputs(of_model, best)
     of_model = of_model.isel(best)
@@ -372,7 +377,7 @@ def _rank_model(of_model: xr.Dataset, tol: float) -> Ranked:
             **chosen,
             "e": float(asked_there),
         }
-    parameters = {".".join(map(str, path_of(name))): chosen[name] for name in chosen if owner_of(name) == key}
+    parameters = {name.config_key: chosen[str(name)] for name in map(InputName.parse, chosen) if name.model == key}
     served = _served_ranges(e.values, asked_at, missed_at) if along_one else None
     return Ranked(
         key,
@@ -424,7 +429,7 @@ def _swept_inputs(of_model: xr.Dataset, positions: Mapping[Hashable, int]) -> di
         name: variables[name].values[position].item()
         for dim, position in positions.items()
         for name in dict.fromkeys([str(dim), *columns_along(of_model, dim)])
-        if owner_of(name) in ("", key)
+        if InputName.parse(name).applies_to(key)
     }
 
 
