@@ -17,8 +17,8 @@ from impact.contact.variables import BY_DEFAULT, OUTPUTS
 from impact.engine.execute import integrate_ranges, with_core
 from impact.engine.plan import Plan
 from impact.engine.trajectories import trajectory_maps, trajectory_ranges
-from impact.results.expand import TrajectoryRows, TrajectoryTable, in_memory, lazy_dataset
 from impact.results.schema import dataset_template, stored_variables, udunits
+from impact.results.trajectory_table import TrajectoryRows, TrajectoryTable, in_memory, lazy_dataset
 
 from .conftest import WIDE
 

@@ -9,7 +9,8 @@
     ├── InUseError     another process writes the output
     └── UnfinishedError  a signal stopped a sweep; finished blocks are kept
 
-A message states the error and its location, the invalid value and the expected form. `impact.cli.exits` maps
+A message states the error and its location, the invalid value and the expected form. It may quote any file, name
+or value: the constructor escapes what could forge a line or control a terminal. `impact.cli.exits` maps
 exceptions to exit codes.
 """
 
@@ -18,11 +19,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from difflib import get_close_matches
 
-from .text import safe_text
+from .text import escape_controls, safe_text
+
+# characters of a problem; a longer one is cut in its middle, since its end says what was expected
+MAX_PROBLEM = 2000
 
 
 class ImpactError(Exception):
-    """Base class of all expected errors, with a message for the user.
+    """Base class of all expected errors; `problems` holds the lines of the message for the user, escaped.
 
     >>> import impact
     >>> try:
@@ -32,13 +36,22 @@ class ImpactError(Exception):
     --at e=1.4: sweep.e: got 1.4, expected a number from 0 to 1
     """
 
+    def __init__(self, *problems: str) -> None:
+        # a second time changes nothing: an error may quote another one, or be copied to another process
+        self.problems = tuple(_shorten(escape_controls(problem)) for problem in problems)
+        super().__init__(*self.problems)
+
+    def __str__(self) -> str:
+        return "\n".join(self.problems)
+
+
+def _shorten(problem: str) -> str:
+    half = MAX_PROBLEM // 2
+    return problem if len(problem) <= MAX_PROBLEM else f"{problem[:half]}…{problem[1 - half :]}"
+
 
 class ConfigError(ImpactError):
     """The config of a sweep is invalid; `problems` holds one line for each problem."""
-
-    def __init__(self, problems: Sequence[str]) -> None:
-        self.problems = tuple(problems)
-        super().__init__("\n".join(self.problems))
 
 
 class ModelError(ImpactError):

@@ -28,8 +28,17 @@ def safe_text(text: str, limit: int = 200) -> str:
     ('a\\u202eb', 'abc…')
     """
     # an escape is never shorter than its character: characters beyond the limit are not needed
-    shown = "".join(_escaped(letter) if category(letter) in UNSAFE else letter for letter in text[: limit + 1])
+    shown = escape_controls(text[: limit + 1])
     return shown if len(shown) <= limit else shown[: limit - 1] + "…"
+
+
+def escape_controls(text: str) -> str:
+    r"""Escape control and invisible characters; a second time changes nothing.
+
+    >>> escape_controls("steel\n"), escape_controls(escape_controls("steel\n"))
+    ('steel\\x0a', 'steel\\x0a')
+    """
+    return "".join(_escaped(letter) if category(letter) in UNSAFE else letter for letter in text)
 
 
 def _escaped(letter: str) -> str:

@@ -111,8 +111,8 @@ def _exit_code(command: Callable[[], object], *, debug: bool) -> int:
             print_line(_usage_message(error), error=True)
         return EXIT_USAGE
     except ImpactError as error:
-        for line in str(error).splitlines():
-            print_line(line, error=True)
+        for problem in error.problems:
+            print_line(problem, error=True)
         return next((code for kind, code in ERROR_EXIT_CODES.items() if isinstance(error, kind)), EXIT_USAGE)
     except BrokenPipeError:
         _discard_output(sys.stdout)

@@ -22,10 +22,9 @@ from ..contact.model import ForceModel
 from ..contact.variables import OUTPUTS
 from ..errors import ConfigError
 from ..text import safe_text
-from .files import MAX_OVERRIDE_LENGTH, as_table, read_text, set_value, toml_key, toml_text
-from .grid import name_of, path_of
+from .files import as_table, override_text, read_text, set_value
+from .input_names import InputName, input_values
 from .quantities import MAX_PROBLEMS, ConfigProblem, KeyPath, Quantity, mismatch_error, show, suggest
-from .tables import MATERIAL_KEYS, MATERIAL_QUANTITIES, SWEEP_QUANTITIES, model_quantities, quantity_at
 
 MAX_CSV_BYTES = 2_000_000  # size of a CSV file, whose values a result stores
 COLUMN_HEADER = re.compile(r"\s*(.*?)\s*(?:\[\s*(.*?)\s*\])?\s*", re.DOTALL)
@@ -72,24 +71,24 @@ def read_csv(
     try:
         lines = [(rows.line_num, row) for row in rows if row]
     except csv.Error as error:
-        raise ConfigError([f"{name}:{rows.line_num}: not CSV: {safe_text(str(error))}"]) from None
+        raise ConfigError(f"{name}:{rows.line_num}: not CSV: {safe_text(str(error))}") from None
     if len(lines) < 2:
-        raise ConfigError([f"{name}: got {len(lines)} lines, expected a line of names and at least one of values"])
+        raise ConfigError(f"{name}: got {len(lines)} lines, expected a line of names and at least one of values")
     first, header = lines[0]
     location = f"{name}:{first}"
     if header[0].lstrip().startswith("#"):
-        raise ConfigError([f"{location}: got a comment, expected the names of the columns"])
+        raise ConfigError(f"{location}: got a comment, expected the names of the columns")
     separator = next((mark for mark in ";\t" if mark in header[0]), "")
     if len(header) == 1 and separator:
         got = f'columns separated by {show(separator)}, expected ","'
-        raise ConfigError([f"{location}: got {got}, and a point in numbers, such as 0.5"])
+        raise ConfigError(f"{location}: got {got}, and a point in numbers, such as 0.5")
     matches = [match for match in map(COLUMN_HEADER.fullmatch, header) if match is not None]
     units = {match[1]: match[2] or "" for match in matches}
     with_square_brackets = {column: _with_square_brackets(column, quantity_of) for column in units}
     is_known = any(_is_known(column, quantity_of) or with_square_brackets[column] for column in units)
     if not (is_known or with_any_names):
         expected = "names of inputs or outputs, such as v1 [m/s] or e_out"
-        raise ConfigError([f"{location}: got no known column, expected {expected}"])
+        raise ConfigError(f"{location}: got no known column, expected {expected}")
     problems = [
         f"{location}: {safe_text(column, 60)}: got round brackets, expected {show(expected)}"
         for column, expected in with_square_brackets.items()
@@ -101,7 +100,7 @@ def read_csv(
             problems.append(f"{location}: got {got}, expected each column once")
     problems += _length_problems(name, lines[1:], len(header))
     if problems:
-        raise ConfigError(problems[:MAX_PROBLEMS])
+        raise ConfigError(*problems[:MAX_PROBLEMS])
     columns = zip(*(row for _, row in lines[1:]), strict=True)
     numbers = [line for line, _ in lines[1:]]
     return CsvTable(
@@ -158,7 +157,7 @@ def column_quantity(name: str, models: Mapping[str, ForceModel]) -> Quantity | N
     ------
     KeyError : there is no such output or input
     """
-    return Quantity(OUTPUTS[name].unit, "output") if name in OUTPUTS else quantity_at(path_of(name), models)
+    return Quantity(OUTPUTS[name].unit, "output") if name in OUTPUTS else InputName.parse(name).quantity(models)
 
 
 def column_values(table: CsvTable, column: str, quantity: Quantity | None, n: float | None) -> list[float | str]:
@@ -176,7 +175,7 @@ def column_values(table: CsvTable, column: str, quantity: Quantity | None, n: fl
             Quantity(quantity.unit, "").read(f"1 {unit}", n)
         except PydanticCustomError as error:
             expected = error.message().partition(", expected ")[2]
-            raise ConfigError([f"{table.name}:1: {shown}: got [{safe_text(unit)}], expected {expected}"]) from None
+            raise ConfigError(f"{table.name}:1: {shown}: got [{safe_text(unit)}], expected {expected}") from None
     values: list[float | str] = []
     problems: list[str] = []
     for line, cell in cells:
@@ -187,7 +186,7 @@ def column_values(table: CsvTable, column: str, quantity: Quantity | None, n: fl
             if len(problems) >= MAX_PROBLEMS:
                 break
     if problems:
-        raise ConfigError(problems)
+        raise ConfigError(*problems)
     return values
 
 
@@ -196,13 +195,13 @@ def _values_of_unknown(
 ) -> list[float | str]:
     """The numbers of a column of a table without known names; problems contain nothing of the file."""
     if quantity is None:
-        raise ConfigError([f"{table.name}:1: got no known column, expected such as material1 or v1 [m/s]"])
+        raise ConfigError(f"{table.name}:1: got no known column, expected such as material1 or v1 [m/s]")
     values: list[float | str] = []
     for line, cell in table.cells[column]:
         try:
             values.append(_cell_value(cell.strip(), table.units[column], quantity, n))
         except PydanticCustomError:
-            raise ConfigError([f"{table.name}:{line}: expected {quantity.expected}"]) from None
+            raise ConfigError(f"{table.name}:{line}: expected {quantity.expected}") from None
     return values
 
 
@@ -247,7 +246,7 @@ def inline_files(
 
     def open_csv(file: str, *, with_any_names: bool = False) -> CsvTable:
         if folder is None:
-            raise ConfigError([f"{safe_text(file)}: not read; a stored config contains values, not file names"])
+            raise ConfigError(f"{safe_text(file)}: not read; a stored config contains values, not file names")
         key = (file, with_any_names)
         if key not in files:
             of_column = partial(column_quantity, models=models)
@@ -256,7 +255,7 @@ def inline_files(
 
     def store_values(path: KeyPath, value: object) -> None:
         nonlocal data
-        overrides.append(values_override(path, value))
+        overrides.append(override_text(path, value))
         data, _ = set_value(data, path, value)
 
     cases = as_table(data.get("sweep")).get("cases")
@@ -265,38 +264,25 @@ def inline_files(
             store_values(("sweep", "cases"), _read_cases(open_csv(cases), models, n))
         except ConfigError as error:
             problems += error.problems
-    for path, file, column in list(_file_columns(data)):
+    for name, file, column in list(_file_columns(data)):
         try:
             table = open_csv(file, with_any_names=True)
             is_sample = column is None
             if column is None:
                 # the only column, or that of the input
-                column = next(iter(table.units)) if len(table.units) == 1 else name_of(path)
+                column = next(iter(table.units)) if len(table.units) == 1 else str(name)
             if column not in table.units:
                 known = f"; {suggest(column, list(table.units))}" if table.is_known else ""
-                if any(name.startswith(f"{column} (") for name in table.units):
+                if any(header.startswith(f"{column} (") for header in table.units):
                     known = f'; a unit is in square brackets: "{safe_text(column, 60)} [UNIT]"'
-                raise ConfigError([f"{table.name}:1: got {show(column)}, expected one of its columns{known}"])
-            values = column_values(table, column, quantity_at(path, models), n)
-            store_values(path, {"empirical": values} if is_sample else values)
+                raise ConfigError(f"{table.name}:1: got {show(column)}, expected one of its columns{known}")
+            values = column_values(table, column, name.quantity(models), n)
+            store_values(name.path, {"empirical": values} if is_sample else values)
         except ConfigError as error:
             problems += error.problems
         except KeyError:
             continue  # an unknown key is reported with the others
     return dict(data), overrides, list(dict.fromkeys(problems))
-
-
-def values_override(path: KeyPath, value: object) -> str:
-    """The override that sets the values of a file.
-
-    Raises
-    ------
-    ConfigError : it is too long
-    """
-    text = f"{'.'.join(toml_key(str(part)) for part in path)}={toml_text(value)}"
-    if len(text) > MAX_OVERRIDE_LENGTH:
-        raise ConfigError([f"{path[-1]}: larger than {MAX_OVERRIDE_LENGTH:,} characters"])
-    return text
 
 
 def _read_cases(
@@ -309,53 +295,26 @@ def _read_cases(
     n = None if "n" in table.units else n
     for column in table.units:
         try:
-            values[column] = column_values(table, column, quantity_at(path_of(column), models), n)
+            values[column] = column_values(table, column, InputName.parse(column).quantity(models), n)
         except ConfigError as error:
             problems += error.problems
         except KeyError:
-            problems.append(f"{table.name}:1: {safe_text(column, 60)}: {unknown_input_message(column, models)}")
+            problems.append(
+                f"{table.name}:1: {safe_text(column, 60)}: {InputName.parse(column).unknown_message(models)}"
+            )
     if problems:
-        raise ConfigError(problems)
+        raise ConfigError(*problems)
     return values
 
 
-def unknown_input_message(name: str, models: Mapping[str, ForceModel]) -> str:
-    """A message about the name of a column that is no input."""
-    table, key, *_ = map(str, path_of(name))
-    if table == "materials":
-        inputs = [f"materials.{key}.{field}" for field in MATERIAL_QUANTITIES]
-    elif table == "sweep":
-        inputs = input_names()
-    elif key in models:
-        inputs = [f"{key}.{parameter}" for parameter in model_quantities(models[key])]
-    else:
-        name, inputs = key, list(models)
-    return f"no such input; {suggest(name, inputs)}"
-
-
-def input_names() -> list[str]:
-    """The names of the inputs in [sweep]."""
-    return [*SWEEP_QUANTITIES, *MATERIAL_KEYS]
-
-
-def input_values(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, Any]]:
-    """The path and the value of every key of [sweep], of a material and of [model.KEY]."""
-    tables: dict[KeyPath, dict[str, Any]] = {("sweep",): as_table(data.get("sweep"))}
-    for name in ("materials", "model"):
-        tables |= {(name, key): as_table(table) for key, table in as_table(data.get(name)).items()}
-    for path, table in tables.items():
-        for key, value in table.items():
-            yield (*path, key), value
-
-
-def _file_columns(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, str, str | None]]:
-    """The path, the file and the column of every `{ file = ..., column = ... }` and `{ empirical = file }`."""
-    for path, reference in input_values(data):
+def _file_columns(data: Mapping[str, Any]) -> Iterator[tuple[InputName, str, str | None]]:
+    """The name, the file and the column of every `{ file = ..., column = ... }` and `{ empirical = file }`."""
+    for name, reference in input_values(data):
         match reference:
             case {"file": str(file), "column": str(column), **others} if not others:
-                yield path, file, column
+                yield name, file, column
             case {"empirical": str(file), **others} if not others:
-                yield path, file, None
+                yield name, file, None
 
 
 def named_files(data: Mapping[str, Any]) -> list[str]:
@@ -382,21 +341,21 @@ def expand_cases(
     problems: list[ConfigProblem] = []
     names: dict[str, str] = {}
     # the columns that belong to [sweep] take the position of the table
-    columns = {name: values for name, values in cases.items() if path_of(name)[0] == "sweep"}
+    columns = {name: values for name, values in cases.items() if not InputName.parse(name).owner}
     position = list(sweep).index("cases")
     sweep_items = list(sweep.items())
     new = {**data, "sweep": {**dict(sweep_items[:position]), **columns, **dict(sweep_items[position + 1 :])}}
     n_cases = len(next(iter(cases.values()), []))
     for name, values in cases.items():
-        path, cases_path = path_of(name), ("sweep", "cases", name)
+        input_name, cases_path = InputName.parse(name), ("sweep", "cases", name)
         try:
-            quantity_at(path, models)
+            input_name.quantity(models)
         except KeyError:
-            problems.append((cases_path, unknown_input_message(name, models)))
+            problems.append((cases_path, input_name.unknown_message(models)))
             new["sweep"].pop(name, None)
             continue
-        if contains_path(data, path):
-            problems.append((cases_path, f"set together with {'.'.join(map(str, path))}, expected one of the two"))
+        if contains_path(data, input_name.path):
+            problems.append((cases_path, f"set together with {input_name.config_key}, expected one of the two"))
         if len(values) != n_cases or not values:
             problems.append(
                 (
@@ -404,9 +363,9 @@ def expand_cases(
                     f"got {len(values)} values, expected {n_cases or 'at least one'}, as in the first column",
                 )
             )
-        if path[0] != "sweep":
-            new, _ = set_value(new, path, values)
-        names[name_of(path)] = name
+        if input_name.owner:
+            new, _ = set_value(new, input_name.path, values)
+        names[str(input_name)] = name
     return new, names, problems
 
 

@@ -56,24 +56,24 @@ def read_text(path: Path, kind: str = "TOML", most: int = MAX_CONFIG_BYTES) -> s
     name = safe_text(str(path))
     try:
         if path.exists() and not path.is_file():
-            raise ConfigError([f"{name}: not a regular file, expected a {kind} file"])
+            raise ConfigError(f"{name}: not a regular file, expected a {kind} file")
         # also a file of the system such as /proc/kmsg, of which reading might never end
         if path.stat().st_size == 0:
-            raise ConfigError([f"{name}: empty, expected a {kind} file"])
+            raise ConfigError(f"{name}: empty, expected a {kind} file")
         with path.open("rb") as file:
             content = file.read(most + 1)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise ConfigError([f"{name}: cannot be read: {safe_text(reason)}"]) from None
+        raise ConfigError(f"{name}: cannot be read: {safe_text(reason)}") from None
     if content.startswith(RESULT_MAGIC):
-        raise ConfigError([f"{name}: {file_hint(path, content)}"])
+        raise ConfigError(f"{name}: {file_hint(path, content)}")
     if len(content) > most:
-        raise ConfigError([f"{name}: larger than {most:,} bytes"])
+        raise ConfigError(f"{name}: larger than {most:,} bytes")
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
-        raise ConfigError([f"{name}:{line}: not UTF-8: byte 0x{content[error.start]:02x}"]) from None
+        raise ConfigError(f"{name}:{line}: not UTF-8: byte 0x{content[error.start]:02x}") from None
 
 
 def parse_document(text: str, name: str) -> Any:
@@ -87,7 +87,7 @@ def parse_document(text: str, name: str) -> Any:
     is_json = text.lstrip().startswith("{")
     limit = MAX_JSON_LENGTH if is_json else MAX_CONFIG_BYTES
     if len(text) > limit:
-        raise ConfigError([f"{name}: larger than {limit:,} characters"])
+        raise ConfigError(f"{name}: larger than {limit:,} characters")
     return _parse(text, json.loads if is_json else tomllib.loads, "JSON" if is_json else "TOML", name)
 
 
@@ -95,14 +95,14 @@ def _parse(text: str, loads: Callable[[str], object], language: str, name: str) 
     long = LONG_KEY.search(text) if language == "TOML" else None
     if long is not None:
         line = text.count("\n", 0, long.start()) + 1
-        raise ConfigError([f"{name}:{line}: a key of more than {MAX_KEY_PARTS} dots: {safe_text(long[0], 40)}"])
+        raise ConfigError(f"{name}:{line}: a key of more than {MAX_KEY_PARTS} dots: {safe_text(long[0], 40)}")
     try:
         return loads(text)
     except RecursionError:
         line = max(range(1, text.count("\n") + 2), key=_bracket_counts(text).__getitem__)
-        raise ConfigError([f"{name}:{line}: nested too deeply, expected at most {MAX_DEPTH} levels"]) from None
+        raise ConfigError(f"{name}:{line}: nested too deeply, expected at most {MAX_DEPTH} levels") from None
     except ValueError as error:
-        raise ConfigError([f"{name}:{_syntax_error_line(text, language, str(error))}"]) from None
+        raise ConfigError(f"{name}:{_syntax_error_line(text, language, str(error))}") from None
 
 
 def _bracket_counts(text: str) -> list[int]:
@@ -191,13 +191,45 @@ def toml_key(name: str) -> str:
     return name if re.fullmatch(BARE_KEY, name) else toml_text(name)
 
 
+def toml_path(path: KeyPath) -> str:
+    """A dotted TOML key.
+
+    >>> toml_path(("materials", "steel.2", "E"))
+    'materials."steel.2".E'
+    """
+    return ".".join(toml_key(str(part)) for part in path)
+
+
+def toml_document(tables: Mapping[KeyPath, Mapping[str, object]]) -> str:
+    """A TOML text with a table of values at each path; those at the path () come first, without a header.
+
+    >>> print(toml_document({(): {"title": "a"}, ("model", "hertz"): {"K": 1e6}}), end="")
+    title = "a"
+    <BLANKLINE>
+    [model.hertz]
+    K = 1000000.0
+    """
+    blocks = []
+    for path, values in tables.items():
+        header = [f"[{toml_path(path)}]"] if path else []
+        blocks.append([*header, *(f"{toml_key(name)} = {toml_text(value)}" for name, value in values.items())])
+    return "\n\n".join(map("\n".join, blocks)) + "\n"
+
+
 def override_text(path: KeyPath, value: object) -> str:
     """An override that sets a value.
+
+    Raises
+    ------
+    ConfigError : it is too long
 
     >>> override_text(("materials", "steel.2", "E"), [2e11])
     'materials."steel.2".E=[200000000000.0]'
     """
-    return f"{'.'.join(toml_key(str(part)) for part in path)}={toml_text(value)}"
+    text = f"{toml_path(path)}={toml_text(value)}"
+    if len(text) > MAX_OVERRIDE_LENGTH:
+        raise ConfigError(f"{path[-1]}: larger than {MAX_OVERRIDE_LENGTH:,} characters")
+    return text
 
 
 def apply_overrides(

@@ -24,14 +24,14 @@ from .design import design_problems, distribution_paths, draw_columns, unit_samp
 from .files import (
     apply_overrides,
     as_table,
+    override_text,
     parse_document,
     read_override,
     read_text,
     to_plain_data,
-    toml_key,
-    toml_text,
 )
-from .grid import MAX_POINTS, Axis, build_grid, chunk_problems, name_of, path_of
+from .grid import MAX_POINTS, Axis, build_grid, chunk_problems
+from .input_names import InputName
 from .library import library
 from .lines import SourceLocations, key_lines, problem_lines, validation_problems
 from .measurements import (
@@ -69,7 +69,6 @@ from .tables import (
     document_type,
     expand_models,
     json_schema,
-    quantity_at,
 )
 
 __all__ = [
@@ -233,7 +232,7 @@ class _Reader:
         if config is None or override_problems or file_problems:
             if text is not None and not text.lstrip().startswith("{"):
                 locations = replace(locations, lines=key_lines(text))
-            raise ConfigError([*problem_lines(problems, locations), *file_problems, *override_problems])
+            raise ConfigError(*problem_lines(problems, locations), *file_problems, *override_problems)
         return replace(config, files=files)
 
     def _build_config(
@@ -270,14 +269,14 @@ class _Reader:
             values = {name: value for name, value in values.items() if isinstance(value, float | str)}
         else:
             problems += design_problems(data)
-        optional = {name: quantity_at(path_of(name), self.models) for name in values}
+        optional = {name: InputName.parse(name).quantity(self.models) for name in values}
         quantities = {name: quantity for name, quantity in optional.items() if quantity is not None}
         output = document.output
         distributions = {name: value for name, value in values.items() if isinstance(value, Distribution)}
         if distributions and document.design is not None:
             u = unit_samples(document.design, len(distributions))
             drawn, draw_problems = draw_columns(distributions, quantities, u)
-            problems += [(path_of(name), message) for name, message in draw_problems.items()]
+            problems += [(InputName.parse(name).path, message) for name, message in draw_problems.items()]
             values |= {name: tuple(column.tolist()) for name, column in drawn.items()}
         grid = build_grid(
             values,
@@ -357,7 +356,7 @@ def _library_overrides(data: Mapping[str, Any], overrides: Sequence[str]) -> lis
     paths = [path for path, _ in map(read_override, overrides) if path[:1] == ("materials",)]
     names = dict.fromkeys(str(path[1]) for path in paths if len(path) > 2)
     return [
-        _material_override(name, library()[name])
+        override_text(("materials", name), library()[name])
         for name in names
         if _is_from_library(name, data) and ("materials", name) not in paths
     ]
@@ -368,11 +367,6 @@ def _is_from_library(name: str, data: Mapping[str, Any]) -> bool:
     return name in library() and name not in as_table(data.get("materials"))
 
 
-def _material_override(name: str, properties: Mapping[str, object]) -> str:
-    """The override that defines a material."""
-    return f"materials.{toml_key(name)}={toml_text(dict(properties))}"
-
-
 def _add_library_materials(data: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
     """The data with tables for the library materials that a ball may have, and overrides that add those tables."""
     sweep = as_table(data.get("sweep"))
@@ -380,7 +374,7 @@ def _add_library_materials(data: Mapping[str, Any]) -> tuple[dict[str, Any], lis
     names = dict.fromkeys(
         name for key in MATERIAL_KEYS for table in (sweep, cases) for name in listed_names(table.get(key))
     )
-    names |= {str(path[1]): None for path in map(path_of, cases) if path[0] == "materials"}
+    names |= {name.material: None for name in map(InputName.parse, cases) if name.material}
     materials = {
         # a column of cases or of measurements replaces a property
         name: {key: value for key, value in library()[name].items() if f"materials.{name}.{key}" not in cases}
@@ -388,7 +382,7 @@ def _add_library_materials(data: Mapping[str, Any]) -> tuple[dict[str, Any], lis
         if _is_from_library(name, data) and isinstance(data.get("materials", {}), dict)
     }
     extended = {**data, "materials": {**data.get("materials", {}), **materials}} if materials else dict(data)
-    return extended, [_material_override(name, properties) for name, properties in materials.items()]
+    return extended, [override_text(("materials", name), properties) for name, properties in materials.items()]
 
 
 def _remove_invalid(data: Mapping[str, Any], paths: Sequence[KeyPath]) -> dict[str, Any]:
@@ -478,7 +472,7 @@ def _calibration_problems(
         ]
     for name, value in values.items():
         if isinstance(value, tuple | Range):
-            problems.append((path_of(name), f"got an axis, {single}"))
+            problems.append((InputName.parse(name).path, f"got an axis, {single}"))
     uncertain = next(distribution_paths(data), ("design",) if "design" in data else ())
     if uncertain:
         problems.append((uncertain, "got an uncertain input, which impact sweep and impact sensitivity take"))
@@ -513,7 +507,7 @@ def _locate_in_cases(problems: Sequence[ConfigProblem], cases: Mapping[str, str]
 
     def located(path: KeyPath) -> KeyPath:
         length = 2 if path[:1] == ("sweep",) else 3
-        column = cases.get(name_of(path[:length])) if len(path) >= length else None
+        column = cases.get(str(InputName.of_path(path[:length]))) if len(path) >= length else None
         return path if column is None else ("sweep", "cases", column, *path[length:])
 
     return [(located(path), message) for path, message in problems]

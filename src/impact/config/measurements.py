@@ -20,16 +20,12 @@ from .cases import (
     column_quantity,
     column_values,
     contains_path,
-    input_names,
-    input_values,
     read_csv,
-    unknown_input_message,
-    values_override,
 )
-from .files import as_table, set_value
-from .grid import name_of, path_of
+from .files import as_table, override_text, set_value
+from .input_names import InputName, input_values
 from .quantities import MAX_PROBLEMS, ConfigProblem, KeyPath, Quantity, show, suggest, value_error
-from .tables import LOSSES, MATERIAL_KEYS, MAX_MEASURED, MIN_SIGMA, NOISES, quantity_at
+from .tables import LOSSES, MAX_MEASURED, MIN_SIGMA, NOISES, SWEEP_QUANTITIES
 
 Noise = Literal["given", "scale", "excess"]
 Loss = Literal["linear", "huber", "cauchy"]
@@ -87,9 +83,9 @@ class _DataColumn:
 
 def fit_paths(data: Mapping[str, Any]) -> Iterator[KeyPath]:
     """The path of every `{ fit = ... }`."""
-    for path, value in input_values(data):
+    for name, value in input_values(data):
         if isinstance(value, dict) and "fit" in value:
-            yield path
+            yield name.path
 
 
 def purpose_problems(data: Mapping[str, Any]) -> list[ConfigProblem]:
@@ -118,9 +114,9 @@ def _columns_of(
         )
         if other != name:
             problems.append((name, f"got a second column of {column.name}, beside {show(other)}, expected one"))
-        elif column.kind == "input" and contains_path(data, path_of(name)):
+        elif column.kind == "input" and contains_path(data, InputName.parse(name).path):
             problems.append(
-                (name, f"set together with {'.'.join(map(str, path_of(name)))}, expected one of the two")
+                (name, f"set together with {InputName.parse(name).config_key}, expected one of the two")
             )
     if not outputs and not problems:
         problems.append(("", "got no column of an output, expected one, such as e_out or contact_time"))
@@ -147,18 +143,23 @@ def _column_of(name: str, outputs: Sequence[str], models: Mapping[str, ForceMode
         )
     if not name:
         raise value_error("got a column without a name, expected that of an input or an output")
-    path = path_of(name)
+    input_name = InputName.parse(name)
     try:
-        quantity = quantity_at(path, models)
+        quantity = input_name.quantity(models)
     except KeyError:
-        if path[0] != "sweep":
-            raise value_error(unknown_input_message(name, models)) from None
-        inputs = [key for key in input_names() if key not in MATERIAL_KEYS]
-        choices = [*MEASURED_OUTPUTS, SIGMA, SPECIMEN, *inputs, *(f"{SIGMA}_{output}" for output in outputs)]
+        if input_name.owner:
+            raise value_error(input_name.unknown_message(models)) from None
+        choices = [
+            *MEASURED_OUTPUTS,
+            SIGMA,
+            SPECIMEN,
+            *SWEEP_QUANTITIES,
+            *(f"{SIGMA}_{output}" for output in outputs),
+        ]
         raise value_error(f"no such input or output; {suggest(name, choices)}") from None
     if quantity is None:
         raise value_error("got names of materials, expected numbers; all points have the materials of [sweep]")
-    return _DataColumn("input", name_of(path), replace(quantity, infinite=False))
+    return _DataColumn("input", str(input_name), replace(quantity, infinite=False))
 
 
 def inline_measurements(
@@ -175,7 +176,7 @@ def inline_measurements(
         table_of_file = read_csv(folder / file, partial(column_quantity, models=models))
         values, lines = _read_values(table_of_file, data, models, n)
         stored: dict[KeyPath, object] = {("data", "columns"): values, ("data", "lines"): lines}
-        overrides = [values_override(path, value) for path, value in stored.items()]
+        overrides = [override_text(path, value) for path, value in stored.items()]
     except ConfigError as error:
         return dict(data), [], list(error.problems)
     for path, value in stored.items():
@@ -229,7 +230,7 @@ def _read_values(
             except ConfigError as error:
                 problems += error.problems
     if problems:
-        raise ConfigError(problems[:MAX_PROBLEMS])
+        raise ConfigError(*problems[:MAX_PROBLEMS])
     return values, [line for line, _ in next(iter(table.cells.values()))]
 
 
@@ -337,7 +338,7 @@ def expand_measurements(
         loss=loss,
     )
     for name, column_of_input in measurements.inputs.items():
-        data, _ = set_value(data, path_of(name), column_of_input[0])
+        data, _ = set_value(data, InputName.parse(name).path, column_of_input[0])
     return dict(data), measurements, []
 
 
@@ -417,14 +418,14 @@ def fitted_parameters(fits: Mapping[str, tuple[float, float]], model: ForceModel
     used = with_base_quantities(model.quantities)
 
     def is_used(name: str) -> bool:
-        table, *keys = path_of(name)
         if name in ("e", "alpha"):
             return "e" in used
         if name == "n":
             return model.exponent is None
-        if keys[-1] == "yield_strength":
+        input_name = InputName.parse(name)
+        if input_name.key == "yield_strength":
             return bool(used & {"yield_strength1", "yield_strength2"})
-        return table != "model" or keys[0] == model.key
+        return input_name.applies_to(model.key)
 
     return tuple(filter(is_used, fits))
 

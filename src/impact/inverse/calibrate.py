@@ -12,19 +12,19 @@ import numpy as np
 import xarray as xr
 
 from ..array_types import Array
-from ..config.files import toml_key, toml_text
-from ..config.grid import Axis, path_of
+from ..config.files import override_text, toml_document
+from ..config.grid import Axis
+from ..config.input_names import InputName
 from ..config.load import Config, parse_config
 from ..config.measurements import fitted_parameters
-from ..config.quantities import Quantity
-from ..config.tables import quantity_at
+from ..config.quantities import KeyPath, Quantity
 from ..contact.model import ForceModel
 from ..contact.outputs import collide
 from ..contact.units import dimension
 from ..engine.build_impacts import build_impacts
 from ..engine.execute import WorkerContext, context_of, models_of_context
 from ..engine.executors import choose_backend
-from ..engine.plan import Inputs, Plan, is_foreign
+from ..engine.plan import Inputs, Plan
 from ..engine.plugins import Plugins
 from ..results.calibration import calibration_template
 from ..results.schema import FIT_STATUSES
@@ -170,7 +170,7 @@ def _fit_remotely(key: str, text: str, overrides: Sequence[str], context: Worker
     """The fit of the law of a key, in any process, with a config given by its text and overrides."""
     models = models_of_context(context)
     plugins = [models[name] for name, _ in context.hashes]
-    selection = f"models={toml_text([key])}"
+    selection = override_text(("models",), [key])
     return fit_laws(parse_config(text, [*overrides, selection], plugins, "", purpose="calibrate"))[key]
 
 
@@ -267,7 +267,7 @@ def determined_groups(config: Config, model: ForceModel, names: Sequence[str], f
     groups = []
     for row in reduced:
         powers = {
-            names[number].rpartition(".")[2]: Fraction(float(power)).limit_denominator(MAX_DENOMINATOR)
+            InputName.parse(names[number]).key: Fraction(float(power)).limit_denominator(MAX_DENOMINATOR)
             for number, power in zip(involved.tolist(), row, strict=True)
         }
         units = [_quantity(config, names[number]).unit for number in involved.tolist()]
@@ -276,7 +276,7 @@ def determined_groups(config: Config, model: ForceModel, names: Sequence[str], f
 
 
 def _quantity(config: Config, name: str) -> Quantity:
-    quantity = quantity_at(path_of(name), {model.key: model for model in config.models})
+    quantity = InputName.parse(name).quantity({model.key: model for model in config.models})
     assert quantity is not None
     return quantity
 
@@ -348,22 +348,18 @@ def best_config(calibration: Calibration) -> str:
     values |= {name: sorted(set(column)) for name, column in config.data.inputs.items()}
     law = calibration.laws[key]
     values |= dict(zip(law.names, map(float, law.fit.estimate), strict=True))
-    tables: dict[str, dict[str, object]] = {"sweep": {}}
+    tables: dict[KeyPath, dict[str, object]] = {(): {"models": [key], "title": config.title}, ("sweep",): {}}
     for name, material in config.materials.items():
         known = {field: value for field, value in asdict(material).items() if value is not None and value == value}
-        tables[f"materials.{toml_key(name)}"] = known
+        tables["materials", name] = known
     for name, value in values.items():
-        table, _, parameter = name.rpartition(".")
-        if is_foreign([name], key) or (name in config.fits and name not in law.names):
+        parsed = InputName.parse(name)
+        if not parsed.applies_to(key) or (name in config.fits and name not in law.names):
             continue
-        place = "sweep" if not table else table if table.startswith("materials.") else f"model.{table}"
         if isinstance(value, list) and len(value) == 1:
             (value,) = value
-        tables.setdefault(place, {})[parameter] = value
-    lines = [f"models = {toml_text([key])}", f"title = {toml_text(config.title)}"]
-    for place, table_values in tables.items():
-        lines += ["", f"[{place}]", *(f"{name} = {toml_text(value)}" for name, value in table_values.items())]
-    return "\n".join(lines) + "\n"
+        tables.setdefault(parsed.path[:-1], {})[parsed.key] = value
+    return toml_document(tables)
 
 
 def calibration_dataset(calibration: Calibration, plugins: Plugins) -> xr.Dataset:

@@ -156,7 +156,7 @@ def read_points(points: str | Path | pd.DataFrame | xr.Dataset) -> Points:
     for column in table.units:
         if column not in quantities:
             location = f"{table.name}:1: " if is_file else f"{table.name}: "
-            raise ConfigError([f"{location}got {show(column)}; {did_you_mean(column, sorted(quantities))}"])
+            raise ConfigError(f"{location}got {show(column)}; {did_you_mean(column, sorted(quantities))}")
     units, previous = dict(table.units), ""
     for column in table.units:
         if column == SIGMA and previous:

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from ..config.grid import SAMPLE, path_of
-from ..config.tables import quantity_at
+from ..config.grid import SAMPLE
+from ..config.input_names import InputName
 from ..contact.units import with_numbers
 from ..contact.variables import OUTPUTS
 from ..engine.plan import Plan
@@ -43,7 +43,7 @@ def sensitivity_template(plan: Plan, of: str, others: Sequence[str]) -> xr.Datas
         for name, coordinate in plan_coordinates(plan).variables.items()
         if SAMPLE not in coordinate.dims
     }
-    paths = [".".join(map(str, path_of(name))) for name in config.distributions]
+    paths = [InputName.parse(name).config_key for name in config.distributions]
     new = {
         "input": ("input", paths, {"long_name": "uncertain input, by its path in the config"}),
         "quantile": ("quantile", list(QUANTILES), {"long_name": "probability", "units": "1"}),
@@ -73,7 +73,7 @@ def distribution_texts(dataset: xr.Dataset) -> list[str]:
 def _unit_of_input(name: str) -> str:
     """The unit of an input by its config name; "1" for a parameter of a model."""
     try:
-        quantity = quantity_at(path_of(name), {})
+        quantity = InputName.parse(name).quantity({})
     except KeyError:
         return "1"
     return "1" if quantity is None else quantity.unit
