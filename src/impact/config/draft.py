@@ -29,11 +29,14 @@ from .files import (
     set_value,
     to_plain_data,
 )
-from .grid import path_of
+from .input_names import InputName, input_values
 from .library import library
 from .lines import MAX_PROBLEM_LINES, key_lines, path_text
 from .quantities import VALUE_FORMS, ConfigProblem, KeyPath
 from .tables import MATERIAL_KEYS, SWEEP_DEFAULTS, SWEEP_QUANTITIES, expand_models
+
+# keys of [sweep] that arrange inputs
+NO_INPUTS = (("sweep", "zip"), ("sweep", "cases"))
 
 if TYPE_CHECKING:
     from .measurements import Measurements
@@ -128,9 +131,7 @@ class Draft:
     @cached_property
     def input_names(self) -> list[str]:
         """The config names of all inputs, whether or not their values are valid."""
-        names = [name for name in self.table("sweep") if name not in ("zip", "cases")]
-        names += [f"materials.{key}.{name}" for key, t in self.table("materials").items() for name in as_table(t)]
-        return names + [f"{key}.{name}" for key, t in self.table("model").items() for name in as_table(t)]
+        return [str(name) for name, _ in input_values(self.data) if name.path not in NO_INPUTS]
 
     def with_problems(self, problems: Iterable[ConfigProblem]) -> Draft:
         return replace(self, problems=(*self.problems, *problems))
@@ -255,11 +256,11 @@ def add_library_materials(draft: Draft) -> Draft:
     names = dict.fromkeys(
         name for key in MATERIAL_KEYS for table in (sweep, columns) for name in listed_names(table.get(key))
     )
-    paths = [path for path in map(path_of, columns) if path[0] == "materials"]
-    names |= {str(path[1]): None for path in paths}
+    properties = [name for name in map(InputName.parse, columns) if name.material]
+    names |= {name.material: None for name in properties}
     settings = [
         # a column of cases or of measurements replaces a property
-        _library_setting(name, without=[str(path[2]) for path in paths if path[1] == name])
+        _library_setting(name, without=[other.key for other in properties if other.material == name])
         for name in names
         if name in library() and name not in draft.table("materials")
     ]

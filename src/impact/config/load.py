@@ -19,7 +19,8 @@ from . import cases, measurements
 from .design import design_problems, distribution_paths, draw_columns, unit_samples
 from .draft import Draft, Setting, add_library_materials, open_config, open_text
 from .files import as_table
-from .grid import MAX_POINTS, Axis, build_grid, chunk_problems, name_of, path_of
+from .grid import MAX_POINTS, Axis, build_grid, chunk_problems
+from .input_names import InputName
 from .library import library
 from .lines import validation_problems
 from .measurements import (
@@ -52,7 +53,6 @@ from .tables import (
     Solver,
     document_type,
     json_schema,
-    quantity_at,
 )
 
 __all__ = [
@@ -198,18 +198,21 @@ def build(draft: Draft, max_points: int = MAX_POINTS, purpose: Purpose = "sweep"
         values = {name: value for name, value in values.items() if isinstance(value, float | str)}
     else:
         draft = draft.with_problems(design_problems(draft.data))
-    quantities = {name: q for name in values if (q := quantity_at(path_of(name), draft.known_models)) is not None}
+    optional = {name: InputName.parse(name).quantity(draft.known_models) for name in values}
+    quantities = {name: quantity for name, quantity in optional.items() if quantity is not None}
     distributions = {name: value for name, value in values.items() if isinstance(value, Distribution)}
     if distributions and document.design is not None:
         u = unit_samples(document.design, len(distributions))
         drawn, draw_problems = draw_columns(distributions, quantities, u)
-        draft = draft.with_problems((path_of(name), message) for name, message in draw_problems.items())
+        draft = draft.with_problems(
+            (InputName.parse(name).path, message) for name, message in draw_problems.items()
+        )
         values |= {name: tuple(column.tolist()) for name, column in drawn.items()}
     grid = build_grid(
         values,
         quantities,
         document.sweep.zip if purpose == "sweep" else (),
-        [name_of(path) for path in draft.cases] if purpose == "sweep" else (),
+        [str(InputName.of_path(path)) for path in draft.cases] if purpose == "sweep" else (),
         list(distributions),
         draft.input_names,
         len(draft.models),
@@ -257,7 +260,9 @@ def _inline_files(draft: Draft) -> Draft:
 
 def _expand_cases(draft: Draft) -> Draft:
     data, names, problems = cases.expand_cases(draft.data, draft.known_models)
-    paths = {path_of(name): ("sweep", "cases", column) for name, column in names.items()}
+    paths: dict[KeyPath, KeyPath] = {
+        InputName.parse(name).path: ("sweep", "cases", column) for name, column in names.items()
+    }
     return replace(draft, data=data, cases=paths).with_problems(problems)
 
 
@@ -374,7 +379,7 @@ def _calibration_problems(
         ]
     for name, value in values.items():
         if isinstance(value, tuple | Range):
-            problems.append((path_of(name), f"got an axis, {single}"))
+            problems.append((InputName.parse(name).path, f"got an axis, {single}"))
     uncertain = next(distribution_paths(data), ("design",) if "design" in data else ())
     if uncertain:
         problems.append((uncertain, "got an uncertain input, which impact sweep and impact sensitivity take"))
