@@ -13,7 +13,6 @@ if TYPE_CHECKING:
         check_model as check_model,
         estimate as estimate,
         expand as expand,
-        explore as explore,
         export as export,
         export_codes as export_codes,
         extend as extend,
@@ -23,10 +22,7 @@ if TYPE_CHECKING:
         materials as materials,
         merge as merge,
         models as models,
-        plot as plot,
-        plot_to_files as plot_to_files,
         recommend as recommend,
-        report as report,
         rerun as rerun,
         run as run,
         schema as schema,
@@ -45,7 +41,11 @@ if TYPE_CHECKING:
     from .contact.models.hysteresis import hysteresis as hysteresis
     from .contact.powers import power as power
     from .errors import ImpactError as ImpactError
+    from .plots.draw import plot as plot
+    from .plots.explore import explore as explore
+    from .plots.files import plot_to_files as plot_to_files
     from .progress_display import progress_bar as progress_bar
+    from .reporting.page import report as report
     from .results.backend import load as load, save as save
 
 # the module of each public name, which is imported on first use: `import impact` and `impact --help` need no numpy
@@ -61,7 +61,7 @@ _MODULES = {
     "compare": "comparison.compare",
     "estimate": "api",
     "expand": "api",
-    "explore": "api",
+    "explore": "plots.explore",
     "export": "api",
     "export_codes": "api",
     "extend": "api",
@@ -73,12 +73,12 @@ _MODULES = {
     "materials": "api",
     "merge": "api",
     "models": "api",
-    "plot": "api",
-    "plot_to_files": "api",
+    "plot": "plots.draw",
+    "plot_to_files": "plots.files",
     "power": "contact.powers",
     "progress_bar": "progress_display",
     "recommend": "api",
-    "report": "api",
+    "report": "reporting.page",
     "rerun": "api",
     "run": "api",
     "save": "results.backend",
