@@ -32,7 +32,6 @@ from .quantities import (
     RANGE,
     SCALAR,
     ConfigProblem,
-    KeyPath,
     Names,
     Numbers,
     Quantity,
@@ -220,6 +219,11 @@ class Output:
         Field(description="all values, or the trajectories from which they are computed when they are read"),
     ] = "auto"
 
+    @property
+    def is_full(self) -> bool:
+        """Whether all points are stored, whatever their number."""
+        return self.layout == "full" or (self.layout == "auto" and bool(self.chunks))
+
 
 # least standard deviation and largest measured value, in SI: squares of their ratio overflow beyond them
 MIN_SIGMA, MAX_MEASURED = 1e-30, 1e100
@@ -315,23 +319,6 @@ def model_quantities(model: ForceModel) -> dict[str, Quantity]:
         parameter.name: Quantity(parameter.unit, parameter.meaning, parameter.least, parameter.most)
         for parameter in model.parameters
     }
-
-
-def quantity_at(path: KeyPath, models: Mapping[str, ForceModel]) -> Quantity | None:
-    """The quantity of the input at a path; None for the name of a material.
-
-    Raises
-    ------
-    KeyError : no input has this path
-    """
-    match path:
-        case ("sweep", str(name)):
-            return None if name in MATERIAL_KEYS else SWEEP_QUANTITIES[name]
-        case ("materials", _, str(name)):
-            return MATERIAL_QUANTITIES[name]
-        case ("model", str(key), str(name)):
-            return model_quantities(models[key])[name]
-    raise KeyError(path)
 
 
 def parameter_table(model: ForceModel) -> type[Table]:

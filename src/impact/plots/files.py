@@ -8,9 +8,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from ..atomic import check_outputs, write_file
 from ..contact.model import ForceModel
 from ..errors import UsageError
-from ..results.backend import check_outputs, load, write_file
+from ..results.xarray_backend import load
 from .data import check_table, encode_table, read_points
 from .draw import draw, get_plot_data, label_keys
 from .kinds import MOTION_KINDS, Choice, Look, check_kind, default_kind
