@@ -14,8 +14,6 @@ if TYPE_CHECKING:
         estimate as estimate,
         expand as expand,
         explore as explore,
-        export as export,
-        export_codes as export_codes,
         extend as extend,
         extend_to_file as extend_to_file,
         info as info,
@@ -45,6 +43,7 @@ if TYPE_CHECKING:
     from .contact.models.hysteresis import hysteresis as hysteresis
     from .contact.powers import power as power
     from .errors import ImpactError as ImpactError
+    from .exporters.export import export as export, export_codes as export_codes
     from .progress_display import progress_bar as progress_bar
     from .results.backend import load as load, save as save
 
@@ -62,8 +61,8 @@ _MODULES = {
     "estimate": "api",
     "expand": "api",
     "explore": "api",
-    "export": "api",
-    "export_codes": "api",
+    "export": "exporters.export",
+    "export_codes": "exporters.export",
     "extend": "api",
     "extend_to_file": "api",
     "hysteresis": "contact.models.hysteresis",

@@ -57,7 +57,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from .contact.checks import Finding
-    from .exporters.export import Export
     from .inverse.solve import SolveResult
     from .inverse.timestep import TimestepResult
     from .plots.kinds import Choice, PlotData
@@ -717,107 +716,6 @@ def sensitivities(
     if output is not None:
         save(results[0], output, overwrite=overwrite)
     return results
-
-
-def export(
-    to: str,
-    model: str | None = None,
-    *,
-    source: str | Path | Mapping[str, object] | None = None,
-    at: Mapping[str, float | str] | None = None,
-    dt: float | None = None,
-    code_version: str | None = None,
-    script: bool = False,
-    verify: bool = False,
-    program: str | None = None,
-    output: str | Path | None = None,
-    overwrite: bool = False,
-    overrides: Sequence[str] = (),
-) -> Export:
-    """Write a law as a code takes it, with the restitution that the code delivers at its time step.
-
-    Parameters
-    ----------
-    to : name of the code, see `export_codes`
-    model : a law that the code has, by its key; by default the first one of the source, or without a source the
-        first one of `export_codes`, that the release of the code has
-    source, overrides : see `solve`
-    at : values of inputs by config name; an e for a law that takes none is reached by its damping parameter
-    dt : time step [s]; by default the contact time of the continuous law over 50
-    code_version : release of the code, letters, digits, spaces and `._+()-`; by default that of the program, or
-        else the newest known one
-    script : write a complete input with two balls that prints the e that it measures
-    verify : run such inputs at four phases, and compare their e with the prediction
-    program : what runs scripts, such as the file of lmp, or of a Python with the code's package; by default found
-    output : file to write the lines or the script to
-    overwrite : replace the output if it exists
-
-    Returns
-    -------
-    Export : parameters, lines, script and what the code delivers; `text` is what is written to `output`
-
-    Raises
-    ------
-    UsageError : the code or the law is unknown, no damping gives the e, the code is not installed, or the output
-        exists
-    ConfigError : see `sweep`
-
-    What LAMMPS takes for a restitution of 0.6:
-
-    >>> import impact
-    >>> law, at = "lammps-coeff-restitution-hooke", {"e": 0.6, "K": 1e6}
-    >>> export = impact.export("lammps", law, at=at, code_version="22Jul2025")
-    >>> export.lines[1]
-    'pair_coeff      * * hooke 1000000.0 0.6 damping coeff_restitution tangential linear_nohistory 0.0 0.0'
-    >>> round(export.at_dt.e_mean, 4)
-    0.5985
-    """
-    # its modules import scipy.optimize, which other functions do without
-    from .exporters.codes import find_code
-    from .exporters.export import write_export
-    from .exporters.problem import prepare_export
-    from .exporters.verify import choose_version
-
-    # before a program is run
-    check_outputs([output], [source], overwrite=overwrite)
-    code = find_code(to)
-    found, version = choose_version(code, program, code_version, verify=verify)
-    problem = prepare_export(code, model, version, source, at or {}, overrides)
-    check_outputs([output], [source, *problem.config.files], overwrite=overwrite)
-    result = write_export(problem, dt, found if verify else None, with_script=script)
-    if output is not None:
-        write_file(Path(output), result.text.encode(), overwrite=overwrite)
-    return result
-
-
-def export_codes() -> list[dict[str, Any]]:
-    """The codes to which laws are exported, each with its laws, by key of the catalogue.
-
-    Returns
-    -------
-    list : for each code a dict of its name "code", "title", the "installed" and the "newest" known version,
-        the "scheme" of its time step, what was "tested", and what it calls each of its "laws"
-
-    >>> import impact
-    >>> (mujoco,) = (code for code in impact.export_codes() if code["code"] == "mujoco")
-    >>> mujoco["laws"]["mujoco-solref"]
-    'solref, standard format'
-    """
-    from .exporters.codes import CODES
-    from .exporters.verify import installed_version
-
-    return [
-        {
-            "code": code.name,
-            "title": code.title,
-            "installed": installed_version(code),
-            "newest": code.newest,
-            "scheme": code.scheme,
-            "tested": code.tested,
-            "laws": dict(code.laws),
-        }
-        for code in CODES.values()
-    ]
 
 
 def extend(
