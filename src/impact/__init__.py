@@ -12,18 +12,15 @@ if TYPE_CHECKING:
         calibrate as calibrate,
         check_model as check_model,
         estimate as estimate,
-        expand as expand,
         explore as explore,
         extend as extend,
         extend_to_file as extend_to_file,
-        info as info,
         init as init,
         materials as materials,
         merge as merge,
         models as models,
         plot as plot,
         plot_to_files as plot_to_files,
-        recommend as recommend,
         report as report,
         rerun as rerun,
         run as run,
@@ -45,7 +42,9 @@ if TYPE_CHECKING:
     from .errors import ImpactError as ImpactError
     from .exporters.export import export as export, export_codes as export_codes
     from .progress_display import progress_bar as progress_bar
-    from .results.backend import load as load, save as save
+    from .results.info import info as info
+    from .results.ranking import recommend as recommend
+    from .results.xarray_backend import expand as expand, load as load, save as save
 
 # the module of each public name, which is imported on first use: `import impact` and `impact --help` need no numpy
 _MODULES = {
@@ -59,16 +58,16 @@ _MODULES = {
     "check_model": "api",
     "compare": "comparison.compare",
     "estimate": "api",
-    "expand": "api",
+    "expand": "results.xarray_backend",
     "explore": "api",
     "export": "exporters.export",
     "export_codes": "exporters.export",
     "extend": "api",
     "extend_to_file": "api",
     "hysteresis": "contact.models.hysteresis",
-    "info": "api",
+    "info": "results.info",
     "init": "api",
-    "load": "results.backend",
+    "load": "results.xarray_backend",
     "materials": "api",
     "merge": "api",
     "models": "api",
@@ -76,11 +75,11 @@ _MODULES = {
     "plot_to_files": "api",
     "power": "contact.powers",
     "progress_bar": "progress_display",
-    "recommend": "api",
+    "recommend": "results.ranking",
     "report": "api",
     "rerun": "api",
     "run": "api",
-    "save": "results.backend",
+    "save": "results.xarray_backend",
     "schema": "api",
     "sensitivity": "api",
     "solve": "api",

@@ -38,7 +38,7 @@ def info(
     as_json: JsonOption = False,
 ) -> None:
     """Show the axes, variables, largest errors and provenance of a file."""
-    from ..results.backend import open_result
+    from ..results.xarray_backend import open_result
 
     # not loaded, so that a summary in the file is used
     with open_result(file) as dataset:

@@ -14,7 +14,7 @@ from ..contact.status import Status
 from ..errors import UsageError
 from ..formatting import decimals, number, quantity
 from ..inverse.timestep import TimestepRow, needed_steps, time_steps, timestep_rows
-from ..results.backend import check_outputs, write_file
+from ..results.xarray_backend import check_outputs, write_file
 from ..results.single_impact import ConfigSource
 from ..text import safe_text
 from .code import Collision, Parameters
@@ -248,8 +248,8 @@ def _header(problem: ExportProblem, collision: Collision, row: TimestepRow) -> l
     if problem.defaulted_axes:
         header.append(f"first value of each axis of the source: {', '.join(problem.defaulted_axes)}")
     if problem.solved_parameter:
-        name = problem.solved_parameter.rpartition(".")[2]
-        header.append(f"{name} = {collision[name]!r} gives the e that is wanted")
+        value = collision[problem.solved_parameter]
+        header.append(f"{problem.solved_parameter} = {value!r} gives the e that is wanted")
     asked = f"e = {number(law.e)} is asked for; " if law.has_e else ""
     contact_time = quantity(law.contact_time, "s")
     header.append(

@@ -116,21 +116,21 @@ def prepare_export(
     law = find(key)
     at, solved = dict(at), ""
     if "e" in at and "e" not in law.quantities:
-        if key not in code.damping:
+        solved = code.damping.get(key, "")
+        if not solved:
             raise UsageError(f"--at e: {key} has no e, and no parameter that sets it")
-        parameter = code.damping[key]
-        solved = f"{key}.{parameter}"
-        if solved in at:
-            raise UsageError(f"--at: got e and {solved}, expected one of the two")
-        changes = [*placeholder_override(law, unknown_of(law, parameter)), *overrides]
+        name, unknown = f"{key}.{solved}", unknown_of(law, solved)
+        if name in at:
+            raise UsageError(f"--at: got e and {name}, expected one of the two")
+        changes = [*placeholder_override(law, unknown), *overrides]
         config, _ = single_point(source, changes, plugins, key, at)
         del at["e"]
-        wanted = float(config.scalars["e"])
-        result = solve_input(config, plugins, unknown_of(law, parameter), {"e_out": wanted})
+        requested_e = float(config.scalars["e"])
+        result = solve_input(config, plugins, unknown, {"e_out": requested_e})
         if not result.roots:
-            least, most = map(number, result.attainable)
-            raise UsageError(f"--at e={number(wanted)}: {key} delivers {least} to {most} at any {parameter}")
-        at[solved] = result.roots[0].value
+            lower, upper = map(number, result.attainable)
+            raise UsageError(f"--at e={number(requested_e)}: {key} delivers {lower} to {upper} at any {solved}")
+        at[name] = result.roots[0].value
     config, defaulted_axes = single_point(source, overrides, plugins, key, at)
     fixed, collision = fixed_step_law(config, PHASES, code.scheme)
     return ExportProblem(
