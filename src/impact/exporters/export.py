@@ -13,8 +13,8 @@ from .._version import __version__
 from ..contact.status import Status
 from ..errors import UsageError
 from ..formatting import decimals, number, quantity
+from ..impact.atomic import check_outputs, write_file
 from ..inverse.timestep import TimestepRow, needed_steps, time_steps, timestep_rows
-from ..results.xarray_backend import check_outputs, write_file
 from ..results.single_impact import ConfigSource
 from ..text import safe_text
 from .code import Collision, Parameters
