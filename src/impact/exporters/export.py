@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from .._version import __version__
+from ..atomic import check_outputs, write_file
 from ..contact.status import Status
 from ..errors import UsageError
 from ..formatting import decimals, number, quantity
-from ..impact.atomic import check_outputs, write_file
 from ..inverse.timestep import TimestepRow, needed_steps, time_steps, timestep_rows
 from ..results.single_impact import ConfigSource
 from ..text import safe_text
