@@ -22,7 +22,7 @@ from ..plots.curves import MAX_RESTITUTIONS, STEP_AXES
 from ..plots.draw import draw, get_plot_data
 from ..plots.kinds import MAP_KINDS, Choice, Look
 from ..plots.style import encoded
-from ..results.kinds import is_calibration, is_sensitivity
+from ..results.kinds import has_fixed_steps, is_calibration, is_sensitivity
 from ..results.schema import columns_along, plain_unit
 from ..results.selection import model_positions
 from ..results.slabs import distinct_points, is_computed, slabs
@@ -136,7 +136,7 @@ def iterate_choices(dataset: xr.Dataset, keys: Sequence[str]) -> Iterator[tuple[
             continue
         if kind == "uncertainty" and SAMPLE not in dataset.dims:
             continue
-        if (kind == "timestep" and not steps) or (kind == "loop" and "integrator" in dataset.attrs):
+        if (kind == "timestep" and not steps) or (kind == "loop" and has_fixed_steps(dataset)):
             continue
         names = (x, y) if kind in MAP_KINDS else (steps, "phase", *few_e) if kind == "timestep" else (x,)
         drawn = list(dict.fromkeys(along[name].dims[0] for name in names if name in along))

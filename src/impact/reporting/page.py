@@ -28,7 +28,6 @@ from ..formatting import label, number
 from ..results.attributes import read_attribute
 from ..results.calibration import (
     FIT_HEADINGS,
-    FIT_STATUSES,
     calibration_title,
     describe_data,
     fit_notes,
@@ -38,7 +37,7 @@ from ..results.kinds import is_calibration, is_sensitivity
 from ..results.plausibility import depth_summary, material_notes, result_notes
 from ..results.ranking import DEFAULT_TOL, Ranking, rank_models, rankable_parts
 from ..results.replay_command import describe_point
-from ..results.schema import count_points, exponents_of
+from ..results.schema import FIT_STATUSES, count_points, exponents_of
 from ..results.sensitivity import INDEX_HEADINGS, describe_design, describe_study, index_rows, iterate_studies
 from ..results.slabs import MAX_SUMMARY_POINTS, is_large
 from ..results.summary import Summary, extremes_of, summarize
