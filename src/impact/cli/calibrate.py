@@ -12,7 +12,6 @@ import typer
 
 import impact
 
-from ..text import safe_text
 from . import exits
 from .console import cell, console, dump, table
 from .options import JobsOption, JsonOption, OverwriteOption, PluginOption, SetOption
@@ -56,7 +55,7 @@ def calibrate(
         print_fits(result)
     for path in (output, best):
         if path is not None:
-            exits.print_line(f"{safe_text(str(path))}: written")
+            exits.print_line(f"{path}: written")
 
 
 # numbers of a law in JSON

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..text import safe_text
 from . import exits
 from .completion import complete_output
 from .console import cell, console, dump, table
@@ -95,7 +94,7 @@ def sensitivity(
                 print()
             print_studies(result)
     if output is not None:
-        exits.print_line(f"{safe_text(str(output))}: written")
+        exits.print_line(f"{output}: written")
     if any(int(result["failed"].sum()) for result in results) and not allow_failed:
         raise typer.Exit(exits.EXIT_POINTS_FAILED)
 
