@@ -19,7 +19,7 @@ from ..contact.numba.dispatch import is_installed
 from ..contact.outputs import BY_DEFAULT
 from ..contact.timestep import EXACT
 from ..errors import ConfigError
-from .cases import expand_cases, inline_files, named_files
+from .columns import expand_cases, named_files, read_files
 from .design import design_problems, distribution_paths, draw_columns, unit_samples
 from .files import (
     apply_overrides,
@@ -28,6 +28,7 @@ from .files import (
     parse_document,
     read_override,
     read_text,
+    set_value,
     to_plain_data,
 )
 from .grid import MAX_POINTS, Axis, build_grid, chunk_problems
@@ -37,10 +38,10 @@ from .lines import SourceLocations, key_lines, problem_lines, validation_problem
 from .measurements import (
     Measurements,
     count_problems,
-    expand_measurements,
     fit_paths,
-    inline_measurements,
     purpose_problems,
+    read_data_file,
+    read_measurements,
 )
 from .quantities import (
     Column,
@@ -225,10 +226,13 @@ class _Reader:
                 text = json.dumps(source_data, separators=(",", ":"), default=str)
             n = read_exponent(as_table(data.get("sweep")))
             files = tuple((self.folder or Path()) / file for file in named_files(data))
-            data, file_overrides, file_problems = inline_files(data, self.folder, self.models, n)
-            data, data_overrides, data_problems = inline_measurements(data, self.folder, self.models, n)
-            file_problems += data_problems
-            config, problems = self._build_config(data, text, (*overrides, *file_overrides, *data_overrides))
+            for read in (read_files, read_data_file):
+                values, read_problems = read(data, self.folder, self.models, n)
+                file_problems += read_problems
+                for path, value in values.items():
+                    overrides = (*overrides, override_text(path, value))
+                    data, _ = set_value(data, path, value)
+            config, problems = self._build_config(data, text, overrides)
         if config is None or override_problems or file_problems:
             if text is not None and not text.lstrip().startswith("{"):
                 locations = replace(locations, lines=key_lines(text))
@@ -242,8 +246,12 @@ class _Reader:
         data, library_overrides = _add_library_materials(data)
         data, cases, problems = expand_cases(data, self.models)
         n = read_exponent(as_table(data.get("sweep")))
-        data, measurements, data_problems = expand_measurements(data, self.models, n)
+        measurements, data_problems = read_measurements(data, self.models, n)
         problems += data_problems
+        measured = {} if measurements is None else {name: cells[0] for name, cells in measurements.inputs.items()}
+        for name, value in measured.items():
+            # rules between inputs apply to the first value
+            data, _ = set_value(data, InputName.parse(name).path, value)
         sweep, parameters = as_table(data.get("sweep")), as_table(data.get("model"))
         n = None if measurements is not None and "n" in measurements.inputs else n
         models, _ = expand_models(data.get("models"), self.models)
@@ -308,7 +316,7 @@ class _Reader:
             models=tuple(models),
             scalars={
                 **grid.scalars,
-                **{name: column[0] for name, column in (measurements.inputs if measurements else {}).items()},
+                **measured,
                 **{name: value for name, value in defaults.items() if name not in values},
             },
             axes=grid.axes,
