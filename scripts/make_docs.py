@@ -5,48 +5,20 @@ python scripts/make_docs.py
 
 from __future__ import annotations
 
-import ast
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import impact
 from gallery import gallery_page, write_gallery
 from impact.contact.status import Status
+from impact.contact.variables import Variable
 from impact.plots.style import save_figure
-from impact.results.calibration import CALIBRATION_VARIABLES
-from impact.results.schema import HISTORY_VARIABLES, SCHEMA, SCHEMA_VERSION
-from impact.results.sensitivity import SENSITIVITY_VARIABLES
+from impact.results.kinds import Kind
+from impact.results.schema import SCHEMA, SCHEMA_VERSION, udunits
 from models_page import models_page
 from models_pictures import pictures
 
 ROOT = Path(__file__).parent.parent
-PACKAGE = ROOT / "src" / "impact"
-# an importing package comes before the packages that it imports
-PACKAGES = (
-    "cli",
-    "pytest_plugin",
-    "api",
-    "reporting",
-    "progress_display",
-    "plots",
-    "exporters",
-    "inverse",
-    "uncertainty",
-    "comparison",
-    "results",
-    "engine",
-    "config",
-    "contact",
-    "contact/models",
-    "contact/closed_forms",
-    "contact/numba",
-    "ode",
-    "formatting",
-    "text",
-    "errors",
-    "atomic",
-    "array_types",
-    "_version",
-)
 # the figures of the paper that show a single impact, and their kinds
 PAPER_FIGURES = {
     "figure2": "impulse",
@@ -169,51 +141,34 @@ The result of `impact sensitivity` has the dimensions `model`, the axes other th
 
 def schema_page() -> str:
     """docs/schema.md as text."""
-    variables = []
-    for variable in SCHEMA:
-        dims = "model, axes" if variable.per == "model" else "axes"
-        cells = (variable.unit, dims, variable.judged, variable.meaning, variable.equation.replace("|", "\\|"))
-        variables.append(f"| `{variable.name}` | {' | '.join(cells)} |")
+
+    def rows(kind: Kind, cells: Callable[[Variable], Sequence[str]]) -> list[str]:
+        return [f"| `{name}` | {' | '.join(cells(variable))} |" for name, variable in SCHEMA[kind].items()]
+
+    def output_cells(variable: Variable) -> Sequence[str]:
+        equation = variable.equation.replace("|", "\\|")
+        return udunits(variable.unit), ", ".join(variable.dims), variable.judged, variable.meaning, equation
+
     statuses = [f"| {status.value} | {status.name.lower()} | {status.meaning} |" for status in Status]
-    history = [f"| `{name}` | {unit} | {meaning} |" for name, unit, meaning in HISTORY_VARIABLES]
-    calibration = [
-        f"| `{name}` | {variable.unit} | {', '.join(variable.dims)} | {variable.scale} | {variable.meaning} |"
-        for name, variable in CALIBRATION_VARIABLES.items()
-    ]
-    sensitivity = [
-        f"| `{name}` | {dimension} | {meaning} |" for name, (dimension, meaning) in SENSITIVITY_VARIABLES.items()
-    ]
     tables = {
-        "variables": variables,
+        "variables": rows("sweep", output_cells),
         "statuses": statuses,
-        "history": history,
-        "calibration": calibration,
-        "sensitivity": sensitivity,
+        "history": rows("history", lambda variable: (udunits(variable.unit), variable.meaning)),
+        "calibration": rows(
+            "calibration",
+            lambda variable: (variable.unit, ", ".join(variable.dims), variable.scale, variable.meaning),
+        ),
+        "sensitivity": rows(
+            "sensitivity study", lambda variable: (", ".join(variable.dims[2:]), variable.meaning)
+        ),
     }
-    on_request = ", ".join(f"`{variable.name}`" for variable in SCHEMA if not variable.by_default)
-    rows_as_text = {name: "\n".join(rows) for name, rows in tables.items()}
+    on_request = ", ".join(f"`{name}`" for name, variable in SCHEMA["sweep"].items() if variable.on_request)
+    rows_as_text = {name: "\n".join(lines) for name, lines in tables.items()}
     return SCHEMA_PAGE.format(on_request=on_request, version=SCHEMA_VERSION, **rows_as_text)
 
 
-def architecture_page(page: str) -> str:
-    """docs/architecture.md with a new list of modules, each with the first line of its docstring.
-
-    Parameters
-    ----------
-    page : the present text of the page
-    """
-    begin, end = "<!-- modules -->\n", "<!-- end of modules -->"
-    before, _, rest = page.partition(begin)
-    lines = []
-    for part in PACKAGES:
-        package = PACKAGE / part
-        lines += ["", f"**{part}**", ""]
-        for module in sorted(package.glob("*.py")) if package.is_dir() else [package.with_suffix(".py")]:
-            summary = ast.get_docstring(ast.parse(module.read_text(encoding="utf-8")))
-            if summary:
-                name = module.relative_to(PACKAGE).with_suffix("").as_posix().removesuffix("/__init__")
-                lines.append(f"- `{name}`: {summary.splitlines()[0]}")
-    return f"{before}{begin}{chr(10).join(lines[1:])}\n{end}{rest.partition(end)[2]}"
+# each generated page of docs, and the function that returns its text
+PAGES = {"schema.md": schema_page, "models.md": models_page, "gallery.md": gallery_page}
 
 
 def write_pictures(folder: Path) -> None:
@@ -243,12 +198,9 @@ def write_timestep_figure(path: Path) -> None:
 
 
 def main() -> None:
-    (ROOT / "docs" / "schema.md").write_text(schema_page(), encoding="utf-8")
-    architecture = ROOT / "docs" / "architecture.md"
-    architecture.write_text(architecture_page(architecture.read_text(encoding="utf-8")), encoding="utf-8")
-    (ROOT / "docs" / "models.md").write_text(models_page(), encoding="utf-8")
+    for name, page in PAGES.items():
+        (ROOT / "docs" / name).write_text(page(), encoding="utf-8")
     write_pictures(ROOT / "docs" / "models")
-    (ROOT / "docs" / "gallery.md").write_text(gallery_page(), encoding="utf-8")
     write_gallery(ROOT / "docs" / "gallery")
     write_timestep_figure(ROOT / "docs" / "timestep.svg")
     write_paper_figures(ROOT / "docs" / "paper")

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 from pydantic_core import PydanticCustomError
 
 from ..contact.model import ForceModel
-from ..contact.outputs import UNITS
+from ..contact.variables import OUTPUTS
 from ..errors import ConfigError, did_you_mean
 from ..text import safe_text
 from .files import as_table, read_text, set_value
@@ -246,7 +246,9 @@ def columns_of_table(table: Any, source: str) -> Columns:
 
 def column_quantity(models: Mapping[str, ForceModel]) -> QuantityOf:
     """Define the quantity of a column that has the name of an output or an input."""
-    return lambda name: Quantity(UNITS[name], "") if name in UNITS else InputName.parse(name).quantity(models)
+    return lambda name: (
+        Quantity(OUTPUTS[name].unit, "") if name in OUTPUTS else InputName.parse(name).quantity(models)
+    )
 
 
 def read_files(
@@ -348,12 +350,12 @@ class Cases(NamedTuple):
     Parameters
     ----------
     data : plain data
-    columns : the names of the columns by config name
+    paths : where the values of an input are in the table of cases, by the path of the input
     problems : names that are unknown or have another value, and columns of another length than the first
     """
 
     data: dict[str, Any]
-    columns: dict[str, str]
+    paths: dict[KeyPath, KeyPath]
     problems: list[ConfigProblem]
 
 
@@ -364,7 +366,7 @@ def expand_cases(data: Mapping[str, Any], models: Mapping[str, ForceModel]) -> C
     if not isinstance(cases, dict) or not cases or not all(isinstance(values, list) for values in cases.values()):
         return Cases(dict(data), {}, [])
     problems: list[ConfigProblem] = []
-    columns: dict[str, str] = {}
+    paths: dict[KeyPath, KeyPath] = {}
     # the columns that belong to [sweep] take the position of the table
     in_sweep = {column: values for column, values in cases.items() if not InputName.parse(column).owner}
     position, items = list(sweep).index("cases"), list(sweep.items())
@@ -385,8 +387,8 @@ def expand_cases(data: Mapping[str, Any], models: Mapping[str, ForceModel]) -> C
             problems.append((path, f"got {len(values)} values, expected {expected}"))
         if name.owner:
             new, _ = set_value(new, name.path, values)
-        columns[str(name)] = column
-    return Cases(new, columns, problems)
+        paths[name.path] = path
+    return Cases(new, paths, problems)
 
 
 def contains_path(data: Mapping[str, Any], path: KeyPath) -> bool:

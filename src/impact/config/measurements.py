@@ -10,7 +10,7 @@ from typing import Any, Literal
 from pydantic_core import PydanticCustomError
 
 from ..contact.model import ForceModel, with_base_quantities
-from ..contact.outputs import UNITS
+from ..contact.variables import OUTPUTS
 from ..errors import ConfigError, did_you_mean
 from ..formatting import number
 from ..text import safe_text
@@ -25,26 +25,16 @@ Loss = Literal["linear", "huber", "cauchy"]
 
 SIGMA, SPECIMEN = "sigma", "specimen"
 SPECIMEN_EXPECTED = "got nothing, expected the name of a specimen"
-_ANY: dict[str, Any] = {"least": -MAX_MEASURED, "most": MAX_MEASURED}
-_POSITIVE: dict[str, Any] = {"least": 0.0, "above": True, "most": MAX_MEASURED}
-# a measured fraction may be below 0 or above 1 by its noise; a value that is farther off is no fraction
-_FRACTION: dict[str, Any] = {"least": -0.5, "most": 1.5}
-# the outputs that can be measured, with the interval of their values
+# intervals of measured values; a fraction may be below 0 or above 1 by its noise, farther off it is no fraction
+_INTERVALS: dict[str, dict[str, Any]] = {
+    "any": {"least": -MAX_MEASURED, "most": MAX_MEASURED},
+    "positive": {"least": 0.0, "above": True, "most": MAX_MEASURED},
+    "fraction": {"least": -0.5, "most": 1.5},
+}
 MEASURED_OUTPUTS = {
-    name: Quantity(UNITS[name], "measured", **interval)
-    for name, interval in {
-        "e_out": _FRACTION,
-        "v1_post": _ANY,
-        "v2_post": _ANY,
-        "contact_time": _POSITIVE,
-        "separation_time": _POSITIVE,
-        "peak_force": _POSITIVE,
-        "peak_indentation": _POSITIVE,
-        "permanent_indentation": _ANY,
-        "energy_loss": _ANY,
-        "e_kinetic": _FRACTION,
-        "e_energetic": _FRACTION,
-    }.items()
+    name: Quantity(output.unit, "measured", **_INTERVALS[output.measured])
+    for name, output in OUTPUTS.items()
+    if output.measured
 }
 
 
@@ -205,7 +195,7 @@ def _column_of(header: str, outputs: Sequence[str], models: Mapping[str, ForceMo
 
 
 def _deviation(output: str) -> Quantity:
-    return Quantity(UNITS[output], "standard deviation", least=MIN_SIGMA, most=MAX_MEASURED)
+    return Quantity(OUTPUTS[output].unit, "standard deviation", least=MIN_SIGMA, most=MAX_MEASURED)
 
 
 def read_data_file(
@@ -236,7 +226,7 @@ def _is_in_percent(cell: object, quantity: Quantity) -> bool:
     if "%" in str(cell):
         return True
     try:
-        return quantity.most == _FRACTION["most"] and float(cell) > quantity.most
+        return quantity.most == _INTERVALS["fraction"]["most"] and float(cell) > quantity.most
     except (ValueError, OverflowError):
         return False
 

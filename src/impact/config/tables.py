@@ -23,8 +23,8 @@ from pydantic_core import PydanticCustomError
 
 from ..contact.model import ForceModel
 from ..contact.models import built_in, catalogue
-from ..contact.outputs import OUTPUTS
 from ..contact.timestep import EXACT, MAX_STEPS_PER_CONTACT, SCHEMES
+from ..contact.variables import OUTPUTS
 from ..errors import did_you_mean
 from .quantities import (
     MAX_AXIS_VALUES,
@@ -174,7 +174,7 @@ class Solver:
     ] = EXACT
 
 
-OutputVariable = Annotated[Literal[*OUTPUTS], known_name("a variable of the result", lambda info: OUTPUTS)]  # type: ignore[valid-type]
+OutputVariable = Annotated[Literal[*OUTPUTS], known_name("a variable of the result", lambda info: tuple(OUTPUTS))]  # type: ignore[valid-type]
 
 
 def _list_or_none(value: object) -> object:
@@ -218,6 +218,11 @@ class Output:
         Literal["auto", "full", "factored"],
         Field(description="all values, or the trajectories from which they are computed when they are read"),
     ] = "auto"
+
+    @property
+    def is_full(self) -> bool:
+        """Whether all points are stored, whatever their number."""
+        return self.layout == "full" or (self.layout == "auto" and bool(self.chunks))
 
 
 # least standard deviation and largest measured value, in SI: squares of their ratio overflow beyond them

@@ -13,7 +13,8 @@ from pathlib import Path
 import xarray as xr
 
 from .._version import __version__
-from ..config.files import apply_overrides, override_text, parse_document, read_text
+from ..config.draft import Setting, open_config
+from ..config.files import override_text
 from ..config.grid import Axis
 from ..config.input_names import InputName, is_input
 from ..config.load import Config, parse_config, read_config
@@ -23,11 +24,12 @@ from ..contact.history import History, follow
 from ..contact.impacts import Impacts
 from ..contact.materials import Material
 from ..contact.model import ForceModel
-from ..contact.models import catalogue, find
+from ..contact.models import find
 from ..contact.outputs import collide
 from ..contact.status import Status
 from ..contact.timestep import EXACT
 from ..contact.units import with_numbers
+from ..contact.variables import HISTORY, OUTPUTS
 from ..engine.build_impacts import build_impacts, fixed_steps_at
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins
@@ -36,7 +38,7 @@ from ..formatting import number, quantity
 from ..text import html_table, safe_text
 from .kinds import require_sweep
 from .provenance import changed_plugins, check_plugins, stored_config, unknown_plugins
-from .schema import HISTORY_VARIABLES, SCHEMA, SCHEMA_VERSION, is_case, plain_unit
+from .schema import SCHEMA_VERSION, attributes_of, is_case, plain_unit
 from .seal import is_result
 from .xarray_backend import open_result
 
@@ -124,10 +126,9 @@ class Impact:
             if self.derived[name] == self.derived[name] and name not in self.point:
                 rows[name] = f"{quantity(self.derived[name], self._with_numbers(plain_unit(unit)), 10)}  {meaning}"
         rows["status"] = f"{self.status.name.lower()}: {self.status.meaning}"
-        for variable in SCHEMA:
-            if variable.dtype == "f8" and variable.name not in ("e_kinetic", "e_energetic"):
-                unit = self._with_numbers(plain_unit(variable.unit))
-                rows[variable.name] = quantity(self.values[variable.name], unit, 10)
+        for name, variable in OUTPUTS.items():
+            if variable.dtype == "f8" and name not in ("e_kinetic", "e_energetic"):
+                rows[name] = quantity(self.values[name], self._with_numbers(variable.unit), 10)
         rows["e_kinematic"] = quantity(self.e_kinematic, "1", 12) + "  (1), from the velocities"
         rows["e_kinetic"] = quantity(self.e_kinetic, "1", 12) + "  (2), tau_r/tau_c"
         rows["e_energetic"] = quantity(self.e_energetic, "1", 12) + "  (3), the root of -W_r/W_c"
@@ -245,10 +246,7 @@ def history_dataset(history: History, model: str, point: Mapping[str, float | st
     point : the inputs of the impact by their config names, stored in the attribute `inputs`
     """
     dataset = xr.Dataset(
-        {
-            name: ("t", getattr(history, name), {"units": unit, "long_name": meaning})
-            for name, unit, meaning in HISTORY_VARIABLES
-        },
+        {name: ("t", getattr(history, name), attributes_of(variable)) for name, variable in HISTORY.items()},
         coords={"t": ("t", history.t, {"units": "s", "long_name": "time since first contact"}), "model": model},
     )
     dataset.attrs = {
@@ -407,18 +405,15 @@ def models_of_source(source: ConfigSource, overrides: Sequence[str], plugins: Pl
     ConfigError : it cannot be read, or selects what is no model
     """
     read, _ = _config_reader(source, overrides, plugins)
-    if isinstance(source, str | Path) and not is_result(Path(source)):
-        data = parse_document(read_text(Path(source)), str(source))
-    elif source is None or (isinstance(source, Mapping) and not isinstance(source, xr.Dataset)):
-        # the models of the starter config are no selection
-        data = dict(source or {})
-    else:
+    if (isinstance(source, str | Path) and is_result(Path(source))) or isinstance(source, xr.Dataset):
         return tuple(model.key for model in read(()).models)
-    selection = apply_overrides(data, overrides)[0].get("models")
-    if selection is None:
+    # the models of the starter config are no selection
+    draft = open_config(Path(source) if isinstance(source, str) else source or {}, plugins.models)
+    draft = draft.with_settings(map(Setting.parse, overrides))
+    if "models" not in draft.data:
         return ()
-    models, problems = expand_models(selection, catalogue(plugins.models))
-    return tuple(model.key for model in (read(()).models if problems else models))
+    _, problems = expand_models(draft.data["models"], draft.known_models)
+    return tuple(model.key for model in (read(()).models if problems else draft.models))
 
 
 def _config_reader(
