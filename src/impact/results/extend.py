@@ -33,8 +33,8 @@ from .provenance import stored_config
 from .selection import IndexArray, match_labels
 from .summary import SweepOutcome
 from .sweep import Extension, SlabValues, sweep_into
-from .trajectory_table import TrajectoryTable
-from .xarray_backend import open_with_table
+from .trajectory_table import TrajectoryTable, table_of_result
+from .xarray_backend import open_result
 
 # statuses that are assigned before integration
 CHECKED_STATUSES = (Status.NO_IMPACT, Status.INVALID_PARAMETER, Status.OUT_OF_RANGE)
@@ -76,7 +76,8 @@ def extend(
     UsageError : the overrides change more than values of axes and models; see also `sweep_into`
     """
     name = safe_text(str(source))
-    before, table = open_with_table(source)
+    before = open_result(source)
+    table = table_of_result(before)
     require_sweep(before, "extend")
     with before:
         config = stored_config(before.attrs, [], plugins, str(source), max_points)
