@@ -377,8 +377,7 @@ class SweepServer:
 
     def expected_digest(self, folder: Path) -> str:
         """The SHA-256 of the result of a folder's config, computed in this process without a fault."""
-        from impact.api import prepare
-        from impact.results.sweep import sweep_into
+        from impact.results.sweep import prepare, sweep_into
 
         text = (folder / CONFIG).read_text()
         if text not in self.digests:

@@ -46,8 +46,7 @@ def test_a_value_of_e_takes_the_steps_of_the_page_in_their_order(tmp_path: Path)
             calls.append(name)
 
     import impact
-    from impact.api import prepare
-    from impact.results.sweep import sweep_into
+    from impact.results.sweep import prepare, sweep_into
 
     sys.setprofile(note)
     try:

@@ -11,31 +11,24 @@ if TYPE_CHECKING:
     from .api import (
         calibrate as calibrate,
         check_model as check_model,
-        estimate as estimate,
         explore as explore,
         export as export,
         export_codes as export_codes,
-        extend as extend,
-        extend_to_file as extend_to_file,
         init as init,
         materials as materials,
-        merge as merge,
         models as models,
         plot as plot,
         plot_to_files as plot_to_files,
         report as report,
-        rerun as rerun,
         run as run,
         schema as schema,
         sensitivity as sensitivity,
         solve as solve,
-        sweep as sweep,
-        sweep_shard as sweep_shard,
-        sweep_to_file as sweep_to_file,
         timestep as timestep,
     )
     from .comparison.bless import bless as bless
     from .comparison.compare import compare as compare
+    from .comparison.rerun import rerun as rerun
     from .comparison.verdict import Verdict as Verdict
     from .contact.evidence import Evidence as Evidence
     from .contact.model import ForceModel as ForceModel, Parameter as Parameter
@@ -43,8 +36,12 @@ if TYPE_CHECKING:
     from .contact.powers import power as power
     from .errors import ImpactError as ImpactError
     from .progress_display import progress_bar as progress_bar
+    from .results.estimate import estimate as estimate
+    from .results.extend import extend as extend, extend_to_file as extend_to_file
     from .results.info import info as info
     from .results.ranking import recommend as recommend
+    from .results.shards import merge as merge, sweep_shard as sweep_shard
+    from .results.sweep import sweep as sweep, sweep_to_file as sweep_to_file
     from .results.xarray_backend import expand as expand, load as load, save as save
 
 # the module of each public name, which is imported on first use: `import impact` and `impact --help` need no numpy
@@ -58,19 +55,19 @@ _MODULES = {
     "calibrate": "api",
     "check_model": "api",
     "compare": "comparison.compare",
-    "estimate": "api",
+    "estimate": "results.estimate",
     "expand": "results.xarray_backend",
     "explore": "api",
     "export": "api",
     "export_codes": "api",
-    "extend": "api",
-    "extend_to_file": "api",
+    "extend": "results.extend",
+    "extend_to_file": "results.extend",
     "hysteresis": "contact.models.hysteresis",
     "info": "results.info",
     "init": "api",
     "load": "results.xarray_backend",
     "materials": "api",
-    "merge": "api",
+    "merge": "results.shards",
     "models": "api",
     "plot": "api",
     "plot_to_files": "api",
@@ -78,15 +75,15 @@ _MODULES = {
     "progress_bar": "progress_display",
     "recommend": "results.ranking",
     "report": "api",
-    "rerun": "api",
+    "rerun": "comparison.rerun",
     "run": "api",
     "save": "results.xarray_backend",
     "schema": "api",
     "sensitivity": "api",
     "solve": "api",
-    "sweep": "api",
-    "sweep_shard": "api",
-    "sweep_to_file": "api",
+    "sweep": "results.sweep",
+    "sweep_shard": "results.shards",
+    "sweep_to_file": "results.sweep",
     "timestep": "api",
 }
 __all__ = list(_MODULES)

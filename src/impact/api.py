@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Executor
-from contextlib import AbstractContextManager, nullcontext
-from dataclasses import replace
 from fnmatch import fnmatchcase
 from functools import partial
 from pathlib import Path
@@ -15,7 +12,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from .atomic import check_outputs, write_file
 from .comparison.bless import bless as bless
 from .comparison.compare import compare as compare
-from .comparison.tolerances import Tolerances
 from .comparison.verdict import Verdict as Verdict
 from .config.grid import MAX_POINTS
 from .config.library import records
@@ -27,23 +23,12 @@ from .contact.model import ForceModel as ForceModel, Parameter as Parameter
 from .contact.models import catalogue, find
 from .contact.models.hysteresis import hysteresis as hysteresis
 from .contact.powers import power as power
-from .engine.checkpoint import remove_stale_work_folder
-from .engine.execute import never_stop
-from .engine.executors import SERIAL, Backend, choose_backend
 from .engine.plan import Plan
-from .engine.plugins import Plugins, read_plugins
-from .engine.progress import Progress, ProgressCallback
-from .engine.trajectories import check_count
-from .errors import ImpactError as ImpactError, UnfinishedError, UsageError, did_you_mean
-from .results.extend import extend as extend_result
-from .results.kinds import is_calibration, require_sweep
-from .results.plausibility import material_notes
-from .results.provenance import config_of_part, stored_config
-from .results.replay_command import command_start
-from .results.shards import Shard, ShardProgress, merge as merge_shards, sweep_shard as write_shard
+from .engine.plugins import read_plugins
+from .engine.run import Run
+from .errors import ImpactError as ImpactError, UsageError, did_you_mean
 from .results.single_impact import STARTER_CONFIG, Impact as Impact, histories, run_single_impact, single_point
-from .results.summary import SweepOutcome
-from .results.sweep import find_finished, sweep_in_memory, sweep_into
+from .results.sweep import prepare, sweep_in_memory
 from .results.xarray_backend import load as load, save as save
 from .text import html_table, safe_text
 
@@ -59,7 +44,6 @@ if TYPE_CHECKING:
     from .inverse.solve import SolveResult
     from .inverse.timestep import TimestepResult
     from .plots.kinds import Choice, PlotData
-    from .results.estimate import Estimate
 
 
 class PlotFiles(NamedTuple):
@@ -68,358 +52,6 @@ class PlotFiles(NamedTuple):
     pictures: dict[str, Path]
     plot_data: dict[str, PlotData]
     left_out: dict[str, str]
-
-
-def ignore_progress(progress: Progress) -> None:
-    """Default of `on_progress`."""
-
-
-def ignore_note(note: str) -> None:
-    """Default of `on_note`."""
-
-
-def prepare(
-    source: str | Path | Mapping[str, object],
-    overrides: Sequence[str] = (),
-    plugins: Sequence[ForceModel | str | Path] = (),
-    max_points: int = MAX_POINTS,
-) -> Plan:
-    """The plan of a config: a TOML file, or a mapping of the same shape.
-
-    Raises
-    ------
-    ConfigError : with all problems of the config
-    UsageError : more than `max_points` trajectories would be integrated
-    """
-    source = Path(source) if isinstance(source, str) else source
-    plugin_set = read_plugins(plugins)
-    config = read_config(source, overrides, plugin_set.models, max_points)
-    plan = Plan(config, plugin_set.of(config.models))
-    check_count(plan, max_points, str(source) if isinstance(source, Path) else "config")
-    return plan
-
-
-def execute(
-    plan: Plan,
-    backend: Backend = SERIAL,
-    on_progress: ProgressCallback | None = None,
-    should_stop: Callable[[], bool] = never_stop,
-) -> xr.Dataset:
-    """The result of a plan, in memory; for the parameters see `impact.results.sweep.sweep_into`."""
-    return sweep_in_memory(
-        plan, backend=backend, on_progress=on_progress or (lambda progress: None), should_stop=should_stop
-    )
-
-
-def sweep(
-    source: str | Path | Mapping[str, object],
-    *,
-    output: str | Path | None = None,
-    overrides: Sequence[str] = (),
-    plugins: Sequence[ForceModel | str | Path] = (),
-    jobs: int = 1,
-    threads: int = 1,
-    executor: Executor | None = None,
-    max_points: int = MAX_POINTS,
-    resume: bool = False,
-    overwrite: bool = False,
-    progress: bool = False,
-) -> xr.Dataset:
-    """Run a sweep; the result is in memory, or in a file and of any size.
-
-    Parameters
-    ----------
-    source : path of a TOML file, or a mapping of the same shape
-    output : file to write; by default the result stays in memory
-    overrides : changes to the config, such as `"sweep.e=0.5"`
-    plugins : plug-in models, which the config may name, and paths of Python files with such models, which are
-        executed
-    jobs : number of processes that integrate; with more than one a script needs the usual
-        `if __name__ == "__main__":`
-    threads : number of threads that integrate, instead of processes; they run in parallel if the core is compiled
-    executor : an executor of the interface of `concurrent.futures` that integrates instead, such as dask's
-        `client.get_executor(pure=False)` or that of mpi4py; it is not shut down
-    max_points : the largest number of points, of all models together
-    resume : continue an interrupted sweep into `output`
-    overwrite : replace `output` if it exists
-    progress : show a bar if it takes more than a second, in a terminal or, with ipywidgets, in a notebook; else
-        print a line every ten seconds
-
-    Returns
-    -------
-    xarray.Dataset : see docs/schema.md; of a large file the values are read when they are indexed
-
-    Raises
-    ------
-    ConfigError : with all problems of the config
-    UsageError, ModelError : a plug-in cannot be read or is invalid; more than one of jobs, threads and executor;
-        `output` exists
-    StoreError : the disk is full or failed; or processes were killed repeatedly
-
-    >>> import impact
-    >>> result = impact.sweep({
-    ...     "models": ["lankarani-nikravesh-1990"],
-    ...     "sweep": {"e": [0.1, 0.9], "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6e9},
-    ... })
-    >>> result["e_out"].values.round(6).tolist()
-    [[0.665265, 0.913177]]
-    """
-    if output is None:
-        if resume or overwrite:
-            raise UsageError("resume and overwrite: got no output, expected one as well")
-        plan, backend = prepare(source, overrides, plugins, max_points), choose_backend(jobs, threads, executor)
-        with _progress(shown=progress) as on_progress:
-            return execute(plan, backend, on_progress)
-    with _progress(shown=progress) as on_progress:
-        sweep_to_file(
-            source,
-            output,
-            overrides=overrides,
-            plugins=plugins,
-            backend=nullcontext(choose_backend(jobs, threads, executor)),
-            max_points=max_points,
-            resume=resume,
-            overwrite=overwrite,
-            on_progress=on_progress,
-        )
-    return load(output)
-
-
-def _progress(*, shown: bool) -> AbstractContextManager[ProgressCallback]:
-    """The progress bar, or nothing; rich is imported for a bar only."""
-    if not shown:
-        return nullcontext(ignore_progress)
-    from .progress_display import progress_bar
-
-    return progress_bar()
-
-
-def sweep_to_file(
-    source: str | Path | Mapping[str, object],
-    output: str | Path,
-    *,
-    overrides: Sequence[str] = (),
-    plugins: Sequence[ForceModel | str | Path] = (),
-    backend: AbstractContextManager[Backend] | None = None,
-    max_points: int = MAX_POINTS,
-    resume: bool = False,
-    overwrite: bool = False,
-    on_progress: ProgressCallback = ignore_progress,
-    on_note: Callable[[str], None] = ignore_note,
-    should_stop: Callable[[], bool] = never_stop,
-) -> SweepOutcome:
-    """Run a sweep into a file and summarize it, without reading the file again.
-
-    A file that already contains this sweep is not modified.
-
-    Parameters
-    ----------
-    source, overrides, plugins, max_points : see `sweep`
-    output : the file
-    backend : context manager of the backend, entered when it is needed; by default this process
-    resume : continue with the work folder of an interrupted sweep
-    overwrite : replace the file if it exists
-    on_progress : called from time to time with the progress
-    on_note : called with a sentence about each implausible value
-    should_stop : returns whether to stop; finished blocks stay in the work folder
-
-    Returns
-    -------
-    SweepOutcome : counts of points by status, largest errors, first failed points
-
-    Raises
-    ------
-    ConfigError : with all problems of the config
-    UsageError, ModelError : see `sweep`
-    InUseError : another process writes the file
-    StoreError : the disk is full or failed, or processes were killed; finished blocks stay in the work folder
-    UnfinishedError : `should_stop` stopped it
-
-    >>> import impact, tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     outcome = impact.sweep_to_file("configs/figure6.toml", f"{folder}/results.h5")
-    >>> outcome.summary.points, outcome.trajectories, outcome.is_new
-    (303, 303, True)
-    """
-    plan = _prepare_with_notes(source, overrides, plugins, max_points, on_note)
-    output = Path(output)
-    shown = safe_text(str(output))
-    outcome = None if overwrite else find_finished(output, plan)
-    if outcome is not None:
-        remove_stale_work_folder(output, plan)
-        if should_stop():
-            raise UnfinishedError(f"{shown} already contains this sweep")
-        return replace(outcome, is_new=False)
-    check_outputs([output], [source, *plugins, *plan.config.files], overwrite=overwrite)
-    with backend or nullcontext(SERIAL) as integrator:
-        outcome = sweep_into(
-            output,
-            plan,
-            resume=resume,
-            overwrite=overwrite,
-            backend=integrator,
-            on_progress=on_progress,
-            should_stop=should_stop,
-        )
-    if should_stop():
-        raise UnfinishedError(f"{shown} is complete")
-    return outcome
-
-
-def sweep_shard(
-    source: str | Path | Mapping[str, object],
-    shard: str,
-    output: str | Path,
-    *,
-    overrides: Sequence[str] = (),
-    plugins: Sequence[ForceModel | str | Path] = (),
-    backend: AbstractContextManager[Backend] | None = None,
-    max_points: int = MAX_POINTS,
-    overwrite: bool = False,
-    on_progress: ProgressCallback = ignore_progress,
-    on_note: Callable[[str], None] = ignore_note,
-    should_stop: Callable[[], bool] = never_stop,
-) -> ShardProgress:
-    """Integrate one shard of a sweep into its work folder; `merge` joins the folders of all shards.
-
-    Parameters
-    ----------
-    shard : "K/N", the part K of N, such as "3/16"
-    output : file of the whole result; the work folder is next to it
-    overwrite : start the shard again
-    source, overrides, plugins, max_points, backend, on_progress, on_note, should_stop : see `sweep_to_file`
-
-    Returns
-    -------
-    ShardProgress : the work folder, and its finished part
-
-    Raises
-    ------
-    ConfigError, UsageError, ModelError, InUseError, StoreError, UnfinishedError : see `sweep_to_file`
-
-    >>> import impact, tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     impact.sweep_shard("configs/figure6.toml", "1/1", f"{folder}/results.h5").trajectories
-    303
-    """
-    plan = _prepare_with_notes(source, overrides, plugins, max_points, on_note)
-    part = Shard.parse(shard)
-    # the command of the whole sweep: `merge` reports it for a missing shard
-    config = str(source) if isinstance(source, str | Path) else "CONFIG.toml"
-    command = ["impact", "sweep", config, "-o", str(output)]
-    command += [word for change in overrides for word in ("--set", change)]
-    command += [word for path in plugins if isinstance(path, str | Path) for word in ("--plugin", str(path))]
-    with backend or nullcontext(SERIAL) as integrator:
-        done = write_shard(
-            Path(output),
-            plan,
-            part,
-            command,
-            overwrite=overwrite,
-            backend=integrator,
-            on_progress=on_progress,
-            should_stop=should_stop,
-        )
-    if should_stop():
-        raise UnfinishedError(f"{safe_text(str(done.folder))} is complete")
-    return done
-
-
-def merge(
-    folders: Sequence[str | Path],
-    output: str | Path,
-    *,
-    plugins: Sequence[ForceModel | str | Path] = (),
-    overwrite: bool = False,
-    on_progress: ProgressCallback = ignore_progress,
-    should_stop: Callable[[], bool] = never_stop,
-) -> SweepOutcome:
-    """Join the shards of a sweep into a file, and summarize it; the work folders are kept.
-
-    Parameters
-    ----------
-    folders : the work folders of all shards, in any order
-    output : the file
-    plugins : the plug-in models that the shards were integrated with
-    overwrite : replace the file if it exists
-    on_progress, should_stop : see `sweep_to_file`
-
-    Returns
-    -------
-    SweepOutcome : counts of points by status, largest errors, first failed points
-
-    Raises
-    ------
-    UsageError : a folder is not a shard, or of another sweep; or shards are missing or unfinished
-    ResultError : a block is in two folders, and they differ
-    InUseError, StoreError, UnfinishedError : see `sweep_to_file`
-
-    >>> import impact, tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     output = f"{folder}/results.h5"
-    ...     shards = [impact.sweep_shard("configs/figure6.toml", f"{k}/2", output) for k in (1, 2)]
-    ...     impact.merge([shard.folder for shard in shards], output).summary.points
-    303
-    """
-    check_outputs([output], plugins, overwrite=overwrite)
-    outcome, repeated = merge_shards(
-        [Path(folder) for folder in folders],
-        Path(output),
-        read_plugins(plugins),
-        overwrite=overwrite,
-        on_progress=on_progress,
-        should_stop=should_stop,
-    )
-    if should_stop():
-        raise UnfinishedError(f"{safe_text(str(output))} is complete")
-    return replace(outcome, repeated_blocks=repeated)
-
-
-def estimate(
-    source: str | Path | Mapping[str, object],
-    *,
-    overrides: Sequence[str] = (),
-    plugins: Sequence[ForceModel | str | Path] = (),
-    jobs: int = 1,
-    max_points: int = MAX_POINTS,
-    on_note: Callable[[str], None] = ignore_note,
-) -> Estimate:
-    """Count the points and trajectories of a sweep, and estimate its size and time; nothing is written.
-
-    Parameters
-    ----------
-    source, overrides, plugins, max_points : see `sweep`
-    jobs : number of processes or threads that integrate
-    on_note : called with a sentence about each implausible value
-
-    Raises
-    ------
-    ConfigError, UsageError, ModelError : see `sweep`
-
-    >>> import impact
-    >>> impact.estimate("configs/figure6.toml").points
-    303
-    """
-    plan = _prepare_with_notes(source, overrides, plugins, max_points, on_note)
-    # it integrates a range, which a program that only imports impact does without
-    from .results.estimate import estimate as estimate_plan
-
-    return estimate_plan(plan, jobs)
-
-
-def _prepare_with_notes(
-    source: str | Path | Mapping[str, object],
-    overrides: Sequence[str],
-    plugins: Sequence[ForceModel | str | Path],
-    max_points: int,
-    on_note: Callable[[str], None],
-) -> Plan:
-    """The plan of a config; calls `on_note` for each material whose modulus is implausible."""
-    plan = prepare(source, overrides, plugins, max_points)
-    columns = {name: values for axis in plan.config.axes for name, values in axis.columns.items()}
-    for note in material_notes(plan.material_record, columns):
-        on_note(note)
-    return plan
 
 
 def run(
@@ -638,7 +270,7 @@ def sensitivity(
     overrides: Sequence[str] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
     max_points: int = MAX_POINTS,
-    execute: Callable[[Plan], xr.Dataset] = execute,
+    execute: Callable[[Plan], xr.Dataset] = sweep_in_memory,
 ) -> xr.Dataset:
     """Which uncertain input matters: Sobol indices of an output, its mean and quantiles, for every model.
 
@@ -708,7 +340,7 @@ def sensitivities(
     if output is not None and len(of) > 1:
         raise UsageError(f"--output: got {len(of)} outputs (--of), expected one for a file")
     name = safe_text(str(source)) if isinstance(source, str | Path) else "config"
-    plan = sensitivity_plan(prepare(source, overrides, plugins, max_points), of, max_points, name)
+    plan = sensitivity_plan(prepare(source, overrides, plugins, Run(max_points=max_points)), of, max_points, name)
     check_outputs([output], [source, *plugins, *plan.config.files], overwrite=overwrite)
     swept = execute(plan)
     results = [sensitivity_of(plan, of_study, swept) for of_study in of]
@@ -816,176 +448,6 @@ def export_codes() -> list[dict[str, Any]]:
         }
         for code in CODES.values()
     ]
-
-
-def extend(
-    result: str | Path,
-    overrides: Sequence[str],
-    *,
-    output: str | Path | None = None,
-    overwrite: bool = False,
-    plugins: Sequence[ForceModel | str | Path] = (),
-    max_points: int = MAX_POINTS,
-) -> xr.Dataset:
-    """Add values to the axes of a stored result, or models to it, and integrate only what it does not hold.
-
-    A result of layout "factored" holds trajectories, which new points may share; one of layout "full" has
-    values alone, and all trajectories of the new points are integrated.
-
-    Parameters
-    ----------
-    result : the file
-    overrides : changes to its config, such as `"sweep.m2=[1.0, 2.0]"`; existing values are kept
-    output : file of the larger result; by default it replaces the smaller one
-    overwrite : replace the output if it exists
-    plugins : plug-in models, among them those that the result was computed with
-    max_points : the largest number of points, of all models together
-
-    Returns
-    -------
-    xarray.Dataset : the larger result, equal to that of a single sweep in all variables and coordinates
-
-    Raises
-    ------
-    ResultError : the file is not a readable result, or was written by another version of this program
-    UsageError : the overrides change more than values of axes and models
-    StoreError : the disk is full or failed
-
-    >>> import impact, tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     impact.save(impact.sweep("configs/figure6.toml"), f"{folder}/r.h5")
-    ...     impact.extend(f"{folder}/r.h5", ["sweep.m2=[1.0, 2.0]"]).sizes["m2"]
-    2
-    """
-    target = result if output is None else output
-    extend_to_file(result, overrides, output=target, overwrite=overwrite, plugins=plugins, max_points=max_points)
-    return load(target)
-
-
-def extend_to_file(
-    result: str | Path,
-    overrides: Sequence[str],
-    *,
-    output: str | Path | None = None,
-    overwrite: bool = False,
-    resume: bool = False,
-    plugins: Sequence[ForceModel | str | Path] = (),
-    backend: AbstractContextManager[Backend] | None = None,
-    max_points: int = MAX_POINTS,
-    on_progress: ProgressCallback = ignore_progress,
-    should_stop: Callable[[], bool] = never_stop,
-) -> SweepOutcome:
-    """Extend a stored result as `extend` does, and summarize it, without reading the file again.
-
-    Parameters
-    ----------
-    result, overrides, output, overwrite, plugins, max_points : see `extend`
-    resume : continue with the work folder of an interrupted extension
-    backend, on_progress, should_stop : see `sweep_to_file`
-
-    Returns
-    -------
-    SweepOutcome : counts of points by status, largest errors, first failed points; `integrated` counts the
-        trajectories that were integrated
-
-    Raises
-    ------
-    ResultError, UsageError, StoreError : see `extend`
-    InUseError, UnfinishedError : see `sweep_to_file`
-
-    >>> import impact, tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     outcome = impact.sweep_to_file("configs/figure6.toml", f"{folder}/r.h5")
-    ...     impact.extend_to_file(f"{folder}/r.h5", ["sweep.e=[0.123]"]).integrated
-    3
-    """
-    target = Path(result if output is None else output)
-    check_outputs([target], plugins, overwrite=True)
-    with backend or nullcontext(SERIAL) as integrator:
-        outcome = extend_result(
-            Path(result),
-            target,
-            overrides,
-            read_plugins(plugins),
-            resume=resume,
-            overwrite=overwrite,
-            max_points=max_points,
-            backend=integrator,
-            on_progress=on_progress,
-            should_stop=should_stop,
-        )
-    if should_stop():
-        raise UnfinishedError(f"{safe_text(str(target))} is complete")
-    return outcome
-
-
-def rerun(
-    result: str | Path,
-    *,
-    plugins: Sequence[ForceModel | str | Path] = (),
-    tol: float | Tolerances | None = None,
-    subset: bool = False,
-    max_points: int = MAX_POINTS,
-    execute: Callable[[Plan], xr.Dataset] = execute,
-) -> Verdict:
-    """Repeat the sweep or the calibration of a result from its file alone, and compare the new values with it.
-
-    Of a sweep, only the points in the file are repeated, even if its config has more.
-
-    Parameters
-    ----------
-    result : the file
-    plugins : the plug-in models that it was computed with; a note of the verdict names a changed one
-    tol, subset : see `compare`
-    max_points : the largest number of points
-    execute : function that runs a plan; by default it is run in this process
-
-    Raises
-    ------
-    ResultError : the file is not a readable result
-    UsageError : it is a time history, or a plug-in is missing or a different one
-    ConfigError : this version does not have a model of the result, or cannot read its config
-
-    >>> import impact, tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     impact.save(impact.sweep("configs/figure6.toml"), f"{folder}/stored.h5")
-    ...     print(impact.rerun(f"{folder}/stored.h5"))
-    equal: 19 variables, 5,353 values, none differs
-    """
-    stored = load(result)
-    plugin_set = read_plugins(plugins)
-    if is_calibration(stored):
-        new = _repeat_calibration(stored, plugin_set, str(result))
-        return replace(compare(new, stored, tol=tol, subset=subset), new="the rerun", baseline=str(result))
-    require_sweep(stored, "rerun")
-    # models by key, because "all" may include new models; the tolerances that were used
-    keys = stored["model"].values.tolist() if "model" in stored.dims else []
-    solver = (f"solver.{name}={stored.attrs.get(name)}" for name in ("rtol", "max_steps"))
-    # any core gives the same result
-    changes = [f"models={json.dumps(keys)}", *solver, 'solver.core="auto"']
-    config = stored_config(stored.attrs, changes, plugin_set, str(result), max_points, allow_changed_plugins=True)
-    whole = Plan(config, plugin_set.of(config.models))
-    plan = replace(whole, config=config_of_part(config, stored))
-    check_count(plan, max_points, str(result))
-    verdict = compare(execute(plan), stored, tol=tol, subset=subset)
-    if plan.points < whole.points:
-        part = f"repeated {plan.points:,} of {whole.points:,} points of the config: the file holds no others"
-        verdict = replace(verdict, notes=(part, *verdict.notes))
-    files = [word for path in plugins if isinstance(path, str | Path) for word in ("--plugin", str(path))]
-    command = ("impact", "run", str(result), *files) if command_start(str(result), stored) else ()
-    return replace(verdict, new="the rerun", baseline=str(result), repeats=command)
-
-
-def _repeat_calibration(stored: xr.Dataset, plugins: Plugins, name: str) -> xr.Dataset:
-    """The calibration of a stored config with the models and the tolerances of the result."""
-    # its modules import scipy.optimize, which other functions do without
-    from .inverse.calibrate import calibrate_config, calibration_dataset
-
-    changes = [f"models={json.dumps(stored['model'].values.tolist())}"]
-    changes += [f"solver.{key}={stored.attrs.get(key)}" for key in ("rtol", "max_steps")]
-    config = stored_config(stored.attrs, changes, plugins, name, allow_changed_plugins=True, purpose="calibrate")
-    of_config = plugins.of(config.models)
-    return calibration_dataset(calibrate_config(config, of_config), of_config)
 
 
 class Models(dict[str, ForceModel]):
