@@ -11,15 +11,11 @@ if TYPE_CHECKING:
     from .api import (
         calibrate as calibrate,
         check_model as check_model,
-        explore as explore,
         export as export,
         export_codes as export_codes,
         init as init,
         materials as materials,
         models as models,
-        plot as plot,
-        plot_to_files as plot_to_files,
-        report as report,
         run as run,
         schema as schema,
         sensitivity as sensitivity,
@@ -35,7 +31,11 @@ if TYPE_CHECKING:
     from .contact.models.hysteresis import hysteresis as hysteresis
     from .contact.powers import power as power
     from .errors import ImpactError as ImpactError
+    from .plots.draw import plot as plot
+    from .plots.explore import explore as explore
+    from .plots.files import plot_to_files as plot_to_files
     from .progress_display import progress_bar as progress_bar
+    from .reporting.page import report as report
     from .results.estimate import estimate as estimate
     from .results.extend import extend as extend, extend_to_file as extend_to_file
     from .results.info import info as info
@@ -57,7 +57,7 @@ _MODULES = {
     "compare": "comparison.compare",
     "estimate": "results.estimate",
     "expand": "results.xarray_backend",
-    "explore": "api",
+    "explore": "plots.explore",
     "export": "api",
     "export_codes": "api",
     "extend": "results.extend",
@@ -69,12 +69,12 @@ _MODULES = {
     "materials": "api",
     "merge": "results.shards",
     "models": "api",
-    "plot": "api",
-    "plot_to_files": "api",
+    "plot": "plots.draw",
+    "plot_to_files": "plots.files",
     "power": "contact.powers",
     "progress_bar": "progress_display",
     "recommend": "results.ranking",
-    "report": "api",
+    "report": "reporting.page",
     "rerun": "comparison.rerun",
     "run": "api",
     "save": "results.xarray_backend",

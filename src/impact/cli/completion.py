@@ -59,9 +59,9 @@ def complete_unknown(context: typer.Context, incomplete: str) -> list[str]:
 
 def complete_output(incomplete: str) -> list[str]:
     """The variables of a result."""
-    from ..results.schema import SCHEMA
+    from ..contact.variables import OUTPUTS
 
-    return _beginning_with(incomplete, [variable.name for variable in SCHEMA])
+    return _beginning_with(incomplete, [*OUTPUTS])
 
 
 def complete_target(incomplete: str) -> list[str]:

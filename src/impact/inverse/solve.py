@@ -19,11 +19,11 @@ from ..contact.model import ForceModel, Parameter
 from ..contact.status import Status
 from ..contact.timestep import EXACT
 from ..contact.units import with_numbers
+from ..contact.variables import OUTPUTS
 from ..engine.build_impacts import build_impacts
 from ..engine.plan import Inputs, Plan
 from ..engine.plugins import Plugins
 from ..errors import UsageError, did_you_mean
-from ..results.schema import SCHEMA
 from ..results.sweep import sweep_in_memory
 from ..text import safe_text
 
@@ -124,7 +124,7 @@ def check_target(target: Mapping[str, float]) -> tuple[str, float]:
     ------
     UsageError : it is not one variable of a result with a finite value
     """
-    names = [variable.name for variable in SCHEMA if variable.dtype == "f8" and variable.per == "model"]
+    names = [name for name, variable in OUTPUTS.items() if variable.dtype == "f8" and "model" in variable.dims]
     if len(target) != 1:
         raise UsageError(f"--target: got {len(target)} targets, expected one, such as e_out=0.6")
     ((name, value),) = target.items()

@@ -27,6 +27,7 @@ from ..contact.materials import Material
 from ..contact.model import Law, Parameter
 from ..contact.simulate import TABLE_COLUMNS, CollisionResult
 from ..contact.status import STATUSES, Status
+from ..contact.variables import OUTPUTS, Variable
 from ..engine.build_impacts import Stiffness, has_stiffness_rule, mass_at, values_at
 from ..engine.plan import Index, Inputs
 from ..engine.trajectories import TrajectoryMap
@@ -35,7 +36,7 @@ from ..formatting import number
 from ..text import safe_text
 from .attributes import LawRecord, SummaryRecord, read_attribute
 from .netcdf import Region
-from .schema import SCHEMA, SchemaVariable, attributes_of, count_points, derived_names, scale_of
+from .schema import attributes_of, count_points, derived_names, scale_of
 from .trajectory_table import MAX_STIFFNESS_VALUES, TrajectoryRows, TrajectoryTable, expand, whole_stiffness
 
 N_WITNESSES = 1_000
@@ -91,7 +92,7 @@ def _stiffness_of_laws(table: TrajectoryTable) -> list[tuple[tuple[int, ...], Ar
 
 
 def factored_template(
-    result_template: xr.Dataset, table: TrajectoryTable, variables: Sequence[SchemaVariable]
+    result_template: xr.Dataset, table: TrajectoryTable, variables: Sequence[Variable]
 ) -> xr.Dataset:
     """Build the dataset of a factored file, with placeholder values, from the coordinates of the result.
 
@@ -147,7 +148,7 @@ def factored_template(
 
 
 def table_values(
-    table: TrajectoryTable, variables: Sequence[SchemaVariable]
+    table: TrajectoryTable, variables: Sequence[Variable]
 ) -> Iterator[tuple[str, Region, NDArray[Any]]]:
     """Yield the values of a factored file, a few at a time: name of the variable, region and values."""
     start = 0
@@ -196,7 +197,7 @@ def witness_indices(points: int) -> NDArray[np.int64]:
 
 
 def witness_values(
-    table: TrajectoryTable, variables: Sequence[SchemaVariable], indices: NDArray[np.int64]
+    table: TrajectoryTable, variables: Sequence[Variable], indices: NDArray[np.int64]
 ) -> dict[str, NDArray[Any]]:
     """Compute the values of some points of a result, by name; arrays of shape (len(indices),)."""
     models, cells = np.divmod(indices, table.inputs.cells)
@@ -385,7 +386,7 @@ def _stored_axis_names(dataset: xr.Dataset) -> list[str]:
     return names
 
 
-def check_witnesses(table: TrajectoryTable, variables: Sequence[SchemaVariable], stored: xr.Dataset) -> None:
+def check_witnesses(table: TrajectoryTable, variables: Sequence[Variable], stored: xr.Dataset) -> None:
     """Refuse a file whose witnesses, stored with their index, expand to other numbers; name both versions."""
     indices = np.asarray(stored["witness_index"].values, np.int64)
     points = len(table.laws) * table.inputs.cells
@@ -417,10 +418,10 @@ def check_witnesses(table: TrajectoryTable, variables: Sequence[SchemaVariable],
             )
 
 
-def witness_variables(stored: xr.Dataset) -> tuple[SchemaVariable, ...]:
+def witness_variables(stored: xr.Dataset) -> tuple[Variable, ...]:
     """List the variables of a file's witnesses, with their dtypes in the file."""
     return tuple(
-        replace(variable, dtype=stored[f"witness_{variable.name}"].dtype.str[1:])
-        for variable in SCHEMA
-        if f"witness_{variable.name}" in stored
+        replace(variable, dtype=stored[f"witness_{name}"].dtype.str[1:])
+        for name, variable in OUTPUTS.items()
+        if f"witness_{name}" in stored
     )

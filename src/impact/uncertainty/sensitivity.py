@@ -15,7 +15,7 @@ from ..config.input_names import InputName
 from ..config.lines import path_text
 from ..config.load import Config
 from ..config.tables import power_of_two_problem
-from ..contact.outputs import OUTPUTS
+from ..contact.variables import OUTPUTS
 from ..engine.plan import Plan
 from ..engine.trajectories import check_count
 from ..errors import ConfigError, UsageError, did_you_mean
