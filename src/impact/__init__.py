@@ -9,7 +9,6 @@ from ._version import __version__ as __version__
 
 if TYPE_CHECKING:
     from .api import (
-        calibrate as calibrate,
         check_model as check_model,
         estimate as estimate,
         expand as expand,
@@ -31,11 +30,9 @@ if TYPE_CHECKING:
         run as run,
         schema as schema,
         sensitivity as sensitivity,
-        solve as solve,
         sweep as sweep,
         sweep_shard as sweep_shard,
         sweep_to_file as sweep_to_file,
-        timestep as timestep,
     )
     from .comparison.bless import bless as bless
     from .comparison.compare import compare as compare
@@ -45,6 +42,9 @@ if TYPE_CHECKING:
     from .contact.models.hysteresis import hysteresis as hysteresis
     from .contact.powers import power as power
     from .errors import ImpactError as ImpactError
+    from .inverse.calibrate import calibrate as calibrate
+    from .inverse.solve import solve as solve
+    from .inverse.timestep import timestep as timestep
     from .progress_display import progress_bar as progress_bar
     from .results.backend import load as load, save as save
 
@@ -56,7 +56,7 @@ _MODULES = {
     "Parameter": "contact.model",
     "Verdict": "comparison.verdict",
     "bless": "comparison.bless",
-    "calibrate": "api",
+    "calibrate": "inverse.calibrate",
     "check_model": "api",
     "compare": "comparison.compare",
     "estimate": "api",
@@ -84,11 +84,11 @@ _MODULES = {
     "save": "results.backend",
     "schema": "api",
     "sensitivity": "api",
-    "solve": "api",
+    "solve": "inverse.solve",
     "sweep": "api",
     "sweep_shard": "api",
     "sweep_to_file": "api",
-    "timestep": "api",
+    "timestep": "inverse.timestep",
 }
 __all__ = list(_MODULES)
 

@@ -97,7 +97,7 @@ def sensitivity_of(plan: Plan, of: str, swept: xr.Dataset) -> xr.Dataset:
     shape = [outputs.sizes["model"], *(outputs.sizes[dim] for dim in others)]
     values = np.asarray(outputs.values, float).reshape(-1, len(inputs) + 2, n)
     result = sensitivity_template(plan, of, others)
-    found = _statistics(values, config)
+    statistics = _statistics(values, config)
     return result.assign(
         {
             name: (
@@ -105,7 +105,7 @@ def sensitivity_of(plan: Plan, of: str, swept: xr.Dataset) -> xr.Dataset:
                 np.asarray(array).reshape([*shape, *array.shape[1:]]).astype(result[name].dtype),
                 result[name].attrs,
             )
-            for name, array in found.items()
+            for name, array in statistics.items()
         }
     )
 
@@ -126,7 +126,7 @@ def _statistics(values: Array, config: Config) -> dict[str, Array]:
     varies = deviation > resolution
     changes = np.abs(values[:, 2:] - values[:, :1]).max(axis=2) > resolution[:, None]
     values = np.concatenate([values[:, :2], np.where(changes[..., None], values[:, 2:], values[:, :1])], axis=1)
-    found = {
+    statistics = {
         "failed": failed,
         "mean": mean,
         "sd": deviation,
@@ -136,10 +136,10 @@ def _statistics(values: Array, config: Config) -> dict[str, Array]:
     if n > 2:
         half = indices_of(np.ascontiguousarray(values[varies][..., : n // 2]))
     for name in ("first", "total", "first_lower", "first_upper", "total_lower", "total_upper"):
-        found[name] = np.full((outputs, blocks - 2), np.nan)
-        found[name][varies] = getattr(whole, name)
+        statistics[name] = np.full((outputs, blocks - 2), np.nan)
+        statistics[name][varies] = getattr(whole, name)
     for name in HALF:
-        found[name] = np.full((outputs, blocks - 2), np.nan)
+        statistics[name] = np.full((outputs, blocks - 2), np.nan)
         if half is not None:
-            found[name][varies] = getattr(half, name.removesuffix("_half"))
-    return found
+            statistics[name][varies] = getattr(half, name.removesuffix("_half"))
+    return statistics
