@@ -19,7 +19,7 @@ from impact.engine.plan import MAX_FULL_REPEATED, Plan
 from impact.engine.trajectories import trajectory_maps
 from impact.errors import UsageError
 from impact.results.provenance import config_of_part
-from impact.results.ranking import ranking
+from impact.results.ranking import recommend
 from impact.results.schema import SCHEMA
 from impact.results.selection import select
 from impact.results.summary import summarize
@@ -297,11 +297,11 @@ def test_a_failed_point_is_named_without_parameters_of_other_models(tmp_path: Pa
 def test_a_ranking_takes_the_best_parameters_of_each_model(
     ten: tuple[Plan, xr.Dataset], results_alone: dict[str, xr.Dataset]
 ) -> None:
-    ranked = {entry.model: entry for entry in ranking(ten[1], tol=0.05).models}
+    ranked = {entry.model: entry for entry in recommend(ten[1], tol=0.05).models}
     assert ranked.keys() == PARAMETER_OF.keys()
     for key, name in PARAMETER_OF.items():
         alone = results_alone[key]
-        each = [ranking(alone, tol=0.05, sel={f"{key}.{name}": value}).models[0] for value in VALUES]
+        each = [recommend(alone, tol=0.05, sel={f"{key}.{name}": value}).models[0] for value in VALUES]
         best = min(each, key=lambda entry: (-entry.share, entry.max_error))
         entry = ranked[key]
         assert entry.parameters == {f"model.{key}.{name}": VALUES[each.index(best)]}
@@ -314,6 +314,6 @@ def test_an_axis_with_a_common_input_is_common_to_all_models() -> None:
     axes = (Axis({"v1": (0.5, 1.0), "johnson-1985.c": (1.0, 2.0)}), plan.config.axes[1])
     plan = replace(plan, config=replace(plan.config, axes=axes))
     assert plan.points == 2 * len(VALUES) + 2
-    names = {entry.model: entry.parameters for entry in ranking(execute(plan)).models}
+    names = {entry.model: entry.parameters for entry in recommend(execute(plan)).models}
     assert names["johnson-1985"] == {}
     assert [*names["kelvin-voigt"]] == ["model.kelvin-voigt.C"]

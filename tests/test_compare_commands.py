@@ -27,7 +27,7 @@ import impact
 from impact.atomic import atomic_write
 from impact.cli.main import app
 from impact.errors import ResultError, StoreError, UsageError
-from impact.results.backend import write_sealed
+from impact.results.xarray_backend import write_sealed
 
 from .conftest import ROOT, WIDE
 from .fork_server import CompletedCommand, ForkServer, abandoned_pipe, printed_on_terminal

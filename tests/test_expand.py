@@ -17,9 +17,9 @@ from impact.contact.status import Status
 from impact.engine.build_impacts import build_impacts
 from impact.errors import UsageError
 from impact.results import sweep as sweep_module
-from impact.results.expand import CHECKS, checks_that_may_fail
 from impact.results.schema import SCHEMA
 from impact.results.sweep import sweep_into
+from impact.results.trajectory_table import CHECKS, checks_that_may_fail
 
 from .conftest import Run
 from .problems import table1_impacts

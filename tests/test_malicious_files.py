@@ -15,7 +15,7 @@ import xarray as xr
 
 import impact
 from impact.errors import ResultError
-from impact.results.backend import open_result
+from impact.results.xarray_backend import open_result
 
 from .fork_server import CompletedCommand, ForkServer
 from .malicious_files import (

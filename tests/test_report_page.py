@@ -27,7 +27,7 @@ from impact.contact.models import catalogue
 from impact.errors import UsageError
 from impact.reporting.figures import FIGURES
 from impact.reporting.page import page
-from impact.results.ranking import ranking
+from impact.results.ranking import recommend
 from impact.results.replay_command import describe_point
 
 from .conftest import ROOT, Run
@@ -202,7 +202,7 @@ def test_all_models_and_axes_are_named(pages: dict[str, str], wide: xr.Dataset, 
 
 def test_the_table_of_models_is_the_ranking(pages: dict[str, str], wide: xr.Dataset, many: xr.Dataset) -> None:
     for name, result in (("wide", wide), ("many", many)):
-        ranked = ranking(result)
+        ranked = recommend(result)
         assert ranked.headline in ParsedPage(pages[name]).text().replace("No model", "no model")
         rows = table(pages[name], "Models, the best first")
         assert [row[0] for row in rows] == [model.name for model in ranked.models]
@@ -216,7 +216,7 @@ def test_the_table_of_models_is_the_ranking(pages: dict[str, str], wide: xr.Data
 
 
 def test_of_many_models_the_figures_show_the_best(pages: dict[str, str], many: xr.Dataset) -> None:
-    best = [model.model for model in ranking(many).models[:8]]
+    best = [model.model for model in recommend(many).models[:8]]
     assert f"The figures show 8 of the {many.sizes['model']} models: {', '.join(best)}." in pages["many"]
     assert "The figures show" not in pages["wide"] + pages["figure 6"]
     assert figures(pages["many"]) == [FIGURES[kind] for kind in OF_A_SWEEP]

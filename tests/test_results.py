@@ -16,8 +16,8 @@ from impact.contact.status import Status
 from impact.engine.execute import integrate_ranges, with_core
 from impact.engine.plan import Plan
 from impact.engine.trajectories import trajectory_maps, trajectory_ranges
-from impact.results.expand import TrajectoryRows, TrajectoryTable, in_memory, lazy_dataset
 from impact.results.schema import SCHEMA, dataset_template, stored_variables
+from impact.results.trajectory_table import TrajectoryRows, TrajectoryTable, in_memory, lazy_dataset
 
 from .conftest import WIDE
 

@@ -19,12 +19,12 @@ from impact.config.grid import MAX_AXES, MAX_CHUNK_POINTS, MAX_COUNTED_POINTS, M
 from impact.config.quantities import MAX_AXIS_VALUES
 from impact.engine.plan import MAX_FULL_POINTS
 from impact.plots.slices import MAX_DRAWN
-from impact.results.backend import MAX_LOADED_BYTES
-from impact.results.expand import MAX_STIFFNESS_VALUES
 from impact.results.factored import N_WITNESSES, WITNESS_TOLERANCE
 from impact.results.netcdf import MAX_LABEL_BYTES
 from impact.results.ranking import MAX_RANKED_POINTS
 from impact.results.slabs import MAX_SUMMARY_POINTS
+from impact.results.trajectory_table import MAX_STIFFNESS_VALUES
+from impact.results.xarray_backend import MAX_LOADED_BYTES
 
 from .conftest import ROOT, Run
 

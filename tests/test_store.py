@@ -24,13 +24,13 @@ import xarray as xr
 
 import impact
 from impact.api import prepare
-from impact.atomic import atomic_write
+from impact.atomic import atomic_write, write_file
 from impact.engine.executors import choose_backend
 from impact.errors import ResultError, StoreError, UnfinishedError, UsageError
 from impact.results import sweep as sweep_module
-from impact.results.backend import open_result, write_file
 from impact.results.seal import write_seal
 from impact.results.sweep import sweep_into
+from impact.results.xarray_backend import open_result
 
 from .conftest import ROOT, Run
 from .fork_server import ForkServer

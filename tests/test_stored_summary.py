@@ -13,9 +13,9 @@ import pytest
 import xarray as xr
 
 import impact
-from impact.results.backend import open_result
 from impact.results.slabs import is_computed
 from impact.results.summary import summarize
+from impact.results.xarray_backend import open_result
 
 from .malicious_files import seal
 

@@ -13,7 +13,7 @@ from h5netcdf.utils import CompatibilityError
 
 import impact
 from impact.errors import ResultError, UsageError
-from impact.results import backend
+from impact.results import xarray_backend
 
 from .conftest import ROOT
 
@@ -81,7 +81,7 @@ def check(dataset: xr.Dataset, words: str, path: Path, monkeypatch: pytest.Monke
         impact.save(dataset, path)
     assert not path.exists()
     with monkeypatch.context() as patch:
-        patch.setattr(backend, "schema_violation", lambda _: None)
+        patch.setattr(xarray_backend, "schema_violation", lambda _: None)
         try:
             impact.save(dataset, path)
         except (UsageError, TypeError, CompatibilityError):

@@ -11,20 +11,17 @@ if TYPE_CHECKING:
     from .api import (
         check_model as check_model,
         estimate as estimate,
-        expand as expand,
         explore as explore,
         export as export,
         export_codes as export_codes,
         extend as extend,
         extend_to_file as extend_to_file,
-        info as info,
         init as init,
         materials as materials,
         merge as merge,
         models as models,
         plot as plot,
         plot_to_files as plot_to_files,
-        recommend as recommend,
         report as report,
         rerun as rerun,
         run as run,
@@ -46,7 +43,10 @@ if TYPE_CHECKING:
     from .inverse.solve import solve as solve
     from .inverse.timestep import timestep as timestep
     from .progress_display import progress_bar as progress_bar
-    from .results.backend import load as load, save as save
+    from .results.describe import describe as describe
+    from .results.info import info as info
+    from .results.ranking import recommend as recommend
+    from .results.xarray_backend import expand as expand, load as load, save as save
 
 # the module of each public name, which is imported on first use: `import impact` and `impact --help` need no numpy
 _MODULES = {
@@ -59,17 +59,18 @@ _MODULES = {
     "calibrate": "inverse.calibrate",
     "check_model": "api",
     "compare": "comparison.compare",
+    "describe": "results.describe",
     "estimate": "api",
-    "expand": "api",
+    "expand": "results.xarray_backend",
     "explore": "api",
     "export": "api",
     "export_codes": "api",
     "extend": "api",
     "extend_to_file": "api",
     "hysteresis": "contact.models.hysteresis",
-    "info": "api",
+    "info": "results.info",
     "init": "api",
-    "load": "results.backend",
+    "load": "results.xarray_backend",
     "materials": "api",
     "merge": "api",
     "models": "api",
@@ -77,11 +78,11 @@ _MODULES = {
     "plot_to_files": "api",
     "power": "contact.powers",
     "progress_bar": "progress_display",
-    "recommend": "api",
+    "recommend": "results.ranking",
     "report": "api",
     "rerun": "api",
     "run": "api",
-    "save": "results.backend",
+    "save": "results.xarray_backend",
     "schema": "api",
     "sensitivity": "api",
     "solve": "inverse.solve",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, nullcontext
@@ -13,6 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from .atomic import check_outputs, write_file
 from .comparison.bless import bless as bless
 from .comparison.compare import compare as compare
 from .comparison.tolerances import Tolerances
@@ -35,18 +35,16 @@ from .engine.plugins import Plugins, read_plugins
 from .engine.progress import Progress, ProgressCallback
 from .engine.trajectories import check_count
 from .errors import ImpactError as ImpactError, UnfinishedError, UsageError, did_you_mean
-from .results.backend import check_outputs, load as load, open_result, save as save, write_file
 from .results.extend import extend as extend_result
 from .results.kinds import is_calibration, require_sweep
 from .results.plausibility import material_notes
 from .results.provenance import config_of_part, stored_config
-from .results.ranking import Ranking, ranking
 from .results.replay_command import command_start
-from .results.selection import model_positions, select
 from .results.shards import Shard, ShardProgress, merge as merge_shards, sweep_shard as write_shard
 from .results.single_impact import STARTER_CONFIG, Impact as Impact, histories, run_single_impact, single_point
-from .results.summary import SweepOutcome, describe
+from .results.summary import SweepOutcome
 from .results.sweep import find_finished, sweep_in_memory, sweep_into
+from .results.xarray_backend import load as load, save as save
 from .text import html_table, safe_text
 
 if TYPE_CHECKING:
@@ -750,63 +748,6 @@ def extend_to_file(
     return outcome
 
 
-def expand(
-    result: str | Path,
-    output: str | Path,
-    *,
-    sel: Mapping[str, float | str] | None = None,
-    models: Sequence[str] | None = None,
-    overwrite: bool = False,
-    max_points: int = MAX_POINTS,
-    should_stop: Callable[[], bool] = never_stop,
-) -> int:
-    """Write all values of a stored result, or of a part of it, as netCDF for programs that do not use impact.
-
-    Parameters
-    ----------
-    result : file of the result
-    output : the file to write
-    sel : values of axes, such as `{"m2": 1.0}`; all values of other axes are written
-    models : keys of the models to write; by default all
-    overwrite : replace the output if it exists
-    max_points : the largest number of points to write
-    should_stop : returns whether to stop
-
-    Returns
-    -------
-    int : number of points written
-
-    Raises
-    ------
-    ResultError : the file is not a readable result
-    UsageError : it is no result of a sweep, it has more than `max_points` points, or the output exists
-    StoreError : the disk is full or failed
-
-    >>> import impact, tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     outcome = impact.sweep_to_file("configs/figure6.toml", f"{folder}/r.h5")
-    ...     impact.expand(f"{folder}/r.h5", f"{folder}/full.h5", sel={"e": 0.5})
-    3
-    """
-    output, shown = Path(output), safe_text(str(result))
-    check_outputs([output], [result], overwrite=overwrite)
-    opened = open_result(result)
-    require_sweep(opened, "expand")
-    dataset = select(opened, sel or {})
-    if "model" not in dataset.dims:
-        raise UsageError(f"{shown}: is a time history, expected a result of a sweep")
-    if models:
-        dataset = dataset.isel(model=model_positions(models, dataset))
-    points = math.prod(dataset.sizes.values())
-    if points > max_points:
-        raise UsageError(
-            f"{shown}: got {points:,} points, expected at most {max_points:,} (--max-points); select a part, such "
-            "as --sel e=0.5"
-        )
-    save(dataset, output, overwrite=overwrite, should_stop=should_stop)
-    return points
-
-
 def rerun(
     result: str | Path,
     *,
@@ -964,31 +905,6 @@ def check_model(model: ForceModel) -> list[Finding]:
     from .contact.checks import contract
 
     return list(contract(model))
-
-
-def info(result: xr.Dataset | str | Path) -> dict[str, Any]:
-    """The contents of a result or a time history of any size, as plain data.
-
-    Returns
-    -------
-    dict : points; layout and seal of the file, None in memory; dimensions; coordinates; units, dims, smallest and
-        largest value and number of missing values of each variable; counts of points by status; largest errors by
-        variable and model; attributes. A value is None, or missing, where a summary would evaluate too many
-        points; `not_evaluated` counts the points without a status
-
-    Raises
-    ------
-    ResultError : the file is not a readable result
-
-    >>> import impact
-    >>> impact.info(impact.sweep("configs/figure6.toml"))["status"]
-    {'ok': 301, 'limit': 2}
-    """
-    if isinstance(result, str | Path):
-        # not loaded, so that a summary in the file is used
-        with open_result(result) as opened:
-            return describe(opened)
-    return describe(result)
 
 
 def plot(
@@ -1221,40 +1137,6 @@ def materials() -> dict[str, dict[str, float | str]]:
     72000000000.0
     """
     return {name: dict(record) for name, record in records().items()}
-
-
-def recommend(
-    dataset: xr.Dataset,
-    *,
-    tol: float = 0.01,
-    sel: Mapping[str, float | str] | None = None,
-    models: Sequence[str] | None = None,
-) -> Ranking:
-    """Rank the models of a result by the error of their restitution, over all points of the sweep.
-
-    Parameters
-    ----------
-    dataset : a result
-    tol : largest accepted |e_out - e|
-    sel : values of axes, such as `{"m2": 1.0}`; by default all values of an axis are ranked
-    models : keys of the models to rank; by default all
-
-    Returns
-    -------
-    Ranking : the models, the best first; `ranking.best` are those within the tolerance at all points
-
-    Raises
-    ------
-    UsageError : the result has no requested e, or lacks what the arguments select; tol is not a positive finite
-        number
-
-    >>> import impact
-    >>> result = impact.sweep("configs/figure6.toml")
-    >>> print(impact.recommend(result, models=["gharib-hurmuzlu-2012"]).headline)
-    no model gives e within 0.01 everywhere; gharib-hurmuzlu-2012 is nearest: 25.7% of 101 points
-    """
-    require_sweep(dataset, "recommend")
-    return ranking(dataset, tol, sel, models)
 
 
 def report(

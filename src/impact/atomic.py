@@ -10,7 +10,7 @@ import re
 import stat
 import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from secrets import token_hex
@@ -184,6 +184,82 @@ def atomic_write(path: Path, *, overwrite: bool, part: Path | None = None) -> It
         raise StoreError(
             f"{shown}: written, but its name may not be on the disk: {error.strerror}; a power cut may undo it"
         ) from error
+
+
+def check_output(path: Path, *, overwrite: bool, source: Path | None = None) -> None:
+    """Refuse an output that cannot be written, before any work starts, or that is the file to be read.
+
+    Raises
+    ------
+    UsageError : it exists and must not be overwritten, is not a regular file, or its folder is not writable
+    """
+    shown = safe_text(str(path))
+    folder = path.parent
+    if not folder.is_dir():
+        raise UsageError(f"{shown}: the folder {safe_text(str(folder))} does not exist")
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise UsageError(f"{shown}: the folder {safe_text(str(folder))} cannot be written to")
+    _check_name_length(path)
+    try:
+        mode = path.lstat().st_mode
+    except FileNotFoundError:
+        return
+    except OSError as error:
+        raise UsageError(f"{shown}: {error.strerror}") from None
+    if not stat.S_ISREG(mode):
+        raise UsageError(f"{shown}: is not a regular file, and is not modified")
+    if source is not None and source.exists() and path.samefile(source):
+        raise UsageError(f"{shown}: is the file to be read, and is not modified")
+    if not overwrite:
+        raise UsageError(f"{shown}: exists; give another name, or overwrite it (--overwrite)")
+
+
+def check_outputs(outputs: Iterable[str | Path | None], inputs: Iterable[object], *, overwrite: bool) -> None:
+    """Refuse outputs that cannot be written, or that are a file which the command reads.
+
+    Parameters
+    ----------
+    outputs : the files to write; None for an output that is not wanted
+    inputs : what is read; other values than paths, such as mappings and models, are no files
+    overwrite : whether the outputs may exist
+
+    Raises
+    ------
+    UsageError : see `check_output`; or two outputs are the same file
+    """
+    paths = [Path(output) for output in outputs if output is not None]
+    sources: list[Path | None] = [Path(source) for source in inputs if isinstance(source, str | Path)]
+    for path in paths:
+        for source in sources or [None]:
+            check_output(path, overwrite=overwrite, source=source)
+    for path in {path for path in paths if paths.count(path) > 1}:
+        raise UsageError(f"{safe_text(str(path))}: is named for two outputs")
+
+
+def _check_name_length(path: Path) -> None:
+    """Refuse a name that is too long for the temporary files next to it, such as RESULT.12345678.part."""
+    try:
+        limit = os.pathconf(path.parent, "PC_NAME_MAX")
+    except (OSError, ValueError, AttributeError):
+        return
+    suffix_length = len(".12345678.part")
+    length = len(os.fsencode(path.name))
+    if length > limit - suffix_length:
+        shown = safe_text(str(path), 60)
+        raise UsageError(f"{shown}: got a name of {length} bytes, expected at most {limit - suffix_length}")
+
+
+def write_file(path: Path, content: bytes | memoryview, *, overwrite: bool) -> None:
+    """Write a file atomically: its name appears when it is complete, and it survives a power failure.
+
+    Raises
+    ------
+    UsageError : see `check_output`
+    StoreError : the disk is full or failed; no file of that name is left
+    """
+    check_output(path, overwrite=overwrite)
+    with atomic_write(path, overwrite=overwrite) as sink:
+        sink.write(content)
 
 
 def _remove_stale_parts(path: Path) -> None:

@@ -11,6 +11,7 @@ import typer
 
 import impact
 
+from ..atomic import check_output
 from ..errors import ImpactError, UsageError
 from ..text import safe_text
 from . import exits
@@ -139,7 +140,6 @@ def _check_plot(plot: Path | None, *sources: Path) -> None:
     """Refuse a picture that cannot be stored before any work is done."""
     if plot is not None:
         from ..plots.style import check_picture
-        from ..results.backend import check_output
 
         check_picture(plot)
         for source in sources:

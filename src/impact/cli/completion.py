@@ -118,9 +118,9 @@ def _parameters(context: typer.Context) -> list[str]:
 
 
 def _inputs(context: typer.Context) -> list[str]:
-    from ..config.cases import input_names
+    from ..config.input_names import SWEEP_INPUTS
 
-    return [*input_names(), *_parameters(context)]
+    return [*SWEEP_INPUTS, *_parameters(context)]
 
 
 def _axes(context: typer.Context) -> list[str]:

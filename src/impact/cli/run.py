@@ -10,6 +10,7 @@ import typer
 
 import impact
 
+from ..atomic import check_output, write_file
 from ..errors import UsageError
 from ..text import safe_text
 from . import exits
@@ -58,13 +59,12 @@ def run(
     """Run one impact: inputs, outputs and estimated errors."""
     from ..contact.status import FIRST_FAILURE
     from ..plots.data import encode_history
-    from ..results import backend
 
     if times is not None and history is None:
         raise UsageError(f"--times {times}: expected --history FILE as well")
     if history is not None:
         for path in (source, *(plugins or ())):
-            backend.check_output(history, overwrite=overwrite, source=path)
+            check_output(history, overwrite=overwrite, source=path)
         if history.suffix.lower() not in HISTORY_SUFFIXES:
             *most, last = HISTORY_SUFFIXES
             expected = f"expected a name that ends in {', '.join(most)} or {last}"
@@ -82,7 +82,7 @@ def run(
         if result.history is None:
             raise UsageError(f"no history to store: {result.why_no_history}")
         if history.suffix.lower() == ".csv":
-            backend.write_file(history, encode_history(result.history), overwrite=overwrite)
+            write_file(history, encode_history(result.history), overwrite=overwrite)
         else:
             impact.save(result.history, history, overwrite=overwrite)
         exits.print_line(f"{safe_text(str(history))}: {result.history.sizes['t']} points in time")

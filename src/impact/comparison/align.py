@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..engine.plan import material_property, owner_of
+from ..config.input_names import InputName, is_input
 from ..formatting import number
 from ..results.attributes import read_attribute
-from ..results.schema import MODEL_METADATA, SCHEMA, SchemaVariable, columns_along, is_case, is_input
+from ..results.schema import MODEL_METADATA, SCHEMA, SchemaVariable, columns_along, is_case
 from ..results.selection import LABEL_RTOL, NUMBER_DTYPE_KINDS, IndexArray, Labels, match_labels
 from ..text import safe_text
 from .verdict import Fault, FaultKind
@@ -110,7 +110,7 @@ def align(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Aligned:
         names = [*(n for n in columns[0] if n == axis), *(n for n in columns[0] if n != axis)]
         labels = [[coords[name].values for name in names] for coords in (a, b)]
         faults += _label_faults(labels[0], labels[1], names, positions[axis], subset=subset)
-    for name in sorted(str(name) for name in a.coords.keys() & b.coords.keys() if is_input(str(name))):
+    for name in sorted(str(name) for name in a.coords.keys() & b.coords.keys() if is_input(name)):
         if a[name].ndim == b[name].ndim == 0 and not _labels_agree(a[name].values, b[name].values):
             kind: FaultKind = "nothing in common" if subset else "physics config"
             values = f"{_format_value(a[name].values)}, in BASELINE {_format_value(b[name].values)}"
@@ -137,7 +137,7 @@ def align(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Aligned:
 def _drop_foreign_axes(result: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
     """A result without the parameters of models that the other one lacks; other models do not depend on them."""
     models = {str(key) for key in np.ravel(other["model"].values)}
-    foreign = [str(name) for name in result.coords if owner_of(str(name)) not in models | {""}]
+    foreign = [str(name) for name in result.coords if InputName.parse(name).model not in models | {""}]
     return result.isel({name: 0 for name in foreign if name in result.dims}).drop_vars(foreign)
 
 
@@ -167,9 +167,9 @@ def _comparable_coordinates(result: xr.Dataset, other: xr.Dataset) -> xr.Dataset
 def _with_materials(coords: xr.Dataset, materials: Mapping[str, Any], other: xr.Dataset) -> xr.Dataset:
     """Coordinates, with the properties of materials that are coordinates of the other result only."""
     for name in map(str, other.coords):
-        material, key = material_property(name) or ("", "")
-        properties = materials.get(material)
-        value = properties.get(key) if isinstance(properties, dict) and name not in coords else None
+        parsed = InputName.parse(name)
+        properties = materials.get(parsed.material)
+        value = properties.get(parsed.key) if isinstance(properties, dict) and name not in coords else None
         if isinstance(value, float):
             coords = coords.assign_coords({name: xr.Variable((), value, other.variables[name].attrs)})
     return coords

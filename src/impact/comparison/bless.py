@@ -10,10 +10,11 @@ from pathlib import Path
 
 import xarray as xr
 
+from ..atomic import check_output
 from ..errors import ResultError, UsageError
-from ..results.backend import check_output, load, save_with_attributes
 from ..results.replay_command import command_start, describe_point, inputs_of_model
 from ..results.summary import summarize
+from ..results.xarray_backend import load, save_with_attributes
 from ..text import safe_text
 from .compare import check_comparable, compare
 from .tolerances import Tolerances, effective_tolerances

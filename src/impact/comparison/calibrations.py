@@ -10,10 +10,10 @@ import numpy as np
 import xarray as xr
 
 from ..array_types import Array
+from ..config.input_names import is_input
 from ..errors import UsageError
 from ..results.attributes import read_attribute
 from ..results.calibration import CALIBRATION_VARIABLES, fit_status
-from ..results.schema import is_input
 from ..text import safe_text
 from .tolerances import ALL_VARIABLES, Tolerances
 from .verdict import Fault, Judged, Verdict
@@ -106,7 +106,7 @@ def _data_faults(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
             faults.append(Fault("labels", name, f"{name}: the measured points differ"))
     for name in baseline.coords.keys() & new.coords.keys():
         a, b = new.coords[name], baseline.coords[name]
-        if is_input(str(name)) and a.ndim == b.ndim == 0 and a.item() != b.item():
+        if is_input(name) and a.ndim == b.ndim == 0 and a.item() != b.item():
             text = f"{name} is {a.item()}, in BASELINE {b.item()}"
             faults.append(Fault("physics config", str(name), safe_text(text)))
     return faults

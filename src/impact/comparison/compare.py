@@ -9,14 +9,15 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from ..config.input_names import is_input
 from ..contact.timestep import EXACT
 from ..errors import UsageError
 from ..formatting import number
 from ..results.attributes import read_attribute
-from ..results.backend import load
 from ..results.kinds import is_calibration, require_sweep
 from ..results.replay_command import command_start
-from ..results.schema import MODEL_METADATA, SCHEMA, SCHEMA_VERSION, is_case, is_input
+from ..results.schema import MODEL_METADATA, SCHEMA, SCHEMA_VERSION, is_case
+from ..results.xarray_backend import load
 from ..text import safe_text
 from .align import MODEL_COORDINATES, align
 from .calibrations import compare_calibrations
@@ -143,7 +144,7 @@ def check_comparable(dataset: xr.Dataset, name: str) -> None:
             raise UsageError(f"{shown}: has no coordinate {coordinate}, expected a whole result")
         if coordinate != "model" and dataset[coordinate].dtype.kind not in "fiu":
             raise UsageError(f"{shown}: {coordinate}: got {dataset[coordinate].dtype}, expected numbers")
-    axes = {dim for name, v in dataset.variables.items() if is_input(str(name)) for dim in v.dims}
+    axes = {dim for name, v in dataset.variables.items() if is_input(name) for dim in v.dims}
     for name in (variable.name for variable in SCHEMA):
         if name in dataset and dataset[name].dtype.kind not in "fiu":
             raise UsageError(f"{shown}: {name}: got {dataset[name].dtype}, expected numbers")

@@ -23,9 +23,8 @@ from ..contact.outputs import UNITS
 from ..errors import ConfigError
 from ..text import safe_text
 from .files import as_table, override_text, read_text, set_value
-from .grid import name_of, path_of
+from .input_names import InputName, input_values
 from .quantities import MAX_PROBLEMS, ConfigProblem, KeyPath, Quantity, mismatch_error, show, suggest
-from .tables import MATERIAL_KEYS, MATERIAL_QUANTITIES, SWEEP_QUANTITIES, model_quantities, quantity_at
 
 MAX_CSV_BYTES = 2_000_000  # size of a CSV file, whose values a result stores
 COLUMN_HEADER = re.compile(r"\s*(.*?)\s*(?:\[\s*(.*?)\s*\])?\s*", re.DOTALL)
@@ -158,7 +157,7 @@ def column_quantity(name: str, models: Mapping[str, ForceModel]) -> Quantity | N
     ------
     KeyError : there is no such output or input
     """
-    return Quantity(UNITS[name], "output") if name in UNITS else quantity_at(path_of(name), models)
+    return Quantity(UNITS[name], "output") if name in UNITS else InputName.parse(name).quantity(models)
 
 
 def column_values(table: CsvTable, column: str, quantity: Quantity | None, n: float | None) -> list[float | str]:
@@ -265,20 +264,20 @@ def inline_files(
             store_values(("sweep", "cases"), _read_cases(open_csv(cases), models, n))
         except ConfigError as error:
             problems += error.problems
-    for path, file, column in list(_file_columns(data)):
+    for name, file, column in list(_file_columns(data)):
         try:
             table = open_csv(file, with_any_names=True)
             is_sample = column is None
             if column is None:
                 # the only column, or that of the input
-                column = next(iter(table.units)) if len(table.units) == 1 else name_of(path)
+                column = next(iter(table.units)) if len(table.units) == 1 else str(name)
             if column not in table.units:
                 known = f"; {suggest(column, list(table.units))}" if table.is_known else ""
-                if any(name.startswith(f"{column} (") for name in table.units):
+                if any(header.startswith(f"{column} (") for header in table.units):
                     known = f'; a unit is in square brackets: "{safe_text(column, 60)} [UNIT]"'
                 raise ConfigError(f"{table.name}:1: got {show(column)}, expected one of its columns{known}")
-            values = column_values(table, column, quantity_at(path, models), n)
-            store_values(path, {"empirical": values} if is_sample else values)
+            values = column_values(table, column, name.quantity(models), n)
+            store_values(name.path, {"empirical": values} if is_sample else values)
         except ConfigError as error:
             problems += error.problems
         except KeyError:
@@ -296,53 +295,26 @@ def _read_cases(
     n = None if "n" in table.units else n
     for column in table.units:
         try:
-            values[column] = column_values(table, column, quantity_at(path_of(column), models), n)
+            values[column] = column_values(table, column, InputName.parse(column).quantity(models), n)
         except ConfigError as error:
             problems += error.problems
         except KeyError:
-            problems.append(f"{table.name}:1: {safe_text(column, 60)}: {unknown_input_message(column, models)}")
+            problems.append(
+                f"{table.name}:1: {safe_text(column, 60)}: {InputName.parse(column).unknown_message(models)}"
+            )
     if problems:
         raise ConfigError(*problems)
     return values
 
 
-def unknown_input_message(name: str, models: Mapping[str, ForceModel]) -> str:
-    """A message about the name of a column that is no input."""
-    table, key, *_ = map(str, path_of(name))
-    if table == "materials":
-        inputs = [f"materials.{key}.{field}" for field in MATERIAL_QUANTITIES]
-    elif table == "sweep":
-        inputs = input_names()
-    elif key in models:
-        inputs = [f"{key}.{parameter}" for parameter in model_quantities(models[key])]
-    else:
-        name, inputs = key, list(models)
-    return f"no such input; {suggest(name, inputs)}"
-
-
-def input_names() -> list[str]:
-    """The names of the inputs in [sweep]."""
-    return [*SWEEP_QUANTITIES, *MATERIAL_KEYS]
-
-
-def input_values(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, Any]]:
-    """The path and the value of every key of [sweep], of a material and of [model.KEY]."""
-    tables: dict[KeyPath, dict[str, Any]] = {("sweep",): as_table(data.get("sweep"))}
-    for name in ("materials", "model"):
-        tables |= {(name, key): as_table(table) for key, table in as_table(data.get(name)).items()}
-    for path, table in tables.items():
-        for key, value in table.items():
-            yield (*path, key), value
-
-
-def _file_columns(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, str, str | None]]:
-    """The path, the file and the column of every `{ file = ..., column = ... }` and `{ empirical = file }`."""
-    for path, reference in input_values(data):
+def _file_columns(data: Mapping[str, Any]) -> Iterator[tuple[InputName, str, str | None]]:
+    """The name, the file and the column of every `{ file = ..., column = ... }` and `{ empirical = file }`."""
+    for name, reference in input_values(data):
         match reference:
             case {"file": str(file), "column": str(column), **others} if not others:
-                yield path, file, column
+                yield name, file, column
             case {"empirical": str(file), **others} if not others:
-                yield path, file, None
+                yield name, file, None
 
 
 def named_files(data: Mapping[str, Any]) -> list[str]:
@@ -369,21 +341,21 @@ def expand_cases(
     problems: list[ConfigProblem] = []
     names: dict[str, str] = {}
     # the columns that belong to [sweep] take the position of the table
-    columns = {name: values for name, values in cases.items() if path_of(name)[0] == "sweep"}
+    columns = {name: values for name, values in cases.items() if not InputName.parse(name).owner}
     position = list(sweep).index("cases")
     sweep_items = list(sweep.items())
     new = {**data, "sweep": {**dict(sweep_items[:position]), **columns, **dict(sweep_items[position + 1 :])}}
     n_cases = len(next(iter(cases.values()), []))
     for name, values in cases.items():
-        path, cases_path = path_of(name), ("sweep", "cases", name)
+        input_name, cases_path = InputName.parse(name), ("sweep", "cases", name)
         try:
-            quantity_at(path, models)
+            input_name.quantity(models)
         except KeyError:
-            problems.append((cases_path, unknown_input_message(name, models)))
+            problems.append((cases_path, input_name.unknown_message(models)))
             new["sweep"].pop(name, None)
             continue
-        if contains_path(data, path):
-            problems.append((cases_path, f"set together with {'.'.join(map(str, path))}, expected one of the two"))
+        if contains_path(data, input_name.path):
+            problems.append((cases_path, f"set together with {input_name.config_key}, expected one of the two"))
         if len(values) != n_cases or not values:
             problems.append(
                 (
@@ -391,9 +363,9 @@ def expand_cases(
                     f"got {len(values)} values, expected {n_cases or 'at least one'}, as in the first column",
                 )
             )
-        if path[0] != "sweep":
-            new, _ = set_value(new, path, values)
-        names[name_of(path)] = name
+        if input_name.owner:
+            new, _ = set_value(new, input_name.path, values)
+        names[str(input_name)] = name
     return new, names, problems
 
 

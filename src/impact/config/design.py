@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..array_types import Array
-from .cases import input_values
+from .input_names import input_values
 from .quantities import DISTRIBUTION_FORMS, ConfigProblem, Distribution, KeyPath, Quantity, show
 from .tables import Design
 
@@ -20,9 +20,9 @@ LEAST_UNIT = 2.0**-31
 
 def distribution_paths(data: Mapping[str, Any]) -> Iterator[KeyPath]:
     """The path of every distribution in the plain data of a config."""
-    for path, value in input_values(data):
+    for name, value in input_values(data):
         if isinstance(value, dict) and not DISTRIBUTION_FORMS.keys().isdisjoint(value):
-            yield path
+            yield name.path
 
 
 def design_problems(data: Mapping[str, Any]) -> list[ConfigProblem]:

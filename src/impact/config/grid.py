@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from pydantic import ValidationError
 
 from ..contact.outputs import BY_DEFAULT
-from .quantities import MAX_PROBLEMS, ConfigProblem, KeyPath, Names, Numbers, Quantity, Range, show, suggest
+from .input_names import InputName
+from .quantities import MAX_PROBLEMS, ConfigProblem, Names, Numbers, Quantity, Range, show, suggest
 
 # default limit of the points of all models together
 MAX_POINTS = 10**9
@@ -128,7 +129,9 @@ def build_grid(
             try:
                 columns[name] = value.values(quantities[name])
             except ValidationError as error:
-                problems += [((*path_of(name), *detail["loc"]), detail["msg"]) for detail in error.errors()]
+                problems += [
+                    ((*InputName.parse(name).path, *detail["loc"]), detail["msg"]) for detail in error.errors()
+                ]
     # a group member with an invalid value has no column; that problem is reported by the validation
     groups = [member_of.get(name, (name,)) for name in leaders]
     is_complete = not problems and all(name in columns for group in groups for name in group)
@@ -197,27 +200,6 @@ def chunk_problems(
     return []
 
 
-def path_of(name: str) -> KeyPath:
-    """The path of a config name: of an input, of a parameter of a model or of a material.
-
-    >>> path_of("v1"), path_of("bilinear.K"), path_of("model.bilinear.K"), path_of("materials.steel.E")
-    (('sweep', 'v1'), ('model', 'bilinear', 'K'), ('model', 'bilinear', 'K'), ('materials', 'steel', 'E'))
-    """
-    table, _, key = name.removeprefix("model.").rpartition(".")
-    if table.startswith("materials."):
-        return ("materials", table.removeprefix("materials."), key)
-    return ("model", table, key) if table else ("sweep", name)
-
-
-def name_of(path: KeyPath) -> str:
-    """The config name of a path, which is also the name of its column in a result.
-
-    >>> name_of(path_of("model.bilinear.K"))
-    'bilinear.K'
-    """
-    return ".".join(map(str, path[0 if path[0] == "materials" else 1 :]))
-
-
 def _zip_groups(
     groups: Sequence[Sequence[str]],
     sizes: Mapping[str, int | None],
@@ -237,7 +219,7 @@ def _zip_groups(
     problems: list[ConfigProblem] = []
     for group_index, group in enumerate(groups[:MAX_PROBLEMS]):
         lengths: dict[str, int] = {}
-        names = [name_of(path_of(name)) for name in group[:MAX_PROBLEMS]]
+        names = [str(InputName.parse(name)) for name in group[:MAX_PROBLEMS]]
         for member_index, name in enumerate(names):
             path = ("sweep", "zip", group_index, member_index)
             size = sizes.get(name)
@@ -266,6 +248,6 @@ def _repetition_problems(name: str, values: AxisValues) -> list[ConfigProblem]:
     seen: set[object] = set()
     for index, value in enumerate(values):
         if value in seen:
-            return [((*path_of(name), index), f"got {show(value)} twice, expected each value once")]
+            return [((*InputName.parse(name).path, index), f"got {show(value)} twice, expected each value once")]
         seen.add(value)
     return []

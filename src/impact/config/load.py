@@ -30,7 +30,8 @@ from .files import (
     read_text,
     to_plain_data,
 )
-from .grid import MAX_POINTS, Axis, build_grid, chunk_problems, name_of, path_of
+from .grid import MAX_POINTS, Axis, build_grid, chunk_problems
+from .input_names import InputName
 from .library import library
 from .lines import SourceLocations, key_lines, problem_lines, validation_problems
 from .measurements import (
@@ -68,7 +69,6 @@ from .tables import (
     document_type,
     expand_models,
     json_schema,
-    quantity_at,
 )
 
 __all__ = [
@@ -269,14 +269,14 @@ class _Reader:
             values = {name: value for name, value in values.items() if isinstance(value, float | str)}
         else:
             problems += design_problems(data)
-        optional = {name: quantity_at(path_of(name), self.models) for name in values}
+        optional = {name: InputName.parse(name).quantity(self.models) for name in values}
         quantities = {name: quantity for name, quantity in optional.items() if quantity is not None}
         output = document.output
         distributions = {name: value for name, value in values.items() if isinstance(value, Distribution)}
         if distributions and document.design is not None:
             u = unit_samples(document.design, len(distributions))
             drawn, draw_problems = draw_columns(distributions, quantities, u)
-            problems += [(path_of(name), message) for name, message in draw_problems.items()]
+            problems += [(InputName.parse(name).path, message) for name, message in draw_problems.items()]
             values |= {name: tuple(column.tolist()) for name, column in drawn.items()}
         grid = build_grid(
             values,
@@ -374,7 +374,7 @@ def _add_library_materials(data: Mapping[str, Any]) -> tuple[dict[str, Any], lis
     names = dict.fromkeys(
         name for key in MATERIAL_KEYS for table in (sweep, cases) for name in listed_names(table.get(key))
     )
-    names |= {str(path[1]): None for path in map(path_of, cases) if path[0] == "materials"}
+    names |= {name.material: None for name in map(InputName.parse, cases) if name.material}
     materials = {
         # a column of cases or of measurements replaces a property
         name: {key: value for key, value in library()[name].items() if f"materials.{name}.{key}" not in cases}
@@ -472,7 +472,7 @@ def _calibration_problems(
         ]
     for name, value in values.items():
         if isinstance(value, tuple | Range):
-            problems.append((path_of(name), f"got an axis, {single}"))
+            problems.append((InputName.parse(name).path, f"got an axis, {single}"))
     uncertain = next(distribution_paths(data), ("design",) if "design" in data else ())
     if uncertain:
         problems.append((uncertain, "got an uncertain input, which impact sweep and impact sensitivity take"))
@@ -507,7 +507,7 @@ def _locate_in_cases(problems: Sequence[ConfigProblem], cases: Mapping[str, str]
 
     def located(path: KeyPath) -> KeyPath:
         length = 2 if path[:1] == ("sweep",) else 3
-        column = cases.get(name_of(path[:length])) if len(path) >= length else None
+        column = cases.get(str(InputName.of_path(path[:length]))) if len(path) >= length else None
         return path if column is None else ("sweep", "cases", column, *path[length:])
 
     return [(located(path), message) for path, message in problems]

@@ -20,15 +20,12 @@ from .cases import (
     column_quantity,
     column_values,
     contains_path,
-    input_names,
-    input_values,
     read_csv,
-    unknown_input_message,
 )
 from .files import as_table, override_text, set_value
-from .grid import name_of, path_of
+from .input_names import InputName, input_values
 from .quantities import MAX_PROBLEMS, ConfigProblem, KeyPath, Quantity, show, suggest, value_error
-from .tables import LOSSES, MATERIAL_KEYS, MAX_MEASURED, MIN_SIGMA, NOISES, quantity_at
+from .tables import LOSSES, MAX_MEASURED, MIN_SIGMA, NOISES, SWEEP_QUANTITIES
 
 Noise = Literal["given", "scale", "excess"]
 Loss = Literal["linear", "huber", "cauchy"]
@@ -96,9 +93,9 @@ class _DataColumn:
 
 def fit_paths(data: Mapping[str, Any]) -> Iterator[KeyPath]:
     """The path of every `{ fit = ... }`."""
-    for path, value in input_values(data):
+    for name, value in input_values(data):
         if isinstance(value, dict) and "fit" in value:
-            yield path
+            yield name.path
 
 
 def purpose_problems(data: Mapping[str, Any]) -> list[ConfigProblem]:
@@ -127,9 +124,9 @@ def _columns_of(
         )
         if other != name:
             problems.append((name, f"got a second column of {column.name}, beside {show(other)}, expected one"))
-        elif column.kind == "input" and contains_path(data, path_of(name)):
+        elif column.kind == "input" and contains_path(data, InputName.parse(name).path):
             problems.append(
-                (name, f"set together with {'.'.join(map(str, path_of(name)))}, expected one of the two")
+                (name, f"set together with {InputName.parse(name).config_key}, expected one of the two")
             )
     if not outputs and not problems:
         problems.append(("", "got no column of an output, expected one, such as e_out or contact_time"))
@@ -154,18 +151,23 @@ def _column_of(name: str, outputs: Sequence[str], models: Mapping[str, ForceMode
         )
     if not name:
         raise value_error("got a column without a name, expected that of an input or an output")
-    path = path_of(name)
+    input_name = InputName.parse(name)
     try:
-        quantity = quantity_at(path, models)
+        quantity = input_name.quantity(models)
     except KeyError:
-        if path[0] != "sweep":
-            raise value_error(unknown_input_message(name, models)) from None
-        inputs = [key for key in input_names() if key not in MATERIAL_KEYS]
-        choices = [*MEASURED_OUTPUTS, SIGMA, SPECIMEN, *inputs, *(f"{SIGMA}_{output}" for output in outputs)]
+        if input_name.owner:
+            raise value_error(input_name.unknown_message(models)) from None
+        choices = [
+            *MEASURED_OUTPUTS,
+            SIGMA,
+            SPECIMEN,
+            *SWEEP_QUANTITIES,
+            *(f"{SIGMA}_{output}" for output in outputs),
+        ]
         raise value_error(f"no such input or output; {suggest(name, choices)}") from None
     if quantity is None:
         raise value_error("got names of materials, expected numbers; all points have the materials of [sweep]")
-    return _DataColumn("input", name_of(path), replace(quantity, infinite=False))
+    return _DataColumn("input", str(input_name), replace(quantity, infinite=False))
 
 
 def inline_measurements(
@@ -344,7 +346,7 @@ def expand_measurements(
         loss=loss,
     )
     for name, column_of_input in measurements.inputs.items():
-        data, _ = set_value(data, path_of(name), column_of_input[0])
+        data, _ = set_value(data, InputName.parse(name).path, column_of_input[0])
     return dict(data), measurements, []
 
 
@@ -419,14 +421,14 @@ def fitted_parameters(fits: Mapping[str, tuple[float, float]], model: ForceModel
     used = with_base_quantities(model.quantities)
 
     def is_used(name: str) -> bool:
-        table, *keys = path_of(name)
         if name in ("e", "alpha"):
             return "e" in used
         if name == "n":
             return model.exponent is None
-        if keys[-1] == "yield_strength":
+        input_name = InputName.parse(name)
+        if input_name.key == "yield_strength":
             return bool(used & {"yield_strength1", "yield_strength2"})
-        return table != "model" or keys[0] == model.key
+        return input_name.applies_to(model.key)
 
     return tuple(filter(is_used, fits))
 

@@ -32,7 +32,6 @@ from .quantities import (
     RANGE,
     SCALAR,
     ConfigProblem,
-    KeyPath,
     Names,
     Numbers,
     Quantity,
@@ -315,23 +314,6 @@ def model_quantities(model: ForceModel) -> dict[str, Quantity]:
         parameter.name: Quantity(parameter.unit, parameter.meaning, parameter.least, parameter.most)
         for parameter in model.parameters
     }
-
-
-def quantity_at(path: KeyPath, models: Mapping[str, ForceModel]) -> Quantity | None:
-    """The quantity of the input at a path; None for the name of a material.
-
-    Raises
-    ------
-    KeyError : no input has this path
-    """
-    match path:
-        case ("sweep", str(name)):
-            return None if name in MATERIAL_KEYS else SWEEP_QUANTITIES[name]
-        case ("materials", _, str(name)):
-            return MATERIAL_QUANTITIES[name]
-        case ("model", str(key), str(name)):
-            return model_quantities(models[key])[name]
-    raise KeyError(path)
 
 
 def parameter_table(model: ForceModel) -> type[Table]:

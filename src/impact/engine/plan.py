@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import Literal
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._version import __version__
+from ..config.input_names import InputName, is_foreign
 from ..config.load import Axis, Config
 from ..contact.materials import Material
 from ..contact.model import ForceModel
@@ -31,47 +32,6 @@ Index = tuple[NDArray[np.intp], ...]
 def dimensions(index: Index) -> int:
     """Number of dimensions of the arrays of an index; one for a plan without axes."""
     return index[0].ndim if index else 1
-
-
-def owner_of(name: str) -> str:
-    """The key of the model whose parameter a config name is; empty for an input that all models share.
-
-    >>> owner_of("bilinear.K"), owner_of("v1"), owner_of("materials.steel.E")
-    ('bilinear', '', '')
-    """
-    return "" if material_property(name) else name.rpartition(".")[0]
-
-
-def material_property(name: str) -> tuple[str, str] | None:
-    """The material and the property of a config name, or None if it is not a property of a material.
-
-    >>> material_property("materials.steel.E"), material_property("bilinear.K")
-    (('steel', 'E'), None)
-    """
-    # the key of a model has no dot
-    table, _, rest = name.partition(".")
-    material, _, key = rest.rpartition(".")
-    return (material, key) if table == "materials" and material else None
-
-
-def is_foreign(names: Iterable[str], model: str) -> bool:
-    """Whether columns that vary together are parameters of other models only, and do not affect this model.
-
-    >>> is_foreign(["bilinear.K"], "hertz"), is_foreign(["bilinear.K", "m1"], "hertz")
-    (True, False)
-    """
-    owners = {owner_of(name) for name in names}
-    return bool(owners) and owners.isdisjoint({"", model})
-
-
-def is_own(names: Iterable[str], model: str) -> bool:
-    """Whether columns that vary together are parameters of this model, and none is an input of all models.
-
-    >>> is_own(["bilinear.K"], "bilinear"), is_own(["bilinear.K", "m1"], "bilinear")
-    (True, False)
-    """
-    owners = {owner_of(name) for name in names}
-    return model in owners and "" not in owners
 
 
 @dataclass(frozen=True)
@@ -126,8 +86,9 @@ class Inputs:
         """All values of a name: those of its axis, or a single value, which is None for a name without a value."""
         if name in self._arrays:
             return self._arrays[name]
-        material, key = material_property(name) or ("", "")
-        constant = getattr(self.materials[material], key) if material in self.materials else None
+        parsed = InputName.parse(name)
+        material = self.materials.get(parsed.material)
+        constant = getattr(material, parsed.key) if material is not None else None
         return np.asarray(self.scalars.get(name, constant))
 
     def materials_of(self, ball: str) -> frozenset[str]:
@@ -231,8 +192,8 @@ class Plan:
         """The materials of the balls by name; properties that are axes are NaN for E and nu, otherwise None."""
         fixed: dict[str, dict[str, float]] = {}
         for name, value in self.config.scalars.items():
-            material, key = material_property(name) or ("", "")
-            fixed.setdefault(material, {})[key] = float(value) if material else math.nan
+            if (parsed := InputName.parse(name)).material:
+                fixed.setdefault(parsed.material, {})[parsed.key] = float(value)
         used = sorted(self.inputs.materials_of("1") | self.inputs.materials_of("2"))
         return {name: replace(self.config.materials[name], **fixed.get(name, {})) for name in used}
 

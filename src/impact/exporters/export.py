@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from .._version import __version__
+from ..config.input_names import InputName
 from ..contact.status import Status
 from ..errors import UsageError
 from ..formatting import decimals, number, quantity
@@ -164,7 +165,7 @@ def _header(problem: ExportProblem, collision: Collision, row: TimestepRow) -> l
     if problem.first:
         header.append(f"first value of each axis of the source: {', '.join(problem.first)}")
     if problem.solved:
-        name = problem.solved.rpartition(".")[2]
+        name = InputName.parse(problem.solved).key
         header.append(f"{name} = {collision[name]!r} gives the e that is wanted")
     asked = f"e = {number(law.e)} is asked for; " if law.has_e else ""
     contact_time = quantity(law.contact_time, "s")

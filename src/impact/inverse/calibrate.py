@@ -13,22 +13,23 @@ import numpy as np
 import xarray as xr
 
 from ..array_types import Array
+from ..atomic import check_outputs, write_file
 from ..config.files import override_text, toml_document
-from ..config.grid import Axis, path_of
+from ..config.grid import Axis
+from ..config.input_names import InputName
 from ..config.load import Config, parse_config, read_config
 from ..config.measurements import fitted_parameters
 from ..config.quantities import KeyPath, Quantity
-from ..config.tables import quantity_at
 from ..contact.model import ForceModel
 from ..contact.outputs import collide
 from ..contact.units import dimension
 from ..engine.build_impacts import build_impacts
 from ..engine.execute import WorkerContext, context_of, models_of_context
 from ..engine.executors import choose_backend
-from ..engine.plan import Inputs, Plan, is_foreign
+from ..engine.plan import Inputs, Plan
 from ..engine.plugins import Plugins, read_plugins
-from ..results.backend import check_outputs, save, write_file
 from ..results.calibration import FIT_STATUSES, calibration_template
+from ..results.xarray_backend import save
 from .batch import VectorFunction
 from .fit import Bounds, DataPoints, Fit, Problem, fit_all, half_widths
 
@@ -280,7 +281,7 @@ def determined_groups(config: Config, model: ForceModel, names: Sequence[str], f
     groups = []
     for row in reduced:
         powers = {
-            names[number].rpartition(".")[2]: Fraction(float(power)).limit_denominator(MAX_DENOMINATOR)
+            InputName.parse(names[number]).key: Fraction(float(power)).limit_denominator(MAX_DENOMINATOR)
             for number, power in zip(involved.tolist(), row, strict=True)
         }
         units = [_quantity(config, names[number]).unit for number in involved.tolist()]
@@ -289,7 +290,7 @@ def determined_groups(config: Config, model: ForceModel, names: Sequence[str], f
 
 
 def _quantity(config: Config, name: str) -> Quantity:
-    quantity = quantity_at(path_of(name), {model.key: model for model in config.models})
+    quantity = InputName.parse(name).quantity({model.key: model for model in config.models})
     assert quantity is not None
     return quantity
 
@@ -366,12 +367,12 @@ def best_config(config: Config, result: xr.Dataset) -> str:
         known = {field: value for field, value in asdict(material).items() if value is not None and value == value}
         tables["materials", name] = known
     for name, value in {**config.scalars, **columns, **estimates}.items():
-        if is_foreign([name], key) or (name in config.fits and name not in estimates):
+        parsed = InputName.parse(name)
+        if not parsed.applies_to(key) or (name in config.fits and name not in estimates):
             continue
-        *table, parameter = path_of(name)
         if isinstance(value, list) and len(value) == 1:
             (value,) = value
-        tables.setdefault(tuple(table), {})[str(parameter)] = value
+        tables.setdefault(parsed.path[:-1], {})[parsed.key] = value
     return toml_document(tables)
 
 

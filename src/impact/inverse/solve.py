@@ -21,6 +21,7 @@ from scipy.optimize import elementwise, minimize_scalar
 
 from ..array_types import Array, Mask
 from ..config.grid import Axis
+from ..config.input_names import InputName
 from ..config.load import Config, Output
 from ..contact.model import ForceModel, Parameter
 from ..contact.models import find
@@ -344,7 +345,7 @@ class _Problem:
 
     def unit(self) -> str:
         """The SI unit of the unknown, with numbers for the names in its exponents."""
-        numbers = {name.rpartition(".")[2]: v for name, v in self.config.scalars.items() if isinstance(v, float)}
+        numbers = {InputName.parse(name).key: v for name, v in self.config.scalars.items() if isinstance(v, float)}
         exponent = {} if self.model.exponent is None else {"n": self.model.exponent}
         return with_numbers(self.unknown.unit, {**numbers, **exponent})
 

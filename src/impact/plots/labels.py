@@ -10,6 +10,7 @@ from matplotlib.axis import Axis
 from matplotlib.mathtext import MathTextParser
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
+from ..config.input_names import InputName
 from ..errors import UsageError
 from ..formatting import scaled_unit, typographic
 from ..text import safe_text, with_year
@@ -74,7 +75,7 @@ def symbol(name: str) -> str:
     >>> symbol("v1"), symbol("e_out"), symbol("tau_c"), symbol("contact_time"), symbol("maw.gamma")
     ('$v_1$', '$e_\\mathrm{out}$', '$\\tau_c$', '', '$\\gamma$')
     """
-    name = name.rpartition(".")[2]
+    name = InputName.parse(name).key
     if name in MATH_SYMBOLS:
         return f"${MATH_SYMBOLS[name]}$"
     parts = re.fullmatch(r"([A-Za-z]|[a-z]+)_?([A-Za-z]?|[0-9]*)", name)

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..config.input_names import InputName, is_input
 from ..contact.units import with_numbers
-from ..engine.plan import owner_of
 from ..errors import UsageError, did_you_mean
 from ..formatting import quantity
-from ..results.schema import exponents_of, is_input, plain_unit
+from ..results.schema import exponents_of, plain_unit
 from ..results.selection import model_positions, select
 from ..text import safe_text
 
@@ -142,7 +142,7 @@ def is_ordered(dataset: xr.Dataset, name: str) -> bool:
         return False
     values = np.asarray(dataset[name].values, float)
     values = values[np.isfinite(values)]
-    together = [other for other, coord in dataset.coords.items() if coord.dims == (dim,) and is_input(str(other))]
+    together = [other for other, coord in dataset.coords.items() if coord.dims == (dim,) and is_input(other)]
     steps = np.diff(values)
     if dim == name and len(together) <= 1:
         return True
@@ -210,7 +210,7 @@ def scalars_of(dataset: xr.Dataset) -> dict[str, object]:
     return {
         str(name): coordinate.values.item()
         for name, coordinate in dataset.coords.items()
-        if coordinate.ndim == 0 and is_input(str(name))
+        if coordinate.ndim == 0 and is_input(name)
     }
 
 
@@ -218,7 +218,7 @@ def described_inputs(inputs: Mapping[str, object], units: Mapping[str, str], exp
     """Inputs with their units as text; `exponent` is the text for n if the laws shown fix their exponent."""
     parts = []
     for name, value in inputs.items():
-        if not owner_of(name):
+        if not InputName.parse(name).model:
             n = inputs.get("n")
             unit = with_numbers(units[name], {"n": n}) if isinstance(n, float) else units[name]
             text = exponent if name == "n" and exponent else quantity(value, unit)

@@ -17,9 +17,9 @@ import numpy as np
 from matplotlib import rc_params_from_file, rcParams, rcParamsDefault
 from matplotlib.figure import Figure
 
+from ..atomic import write_file
 from ..contact.models import catalogue
 from ..errors import UsageError
-from ..results.backend import write_file
 from ..text import safe_text
 from .kinds import WIDTHS
 

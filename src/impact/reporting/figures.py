@@ -12,15 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..config.grid import SAMPLE
+from ..config.input_names import InputName, is_input
 from ..contact.status import FIRST_FAILURE, NO_IMPACT
-from ..engine.plan import owner_of
 from ..errors import ImpactError
 from ..formatting import label
 from ..plots.curves import MAX_RESTITUTIONS, STEP_AXES
 from ..plots.kinds import MAP_KINDS, WIDTHS, Choice, draw
 from ..plots.style import encoded
 from ..results.kinds import is_calibration, is_sensitivity
-from ..results.schema import columns_along, is_input, plain_unit
+from ..results.schema import columns_along, plain_unit
 from ..results.selection import model_positions
 from ..results.slabs import distinct_points, is_computed, slabs
 
@@ -101,7 +101,7 @@ def _condition_sentences(
     """
     point, inputs = dataset.isel(position), varying(dataset)
     for key in ("", *keys):
-        values = at_text(point, [name for name in inputs if owner_of(name) == key])
+        values = at_text(point, [name for name in inputs if InputName.parse(name).model == key])
         if values:
             yield f"{'With' if key else 'At'} {values}."
 
@@ -131,7 +131,7 @@ def iterate_choices(dataset: xr.Dataset, keys: Sequence[str]) -> Iterator[tuple[
     }
     x = "e" if "e" in along else next(iter(along), None)
     # a parameter of a single model is not an axis of a map of several models
-    across = [name for name in along if len(keys) == 1 or not owner_of(name)]
+    across = [name for name in along if len(keys) == 1 or not InputName.parse(name).model]
     # an uncertain input is no axis of a map
     across = [name for name in across if along[name].dims != (SAMPLE,)]
     y = next((name for name in across if x and along[name].dims != along[x].dims), None)
@@ -164,7 +164,7 @@ def iterate_choices(dataset: xr.Dataset, keys: Sequence[str]) -> Iterator[tuple[
 
 def _inputs_at(dataset: xr.Dataset, position: Mapping[Hashable, int]) -> dict[str, float | str]:
     """The inputs that select a point: the label of each axis, or all columns of an axis of cases or samples."""
-    names = {dim: [str(dim)] if is_input(str(dim)) else columns_along(dataset, dim) for dim in position}
+    names = {dim: [str(dim)] if is_input(dim) else columns_along(dataset, dim) for dim in position}
     at = {name: dataset[name].values[position[dim]].item() for dim in names for name in names[dim]}
     # a missing number is not an input
     return {name: value for name, value in at.items() if value == value}
@@ -218,7 +218,7 @@ def varying(dataset: xr.Dataset) -> list[str]:
     dims_of = {
         str(name): coordinate.dims
         for name, coordinate in dataset.coords.items()
-        if coordinate.ndim and "model" not in coordinate.dims and is_input(str(name))
+        if coordinate.ndim and "model" not in coordinate.dims and is_input(name)
     }
     along = [name for dim in dataset.dims for name in (str(dim), *dims_of) if dims_of.get(name) == (dim,)]
     return list(dict.fromkeys([*along, *dims_of]))

@@ -17,9 +17,9 @@ from jinja2 import Environment, FunctionLoader, StrictUndefined, Template
 from markupsafe import Markup
 from numpy.typing import NDArray
 
+from ..config.input_names import InputName, is_input
 from ..config.tables import MATERIAL_QUANTITIES
 from ..contact.models import catalogue
-from ..engine.plan import owner_of
 from ..errors import UsageError
 from ..formatting import label, number
 from ..plots.kinds import Choice
@@ -34,9 +34,9 @@ from ..results.calibration import (
 )
 from ..results.kinds import is_calibration, is_sensitivity
 from ..results.plausibility import depth_summary, material_notes, result_notes
-from ..results.ranking import Ranking, ranking
+from ..results.ranking import DEFAULT_TOL, Ranking, rank_models, rankable_parts
 from ..results.replay_command import describe_point
-from ..results.schema import count_points, exponents_of, is_input
+from ..results.schema import count_points, exponents_of
 from ..results.sensitivity import INDEX_HEADINGS, describe_design, describe_study, index_rows, iterate_studies
 from ..results.slabs import MAX_SUMMARY_POINTS, is_large
 from ..results.summary import Summary, extremes_of, summarize
@@ -175,7 +175,7 @@ def _outcomes(summary: Summary) -> Iterator[str]:
 def _single_values(dataset: xr.Dataset) -> Iterator[tuple[str, str, str]]:
     """Name, value and meaning of the inputs and materials that have a single value."""
     for name, coordinate in dataset.coords.items():
-        if coordinate.ndim == 0 and is_input(str(name)):
+        if coordinate.ndim == 0 and is_input(name):
             value = (exponents_of(dataset) if name == "n" else None) or coordinate_text(coordinate)
             yield str(name), value, str(coordinate.attrs.get("long_name", ""))
     units = {key: rule.unit.removesuffix("1") for key, rule in MATERIAL_QUANTITIES.items()}
@@ -228,7 +228,7 @@ def _spacing(values: NDArray[Any]) -> str:
 def _rank_models(dataset: xr.Dataset) -> tuple[Ranking | None, str]:
     """The ranking of the models, None if they cannot be ranked, and the answer in a sentence."""
     try:
-        ranked = ranking(dataset, max_points=MAX_SUMMARY_POINTS)
+        ranked = rank_models(rankable_parts(dataset, {}, None, MAX_SUMMARY_POINTS), DEFAULT_TOL)
     except UsageError as error:
         return None, f"The models are not ranked: {error}."
     return ranked, re.sub("^no ", "No ", f"{ranked.headline}.")
@@ -246,7 +246,7 @@ def _failures_section(dataset: xr.Dataset, summary: Summary) -> dict[str, Any]:
     for status, model, index in summary.failed_at:
         point = dataset.isel({"model": model, **dict(zip(axes, index, strict=True))})
         key = str(point["model"].item())
-        inputs = [name for name in varying(dataset) if owner_of(name) in ("", key)]
+        inputs = [name for name in varying(dataset) if InputName.parse(name).applies_to(key)]
         points.append((key, at_text(point, inputs) or "–", status.meaning))
     more = summary.failed - len(points)
     return {"sentences": sentences, "points": points, "more": f"{more:,}" if more > 0 else ""}

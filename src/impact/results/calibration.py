@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from ..array_types import Array
-from ..config.grid import path_of
+from ..config.input_names import InputName
 from ..config.load import Config
 from ..config.tables import DEFAULT_TITLE
 from ..contact.model import ForceModel
@@ -314,7 +314,7 @@ def calibration_template(
         "loss": data.loss,
         "data_file": data.file,
         "varied": name,
-        "fit_paths": json.dumps([".".join(map(str, path_of(name))) for name in parameters]),
+        "fit_paths": json.dumps([InputName.parse(name).config_key for name in parameters]),
         "fit_bounds": json.dumps({name: list(ends) for name, ends in config.fits.items()}),
     }
     return xr.Dataset(variables, {**coordinates, **new}, attributes)

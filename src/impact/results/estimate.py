@@ -18,9 +18,9 @@ from ..engine.checkpoint import write_block
 from ..engine.execute import context_of, integrate_columns, with_core
 from ..engine.plan import Plan
 from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryMap, columns_of, trajectory_maps, trajectory_ranges
-from .expand import expanded_slabs, table_of
 from .factored import factored_template
 from .schema import dataset_template, stored_variables
+from .trajectory_table import expanded_slabs, table_of
 
 # numbers of workers for which the time is estimated
 WORKER_COUNTS = (1, 2, 8, 32, 128, 512)

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from .._version import __version__
 from ..config.files import override_text
-from ..config.grid import MAX_POINTS, Axis, path_of
+from ..config.grid import MAX_POINTS, Axis
+from ..config.input_names import InputName
 from ..config.tables import CORES
 from ..contact.simulate import CollisionResult
 from ..contact.status import STATUS_OK, Status
@@ -27,13 +28,13 @@ from ..engine.trajectories import TrajectoryMap, TrajectoryRange, check_count, c
 from ..errors import ResultError, UsageError
 from ..text import safe_text
 from .attributes import read_attribute
-from .backend import open_with_table
-from .expand import TrajectoryTable
 from .kinds import require_sweep
 from .provenance import stored_config
 from .selection import IndexArray, match_labels
 from .summary import SweepOutcome
 from .sweep import Extension, SlabValues, sweep_into
+from .trajectory_table import TrajectoryTable
+from .xarray_backend import open_with_table
 
 # statuses that are assigned before integration
 CHECKED_STATUSES = (Status.NO_IMPACT, Status.INVALID_PARAMETER, Status.OUT_OF_RANGE)
@@ -149,7 +150,7 @@ def _extended_plan(
         if len(axis.columns) == 1 and not axis.numbered and not has_all_old_values:
             new_values = (value for value in axis.columns[name] if value not in old_values.tolist())
             values = [*old_values.tolist(), *new_values]
-            appended_overrides.append(override_text(path_of(name), values))
+            appended_overrides.append(override_text(InputName.parse(name).path, values))
     missing = [model.key for model in old.models if model not in config.models]
     if missing:
         keys = [*(model.key for model in old.models), *(m.key for m in config.models if m not in old.models)]

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from .._version import __version__
 from ..array_types import Array
 from ..config.grid import Axis
+from ..config.input_names import is_input
 from ..contact.formula import Formula
 from ..contact.materials import Material
 from ..contact.model import Law, Parameter
@@ -32,8 +33,8 @@ from ..errors import ResultError, UsageError
 from ..formatting import number
 from ..text import safe_text
 from .attributes import SummaryRecord, read_attribute
-from .expand import MAX_STIFFNESS_VALUES, TrajectoryRows, TrajectoryTable, expand, whole_stiffness
-from .schema import SCHEMA, SchemaVariable, attributes_of, count_points, derived_names, is_input, scale_of
+from .schema import SCHEMA, SchemaVariable, attributes_of, count_points, derived_names, scale_of
+from .trajectory_table import MAX_STIFFNESS_VALUES, TrajectoryRows, TrajectoryTable, expand, whole_stiffness
 
 N_WITNESSES = 1_000
 # tolerance of a witness, relative to the scale that `compare` uses for its variable
@@ -368,7 +369,7 @@ def read_inputs(dataset: xr.Dataset) -> Inputs:
     scalars: dict[str, Any] = {}
     axes: dict[str, dict[str, Any]] = {name: {} for name in read_axis_names(dataset)}
     for name, variable in dataset.coords.items():
-        if not is_input(str(name)) or name in derived:
+        if not is_input(name) or name in derived:
             continue
         if variable.ndim == 0:
             scalars[str(name)] = variable.values.item()

@@ -26,10 +26,10 @@ from ..atomic import Sink
 from ..config.tables import Output
 from ..errors import ResultError
 from ..text import safe_text
-from .expand import check_memory
 from .hdf5_structure import ReadBytes, check_object
 from .schema import SCHEMA_VERSION
 from .seal import USER_BLOCK_BYTES
+from .trajectory_table import check_memory
 from .validation import TABLE_VARIABLES, is_name
 
 Region = tuple[int | slice, ...]

@@ -13,14 +13,14 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ..array_types import Mask
-from ..config.grid import path_of
+from ..config.input_names import InputName
 from ..contact.status import FIRST_FAILURE, Status
-from ..engine.plan import owner_of
 from ..errors import UsageError
 from ..formatting import label, number, percentage
 from ..text import html_table, safe_text
+from .kinds import require_sweep
 from .replay_command import describe_point
-from .schema import columns_along, foreign_dims, own_dims
+from .schema import columns_along, foreign_dims
 from .selection import model_positions, select
 from .slabs import Slab, distinct_points, is_computed, over_varying_dims, slabs, varying_dims
 
@@ -28,6 +28,8 @@ from .slabs import Slab, distinct_points, is_computed, over_varying_dims, slabs,
 MAX_RANKED_POINTS = 2**30
 # combinations of the values of a law's own parameters
 MAX_PARAMETER_COMBINATIONS = 2**24
+# accepted |e_out - e|
+DEFAULT_TOL = 0.01
 RANKED_VARIABLES = ("e_error", "status")
 # ranges of e that a table lists
 MAX_RANGES = 8
@@ -161,14 +163,14 @@ class Ranking:
         return html_table(self.headings, (ranked.row for ranked in self.models), self.headline)
 
 
-def ranking(
+def recommend(
     dataset: xr.Dataset,
-    tol: float = 0.01,
+    *,
+    tol: float = DEFAULT_TOL,
     sel: Mapping[str, float | str] | None = None,
     models: Sequence[str] | None = None,
-    max_points: int = MAX_RANKED_POINTS,
 ) -> Ranking:
-    """Rank the models of a result by how well they deliver the target restitution.
+    """Rank the models of a result by the error of their restitution, over all points of the sweep.
 
     The criterion is |e_out - e| at all points with a target e and an impact. A point that failed, or whose target
     e is below 0 (1 - alpha v0 < 0), counts as not within the tolerance. The values of a model's own parameters are
@@ -179,36 +181,60 @@ def ranking(
     Parameters
     ----------
     dataset : a result
-    tol : tolerance of |e_out - e|
-    sel : values of axes, by name
+    tol : largest accepted |e_out - e|
+    sel : values of axes, such as `{"m2": 1.0}`; by default all values of an axis are ranked
     models : keys of the models to rank; by default all
-    max_points : limit of the points to evaluate of a lazy result
+
+    Returns
+    -------
+    Ranking : the models, the best first; `ranking.best` are those within the tolerance at all points
 
     Raises
     ------
-    UsageError : the result has no target e, lacks a model or value that is selected, or has too many points; or
-        tol is not positive
+    UsageError : the result has no requested e, or lacks what the arguments select, or has too many points; tol is
+        not a positive finite number
+
+    >>> import impact
+    >>> result = impact.sweep("configs/figure6.toml")
+    >>> print(impact.recommend(result, models=["gharib-hurmuzlu-2012"]).headline)
+    no model gives e within 0.01 everywhere; gharib-hurmuzlu-2012 is nearest: 25.7% of 101 points
     """
-    _check_rankable(dataset, tol)
+    require_sweep(dataset, "recommend")
+    if not 0.0 < tol < math.inf:
+        raise UsageError(f"tol: got {tol:g}, expected a positive finite number")
+    return rank_models(rankable_parts(dataset, sel or {}, models), tol)
+
+
+def rankable_parts(
+    dataset: xr.Dataset,
+    sel: Mapping[str, float | str],
+    models: Sequence[str] | None,
+    max_points: int = MAX_RANKED_POINTS,
+) -> list[xr.Dataset]:
+    """Select the part of each model to rank; refuse a result that lacks a target e or has too many points."""
+    _check_rankable(dataset)
     chosen = model_positions(models, dataset) if models else range(dataset.sizes["model"])
-    selected = select(dataset[list(RANKED_VARIABLES)], sel or {})
-    by_model = [_select_model(selected, position) for position in chosen]
-    evaluated = [_reduce_dims(of_model)[0] for of_model in by_model if is_computed(of_model.variables["e_error"])]
-    points = sum(math.prod(of_model.sizes.values()) for of_model in evaluated)
+    selected = select(dataset[list(RANKED_VARIABLES)], sel)
+    parts = [_select_model(selected, position) for position in chosen]
+    evaluated = [_reduce_dims(part)[0] for part in parts if is_computed(part.variables["e_error"])]
+    points = sum(math.prod(part.sizes.values()) for part in evaluated)
     if points > max_points:
         raise UsageError(
             f"got {points:,} different points to rank, expected at most {max_points:,}; select values of axes"
         )
-    ranked = [_rank_model(of_model, tol) for of_model in by_model]
+    return parts
+
+
+def rank_models(parts: Sequence[xr.Dataset], tol: float) -> Ranking:
+    """Rank models by their parts of a result; refuse parts without any point to rank."""
+    ranked = [_rank_model(part, tol) for part in parts]
     if not any(model.points for model in ranked):
         raise UsageError("nothing to rank: no point has both a requested e and an impact")
     return Ranking(tol, tuple(sorted(ranked, key=_rank_key)))
 
 
-def _check_rankable(dataset: xr.Dataset, tol: float) -> None:
-    """Refuse a dataset or a tolerance by which models cannot be ranked."""
-    if not 0.0 < tol < math.inf:
-        raise UsageError(f"tol: got {tol:g}, expected a positive finite number")
+def _check_rankable(dataset: xr.Dataset) -> None:
+    """Refuse a dataset by which models cannot be ranked."""
     if "t" in dataset.dims:
         raise UsageError("got a time history, expected the result of a sweep")
     if "model" not in dataset.dims:
@@ -299,10 +325,16 @@ def _best_parameters(of_model: xr.Dataset, parameter_dims: Sequence[Hashable], t
     return dict(zip(parameter_dims, (int(at) for at in np.unravel_index(best, shape)), strict=True))
 
 
+def _varies_parameters(of_model: xr.Dataset, dim: Hashable) -> bool:
+    """Whether only parameters of the model, and perhaps of others, vary along a dimension."""
+    models = {InputName.parse(name).model for name in columns_along(of_model, dim)}
+    return str(of_model["model"].item()) in models and "" not in models
+
+
 def _rank_model(of_model: xr.Dataset, tol: float) -> Ranked:
     """The rank of a model, from its e_error and status and from the target e."""
     key = str(of_model["model"].item())
-    parameter_dims = [dim for dim in own_dims(of_model, key) if dim in of_model.variables["e_error"].dims]
+    parameter_dims = [dim for dim in of_model.variables["e_error"].dims if _varies_parameters(of_model, dim)]
     best = _best_parameters(of_model, parameter_dims, tol) if parameter_dims else {}
     chosen = _swept_inputs(of_model, best)
     of_model = of_model.isel(best)
@@ -345,7 +377,7 @@ def _rank_model(of_model: xr.Dataset, tol: float) -> Ranked:
             **chosen,
             "e": float(asked_there),
         }
-    parameters = {".".join(map(str, path_of(name))): chosen[name] for name in chosen if owner_of(name) == key}
+    parameters = {name.config_key: chosen[str(name)] for name in map(InputName.parse, chosen) if name.model == key}
     served = _served_ranges(e.values, asked_at, missed_at) if along_one else None
     return Ranked(
         key,
@@ -397,7 +429,7 @@ def _swept_inputs(of_model: xr.Dataset, positions: Mapping[Hashable, int]) -> di
         name: variables[name].values[position].item()
         for dim, position in positions.items()
         for name in dict.fromkeys([str(dim), *columns_along(of_model, dim)])
-        if owner_of(name) in ("", key)
+        if InputName.parse(name).applies_to(key)
     }
 
 

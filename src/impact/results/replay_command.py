@@ -8,7 +8,7 @@ from typing import TypeVar
 
 import xarray as xr
 
-from ..engine.plan import owner_of
+from ..config.input_names import InputName
 from ..formatting import number
 from ..text import safe_text
 from .attributes import read_attribute
@@ -36,7 +36,8 @@ def inputs_of_model(at: Mapping[str, InputValue]) -> dict[str, InputValue]:
     >>> inputs_of_model({"model": "mine", "e": 0.5, "mine.c": 2.0, "other.c": 3.0, "materials.steel.E": 2e11})
     {'model': 'mine', 'e': 0.5, 'mine.c': 2.0, 'materials.steel.E': 200000000000.0}
     """
-    return {name: value for name, value in at.items() if owner_of(name) in ("", at.get("model"))}
+    key = str(at.get("model", ""))
+    return {name: value for name, value in at.items() if InputName.parse(name).applies_to(key)}
 
 
 def describe_point(at: Mapping[str, float | str]) -> str:

@@ -18,14 +18,15 @@ from numpy.typing import NDArray
 from .._version import __version__
 from ..array_types import Array
 from ..config.grid import SAMPLE
+from ..config.input_names import InputName, is_foreign, is_input
 from ..config.load import Config
-from ..config.tables import MATERIAL_KEYS, MATERIAL_QUANTITIES, SWEEP_QUANTITIES, model_quantities
+from ..config.tables import MATERIAL_KEYS
 from ..contact.materials import effective_mass
 from ..contact.outputs import BY_DEFAULT, UNITS
 from ..contact.status import Status
 from ..contact.timestep import EXACT
 from ..engine.build_impacts import mass_at, restitution_at
-from ..engine.plan import Index, Inputs, Plan, is_foreign, is_own, material_property
+from ..engine.plan import Index, Inputs, Plan
 from ..formatting import number
 
 SCHEMA_VERSION = 2
@@ -244,20 +245,12 @@ def _coordinates_by_name(plan: Plan) -> dict[str, object]:
 
 def coordinate_attributes(plan: Plan, name: str) -> dict[str, str]:
     """Units and meaning of a coordinate, as attributes."""
-    material, field = material_property(name) or ("", "")
-    if material:
-        return {
-            "units": udunits(MATERIAL_QUANTITIES[field].unit),
-            "long_name": f"{MATERIAL_QUANTITIES[field].meaning} of {material}",
-        }
-    key, _, parameter = name.rpartition(".")
-    for model in plan.models:
-        if model.key == key:
-            quantity = model_quantities(model)[parameter]
-            return {"units": udunits(quantity.unit), "long_name": quantity.meaning}
-    if name in MATERIAL_KEYS:
+    parsed = InputName.parse(name)
+    quantity = parsed.quantity({model.key: model for model in plan.models})
+    if quantity is None:
         return {"long_name": MATERIAL_KEYS[name]}
-    return {"units": udunits(SWEEP_QUANTITIES[name].unit), "long_name": SWEEP_QUANTITIES[name].meaning}
+    of_material = f" of {parsed.material}" if parsed.material else ""
+    return {"units": udunits(quantity.unit), "long_name": f"{quantity.meaning}{of_material}"}
 
 
 def udunits(unit: str) -> str:
@@ -301,11 +294,6 @@ def exponents_of(dataset: xr.Dataset) -> str | None:
     return exponent_text(dict(zip(map(str, keys), np.atleast_1d(exponent.values).tolist(), strict=True)))
 
 
-def is_input(name: str) -> bool:
-    """Whether a coordinate has the name of an input, unlike metadata of models and numbers of cases."""
-    return name in SWEEP_QUANTITIES or name in MATERIAL_KEYS or "." in name
-
-
 def is_case(name: str) -> bool:
     """Whether a dimension numbers its points: that of a table of cases, of a similar group, or of samples.
 
@@ -331,11 +319,6 @@ def columns_along(dataset: xr.Dataset, dim: Hashable) -> list[str]:
 def foreign_dims(dataset: xr.Dataset, key: str) -> list[Hashable]:
     """The dimensions along which only parameters of other models vary, so that nothing of this model does."""
     return [dim for dim in dataset.dims if is_foreign(columns_along(dataset, dim), key)]
-
-
-def own_dims(dataset: xr.Dataset, key: str) -> list[Hashable]:
-    """The dimensions along which only parameters of a model, and perhaps of others, vary."""
-    return [dim for dim in dataset.dims if is_own(columns_along(dataset, dim), key)]
 
 
 def parts_of_models(dataset: xr.Dataset) -> Iterator[xr.Dataset]:

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import xarray as xr
 
-from ..config.grid import SAMPLE, path_of
-from ..config.tables import quantity_at
+from ..config.grid import SAMPLE
+from ..config.input_names import InputName
 from ..contact.units import with_numbers
 from ..engine.plan import Plan
 from ..formatting import decimals, number
@@ -58,7 +58,7 @@ def sensitivity_template(plan: Plan, of: str, others: Sequence[str]) -> xr.Datas
         if SAMPLE not in coordinate.dims
     }
     sizes = {axis.name: axis.size for axis in config.axes} | {"model": len(config.models)}
-    paths = [".".join(map(str, path_of(name))) for name in config.distributions]
+    paths = [InputName.parse(name).config_key for name in config.distributions]
     new = {
         "input": ("input", paths, {"long_name": "uncertain input, by its path in the config"}),
         "quantile": ("quantile", list(QUANTILES), {"long_name": "probability", "units": "1"}),
@@ -92,7 +92,7 @@ def distribution_texts(dataset: xr.Dataset) -> list[str]:
 def _unit_of_input(name: str) -> str:
     """The unit of an input by its config name; "1" for a parameter of a model."""
     try:
-        quantity = quantity_at(path_of(name), {})
+        quantity = InputName.parse(name).quantity({})
     except KeyError:
         return "1"
     return "1" if quantity is None else quantity.unit

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ..atomic import atomic_write
+from ..atomic import atomic_write, check_output
 from ..config.tables import CORES
 from ..engine.checkpoint import WorkFolder, lock_work_folder, open_work_folder
 from ..engine.execute import never_stop, with_core
@@ -25,12 +25,11 @@ from ..engine.progress import ProgressCallback, ProgressCounter, report_kept_blo
 from ..engine.trajectories import TrajectoryRange, trajectory_maps, trajectory_ranges
 from ..errors import ResultError, StoreError, UnfinishedError, UsageError
 from ..text import safe_text
-from .backend import check_output
-from .expand import table_of
 from .provenance import stored_config
 from .schema import dataset_template
 from .summary import SweepOutcome
 from .sweep import check_storable, complete_ranges, range_reader, reload_range, store_result
+from .trajectory_table import table_of
 
 # describes the shard of a work folder, beside the plan
 SHARD_FILE_NAME = "shard.json"

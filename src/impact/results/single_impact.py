@@ -14,9 +14,10 @@ import xarray as xr
 
 from .._version import __version__
 from ..config.files import apply_overrides, override_text, parse_document, read_text
-from ..config.grid import Axis, path_of
+from ..config.grid import Axis
+from ..config.input_names import InputName, is_input
 from ..config.load import Config, parse_config, read_config
-from ..config.tables import MATERIAL_QUANTITIES, SWEEP_QUANTITIES, expand_models, model_quantities
+from ..config.tables import MATERIAL_QUANTITIES, SWEEP_QUANTITIES, expand_models
 from ..contact.force_expressions import returning, stiffer
 from ..contact.history import History, follow
 from ..contact.impacts import Impacts
@@ -28,16 +29,16 @@ from ..contact.status import Status
 from ..contact.timestep import EXACT
 from ..contact.units import with_numbers
 from ..engine.build_impacts import build_impacts, fixed_steps_at
-from ..engine.plan import Plan, owner_of
+from ..engine.plan import Plan
 from ..engine.plugins import Plugins
 from ..errors import ConfigError, UsageError, did_you_mean
 from ..formatting import number, quantity
 from ..text import html_table, safe_text
-from .backend import open_result
 from .kinds import require_sweep
 from .provenance import changed_plugins, check_plugins, stored_config, unknown_plugins
-from .schema import HISTORY_VARIABLES, SCHEMA, SCHEMA_VERSION, is_case, is_input, plain_unit
+from .schema import HISTORY_VARIABLES, SCHEMA, SCHEMA_VERSION, is_case, plain_unit
 from .seal import is_result
+from .xarray_backend import open_result
 
 STARTER_CONFIG = files("impact") / "config" / "starter.toml"
 
@@ -141,19 +142,17 @@ class Impact:
 
     def _unit_of(self, name: str) -> str:
         """The unit of an input, which may be a parameter of the model, or a property of a material."""
-        key, _, parameter = name.rpartition(".")
-        quantities = (
-            model_quantities(self.model)
-            if key == self.model.key
-            else MATERIAL_QUANTITIES
-            if key
-            else SWEEP_QUANTITIES
-        )
-        return self._with_numbers(quantities[parameter].unit if parameter in quantities else "1")
+        try:
+            quantity = InputName.parse(name).quantity({self.model.key: self.model})
+        except KeyError:
+            quantity = None
+        return self._with_numbers("1" if quantity is None else quantity.unit)
 
     def _with_numbers(self, unit: str) -> str:
         """A unit with the values of n and of the parameters that its exponents have."""
-        values = {name.rpartition(".")[2]: value for name, value in self.point.items() if isinstance(value, float)}
+        values = {
+            InputName.parse(name).key: value for name, value in self.point.items() if isinstance(value, float)
+        }
         return with_numbers(unit, {**values, "n": self.exponent})
 
 
@@ -300,7 +299,7 @@ def histories(
     ends: dict[str, str] = {}
     first: dict[str, float | str] = {}
     for key in dict.fromkeys(models or keys):
-        others = {str(name) for name in dataset.coords if owner_of(str(name)) not in ("", key)}
+        others = {str(name) for name in dataset.coords if not InputName.parse(name).applies_to(key)}
         of_model = {name: value for name, value in at.items() if name not in others}
         config, names = single_point(dataset, (), plugins, key, of_model)
         impact = run_single_impact(Plan(config, plugins.of(config.models)), names)
@@ -351,12 +350,12 @@ def single_point(
     # each override, and the option that messages name instead
     option_names = {} if model is None else {override_text(("models",), [model]): f"--model {model}"}
     for name, values in (over or {}).items():
-        option_names[override_text(path_of(name), values)] = f"--over {name}"
+        option_names[override_text(InputName.parse(name).path, values)] = f"--over {name}"
     values = dict(at or {})
 
     def with_values() -> dict[str, str]:
         """The overrides, and those of all values of `at`."""
-        by_override = {override_text(path_of(k), v): f"--at {k}={v}" for k, v in values.items()}
+        by_override = {override_text(InputName.parse(k).path, v): f"--at {k}={v}" for k, v in values.items()}
         return {**option_names, **by_override}
 
     fixed_exponent = model is not None and find(model, plugins.models).exponent is not None
@@ -385,7 +384,7 @@ def single_point(
         if name not in inputs and name not in SWEEP_QUANTITIES and name != f"{config.models[0].key}.K":
             raise UsageError(f'no input "{safe_text(name)}" here; {did_you_mean(name, inputs)}')
         if name not in together:
-            option_names[override_text(path_of(name), value)] = f"--at {name}={value}"
+            option_names[override_text(InputName.parse(name).path, value)] = f"--at {name}={value}"
     config = _read_with_option_names(read, option_names)
 
     scalars = dict(config.scalars)

@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 
 from ..contact.status import FIRST_FAILURE, Status
 from .attributes import SummaryRecord
-from .expand import TrajectoryTable, expand, summary_of_variable
-from .kinds import is_calibration, is_sensitivity
-from .schema import count_points, parts_of_models
+from .schema import parts_of_models
 from .slabs import MAX_SUMMARY_POINTS, distinct_points, is_computed, slabs
+from .trajectory_table import TrajectoryTable, expand, summary_of_variable
 
 # variables of which the largest absolute value is reported
 ERROR_VARIABLES = ("e_error", "v1_error", "v2_error", "closed_form_error", "energy_residual")
@@ -202,7 +201,7 @@ def summarize_table(dataset: xr.Dataset, table: TrajectoryTable) -> tuple[Summar
 
     Parameters
     ----------
-    dataset : see `impact.results.expand.lazy_dataset`
+    dataset : see `impact.results.trajectory_table.lazy_dataset`
     table : of the sweep
     """
     summary, extremes = Summary(), dict[str, Extremes | None]()
@@ -319,41 +318,6 @@ class SweepOutcome:
     integrated: int | None = None
     repeated_blocks: int = 0
     extended_layout: str | None = None
-
-
-def describe(dataset: xr.Dataset) -> dict[str, Any]:
-    """The contents of a result or a time history, as plain data; see `impact.info`."""
-    summary = summarize(dataset) if "model" in dataset.dims else Summary()
-    variables: dict[str, Any] = {}
-    for name, variable in dataset.items():
-        extremes = extremes_of(dataset, str(name))
-        variables[str(name)] = {
-            "units": variable.attrs.get("units"),
-            "dims": list(variable.dims),
-            **(extremes._asdict() if extremes else dict.fromkeys(Extremes._fields)),
-        }
-    return {
-        "points": _count_points(dataset),
-        # of a result in memory neither is known
-        **{name: dataset.encoding.get(name) for name in ("layout", "seal")},
-        "dimensions": {str(name): size for name, size in dataset.sizes.items()},
-        "coordinates": [str(name) for name in dataset.coords],
-        "variables": variables,
-        "status": counts_by_name(summary.counts),
-        "not_evaluated": summary.not_counted,
-        "worst": worst_by_model(summary, dataset),
-        "attributes": {
-            str(name): value if isinstance(value, str) else np.asarray(value).tolist()
-            for name, value in dataset.attrs.items()
-        },
-    }
-
-
-def _count_points(dataset: xr.Dataset) -> int:
-    """The points of a sweep, the measured values of a calibration, or the studies of a sensitivity study."""
-    if is_calibration(dataset):
-        return dataset.sizes["point"]
-    return int(dataset["mean"].size) if is_sensitivity(dataset) else count_points(dataset)
 
 
 def worst_by_model(summary: Summary, dataset: xr.Dataset) -> dict[str, dict[str, float]]:

@@ -14,13 +14,14 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ..atomic import atomic_write
+from ..atomic import atomic_write, check_output
+from ..config.input_names import InputName
 from ..contact.impacts import Impacts
 from ..contact.simulate import TABLE_COLUMNS, CollisionResult
 from ..engine.checkpoint import WorkFolder, open_work_folder, partial_file_of, remove_work_folder, work_folder_of
 from ..engine.execute import FindReused, integrate_ranges, never_stop, with_core
 from ..engine.executors import SERIAL, Backend
-from ..engine.plan import Plan, material_property
+from ..engine.plan import Plan
 from ..engine.progress import ProgressCallback, ProgressCounter, report_kept_blocks
 from ..engine.trajectories import (
     RANGE_TRAJECTORIES,
@@ -32,13 +33,13 @@ from ..engine.trajectories import (
 )
 from ..errors import ResultError, StoreError, UnfinishedError, UsageError
 from ..text import safe_text
-from .backend import MAX_LOADED_BYTES, check_output, check_readable, open_result, write_sealed
-from .expand import TrajectoryTable, expanded_slabs, in_memory, lazy_dataset, table_of
 from .factored import check_factored, factored_template, table_values
 from .netcdf import MAX_LABEL_BYTES, encode_text, is_text
 from .schema import SchemaVariable, dataset_template, plan_coordinates, stored_variables
 from .summary import Summary, SweepOutcome, summarize, summarize_table, summary_record
+from .trajectory_table import TrajectoryTable, expanded_slabs, in_memory, lazy_dataset, table_of
 from .validation import is_name
+from .xarray_backend import MAX_LOADED_BYTES, check_readable, open_result, write_sealed
 
 # approximate bytes of a result besides its values
 OVERHEAD_BYTES = 2**16
@@ -258,7 +259,7 @@ def check_labels(plan: Plan) -> None:
     UsageError : they are too long, or a material with an axis has a name that a file cannot hold
     """
     columns = [name for axis in plan.config.axes for name in axis.columns]
-    odd = [name for name in columns if material_property(name) and not is_name(name)]
+    odd = [name for name in columns if InputName.parse(name).material and not is_name(name)]
     if odd:
         raise UsageError(
             f"{safe_text(odd[0])}: expected a material name without spaces and slashes, to be an axis"

@@ -11,10 +11,10 @@ from collections.abc import Iterator
 import numpy as np
 import xarray as xr
 
+from ..config.input_names import InputName
 from ..config.tables import MATERIAL_KEYS, MATERIAL_QUANTITIES, SWEEP_QUANTITIES
 from ..contact.simulate import TABLE_COLUMNS
 from ..contact.status import STATUSES
-from ..engine.plan import material_property
 from ..errors import ResultError
 from ..text import safe_text
 from .attributes import ATTRIBUTE_TYPES, read_attribute
@@ -65,9 +65,10 @@ def is_name(name: str) -> bool:
     """
     if name in ALLOWED_NAMES or PARAMETER_NAME.fullmatch(name) or is_case(name):
         return True
-    material, key = material_property(name) or ("", "")
+    parsed = InputName.parse(name)
     # netCDF separates names by spaces, HDF5 separates groups by slashes
-    return key in MATERIAL_QUANTITIES and material.isprintable() and re.fullmatch(r"[^\s/]+", material) is not None
+    is_legal = parsed.material.isprintable() and re.fullmatch(r"[^\s/]+", parsed.material) is not None
+    return parsed.key in MATERIAL_QUANTITIES and is_legal
 
 
 def is_quantity(name: str, axes: tuple[str, ...]) -> bool:

@@ -10,10 +10,11 @@ import xarray as xr
 
 from ..array_types import Array
 from ..config.design import draw_columns, unit_samples
-from ..config.grid import SAMPLE, path_of
+from ..config.grid import SAMPLE
+from ..config.input_names import InputName
 from ..config.lines import path_text
 from ..config.load import Config
-from ..config.tables import power_of_two_problem, quantity_at
+from ..config.tables import power_of_two_problem
 from ..contact.outputs import OUTPUTS
 from ..engine.plan import Plan
 from ..engine.trajectories import check_count
@@ -61,12 +62,13 @@ def sensitivity_plan(plan: Plan, of: Sequence[str], max_points: int, name: str) 
         raise ConfigError(f"{name}: design.n: {problem}")
     names = list(config.distributions)
     models = {model.key: model for model in config.models}
-    quantities = {key: q for key in names if (q := quantity_at(path_of(key), models)) is not None}
+    quantities = {key: q for key in names if (q := InputName.parse(key).quantity(models)) is not None}
     u = unit_samples(config.design, 2 * len(names))
     parts = [draw_columns(config.distributions, quantities, part) for part in np.split(u, 2, axis=1)]
     problems = dict(problem for _, of_part in parts for problem in of_part.items())
     if problems:
-        raise ConfigError(*(f"{name}: {path_text(path_of(key))}: {text}" for key, text in problems.items()))
+        paths = {key: path_text(InputName.parse(key).path) for key in problems}
+        raise ConfigError(*(f"{name}: {paths[key]}: {text}" for key, text in problems.items()))
     rows = mixed_rows(*(np.column_stack([drawn[key] for key in names]) for drawn, _ in parts))
     columns = dict(zip(names, (tuple(column) for column in rows.T.tolist()), strict=True))
     axes = tuple(replace(axis, columns=columns) if axis.name == SAMPLE else axis for axis in config.axes)

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-import os
-import stat
+import math
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,18 +16,21 @@ import xarray as xr
 from numpy.typing import NDArray
 from xarray.backends import BackendEntrypoint
 
-from ..atomic import Sink, atomic_write
+from ..atomic import Sink, atomic_write, check_output, check_outputs
 from ..config.files import RESULT_MAGIC
+from ..config.grid import MAX_POINTS
 from ..config.tables import Output
 from ..errors import ResultError, UnfinishedError, UsageError
 from ..text import safe_text
-from .expand import TrajectoryTable, in_memory, lazy_dataset
 from .factored import check_witnesses, stored_table, witness_variables
 from .hdf5_structure import ReadBytes, byte_reader, check_root
+from .kinds import require_sweep
 from .netcdf import StoredArray, open_for_writing, read_variables
 from .schema import SCHEMA
 from .seal import check_seal, write_seal
+from .selection import model_positions, select
 from .slabs import slabs
+from .trajectory_table import TrajectoryTable, in_memory, lazy_dataset
 from .validation import FACTORED_ATTRIBUTES, TABLE_VARIABLES, is_quantity, schema_violation
 
 DEFAULT_OUTPUT = Output()
@@ -36,82 +38,6 @@ DEFAULT_OUTPUT = Output()
 MAX_LOADED_BYTES = 2**29
 # bytes of a file that are copied at a time
 COPY_BUFFER_BYTES = 2**22
-
-
-def check_output(path: Path, *, overwrite: bool, source: Path | None = None) -> None:
-    """Refuse an output that cannot be written, before any work starts, or that is the file to be read.
-
-    Raises
-    ------
-    UsageError : it exists and must not be overwritten, is not a regular file, or its folder is not writable
-    """
-    shown = safe_text(str(path))
-    folder = path.parent
-    if not folder.is_dir():
-        raise UsageError(f"{shown}: the folder {safe_text(str(folder))} does not exist")
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise UsageError(f"{shown}: the folder {safe_text(str(folder))} cannot be written to")
-    _check_name_length(path)
-    try:
-        mode = path.lstat().st_mode
-    except FileNotFoundError:
-        return
-    except OSError as error:
-        raise UsageError(f"{shown}: {error.strerror}") from None
-    if not stat.S_ISREG(mode):
-        raise UsageError(f"{shown}: is not a regular file, and is not modified")
-    if source is not None and source.exists() and path.samefile(source):
-        raise UsageError(f"{shown}: is the file to be read, and is not modified")
-    if not overwrite:
-        raise UsageError(f"{shown}: exists; give another name, or overwrite it (--overwrite)")
-
-
-def check_outputs(outputs: Iterable[str | Path | None], inputs: Iterable[object], *, overwrite: bool) -> None:
-    """Refuse outputs that cannot be written, or that are a file which the command reads.
-
-    Parameters
-    ----------
-    outputs : the files to write; None for an output that is not wanted
-    inputs : what is read; other values than paths, such as mappings and models, are no files
-    overwrite : whether the outputs may exist
-
-    Raises
-    ------
-    UsageError : see `check_output`; or two outputs are the same file
-    """
-    paths = [Path(output) for output in outputs if output is not None]
-    sources: list[Path | None] = [Path(source) for source in inputs if isinstance(source, str | Path)]
-    for path in paths:
-        for source in sources or [None]:
-            check_output(path, overwrite=overwrite, source=source)
-    for path in {path for path in paths if paths.count(path) > 1}:
-        raise UsageError(f"{safe_text(str(path))}: is named for two outputs")
-
-
-def _check_name_length(path: Path) -> None:
-    """Refuse a name that is too long for the temporary files beside it, such as RESULT.12345678.part."""
-    try:
-        limit = os.pathconf(path.parent, "PC_NAME_MAX")
-    except (OSError, ValueError, AttributeError):
-        return
-    suffix_length = len(".12345678.part")
-    length = len(os.fsencode(path.name))
-    if length > limit - suffix_length:
-        shown = safe_text(str(path), 60)
-        raise UsageError(f"{shown}: got a name of {length} bytes, expected at most {limit - suffix_length}")
-
-
-def write_file(path: Path, content: bytes | memoryview, *, overwrite: bool) -> None:
-    """Write a file atomically: its name appears when it is complete, and it survives a power failure.
-
-    Raises
-    ------
-    UsageError : see `check_output`
-    StoreError : the disk is full or failed; no file of that name is left
-    """
-    check_output(path, overwrite=overwrite)
-    with atomic_write(path, overwrite=overwrite) as sink:
-        sink.write(content)
 
 
 def write_sealed(
@@ -321,6 +247,63 @@ def load(path: str | Path) -> xr.Dataset:
             raise _with_file_name(shown, error) from None
         except Exception as error:
             raise ResultError(f"{shown}: is not a readable result ({safe_text(str(error), 80)})") from error
+
+
+def expand(
+    result: str | Path,
+    output: str | Path,
+    *,
+    sel: Mapping[str, float | str] | None = None,
+    models: Sequence[str] | None = None,
+    overwrite: bool = False,
+    max_points: int = MAX_POINTS,
+    should_stop: Callable[[], bool] = lambda: False,
+) -> int:
+    """Write all values of a stored result, or of a part of it, as netCDF for programs that do not use impact.
+
+    Parameters
+    ----------
+    result : file of the result
+    output : the file to write
+    sel : values of axes, such as `{"m2": 1.0}`; all values of other axes are written
+    models : keys of the models to write; by default all
+    overwrite : replace the output if it exists
+    max_points : the largest number of points to write
+    should_stop : returns whether to stop
+
+    Returns
+    -------
+    int : number of points written
+
+    Raises
+    ------
+    ResultError : the file is not a readable result
+    UsageError : it is no result of a sweep, it has more than `max_points` points, or the output exists
+    StoreError : the disk is full or failed
+
+    >>> import impact, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     outcome = impact.sweep_to_file("configs/figure6.toml", f"{folder}/r.h5")
+    ...     impact.expand(f"{folder}/r.h5", f"{folder}/full.h5", sel={"e": 0.5})
+    3
+    """
+    output, shown = Path(output), safe_text(str(result))
+    check_outputs([output], [result], overwrite=overwrite)
+    opened = open_result(result)
+    require_sweep(opened, "expand")
+    dataset = select(opened, sel or {})
+    if "model" not in dataset.dims:
+        raise UsageError(f"{shown}: is a time history, expected a result of a sweep")
+    if models:
+        dataset = dataset.isel(model=model_positions(models, dataset))
+    points = math.prod(dataset.sizes.values())
+    if points > max_points:
+        raise UsageError(
+            f"{shown}: got {points:,} points, expected at most {max_points:,} (--max-points); select a part, such "
+            "as --sel e=0.5"
+        )
+    save(dataset, output, overwrite=overwrite, should_stop=should_stop)
+    return points
 
 
 def _read_dataset(file: h5py.File, read: ReadBytes) -> tuple[xr.Dataset, TrajectoryTable | None, tuple[str, ...]]:

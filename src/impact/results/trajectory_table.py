@@ -21,6 +21,7 @@ from xarray.core import indexing
 
 from ..array_types import Array
 from ..config.grid import Axis
+from ..config.input_names import InputName
 from ..config.tables import FIXED_STEP_INPUTS
 from ..contact.impacts import CHECKS, Impacts, check_inputs
 from ..contact.model import Law
@@ -28,7 +29,7 @@ from ..contact.outputs import Outputs, outputs
 from ..contact.simulate import CollisionResult
 from ..contact.status import Status
 from ..engine.build_impacts import Stiffness, build_impacts, has_stiffness_rule
-from ..engine.plan import Index, Inputs, Plan, dimensions, owner_of
+from ..engine.plan import Index, Inputs, Plan, dimensions
 from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryMap, axes_of_arrays, even_size, probe_index
 from .attributes import SummaryRecord
 from .schema import SchemaVariable, attributes_of
@@ -206,7 +207,8 @@ def checks_that_may_fail(inputs: Inputs, law: Law, stiffness: Stiffness | None =
     ends: dict[str, tuple[Any, ...]] = {"v1": tuple(speeds.tolist())}
     for axis in inputs.axes:
         for name, values in axis.columns.items():
-            if name not in ("v1", "v2", "e", "alpha", *FIXED_STEP_INPUTS) and owner_of(name) in ("", law.key):
+            is_used = InputName.parse(name).applies_to(law.key)
+            if is_used and name not in ("v1", "v2", "e", "alpha", *FIXED_STEP_INPUTS):
                 is_text = isinstance(values[0], str)
                 ends[name] = tuple(sorted({*values})) if is_text else tuple({min(values), max(values)})
     if stiffness is not None or has_stiffness_rule(inputs, law):

@@ -1,0 +1,126 @@
+"""Names of inputs: keys of [sweep], properties of materials, and parameters of models."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from ..contact.model import ForceModel
+from .files import as_table
+from .quantities import KeyPath, Quantity, suggest
+from .tables import MATERIAL_KEYS, MATERIAL_QUANTITIES, SWEEP_QUANTITIES, model_quantities
+
+# keys of the inputs in [sweep]
+SWEEP_INPUTS = (*SWEEP_QUANTITIES, *MATERIAL_KEYS)
+
+
+@dataclass(frozen=True)
+class InputName:
+    """The name of an input, which is also the name of its coordinate in a result.
+
+    Parameters
+    ----------
+    table : "sweep", "materials" or "model"
+    owner : the material, or the key of the model; empty in [sweep]
+    key : in that table
+
+    >>> InputName.parse("v1"), InputName.parse("materials.steel.E").owner, InputName.parse("model.bilinear.K").path
+    (InputName(table='sweep', owner='', key='v1'), 'steel', ('model', 'bilinear', 'K'))
+    """
+
+    table: str
+    owner: str
+    key: str
+
+    @classmethod
+    def parse(cls, text: object) -> InputName:
+        """Read a config name; "model." before the key of a model may be omitted."""
+        # the key of a model has no dot, the name of a material may have one
+        owner, _, key = str(text).removeprefix("model.").rpartition(".")
+        if owner.startswith("materials."):
+            return cls("materials", owner.removeprefix("materials."), key)
+        return cls("model", owner, key) if owner else cls("sweep", "", str(text))
+
+    @classmethod
+    def of_path(cls, path: KeyPath) -> InputName:
+        """Read a path such as ("sweep", "v1"), ("materials", "steel", "E") or ("model", "bilinear", "K")."""
+        table, *owner, key = map(str, path)
+        return cls(table, ".".join(owner), key)
+
+    def __str__(self) -> str:
+        prefix = "materials." if self.table == "materials" else ""
+        return f"{prefix}{self.owner}.{self.key}" if self.owner else self.key
+
+    @property
+    def path(self) -> tuple[str, ...]:
+        """Path from the top of a config."""
+        return (self.table, self.owner, self.key) if self.owner else (self.table, self.key)
+
+    @property
+    def config_key(self) -> str:
+        """The path as text, for example "model.bilinear.K"."""
+        return ".".join(self.path)
+
+    @property
+    def material(self) -> str:
+        """The material of which it is a property; otherwise empty."""
+        return self.owner if self.table == "materials" else ""
+
+    @property
+    def model(self) -> str:
+        """The key of the model of which it is a parameter; empty for an input of all models."""
+        return self.owner if self.table == "model" else ""
+
+    def applies_to(self, model: str) -> bool:
+        """Whether a model may depend on it: it is not a parameter of another model."""
+        return self.model in ("", model)
+
+    def quantity(self, models: Mapping[str, ForceModel]) -> Quantity | None:
+        """Find its quantity; None for the name of a material.
+
+        Raises
+        ------
+        KeyError : there is no such input
+        """
+        if self.table == "model":
+            return model_quantities(models[self.owner])[self.key]
+        if self.table == "materials":
+            return MATERIAL_QUANTITIES[self.key]
+        return None if self.key in MATERIAL_KEYS else SWEEP_QUANTITIES[self.key]
+
+    def unknown_message(self, models: Mapping[str, ForceModel]) -> str:
+        """Describe an input that does not exist, with the nearest name."""
+        name, names = str(self), [*SWEEP_INPUTS]
+        if self.table == "materials":
+            names = [str(InputName("materials", self.owner, key)) for key in MATERIAL_QUANTITIES]
+        elif self.owner in models:
+            names = [f"{self.owner}.{parameter}" for parameter in model_quantities(models[self.owner])]
+        elif self.owner:
+            name, names = self.owner, list(models)
+        return f"no such input; {suggest(name, names)}"
+
+
+def is_foreign(names: Iterable[str], model: str) -> bool:
+    """Whether inputs that vary together are parameters of other models only.
+
+    >>> is_foreign(["bilinear.K"], "hertz"), is_foreign(["bilinear.K", "m1"], "hertz")
+    (True, False)
+    """
+    applies = [InputName.parse(name).applies_to(model) for name in names]
+    return bool(applies) and not any(applies)
+
+
+def is_input(name: object) -> bool:
+    """Whether a coordinate of a result is an input, unlike metadata of models and numbers of cases."""
+    return name in SWEEP_INPUTS or "." in str(name)
+
+
+def input_values(data: Mapping[str, Any]) -> Iterator[tuple[InputName, Any]]:
+    """Yield the name and the value of every key of [sweep], of a material and of [model.KEY]."""
+    for key, value in as_table(data.get("sweep")).items():
+        yield InputName("sweep", "", key), value
+    for table in ("materials", "model"):
+        for owner, values in as_table(data.get(table)).items():
+            for key, value in as_table(values).items():
+                yield InputName(table, owner, key), value
