@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -117,10 +118,23 @@ def api_page() -> str:
     return "\n".join(lines) + "\n"
 
 
+def module_page() -> str:
+    """Every module, with the first line of its docstring."""
+    package = Path(impact.__file__).parent
+    lines = ["# Modules", "", "The first line of the docstring of each module, by package."]
+    for folder in sorted({path.parent for path in package.rglob("*.py")}):
+        lines += ["", f"## {folder.relative_to(package.parent).as_posix().replace('/', '.')}", ""]
+        for module in sorted(folder.glob("*.py")):
+            summary = ast.get_docstring(ast.parse(module.read_text(encoding="utf-8")))
+            lines += [f"- `{module.stem}`: {summary.splitlines()[0]}"] if summary else []
+    return "\n".join(lines) + "\n"
+
+
 def write_reference(app: Any) -> None:
     """Write the pages that are generated from the code."""
     REFERENCE.mkdir(exist_ok=True)
-    for name, page in {"commands": command_page, "config": config_page, "python": api_page}.items():
+    pages = {"commands": command_page, "config": config_page, "python": api_page, "modules": module_page}
+    for name, page in pages.items():
         (REFERENCE / f"{name}.md").write_text(page(), encoding="utf-8")
     for name, copy in COPIED.items():
         text = (REFERENCE.parents[1] / name).read_text(encoding="utf-8")

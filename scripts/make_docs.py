@@ -5,7 +5,6 @@ python scripts/make_docs.py
 
 from __future__ import annotations
 
-import ast
 from pathlib import Path
 
 import impact
@@ -19,34 +18,6 @@ from models_page import models_page
 from models_pictures import pictures
 
 ROOT = Path(__file__).parent.parent
-PACKAGE = ROOT / "src" / "impact"
-# an importing package comes before the packages that it imports
-PACKAGES = (
-    "cli",
-    "pytest_plugin",
-    "api",
-    "reporting",
-    "progress_display",
-    "plots",
-    "exporters",
-    "inverse",
-    "uncertainty",
-    "comparison",
-    "results",
-    "engine",
-    "config",
-    "contact",
-    "contact/models",
-    "contact/closed_forms",
-    "contact/numba",
-    "ode",
-    "formatting",
-    "text",
-    "errors",
-    "atomic",
-    "array_types",
-    "_version",
-)
 # the figures of the paper that show a single impact, and their kinds
 PAPER_FIGURES = {
     "figure2": "impulse",
@@ -195,25 +166,8 @@ def schema_page() -> str:
     return SCHEMA_PAGE.format(on_request=on_request, version=SCHEMA_VERSION, **rows_as_text)
 
 
-def architecture_page(page: str) -> str:
-    """docs/architecture.md with a new list of modules, each with the first line of its docstring.
-
-    Parameters
-    ----------
-    page : the present text of the page
-    """
-    begin, end = "<!-- modules -->\n", "<!-- end of modules -->"
-    before, _, rest = page.partition(begin)
-    lines = []
-    for part in PACKAGES:
-        package = PACKAGE / part
-        lines += ["", f"**{part}**", ""]
-        for module in sorted(package.glob("*.py")) if package.is_dir() else [package.with_suffix(".py")]:
-            summary = ast.get_docstring(ast.parse(module.read_text(encoding="utf-8")))
-            if summary:
-                name = module.relative_to(PACKAGE).with_suffix("").as_posix().removesuffix("/__init__")
-                lines.append(f"- `{name}`: {summary.splitlines()[0]}")
-    return f"{before}{begin}{chr(10).join(lines[1:])}\n{end}{rest.partition(end)[2]}"
+# each generated page of docs, and the function that returns its text
+PAGES = {"schema.md": schema_page, "models.md": models_page, "gallery.md": gallery_page}
 
 
 def write_pictures(folder: Path) -> None:
@@ -243,12 +197,9 @@ def write_timestep_figure(path: Path) -> None:
 
 
 def main() -> None:
-    (ROOT / "docs" / "schema.md").write_text(schema_page(), encoding="utf-8")
-    architecture = ROOT / "docs" / "architecture.md"
-    architecture.write_text(architecture_page(architecture.read_text(encoding="utf-8")), encoding="utf-8")
-    (ROOT / "docs" / "models.md").write_text(models_page(), encoding="utf-8")
+    for name, page in PAGES.items():
+        (ROOT / "docs" / name).write_text(page(), encoding="utf-8")
     write_pictures(ROOT / "docs" / "models")
-    (ROOT / "docs" / "gallery.md").write_text(gallery_page(), encoding="utf-8")
     write_gallery(ROOT / "docs" / "gallery")
     write_timestep_figure(ROOT / "docs" / "timestep.svg")
     write_paper_figures(ROOT / "docs" / "paper")

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 import impact
-from impact.api import prepare
 from impact.contact.impacts import Impacts
 from impact.contact.model import ForceModel
 from impact.contact.models import catalogue, find
@@ -22,6 +21,7 @@ from impact.contact.status import FIRST_FAILURE
 from impact.engine.execute import NUMBA_MIN_TRAJECTORIES, with_core
 from impact.engine.trajectories import trajectory_maps
 from impact.errors import ConfigError, UsageError
+from impact.results.sweep import prepare
 
 from .conftest import ROOT, Run
 from .problems import table1_impacts, with_parameters

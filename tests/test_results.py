@@ -15,6 +15,7 @@ from impact.contact.outputs import OUTPUTS
 from impact.contact.status import Status
 from impact.engine.execute import integrate_ranges, with_core
 from impact.engine.plan import Plan
+from impact.engine.run import DEFAULT_RUN
 from impact.engine.trajectories import trajectory_maps, trajectory_ranges
 from impact.results.schema import SCHEMA, dataset_template, stored_variables
 from impact.results.trajectory_table import TrajectoryRows, TrajectoryTable, in_memory, lazy_dataset
@@ -187,7 +188,9 @@ def test_the_size_and_order_of_ranges_change_no_bit(wide: xr.Dataset, size: int,
     maps = trajectory_maps(plan)
     plan = with_core(plan, maps)
     ranges = sorted(trajectory_ranges(maps, size), key=lambda part: hash((part.number, "shuffled")))
-    finished = {(part.model, part.start): columns for part, columns in integrate_ranges(plan, maps, ranges)}
+    finished = {
+        (part.model, part.start): columns for part, columns in integrate_ranges(plan, maps, ranges, DEFAULT_RUN)
+    }
     rows = TrajectoryRows(maps, lambda model, start, stop: finished[model, start], size)
     table = TrajectoryTable(plan.inputs, plan.models, maps, rows, (None,) * len(plan.models))
     # the overrides of the config are an attribute

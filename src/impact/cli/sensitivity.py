@@ -63,22 +63,21 @@ def sensitivity(
     """
     outputs = list(dict.fromkeys(of or ["e_out"]))
     with exits.catch_signals() as should_stop:
-        from ..engine.executors import choose_backend
+        from ..engine.executors import choose_executor
         from ..progress_display import progress_bar
 
-        backend = choose_backend(jobs, threads)
+        executor = choose_executor(jobs, threads)
 
         def run_plan(plan: Plan) -> xr.Dataset:
             with progress_bar(exits.print_line, quiet=quiet) as on_progress:
-                from ..api import execute
+                from ..engine.run import Run
+                from ..results.sweep import sweep_in_memory
 
-                return execute(plan, backend, on_progress, should_stop)
+                return sweep_in_memory(plan, Run(executor, on_progress=on_progress, should_stop=should_stop))
 
-        from ..api import sensitivities
-
-        results = sensitivities(
+        results = impact.sensitivities(
             config,
-            of=outputs,
+            outputs,
             output=output,
             overwrite=overwrite,
             overrides=sets or (),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import ConfigError
 from ..text import safe_text
 from .lines import BARE_KEY
-from .quantities import VALUE_FORMS, ConfigProblem, KeyPath, show
+from .quantities import ConfigProblem, KeyPath, show
 
 MAX_CONFIG_BYTES = 1_000_000  # size of a TOML file
 MAX_OVERRIDE_LENGTH = 4_000_000  # characters of the value of an override
@@ -230,35 +230,6 @@ def override_text(path: KeyPath, value: object) -> str:
     if len(text) > MAX_OVERRIDE_LENGTH:
         raise ConfigError(f"{path[-1]}: larger than {MAX_OVERRIDE_LENGTH:,} characters")
     return text
-
-
-def apply_overrides(
-    data: dict[str, Any], overrides: Sequence[str]
-) -> tuple[dict[str, Any], dict[KeyPath, tuple[int, KeyPath]], list[str]]:
-    """Apply overrides such as `sweep.e.linspace=[0,1,11]`.
-
-    Returns
-    -------
-    The new data; for each path that was set, the index of the override and the path that it names; and problems.
-    """
-    problems: list[str] = []
-    overridden: dict[KeyPath, tuple[int, KeyPath]] = {}
-    for index, text in enumerate(overrides):
-        path, value_text = read_override(text)
-        if not path:
-            problems.append(f"--set {safe_text(text)}: expected PATH=VALUE, such as sweep.e=0.5")
-            continue
-        is_input = path[0] in ("sweep", "model", "materials") and len(path) > 2
-        new_range = is_input and path[-1] in VALUE_FORMS
-        data, start = set_value(data, path, read_value(value_text), new_range=new_range)
-        overridden = {old: override for old, override in overridden.items() if old[: len(start)] != start}
-        overridden[start] = (index, path)
-        other = "alpha" if path[:2] == ("sweep", "e") else "e" if path[:2] == ("sweep", "alpha") else None
-        if other:
-            # e and alpha exclude each other: an override of one removes the other
-            overridden = {old: override for old, override in overridden.items() if old[:2] != ("sweep", other)}
-            data = {**data, "sweep": {key: value for key, value in data["sweep"].items() if key != other}}
-    return data, overridden, problems
 
 
 def read_override(text: str) -> tuple[KeyPath, str]:

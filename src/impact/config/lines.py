@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
 
 from pydantic import ValidationError
 
@@ -167,44 +166,6 @@ def _unquoted(token: str) -> str:
         return token[1:-1]
 
 
-@dataclass(frozen=True)
-class SourceLocations:
-    """Where the values of a config were written: lines of its source, and overrides.
-
-    Parameters
-    ----------
-    name : the file, or another name of the source
-    lines : the line of each path; empty for a source without lines
-    overrides : the overrides in order
-    overridden : for each path that an override changed, the index of the override and the path that it sets
-    """
-
-    name: str
-    lines: Mapping[KeyPath, int] = field(default_factory=dict)
-    overrides: tuple[str, ...] = ()
-    overridden: Mapping[KeyPath, tuple[int, KeyPath]] = field(default_factory=dict)
-
-    def find(self, path: KeyPath) -> tuple[tuple[int, int], str]:
-        """The location of the value at a path: a sort key, by line and then by override, and its text."""
-        for end in range(len(path), 0, -1):
-            if path[:end] in self.overridden:
-                override, override_path = self.overridden[path[:end]]
-                shared = min(len(path), len(override_path))
-                # an override that creates a table for one key is not the location of another, missing key
-                if path[:shared] == override_path[:shared]:
-                    return (1, override), f"--set {safe_text(self.overrides[override])}"
-                break
-            if path[:end] in self.lines and not self._is_overridden(path[:end]):
-                line = self.lines[path[:end]]
-                return (0, line), f"{safe_text(self.name)}:{line}"
-        # a parameter of a model without a table is required by the key `models`
-        return self.find(("models",)) if path[:1] == ("model",) else ((0, 0), safe_text(self.name))
-
-    def _is_overridden(self, path: KeyPath) -> bool:
-        """Whether an override replaced the value at a path of the source."""
-        return any(path[:end] in self.overridden for end in range(len(path) + 1))
-
-
 def validation_problems(error: ValidationError, models: Mapping[str, ForceModel]) -> Iterable[ConfigProblem]:
     """The problems that pydantic reports, with the path of each value.
 
@@ -264,15 +225,3 @@ def _unknown_key_hint(location: KeyPath, models: Mapping[str, ForceModel]) -> st
         case (table, *_):
             keys = vars(Solver() if table == "solver" else Output())
     return suggest(name, list(keys), KEY_SYNONYMS)
-
-
-def problem_lines(problems: Iterable[ConfigProblem], locations: SourceLocations) -> list[str]:
-    """One line for each problem, in the order of the file, then of the overrides."""
-    ranked: list[tuple[tuple[int, int], str]] = []
-    for path, message in problems:
-        rank, location = locations.find(path)
-        ranked.append((rank, ": ".join(part for part in (location, path_text(path), message) if part)))
-    lines = [line for _, line in sorted(ranked, key=lambda ranked_line: ranked_line[0])]
-    if len(lines) > MAX_PROBLEM_LINES:
-        lines[MAX_PROBLEM_LINES:] = [f"and {len(lines) - MAX_PROBLEM_LINES} more"]
-    return lines

@@ -2,44 +2,31 @@
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import ValidationError
-from pydantic_core import PydanticCustomError
 
 from ..contact.materials import Material
 from ..contact.model import ForceModel
-from ..contact.models import catalogue
 from ..contact.numba.dispatch import is_installed
 from ..contact.outputs import BY_DEFAULT
 from ..contact.timestep import EXACT
-from ..errors import ConfigError
-from .cases import expand_cases, inline_files, named_files
+from . import cases, measurements
 from .design import design_problems, distribution_paths, draw_columns, unit_samples
-from .files import (
-    apply_overrides,
-    as_table,
-    override_text,
-    parse_document,
-    read_override,
-    read_text,
-    to_plain_data,
-)
+from .draft import Draft, Setting, add_library_materials, open_config, open_text
+from .files import as_table
 from .grid import MAX_POINTS, Axis, build_grid, chunk_problems
 from .input_names import InputName
 from .library import library
-from .lines import SourceLocations, key_lines, problem_lines, validation_problems
+from .lines import validation_problems
 from .measurements import (
     Measurements,
     count_problems,
-    expand_measurements,
     fit_paths,
-    inline_measurements,
     purpose_problems,
 )
 from .quantities import (
@@ -54,20 +41,17 @@ from .quantities import (
     Table,
     ValidationContext,
 )
-from .rules import RawConfig, listed_names, rule_problems
+from .rules import check_rules, materials_of
 from .tables import (
     DEFAULT_RTOL,
     FIXED_STEP_DEFAULTS,
-    MATERIAL_KEYS,
     SWEEP_DEFAULTS,
-    SWEEP_QUANTITIES,
     Design,
     Document,
     MaterialTable,
     Output,
     Solver,
     document_type,
-    expand_models,
     json_schema,
 )
 
@@ -106,9 +90,8 @@ class Config:
     solver : tolerances and core
     output : which variables are stored, and how
     text : the TOML text verbatim, or a mapping as JSON, without overrides
-    overrides : PATH=VALUE strings in order: first the library materials that the config uses, then those of the
-        caller, then the values of the CSV files that the config names. So text and overrides define the config
-        without the library or any file
+    settings : first the library materials that the config uses, then those of the caller, then the values of the
+        CSV files that the config names. So text and settings define the config without the library or any file
     fits : the least and the largest value of each parameter to fit, by config name; empty for a sweep
     data : the measurements to which they are fitted; None for a sweep
     design : how the samples of uncertain inputs are drawn; None without any
@@ -124,12 +107,17 @@ class Config:
     solver: Solver
     output: Output
     text: str
-    overrides: tuple[str, ...]
+    settings: tuple[Setting, ...] = field(repr=False, compare=False)
     fits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     data: Measurements | None = None
     design: Design | None = None
     distributions: Mapping[str, Distribution] = field(default_factory=dict)
     files: tuple[Path, ...] = field(default=(), repr=False, compare=False)
+
+    @property
+    def overrides(self) -> tuple[str, ...]:
+        """The settings as PATH=VALUE."""
+        return tuple(setting.override for setting in self.settings)
 
 
 def read_config(
@@ -147,8 +135,7 @@ def read_config(
         folder of the TOML file, or for a mapping to the working directory
     overrides : strings such as "sweep.e.linspace=[0,1,11]"
     plugins : models that are not built in
-    max_points : limit of the points of all models together, checked before any array is allocated
-    purpose : "sweep" refuses measurements and parameters to fit; "calibrate" requires them and refuses axes
+    max_points, purpose : see `build`
 
     Raises
     ------
@@ -159,12 +146,8 @@ def read_config(
     >>> read_config({"models": "hertz", "sweep": sweep, "materials": {"steel": steel}}).axes
     (Axis(columns={'e': (0.5, 1.0)}, numbered='', numbers=()),)
     """
-    reader = _Reader(catalogue(plugins), tuple(overrides), max_points, Path(), purpose)
-    if isinstance(source, Mapping):
-        return reader.read(source, None, "config")
-    path = Path(source)
-    text = read_text(path)
-    return replace(reader, folder=path.parent).read(parse_document(text, str(path)), text, str(path))
+    draft = open_config(source, plugins).with_settings(map(Setting.parse, overrides))
+    return build(draft, max_points, purpose)
 
 
 def parse_config(
@@ -179,219 +162,147 @@ def parse_config(
 
     No file is read, because the text may come from a result of unknown origin.
     """
-    reader = _Reader(catalogue(plugins), tuple(overrides), max_points, None, purpose)
-    return reader.read(parse_document(text, name), text, name)
+    draft = open_text(text, name, plugins).with_settings(map(Setting.parse, overrides))
+    return build(draft, max_points, purpose)
 
 
-@dataclass(frozen=True)
-class _Reader:
-    """Reads one config.
+def build(draft: Draft, max_points: int = MAX_POINTS, purpose: Purpose = "sweep") -> Config:
+    """Check a draft and build its config.
 
     Parameters
     ----------
-    models : all models by key
-    overrides, max_points, purpose : see `read_config`
-    folder : of the files that the config names; None if no file may be read
+    draft : with all settings
+    max_points : limit of the points of all models together, checked before any array is allocated
+    purpose : "sweep" refuses measurements and parameters to fit; "calibrate" requires them and refuses axes
+
+    Raises
+    ------
+    ConfigError : with all problems, one per line
     """
-
-    models: Mapping[str, ForceModel]
-    overrides: tuple[str, ...]
-    max_points: int
-    folder: Path | None
-    purpose: Purpose
-
-    def read(self, source: object, text: str | None, name: str) -> Config:
-        """Read a config, or report every problem of its overrides, files and values.
-
-        Parameters
-        ----------
-        source : data of the config
-        text : of the file; None for a mapping
-        name : of the source, for messages
-        """
-        source_data, problems = to_plain_data(source)
-        locations, config = SourceLocations(name), None
-        override_problems: list[str] = []
-        file_problems: list[str] = []
-        if not problems:
-            overrides = (*_library_overrides(source_data, self.overrides), *self.overrides)
-            data, overridden, override_problems = apply_overrides(source_data, overrides)
-            locations = SourceLocations(name, overrides=overrides, overridden=overridden)
-            data, problems = to_plain_data(data)
-            if self.purpose == "sweep":
-                problems = problems or purpose_problems(data)
-        if not problems:
-            if text is None:
-                text = json.dumps(source_data, separators=(",", ":"), default=str)
-            n = read_exponent(as_table(data.get("sweep")))
-            files = tuple((self.folder or Path()) / file for file in named_files(data))
-            data, file_overrides, file_problems = inline_files(data, self.folder, self.models, n)
-            data, data_overrides, data_problems = inline_measurements(data, self.folder, self.models, n)
-            file_problems += data_problems
-            config, problems = self._build_config(data, text, (*overrides, *file_overrides, *data_overrides))
-        if config is None or override_problems or file_problems:
-            if text is not None and not text.lstrip().startswith("{"):
-                locations = replace(locations, lines=key_lines(text))
-            raise ConfigError(*problem_lines(problems, locations), *file_problems, *override_problems)
-        return replace(config, files=files)
-
-    def _build_config(
-        self, data: Mapping[str, Any], text: str, overrides: Sequence[str]
-    ) -> tuple[Config | None, list[ConfigProblem]]:
-        """The config of plain data, or None and the problems of the data."""
-        data, library_overrides = _add_library_materials(data)
-        data, cases, problems = expand_cases(data, self.models)
-        n = read_exponent(as_table(data.get("sweep")))
-        data, measurements, data_problems = expand_measurements(data, self.models, n)
-        problems += data_problems
-        sweep, parameters = as_table(data.get("sweep")), as_table(data.get("model"))
-        n = None if measurements is not None and "n" in measurements.inputs else n
-        models, _ = expand_models(data.get("models"), self.models)
-        integrator = as_table(data.get("solver")).get("integrator", EXACT)
-        raw = RawConfig(
-            sweep, as_table(data.get("materials")), parameters, models, data.get("models"), n, integrator
+    if purpose == "sweep" and not draft.problems:
+        draft = draft.with_problems(purpose_problems(draft.data))
+    if draft.problems:
+        raise draft.error()
+    files = tuple((draft.folder or Path()) / file for file in cases.named_files(draft.data))
+    for step in (_inline_files, add_library_materials, _expand_cases, _expand_measurements):
+        draft = step(draft)
+    document, invalid_values = _validate(draft)
+    draft = check_rules(draft.with_problems(invalid_values))
+    if document is None:
+        raise draft.error()
+    values = _valid_values(document, draft)
+    fits = {name: value.fit for name, value in values.items() if isinstance(value, FitRange)}
+    values = {name: value.middle if isinstance(value, FitRange) else value for name, value in values.items()}
+    if purpose == "calibrate":
+        draft = draft.with_problems(_calibration_problems(draft.data, values, fits, are_valid=not invalid_values))
+        values = {name: value for name, value in values.items() if isinstance(value, float | str)}
+    else:
+        draft = draft.with_problems(design_problems(draft.data))
+    optional = {name: InputName.parse(name).quantity(draft.known_models) for name in values}
+    quantities = {name: quantity for name, quantity in optional.items() if quantity is not None}
+    distributions = {name: value for name, value in values.items() if isinstance(value, Distribution)}
+    if distributions and document.design is not None:
+        u = unit_samples(document.design, len(distributions))
+        drawn, draw_problems = draw_columns(distributions, quantities, u)
+        draft = draft.with_problems(
+            (InputName.parse(name).path, message) for name, message in draw_problems.items()
         )
-        context = ValidationContext(n, tuple({**raw.materials, **library()}), self.models)
-        document, invalid_values = self._validate(data, context)
-        problems += invalid_values
-        if isinstance(data.get("sweep"), dict):
-            problems += rule_problems(raw)
-        if "cases" in sweep or ("data" in data and measurements is None):
-            # cases and measurements that cannot be read may contain the inputs that seem to be missing
-            problems = [(path, message) for path, message in problems if not message.startswith("missing")]
-        if document is None:
-            return None, _locate_in_cases(problems, cases)
-        values = _valid_values(document, raw)
-        fits = {name: value.fit for name, value in values.items() if isinstance(value, FitRange)}
-        values = {name: value.middle if isinstance(value, FitRange) else value for name, value in values.items()}
-        if self.purpose == "calibrate":
-            problems += _calibration_problems(data, values, fits, are_valid=not invalid_values)
-            values = {name: value for name, value in values.items() if isinstance(value, float | str)}
-        else:
-            problems += design_problems(data)
-        optional = {name: InputName.parse(name).quantity(self.models) for name in values}
-        quantities = {name: quantity for name, quantity in optional.items() if quantity is not None}
-        output = document.output
-        distributions = {name: value for name, value in values.items() if isinstance(value, Distribution)}
-        if distributions and document.design is not None:
-            u = unit_samples(document.design, len(distributions))
-            drawn, draw_problems = draw_columns(distributions, quantities, u)
-            problems += [(InputName.parse(name).path, message) for name, message in draw_problems.items()]
-            values |= {name: tuple(column.tolist()) for name, column in drawn.items()}
-        grid = build_grid(
-            values,
-            quantities,
-            document.sweep.zip if self.purpose == "sweep" else (),
-            tuple(cases) if self.purpose == "sweep" else (),
-            tuple(distributions),
-            raw.names,
-            len(models),
-            self.max_points,
-            in_full=output.layout == "full" or (output.layout == "auto" and bool(output.chunks)),
-        )
-        problems += grid.problems
-        if not problems:
-            problems += _settings_problems(document, grid.axes, len(models))
-        if not problems and measurements is not None:
-            problems += count_problems(measurements, fits, models)
-        if problems:
-            return None, _locate_in_cases(problems, cases)
-        fixed_step_defaults = {} if document.solver.integrator == EXACT else FIXED_STEP_DEFAULTS
-        defaults = {**SWEEP_DEFAULTS, **fixed_step_defaults} | {
-            f"{model.key}.{parameter.name}": parameter.default
-            for model in models
-            for parameter in model.parameters
-            if parameter.default is not None
-        }
-        return Config(
-            title=document.title,
-            models=tuple(models),
-            scalars={
-                **grid.scalars,
-                **{name: column[0] for name, column in (measurements.inputs if measurements else {}).items()},
-                **{name: value for name, value in defaults.items() if name not in values},
-            },
-            axes=grid.axes,
-            materials={name: _build_material(table) for name, table in document.materials.items()},
-            solver=document.solver,
-            output=output,
-            text=text,
-            overrides=(*library_overrides, *overrides),
-            fits=fits,
-            data=measurements,
-            design=document.design,
-            distributions=distributions,
-        ), []
-
-    def _validate(
-        self, data: Mapping[str, Any], context: ValidationContext
-    ) -> tuple[Document | None, list[ConfigProblem]]:
-        """The validated document, and problems; with problems it is the document of the valid part, or None."""
-        with_tables = [key for key in as_table(data.get("model")) if key in self.models]
-        document = document_type(self.models, with_tables)
-        try:
-            return document.model_validate(data, context=context), []
-        except ValidationError as error:
-            problems = list(validation_problems(error, self.models))
-        valid_part = _remove_invalid(data, [path for path, _ in problems])
-        try:
-            return document.model_validate(valid_part, context=context), problems
-        except ValidationError:
-            return None, problems
-
-
-def read_exponent(sweep: Mapping[str, Any]) -> float | None:
-    """The exponent n of [sweep], which the unit of K contains: None if it varies, NaN where it cannot be read."""
-    n = sweep.get("n", SWEEP_DEFAULTS["n"])
-    if isinstance(n, list | dict) or "n" in as_table(sweep.get("cases")):
-        return None
-    try:
-        return SWEEP_QUANTITIES["n"].read(n)
-    except PydanticCustomError:
-        return math.nan
-
-
-def _library_overrides(data: Mapping[str, Any], overrides: Sequence[str]) -> list[str]:
-    """Overrides that define the library materials of which other overrides change a property."""
-    paths = [path for path, _ in map(read_override, overrides) if path[:1] == ("materials",)]
-    names = dict.fromkeys(str(path[1]) for path in paths if len(path) > 2)
-    return [
-        override_text(("materials", name), library()[name])
-        for name in names
-        if _is_from_library(name, data) and ("materials", name) not in paths
-    ]
-
-
-def _is_from_library(name: str, data: Mapping[str, Any]) -> bool:
-    """Whether a material is in the library, and no table of the config replaces it."""
-    return name in library() and name not in as_table(data.get("materials"))
-
-
-def _add_library_materials(data: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
-    """The data with tables for the library materials that a ball may have, and overrides that add those tables."""
-    sweep = as_table(data.get("sweep"))
-    cases = as_table(sweep.get("cases")) | as_table(as_table(data.get("data")).get("columns"))
-    names = dict.fromkeys(
-        name for key in MATERIAL_KEYS for table in (sweep, cases) for name in listed_names(table.get(key))
+        values |= {name: tuple(column.tolist()) for name, column in drawn.items()}
+    grid = build_grid(
+        values,
+        quantities,
+        document.sweep.zip if purpose == "sweep" else (),
+        [str(InputName.of_path(path)) for path in draft.cases] if purpose == "sweep" else (),
+        list(distributions),
+        draft.input_names,
+        len(draft.models),
+        max_points,
+        in_full=document.output.is_full,
     )
-    names |= {name.material: None for name in map(InputName.parse, cases) if name.material}
-    materials = {
-        # a column of cases or of measurements replaces a property
-        name: {key: value for key, value in library()[name].items() if f"materials.{name}.{key}" not in cases}
-        for name in names
-        if _is_from_library(name, data) and isinstance(data.get("materials", {}), dict)
+    draft = draft.with_problems(grid.problems)
+    if not draft.problems:
+        draft = draft.with_problems(_settings_problems(document, grid.axes, len(draft.models)))
+    if not draft.problems and draft.measurements is not None:
+        draft = draft.with_problems(count_problems(draft.measurements, fits, draft.models))
+    if draft.problems or draft.lines:
+        raise draft.error()
+    measured = draft.measurements.inputs if draft.measurements is not None else {}
+    defaults = _default_scalars(draft.models, document.solver)
+    return Config(
+        title=document.title,
+        models=tuple(draft.models),
+        scalars={
+            **grid.scalars,
+            **{name: column[0] for name, column in measured.items()},
+            **{name: value for name, value in defaults.items() if name not in values},
+        },
+        axes=grid.axes,
+        materials={name: _build_material(table) for name, table in document.materials.items()},
+        solver=document.solver,
+        output=document.output,
+        text=draft.text,
+        settings=draft.settings,
+        fits=fits,
+        data=draft.measurements,
+        design=document.design,
+        distributions=distributions,
+        files=files,
+    )
+
+
+def _inline_files(draft: Draft) -> Draft:
+    for inline in (cases.inline_files, measurements.inline_measurements):
+        data, texts, lines = inline(draft.data, draft.folder, draft.known_models, draft.exponent)
+        settings = (*draft.settings, *map(Setting.parse, texts))
+        draft = replace(draft, data=data, settings=settings, lines=(*draft.lines, *lines))
+    return draft
+
+
+def _expand_cases(draft: Draft) -> Draft:
+    data, names, problems = cases.expand_cases(draft.data, draft.known_models)
+    paths: dict[KeyPath, KeyPath] = {
+        InputName.parse(name).path: ("sweep", "cases", column) for name, column in names.items()
     }
-    extended = {**data, "materials": {**data.get("materials", {}), **materials}} if materials else dict(data)
-    return extended, [override_text(("materials", name), properties) for name, properties in materials.items()]
+    return replace(draft, data=data, cases=paths).with_problems(problems)
 
 
-def _remove_invalid(data: Mapping[str, Any], paths: Sequence[KeyPath]) -> dict[str, Any]:
-    """The data without the keys that have problems, and without materials that lack a property.
+def _expand_measurements(draft: Draft) -> Draft:
+    data, found, problems = measurements.expand_measurements(draft.data, draft.known_models, draft.exponent)
+    return replace(draft, data=data, measurements=found).with_problems(problems)
 
-    [solver] and [output] are removed whole, of other tables the key, and of [model.KEY] the parameter.
-    """
+
+def _validate(draft: Draft) -> tuple[Document | None, list[ConfigProblem]]:
+    """Build the document of the valid part, or None, and list the problems of single values."""
+    with_tables = [key for key in draft.table("model") if key in draft.known_models]
+    document = document_type(draft.known_models, with_tables)
+    materials = tuple({**draft.table("materials"), **library()})
+    context = ValidationContext(draft.exponent, materials, draft.known_models)
+    try:
+        return document.model_validate(draft.data, context=context), []
+    except ValidationError as error:
+        problems = list(validation_problems(error, draft.known_models))
+    # a second pass, so that one message also holds the problems between valid values
+    try:
+        return document.model_validate(_remove_invalid(draft.data, problems), context=context), problems
+    except ValidationError:
+        return None, problems
+
+
+def _default_scalars(models: Iterable[ForceModel], solver: Solver) -> dict[str, float]:
+    """List the defaults of inputs and of parameters by config name."""
+    fixed_step = {} if solver.integrator == EXACT else FIXED_STEP_DEFAULTS
+    return {**SWEEP_DEFAULTS, **fixed_step} | {
+        f"{model.key}.{parameter.name}": parameter.default
+        for model in models
+        for parameter in model.parameters
+        if parameter.default is not None
+    }
+
+
+def _remove_invalid(data: Mapping[str, Any], problems: Iterable[ConfigProblem]) -> dict[str, Any]:
+    """Remove keys that have problems: [solver] and [output] whole, and of [model.KEY] the parameter."""
     lengths = {"solver": 1, "output": 1, "model": 3}
-    invalid = {path[: lengths.get(str(path[0]), 2)] for path in paths if path}
+    invalid = {path[: lengths.get(str(path[0]), 2)] for path, _ in problems if path}
 
     def valid_part(value: Any, path: KeyPath) -> Any:
         if not isinstance(value, dict) or len(path) > 2:
@@ -404,27 +315,28 @@ def _remove_invalid(data: Mapping[str, Any], paths: Sequence[KeyPath]) -> dict[s
     return valid_data
 
 
-def _valid_values(document: Document, raw: RawConfig) -> dict[str, Numbers | Names]:
-    """The valid values by config name: keys of [sweep], varying or fitted properties of balls, and parameters."""
+def _valid_values(document: Document, draft: Draft) -> dict[str, Numbers | Names]:
+    """List valid values by config name: keys of [sweep], varying or fitted properties of balls, and parameters."""
     sweep = _values_by_key(document.sweep)
-    values = {name: sweep[name] for name in raw.sweep if name in sweep and name not in ("zip", "cases")}
-    used_materials = {name for ball in "12" for name in raw.materials_of(ball)}
+    values = {name: sweep[name] for name in draft.table("sweep") if name in sweep and name not in ("zip", "cases")}
+    used_materials = {name for ball in "12" for name in materials_of(draft, ball)}
     for material, table in document.materials.items():
         for name, value in _values_by_key(table).items() if material in used_materials else ():
             if not isinstance(value, float):
                 values[f"materials.{material}.{name}"] = value
     tables = _values_by_key(document.model)
-    selected = {model.key for model in raw.models}
-    for key in raw.parameters:
+    selected = {model.key for model in draft.models}
+    for key in draft.table("model"):
         # parameters of models that are not selected are checked, but are not part of the grid
         parameters = _values_by_key(tables.get(key)) if key in selected else {}
         values |= {f"{key}.{name}": value for name, value in parameters.items()}
     # a file that is left cannot be read
-    return {name: value for name, value in values.items() if not _names_file(value)}
-
-
-def _names_file(value: Numbers | Names) -> bool:
-    return isinstance(value, Column) or (isinstance(value, Distribution) and isinstance(value.empirical, str))
+    return {
+        name: value
+        for name, value in values.items()
+        if not isinstance(value, Column)
+        and not (isinstance(value, Distribution) and isinstance(value.empirical, str))
+    }
 
 
 def _values_by_key(table: Table | None) -> dict[str, Any]:
@@ -448,14 +360,9 @@ def _calibration_problems(
     *,
     are_valid: bool,
 ) -> list[ConfigProblem]:
-    """Problems of a calibration: no measurements, no parameter to fit, or axes.
+    """Check that a calibration has measurements, a parameter to fit and no axes, given its valid values.
 
-    Parameters
-    ----------
-    data : plain data of the config
-    values : valid values by config name; parameters to fit have one
-    fits : bounds of the parameters to fit
-    are_valid : no value has a problem of its own; otherwise a fit may be missing because of it
+    Unless all values are valid, a fit may be missing among `fits` because it is invalid.
     """
     problems: list[ConfigProblem] = []
     single = "expected a single value, a column of [data] or { fit = [least, most] }"
@@ -494,20 +401,3 @@ def _settings_problems(document: Document, axes: Sequence[Axis], n_models: int) 
         message = 'set together with layout = "factored", expected layout = "full"'
         problems.append((("output", "chunks"), message))
     return problems
-
-
-def _locate_in_cases(problems: Sequence[ConfigProblem], cases: Mapping[str, str]) -> list[ConfigProblem]:
-    """The problems, with paths inside `sweep.cases` for inputs that are columns there.
-
-    Parameters
-    ----------
-    problems : with the paths that the columns have after `expand_cases`
-    cases : names of the columns by config name
-    """
-
-    def located(path: KeyPath) -> KeyPath:
-        length = 2 if path[:1] == ("sweep",) else 3
-        column = cases.get(str(InputName.of_path(path[:length]))) if len(path) >= length else None
-        return path if column is None else ("sweep", "cases", column, *path[length:])
-
-    return [(located(path), message) for path, message in problems]

@@ -219,6 +219,11 @@ class Output:
         Field(description="all values, or the trajectories from which they are computed when they are read"),
     ] = "auto"
 
+    @property
+    def is_full(self) -> bool:
+        """Whether all points are stored, whatever their number."""
+        return self.layout == "full" or (self.layout == "auto" and bool(self.chunks))
+
 
 # least standard deviation and largest measured value, in SI: squares of their ratio overflow beyond them
 MIN_SIGMA, MAX_MEASURED = 1e-30, 1e100

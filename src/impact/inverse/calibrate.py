@@ -25,7 +25,7 @@ from ..contact.outputs import collide
 from ..contact.units import dimension
 from ..engine.build_impacts import build_impacts
 from ..engine.execute import WorkerContext, context_of, models_of_context
-from ..engine.executors import choose_backend
+from ..engine.executors import choose_executor
 from ..engine.plan import Inputs, Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..results.calibration import FIT_STATUSES, calibration_template
@@ -123,7 +123,7 @@ def calibrate_config(config: Config, plugins: Plugins, jobs: int = 1) -> xr.Data
     """
     if jobs > 1 and len(config.models) > 1:
         context = context_of(Plan(config, plugins))
-        with choose_backend(jobs).executor() as executor:
+        with choose_executor(jobs).start() as executor:
             fit = partial(_fit_remotely, text=config.text, overrides=config.overrides, context=context)
             keys = [model.key for model in config.models]
             laws = dict(zip(keys, executor.map(fit, keys), strict=True))

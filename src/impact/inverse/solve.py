@@ -30,7 +30,6 @@ from ..contact.timestep import EXACT
 from ..contact.units import with_numbers
 from ..display import Block, Displayed
 from ..engine.build_impacts import build_impacts
-from ..engine.execute import never_stop
 from ..engine.plan import Inputs, Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..errors import UsageError, did_you_mean
@@ -309,10 +308,7 @@ class _Problem:
     ) -> xr.Dataset:
         """The outputs at some values, along the dimension `trial`; NaN where the integration fails."""
         at = np.zeros(values.size, np.intp) if conditions is None else conditions
-        result = sweep_in_memory(
-            self.plan(values, at, is_scan=is_scan), on_progress=lambda progress: None, should_stop=never_stop
-        )
-        return result.isel(model=0)
+        return sweep_in_memory(self.plan(values, at, is_scan=is_scan)).isel(model=0)
 
     def target_values(
         self, values: Array, conditions: NDArray[np.intp] | None = None, *, is_scan: bool = False

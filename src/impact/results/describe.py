@@ -132,7 +132,7 @@ def describe(dataset: xr.Dataset) -> Fits | Studies:
     ...     "design": {"n": 1024},
     ... }, of="peak_force")
     >>> impact.describe(study).to_dataframe()[["input", "first", "total"]].round(2).values.tolist()
-    [['sweep.v1', 0.56, 0.56], ['sweep.K', 0.43, 0.44]]
+    [['sweep.v1', 0.56, 0.57], ['sweep.K', 0.43, 0.44]]
     """
     if is_calibration(dataset):
         return Fits(dataset)

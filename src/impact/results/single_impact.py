@@ -13,7 +13,8 @@ from pathlib import Path
 import xarray as xr
 
 from .._version import __version__
-from ..config.files import apply_overrides, override_text, parse_document, read_text
+from ..config.draft import Setting, open_config
+from ..config.files import override_text
 from ..config.grid import Axis
 from ..config.input_names import InputName, is_input
 from ..config.load import Config, parse_config, read_config
@@ -23,7 +24,7 @@ from ..contact.history import History, follow
 from ..contact.impacts import Impacts
 from ..contact.materials import Material
 from ..contact.model import ForceModel
-from ..contact.models import catalogue, find
+from ..contact.models import find
 from ..contact.outputs import collide
 from ..contact.status import Status
 from ..contact.timestep import EXACT
@@ -407,18 +408,15 @@ def models_of_source(source: ConfigSource, overrides: Sequence[str], plugins: Pl
     ConfigError : it cannot be read, or selects what is no model
     """
     read, _ = _config_reader(source, overrides, plugins)
-    if isinstance(source, str | Path) and not is_result(Path(source)):
-        data = parse_document(read_text(Path(source)), str(source))
-    elif source is None or (isinstance(source, Mapping) and not isinstance(source, xr.Dataset)):
-        # the models of the starter config are no selection
-        data = dict(source or {})
-    else:
+    if (isinstance(source, str | Path) and is_result(Path(source))) or isinstance(source, xr.Dataset):
         return tuple(model.key for model in read(()).models)
-    selection = apply_overrides(data, overrides)[0].get("models")
-    if selection is None:
+    # the models of the starter config are no selection
+    draft = open_config(Path(source) if isinstance(source, str) else source or {}, plugins.models)
+    draft = draft.with_settings(map(Setting.parse, overrides))
+    if "models" not in draft.data:
         return ()
-    models, problems = expand_models(selection, catalogue(plugins.models))
-    return tuple(model.key for model in (read(()).models if problems else models))
+    _, problems = expand_models(draft.data["models"], draft.known_models)
+    return tuple(model.key for model in (read(()).models if problems else draft.models))
 
 
 def _config_reader(

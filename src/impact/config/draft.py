@@ -1,0 +1,276 @@
+"""A config that is being read: its plain data, the settings that changed it, and its problems.
+
+Each step from the source to a `Config` takes a draft and returns a new one; see `impact.config.load.build`.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pydantic_core import PydanticCustomError
+
+from ..contact.model import ForceModel
+from ..contact.models import catalogue
+from ..errors import ConfigError
+from ..text import safe_text
+from .files import (
+    as_table,
+    override_text,
+    parse_document,
+    read_override,
+    read_text,
+    read_value,
+    set_value,
+    to_plain_data,
+)
+from .input_names import InputName, input_values
+from .library import library
+from .lines import MAX_PROBLEM_LINES, key_lines, path_text
+from .quantities import VALUE_FORMS, ConfigProblem, KeyPath
+from .tables import MATERIAL_KEYS, SWEEP_DEFAULTS, SWEEP_QUANTITIES, expand_models
+
+# keys of [sweep] that arrange inputs
+NO_INPUTS = (("sweep", "zip"), ("sweep", "cases"))
+
+if TYPE_CHECKING:
+    from .measurements import Measurements
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A value that replaces that of a config.
+
+    Parameters
+    ----------
+    path : of the value; empty for a text that is not PATH=VALUE
+    value : any object, which is checked with the rest of the config
+    shown : the option that sets it, for messages: "--at e=0.6"
+    text : PATH=VALUE, as it is stored with a result; empty for that of the path and the value
+    """
+
+    path: KeyPath
+    value: object
+    shown: str
+    text: str = ""
+
+    @classmethod
+    def parse(cls, text: str) -> Setting:
+        """Parse an override.
+
+        >>> setting = Setting.parse("sweep.e.linspace=[0,1,11]")
+        >>> setting.path, setting.value
+        (('sweep', 'e', 'linspace'), [0, 1, 11])
+        """
+        path, value_text = read_override(text)
+        return cls(path, read_value(value_text), f"--set {text}", text)
+
+    @property
+    def override(self) -> str:
+        """PATH=VALUE."""
+        return self.text or override_text(self.path, to_plain_data(self.value)[0])
+
+
+@dataclass(frozen=True)
+class Draft:
+    """A config that is being read; nothing of it has been checked but its syntax.
+
+    Parameters
+    ----------
+    data : dicts, lists and plain Python values
+    text : the TOML text, or a mapping as JSON, without settings
+    name : of the source, for messages
+    known_models : all models that the config may select, by key
+    folder : of the files that it names; None if no file may be read
+    settings : those applied so far, in the order in which they are stored
+    origins : the setting of each path that a setting changed, in the order in which they were applied
+    cases : the path of each input that is a column of a table of cases, and where its values are in that table
+    measurements : of a config with valid measurements
+    problems : paths and messages
+    lines : complete messages about settings and files
+    """
+
+    data: dict[str, Any]
+    text: str
+    name: str
+    known_models: Mapping[str, ForceModel]
+    folder: Path | None = None
+    settings: tuple[Setting, ...] = ()
+    origins: Mapping[KeyPath, Setting] = field(default_factory=dict)
+    cases: Mapping[KeyPath, KeyPath] = field(default_factory=dict)
+    measurements: Measurements | None = None
+    problems: tuple[ConfigProblem, ...] = ()
+    lines: tuple[str, ...] = ()
+
+    def table(self, name: str) -> dict[str, Any]:
+        """A table of the config, which is empty if the config has no such table."""
+        return as_table(self.data.get(name))
+
+    @cached_property
+    def exponent(self) -> float | None:
+        """The exponent n of [sweep], which the unit of K contains: None if it varies, NaN if it is invalid."""
+        n = self.table("sweep").get("n", SWEEP_DEFAULTS["n"])
+        is_measured = self.measurements is not None and "n" in self.measurements.inputs
+        if is_measured or isinstance(n, list | dict) or "n" in as_table(self.table("sweep").get("cases")):
+            return None
+        try:
+            return SWEEP_QUANTITIES["n"].read(n)
+        except PydanticCustomError:
+            return math.nan
+
+    @cached_property
+    def models(self) -> Sequence[ForceModel]:
+        """The selected models, without those that are unknown."""
+        return expand_models(self.data.get("models"), self.known_models)[0]
+
+    @cached_property
+    def input_names(self) -> list[str]:
+        """The config names of all inputs, whether or not their values are valid."""
+        return [str(name) for name, _ in input_values(self.data) if name.path not in NO_INPUTS]
+
+    def with_problems(self, problems: Iterable[ConfigProblem]) -> Draft:
+        return replace(self, problems=(*self.problems, *problems))
+
+    def with_settings(self, settings: Iterable[Setting]) -> Draft:
+        """Apply settings in order, after library materials of which one of them changes a property."""
+        settings = list(settings)
+        if not settings:
+            return self
+        draft = self
+        for setting in (*self._library_settings(settings), *settings):
+            draft = draft._with_setting(setting)
+        data, problems = to_plain_data(draft.data)
+        return replace(draft, data=data).with_problems(problems)
+
+    def _library_settings(self, settings: Iterable[Setting]) -> list[Setting]:
+        paths = [setting.path for setting in settings if setting.path[:1] == ("materials",)]
+        names = dict.fromkeys(str(path[1]) for path in paths if len(path) > 2)
+        return [
+            _library_setting(name)
+            for name in names
+            if ("materials", name) not in paths and name in library() and name not in self.table("materials")
+        ]
+
+    def _with_setting(self, setting: Setting) -> Draft:
+        path, data = setting.path, self.data
+        if not path:
+            line = f"{safe_text(setting.shown)}: expected PATH=VALUE, such as sweep.e=0.5"
+            return replace(self, lines=(*self.lines, line))
+        is_input = path[0] in ("sweep", "model", "materials") and len(path) > 2
+        data, start = set_value(data, path, setting.value, new_range=is_input and path[-1] in VALUE_FORMS)
+        replaced = [start]
+        if path[:2] in (("sweep", "e"), ("sweep", "alpha")):
+            # e and alpha exclude each other: a setting of one removes the other
+            other = "alpha" if path[1] == "e" else "e"
+            replaced.append(("sweep", other))
+            data = {**data, "sweep": {key: value for key, value in data["sweep"].items() if key != other}}
+        origins = {
+            old: origin
+            for old, origin in self.origins.items()
+            if not any(old[: len(new)] == new for new in replaced)
+        }
+        origins[start] = setting
+        return replace(self, data=data, origins=origins, settings=(*self.settings, setting))
+
+    def error(self) -> ConfigError:
+        """The exception with all problems: those of the file by line, then those of the settings."""
+        key_line = {} if self.text.lstrip().startswith("{") else key_lines(self.text)
+        ranked: list[tuple[tuple[int, int], str]] = []
+        for path, message in self.problems:
+            path = self._written_path(path)
+            rank, location = self._locate(path, key_line)
+            ranked.append((rank, ": ".join(part for part in (location, path_text(path), message) if part)))
+        lines = [line for _, line in sorted(ranked, key=lambda ranked_line: ranked_line[0])]
+        if len(lines) > MAX_PROBLEM_LINES:
+            lines[MAX_PROBLEM_LINES:] = [f"and {len(lines) - MAX_PROBLEM_LINES} more"]
+        return ConfigError(*lines, *self.lines)
+
+    def _written_path(self, path: KeyPath) -> KeyPath:
+        """The path in the source of a path that may be a column of cases."""
+        for end in range(len(path), 0, -1):
+            if path[:end] in self.cases:
+                return (*self.cases[path[:end]], *path[end:])
+        return path
+
+    def _locate(self, path: KeyPath, key_line: Mapping[KeyPath, int]) -> tuple[tuple[int, int], str]:
+        """Find the value at a path: a sort key, by line and then by setting, and the text of its location."""
+        for end in range(len(path), 0, -1):
+            if path[:end] in self.origins:
+                setting = self.origins[path[:end]]
+                shared = min(len(path), len(setting.path))
+                # a setting that creates a table for one key is not the location of another, missing key
+                if path[:shared] == setting.path[:shared]:
+                    return (1, list(self.origins).index(path[:end])), safe_text(setting.shown)
+                break
+            is_replaced = any(path[:start] in self.origins for start in range(end))
+            if path[:end] in key_line and not is_replaced:
+                return (0, key_line[path[:end]]), f"{safe_text(self.name)}:{key_line[path[:end]]}"
+        # a parameter of a model without a table is required by the key `models`
+        return self._locate(("models",), key_line) if path[:1] == ("model",) else ((0, 0), safe_text(self.name))
+
+
+def _library_setting(name: str, without: Iterable[str] = ()) -> Setting:
+    """Define a material by its record in the library, except for some properties."""
+    path = ("materials", name)
+    properties = {key: value for key, value in library()[name].items() if key not in without}
+    text = override_text(path, properties)
+    return Setting(path, properties, f"--set {text}", text)
+
+
+def open_config(source: Path | Mapping[str, object], plugins: Sequence[ForceModel] = ()) -> Draft:
+    """Open the config of a TOML file or a mapping, in which names of files are relative to its folder.
+
+    Raises
+    ------
+    ConfigError : the file cannot be read, or has a syntax error
+    """
+    if not isinstance(source, Mapping):
+        return replace(open_text(read_text(source), str(source), plugins), folder=source.parent)
+    data, problems = to_plain_data(source)
+    text = "" if problems else json.dumps(data, separators=(",", ":"), default=str)
+    return Draft(data, text, "config", catalogue(plugins), Path(), problems=tuple(problems))
+
+
+def open_text(text: str, name: str, plugins: Sequence[ForceModel] = ()) -> Draft:
+    """Open a TOML text, or a JSON text, which starts with a brace; no file is read for it.
+
+    Raises
+    ------
+    ConfigError : it has a syntax error, is too large, or is nested too deeply
+    """
+    data, problems = to_plain_data(parse_document(text, name))
+    return Draft(data, text, name, catalogue(plugins), problems=tuple(problems))
+
+
+def add_library_materials(draft: Draft) -> Draft:
+    """Add a table for each library material that a ball may have and the config does not define."""
+    if not isinstance(draft.data.get("materials", {}), dict):
+        return draft
+    sweep = draft.table("sweep")
+    columns = as_table(sweep.get("cases")) | as_table(draft.table("data").get("columns"))
+    names = dict.fromkeys(
+        name for key in MATERIAL_KEYS for table in (sweep, columns) for name in listed_names(table.get(key))
+    )
+    properties = [name for name in map(InputName.parse, columns) if name.material]
+    names |= {name.material: None for name in properties}
+    settings = [
+        # a column of cases or of measurements replaces a property
+        _library_setting(name, without=[other.key for other in properties if other.material == name])
+        for name in names
+        if name in library() and name not in draft.table("materials")
+    ]
+    if not settings:
+        return draft
+    materials = {str(setting.path[1]): setting.value for setting in settings}
+    data = {**draft.data, "materials": {**draft.table("materials"), **materials}}
+    return replace(draft, data=data, settings=(*settings, *draft.settings))
+
+
+def listed_names(value: object) -> list[str]:
+    """The names in a name or a list of names."""
+    return [name for name in (value if isinstance(value, list) else [value]) if isinstance(name, str)]
