@@ -14,18 +14,18 @@ from hypothesis import given, settings, strategies as st
 import impact
 from impact.cli.summary import summary_json
 from impact.config.load import Axis
+from impact.contact.variables import OUTPUTS
 from impact.engine.plan import MAX_FULL_REPEATED, Plan
 from impact.engine.trajectories import trajectory_maps
 from impact.errors import UsageError
 from impact.results.provenance import config_of_part
 from impact.results.ranking import recommend
-from impact.results.schema import SCHEMA
 from impact.results.selection import select
 from impact.results.summary import summarize
 from impact.results.sweep import prepare, sweep_in_memory, sweep_into
 
 LAYOUTS = ("full", "factored")
-EVERYTHING = [variable.name for variable in SCHEMA]
+EVERYTHING = [*OUTPUTS]
 MATERIALS = {
     "steel": {"E": 210e9, "nu": 0.3, "rho": 7850.0, "yield_strength": 0.8e9},
     "brass": {"E": 100e9, "nu": 0.34, "rho": 8500.0, "yield_strength": 0.3e9},

@@ -16,8 +16,9 @@ from impact.contact.impacts import Impacts
 from impact.contact.model import ForceModel
 from impact.contact.models import catalogue, find
 from impact.contact.numba.dispatch import is_installed, serves
-from impact.contact.outputs import OUTPUTS, Outputs, collide
+from impact.contact.outputs import Outputs, collide
 from impact.contact.status import FIRST_FAILURE
+from impact.contact.variables import OUTPUTS
 from impact.engine.execute import NUMBA_MIN_TRAJECTORIES, with_core
 from impact.engine.trajectories import trajectory_maps
 from impact.errors import ConfigError, UsageError

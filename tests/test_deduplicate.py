@@ -12,13 +12,13 @@ from hypothesis import given, settings, strategies as st
 import impact
 from impact.config.load import read_config
 from impact.contact.impacts import Impacts
+from impact.contact.variables import BY_DEFAULT
 from impact.engine import trajectories as trajectories_module
 from impact.engine.build_impacts import build_impacts
 from impact.engine.plan import Plan
 from impact.engine.run import Run
 from impact.engine.trajectories import trajectory_maps
 from impact.results.estimate import estimate
-from impact.results.schema import SCHEMA
 from impact.results.sweep import prepare
 
 from .conftest import ROOT
@@ -104,7 +104,7 @@ def sweep_with_plugins(config: dict[str, object], *overrides: str) -> xr.Dataset
 
 
 def assert_same_bits(first: xr.Dataset, second: xr.Dataset) -> None:
-    for name in (variable.name for variable in SCHEMA if variable.by_default):
+    for name in BY_DEFAULT:
         assert first[name].values.tobytes() == second[name].values.tobytes(), name
 
 

@@ -14,11 +14,11 @@ import xarray as xr
 import impact
 from impact.config.load import Axis
 from impact.contact.materials import Material
+from impact.contact.variables import OUTPUTS
 from impact.engine.plan import Plan
 from impact.engine.run import Run
 from impact.engine.trajectories import trajectory_maps
 from impact.errors import ModelError, UsageError
-from impact.results.schema import SCHEMA
 from impact.results.sweep import prepare, sweep_in_memory, sweep_into
 
 STEEL = {"E": 210e9, "nu": 0.3, "rho": 7850.0, "yield_strength": 0.8e9}
@@ -30,7 +30,7 @@ PROPERTIES: dict[str, list[float]] = {
     "yield_strength": [0.1e9, 0.4e9, 1e9],
 }
 LAYOUTS = ("full", "factored")
-EVERYTHING = [variable.name for variable in SCHEMA]
+EVERYTHING = [*OUTPUTS]
 # a stiffness by Hertz, one with a yield strength, one with its own rule for K, and another one by Hertz
 LAWS = ["gharib-hurmuzlu-2012", "thornton-1997", "liggghts-hooke", "bilinear"]
 

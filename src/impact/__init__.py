@@ -10,15 +10,9 @@ from ._version import __version__ as __version__
 if TYPE_CHECKING:
     from .api import (
         check_model as check_model,
-        explore as explore,
-        export as export,
-        export_codes as export_codes,
         init as init,
         materials as materials,
         models as models,
-        plot as plot,
-        plot_to_files as plot_to_files,
-        report as report,
         run as run,
         schema as schema,
     )
@@ -31,10 +25,15 @@ if TYPE_CHECKING:
     from .contact.models.hysteresis import hysteresis as hysteresis
     from .contact.powers import power as power
     from .errors import ImpactError as ImpactError
+    from .exporters.export import export as export, export_codes as export_codes
     from .inverse.calibrate import calibrate as calibrate
     from .inverse.solve import solve as solve
     from .inverse.timestep import timestep as timestep
+    from .plots.draw import plot as plot
+    from .plots.explore import explore as explore
+    from .plots.files import plot_to_files as plot_to_files
     from .progress_display import progress_bar as progress_bar
+    from .reporting.page import report as report
     from .results.describe import describe as describe
     from .results.estimate import estimate as estimate
     from .results.extend import extend as extend, extend_to_file as extend_to_file
@@ -59,9 +58,9 @@ _MODULES = {
     "describe": "results.describe",
     "estimate": "results.estimate",
     "expand": "results.xarray_backend",
-    "explore": "api",
-    "export": "api",
-    "export_codes": "api",
+    "explore": "plots.explore",
+    "export": "exporters.export",
+    "export_codes": "exporters.export",
     "extend": "results.extend",
     "extend_to_file": "results.extend",
     "hysteresis": "contact.models.hysteresis",
@@ -71,12 +70,12 @@ _MODULES = {
     "materials": "api",
     "merge": "results.shards",
     "models": "api",
-    "plot": "api",
-    "plot_to_files": "api",
+    "plot": "plots.draw",
+    "plot_to_files": "plots.files",
     "power": "contact.powers",
     "progress_bar": "progress_display",
     "recommend": "results.ranking",
-    "report": "api",
+    "report": "reporting.page",
     "rerun": "comparison.rerun",
     "run": "api",
     "save": "results.xarray_backend",

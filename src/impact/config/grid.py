@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from pydantic import ValidationError
 
-from ..contact.outputs import BY_DEFAULT
+from ..contact.variables import BY_DEFAULT
 from .input_names import InputName
 from .quantities import MAX_PROBLEMS, ConfigProblem, Names, Numbers, Quantity, Range, show, suggest
 

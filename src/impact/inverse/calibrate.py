@@ -28,7 +28,8 @@ from ..engine.execute import WorkerContext, context_of, models_of_context
 from ..engine.executors import choose_executor
 from ..engine.plan import Inputs, Plan
 from ..engine.plugins import Plugins, read_plugins
-from ..results.calibration import FIT_STATUSES, calibration_template
+from ..results.calibration import calibration_template
+from ..results.schema import FIT_STATUSES
 from ..results.xarray_backend import save
 from .batch import VectorFunction
 from .fit import Bounds, DataPoints, Fit, Problem, fit_all, half_widths

@@ -28,13 +28,13 @@ from ..contact.models import find
 from ..contact.status import Status
 from ..contact.timestep import EXACT
 from ..contact.units import with_numbers
+from ..contact.variables import OUTPUTS
 from ..display import Block, Displayed
 from ..engine.build_impacts import build_impacts
 from ..engine.plan import Inputs, Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..errors import UsageError, did_you_mean
 from ..formatting import number, quantity
-from ..results.schema import SCHEMA
 from ..results.single_impact import single_point
 from ..results.sweep import sweep_in_memory
 from ..text import safe_text
@@ -229,7 +229,7 @@ def check_target(target: Mapping[str, float]) -> tuple[str, float]:
     ------
     UsageError : it is not one variable of a result with a finite value
     """
-    names = [variable.name for variable in SCHEMA if variable.dtype == "f8" and variable.per == "model"]
+    names = [name for name, variable in OUTPUTS.items() if variable.dtype == "f8" and "model" in variable.dims]
     if len(target) != 1:
         raise UsageError(f"--target: got {len(target)} targets, expected one, such as e_out=0.6")
     ((name, value),) = target.items()

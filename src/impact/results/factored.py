@@ -26,6 +26,7 @@ from ..contact.materials import Material
 from ..contact.model import Law, Parameter
 from ..contact.simulate import TABLE_COLUMNS, CollisionResult
 from ..contact.status import STATUSES, Status
+from ..contact.variables import OUTPUTS, Variable
 from ..engine.build_impacts import Stiffness, has_stiffness_rule, mass_at, values_at
 from ..engine.plan import Index, Inputs
 from ..engine.trajectories import TrajectoryMap
@@ -33,7 +34,7 @@ from ..errors import ResultError, UsageError
 from ..formatting import number
 from ..text import safe_text
 from .attributes import SummaryRecord, read_attribute
-from .schema import SCHEMA, SchemaVariable, attributes_of, count_points, derived_names, scale_of
+from .schema import attributes_of, count_points, derived_names, scale_of
 from .trajectory_table import MAX_STIFFNESS_VALUES, TrajectoryRows, TrajectoryTable, expand, whole_stiffness
 
 N_WITNESSES = 1_000
@@ -71,7 +72,7 @@ class StoredLaw:
 
 
 def factored_template(
-    result_template: xr.Dataset, table: TrajectoryTable, variables: Sequence[SchemaVariable]
+    result_template: xr.Dataset, table: TrajectoryTable, variables: Sequence[Variable]
 ) -> xr.Dataset:
     """The dataset of a factored file: coordinates, attributes, and variables with placeholder values.
 
@@ -165,7 +166,7 @@ def _placeholder(dim: str, size: int, dtype: np.dtype[Any], meaning: str) -> tup
 
 
 def table_values(
-    table: TrajectoryTable, variables: Sequence[SchemaVariable]
+    table: TrajectoryTable, variables: Sequence[Variable]
 ) -> Iterator[tuple[str, slice, NDArray[Any]]]:
     """The values of a factored file, a few at a time: name of the variable, region and values."""
     start = cell = 0
@@ -208,7 +209,7 @@ def witness_indices(points: int) -> NDArray[np.int64]:
 
 
 def witness_values(
-    table: TrajectoryTable, variables: Sequence[SchemaVariable], indices: NDArray[np.int64]
+    table: TrajectoryTable, variables: Sequence[Variable], indices: NDArray[np.int64]
 ) -> dict[str, NDArray[Any]]:
     """The values of some points of a result, by name; arrays of shape (len(indices),)."""
     models, cells = np.divmod(indices, table.inputs.cells)
@@ -410,7 +411,7 @@ def read_axis_names(dataset: xr.Dataset) -> list[str]:
     return names
 
 
-def check_witnesses(table: TrajectoryTable, variables: Sequence[SchemaVariable], stored: xr.Dataset) -> None:
+def check_witnesses(table: TrajectoryTable, variables: Sequence[Variable], stored: xr.Dataset) -> None:
     """Refuse a file whose witnesses expand to other numbers than those stored.
 
     Parameters
@@ -453,10 +454,10 @@ def check_witnesses(table: TrajectoryTable, variables: Sequence[SchemaVariable],
             )
 
 
-def witness_variables(stored: xr.Dataset) -> tuple[SchemaVariable, ...]:
+def witness_variables(stored: xr.Dataset) -> tuple[Variable, ...]:
     """The variables of a file's witnesses, with their dtypes in the file."""
     return tuple(
-        replace(variable, dtype=stored[f"witness_{variable.name}"].dtype.str[1:])
-        for variable in SCHEMA
-        if f"witness_{variable.name}" in stored
+        replace(variable, dtype=stored[f"witness_{name}"].dtype.str[1:])
+        for name, variable in OUTPUTS.items()
+        if f"witness_{name}" in stored
     )

@@ -23,6 +23,7 @@ from ..config.load import read_config
 from ..contact.impacts import Impacts
 from ..contact.model import ForceModel
 from ..contact.simulate import TABLE_COLUMNS, CollisionResult
+from ..contact.variables import Variable
 from ..engine import checkpoint
 from ..engine.execute import FindReused, integrate_ranges, reuse_nothing, with_core
 from ..engine.executors import SERIAL, ExecutorSpec, choose_executor
@@ -43,7 +44,7 @@ from ..text import safe_text
 from .factored import check_factored, factored_template, table_values
 from .netcdf import MAX_LABEL_BYTES, encode_text, is_text
 from .plausibility import material_notes
-from .schema import SchemaVariable, dataset_template, plan_coordinates, stored_variables
+from .schema import dataset_template, plan_coordinates, stored_variables
 from .summary import Summary, SweepOutcome, summarize, summarize_table, summary_record
 from .trajectory_table import TrajectoryTable, expanded_slabs, in_memory, lazy_dataset, table_of
 from .validation import is_name
@@ -480,7 +481,7 @@ def store_result(
     return SweepOutcome(whole, summary, progress.of_trajectories)
 
 
-def _summarize_points(table: TrajectoryTable, variables: Sequence[SchemaVariable]) -> Summary:
+def _summarize_points(table: TrajectoryTable, variables: Sequence[Variable]) -> Summary:
     """Summarize a trajectory table point by point; unlike `summarize` this has the radii."""
     summary = Summary()
     for model, region, impacts, values in expanded_slabs(table, variables):

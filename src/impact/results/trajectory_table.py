@@ -28,11 +28,12 @@ from ..contact.model import Law
 from ..contact.outputs import Outputs, outputs
 from ..contact.simulate import CollisionResult
 from ..contact.status import Status
+from ..contact.variables import Variable
 from ..engine.build_impacts import Stiffness, build_impacts, has_stiffness_rule
 from ..engine.plan import Index, Inputs, Plan, dimensions
 from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryMap, axes_of_arrays, even_size, probe_index
 from .attributes import SummaryRecord
-from .schema import SchemaVariable, attributes_of
+from .schema import attributes_of
 from .slabs import ORIGINAL_DIMS, VARIES_ALONG, aligned_slabs, slabs
 
 # a law's rule of K is evaluated as a whole, and stored in a file, up to this many values
@@ -274,9 +275,9 @@ class ExpandedArray(BackendArray):
     variable : the variable to compute
     """
 
-    def __init__(self, table: TrajectoryTable, variable: SchemaVariable) -> None:
+    def __init__(self, table: TrajectoryTable, variable: Variable) -> None:
         self.table, self.variable = table, variable
-        self.shape = ((len(table.laws),) if variable.per == "model" else ()) + table.inputs.shape
+        self.shape = ((len(table.laws),) if variable.per_model else ()) + table.inputs.shape
         self.dtype = np.dtype(variable.dtype)
 
     def __getitem__(self, key: indexing.ExplicitIndexer) -> Any:
@@ -287,7 +288,7 @@ class ExpandedArray(BackendArray):
         shape = tuple(part.size for part in positions)
         check_memory(self.variable.name, shape, self.dtype)
         values = np.empty(shape, self.dtype)
-        of_models = self.variable.per == "model"
+        of_models = self.variable.per_model
         models, axes = (positions[0], positions[1:]) if of_models else (np.zeros(1, np.intp), positions)
         for row, model in enumerate(models.tolist()):
             # a view, also if there is no axis
@@ -340,7 +341,7 @@ def max_indexed_bytes() -> int:
     return min(MAX_INDEXED_BYTES, whole // 2)
 
 
-def lazy_dataset(template: xr.Dataset, table: TrajectoryTable, variables: Sequence[SchemaVariable]) -> xr.Dataset:
+def lazy_dataset(template: xr.Dataset, table: TrajectoryTable, variables: Sequence[Variable]) -> xr.Dataset:
     """A result whose variables are computed when they are read.
 
     Parameters
@@ -354,7 +355,7 @@ def lazy_dataset(template: xr.Dataset, table: TrajectoryTable, variables: Sequen
     along = [varies_along(table, model, names) for model in range(len(table.laws))]
     computed = {}
     for variable in variables:
-        dims = ["model", *axes] if variable.per == "model" else axes
+        dims = ["model", *axes] if variable.per_model else axes
         by_model = {
             law.key: tuple(axes[axis] for axis in axes_by_variable[variable.name])
             for law, axes_by_variable in zip(table.laws, along, strict=True)
@@ -370,7 +371,7 @@ def lazy_dataset(template: xr.Dataset, table: TrajectoryTable, variables: Sequen
 
 
 def expanded_slabs(
-    table: TrajectoryTable, variables: Sequence[SchemaVariable], lengths: Sequence[int] = ()
+    table: TrajectoryTable, variables: Sequence[Variable], lengths: Sequence[int] = ()
 ) -> Iterator[tuple[int, tuple[slice, ...], Impacts, dict[str, NDArray[Any]]]]:
     """All values of a result, slab by slab: number of the model, region, impacts, and values by name.
 
@@ -385,7 +386,7 @@ def expanded_slabs(
     for model in range(len(table.laws)):
         for slab in aligned_slabs(sizes, lengths) if lengths else slabs(sizes):
             where = tuple(slab.values())
-            slab_variables = [variable for variable in variables if variable.per == "model" or model == 0]
+            slab_variables = [variable for variable in variables if variable.per_model or model == 0]
             index = table.inputs.index(where)
             impacts, arrays = _expand(table, model, index, [variable.name for variable in slab_variables])
             shape = tuple(part.stop - part.start for part in where)
@@ -397,7 +398,7 @@ def expanded_slabs(
             yield model, where, impacts, values
 
 
-def in_memory(dataset: xr.Dataset, table: TrajectoryTable, variables: Sequence[SchemaVariable]) -> xr.Dataset:
+def in_memory(dataset: xr.Dataset, table: TrajectoryTable, variables: Sequence[Variable]) -> xr.Dataset:
     """A result with all of its values in memory."""
     arrays = {variable.name: np.empty(dataset[variable.name].shape, variable.dtype) for variable in variables}
     for model, where, _, values in expanded_slabs(table, variables):

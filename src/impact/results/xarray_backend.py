@@ -20,13 +20,13 @@ from ..atomic import Sink, atomic_write, check_output, check_outputs
 from ..config.files import RESULT_MAGIC
 from ..config.grid import MAX_POINTS
 from ..config.tables import Output
+from ..contact.variables import OUTPUTS
 from ..errors import ResultError, UnfinishedError, UsageError
 from ..text import safe_text
 from .factored import check_witnesses, stored_table, witness_variables
 from .hdf5_structure import ReadBytes, byte_reader, check_root
 from .kinds import require_sweep
 from .netcdf import StoredArray, open_for_writing, read_variables
-from .schema import SCHEMA
 from .seal import check_seal, write_seal
 from .selection import model_positions, select
 from .slabs import slabs
@@ -236,9 +236,9 @@ def load(path: str | Path) -> xr.Dataset:
                 return dataset.load()
             # all variables of a slab together: they share most of the computation
             variables = [
-                replace(variable, dtype=dataset[variable.name].dtype.str[1:])
-                for variable in SCHEMA
-                if variable.name in dataset
+                replace(variable, dtype=dataset[name].dtype.str[1:])
+                for name, variable in OUTPUTS.items()
+                if name in dataset
             ]
             return in_memory(dataset, table, variables)
         except MemoryError:

@@ -18,7 +18,7 @@ from ..config.lines import path_text
 from ..config.load import Config
 from ..config.tables import power_of_two_problem
 from ..contact.model import ForceModel
-from ..contact.outputs import OUTPUTS
+from ..contact.variables import OUTPUTS
 from ..engine.plan import Plan
 from ..engine.run import Run
 from ..engine.trajectories import check_count
