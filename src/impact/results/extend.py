@@ -36,8 +36,8 @@ from .provenance import stored_config
 from .selection import IndexArray, match_labels
 from .summary import SweepOutcome
 from .sweep import Extension, SlabValues, sweep_into
-from .trajectory_table import TrajectoryTable
-from .xarray_backend import load, open_with_table
+from .trajectory_table import TrajectoryTable, table_of_result
+from .xarray_backend import load, open_result
 
 # statuses that are assigned before integration
 CHECKED_STATUSES = (Status.NO_IMPACT, Status.INVALID_PARAMETER, Status.OUT_OF_RANGE)
@@ -142,7 +142,8 @@ def _extend_into(output: Path, source: Path, overrides: Sequence[str], plugins: 
     had the same one.
     """
     name = str(source)
-    before, table = open_with_table(source)
+    before = open_result(source)
+    table = table_of_result(before)
     require_sweep(before, "extend")
     with before:
         config = stored_config(before.attrs, [], plugins, str(source), run.max_points)

@@ -40,7 +40,7 @@ from ..engine.trajectories import (
     trajectory_ranges,
 )
 from ..errors import ResultError, StoreError, UnfinishedError, UsageError
-from .factored import check_factored, factored_template, table_values
+from .factored import factored_template, stored_stiffness, table_values
 from .netcdf import MAX_LABEL_BYTES, encode_text, is_text
 from .plausibility import material_notes
 from .schema import dataset_template, plan_coordinates, stored_variables
@@ -271,7 +271,7 @@ def sweep_in_memory(plan: Plan, run: Run = DEFAULT_RUN) -> xr.Dataset:
         raise UnfinishedError("nothing was written")
     table, variables = table_of(plan, maps, range_reader(maps, finished.__getitem__)), stored_variables(plan)
     dataset = lazy_dataset(dataset_template(plan), table, variables)
-    return in_memory(dataset, table, variables) if dataset.nbytes <= MAX_LOADED_BYTES else dataset
+    return in_memory(dataset) if dataset.nbytes <= MAX_LOADED_BYTES else dataset
 
 
 def sweep_into(
@@ -374,7 +374,8 @@ def check_storable(plan: Plan) -> None:
     """Refuse a plan whose labels are too long or whose laws cannot be factored, before integration."""
     check_labels(plan)
     if plan.layout == "factored":
-        check_factored(plan.inputs, plan.models)
+        for law in plan.models:
+            stored_stiffness(plan.inputs, law)
 
 
 def check_labels(plan: Plan) -> None:
@@ -454,9 +455,9 @@ def store_result(
             _add_slab(summary, axes, model, region, impacts, values)
             check(summary.points)
 
-    def factored() -> Iterator[tuple[str, tuple[slice], NDArray[Any]]]:
-        for name, rows, array in table_values(table, variables):
-            yield name, (rows,), array
+    def factored() -> Iterator[tuple[str, tuple[int | slice, ...], NDArray[Any]]]:
+        for stored in table_values(table, variables):
+            yield stored
             check(0)
 
     is_full = plan.layout == "full"
