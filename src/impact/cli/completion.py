@@ -28,7 +28,7 @@ def complete_family(incomplete: str) -> list[str]:
 
 def complete_code(incomplete: str) -> list[str]:
     """The codes to which laws are exported."""
-    from ..exporters.codes import CODES
+    from ..exporters.registry import CODES
 
     return _beginning_with(incomplete, CODES)
 

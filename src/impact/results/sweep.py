@@ -40,8 +40,7 @@ from ..engine.trajectories import (
     trajectory_ranges,
 )
 from ..errors import ResultError, StoreError, UnfinishedError, UsageError
-from ..text import safe_text
-from .factored import check_factored, factored_template, table_values
+from .factored import factored_template, stored_stiffness, table_values
 from .netcdf import MAX_LABEL_BYTES, encode_text, is_text
 from .plausibility import material_notes
 from .schema import dataset_template, plan_coordinates, stored_variables
@@ -215,16 +214,15 @@ def sweep_to_file(
     run = Run(backend or SERIAL, resume, overwrite, max_points, on_progress, on_note, should_stop)
     plan = prepare(source, overrides, plugins, run)
     output = Path(output)
-    shown = safe_text(str(output))
     outcome = None if overwrite else find_finished(output, plan)
     if outcome is not None:
         checkpoint.remove_stale_work_folder(output, plan)
-        run.check_stop(f"{shown} already contains this sweep")
+        run.check_stop(f"{output} already contains this sweep")
         return outcome
     check_outputs([output], [source, *plugins, *plan.config.files], overwrite=overwrite)
     with run.connected() as connected:
         outcome = sweep_into(output, plan, connected)
-    run.check_stop(f"{shown} is complete")
+    run.check_stop(f"{output} is complete")
     return outcome
 
 
@@ -273,7 +271,7 @@ def sweep_in_memory(plan: Plan, run: Run = DEFAULT_RUN) -> xr.Dataset:
         raise UnfinishedError("nothing was written")
     table, variables = table_of(plan, maps, range_reader(maps, finished.__getitem__)), stored_variables(plan)
     dataset = lazy_dataset(dataset_template(plan), table, variables)
-    return in_memory(dataset, table, variables) if dataset.nbytes <= MAX_LOADED_BYTES else dataset
+    return in_memory(dataset) if dataset.nbytes <= MAX_LOADED_BYTES else dataset
 
 
 def sweep_into(
@@ -368,7 +366,7 @@ def reload_range(work_folder: checkpoint.WorkFolder, trajectory_range: Trajector
     """Load a finished range, or raise a `StoreError` if it is damaged."""
     collisions = work_folder.load(trajectory_range)
     if collisions is None:
-        raise StoreError(f"{safe_text(str(work_folder.path(trajectory_range.number)))}: can no longer be read")
+        raise StoreError(f"{work_folder.path(trajectory_range.number)}: can no longer be read")
     return collisions
 
 
@@ -376,7 +374,8 @@ def check_storable(plan: Plan) -> None:
     """Refuse a plan whose labels are too long or whose laws cannot be factored, before integration."""
     check_labels(plan)
     if plan.layout == "factored":
-        check_factored(plan.inputs, plan.models)
+        for law in plan.models:
+            stored_stiffness(plan.inputs, law)
 
 
 def check_labels(plan: Plan) -> None:
@@ -384,9 +383,7 @@ def check_labels(plan: Plan) -> None:
     columns = [name for axis in plan.config.axes for name in axis.columns]
     odd = [name for name in columns if InputName.parse(name).material and not is_name(name)]
     if odd:
-        raise UsageError(
-            f"{safe_text(odd[0])}: expected a material name without spaces and slashes, to be an axis"
-        )
+        raise UsageError(f"{odd[0]}: expected a material name without spaces and slashes, to be an axis")
     coordinates = plan_coordinates(plan).values()
     size = sum(encode_text(coordinate).size for coordinate in coordinates if is_text(coordinate))
     if size > MAX_LABEL_BYTES:
@@ -458,9 +455,9 @@ def store_result(
             _add_slab(summary, axes, model, region, impacts, values)
             check(summary.points)
 
-    def factored() -> Iterator[tuple[str, tuple[slice], NDArray[Any]]]:
-        for name, rows, array in table_values(table, variables):
-            yield name, (rows,), array
+    def factored() -> Iterator[tuple[str, tuple[int | slice, ...], NDArray[Any]]]:
+        for stored in table_values(table, variables):
+            yield stored
             check(0)
 
     is_full = plan.layout == "full"

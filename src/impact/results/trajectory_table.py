@@ -303,13 +303,20 @@ class ExpandedArray(BackendArray):
         return np.asarray(values[selected])
 
 
-def summary_of_variable(variable: xr.Variable) -> SummaryRecord | None:
-    """The summary in the file of a variable, if it has one and the variable is not a selection."""
+def computed_array(variable: xr.Variable) -> ExpandedArray | None:
+    """Find what computes a variable; None if it is stored or a selection."""
     data = variable._data
     if not isinstance(data, indexing.LazilyIndexedArray) or not isinstance(data.array, ExpandedArray):
         return None
     is_whole = all(isinstance(part, slice) and part == slice(None) for part in data.key.tuple)
-    return data.array.table.summary if is_whole else None
+    return data.array if is_whole else None
+
+
+def table_of_result(dataset: xr.Dataset) -> TrajectoryTable | None:
+    """Find the trajectory table that a whole result is computed from; None if its values are stored."""
+    arrays = [computed_array(variable.variable) for variable in dataset.values()]
+    tables = [None if array is None else array.table for array in arrays]
+    return tables[0] if tables and all(table is tables[0] for table in tables) else None
 
 
 def _without_dummy_axis(values: NDArray[Any], where: tuple[slice, ...]) -> NDArray[Any]:
@@ -398,13 +405,16 @@ def expanded_slabs(
             yield model, where, impacts, values
 
 
-def in_memory(dataset: xr.Dataset, table: TrajectoryTable, variables: Sequence[Variable]) -> xr.Dataset:
-    """A result with all of its values in memory."""
-    arrays = {variable.name: np.empty(dataset[variable.name].shape, variable.dtype) for variable in variables}
-    for model, where, _, values in expanded_slabs(table, variables):
-        for name, part in values.items():
+def in_memory(dataset: xr.Dataset) -> xr.Dataset:
+    """Compute all values of a result that is computed from a trajectory table."""
+    computed = {str(name): computed_array(variable.variable) for name, variable in dataset.items()}
+    expanded = [array for array in computed.values() if array is not None]
+    values = {array.variable.name: np.empty(array.shape, array.dtype) for array in expanded}
+    # all variables of a slab together: they share most of the computation
+    for model, where, _, parts in expanded_slabs(expanded[0].table, [array.variable for array in expanded]):
+        for name, part in parts.items():
             region: tuple[Any, ...] = (model, *where) if "model" in dataset[name].dims else where
-            arrays[name][region or ...] = part
+            values[name][region or ...] = part
     return dataset.assign(
-        {name: (dataset[name].dims, array, dataset[name].attrs) for name, array in arrays.items()}
+        {name: (dataset[name].dims, array, dataset[name].attrs) for name, array in values.items()}
     )
