@@ -46,9 +46,9 @@ def stored_config(
     """
     text = attributes.get("config")
     if text is None:
-        raise UsageError(f"{safe_text(name)}: contains no config, it is a time history")
+        raise UsageError(f"{name}: contains no config, it is a time history")
     if not isinstance(text, str):
-        raise ResultError(f"{safe_text(name)}: its attribute config is not text")
+        raise ResultError(f"{name}: its attribute config is not text")
     check_plugins(attributes, plugins, name)
     if not allow_changed_plugins:
         for reason in (*changed_plugins(attributes, plugins, name), *unknown_plugins(attributes, plugins, name)):
@@ -112,7 +112,7 @@ def check_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str)
         )
         ways = " and ".join(sorted({_how_to_supply(record) for record in missing.values()}))
         again = "it" if len(missing) == 1 else "them"
-        raise UsageError(f"{safe_text(name)}: made with {safe_text(named)}; give {again} again with {ways}")
+        raise UsageError(f"{name}: made with {safe_text(named)}; give {again} again with {ways}")
 
 
 def changed_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str) -> tuple[str, ...]:
