@@ -41,7 +41,14 @@ from .results.plausibility import material_notes
 from .results.provenance import config_of_part, stored_config
 from .results.replay_command import command_start
 from .results.shards import Shard, ShardProgress, merge as merge_shards, sweep_shard as write_shard
-from .results.single_impact import STARTER_CONFIG, Impact as Impact, histories, run_single_impact, single_point
+from .results.single_impact import (
+    STARTER_CONFIG,
+    Impact as Impact,
+    histories,
+    open_source,
+    run_single_impact,
+    single_point,
+)
 from .results.summary import SweepOutcome
 from .results.sweep import find_finished, sweep_in_memory, sweep_into
 from .results.xarray_backend import load as load, save as save
@@ -456,7 +463,7 @@ def run(
     if times is not None and times < 2:
         raise UsageError(f"times: got {times}, expected a whole number >= 2")
     plugin_set = read_plugins(plugins)
-    config, first = single_point(source, overrides, plugin_set, model, at)
+    config, first = single_point(open_source(source, overrides, plugin_set), model, at)
     return run_single_impact(Plan(config, plugin_set.of(config.models)), first, times)
 
 
@@ -503,15 +510,15 @@ def solve(
     'no_root'
     """
     # its module imports scipy.optimize, which other functions do without
-    from .inverse.solve import placeholder_override, solve_input, unknown_of
+    from .inverse.solve import placeholder, solve_input, unknown_of
 
     if over is not None and len(over) != 1:
         raise UsageError(f"--over: got {len(over)} inputs, expected one")
     plugin_set = read_plugins(plugins)
     law = find(model, plugin_set.models)
     unknown = unknown_of(law, name)
-    changes = [*placeholder_override(law, unknown), *overrides]
-    config, _ = single_point(source, changes, plugin_set, model, at, over)
+    values = {**placeholder(law, unknown), **(at or {})}
+    config, _ = single_point(open_source(source, overrides, plugin_set), model, values, over)
     return solve_input(config, plugin_set.of(config.models), unknown, target)
 
 
@@ -565,7 +572,7 @@ def timestep(
     # its module imports scipy.optimize, which other functions do without
     from .inverse.timestep import timestep_study
 
-    config, _ = single_point(source, overrides, read_plugins(plugins), model, at)
+    config, _ = single_point(open_source(source, overrides, read_plugins(plugins)), model, at)
     return timestep_study(
         config, steps_per_contact=steps_per_contact, dt=dt, phases=phases, tol=tol, scheme=scheme
     )

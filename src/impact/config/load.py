@@ -183,8 +183,7 @@ def build(draft: Draft, max_points: int = MAX_POINTS, purpose: Purpose = "sweep"
         draft = draft.with_problems(purpose_problems(draft.data))
     if draft.problems:
         raise draft.error()
-    files = tuple((draft.folder or Path()) / file for file in cases.named_files(draft.data))
-    for step in (_inline_files, add_library_materials, _expand_cases, _expand_measurements):
+    for step in (inline_files, add_library_materials, _expand_cases, _expand_measurements):
         draft = step(draft)
     document, invalid_values = _validate(draft)
     draft = check_rules(draft.with_problems(invalid_values))
@@ -246,15 +245,19 @@ def build(draft: Draft, max_points: int = MAX_POINTS, purpose: Purpose = "sweep"
         data=draft.measurements,
         design=document.design,
         distributions=distributions,
-        files=files,
+        files=draft.files or (),
     )
 
 
-def _inline_files(draft: Draft) -> Draft:
+def inline_files(draft: Draft) -> Draft:
+    """Replace the names of CSV files by the values in them."""
+    if draft.files is not None:
+        return draft
+    files = tuple((draft.folder or Path()) / file for file in cases.named_files(draft.data))
     for inline in (cases.inline_files, measurements.inline_measurements):
         data, texts, lines = inline(draft.data, draft.folder, draft.known_models, draft.exponent)
         settings = (*draft.settings, *map(Setting.parse, texts))
-        draft = replace(draft, data=data, settings=settings, lines=(*draft.lines, *lines))
+        draft = replace(draft, data=data, settings=settings, files=files, lines=(*draft.lines, *lines))
     return draft
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 from ..config.load import Config
 from ..contact.impacts import Impacts
@@ -14,9 +14,9 @@ from ..contact.models import find
 from ..engine.plugins import Plugins
 from ..errors import UsageError, did_you_mean
 from ..formatting import number
-from ..inverse.solve import placeholder_override, solve_input, unknown_of
+from ..inverse.solve import placeholder, solve_input, unknown_of
 from ..inverse.timestep import FixedStepLaw, fixed_step_law
-from ..results.single_impact import ConfigSource, models_of_source, single_point
+from ..results.single_impact import ConfigSource, open_source, single_point
 from ..text import safe_text
 from .code import Code, Collision
 
@@ -158,9 +158,10 @@ def prepare_export(
     ConfigError : an input is not allowed
     """
     plugins, laws, missing = Plugins(()), tuple(code.laws), ""
+    point_source = open_source(source, overrides, plugins)
     if model is not None:
         key = law_of_code(code, model, version)
-    elif models := models_of_source(source, overrides, plugins):
+    elif models := point_source.models:
         key = first_law(code, models, version)
     else:
         key, newest = (first_law(code, laws, release) for release in (version, code.newest))
@@ -174,16 +175,15 @@ def prepare_export(
         solved = f"{key}.{parameter}"
         if solved in at:
             raise UsageError(f"--at: got e and {solved}, expected one of the two")
-        changes = [*placeholder_override(law, unknown_of(law, parameter)), *overrides]
-        config, _ = single_point(source, changes, plugins, key, at)
-        del at["e"]
+        at |= placeholder(law, unknown_of(law, parameter))
+    config, first = single_point(point_source, key, at)
+    if solved:
         wanted = float(config.scalars["e"])
         result = solve_input(config, plugins, unknown_of(law, parameter), {"e_out": wanted})
         if not result.roots:
             least, most = map(number, result.attainable)
             raise UsageError(f"--at e={number(wanted)}: {key} delivers {least} to {most} at any {parameter}")
-        at[solved] = result.roots[0].value
-    config, first = single_point(source, overrides, plugins, key, at)
+        config = replace(config, scalars={**config.scalars, solved: result.roots[0].value})
     fixed, collision = fixed_step_law(config, PHASES, code.scheme)
     return ExportProblem(
         code=code,

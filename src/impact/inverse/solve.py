@@ -109,13 +109,13 @@ def unknown_of(model: ForceModel, name: str) -> Parameter:
     return unknowns[name]
 
 
-def placeholder_override(model: ForceModel, unknown: Parameter) -> list[str]:
-    """The override that gives the unknown a valid value, so that the config needs none."""
+def placeholder(model: ForceModel, unknown: Parameter) -> dict[str, float]:
+    """Give the unknown a valid value by its config name, so that the config needs none."""
     if unknown.name == "K":
-        return []
+        return {}
     value = next((v for v in (unknown.default, unknown.typical) if v is not None), 1.0)
-    value = min(max(value, unknown.least), unknown.most)
-    return [f"sweep.e={value!r}" if unknown.name == "e" else f"model.{model.key}.{unknown.name}={value!r}"]
+    name = "e" if unknown.name == "e" else f"{model.key}.{unknown.name}"
+    return {name: min(max(value, unknown.least), unknown.most)}
 
 
 def check_target(target: Mapping[str, float]) -> tuple[str, float]:
