@@ -29,8 +29,9 @@ from impact.contact.closed_forms.hysteresis import delivered_restitution
 from impact.contact.impacts import Impacts
 from impact.contact.model import ForceModel
 from impact.contact.numba.dispatch import is_installed
-from impact.contact.outputs import OUTPUTS, collide
-from impact.engine.executors import choose_backend
+from impact.contact.outputs import collide
+from impact.contact.variables import OUTPUTS
+from impact.engine.executors import choose_executor
 from impact.engine.trajectories import RANGE_TRAJECTORIES, even_size
 
 # models of the paper whose restitution depends on e only: equations (10), (19)-(23), (28), (29), (33) and (43)
@@ -106,7 +107,7 @@ def run_core(e: np.ndarray, rtol: float, core: str, threads: int = 1) -> tuple[f
         values = {name: contact[name] for name in OUTPUTS}
         return float(np.max(np.abs(values["closed_form_error"]))), int(values["steps"].sum())
 
-    with choose_backend(1, threads).executor() as pool:
+    with choose_executor(1, threads).start() as pool:
         start = time.perf_counter()
         errors, steps = zip(*pool.map(run_block, blocks), strict=True)
         seconds = time.perf_counter() - start

@@ -19,9 +19,10 @@ from rich.console import Console
 from rich.table import Table
 
 from bench_core import PAPER_MODELS
-from impact.api import execute, prepare
 from impact.contact.numba.dispatch import is_installed
-from impact.engine.executors import choose_backend
+from impact.engine.executors import choose_executor
+from impact.engine.run import Run
+from impact.results.sweep import prepare, sweep_in_memory
 
 
 def sweep_rate(impacts: int, rtol: float, core: str, jobs: int, threads: int) -> float:
@@ -41,7 +42,7 @@ def sweep_rate(impacts: int, rtol: float, core: str, jobs: int, threads: int) ->
     }
     plan = prepare(config)
     start = time.perf_counter()
-    execute(plan, choose_backend(jobs, threads))
+    sweep_in_memory(plan, Run(choose_executor(jobs, threads)))
     return plan.points / (time.perf_counter() - start)
 
 

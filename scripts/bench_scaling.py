@@ -31,12 +31,11 @@ import psutil
 from rich.console import Console
 from rich.table import Table
 
-from impact.api import prepare
 from impact.engine.dask import cluster
 from impact.engine.execute import context_of, integrate_columns, integrate_remotely, with_core
-from impact.engine.executors import BLOCKS_IN_FLIGHT, Backend, choose_backend
+from impact.engine.executors import RANGES_IN_FLIGHT, ExecutorSpec, choose_executor
 from impact.engine.plan import Plan
-from impact.engine.progress import Progress
+from impact.engine.run import Progress, Run
 from impact.engine.trajectories import (
     RANGE_TRAJECTORIES,
     Columns,
@@ -44,7 +43,7 @@ from impact.engine.trajectories import (
     trajectory_maps,
     trajectory_ranges,
 )
-from impact.results.sweep import sweep_into
+from impact.results.sweep import prepare, sweep_into
 
 IDLE_TIME_S = 5.0
 MODELS = ("lankarani-nikravesh-1990", "gharib-hurmuzlu-2012")
@@ -107,12 +106,12 @@ class Cost:
         return Cost(*(getattr(self, name) - getattr(start, name) for name in vars(self)))
 
 
-def best_cost(plan: Plan, backend: Backend, scheduler: psutil.Process | None = None) -> tuple[float, Cost]:
+def best_cost(plan: Plan, executor: ExecutorSpec, scheduler: psutil.Process | None = None) -> tuple[float, Cost]:
     """Seconds of a whole sweep, and the cost of its integration; the fastest of three runs."""
-    return min((sweep_cost(plan, backend, scheduler) for _ in range(3)), key=lambda timing: timing[0])
+    return min((sweep_cost(plan, executor, scheduler) for _ in range(3)), key=lambda timing: timing[0])
 
 
-def sweep_cost(plan: Plan, backend: Backend, scheduler: psutil.Process | None) -> tuple[float, Cost]:
+def sweep_cost(plan: Plan, executor: ExecutorSpec, scheduler: psutil.Process | None) -> tuple[float, Cost]:
     """Seconds of a whole sweep, and the cost of its integration."""
     start, integration = Cost.now(scheduler), []
 
@@ -121,7 +120,7 @@ def sweep_cost(plan: Plan, backend: Backend, scheduler: psutil.Process | None) -
             integration.append(Cost.now(scheduler))
 
     with tempfile.TemporaryDirectory() as folder:
-        sweep_into(Path(folder) / "results.h5", plan, backend=backend, on_progress=on_progress)
+        sweep_into(Path(folder) / "results.h5", plan, Run(executor, on_progress=on_progress))
     return Cost.now(scheduler).since(start).wall, integration[-1].since(integration[0])
 
 
@@ -130,17 +129,17 @@ def dask_cost(plan: Plan, key: str, columns: Columns, workers: int) -> tuple[flo
     with (
         tempfile.TemporaryDirectory() as folder,
         dask_processes(Path(folder), workers) as (file, scheduler),
-        cluster(file) as joined,
+        cluster(file) as spec,
     ):
-        while joined.backend.capacity() < BLOCKS_IN_FLIGHT * workers:
+        while spec.capacity() < RANGES_IN_FLIGHT * workers:
             time.sleep(0.1)
-        with joined.backend.executor() as executor:
+        with spec.start() as executor:
             context = context_of(plan)
             wait([executor.submit(integrate_remotely, key, columns, context) for _ in range(4 * workers)])
         start = Cost.now(scheduler)
         time.sleep(IDLE_TIME_S)
         idle = Cost.now(scheduler).since(start)
-        seconds, cost = best_cost(plan, joined.backend, scheduler)
+        seconds, cost = best_cost(plan, spec, scheduler)
         share = cost.wall / idle.wall
         driver, scheduling = cost.driver - share * idle.driver, cost.scheduler - share * idle.scheduler
         return seconds, Cost(cost.wall, driver, scheduling, cost.bytes_sent)
@@ -171,8 +170,8 @@ def main() -> None:
     worker_time = range_time(plan, key, columns)
     print(f"{plan.points:,} points, {len(ranges)} ranges, {args.core}, {os.cpu_count()} cores")
     table = Table("", "trajectories/s", "ratio", "driver", "scheduler", "bytes", box=None)
-    single, _ = best_cost(plan, choose_backend(1))
-    for name, seconds in (("1 process", single), ("2 processes", best_cost(plan, choose_backend(2))[0])):
+    single, _ = best_cost(plan, choose_executor(1))
+    for name, seconds in (("1 process", single), ("2 processes", best_cost(plan, choose_executor(2))[0])):
         table.add_row(name, f"{plan.points / seconds:,.0f}", f"{single / seconds:.2f}")
     for workers in (1, 2):
         seconds, cost = dask_cost(plan, key, columns, workers)

@@ -31,9 +31,9 @@ from pathlib import Path
 from types import FrameType
 
 import impact
-from impact.api import prepare
 from impact.config.load import read_config
 from impact.errors import ConfigError, Interruption
+from impact.results.sweep import prepare
 
 ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT))

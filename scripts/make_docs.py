@@ -5,15 +5,16 @@ python scripts/make_docs.py
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import impact
 from gallery import gallery_page, write_gallery
 from impact.contact.status import Status
+from impact.contact.variables import Variable
 from impact.plots.style import save_figure
-from impact.results.calibration import CALIBRATION_VARIABLES
-from impact.results.schema import HISTORY_VARIABLES, SCHEMA, SCHEMA_VERSION
-from impact.results.sensitivity import SENSITIVITY_VARIABLES
+from impact.results.kinds import Kind
+from impact.results.schema import SCHEMA, SCHEMA_VERSION, udunits
 from models_page import models_page
 from models_pictures import pictures
 
@@ -140,29 +141,29 @@ The result of `impact sensitivity` has the dimensions `model`, the axes other th
 
 def schema_page() -> str:
     """docs/schema.md as text."""
-    variables = []
-    for variable in SCHEMA:
-        dims = "model, axes" if variable.per == "model" else "axes"
-        cells = (variable.unit, dims, variable.judged, variable.meaning, variable.equation.replace("|", "\\|"))
-        variables.append(f"| `{variable.name}` | {' | '.join(cells)} |")
+
+    def rows(kind: Kind, cells: Callable[[Variable], Sequence[str]]) -> list[str]:
+        return [f"| `{name}` | {' | '.join(cells(variable))} |" for name, variable in SCHEMA[kind].items()]
+
+    def output_cells(variable: Variable) -> Sequence[str]:
+        equation = variable.equation.replace("|", "\\|")
+        return udunits(variable.unit), ", ".join(variable.dims), variable.judged, variable.meaning, equation
+
     statuses = [f"| {status.value} | {status.name.lower()} | {status.meaning} |" for status in Status]
-    history = [f"| `{name}` | {unit} | {meaning} |" for name, unit, meaning in HISTORY_VARIABLES]
-    calibration = [
-        f"| `{name}` | {variable.unit} | {', '.join(variable.dims)} | {variable.scale} | {variable.meaning} |"
-        for name, variable in CALIBRATION_VARIABLES.items()
-    ]
-    sensitivity = [
-        f"| `{name}` | {dimension} | {meaning} |" for name, (dimension, meaning) in SENSITIVITY_VARIABLES.items()
-    ]
     tables = {
-        "variables": variables,
+        "variables": rows("sweep", output_cells),
         "statuses": statuses,
-        "history": history,
-        "calibration": calibration,
-        "sensitivity": sensitivity,
+        "history": rows("history", lambda variable: (udunits(variable.unit), variable.meaning)),
+        "calibration": rows(
+            "calibration",
+            lambda variable: (variable.unit, ", ".join(variable.dims), variable.scale, variable.meaning),
+        ),
+        "sensitivity": rows(
+            "sensitivity study", lambda variable: (", ".join(variable.dims[2:]), variable.meaning)
+        ),
     }
-    on_request = ", ".join(f"`{variable.name}`" for variable in SCHEMA if not variable.by_default)
-    rows_as_text = {name: "\n".join(rows) for name, rows in tables.items()}
+    on_request = ", ".join(f"`{name}`" for name, variable in SCHEMA["sweep"].items() if variable.on_request)
+    rows_as_text = {name: "\n".join(lines) for name, lines in tables.items()}
     return SCHEMA_PAGE.format(on_request=on_request, version=SCHEMA_VERSION, **rows_as_text)
 
 

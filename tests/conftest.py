@@ -68,7 +68,7 @@ def assert_same_output(printed: str, expected: str) -> None:
 
 def default_law(code: str) -> str:
     """The first law of a code to which laws are exported."""
-    from impact.exporters.codes import CODES
+    from impact.exporters.registry import CODES
 
     return next(iter(CODES[code].laws))
 
@@ -100,7 +100,7 @@ def sweeps(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SweepServer]:
 @pytest.fixture(scope="session")
 def silent_programs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with programs of the codes that laws are exported to, which print nothing."""
-    from impact.exporters.codes import CODES
+    from impact.exporters.registry import CODES
 
     folder = tmp_path_factory.mktemp("silent")
     for program in {code.program for code in CODES.values()} - {"", "python"}:

@@ -1,14 +1,11 @@
 """Inject faults into sweeps: the command line in real processes, in which a system call is interrupted or fails.
 
-A server imports the modules of a sweep once, makes blocks and slabs small, and forks. It reads requests from
-standard input, one per line: a command to start or a process to wait for. It writes one reply per line to standard
-output: a process id or an exit status.
+Their server makes blocks and slabs small; a child installs its fault before it executes the command line.
 """
 
 from __future__ import annotations
 
 import errno
-import gc
 import hashlib
 import io
 import itertools
@@ -18,7 +15,6 @@ import resource
 import shutil
 import signal
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -26,9 +22,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
-from .fork_server import POLL_INTERVAL_S, ROOT, run_command
+from .fork_server import POLL_INTERVAL_S, ForkServer, serve, start_fork_server
 
 # small, for many blocks and slabs in a short time
 BLOCK_TRAJECTORIES, SLAB_POINTS = 64, 128
@@ -182,17 +178,6 @@ def _log_progress(log_fd: int) -> None:
 # ---- the server
 
 
-def serve() -> None:
-    """Answer requests until standard input is closed."""
-    _warm_up()
-    # the garbage collector of a child need not visit the shared objects
-    gc.freeze()
-    for line in sys.stdin:
-        request = json.loads(line)
-        reply = _start(**request["start"]) if "start" in request else _wait(**request["wait"])
-        print(json.dumps(reply), flush=True)
-
-
 def _warm_up() -> None:
     """Make blocks and slabs small before other modules import their sizes, and import the modules of a sweep."""
     from impact.engine import trajectories
@@ -211,37 +196,14 @@ def _warm_up() -> None:
             impact.cli.sweep.sweep(config, result, quiet=True, overwrite=True)
 
 
-def _start(argv: list[str], cwd: str, output: str, fault: list[Any]) -> int:
-    child = os.fork()
-    if child == 0:
-        _become(argv, cwd, output, fault)
-    return child
-
-
-def _become(argv: list[str], cwd: str, output: str, fault: list[Any]) -> NoReturn:
-    """In the child: install the fault and execute the command, in a separate process group."""
+def begin(log: str, fault: Sequence[Any]) -> None:
+    """In the child: install the fault, in a separate process group."""
     os.setpgid(0, 0)
-    log_fd = os.open(f"{output}.log", os.O_WRONLY | os.O_CREAT | os.O_APPEND)
+    log_fd = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
     _log_progress(log_fd)
     if fault:
         faults = (send_signals, fail_disk, record_operations, limit_file_size)
         {install.__name__: install for install in faults}[fault[0]](log_fd, *fault[1:])
-    with open(f"{output}.out", "wb") as out, open(f"{output}.err", "wb") as err:
-        run_command(argv, cwd, "", out.fileno(), err.fileno())
-
-
-def _wait(pid: int, limit: float) -> int | None:
-    """Wait for a child; return its exit status, or None if it was killed after the time limit [s]."""
-    start_time = time.monotonic()
-    while True:
-        ended_pid, status = os.waitpid(pid, os.WNOHANG)
-        if ended_pid:
-            return os.waitstatus_to_exitcode(status)
-        if time.monotonic() - start_time > limit:
-            os.kill(pid, signal.SIGKILL)
-            os.waitpid(pid, 0)
-            return None
-        time.sleep(POLL_INTERVAL_S)
 
 
 # ---- the client
@@ -266,13 +228,13 @@ class FinishedSweep:
 class RunningSweep:
     """A command line that has been started; its process id stays reserved until `wait`."""
 
-    sweeps: SweepServer
+    forked: ForkServer
     pid: int
-    output: Path
+    log_file: Path
 
     def log(self) -> Log:
-        path = self.output.with_suffix(".log")
-        return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+        exists = self.log_file.exists()
+        return [json.loads(line) for line in self.log_file.read_text().splitlines()] if exists else []
 
     def wait_until(self, *words: Any) -> None:
         """Wait until the log has an entry that starts with these words, or the process has ended."""
@@ -303,10 +265,9 @@ class RunningSweep:
 
     def wait(self, limit: float = TIMEOUT_S) -> FinishedSweep:
         """Wait for the end; fail after the time limit [s]."""
-        code = self.sweeps.ask({"wait": {"pid": self.pid, "limit": limit}})
-        texts = [self.output.with_suffix(end).read_text() for end in (".out", ".err")]
-        assert code is not None, ("the process hangs", *texts)
-        return FinishedSweep(code, *texts, self.log())
+        ended = self.forked.wait(self.pid, limit)
+        assert not ended.timed_out, ("the process hangs", ended)
+        return FinishedSweep(ended.returncode, ended.stdout, ended.stderr, self.log())
 
 
 def wait_until(condition: Callable[[], bool]) -> None:
@@ -337,27 +298,20 @@ def parent_process(pid: int) -> int:
 class SweepServer:
     """The client of a server, and a folder for logs and outputs; `sweeps(...)` runs a command line to its end."""
 
-    server: subprocess.Popen[str]
+    forked: ForkServer
     base: Path
     text: str = CONFIG_TEXT
     count: Iterator[int] = field(default_factory=itertools.count)
     digests: dict[str, str] = field(default_factory=dict)
 
-    def ask(self, request: object) -> int | None:
-        assert self.server.stdin is not None
-        assert self.server.stdout is not None
-        print(json.dumps(request), file=self.server.stdin, flush=True)
-        reply: int | None = json.loads(self.server.stdout.readline())
-        return reply
-
     def start(self, *words: str | Path | int, cwd: Path, fault: Sequence[Any] = ()) -> RunningSweep:
         """Start `impact sweep c.toml -o results.h5` with more words, in a folder with the config."""
-        output = self.base / str(next(self.count))
-        argv = ["sweep", CONFIG, "-o", RESULT, "--quiet", *map(str, words)]
-        start = {"argv": argv, "cwd": str(cwd), "output": str(output), "fault": [*fault]}
-        pid = self.ask({"start": start})
-        assert pid is not None
-        return RunningSweep(self, pid, output)
+        log = self.base / f"{next(self.count)}.log"
+        code = (
+            f"import json\nfrom tests.faults import begin\nbegin(*json.loads({json.dumps([str(log), fault])!r}))"
+        )
+        pid = self.forked.start("sweep", CONFIG, "-o", RESULT, "--quiet", *words, cwd=cwd, code=code)
+        return RunningSweep(self.forked, pid, log)
 
     def __call__(
         self, *words: str | Path | int, cwd: Path, fault: Sequence[Any] = (), limit: float = TIMEOUT_S
@@ -377,8 +331,7 @@ class SweepServer:
 
     def expected_digest(self, folder: Path) -> str:
         """The SHA-256 of the result of a folder's config, computed in this process without a fault."""
-        from impact.api import prepare
-        from impact.results.sweep import sweep_into
+        from impact.results.sweep import prepare, sweep_into
 
         text = (folder / CONFIG).read_text()
         if text not in self.digests:
@@ -415,7 +368,7 @@ class SweepServer:
         """A folder that a sweep killed at an operation leaves."""
         folder = self.folder()
         killed = self(cwd=folder, fault=("send_signals", operation, signal.SIGKILL))
-        assert killed.returncode == -signal.SIGKILL
+        assert killed.returncode == -signal.SIGKILL, killed
         return folder
 
     @cached_property
@@ -504,22 +457,9 @@ def mount_tmpfs(folder: Path, options: str) -> Iterator[None]:
 @contextmanager
 def start_sweep_server(base: Path) -> Iterator[SweepServer]:
     """Start a server; it ends with the context."""
-    single_thread = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-    command = [sys.executable, "-m", "tests.faults"]
-    with subprocess.Popen(
-        command,
-        cwd=ROOT,
-        env={**os.environ, **single_thread},
-        text=True,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-    ) as server:
-        try:
-            yield SweepServer(server, base)
-        finally:
-            assert server.stdin is not None
-            server.stdin.close()
+    with start_fork_server("tests.faults") as forked:
+        yield SweepServer(forked, base)
 
 
 if __name__ == "__main__":
-    serve()
+    serve(_warm_up)

@@ -1,8 +1,8 @@
 """Run the command line in hundreds of processes: a server imports the modules once and forks for each command.
 
-The server reads requests from standard input, one JSON object per line, such as
-{"argv": [...], "cwd": "...", "limit": seconds, "environment": {...}}, and writes one reply per line to standard
-output. It has a single thread: a lock held by another thread at the fork would never be released in the child.
+The server reads requests from standard input, one JSON object per line: {"start": {...}}, whose reply is a process
+id, or {"wait": {...}}, whose reply is what became of the process. It has a single thread: a lock held by another
+thread at the fork would never be released in the child.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import io
 import json
 import os
 import pty
+import shutil
 import signal
 import struct
 import subprocess
@@ -24,11 +25,11 @@ import termios
 import threading
 import time
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import IO, NoReturn
+from typing import Any, NoReturn
 
 ROOT = Path(__file__).parent.parent
 POLL_INTERVAL_S = 0.002  # between checks whether a child has ended
@@ -52,44 +53,52 @@ class ForkServer:
 
     server: subprocess.Popen[str]
 
-    def __call__(
+    def ask(self, request: object) -> Any:
+        assert self.server.stdin is not None
+        assert self.server.stdout is not None
+        print(json.dumps(request), file=self.server.stdin, flush=True)
+        return json.loads(self.server.stdout.readline())
+
+    def start(
         self,
-        *words: str | Path,
+        *words: str | Path | int,
         cwd: Path = ROOT,
-        limit: float = 30.0,
         code: str = "",
         stdout: str = "",
         stderr: str = "",
         **environment: str,
-    ) -> CompletedCommand:
-        """Run a command line.
+    ) -> int:
+        """Start a command line; return its process id, which stays reserved until `wait`.
 
         `code` is Python code that the child executes first. `stdout` and `stderr` are paths of files or terminals;
-        without a path the output is captured. After `limit` seconds the child is killed.
+        without a path the output is captured.
         """
-        assert self.server.stdin is not None
-        assert self.server.stdout is not None
         request = {
             "argv": [str(word) for word in words],
             "cwd": str(cwd),
-            "limit": limit,
-            "environment": environment,
             "code": code,
             "stdout": stdout,
             "stderr": stderr,
+            "environment": environment,
         }
-        print(json.dumps(request), file=self.server.stdin, flush=True)
-        return CompletedCommand(**json.loads(self.server.stdout.readline()))
+        return int(self.ask({"start": request}))
+
+    def wait(self, pid: int, limit: float) -> CompletedCommand:
+        """Wait for the end of a command; after `limit` seconds it is killed."""
+        return CompletedCommand(**self.ask({"wait": {"pid": pid, "limit": limit}}))
+
+    def __call__(self, *words: str | Path, limit: float = 30.0, **options: Any) -> CompletedCommand:
+        """Run a command line to its end; see `start` for the options."""
+        return self.wait(self.start(*words, **options), limit)
 
 
 @contextmanager
-def start_fork_server() -> Iterator[ForkServer]:
-    """Start a server; it ends with the context."""
+def start_fork_server(module: str = "tests.fork_server") -> Iterator[ForkServer]:
+    """Start the server of a module; it ends with the context."""
     # threads that a library starts before the fork do not exist in the child
     single_thread = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-    command = [sys.executable, "-m", "tests.fork_server"]
     with subprocess.Popen(
-        command,
+        [sys.executable, "-m", module],
         cwd=ROOT,
         env={**os.environ, **single_thread},
         text=True,
@@ -147,22 +156,30 @@ def printed_on_terminal(
     return completed, printed.decode()
 
 
-def serve() -> None:
+def serve(warm_up: Callable[[], None]) -> None:
     """Answer requests until standard input is closed."""
-    _warm_up()
+    warm_up()
+    # the garbage collector of a child would visit the shared objects, and so copy their memory
+    gc.freeze()
+    # a TemporaryDirectory would be removed by the first child that ends
+    folder = tempfile.mkdtemp()
     for line in sys.stdin:
-        request = json.loads(line)
-        with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
-            child = os.fork()
-            if child == 0:
-                os.environ |= request["environment"]
-                streams = [
-                    os.open(request[name], os.O_WRONLY) if request[name] else file.fileno()
-                    for name, file in (("stdout", out), ("stderr", err))
-                ]
-                run_command(request["argv"], request["cwd"], request["code"], *streams)
-            completed = _wait(child, request["limit"], out, err)
-        print(json.dumps(asdict(completed)), flush=True)
+        ((name, request),) = json.loads(line).items()
+        reply = _start(folder, **request) if name == "start" else asdict(_wait(folder, **request))
+        print(json.dumps(reply), flush=True)
+    shutil.rmtree(folder)
+
+
+def _start(folder: str, environment: dict[str, str], **request: Any) -> int:
+    """In the server: fork a child that executes a command line; what it prints is captured in files of its id."""
+    child = os.fork()
+    if child == 0:
+        os.environ |= environment
+        for name in ("stdout", "stderr"):
+            path = request[name] or f"{folder}/{os.getpid()}.{name}"
+            request[name] = os.open(path, os.O_WRONLY | (0 if request[name] else os.O_CREAT))
+        run_command(**request)
+    return child
 
 
 # the server runs these commands once: modules are then loaded and caches filled in every child
@@ -200,15 +217,13 @@ def _warm_up() -> None:
             assert not app(words.split(), standalone_mode=False, prog_name="impact"), words
         os.chdir(before)
     assert threading.active_count() == 1
-    # the garbage collector of a child would visit the shared objects, and so copy their memory
-    gc.freeze()
 
 
-def run_command(argv: list[str], cwd: str, program: str, stdout: int, stderr: int) -> NoReturn:
+def run_command(argv: list[str], cwd: str, code: str, stdout: int, stderr: int) -> NoReturn:
     """In the child: execute a command line and exit as the interpreter does."""
     from impact.cli.main import main
 
-    code: object = 99
+    status: object = 99
     try:
         os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
         os.dup2(stdout, 1)
@@ -218,10 +233,10 @@ def run_command(argv: list[str], cwd: str, program: str, stdout: int, stderr: in
         sys.stderr = os.fdopen(2, "w", buffering=1, closefd=False)
         os.chdir(cwd)
         sys.argv = ["impact", *argv]
-        exec(program, {})
+        exec(code, {})
         main()
     except SystemExit as leaving:
-        code = leaving.code or 0
+        status = leaving.code or 0
     except BaseException:
         traceback.print_exc()
     finally:
@@ -230,29 +245,31 @@ def run_command(argv: list[str], cwd: str, program: str, stdout: int, stderr: in
                 stream.flush()
             except OSError:
                 # the exit status of the interpreter if it cannot flush
-                code = 120
+                status = 120
         # libraries close their files at exit and can crash there; os._exit would hide that
         atexit._run_exitfuncs()
-        ctypes.CDLL(None).exit(code if isinstance(code, int) else 99)
+        ctypes.CDLL(None).exit(status if isinstance(status, int) else 99)
     raise AssertionError("not reached")
 
 
-def _wait(child: int, limit: float, out: IO[bytes], err: IO[bytes]) -> CompletedCommand:
-    """In the server: wait for the child, and kill it after the time limit."""
+def _wait(folder: str, pid: int, limit: float) -> CompletedCommand:
+    """In the server: wait for a child, and kill it after the time limit."""
     start = time.monotonic()
     timed_out = False
     while True:
-        pid, status, usage = os.wait4(child, os.WNOHANG)
-        if pid:
+        ended_pid, status, usage = os.wait4(pid, os.WNOHANG)
+        if ended_pid:
             break
         if not timed_out and time.monotonic() - start > limit:
-            os.kill(child, signal.SIGKILL)
+            os.kill(pid, signal.SIGKILL)
             timed_out = True
         time.sleep(POLL_INTERVAL_S)
     texts = []
-    for stream in (out, err):
-        stream.seek(0)
-        texts.append(stream.read().decode(errors="backslashreplace"))
+    for name in ("stdout", "stderr"):
+        # a stream that was sent to a file or a terminal is not captured
+        captured = Path(folder, f"{pid}.{name}")
+        texts.append(captured.read_bytes().decode(errors="backslashreplace") if captured.exists() else "")
+        captured.unlink(missing_ok=True)
     # ru_maxrss is in units of 1024 bytes, on macOS in bytes
     unit = 1 if sys.platform == "darwin" else 1024
     return CompletedCommand(
@@ -265,4 +282,4 @@ def _wait(child: int, limit: float, out: IO[bytes], err: IO[bytes]) -> Completed
 
 
 if __name__ == "__main__":
-    serve()
+    serve(_warm_up)

@@ -20,6 +20,7 @@ from impact.contact.status import Status
 from impact.engine.checkpoint import open_work_folder
 from impact.engine.plan import Plan
 from impact.engine.plugins import read_plugins
+from impact.engine.run import Run
 from impact.errors import ModelError, UsageError
 from impact.results.sweep import find_finished
 
@@ -143,11 +144,11 @@ def test_a_model_that_closes_over_values_is_never_the_same_as_another(tmp_path: 
     for model in (*closed, partly):
         plan = Plan(read_config(config, (), [model]), read_plugins([model]))
         assert find_finished(tmp_path / "result.h5", plan) is None
-        with open_work_folder(tmp_path / "work", plan, resume=False, overwrite=True):
+        with open_work_folder(tmp_path / "work", plan, Run(overwrite=True)):
             pass
         with (
             pytest.raises(UsageError, match="mine-2026 has no file, so it cannot be compared"),
-            open_work_folder(tmp_path / "work", plan, resume=True, overwrite=False),
+            open_work_folder(tmp_path / "work", plan, Run(resume=True)),
         ):
             pass
     in_a_file = Plan(read_config({**config, "models": "hertz"}))

@@ -12,21 +12,20 @@ import xarray as xr
 from hypothesis import given, settings, strategies as st
 
 import impact
-from impact.api import execute, prepare
 from impact.cli.summary import summary_json
 from impact.config.load import Axis
+from impact.contact.variables import OUTPUTS
 from impact.engine.plan import MAX_FULL_REPEATED, Plan
 from impact.engine.trajectories import trajectory_maps
 from impact.errors import UsageError
 from impact.results.provenance import config_of_part
 from impact.results.ranking import recommend
-from impact.results.schema import SCHEMA
 from impact.results.selection import select
 from impact.results.summary import summarize
-from impact.results.sweep import sweep_into
+from impact.results.sweep import prepare, sweep_in_memory, sweep_into
 
 LAYOUTS = ("full", "factored")
-EVERYTHING = [variable.name for variable in SCHEMA]
+EVERYTHING = [*OUTPUTS]
 MATERIALS = {
     "steel": {"E": 210e9, "nu": 0.3, "rho": 7850.0, "yield_strength": 0.8e9},
     "brass": {"E": 100e9, "nu": 0.34, "rho": 8500.0, "yield_strength": 0.3e9},
@@ -89,11 +88,11 @@ def tables(draw: st.DrawFn) -> dict[str, list[Any]]:
 @given(tables())
 def test_a_case_equals_a_sweep_with_its_values(columns: dict[str, list[Any]]) -> None:
     plan = plan_of(columns)
-    result = execute(plan)
+    result = sweep_in_memory(plan)
     assert result["case"].values.tolist() == list(range(len(next(iter(columns.values())))))
     for case in result["case"].values.tolist():
         row = {name: values[case] for name, values in columns.items()}
-        single = execute(one_row(plan, row))
+        single = sweep_in_memory(one_row(plan, row))
         for name in EVERYTHING:
             assert_same_bits(result[name].isel(case=case), single[name])
 
@@ -115,7 +114,7 @@ def cases() -> dict[str, list[Any]]:
 
 @pytest.fixture(scope="module")
 def case_result(cases: dict[str, list[Any]]) -> xr.Dataset:
-    return execute(plan_of(cases))
+    return sweep_in_memory(plan_of(cases))
 
 
 def test_a_file_of_either_layout_holds_the_cases(tmp_path: Path, cases: dict[str, list[Any]]) -> None:
@@ -149,7 +148,7 @@ def test_cases_are_compared_by_their_numbers(cases: dict[str, list[Any]], case_r
     assert impact.compare(case_result.isel(case=[1, 2]), case_result, subset=True).equal
     fewer = impact.compare(case_result.isel(case=[1, 2]), case_result)
     assert "case: 2 of 4 in BASELINE only: 0, 3" in str(fewer)
-    other = execute(plan_of({**cases, "v1": [0.5, 1.0, 0.7, 1.0]}))
+    other = sweep_in_memory(plan_of({**cases, "v1": [0.5, 1.0, 0.7, 1.0]}))
     assert "v1 is 0.7 at case 2, in BASELINE 0.5" in str(impact.compare(other, case_result))
 
 
@@ -158,7 +157,7 @@ def test_a_part_of_the_cases_is_repeated_under_their_numbers(
 ) -> None:
     plan = plan_of(cases)
     part = case_result.isel(case=[1, 2])
-    repeated = execute(replace(plan, config=config_of_part(plan.config, part)))
+    repeated = sweep_in_memory(replace(plan, config=config_of_part(plan.config, part)))
     assert repeated["case"].values.tolist() == [1, 2]
     assert impact.compare(repeated, part).equal
 
@@ -226,13 +225,13 @@ def axes_of_parameters(keys: list[str], **output: Any) -> Plan:
 @pytest.fixture(scope="module")
 def ten() -> tuple[Plan, xr.Dataset]:
     plan = axes_of_parameters([*PARAMETER_OF])
-    return plan, execute(plan)
+    return plan, sweep_in_memory(plan)
 
 
 @pytest.fixture(scope="module")
 def results_alone() -> dict[str, xr.Dataset]:
     """The result of each model without the others."""
-    return {key: execute(axes_of_parameters([key])) for key in PARAMETER_OF}
+    return {key: sweep_in_memory(axes_of_parameters([key])) for key in PARAMETER_OF}
 
 
 def test_ten_models_with_their_parameters_as_axes_cost_as_much_as_each_alone(ten: tuple[Plan, xr.Dataset]) -> None:
@@ -314,6 +313,6 @@ def test_an_axis_with_a_common_input_is_common_to_all_models() -> None:
     axes = (Axis({"v1": (0.5, 1.0), "johnson-1985.c": (1.0, 2.0)}), plan.config.axes[1])
     plan = replace(plan, config=replace(plan.config, axes=axes))
     assert plan.points == 2 * len(VALUES) + 2
-    names = {entry.model: entry.parameters for entry in recommend(execute(plan)).models}
+    names = {entry.model: entry.parameters for entry in recommend(sweep_in_memory(plan)).models}
     assert names["johnson-1985"] == {}
     assert [*names["kelvin-voigt"]] == ["model.kelvin-voigt.C"]

@@ -26,7 +26,7 @@ from impact.contact.models import catalogue, find
 from impact.contact.outputs import collide
 from impact.contact.scaling import delivered
 from impact.contact.status import Status
-from impact.exporters.codes import CODES
+from impact.exporters.registry import CODES
 
 from .problems import table1_impacts
 

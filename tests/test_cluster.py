@@ -13,9 +13,9 @@ from pathlib import Path
 import pytest
 
 import impact
-from impact.api import prepare
 from impact.engine.execute import context_of, integrate_remotely, with_core
 from impact.engine.trajectories import columns_of, trajectory_maps, trajectory_ranges
+from impact.results.sweep import prepare
 
 from .clusters import (
     BLOCK_COUNT,

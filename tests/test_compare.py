@@ -14,8 +14,8 @@ import xarray as xr
 
 import impact
 from impact.comparison.verdict import Verdict
+from impact.contact.variables import BY_DEFAULT, OUTPUTS
 from impact.errors import ResultError, UsageError
-from impact.results.schema import SCHEMA
 
 from .fork_server import ForkServer
 
@@ -28,10 +28,9 @@ GEOMETRIC = {
 BY_HAND = {
     "models": ["hertz"],
     "sweep": {"e": [0.5, 1.0], "v1": 2.0, "v2": -1.0, "m1": 1.0, "m2": 3.0, "K": 6e9},
-    "output": {"variables": [variable.name for variable in SCHEMA]},
+    "output": {"variables": [*OUTPUTS]},
     "solver": {"rtol": 1e-4},
 }
-BY_DEFAULT = [variable.name for variable in SCHEMA if variable.by_default]
 GAMMA = "ismail-stronge-2008.gamma"
 
 
@@ -88,7 +87,7 @@ def test_a_result_is_equal_to_itself(figure6: xr.Dataset, wide: xr.Dataset, stor
         assert verdict.equal, verdict
         assert verdict.headline.endswith("none differs")
         assert (verdict.faults, verdict.notes, verdict.lines) == ((), (), ())
-        assert [judged.name for judged in verdict.variables] == BY_DEFAULT
+        assert tuple(judged.name for judged in verdict.variables) == BY_DEFAULT
     assert impact.compare(stored, str(stored)).equal
     assert impact.compare(figure6, stored).equal
 
@@ -367,7 +366,7 @@ RELATIVE |= {"separation_time"}
 
 
 def test_the_scales_of_this_file_cover_every_variable_with_a_tolerance() -> None:
-    assert {variable.name for variable in SCHEMA if variable.judged not in ("exact", "reported")} == SCALES.keys()
+    assert {name for name, variable in OUTPUTS.items() if variable.has_tolerance} == SCALES.keys()
 
 
 @pytest.mark.parametrize("name", SCALES)

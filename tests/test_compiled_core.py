@@ -12,16 +12,17 @@ import numpy as np
 import pytest
 
 import impact
-from impact.api import prepare
 from impact.contact.impacts import Impacts
 from impact.contact.model import ForceModel
 from impact.contact.models import catalogue, find
 from impact.contact.numba.dispatch import is_installed, serves
-from impact.contact.outputs import OUTPUTS, Outputs, collide
+from impact.contact.outputs import Outputs, collide
 from impact.contact.status import FIRST_FAILURE
+from impact.contact.variables import OUTPUTS
 from impact.engine.execute import NUMBA_MIN_TRAJECTORIES, with_core
 from impact.engine.trajectories import trajectory_maps
 from impact.errors import ConfigError, UsageError
+from impact.results.sweep import prepare
 
 from .conftest import ROOT, Run
 from .problems import table1_impacts, with_parameters

@@ -10,15 +10,16 @@ import xarray as xr
 from hypothesis import given, settings, strategies as st
 
 import impact
-from impact.api import prepare
 from impact.config.load import read_config
 from impact.contact.impacts import Impacts
+from impact.contact.variables import BY_DEFAULT
 from impact.engine import trajectories as trajectories_module
 from impact.engine.build_impacts import build_impacts
 from impact.engine.plan import Plan
+from impact.engine.run import Run
 from impact.engine.trajectories import trajectory_maps
 from impact.results.estimate import estimate
-from impact.results.schema import SCHEMA
+from impact.results.sweep import prepare
 
 from .conftest import ROOT
 
@@ -103,7 +104,7 @@ def sweep_with_plugins(config: dict[str, object], *overrides: str) -> xr.Dataset
 
 
 def assert_same_bits(first: xr.Dataset, second: xr.Dataset) -> None:
-    for name in (variable.name for variable in SCHEMA if variable.by_default):
+    for name in BY_DEFAULT:
         assert first[name].values.tobytes() == second[name].values.tobytes(), name
 
 
@@ -214,14 +215,14 @@ def test_the_trajectories_of_a_plan_of_any_size_are_counted() -> None:
     long = {"geomspace": [0.1, 10.0, 10_000]}
     sweep = {"e": {"linspace": [0.01, 1.0, 100]}, "v1": long, "m1": long, "m2": long, "material": ["soft", "hard"]}
     config = {"models": ["gharib-hurmuzlu-2012", "speed"], "sweep": sweep, "materials": MATERIALS}
-    plan = prepare(config, plugins=[SPEED], max_points=10**15)
+    plan = prepare(config, plugins=[SPEED], run=Run(max_points=10**15))
     assert plan.points == 4 * 10**14
     assert [model_map.count for model_map in trajectory_maps(plan)] == [100, 10_000]
-    estimated = estimate(plan)
+    estimated = estimate(config, plugins=[SPEED], max_points=10**15)
     assert (estimated.points, estimated.trajectories) == (plan.points, 10_100)
     # a row of the table for each trajectory, and an index of the same length
     assert 50 * 10_100 < estimated.bytes < 100 * 10_100 + 500_000
-    full = estimate(prepare({**config, "output": {"layout": "full"}}, plugins=[SPEED], max_points=10**15))
+    full = estimate({**config, "output": {"layout": "full"}}, plugins=[SPEED], max_points=10**15)
     assert full.bytes > 100 * plan.points
     assert [model.axes for model in estimated.models] == [("e",), ("v1",)]
 

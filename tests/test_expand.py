@@ -11,14 +11,14 @@ import xarray as xr
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 import impact
-from impact.api import prepare
 from impact.contact.outputs import check_inputs
 from impact.contact.status import Status
+from impact.contact.variables import OUTPUTS
 from impact.engine.build_impacts import build_impacts
+from impact.engine.run import Run as SweepRun
 from impact.errors import UsageError
 from impact.results import sweep as sweep_module
-from impact.results.schema import SCHEMA
-from impact.results.sweep import sweep_into
+from impact.results.sweep import prepare, sweep_into
 from impact.results.trajectory_table import CHECKS, checks_that_may_fail
 
 from .conftest import Run
@@ -41,7 +41,7 @@ SMALL = {
     "solver": {"rtol": 1e-4},
     "sweep": {"e": [0.3, 0.6], "v1": [1.0, 2.0], "m1": 1.0, "m2": 2.0, "K": 1e9},
 }
-EVERYTHING = [variable.name for variable in SCHEMA]
+EVERYTHING = [*OUTPUTS]
 VALUES: dict[str, list[object]] = {
     "e": [0.0, 0.1, 0.5, 1.0], "v1": [-1.0, 0.5, 1.0, 2.0, 1e-200, 1e200], "v2": [0.0, -1.0, 1.0],
     "m1": [1.0, 2.0, float("inf")], "m2": [0.5, 1.0, float("inf")], "material": ["soft", "hard"],
@@ -175,7 +175,9 @@ def test_only_inputs_that_may_be_invalid_are_checked() -> None:
 @given(configs())
 def test_a_factored_file_holds_the_values_of_a_full_one(tmp_path: Path, config: dict[str, object]) -> None:
     plans = {layout: prepare(config, [f'output.layout="{layout}"'], [*PLUGINS.values()]) for layout in LAYOUTS}
-    surveys = {layout: sweep_into(tmp_path / layout, plan, overwrite=True) for layout, plan in plans.items()}
+    surveys = {
+        layout: sweep_into(tmp_path / layout, plan, SweepRun(overwrite=True)) for layout, plan in plans.items()
+    }
     full, factored = (impact.load(tmp_path / layout) for layout in LAYOUTS)
     for name in EVERYTHING:
         assert_same_bits(factored[name], full[name])

@@ -15,11 +15,10 @@ import pytest
 
 import impact
 from impact.errors import ConfigError, UsageError
-from impact.exporters.code import run_program
-from impact.exporters.codes import CODES
 from impact.exporters.export import comment_lines
-from impact.exporters.problem import first_law
-from impact.exporters.verify import installed_version
+from impact.exporters.programs import run_program
+from impact.exporters.registry import CODES
+from impact.exporters.releases import first_law, installed_version
 
 from .conftest import ROOT, Run, default_law, write_program
 
@@ -373,7 +372,7 @@ def test_of_the_texts_of_a_caller_only_the_release_is_written(name: str) -> None
     hostile = "".join(HOSTILE)
     sweep = BALLS | {"e": 0.6, "material1": hostile, "material2": hostile}
     config = {"title": hostile, "models": default_law(name), "materials": {hostile: SOFT}, "sweep": sweep}
-    for script in (False, True) if code.script is not None else (False,):
+    for script in (False, True) if code.template else (False,):
         text = impact.export(
             name, source=config, at=OWN_PARAMETERS.get(name), code_version=code.newest, script=script
         ).text

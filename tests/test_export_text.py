@@ -15,9 +15,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import impact
-from impact.exporters.codes import CODES
 from impact.exporters.export import Export
 from impact.exporters.problem import prepare_export
+from impact.exporters.registry import CODES
 
 from .conftest import Run, default_law
 
@@ -379,7 +379,7 @@ def test_a_wide_transition_of_simscape_is_warned_about() -> None:
 
 # ---- all of them
 
-TEXT_ONLY = [name for name, code in CODES.items() if code.script is None]
+TEXT_ONLY = [name for name, code in CODES.items() if not code.template]
 
 
 def test_codes_without_a_script_are_marked_as_not_run() -> None:

@@ -16,10 +16,11 @@ import pytest
 
 import impact
 from impact.errors import UsageError
-from impact.exporters.code import Code
-from impact.exporters.codes import CODES
-from impact.exporters.problem import law_of_code, prepare_export
-from impact.exporters.verify import choose_version, verify
+from impact.exporters.code import Code, Collision, Parameters
+from impact.exporters.problem import prepare_export
+from impact.exporters.registry import CODES
+from impact.exporters.releases import choose_version, law_of_code
+from impact.exporters.verification import verify_scripts
 
 from .conftest import Run, default_law
 from .test_peers import ENTRIES, MATERIALS, PYTHON, WITHOUT_PEER, by_impact, config_of
@@ -39,7 +40,7 @@ EXPORTED = {
     (code.name, entry.key): entry
     for code in CODES.values()
     for entry in ENTRIES
-    if code.script is not None and entry.key in code.laws
+    if code.template and entry.key in code.laws
 }
 
 
@@ -118,18 +119,17 @@ def test_an_error_in_a_template_is_found(name: str, key: str, old: str, new: str
     code, program, version = code_and_version(name, key)
     entry = EXPORTED[name, key]
     problem = prepare_export(code, key, version, config_of(key, entry.collisions[0]), {}, ())
-    original = code.script
-    assert original is not None
 
-    def wrong(collision, parameters):  # type: ignore[no-untyped-def]
-        text = original(collision, parameters)
-        assert old in text
-        return text.replace(old, new)
+    class Wrong(Code):
+        def script(self, collision: Collision, parameters: Parameters) -> str:
+            text = super().script(collision, parameters)
+            assert old in text
+            return text.replace(old, new)
 
     # an extrapolation to a step of zero needs finer steps
     dt = problem.law.contact_time / (12 if code.scheme is not None else entry.code.steps_per_contact)
-    assert verify(problem, program, dt).agrees
-    assert not verify(replace(problem, code=replace(code, script=wrong)), program, dt).agrees
+    assert verify_scripts(problem, program, dt).agrees
+    assert not verify_scripts(replace(problem, code=Wrong(**vars(code))), program, dt).agrees
 
 
 @pytest.mark.parametrize("materials", [("soft", "hard"), ("hard", "hard")], ids="-".join)
@@ -151,7 +151,7 @@ def test_lammps_mixes_two_materials_as_the_law_does(materials: tuple[str, str]) 
 
 def test_every_law_of_a_code_with_scripts_is_run_or_has_a_reason() -> None:
     """The reasons are those of test_peers.py."""
-    laws = {(code.name, key) for code in CODES.values() if code.script is not None for key in code.laws}
+    laws = {(code.name, key) for code in CODES.values() if code.template for key in code.laws}
     assert {key for _, key in laws - EXPORTED.keys()} <= WITHOUT_PEER.keys()
 
 

@@ -20,6 +20,7 @@ from impact.contact.status import Status
 from impact.contact.timestep import MAX_STEPS_PER_CONTACT, SCHEMES
 from impact.errors import ConfigError, UsageError
 from impact.plots.curves import Curve, CurveData
+from impact.plots.draw import get_plot_data
 from impact.plots.kinds import Choice
 
 from .conftest import ROOT, Run
@@ -384,7 +385,7 @@ def coarse() -> xr.Dataset:
 
 
 def curves_of(dataset: xr.Dataset, **choice: Any) -> tuple[Curve, ...]:
-    curve_data = impact.api.get_plot_data(dataset, "timestep", Choice(**choice))
+    curve_data = get_plot_data(dataset, "timestep", Choice(**choice))
     assert isinstance(curve_data, CurveData)
     (panel,) = curve_data.panels
     assert panel.x_log
@@ -433,7 +434,7 @@ def test_the_numbers_of_the_picture_have_the_range(coarse: xr.Dataset, tmp_path:
     head, first, *_ = (tmp_path / "wide.csv").read_text(encoding="utf-8").splitlines()
     assert head.split(",")[3:6] == [f"e_out{part} {LINEAR} e=0.5" for part in ("", "_least", "_largest")]
     assert float(first.split(",")[4]) == coarse["e_out"].sel(model=LINEAR, e=0.5, steps_per_contact=5).min()
-    rows = list(impact.api.get_plot_data(coarse, "timestep", Choice()).rows())
+    rows = list(get_plot_data(coarse, "timestep", Choice()).rows())
     assert len(rows) == 4 * (2 + 3 * 3)
 
 

@@ -16,10 +16,10 @@ import impact
 from impact.cli.info import print_info
 from impact.contact.status import FIRST_FAILURE, Status
 from impact.errors import UsageError
+from impact.plots.draw import get_plot_data
 from impact.plots.kinds import KINDS, Choice
 from impact.plots.slices import MAX_DRAWN
-from impact.reporting.figures import figures_of
-from impact.reporting.page import page
+from impact.reporting.figures import iterate_choices
 from impact.results.slabs import SLAB_POINTS, distinct_points, slabs, varying_dims
 from impact.results.summary import extremes_of, summarize
 
@@ -63,13 +63,15 @@ def page_without_figures(dataset: xr.Dataset) -> tuple[str, list[Choice]]:
     """A report whose figures are read and not drawn, and their points."""
     choices = []
 
-    def read(kind: str, choice: Choice) -> NoReturn:
+    def read(dataset: xr.Dataset, kind: str, choice: Choice, _: object) -> NoReturn:
         # an error of the data would end the test
-        impact.api.get_plot_data(dataset, kind, choice, [BROKEN])
+        get_plot_data(dataset, kind, choice, [BROKEN])
         choices.append(choice)
         raise UsageError("not drawn")
 
-    return page(dataset, read), choices
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("impact.reporting.figures.get_plot_data", read)
+        return impact.report(dataset), choices
 
 
 def test_the_ranking_of_all_points_is_that_of_the_different_points(
@@ -240,20 +242,13 @@ def test_the_figures_of_a_report_are_at_a_point_that_did_not_fail(big: tuple[xr.
 
     sizes = {str(dim): dataset.sizes[dim] for dim in dataset["status"].dims}
     about = {"dtype": np.dtype(np.int8), "attrs": dataset["status"].attrs}
-    chosen: list[Choice] = []
-
-    def refuse(kind: str, choice: Choice) -> NoReturn:
-        chosen.append(choice)
-        raise UsageError("not drawn")
-
     # along m1 alone all points are read; along m1 and m2 those of a coarse grid
     for along, last in ((["m1"], 7_000), (["m1", "m2"], 7_100)):
         varies_along = dict.fromkeys(MODELS, along)
         late = dataset.assign(status=computed("status", sizes, status, reads, varies_along=varies_along, **about))
-        chosen.clear()
-        figures_of(late, MODELS, refuse)
-        assert chosen[0].x == "e"
-        assert BIG["m1"][7_000] <= chosen[0].sel["m1"] <= BIG["m1"][last]
+        _, choice, _ = next(iterate_choices(late, MODELS))
+        assert choice.x == "e"
+        assert BIG["m1"][7_000] <= choice.sel["m1"] <= BIG["m1"][last]
 
 
 def test_a_lazy_e_over_many_axes_is_read_only_at_the_different_points(
@@ -314,12 +309,12 @@ def test_a_picture_reads_only_what_it_draws(small: xr.Dataset, big: tuple[xr.Dat
     sel = {"v2": 0.0, **({"e": 0.5} if kind in ("loop", "history", "impulse") else {})}
     plane = kind in ("map", "validity")
     choice = Choice(sel=sel, models=MODELS[:3], x="e", y="K" if plane else None)
-    numbers = impact.api.get_plot_data(dataset, kind, choice, [BROKEN])
+    numbers = get_plot_data(dataset, kind, choice, [BROKEN])
     expected = 0 if "e" in sel else 3 * 10 * (1_000 if plane else 1)
     assert max(reads.total.values(), default=0) == expected
     assert list(islice(numbers.rows(), 3))
     if not plane:
-        assert list(numbers.rows()) == list(impact.api.get_plot_data(small, kind, choice, [BROKEN]).rows())
+        assert list(numbers.rows()) == list(get_plot_data(small, kind, choice, [BROKEN]).rows())
         return
     error = small["e_error"].sel(model="lankarani-nikravesh-1990", v2=0.0).values
     assert numbers.panels[1].values[7] == tuple(error.tolist())
@@ -328,7 +323,7 @@ def test_a_picture_reads_only_what_it_draws(small: xr.Dataset, big: tuple[xr.Dat
 def test_a_map_reads_no_omitted_model(small: xr.Dataset) -> None:
     many = small.isel(model=[0] * 42).assign_coords(model=[f"model-{number}" for number in range(42)])
     dataset, reads = stretched(many, BIG)
-    numbers = impact.api.get_plot_data(dataset, "map", Choice(x="e", y="v2"))
+    numbers = get_plot_data(dataset, "map", Choice(x="e", y="v2"))
     assert (len(numbers.panels), len(numbers.left_out)) == (12, 30)
     assert reads.total == {"e_error": 12 * 10 * 3}
 

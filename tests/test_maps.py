@@ -18,7 +18,8 @@ import impact
 from impact.errors import UsageError
 from impact.formatting import percentage
 from impact.plots import maps
-from impact.plots.kinds import Choice, draw
+from impact.plots.draw import draw
+from impact.plots.kinds import Choice, Look
 from impact.plots.maps import CONTOURS, NO_VALUE, MapData, edges_of
 from impact.plots.style import save_figure
 
@@ -179,7 +180,7 @@ def test_a_tie_goes_to_the_first_model_and_missing_values_never_win(many: xr.Dat
     changed["e_error"][2, 0] = 0.0
     map_data = validity(changed)
     assert map_data.shares == pytest.approx({MODELS[1]: 5 / 6, MODELS[2]: 1 / 6})
-    draw(map_data, 7.1)
+    draw(map_data, Look(7.1))
 
 
 def test_edges_lie_half_way_between_values() -> None:
@@ -190,7 +191,7 @@ def test_edges_lie_half_way_between_values() -> None:
 def test_the_drawn_mesh_has_the_values_and_edges_of_the_map_data(many: xr.Dataset, over_speed: xr.Dataset) -> None:
     for dataset in (many, over_speed):
         map_data = field_map(dataset, models=MODELS)
-        figure = draw(map_data, 7.1)
+        figure = draw(map_data, Look(7.1))
         for axes, panel in zip(panels_of(figure, map_data), map_data.panels, strict=True):
             (mesh,) = [artist for artist in axes.collections if isinstance(artist, QuadMesh)]
             drawn = np.ma.filled(np.ma.asarray(mesh.get_array()), np.nan)
@@ -204,12 +205,12 @@ def test_the_drawn_mesh_has_the_values_and_edges_of_the_map_data(many: xr.Datase
             assert -low == high == np.nanmax(np.abs([other.values for other in map_data.panels]))
             scales = (axes.get_xscale(), axes.get_yscale())
             assert scales == ("linear", "log" if dataset is many else "linear")
-    assert draw(field_map(over_speed, log="xy"), 7.1).axes[0].get_xscale() == "log"
+    assert draw(field_map(over_speed, log="xy"), Look(7.1)).axes[0].get_xscale() == "log"
 
 
 def test_contour_lines_lie_where_the_error_has_their_value(many: xr.Dataset) -> None:
     map_data = field_map(many, models=["lankarani-nikravesh-1990"])
-    figure = draw(map_data, 7.1)
+    figure = draw(map_data, Look(7.1))
     lines = [artist for artist in figure.axes[0].collections if not isinstance(artist, QuadMesh)]
     (contours,) = lines
     error = map_data.panels[0].values[0]
@@ -223,27 +224,27 @@ def test_contour_lines_lie_where_the_error_has_their_value(many: xr.Dataset) -> 
     texts = [text.get_text() for text in figure.legends[0].get_texts()]
     assert texts == [rf"$e_\mathrm{{out}}-e$ = ±{level:g}" for level in CONTOURS]
     # only an error has contour lines
-    assert not draw(field_map(many, variable="e_out", models=MODELS), 7.1).legends
+    assert not draw(field_map(many, variable="e_out", models=MODELS), Look(7.1)).legends
 
 
 def test_points_without_a_value_are_hatched_and_in_the_legend(over_speed: xr.Dataset) -> None:
     changed = over_speed.copy(deep=True)
     changed["e_error"][1] = np.nan
     map_data = field_map(changed)
-    figure = draw(map_data, 7.1)
+    figure = draw(map_data, Look(7.1))
     for axes, panel in zip(panels_of(figure, map_data), map_data.panels, strict=True):
         (patch,) = [artist for artist in axes.patches if isinstance(artist, PathPatch)]
         assert patch.get_hatch()
         np.testing.assert_array_equal(covered(patch, map_data), np.isnan(panel.values))
     assert [text.get_text() for text in figure.legends[0].get_texts()].count(NO_VALUE) == 1
-    whole = draw(field_map(over_speed, sel={"alpha": 0.02}, x="v1"), 7.1)
+    whole = draw(field_map(over_speed, sel={"alpha": 0.02}, x="v1"), Look(7.1))
     assert NO_VALUE not in [text.get_text() for text in whole.legends[0].get_texts()]
     assert not whole.axes[0].patches
 
 
 def test_the_patch_of_a_model_covers_the_points_where_it_is_closest(over_speed: xr.Dataset) -> None:
     map_data = validity(over_speed)
-    figure = draw(map_data, 7.1)
+    figure = draw(map_data, Look(7.1))
     left, right = panels_of(figure, map_data)
     patches = [artist for artist in left.patches if isinstance(artist, PathPatch)]
     looks = {(patch.get_facecolor(), patch.get_hatch()) for patch in patches}
@@ -275,7 +276,7 @@ def test_models_beyond_the_largest_number_of_panels_are_reported(many: xr.Datase
     assert [panel.model for panel in map_data.panels] == MORE[:12]
     assert map_data.left_out == ("zhang-2020",)
     assert map_data.conditions.endswith("; the first 12 of 13 models")
-    assert len(draw(map_data, 7.1).axes) == 13
+    assert len(draw(map_data, Look(7.1)).axes) == 13
     # the closest model is chosen among all models
     assert len(validity(many).panels) == 13
     assert not validity(many).left_out
@@ -360,7 +361,7 @@ def test_texts_do_not_overlap(many: xr.Dataset, kind: str, count: int, width: fl
         "force": lambda: field_map(many, variable="peak_force", models=models, x="v1", y="m2"),
         "swapped": lambda: field_map(many, variable="energy_residual", models=models, x="m2", y="e"),
     }[kind]()
-    figure = draw(map_data, width)
+    figure = draw(map_data, Look(width))
     assert figure.get_size_inches()[0] == width
     check_layout(figure)
 
@@ -372,7 +373,7 @@ def test_text_from_a_file_is_text(over_speed: xr.Dataset, tmp_path: Path) -> Non
     changed["e_error"].attrs["long_name"] = "_{$ " * 20
     for map_data, width in ((field_map(changed), 7.1), (validity(changed), 3.5)):
         assert "\x1b" not in map_data.title
-        figure = draw(map_data, width)
+        figure = draw(map_data, Look(width))
         check_layout(figure)
         # a dollar is escaped where mathtext is read
         shown = ["".join(text.get_text().split()) for text in texts_of(figure)]
@@ -384,7 +385,7 @@ def test_text_from_a_file_is_text(over_speed: xr.Dataset, tmp_path: Path) -> Non
 def test_ticks_are_labelled_with_their_values(many: xr.Dataset) -> None:
     raised = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹−", "-0123456789-")
     for map_data in (field_map(many, models=MODELS[:1]), validity(many, models=MODELS)):
-        figure = draw(map_data, 7.1)
+        figure = draw(map_data, Look(7.1))
         figure.draw_without_rendering()
         for axis in (figure.axes[0].xaxis, figure.axes[0].yaxis):
             low, high = axis.get_view_interval()
@@ -397,7 +398,7 @@ def test_ticks_are_labelled_with_their_values(many: xr.Dataset) -> None:
 
 
 def test_only_the_last_row_and_the_first_column_have_tick_labels(many: xr.Dataset) -> None:
-    figure = draw(field_map(many, models=MORE[:7]), 7.1)
+    figure = draw(field_map(many, models=MORE[:7]), Look(7.1))
 
     def is_named(axis: Axis) -> bool:
         return any(tick.label1.get_visible() for tick in axis.get_major_ticks())
@@ -412,5 +413,5 @@ def test_a_map_of_many_points_is_stored_as_an_image(many: xr.Dataset, tmp_path: 
     fine = plane.interp(e=np.linspace(0.1, 1.0, 210), v1=np.linspace(0.1, 10.0, 100))
     fine["e_error"][:, :20] = np.nan
     for get_map_data in (field_map, validity):
-        save_figure(draw(get_map_data(fine), 3.5), tmp_path / f"large.{form}")
+        save_figure(draw(get_map_data(fine), Look(3.5)), tmp_path / f"large.{form}")
         assert (tmp_path / f"large.{form}").stat().st_size < 400_000

@@ -12,14 +12,14 @@ import pytest
 import xarray as xr
 
 import impact
-from impact.api import execute, prepare
 from impact.config.load import Axis
 from impact.contact.materials import Material
+from impact.contact.variables import OUTPUTS
 from impact.engine.plan import Plan
+from impact.engine.run import Run
 from impact.engine.trajectories import trajectory_maps
 from impact.errors import ModelError, UsageError
-from impact.results.schema import SCHEMA
-from impact.results.sweep import sweep_into
+from impact.results.sweep import prepare, sweep_in_memory, sweep_into
 
 STEEL = {"E": 210e9, "nu": 0.3, "rho": 7850.0, "yield_strength": 0.8e9}
 BRASS = {"E": 100e9, "nu": 0.34, "rho": 8500.0, "yield_strength": 0.3e9}
@@ -30,7 +30,7 @@ PROPERTIES: dict[str, list[float]] = {
     "yield_strength": [0.1e9, 0.4e9, 1e9],
 }
 LAYOUTS = ("full", "factored")
-EVERYTHING = [variable.name for variable in SCHEMA]
+EVERYTHING = [*OUTPUTS]
 # a stiffness by Hertz, one with a yield strength, one with its own rule for K, and another one by Hertz
 LAWS = ["gharib-hurmuzlu-2012", "thornton-1997", "liggghts-hooke", "bilinear"]
 
@@ -99,10 +99,10 @@ def test_a_sweep_over_properties_equals_the_sweeps_at_each_value(
         for value in PROPERTIES[first][1:]
         for other in PROPERTIES[second][:2]
     ]
-    singles = [execute(_prepared(config(sweep, table))) for table in tables]
+    singles = [sweep_in_memory(_prepared(config(sweep, table))) for table in tables]
     for layout in LAYOUTS:
         stored = replace(plan, config=replace(plan.config, output=replace(plan.config.output, layout=layout)))
-        outcome = sweep_into(tmp_path / layout, stored, overwrite=True)
+        outcome = sweep_into(tmp_path / layout, stored, Run(overwrite=True))
         assert outcome.summary.points == plan.points
         result = impact.load(tmp_path / layout)
         assert result["materials.steel." + first].attrs["units"]
@@ -127,7 +127,7 @@ LAW = ["gharib-hurmuzlu-2012"]
 
 def test_a_mass_comes_from_a_radius_and_a_density() -> None:
     balls = {**BALLS, "R1": [0.01, 0.02], "R2": float("inf"), "material": "steel"}
-    result = execute(_prepared(config(balls, {"steel": STEEL}, LAW)))
+    result = sweep_in_memory(_prepared(config(balls, {"steel": STEEL}, LAW)))
     masses = [4.0 / 3.0 * np.pi * radius**3 * STEEL["rho"] for radius in (0.01, 0.02)]
     assert result["m1"].dims == ("R1",)
     assert result["m1"].attrs["units"] == "kg"
@@ -173,7 +173,7 @@ def test_a_missing_mass_is_an_error() -> None:
     plan = _prepared(config(balls, {"steel": STEEL}, LAW))
     without = replace(plan, config=replace(plan.config, materials={"steel": Material(210e9, 0.3)}))
     with pytest.raises(ModelError, match="m1: missing, expected m1, or R1 and the density rho of its material"):
-        execute(without)
+        sweep_in_memory(without)
 
 
 def test_a_material_name_with_a_space_is_refused_before_integration() -> None:
@@ -182,7 +182,7 @@ def test_a_material_name_with_a_space_is_refused_before_integration() -> None:
         prepare(config(balls, {"soft steel": STEEL}, LAW)), Axis({"materials.soft steel.E": (1e9, 2e9)})
     )
     with pytest.raises(UsageError, match=r"materials\.soft steel\.E: expected a material name without spaces"):
-        execute(plan)
+        sweep_in_memory(plan)
 
 
 def test_a_file_has_the_unit_of_a_swept_property_and_no_value_in_its_table(tmp_path: Path) -> None:
@@ -200,7 +200,7 @@ def test_a_sweep_over_a_property_is_compared_with_a_sweep_at_one_value() -> None
     balls = {**BALLS, "m1": 1.0, "m2": 1.0, "material": "steel"}
     single = impact.sweep(config(balls, {"steel": STEEL}, LAW))
     plan = prepare(config(balls, {"steel": STEEL}, LAW))
-    swept = execute(with_axes(plan, Axis({"materials.steel.E": (1e9, STEEL["E"])})))
+    swept = sweep_in_memory(with_axes(plan, Axis({"materials.steel.E": (1e9, STEEL["E"])})))
     assert impact.compare(single, swept, subset=True).equal
     assert impact.compare(swept.sel({"materials.steel.E": STEEL["E"]}), single).equal
     other = impact.compare(swept.sel({"materials.steel.E": 1e9}), single)

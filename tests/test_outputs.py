@@ -13,8 +13,9 @@ from impact.contact.closed_forms.hysteresis import delivered_restitution
 from impact.contact.impacts import Impacts
 from impact.contact.model import ForceModel, Parameter
 from impact.contact.models import find
-from impact.contact.outputs import OUTPUTS, Outputs, collide
+from impact.contact.outputs import Outputs, collide
 from impact.contact.status import FIRST_FAILURE, Status
+from impact.contact.variables import OUTPUTS
 from impact.errors import ConfigError
 
 from .problems import LAWS, table1_impacts, with_parameters

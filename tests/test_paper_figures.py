@@ -12,9 +12,9 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import impact
-from impact import api
 from impact.plots.curves import CurveData, Panel
-from impact.plots.kinds import Choice, draw
+from impact.plots.draw import draw, get_plot_data
+from impact.plots.kinds import Choice, Look
 from impact.plots.labels import symbol
 
 from .conftest import ROOT, Run
@@ -40,7 +40,7 @@ MARKS = {
 def figure_data(figure: str) -> CurveData:
     """The data of a figure of the paper."""
     result = impact.sweep(ROOT / "configs" / f"figure{figure}.toml")
-    data = api.get_plot_data(result, "impulse" if figure == "2" else "loop", Choice())
+    data = get_plot_data(result, "impulse" if figure == "2" else "loop", Choice())
     assert isinstance(data, CurveData)
     return data
 
@@ -61,7 +61,7 @@ def test_a_figure_marks_the_points_of_the_paper(figure: str) -> None:
 @pytest.mark.parametrize("figure", MARKS)
 @pytest.mark.parametrize("width", [3.5, 7.1])
 def test_labels_of_marks_overlap_no_text_and_no_curve(figure: str, width: float) -> None:
-    drawn_figure = draw(figure_data(figure), width)
+    drawn_figure = draw(figure_data(figure), Look(width))
     FigureCanvasAgg(drawn_figure).draw()
     (axes,) = drawn_figure.axes
     names = [text for text in axes.texts if text.get_text() in {symbol(mark) for mark in MARKS[figure]}]
@@ -81,13 +81,13 @@ def test_a_plot_of_several_laws_marks_only_the_impulse_common_to_all() -> None:
     config = ROOT / "configs" / "figure6.toml"
     result = impact.sweep(config, overrides=["sweep.e=0.5", "solver.rtol=1e-4"])
     for kind, labels in (("loop", []), ("impulse", ["tau_c"])):
-        data = api.get_plot_data(result, kind, Choice())
+        data = get_plot_data(result, kind, Choice())
         assert [mark.label for mark in only_panel(data).marks] == labels  # type: ignore[arg-type]
 
 
 def test_a_plot_of_a_damped_law_marks_its_peak_indentation_but_no_peak_force() -> None:
     collision = impact.run(model="gharib-hurmuzlu-2012", at={"e": 0.2})
-    data = api.get_plot_data(collision.history, "loop", Choice())  # type: ignore[arg-type]
+    data = get_plot_data(collision.history, "loop", Choice())  # type: ignore[arg-type]
     assert [mark.label for mark in only_panel(data).marks] == ["delta_m"]  # type: ignore[arg-type]
 
 
@@ -99,7 +99,7 @@ def test_plots_show_the_exponent_of_each_law() -> None:
     both = impact.sweep({"models": ["hertz", "bilinear"], **config, "solver": {"rtol": 1e-4}})
     for kind in ("final-velocities", "loop"):
         for models, n in (([], "1.5 (1 for bilinear)"), (["hertz"], "1.5"), (["bilinear"], "1")):
-            conditions = api.get_plot_data(both, kind, Choice(models=models or None)).conditions
+            conditions = get_plot_data(both, kind, Choice(models=models or None)).conditions
             assert f"n = {n}," in f"{conditions},".replace("\N{NO-BREAK SPACE}", " "), (kind, models)
 
 

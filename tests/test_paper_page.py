@@ -9,7 +9,7 @@ import pytest
 
 import impact
 from impact.config.tables import SWEEP_QUANTITIES
-from impact.results.schema import HISTORY_VARIABLES, SCHEMA
+from impact.contact.variables import HISTORY, OUTPUTS
 from impact.results.single_impact import DERIVED_QUANTITIES
 
 from .conftest import ROOT
@@ -48,11 +48,7 @@ def test_every_equation_is_listed_once() -> None:
 
 
 def test_the_names_on_the_page_exist() -> None:
-    known = (
-        {variable.name for variable in SCHEMA}
-        | {name for name, *_ in (*DERIVED_QUANTITIES, *HISTORY_VARIABLES)}
-        | SWEEP_QUANTITIES.keys()
-    )
+    known = OUTPUTS.keys() | HISTORY.keys() | SWEEP_QUANTITIES.keys() | {name for name, *_ in DERIVED_QUANTITIES}
     known |= impact.models().keys() | {"e_kinematic"}
     for section in ("Equations", "Table 1"):
         for row in table_rows(section):

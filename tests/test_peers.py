@@ -29,10 +29,10 @@ import numpy as np
 import pytest
 
 import impact
-from impact.api import prepare
 from impact.contact.scaling import dimensionless_values
 from impact.contact.timestep import collide_at_fixed_step
 from impact.engine.build_impacts import build_impacts
+from impact.results.sweep import prepare
 
 pytestmark = pytest.mark.peers
 

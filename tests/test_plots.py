@@ -22,10 +22,10 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 import impact
-from impact import api
 from impact.errors import UsageError
 from impact.plots.curves import CurveData, Panel
-from impact.plots.kinds import KINDS, MOTION_KINDS, WIDTHS, Choice, draw
+from impact.plots.draw import draw, get_plot_data
+from impact.plots.kinds import KINDS, MOTION_KINDS, WIDTHS, Choice, Look
 from impact.plots.style import save_figure
 from impact.results.single_impact import Impact
 
@@ -44,7 +44,7 @@ def selection_of(kind: str) -> dict[str, float]:
 
 def get_curve_data(dataset: xr.Dataset, kind: str = "final-velocities", **choice: object) -> CurveData:
     """The data of a plot of curves."""
-    curve_data = api.get_plot_data(dataset, kind, Choice(**choice))  # type: ignore[arg-type]
+    curve_data = get_plot_data(dataset, kind, Choice(**choice))  # type: ignore[arg-type]
     assert isinstance(curve_data, CurveData)
     return curve_data
 
@@ -280,7 +280,7 @@ def test_an_axis_label_has_one_prefix_of_its_unit(coarse: xr.Dataset) -> None:
 @pytest.mark.parametrize("width", ["84mm", 7.1, pytest.param("single", marks=pytest.mark.slow)], ids=str)
 @pytest.mark.parametrize("kind", CURVES)
 def test_texts_do_not_overlap(plot_data_by_kind: dict[str, CurveData], kind: str, width: float | str) -> None:
-    figure = draw(plot_data_by_kind[kind], width)
+    figure = draw(plot_data_by_kind[kind], Look(width))
     expected = {"84mm": 84 / 25.4, "single": 3.5, 7.1: 7.1}[width]
     assert figure.get_figwidth() == pytest.approx(expected)
     check_layout(figure)
@@ -295,7 +295,7 @@ def test_labels_of_bands_are_apart_and_inside_their_panel(
     data = replace(plot_data_by_kind["error"], title="", conditions="")
     absolute = data.panels[1]
     curve = replace(absolute.curves[0], x=(0.0, 1.0), y=(smallest, largest))
-    figure = draw(replace(data, panels=(data.panels[0], replace(absolute, curves=(curve,)))), 3.5, height)
+    figure = draw(replace(data, panels=(data.panels[0], replace(absolute, curves=(curve,)))), Look(3.5, height))
     figure.draw_without_rendering()
     axes = figure.axes[1]
     wide, narrow = (text.get_window_extent() for text in axes.texts)

@@ -22,11 +22,9 @@ import pytest
 import xarray as xr
 
 import impact
-from impact import api
 from impact.contact.models import catalogue
 from impact.errors import UsageError
 from impact.reporting.figures import FIGURES
-from impact.reporting.page import page
 from impact.results.ranking import recommend
 from impact.results.replay_command import describe_point
 
@@ -87,7 +85,7 @@ class ParsedPage(HTMLParser):
 
 
 def build(dataset: xr.Dataset, plugins: Sequence[impact.ForceModel | Path] = ()) -> str:
-    return page(dataset, lambda kind, choice: api.get_plot_data(dataset, kind, choice, plugins))
+    return impact.report(dataset, plugins=plugins)
 
 
 def table(text: str, label: str) -> list[list[str]]:
@@ -421,12 +419,13 @@ def check_escaped(make: Callable[[Callable[[str], str]], str], malicious: str) -
 
 
 @pytest.mark.parametrize("malicious", MALICIOUS)
-def test_texts_of_a_file_never_become_elements(malicious: str) -> None:
+def test_texts_of_a_file_never_become_elements(malicious: str, monkeypatch: pytest.MonkeyPatch) -> None:
     def make(words: Callable[[str], str]) -> str:
-        def refused(kind: str, choice: object) -> NoReturn:
+        def refused(dataset: xr.Dataset, kind: str, *_: object) -> NoReturn:
             raise UsageError(words(kind))
 
-        return page(malicious_result(words), refused)
+        monkeypatch.setattr("impact.reporting.figures.get_plot_data", refused)
+        return impact.report(malicious_result(words))
 
     check_escaped(make, malicious)
 

@@ -11,12 +11,14 @@ import xarray as xr
 
 import impact
 from impact.config.load import parse_config
-from impact.contact.outputs import OUTPUTS
+from impact.contact.outputs import FORMULAS
 from impact.contact.status import Status
+from impact.contact.variables import BY_DEFAULT, OUTPUTS
 from impact.engine.execute import integrate_ranges, with_core
 from impact.engine.plan import Plan
+from impact.engine.run import DEFAULT_RUN
 from impact.engine.trajectories import trajectory_maps, trajectory_ranges
-from impact.results.schema import SCHEMA, dataset_template, stored_variables
+from impact.results.schema import dataset_template, stored_variables, udunits
 from impact.results.trajectory_table import TrajectoryRows, TrajectoryTable, in_memory, lazy_dataset
 
 from .conftest import WIDE
@@ -24,20 +26,19 @@ from .conftest import WIDE
 TABLE1 = {"v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6.118486349e9}
 
 
-def test_the_schema_lists_the_outputs_of_a_collision() -> None:
-    assert [variable.name for variable in SCHEMA] == list(OUTPUTS)
+def test_every_output_has_a_formula() -> None:
+    assert OUTPUTS.keys() <= FORMULAS.keys()
 
 
 def test_variables_dimensions_and_units(wide: xr.Dataset) -> None:
     axes = ("e", "v1", "m1", "material2", "ismail-stronge-2008.gamma")
     assert dict(wide.sizes) == {"model": 4, "e": 3, "v1": 2, "m1": 2, "material2": 2, axes[-1]: 2}
-    by_default = [entry for entry in SCHEMA if entry.by_default]
-    assert list(wide.data_vars) == [entry.name for entry in by_default]
-    for entry in by_default:
-        variable = wide[entry.name]
-        assert variable.dims == (("model", *axes) if entry.per == "model" else axes)
+    assert tuple(wide.data_vars) == BY_DEFAULT
+    for name in BY_DEFAULT:
+        entry, variable = OUTPUTS[name], wide[name]
+        assert variable.dims == (("model", *axes) if entry.per_model else axes)
         assert variable.dtype == np.dtype(entry.dtype)
-        assert variable.attrs["units"] == entry.unit
+        assert variable.attrs["units"] == udunits(entry.unit)
         assert variable.attrs["long_name"]
         assert variable.attrs["equation"]
 
@@ -46,7 +47,7 @@ ON_REQUEST = {"e_kinetic": "1", "e_energetic": "1", "lambda": "N s m-(n+1)", "se
 
 
 def test_variables_stored_on_request_only() -> None:
-    assert [entry.name for entry in SCHEMA if not entry.by_default] == list(ON_REQUEST)
+    assert [name for name, entry in OUTPUTS.items() if entry.on_request] == list(ON_REQUEST)
     sweep = {"e": [0.0, 0.25, 0.8], "v1": 2.0, "m1": 1.0, "m2": 3.0, "K": 6e9}
     config = {"models": ["gharib-hurmuzlu-2012", "gharib-hurmuzlu-2012-energetic"], "sweep": sweep}
     assert not ON_REQUEST.keys() & set(impact.sweep(config).data_vars)
@@ -187,13 +188,15 @@ def test_the_size_and_order_of_ranges_change_no_bit(wide: xr.Dataset, size: int,
     maps = trajectory_maps(plan)
     plan = with_core(plan, maps)
     ranges = sorted(trajectory_ranges(maps, size), key=lambda part: hash((part.number, "shuffled")))
-    finished = {(part.model, part.start): columns for part, columns in integrate_ranges(plan, maps, ranges)}
+    finished = {
+        (part.model, part.start): columns for part, columns in integrate_ranges(plan, maps, ranges, DEFAULT_RUN)
+    }
     rows = TrajectoryRows(maps, lambda model, start, stop: finished[model, start], size)
     table = TrajectoryTable(plan.inputs, plan.models, maps, rows, (None,) * len(plan.models))
     # the overrides of the config are an attribute
     template = dataset_template(plan).assign_attrs(config_set=wide.attrs["config_set"])
     dataset = lazy_dataset(template, table, stored_variables(plan))
-    assert in_memory(dataset, table, stored_variables(plan)).identical(wide)
+    assert in_memory(dataset).identical(wide)
     # a part has the numbers of the whole
     part = {"e": [2, 0], "v1": slice(None, None, -1), "material2": 1}
     assert dataset.isel(part).load().identical(wide.isel(part))

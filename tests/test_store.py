@@ -23,13 +23,13 @@ import pytest
 import xarray as xr
 
 import impact
-from impact.api import prepare
 from impact.atomic import atomic_write, write_file
-from impact.engine.executors import choose_backend
+from impact.engine.executors import choose_executor
+from impact.engine.run import Run as SweepRun
 from impact.errors import ResultError, StoreError, UnfinishedError, UsageError
 from impact.results import sweep as sweep_module
 from impact.results.seal import write_seal
-from impact.results.sweep import sweep_into
+from impact.results.sweep import prepare, sweep_into
 from impact.results.xarray_backend import open_result
 
 from .conftest import ROOT, Run
@@ -208,13 +208,13 @@ MANY = {
 def test_threads_processes_and_an_interruption_change_no_byte(tmp_path: Path, layout: str) -> None:
     plan = prepare(MANY | {"output": {"layout": layout}})
     sweep_into(tmp_path / "serial.h5", plan)
-    sweep_into(tmp_path / "threads.h5", plan, backend=choose_backend(threads=2))
-    sweep_into(tmp_path / "jobs.h5", plan, backend=choose_backend(jobs=2))
+    sweep_into(tmp_path / "threads.h5", plan, SweepRun(choose_executor(threads=2)))
+    sweep_into(tmp_path / "jobs.h5", plan, SweepRun(choose_executor(jobs=2)))
     resumed = tmp_path / "resumed.h5"
     with pytest.raises(UnfinishedError, match=r"16,500 of 33,000 trajectories are kept"):
-        sweep_into(resumed, plan, should_stop=lambda: any(tmp_path.glob("resumed.h5.work/*.npz")))
+        sweep_into(resumed, plan, SweepRun(should_stop=lambda: any(tmp_path.glob("resumed.h5.work/*.npz"))))
     assert not resumed.exists()
-    sweep_into(resumed, plan, resume=True)
+    sweep_into(resumed, plan, SweepRun(resume=True))
     assert len({path.read_bytes() for path in tmp_path.glob("*.h5")}) == 1
     assert len(list(tmp_path.iterdir())) == 4
 
@@ -508,7 +508,7 @@ LARGE = {
 
 
 def test_values_that_exceed_the_memory_are_refused_before_they_are_computed(tmp_path: Path) -> None:
-    sweep_into(tmp_path / "large.h5", prepare(LARGE, max_points=10**13))
+    sweep_into(tmp_path / "large.h5", prepare(LARGE, run=SweepRun(max_points=10**13)))
     with open_result(tmp_path / "large.h5") as opened:
         assert opened["e_out"].size == 10**12
         tracemalloc.start()

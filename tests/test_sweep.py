@@ -23,15 +23,14 @@ import pytest
 import xarray as xr
 
 import impact
-from impact.api import execute, prepare
 from impact.engine.execute import context_of, integrate_ranges, integrate_remotely
-from impact.engine.executors import SERIAL, Backend, choose_backend
-from impact.engine.progress import Progress
+from impact.engine.executors import SERIAL, ExecutorSpec, choose_executor
+from impact.engine.run import Progress, Run as SweepRun
 from impact.engine.trajectories import columns_of, trajectory_maps, trajectory_ranges
 from impact.errors import ConfigError, StoreError, UsageError
 from impact.progress_display import line, new_bar, update
 from impact.results.summary import summarize
-from impact.results.sweep import sweep_into
+from impact.results.sweep import prepare, sweep_in_memory, sweep_into
 
 from .conftest import ROOT, WIDE, Run
 from .fork_server import ForkServer, printed_on_terminal
@@ -252,10 +251,10 @@ def test_two_processes_with_a_plug_in_write_the_same_bytes_as_one(blocks: Path) 
     # every process uses the source that was read at the start
     plugin.write_text("raise SystemExit", encoding="utf-8")
     paths = [blocks.parent / name for name in ("serial.h5", "parallel.h5")]
-    for path, backend in zip(paths, (SERIAL, choose_backend(jobs=2)), strict=True):
-        sweep_into(path, plan, backend=backend)
+    for path, executor in zip(paths, (SERIAL, choose_executor(jobs=2)), strict=True):
+        sweep_into(path, plan, SweepRun(executor))
     assert paths[0].read_bytes() == paths[1].read_bytes()
-    assert impact.load(paths[1]).identical(execute(plan))
+    assert impact.load(paths[1]).identical(sweep_in_memory(plan))
 
 
 @pytest.mark.slow
@@ -303,8 +302,8 @@ def test_an_executor_gets_no_more_blocks_than_its_capacity(blocks: Path) -> None
     maps = trajectory_maps(plan)
     todo = list(trajectory_ranges(maps, 10))
     with CountingExecutor(2) as executor:
-        backend = Backend(lambda: nullcontext(executor), lambda: 5, shares_memory=True)
-        for _ in integrate_ranges(plan, maps, todo, backend=backend):
+        spec = ExecutorSpec(lambda: nullcontext(executor), lambda: 5, shares_memory=True)
+        for _ in integrate_ranges(plan, maps, todo, SweepRun(spec)):
             unfinished -= {future for future in unfinished if future.done()}
     assert len(todo) > 100
     assert largest == 5

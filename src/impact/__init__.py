@@ -9,43 +9,40 @@ from ._version import __version__ as __version__
 
 if TYPE_CHECKING:
     from .api import (
-        calibrate as calibrate,
         check_model as check_model,
-        estimate as estimate,
-        explore as explore,
-        export as export,
-        export_codes as export_codes,
-        extend as extend,
-        extend_to_file as extend_to_file,
         init as init,
         materials as materials,
-        merge as merge,
         models as models,
-        plot as plot,
-        plot_to_files as plot_to_files,
-        report as report,
-        rerun as rerun,
         run as run,
         schema as schema,
-        sensitivity as sensitivity,
-        solve as solve,
-        sweep as sweep,
-        sweep_shard as sweep_shard,
-        sweep_to_file as sweep_to_file,
-        timestep as timestep,
     )
     from .comparison.bless import bless as bless
     from .comparison.compare import compare as compare
+    from .comparison.rerun import rerun as rerun
     from .comparison.verdict import Verdict as Verdict
     from .contact.evidence import Evidence as Evidence
     from .contact.model import ForceModel as ForceModel, Parameter as Parameter
     from .contact.models.hysteresis import hysteresis as hysteresis
     from .contact.powers import power as power
     from .errors import ImpactError as ImpactError
+    from .exporters.export import export as export, export_codes as export_codes
+    from .inverse.calibrate import calibrate as calibrate
+    from .inverse.solve import solve as solve
+    from .inverse.timestep import timestep as timestep
+    from .plots.draw import plot as plot
+    from .plots.explore import explore as explore
+    from .plots.files import plot_to_files as plot_to_files
     from .progress_display import progress_bar as progress_bar
+    from .reporting.page import report as report
+    from .results.describe import describe as describe
+    from .results.estimate import estimate as estimate
+    from .results.extend import extend as extend, extend_to_file as extend_to_file
     from .results.info import info as info
     from .results.ranking import recommend as recommend
+    from .results.shards import merge as merge, sweep_shard as sweep_shard
+    from .results.sweep import sweep as sweep, sweep_to_file as sweep_to_file
     from .results.xarray_backend import expand as expand, load as load, save as save
+    from .uncertainty.sensitivity import sensitivities as sensitivities, sensitivity as sensitivity
 
 # the module of each public name, which is imported on first use: `import impact` and `impact --help` need no numpy
 _MODULES = {
@@ -55,39 +52,41 @@ _MODULES = {
     "Parameter": "contact.model",
     "Verdict": "comparison.verdict",
     "bless": "comparison.bless",
-    "calibrate": "api",
+    "calibrate": "inverse.calibrate",
     "check_model": "api",
     "compare": "comparison.compare",
-    "estimate": "api",
+    "describe": "results.describe",
+    "estimate": "results.estimate",
     "expand": "results.xarray_backend",
-    "explore": "api",
-    "export": "api",
-    "export_codes": "api",
-    "extend": "api",
-    "extend_to_file": "api",
+    "explore": "plots.explore",
+    "export": "exporters.export",
+    "export_codes": "exporters.export",
+    "extend": "results.extend",
+    "extend_to_file": "results.extend",
     "hysteresis": "contact.models.hysteresis",
     "info": "results.info",
     "init": "api",
     "load": "results.xarray_backend",
     "materials": "api",
-    "merge": "api",
+    "merge": "results.shards",
     "models": "api",
-    "plot": "api",
-    "plot_to_files": "api",
+    "plot": "plots.draw",
+    "plot_to_files": "plots.files",
     "power": "contact.powers",
     "progress_bar": "progress_display",
     "recommend": "results.ranking",
-    "report": "api",
-    "rerun": "api",
+    "report": "reporting.page",
+    "rerun": "comparison.rerun",
     "run": "api",
     "save": "results.xarray_backend",
     "schema": "api",
-    "sensitivity": "api",
-    "solve": "api",
-    "sweep": "api",
-    "sweep_shard": "api",
-    "sweep_to_file": "api",
-    "timestep": "api",
+    "sensitivities": "uncertainty.sensitivity",
+    "sensitivity": "uncertainty.sensitivity",
+    "solve": "inverse.solve",
+    "sweep": "results.sweep",
+    "sweep_shard": "results.shards",
+    "sweep_to_file": "results.sweep",
+    "timestep": "inverse.timestep",
 }
 __all__ = list(_MODULES)
 

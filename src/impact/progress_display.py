@@ -14,7 +14,7 @@ from rich.progress import BarColumn, Progress as Bar, Task, TextColumn, TimeRema
 from rich.text import Text
 
 if TYPE_CHECKING:
-    from .engine.progress import Progress
+    from .engine.run import Progress
 
 # seconds after which something is printed, between two lines where there is no terminal, and from the beginning of
 # a phase until the remaining time can be estimated

@@ -116,9 +116,10 @@ def rerun(
 
         def run_plan(plan: Plan) -> xr.Dataset:
             with progress_bar(exits.print_line, quiet=quiet) as on_progress:
-                from ..api import execute
+                from ..engine.run import Run
+                from ..results.sweep import sweep_in_memory
 
-                return execute(plan, on_progress=on_progress, should_stop=should_stop)
+                return sweep_in_memory(plan, Run(on_progress=on_progress, should_stop=should_stop))
 
         _check_plot(plot, result)
         try:

@@ -28,7 +28,7 @@ def complete_family(incomplete: str) -> list[str]:
 
 def complete_code(incomplete: str) -> list[str]:
     """The codes to which laws are exported."""
-    from ..exporters.codes import CODES
+    from ..exporters.registry import CODES
 
     return _beginning_with(incomplete, CODES)
 
@@ -59,9 +59,9 @@ def complete_unknown(context: typer.Context, incomplete: str) -> list[str]:
 
 def complete_output(incomplete: str) -> list[str]:
     """The variables of a result."""
-    from ..results.schema import SCHEMA
+    from ..contact.variables import OUTPUTS
 
-    return _beginning_with(incomplete, [variable.name for variable in SCHEMA])
+    return _beginning_with(incomplete, [*OUTPUTS])
 
 
 def complete_target(incomplete: str) -> list[str]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,7 +13,7 @@ from ..text import safe_text
 from .exits import print_line
 
 if TYPE_CHECKING:
-    from ..engine.executors import Backend
+    from ..engine.executors import ExecutorSpec
 
 
 @dataclass(frozen=True)
@@ -36,20 +36,13 @@ class ExecutorOptions:
         if len(selected) > 1:
             raise UsageError(f"{selected[0]}: got {selected[1]} as well, expected one of the two")
 
-    @contextmanager
-    def backend(self, *, quiet: bool, should_stop: Callable[[], bool]) -> Iterator[Backend]:
-        """The backend; prints the size of a cluster on stderr. `should_stop` ends an attempt to connect."""
+    def choose(self, *, quiet: bool, should_stop: Callable[[], bool]) -> AbstractContextManager[ExecutorSpec]:
+        """Choose the executor; the size of a cluster is printed on stderr when it is entered."""
         address = self.scheduler if self.scheduler is not None else self.scheduler_file
         if address is None:
-            from ..engine.executors import choose_backend
+            from ..engine.executors import choose_executor
 
-            yield choose_backend(self.jobs, self.threads)
-            return
+            return choose_executor(self.jobs, self.threads)
         from ..engine.dask import cluster
 
-        with cluster(address, should_stop) as (backend, dashboard, workers):
-            if not quiet:
-                waits = "" if workers else ", waits for some"
-                count = f"{workers} worker{'' if workers == 1 else 's'}{waits}"
-                print_line(f"{count}; dashboard: {dashboard}" if dashboard else count)
-            yield backend
+        return cluster(address, should_stop, (lambda note: None) if quiet else print_line)

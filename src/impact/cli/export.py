@@ -21,7 +21,7 @@ from .params import parse_number
 
 if TYPE_CHECKING:
     from ..exporters.export import Export
-    from ..exporters.verify import Verification
+    from ..exporters.verification import Verification
 
 
 def export(

@@ -88,7 +88,7 @@ def extend(
                 resume=resume,
                 overwrite=overwrite,
                 plugins=plugins or (),
-                backend=executor.backend(quiet=quiet, should_stop=should_stop),
+                backend=executor.choose(quiet=quiet, should_stop=should_stop),
                 max_points=max_points,
                 on_progress=on_progress,
                 should_stop=should_stop,

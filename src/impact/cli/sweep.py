@@ -104,7 +104,7 @@ def sweep(
             if should_stop():
                 raise UnfinishedError("nothing was written")
             return
-        backend = executor.backend(quiet=quiet, should_stop=should_stop)
+        backend = executor.choose(quiet=quiet, should_stop=should_stop)
         with progress_bar(exits.print_line, quiet=quiet) as on_progress:
             inputs |= {"backend": backend, "on_progress": on_progress, "should_stop": should_stop}
             if shard is not None:

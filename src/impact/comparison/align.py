@@ -10,9 +10,10 @@ import numpy as np
 import xarray as xr
 
 from ..config.input_names import InputName, is_input
+from ..contact.variables import OUTPUTS, Variable
 from ..formatting import number
 from ..results.attributes import read_attribute
-from ..results.schema import MODEL_METADATA, SCHEMA, SchemaVariable, columns_along, is_case
+from ..results.schema import MODEL_METADATA, columns_along, is_case
 from ..results.selection import LABEL_RTOL, NUMBER_DTYPE_KINDS, IndexArray, Labels, match_labels
 from ..text import safe_text
 from .verdict import Fault, FaultKind
@@ -123,7 +124,7 @@ def align(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Aligned:
     a, b = a.isel(new_positions), b.isel(baseline_positions)
     faults += _derived_faults(a, b)
     dims = {}
-    for variable in SCHEMA:
+    for variable in OUTPUTS.values():
         if variable.name in new and variable.name in baseline:
             axes = _axes_of_both(variable, baseline, new)
             if set(axes) == set(_axes_of_both(variable, new, baseline)):
@@ -183,10 +184,10 @@ def _with_axis(coords: xr.Dataset, axis: str, names: Iterable[Hashable]) -> xr.D
     )
 
 
-def _axes_of_both(variable: SchemaVariable, result: xr.Dataset, other: xr.Dataset) -> tuple[str, ...]:
+def _axes_of_both(variable: Variable, result: xr.Dataset, other: xr.Dataset) -> tuple[str, ...]:
     """The axes of a variable, after additional axes of length one along which only the other result varies."""
     added = [str(dim) for dim in dict.fromkeys(("model", *other.dims)) if dim not in result.dims]
-    of_variable = [dim for dim in added if dim != "model" or variable.per == "model"]
+    of_variable = [dim for dim in added if dim != "model" or variable.per_model]
     return (*reversed(of_variable), *map(str, result.variables[variable.name].dims))
 
 

@@ -13,7 +13,8 @@ from ..array_types import Array
 from ..config.input_names import is_input
 from ..errors import UsageError
 from ..results.attributes import read_attribute
-from ..results.calibration import CALIBRATION_VARIABLES, fit_status
+from ..results.calibration import fit_status
+from ..results.schema import CALIBRATION
 from ..text import safe_text
 from .tolerances import ALL_VARIABLES, Tolerances
 from .verdict import Fault, Judged, Verdict
@@ -35,7 +36,7 @@ def compare_calibrations(
     """Compare two calibrations law by law; their order does not matter.
 
     A value that the data do not determine is not judged. The scale of each variable is that of
-    `impact.results.calibration.CALIBRATION_VARIABLES`.
+    `impact.results.schema.CALIBRATION`.
 
     Parameters
     ----------
@@ -61,9 +62,7 @@ def compare_calibrations(
     judged: tuple[Judged, ...] = ()
     if common and not any(fault.kind == "labels" and fault.name != "model" for fault in faults):
         sides = new.sel(model=common), baseline.sel(model=common)
-        judged = tuple(
-            _judge(name, *sides, tolerance) for name in CALIBRATION_VARIABLES if name in new and name in baseline
-        )
+        judged = tuple(_judge(name, *sides, tolerance) for name in CALIBRATION if name in new and name in baseline)
     return Verdict(names[0], names[1], tuple(faults), judged, tuple(_notes(new, baseline, common)))
 
 
@@ -114,7 +113,7 @@ def _data_faults(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
 
 def _judge(name: str, new: xr.Dataset, baseline: xr.Dataset, tolerance: float) -> Judged:
     """The comparison of one variable of the same laws."""
-    variable = CALIBRATION_VARIABLES[name]
+    variable = CALIBRATION[name]
     a, b = (np.asarray(dataset[name].values, float) for dataset in (new, baseline))
     is_exact = variable.scale == "exact"
     scale = np.broadcast_to(np.zeros(1) if is_exact else _scale(name, baseline), b.shape)
@@ -154,7 +153,7 @@ def _label(dataset: xr.Dataset, dim: str, position: int) -> Any:
 
 def _scale(name: str, baseline: xr.Dataset) -> Array:
     """The scale of each value of a variable, NaN where it is not judged."""
-    variable = CALIBRATION_VARIABLES[name]
+    variable = CALIBRATION[name]
     values = np.abs(np.asarray(baseline[name].values, float))
     identified = baseline["identifiable"].values == 1
     match variable.scale:

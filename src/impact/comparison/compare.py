@@ -11,12 +11,13 @@ import xarray as xr
 
 from ..config.input_names import is_input
 from ..contact.timestep import EXACT
+from ..contact.variables import OUTPUTS
 from ..errors import UsageError
 from ..formatting import number
 from ..results.attributes import read_attribute
 from ..results.kinds import is_calibration, require_sweep
 from ..results.replay_command import command_start
-from ..results.schema import MODEL_METADATA, SCHEMA, SCHEMA_VERSION, is_case
+from ..results.schema import MODEL_METADATA, SCHEMA_VERSION, is_case
 from ..results.xarray_backend import load
 from ..text import safe_text
 from .align import MODEL_COORDINATES, align
@@ -86,7 +87,7 @@ def compare(
     notes += [safe_text(f"not judged: {', '.join(strange)}")] if strange else []
     if any(fault.kind == "labels" for fault in faults) and not subset:
         notes.append("--subset compares only what both results contain")
-    for name in (variable.name for variable in SCHEMA):
+    for name in OUTPUTS:
         sides = [side for side, dataset in (("NEW", a), ("BASELINE", b)) if name in dataset]
         if len(sides) == 1 and subset:
             notes.append(f"{name} is in {sides[0]} only")
@@ -94,7 +95,7 @@ def compare(
             faults.append(Fault("missing variable", name, f"{name} is in {sides[0]} only"))
     judged: list[Judged] = []
     largest: dict[str, Mapping[str, np.ndarray]] = {}
-    common = [variable for variable in SCHEMA if variable.name in aligned.dims]
+    common = [variable for variable in OUTPUTS.values() if variable.name in aligned.dims]
     # for all variables before the first comparison, so that a refusal comes early
     regions = representative_regions(common, aligned)
     for variable in common:
@@ -145,7 +146,7 @@ def check_comparable(dataset: xr.Dataset, name: str) -> None:
         if coordinate != "model" and dataset[coordinate].dtype.kind not in "fiu":
             raise UsageError(f"{shown}: {coordinate}: got {dataset[coordinate].dtype}, expected numbers")
     axes = {dim for name, v in dataset.variables.items() if is_input(name) for dim in v.dims}
-    for name in (variable.name for variable in SCHEMA):
+    for name in OUTPUTS:
         if name in dataset and dataset[name].dtype.kind not in "fiu":
             raise UsageError(f"{shown}: {name}: got {dataset[name].dtype}, expected numbers")
         if name in dataset and not axes <= set(dataset[name].dims):
@@ -154,7 +155,7 @@ def check_comparable(dataset: xr.Dataset, name: str) -> None:
 
 def _unknown_variables(dataset: xr.Dataset) -> list[str]:
     """The variables that are not part of a result."""
-    standard_names = {*MODEL_COORDINATES, *(variable.name for variable in SCHEMA)}
+    standard_names = {*MODEL_COORDINATES, *OUTPUTS}
     names = [str(name) for name in dataset.variables if name not in standard_names]
     return [name for name in names if not (is_input(name) or is_case(name))]
 

@@ -12,9 +12,10 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ..contact.status import Status
+from ..contact.variables import Variable
 from ..errors import UsageError
 from ..results.replay_command import inputs_of_model
-from ..results.schema import SchemaVariable, columns_along, is_case, scale_of
+from ..results.schema import columns_along, is_case, scale_of
 from ..results.slabs import (
     MAX_SUMMARY_POINTS,
     SLAB_POINTS,
@@ -34,15 +35,13 @@ SlicesByDim = Mapping[str, slice]
 MAX_COMPARED_POINTS = 10**10
 # the largest ratios along longer axes are those of groups of neighbours, enough for a picture
 MAX_RATIO_GROUPS = 2**14
-# variables that may be NaN at status OK: the law lacks the quantity, or the sweep has no e
-OPTIONAL_VARIABLES = ("damping_ratio", "lambda", "closed_form_error", "e_error", "v1_error", "v2_error")
 # |difference|/scale is that of a trajectory: |Delta v1_post|/v0 = (m/m1) |Delta e_out| <= |Delta e_out|
-DIMENSIONLESS_SCALES = ("scaled by v0", "scaled by the peak", "scaled by itself", "scaled by m v0^2/2")
+DIMENSIONLESS_SCALES = ("v0", "the peak", "itself", "m v0^2/2")
 # coordinates that the scale of a point is computed from
-SCALE_INPUTS = {"scaled by v0": ("v1", "v2"), "scaled by m v0^2/2": ("v1", "v2", "m1", "m2")}
+SCALE_INPUTS = {"v0": ("v1", "v2"), "m v0^2/2": ("v1", "v2", "m1", "m2")}
 
 
-def representative_regions(variables: Sequence[SchemaVariable], aligned: Aligned) -> dict[str, list[SlicesByDim]]:
+def representative_regions(variables: Sequence[Variable], aligned: Aligned) -> dict[str, list[SlicesByDim]]:
     """By variable, the parts of the common points that represent all of them; see `compare` for the rule.
 
     Raises
@@ -89,9 +88,7 @@ def _region(dims: Iterable[str], sizes: Mapping[str, int], models: slice) -> Sli
     return {dim: slice(*(models if dim == "model" else slice(None)).indices(sizes[dim])[:2]) for dim in dims}
 
 
-def _representative_dims(
-    variable: SchemaVariable, aligned: Aligned, sides: Sequence[xr.Dataset]
-) -> tuple[str, ...]:
+def _representative_dims(variable: Variable, aligned: Aligned, sides: Sequence[xr.Dataset]) -> tuple[str, ...]:
     """The axes of a variable whose points represent all others.
 
     Parameters
@@ -105,16 +102,16 @@ def _representative_dims(
         return {dim for side in sides for name in names if name in side for dim in varying_dims(side, name)}
 
     scale: set[Hashable] = set()
-    for name in SCALE_INPUTS.get(variable.judged, ()):
+    for name in SCALE_INPUTS.get(variable.scale, ()):
         scale |= set(aligned.baseline.coords.variables[name].dims)
-    if variable.judged == "scaled by the peak" and "peak_indentation" in sides[1]:
+    if variable.scale == "the peak" and "peak_indentation" in sides[1]:
         scale |= set(varying_dims(sides[1], "peak_indentation"))
     full = varying(variable.name) | scale
     candidates = [full]
-    if variable.per == "model" and variable.judged not in ("exact", "reported"):
+    if variable.per_model and variable.has_tolerance:
         # the status decides whether a NaN is an answer
         candidates.insert(0, full | varying("status"))
-    if variable.judged in DIMENSIONLESS_SCALES and all("e_out" in side for side in sides):
+    if variable.scale in DIMENSIONLESS_SCALES and all("e_out" in side for side in sides):
         candidates.append(varying("e_out"))
     chosen = []
     for dims in candidates:
@@ -142,7 +139,7 @@ class Worst:
 
 
 def judge(
-    variable: SchemaVariable, aligned: Aligned, tol: float, regions: Iterable[SlicesByDim]
+    variable: Variable, aligned: Aligned, tol: float, regions: Iterable[SlicesByDim]
 ) -> tuple[Judged, dict[str, NDArray[Any]]]:
     """Compare one variable at all common points: |new - baseline| over tolerance, inf if no difference is allowed.
 
@@ -185,7 +182,7 @@ def judge(
     return Judged(
         name=variable.name,
         judged=variable.judged,
-        tolerance=math.nan if variable.judged in ("exact", "reported") else tol,
+        tolerance=tol if variable.has_tolerance else math.nan,
         points=math.prod(shape),
         different=different,
         worst=worst.difference if worst else 0.0,
@@ -221,7 +218,7 @@ def _slabs(name: str, aligned: Aligned, region: SlicesByDim) -> Iterator[dict[st
 
 
 def _ratio(
-    variable: SchemaVariable,
+    variable: Variable,
     aligned: Aligned,
     where: Mapping[str, slice],
     a: NDArray[Any],
@@ -237,12 +234,12 @@ def _ratio(
         # allow for the rounding of values that were stored in single precision
         lost = sum(float(np.finfo(values.dtype).eps) for values in (a, b) if values.dtype == np.float32)
         allowed = tol * scale + (lost * np.maximum(np.abs(a), np.abs(b)) if lost else 0.0)
-        if variable.judged == "bounded by 10 rtol":
+        if variable.scale == "bounded by 10 rtol":
             # a residual is noise: any value within its bound is accepted
             counted = np.minimum(difference, np.maximum(np.abs(a), np.abs(b)))
         else:
             counted = difference
-        if variable.judged in ("exact", "reported"):
+        if not variable.has_tolerance:
             ratio = np.where(difference == 0.0, 0.0, np.inf)
         else:
             # with an infinite scale every difference would be accepted
@@ -255,16 +252,16 @@ def _ratio(
     return ratio, difference
 
 
-def _may_be_missing(variable: SchemaVariable, aligned: Aligned, where: Mapping[str, slice]) -> NDArray[Any] | bool:
+def _may_be_missing(variable: Variable, aligned: Aligned, where: Mapping[str, slice]) -> NDArray[Any] | bool:
     """Where NaNs in both are equal: the statuses are equal, and the status or the law explains the NaN."""
-    if variable.per == "axes" or not all("status" in side.dataset for side in (aligned.new, aligned.baseline)):
+    if not variable.per_model or not all("status" in side.dataset for side in (aligned.new, aligned.baseline)):
         return True
     new, baseline = (side.read("status", where) for side in (aligned.new, aligned.baseline))
-    return np.asarray((new == baseline) & ((baseline != Status.OK) | (variable.name in OPTIONAL_VARIABLES)))
+    return np.asarray((new == baseline) & ((baseline != Status.OK) | (variable.may_be_nan)))
 
 
 def _worst_of_slab(
-    variable: SchemaVariable,
+    variable: Variable,
     where: Mapping[str, slice],
     ratio: NDArray[Any],
     difference: NDArray[Any],
@@ -275,7 +272,7 @@ def _worst_of_slab(
 
     Among flags, which differ or do not, the first point.
     """
-    sizes = np.ones_like(ratio) if variable.judged == "exact" else np.nan_to_num(difference, nan=np.inf)
+    sizes = np.ones_like(ratio) if variable.scale == "exact" else np.nan_to_num(difference, nan=np.inf)
     index = np.unravel_index(int(np.argmax(np.where(ratio == ratio.max(), sizes, -1.0))), ratio.shape)
     return Worst(
         float(ratio[index]),

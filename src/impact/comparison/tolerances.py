@@ -8,9 +8,9 @@ from typing import Any, TypeGuard
 
 import numpy as np
 
+from ..contact.variables import OUTPUTS
 from ..errors import ResultError, UsageError, did_you_mean
 from ..results.attributes import read_attribute
-from ..results.schema import SCHEMA
 from ..text import safe_text
 
 Tolerances = Mapping[str, float]
@@ -19,8 +19,7 @@ Tolerances = Mapping[str, float]
 ALL_VARIABLES = "all"
 # the default tolerance is this many times the solver's rtol
 DEFAULT_RTOL_FACTOR = 10.0
-JUDGED_BY_NAME = {variable.name: variable.judged for variable in SCHEMA}
-TOLERANCE_VARIABLES = [name for name, judged in JUDGED_BY_NAME.items() if judged not in ("exact", "reported")]
+TOLERANCE_VARIABLES = [name for name, variable in OUTPUTS.items() if variable.has_tolerance]
 
 
 def effective_tolerances(tol: float | Tolerances | None, attributes: Mapping[str, Any]) -> dict[str, float]:
@@ -65,7 +64,7 @@ def _check_tolerances(tolerances: Mapping[str, Any]) -> None:
                 "exact": "has no tolerance, it is judged exactly;",
                 "reported": "has no tolerance, it is not judged;",
             }
-            how = has_none[JUDGED_BY_NAME[name]] if name in JUDGED_BY_NAME else "not a variable of a result;"
+            how = has_none[OUTPUTS[name].scale] if name in OUTPUTS else "not a variable of a result;"
             raise UsageError(f"--tol {safe_text(str(name))}: {how} {did_you_mean(str(name), TOLERANCE_VARIABLES)}")
         if not _is_number(value) or not 0.0 <= value <= sys.float_info.max:
             shown = value if name == ALL_VARIABLES else f"{name}={value}"

@@ -19,7 +19,7 @@ from typing import Any
 from pydantic_core import PydanticCustomError
 
 from ..contact.model import ForceModel
-from ..contact.outputs import UNITS
+from ..contact.variables import OUTPUTS
 from ..errors import ConfigError
 from ..text import safe_text
 from .files import as_table, override_text, read_text, set_value
@@ -157,7 +157,7 @@ def column_quantity(name: str, models: Mapping[str, ForceModel]) -> Quantity | N
     ------
     KeyError : there is no such output or input
     """
-    return Quantity(UNITS[name], "output") if name in UNITS else InputName.parse(name).quantity(models)
+    return Quantity(OUTPUTS[name].unit, "output") if name in OUTPUTS else InputName.parse(name).quantity(models)
 
 
 def column_values(table: CsvTable, column: str, quantity: Quantity | None, n: float | None) -> list[float | str]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from pydantic import ValidationError
 
-from ..contact.outputs import BY_DEFAULT
+from ..contact.variables import BY_DEFAULT
 from .input_names import InputName
 from .quantities import MAX_PROBLEMS, ConfigProblem, Names, Numbers, Quantity, Range, show, suggest
 
@@ -98,7 +98,7 @@ def build_grid(
     config_names : all names in the config, also those with invalid values
     n_models : number of models
     max_points : limit of the number of points
-    in_full : whether every point is stored; otherwise `impact.api.prepare` limits the number of trajectories
+    in_full : whether every point is stored; otherwise the number of trajectories is limited later
     """
     axis_sizes = {name: _axis_size(value) for name, value in values.items()}
     scalars = {name: value for name, value in values.items() if isinstance(value, float | str)}

@@ -13,8 +13,8 @@ from pydantic import ValidationError
 from ..contact.materials import Material
 from ..contact.model import ForceModel
 from ..contact.numba.dispatch import is_installed
-from ..contact.outputs import BY_DEFAULT
 from ..contact.timestep import EXACT
+from ..contact.variables import BY_DEFAULT
 from . import cases, measurements
 from .design import design_problems, distribution_paths, draw_columns, unit_samples
 from .draft import Draft, Setting, add_library_materials, open_config, open_text

@@ -11,7 +11,7 @@ from typing import Any, Literal
 from pydantic_core import PydanticCustomError
 
 from ..contact.model import ForceModel, with_base_quantities
-from ..contact.outputs import UNITS
+from ..contact.variables import OUTPUTS
 from ..errors import ConfigError
 from ..formatting import number
 from ..text import safe_text
@@ -32,26 +32,16 @@ Loss = Literal["linear", "huber", "cauchy"]
 
 SIGMA, SPECIMEN = "sigma", "specimen"
 SPECIMEN_EXPECTED = "got nothing, expected the name of a specimen"
-_ANY: dict[str, Any] = {"least": -MAX_MEASURED, "most": MAX_MEASURED}
-_POSITIVE: dict[str, Any] = {"least": 0.0, "above": True, "most": MAX_MEASURED}
-# a measured fraction may be below 0 or above 1 by its noise; a value that is farther off is no fraction
-_FRACTION: dict[str, Any] = {"least": -0.5, "most": 1.5}
-# the outputs that can be measured, with the interval of their values
+# intervals of measured values; a fraction may be below 0 or above 1 by its noise, farther off it is no fraction
+_INTERVALS: dict[str, dict[str, Any]] = {
+    "any": {"least": -MAX_MEASURED, "most": MAX_MEASURED},
+    "positive": {"least": 0.0, "above": True, "most": MAX_MEASURED},
+    "fraction": {"least": -0.5, "most": 1.5},
+}
 MEASURED_OUTPUTS = {
-    name: Quantity(UNITS[name], "measured", **interval)
-    for name, interval in {
-        "e_out": _FRACTION,
-        "v1_post": _ANY,
-        "v2_post": _ANY,
-        "contact_time": _POSITIVE,
-        "separation_time": _POSITIVE,
-        "peak_force": _POSITIVE,
-        "peak_indentation": _POSITIVE,
-        "permanent_indentation": _ANY,
-        "energy_loss": _ANY,
-        "e_kinetic": _FRACTION,
-        "e_energetic": _FRACTION,
-    }.items()
+    name: Quantity(output.unit, "measured", **_INTERVALS[output.measured])
+    for name, output in OUTPUTS.items()
+    if output.measured
 }
 
 
@@ -147,7 +137,9 @@ def _column_of(name: str, outputs: Sequence[str], models: Mapping[str, ForceMode
         if outputs and output not in outputs:
             raise value_error(f"got no column {output}, expected one beside its standard deviation")
         return _DataColumn(
-            "sigma", output, Quantity(UNITS[output], "standard deviation", least=MIN_SIGMA, most=MAX_MEASURED)
+            "sigma",
+            output,
+            Quantity(OUTPUTS[output].unit, "standard deviation", least=MIN_SIGMA, most=MAX_MEASURED),
         )
     if not name:
         raise value_error("got a column without a name, expected that of an input or an output")
@@ -253,7 +245,7 @@ def _is_in_percent(element: object, quantity: Quantity) -> bool:
     if "%" in str(element):
         return True
     try:
-        return quantity.most == _FRACTION["most"] and float(element) > quantity.most
+        return quantity.most == _INTERVALS["fraction"]["most"] and float(element) > quantity.most
     except (ValueError, OverflowError):
         return False
 
@@ -369,12 +361,17 @@ def _read_list(
     return tuple(values), problems
 
 
+def _deviation_of(output: str) -> Quantity:
+    """Describe the standard deviation of a measured output."""
+    return Quantity(OUTPUTS[output].unit, "standard deviation", least=MIN_SIGMA, most=MAX_MEASURED)
+
+
 def _read_sigma(value: object, output: str, n_points: int) -> tuple[tuple[float, ...], list[ConfigProblem]]:
     """The standard deviations of an output from the key `sigma`, and problems that validation does not report."""
     path: KeyPath = ("data", "sigma")
     if isinstance(value, list) and len(value) != n_points:
         return (), [(path, f"got {len(value)} values, expected {n_points}, one for each point")]
-    quantity = Quantity(UNITS[output], "standard deviation", least=MIN_SIGMA, most=MAX_MEASURED)
+    quantity = _deviation_of(output)
     elements = value if isinstance(value, list) else [value]
     deviations, problems = _read_list(elements, path, quantity, None)
     if not isinstance(value, list):

@@ -23,8 +23,8 @@ from pydantic_core import PydanticCustomError
 
 from ..contact.model import ForceModel
 from ..contact.models import built_in, catalogue
-from ..contact.outputs import OUTPUTS
 from ..contact.timestep import EXACT, MAX_STEPS_PER_CONTACT, SCHEMES
+from ..contact.variables import OUTPUTS
 from .quantities import (
     MAX_AXIS_VALUES,
     MAX_PROBLEMS,
@@ -174,7 +174,7 @@ class Solver:
     ] = EXACT
 
 
-OutputVariable = Annotated[Literal[*OUTPUTS], known_name("a variable of the result", lambda info: OUTPUTS)]  # type: ignore[valid-type]
+OutputVariable = Annotated[Literal[*OUTPUTS], known_name("a variable of the result", lambda info: tuple(OUTPUTS))]  # type: ignore[valid-type]
 
 
 def _list_or_none(value: object) -> object:

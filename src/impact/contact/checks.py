@@ -13,9 +13,10 @@ from ..array_types import Array
 from .impacts import Impacts, stiffness
 from .materials import effective_mass, hertz_stiffness, sphere_radius
 from .model import QUANTITIES, ForceModel, Parameter
-from .outputs import OUTPUTS, Outputs, collide
+from .outputs import Outputs, collide
 from .status import FIRST_FAILURE, Status
 from .units import dimension
+from .variables import OUTPUTS
 
 CONTRACT_RTOL, CONTRACT_MAX_STEPS = 1e-10, 10_000
 # largest error of an identity by rounding, relative to its largest term

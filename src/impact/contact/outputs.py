@@ -1,4 +1,4 @@
-"""The outputs of collisions, in SI: the variables of a result file."""
+"""Compute the outputs of collisions, in SI, that `impact.contact.variables.OUTPUTS` lists."""
 
 from __future__ import annotations
 
@@ -18,40 +18,10 @@ from .scaling import dimensionless_values
 from .simulate import CollisionResult, simulate
 from .status import FIRST_FAILURE, LIMIT, NO_IMPACT, STATUS_OK
 from .timestep import EXACT
+from .variables import OUTPUTS
 
 Outputs = dict[str, NDArray[Any]]
 InSI = Callable[[Array, Array], Array]
-
-# SI units of the outputs that a result has by default, in its order, and of those on request
-DEFAULT_UNITS = {
-    "v1_post": "m/s",
-    "v2_post": "m/s",
-    "v1_reference": "m/s",
-    "v2_reference": "m/s",
-    "v1_error": "m/s",
-    "v2_error": "m/s",
-    "e_out": "1",
-    "e_error": "1",
-    "peak_indentation": "m",
-    "permanent_indentation": "m",
-    "peak_force": "N",
-    "contact_time": "s",
-    "energy_loss": "J",
-    "stiffness": "N/m^n",
-    "damping_ratio": "1",
-    "energy_residual": "1",
-    "closed_form_error": "1",
-    "status": "1",
-    "in_domain": "1",
-    "steps": "1",
-}
-UNITS = DEFAULT_UNITS | {
-    "e_kinetic": "1",
-    "e_energetic": "1",
-    "lambda": "N s/m^(n+1)",
-    "separation_time": "s",
-}
-BY_DEFAULT, OUTPUTS = tuple(DEFAULT_UNITS), tuple(UNITS)
 
 
 def outputs(
@@ -68,7 +38,7 @@ def outputs(
     law : the law
     impacts : the inputs
     result : the collisions, in the contact's own units, of shapes that broadcast to those of the impacts
-    names : names of `OUTPUTS`, see docs/schema.md
+    names : in `OUTPUTS`, see docs/schema.md
     checked : the status by `check_inputs`, if it is already computed
 
     Returns

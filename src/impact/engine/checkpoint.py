@@ -1,7 +1,7 @@
-"""The work folder of a sweep: one file for each finished block, so that no completed work is ever lost.
+"""The work folder of a sweep: one file for each finished range of trajectories, so that no work is ever lost.
 
-While a sweep runs, the folder `results.h5.work/` beside the output `results.h5` contains the plan, a lock, and a
-file for each finished block, which is written to a temporary name, synced and renamed. The folder is removed when
+While a sweep runs, the folder `results.h5.work/` next to the output `results.h5` contains the plan, a lock, and a
+file for each finished range, which is written to a temporary name, synced and renamed. The folder is removed when
 the result is complete.
 """
 
@@ -25,6 +25,7 @@ from ..errors import ImpactError, InUseError, StoreError, UsageError
 from ..text import safe_text
 from .execute import with_core
 from .plan import Plan
+from .run import Run
 from .trajectories import RANGE_TRAJECTORIES, TrajectoryRange, trajectory_maps
 
 PLAN_FILE, LOCK_FILE = "plan.json", "lock"
@@ -33,18 +34,18 @@ MAX_DIFFERENCES = 3  # between two sweeps, in a message
 
 
 def work_folder_of(output: Path) -> Path:
-    """The work folder of an output."""
+    """Name the work folder of an output."""
     return output.with_name(f"{output.name}.work")
 
 
 def partial_file_of(output: Path) -> Path:
-    """The temporary name of an output while it is written."""
+    """Name the temporary file of an output that is being written."""
     return output.with_name(f"{output.name}.part")
 
 
 @dataclass(frozen=True)
 class WorkFolder:
-    """A work folder that this process has locked; `key` identifies the sweep of its blocks."""
+    """A work folder that this process has locked; `key` identifies the sweep of its ranges."""
 
     folder: Path
     key: str
@@ -52,40 +53,35 @@ class WorkFolder:
     def path(self, number: int) -> Path:
         return self.folder / f"{number:08d}.npz"
 
-    def _block_header(self, part: TrajectoryRange) -> str:
-        """The text in a block that identifies its sweep and its range of trajectories."""
-        return f"{part.number} {part.model} {part.start} {part.stop} {self.key}"
+    def _header(self, trajectory_range: TrajectoryRange) -> str:
+        """The text in a file that identifies its sweep and its range."""
+        fields = trajectory_range.number, trajectory_range.model, trajectory_range.start, trajectory_range.stop
+        return " ".join(map(str, (*fields, self.key)))
 
-    def store(self, part: TrajectoryRange, collisions: CollisionResult) -> None:
-        """Store a finished block.
+    def store(self, trajectory_range: TrajectoryRange, collisions: CollisionResult) -> None:
+        """Store a finished range; raises a `StoreError` if the disk is full or failed."""
+        path = self.path(trajectory_range.number)
+        with atomic_write(path, overwrite=True, part=self.folder / "block.part") as sink:
+            write_range(sink, self._header(trajectory_range), collisions)
 
-        Raises
-        ------
-        StoreError : the disk is full or failed
-        """
-        with atomic_write(self.path(part.number), overwrite=True, part=self.folder / "block.part") as sink:
-            write_block(sink, self._block_header(part), collisions)
-
-    def load(self, part: TrajectoryRange) -> CollisionResult | None:
-        """A finished block; None if it is missing or damaged."""
+    def load(self, trajectory_range: TrajectoryRange) -> CollisionResult | None:
+        """Load a finished range; None if it is missing or damaged."""
+        path = self.path(trajectory_range.number)
         # reading something other than a regular file might never end
-        if not self.path(part.number).is_file():
+        if not path.is_file():
             return None
-        return read_block(self.path(part.number), self._block_header(part), part.size)
+        return read_range(path, self._header(trajectory_range), trajectory_range.size)
 
 
 @contextlib.contextmanager
-def open_work_folder(
-    folder: Path, plan: Plan, *, resume: bool, overwrite: bool, extends: str = ""
-) -> Iterator[WorkFolder]:
+def open_work_folder(folder: Path, plan: Plan, run: Run, extends: str = "") -> Iterator[WorkFolder]:
     """Create or reopen a work folder, and lock it.
 
     Parameters
     ----------
     folder : its path
-    plan : the plan whose blocks it contains
-    resume : keep the blocks of an interrupted sweep
-    overwrite : remove the blocks of an interrupted sweep, unless they are resumed
+    plan : the plan whose ranges it contains
+    run : with `resume` the finished ranges are kept; `overwrite` removes them if they are not resumed
     extends : seal of the result that is extended, if any, whose trajectories the folder does not contain
 
     Raises
@@ -96,34 +92,20 @@ def open_work_folder(
     """
     _check_is_work_folder(folder)
     record = _sweep_record(plan, extends)
-    lock = FileLock(folder / LOCK_FILE, timeout=0)
-    try:
-        _acquire_lock(lock, folder)
-        _prepare_folder(folder, record, resume=resume, overwrite=overwrite)
+    with _locked(folder):
+        _prepare_folder(folder, record, run)
         yield WorkFolder(folder, _record_digest(record))
-    finally:
-        lock.release()
 
 
 @contextlib.contextmanager
 def lock_work_folder(folder: Path, plan: Plan) -> Iterator[WorkFolder]:
-    """Lock an existing work folder of a plan without changing it.
-
-    Raises
-    ------
-    InUseError, StoreError : see `open_work_folder`
-    UsageError : the folder belongs to another sweep
-    """
+    """Lock an existing work folder of a plan without changing it; a `UsageError` if it is of another sweep."""
     record = _sweep_record(plan)
     difference = _difference_from(folder, record)
     if difference:
         raise UsageError(f"{safe_text(str(folder))}: {difference}; expected the folders of one sweep")
-    lock = FileLock(folder / LOCK_FILE, timeout=0)
-    try:
-        _acquire_lock(lock, folder)
+    with _locked(folder):
         yield WorkFolder(folder, _record_digest(record))
-    finally:
-        lock.release()
 
 
 def remove_stale_work_folder(output: Path, plan: Plan) -> None:
@@ -141,7 +123,7 @@ def remove_stale_work_folder(output: Path, plan: Plan) -> None:
 
 
 def _check_is_work_folder(folder: Path) -> None:
-    """Refuse a file, link or folder that has the name of a work folder but is none."""
+    """Refuse a file, link or foreign folder that has the name of a work folder."""
     shown = safe_text(str(folder))
     if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
         raise UsageError(f"{shown}: is not a folder, and is not modified")
@@ -160,32 +142,39 @@ def remove_work_folder(folder: Path) -> None:
         folder.rmdir()
 
 
-def _acquire_lock(lock: FileLock, folder: Path) -> None:
+@contextlib.contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    """Create a folder if it is missing, and lock it."""
+    lock = FileLock(folder / LOCK_FILE, timeout=0)
     try:
-        folder.mkdir(exist_ok=True)
-        sync_folder(folder.parent)
-        lock.acquire()
-    except Timeout:
-        raise InUseError(
-            f"{safe_text(str(folder.with_suffix('')))}: is being written by another process"
-        ) from None
-    except OSError as error:
-        raise StoreError(f"{safe_text(str(folder))}: {error.strerror}") from error
+        try:
+            folder.mkdir(exist_ok=True)
+            sync_folder(folder.parent)
+            lock.acquire()
+        except Timeout:
+            raise InUseError(
+                f"{safe_text(str(folder.with_suffix('')))}: is being written by another process"
+            ) from None
+        except OSError as error:
+            raise StoreError(f"{safe_text(str(folder))}: {error.strerror}") from error
+        yield
+    finally:
+        lock.release()
 
 
-def _prepare_folder(folder: Path, record: Mapping[str, Any], *, resume: bool, overwrite: bool) -> None:
-    """Write the plan to a folder, and remove blocks that are not resumed."""
+def _prepare_folder(folder: Path, record: Mapping[str, Any], run: Run) -> None:
+    """Write the plan to a folder, and remove ranges that are not resumed."""
     shown = safe_text(str(folder))
     try:
         has_leftovers = any(path.name != LOCK_FILE for path in folder.iterdir())
-        if has_leftovers and not resume and not overwrite:
+        if has_leftovers and not run.resume and not run.overwrite:
             raise UsageError(
                 f"{shown}: is left of an interrupted sweep; use --resume to continue or --overwrite to start again"
             )
-        if has_leftovers and _can_resume(folder, record, resume=resume):
+        if has_leftovers and _can_resume(folder, record, resume=run.resume):
             return
         _remove_files(folder)
-        # after a power cut, removed blocks must not reappear beside the new plan
+        # after a power cut, removed ranges must not reappear next to the new plan
         sync_folder(folder)
         with atomic_write(folder / PLAN_FILE, overwrite=True) as sink:
             sink.write(json.dumps(record).encode())
@@ -194,7 +183,7 @@ def _prepare_folder(folder: Path, record: Mapping[str, Any], *, resume: bool, ov
 
 
 def _sweep_record(plan: Plan, extends: str = "") -> dict[str, Any]:
-    """The identity of a sweep: everything that its finished blocks depend on."""
+    """Collect everything that the finished ranges of a sweep depend on."""
     solver = plan.config.solver
     return {
         "schema": TABLE_COLUMNS,
@@ -211,20 +200,15 @@ def _record_digest(record: Mapping[str, Any]) -> str:
 
 
 def _remove_files(folder: Path, plan: bool = False) -> None:
-    """Remove the finished and partial blocks, and with `plan` the plan."""
+    """Remove the finished and partial ranges, and with `plan` the plan."""
     for path in (*folder.glob("*.npz"), *folder.glob("*.part"), *([folder / PLAN_FILE] if plan else [])):
         path.unlink(missing_ok=True)
 
 
 def _can_resume(folder: Path, record: Mapping[str, Any], *, resume: bool) -> bool:
-    """Whether the blocks of a folder can be resumed.
-
-    Raises
-    ------
-    UsageError : `resume` is set, and the folder belongs to another sweep
-    """
+    """Whether the ranges of a folder can be resumed; a `UsageError` if they shall be, and are of another sweep."""
     if not resume or not os.path.lexists(folder / PLAN_FILE):
-        # without a plan, the sweep was interrupted before its first block
+        # without a plan, the sweep was interrupted before its first range
         return False
     difference = _difference_from(folder, record)
     if difference:
@@ -233,7 +217,7 @@ def _can_resume(folder: Path, record: Mapping[str, Any], *, resume: bool) -> boo
 
 
 def _difference_from(folder: Path, record: Mapping[str, Any]) -> str | None:
-    """How the sweep of a folder differs from the one of a record; None if they are the same."""
+    """State how the sweep of a folder differs from the one of a record; None if they are the same."""
     unknown = [key for key, digest in record["physics"]["plugins"].items() if digest is None]
     if unknown:
         return f"the model {safe_text(unknown[0])} has no file, so it cannot be compared"
@@ -248,20 +232,13 @@ def _difference_from(folder: Path, record: Mapping[str, Any]) -> str | None:
     return f"belongs to another sweep: {'; '.join(differences[:MAX_DIFFERENCES])}{more}" if differences else None
 
 
-def write_block(file: Any, header: str, collisions: CollisionResult) -> None:
-    """Write a block.
-
-    Parameters
-    ----------
-    file : a binary file
-    header : text that identifies the block
-    collisions : results of its trajectories
-    """
+def write_range(file: Any, header: str, collisions: CollisionResult) -> None:
+    """Write the results of a range, with the header that identifies it, to a binary file."""
     np.savez(file, of=header, **{name: getattr(collisions, name) for name in TABLE_COLUMNS})
 
 
-def read_block(path: Path, header: str, size: int) -> CollisionResult | None:
-    """A block of `size` trajectories; None if it has another header or is damaged."""
+def read_range(path: Path, header: str, size: int) -> CollisionResult | None:
+    """Read a range of `size` trajectories; None if it has another header or is damaged."""
     try:
         with np.load(path, allow_pickle=False) as stored:
             if stored["of"].item() != header:
@@ -281,7 +258,7 @@ def read_block(path: Path, header: str, size: int) -> CollisionResult | None:
 
 
 def record_differences(stored: object, current: object, path: str = "") -> Iterator[str]:
-    """The differences between two records, each with its path."""
+    """List the differences between two records, each with its path."""
     if isinstance(stored, dict) and isinstance(current, dict):
         for key in dict.fromkeys((*stored, *current)):
             name = key if path in ("", "physics") else f"{path}.{key}"

@@ -1,4 +1,4 @@
-"""A backend that integrates on the workers of a scheduler of dask.distributed."""
+"""Integrate on the workers of a scheduler of dask.distributed."""
 
 from __future__ import annotations
 
@@ -11,24 +11,25 @@ from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future,
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from .._version import __version__
 from ..errors import ImpactError, StoreError, UnfinishedError, UsageError
 from ..text import safe_text
-from .execute import never_stop, other_version
-from .executors import BLOCKS_IN_FLIGHT, Backend
+from .execute import other_version
+from .executors import RANGES_IN_FLIGHT, ExecutorSpec
+from .run import ignore, never
 
 if TYPE_CHECKING:
     from distributed import Client, LocalCluster
 
 LOCAL = "local"
 ADDRESS_EXPECTED = "the address of a scheduler of dask, such as tcp://host:8786"
-# unfinished blocks of all workers together, which bounds the memory of the driver for any number of workers
-MAX_BLOCKS_IN_FLIGHT = 256
+# unfinished ranges of all workers together, which bounds the memory of the driver for any number of workers
+MAX_RANGES_IN_FLIGHT = 256
 # seconds between two requests to the scheduler, and to wait for a connection or a scheduler file
 SCHEDULER_POLL_S, CONNECT_TIMEOUT_S = 1.0, 10.0
-# seconds without an answer of the scheduler after which no block is submitted and a signal ends the sweep at once
+# seconds without an answer of the scheduler after which no range is submitted and a signal ends the sweep at once
 SILENCE_LIMIT_S = 3.0
 # seconds that closing a connection may take
 CLOSE_TIMEOUT_S = 2.0
@@ -38,7 +39,7 @@ TIMEOUT_SETTING = "distributed.comm.timeouts.connect"
 NO_WORKERS_LIMIT_S = 60.0
 # an expression that a worker with any version of this package can evaluate
 VERSION_EXPRESSION = "__import__('impact').__version__"
-# of a local scheduler: a block whose worker died is returned to the driver, which submits it again; and a worker
+# of a local scheduler: a range whose worker died is returned to the driver, which submits it again; and a worker
 # that died is restarted whenever that is noticed
 LOCAL_SCHEDULER_SETTINGS = {
     "distributed.scheduler.allowed-failures": 0,
@@ -51,16 +52,10 @@ WORKER_PRELOAD = "import logging, signal; logging.disable(); signal.signal(signa
 ResultT = TypeVar("ResultT")
 
 
-class Cluster(NamedTuple):
-    """A backend, the address of the scheduler's dashboard if it has one, and the initial number of workers."""
-
-    backend: Backend
-    dashboard: str | None
-    workers: int
-
-
 @contextlib.contextmanager
-def cluster(scheduler: str | Path, should_stop: Callable[[], bool] = never_stop) -> Iterator[Cluster]:
+def cluster(
+    scheduler: str | Path, should_stop: Callable[[], bool] = never, on_note: Callable[[str], None] = ignore
+) -> Iterator[ExecutorSpec]:
     """Connect to the workers of a scheduler.
 
     Parameters
@@ -68,6 +63,7 @@ def cluster(scheduler: str | Path, should_stop: Callable[[], bool] = never_stop)
     scheduler : its address, such as "tcp://host:8786"; the path of its scheduler file; or "local", for a temporary
         scheduler with a worker for each processor of this machine
     should_stop : when it returns True, connecting is given up
+    on_note : called with the number of workers and the address of the dashboard
 
     Raises
     ------
@@ -99,8 +95,11 @@ def cluster(scheduler: str | Path, should_stop: Callable[[], bool] = never_stop)
                 f"expected {ADDRESS_EXPECTED} (dask: {TIMEOUT_SETTING})"
             ) from None
         stack.callback(_close, client)
-        backend = Backend(lambda: _open_executor(client, scheduler_name), _capacity(client, scheduler_name))
-        yield Cluster(backend, client.dashboard_link if "dashboard" in info["services"] else None, workers)
+        executor = ExecutorSpec(lambda: _open_executor(client, scheduler_name), _capacity(client, scheduler_name))
+        count = f"{workers} worker{'' if workers == 1 else 's'}{'' if workers else ', waits for some'}"
+        has_dashboard = "dashboard" in info["services"]
+        on_note(f"{count}; dashboard: {client.dashboard_link}" if has_dashboard else count)
+        yield executor
 
 
 def _answer_timeout() -> float:
@@ -113,7 +112,7 @@ def _answer_timeout() -> float:
 
 
 def _run_with_timeout(
-    limit: float, action: Callable[[], ResultT], should_stop: Callable[[], bool] = never_stop
+    limit: float, action: Callable[[], ResultT], should_stop: Callable[[], bool] = never
 ) -> ResultT:
     """The result of an action that may wait forever; it runs in a daemon thread, which is abandoned then.
 
@@ -199,7 +198,7 @@ def _wait_for_file(file: Path, scheduler_name: str) -> None:
 
 
 def _check_versions(client: Client) -> None:
-    """Refuse a scheduler and workers with another version of this package, or none: all deserialize the blocks."""
+    """Refuse a scheduler and workers with another version of this package, or none: all deserialize the ranges."""
     try:
         versions = {"the scheduler": client.run_on_scheduler(eval, VERSION_EXPRESSION)}
     except ImportError as error:
@@ -214,7 +213,7 @@ def _check_versions(client: Client) -> None:
 
 
 def _capacity(client: Client, scheduler_name: str) -> Callable[[], int]:
-    """A function that returns how many unfinished blocks the workers may have: workers join and leave.
+    """A function that returns how many unfinished ranges the workers may have: workers join and leave.
 
     A thread polls the scheduler, which may never answer. All workers of a local cluster must not be gone for long.
     """
@@ -245,7 +244,7 @@ def _capacity(client: Client, scheduler_name: str) -> Callable[[], int]:
             raise StoreError(f"{scheduler_name}: the scheduler has not answered for {limit:g} s")
         if scheduler_name == LOCAL and without_workers_s > NO_WORKERS_LIMIT_S:
             raise StoreError(f"{scheduler_name}: all workers were lost")
-        return 0 if silence_s > SILENCE_LIMIT_S else min(BLOCKS_IN_FLIGHT * n_workers, MAX_BLOCKS_IN_FLIGHT)
+        return 0 if silence_s > SILENCE_LIMIT_S else min(RANGES_IN_FLIGHT * n_workers, MAX_RANGES_IN_FLIGHT)
 
     return current_capacity
 
@@ -282,7 +281,7 @@ def _open_executor(client: Client, scheduler_name: str) -> Iterator[Executor]:
     try:
         yield _CancellableExecutor(dask_executor)
     except KilledWorker as error:
-        # all unfinished blocks are submitted again
+        # all unfinished ranges are submitted again
         with contextlib.suppress(TimeoutError):
             _run_with_timeout(CLOSE_TIMEOUT_S, partial(dask_executor.shutdown, wait=False))
         raise BrokenExecutor from error
@@ -291,6 +290,6 @@ def _open_executor(client: Client, scheduler_name: str) -> Iterator[Executor]:
     except ImpactError:
         raise
     except Exception:
-        # a worker that joined with another version may fail to deserialize a block
+        # a worker that joined with another version may fail to deserialize a range
         _run_with_timeout(_answer_timeout(), partial(_check_versions, client))
         raise

@@ -11,7 +11,7 @@ import time
 import warnings
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 
@@ -28,15 +28,16 @@ from ..contact.status import STATUSES
 from ..errors import StoreError, UsageError
 from ..text import safe_text
 from .build_impacts import exponents
-from .executors import SERIAL, Backend
+from .executors import ExecutorSpec
 from .plan import Plan
+from .run import Run
 from .trajectories import Columns, TrajectoryMap, TrajectoryRange, columns_of
 
 # trajectories of compiled force laws above which numba is faster, including the time to load it
 NUMBA_MIN_TRAJECTORIES = 200_000
 # how often a range whose process was killed is submitted again
 MAX_RETRIES = 3
-# seconds between two checks of `should_stop` and of the capacity of the backend
+# seconds between two checks of `should_stop` and of the capacity of the executor
 POLL_INTERVAL_S = 0.2
 
 # the results of a range, and a line for each distinct error that the law raised
@@ -46,6 +47,11 @@ ReusedPart = tuple[NDArray[np.bool_], CollisionResult] | None
 FindReused = Callable[[TrajectoryRange], ReusedPart]
 # the ranges that are being integrated
 Running = dict[Future[Integrated], tuple[TrajectoryRange, ReusedPart]]
+
+
+def reuse_nothing(trajectory_range: TrajectoryRange) -> ReusedPart:
+    """Return None: the default of `find_reused`."""
+    return None
 
 
 @dataclass(frozen=True)
@@ -119,14 +125,14 @@ def models_of_context(context: WorkerContext) -> Mapping[str, ForceModel]:
 
 
 def other_version(location: str, location_version: str, this_version: str) -> str:
-    """The message about a worker or scheduler that has another version."""
+    """State that a worker or scheduler has another version."""
     return f"{location}: has impact {safe_text(location_version)}, this is {this_version}; expected the same"
 
 
 def with_core(plan: Plan, maps: Sequence[TrajectoryMap]) -> Plan:
-    """The plan with `core = "auto"` replaced by "numba" or "numpy", depending on the number of trajectories.
+    """Replace `core = "auto"` by "numba" or "numpy", depending on the number of trajectories.
 
-    >>> from impact.api import prepare
+    >>> from impact.results.sweep import prepare
     >>> from impact.engine.trajectories import trajectory_maps
     >>> plan = prepare("configs/figure6.toml")
     >>> with_core(plan, trajectory_maps(plan)).config.solver.core
@@ -149,30 +155,16 @@ def _is_compiled(plan: Plan, trajectory_map: TrajectoryMap) -> bool:
     return all(any(serves(model, n)) for n in exponents(plan.inputs, model))
 
 
-def never_stop() -> bool:
-    """The default of `should_stop`."""
-    return False
-
-
 def integrate_ranges(
     plan: Plan,
     maps: Sequence[TrajectoryMap],
     todo: Iterable[TrajectoryRange],
-    *,
-    backend: Backend = SERIAL,
-    should_stop: Callable[[], bool] = never_stop,
-    find_reused: FindReused = lambda trajectory_range: None,
+    run: Run,
+    find_reused: FindReused = reuse_nothing,
 ) -> Iterator[tuple[TrajectoryRange, CollisionResult]]:
     """Integrate ranges of trajectories, and yield each when it is finished: in order in this process alone.
 
-    Parameters
-    ----------
-    plan : the plan
-    maps : its trajectories
-    todo : the ranges to integrate
-    backend : what integrates them
-    should_stop : when it returns True, no further range is started; ranges already started are finished
-    find_reused : returns the trajectories of a range that are not integrated, with their results
+    `find_reused` returns the trajectories of a range that are not integrated, with their results.
 
     Raises
     ------
@@ -183,50 +175,43 @@ def integrate_ranges(
     -----
     UserWarning : a law raised an error; once for each law and distinct error
     """
-    submit = _build_submit(plan, backend)
     remaining, attempts = deque(todo), Counter[int]()
     reported: set[str] = set()
-    while True:
-        running: Running = {}
-        try:
-            with backend.executor() as executor:
-
-                def start(trajectory_range: TrajectoryRange, reused: ReusedPart) -> Future[Integrated]:
-                    # the arguments are built here, so that waiting ranges take no memory
-                    columns = columns_of(plan, maps, trajectory_range)
-                    if reused is not None:
-                        columns = {name: values[~reused[0]] for name, values in columns.items()}
-                    return submit(executor, plan.models[trajectory_range.model].key, columns)
-
-                for trajectory_range, (collisions, errors) in _submit_and_collect(
-                    start, remaining, running, find_reused, backend.capacity, should_stop
-                ):
-                    for error in errors.keys() - reported:
-                        warnings.warn(errors[error], stacklevel=2)
-                    reported |= errors.keys()
-                    yield trajectory_range, collisions
-                return
-        except BrokenExecutor:
-            # it is unknown which of the running ranges killed the worker
-            interrupted = [trajectory_range for trajectory_range, _ in running.values()]
-            remaining.extendleft(interrupted)
-            attempts.update(trajectory_range.number for trajectory_range in interrupted or remaining)
-            if max(attempts.values()) > MAX_RETRIES:
-                raise StoreError(
-                    f"processes were killed {MAX_RETRIES + 1} times at the same trajectories: too little memory, "
-                    'or a script without if __name__ == "__main__":'
-                ) from None
+    with run.executor as spec:
+        submit = _build_submit(plan, maps, spec)
+        while True:
+            running: Running = {}
+            try:
+                with spec.start() as executor:
+                    for trajectory_range, (collisions, errors) in _submit_and_collect(
+                        partial(submit, executor), remaining, running, find_reused, spec.capacity, run.should_stop
+                    ):
+                        for error in errors.keys() - reported:
+                            warnings.warn(errors[error], stacklevel=2)
+                        reported |= errors.keys()
+                        yield trajectory_range, collisions
+                    return
+            except BrokenExecutor:
+                # it is unknown which of the running ranges killed the worker
+                interrupted = [trajectory_range for trajectory_range, _ in running.values()]
+                remaining.extendleft(interrupted)
+                attempts.update(trajectory_range.number for trajectory_range in interrupted or remaining)
+                if max(attempts.values()) > MAX_RETRIES:
+                    raise StoreError(
+                        f"processes were killed {MAX_RETRIES + 1} times at the same trajectories: too little "
+                        'memory, or a script without if __name__ == "__main__":'
+                    ) from None
 
 
 def _submit_and_collect(
-    start: Callable[[TrajectoryRange, ReusedPart], Future[Integrated]],
+    submit: Callable[[TrajectoryRange, ReusedPart], Future[Integrated]],
     remaining: deque[TrajectoryRange],
     running: Running,
     find_reused: FindReused,
     capacity: Callable[[], int],
     should_stop: Callable[[], bool],
 ) -> Iterator[tuple[TrajectoryRange, Integrated]]:
-    """Submit the remaining ranges, as many at a time as the backend takes, and yield each when it is finished."""
+    """Submit the remaining ranges, as many at a time as the executor takes, and yield each when it is finished."""
     try:
         while remaining or running:
             # called in every round, even if no range remains: it raises if the workers cannot be reached any more
@@ -237,7 +222,7 @@ def _submit_and_collect(
                     remaining.popleft()
                     yield trajectory_range, (reused[1], {})
                     continue
-                running[start(trajectory_range, reused)] = trajectory_range, reused
+                running[submit(trajectory_range, reused)] = trajectory_range, reused
                 remaining.popleft()
             # ranges already started are finished, unless no worker is left
             if should_stop() and not (running and limit):
@@ -262,7 +247,7 @@ def _submit_and_collect(
 def _merge_reused(
     reused: tuple[NDArray[np.bool_], CollisionResult], integrated: CollisionResult
 ) -> CollisionResult:
-    """The results of a range of which some trajectories are reused."""
+    """Put the integrated trajectories of a range between the reused ones."""
     is_reused, reused_values = reused
     collisions = reused_values.take(slice(None))
     collisions = CollisionResult(**{name: values.copy() for name, values in vars(collisions).items()})
@@ -277,50 +262,61 @@ def _check_integrated(trajectory_range: TrajectoryRange, integrated: object, siz
     ------
     StoreError : it has another type, or its arrays have another shape or dtype, or contain an unknown status
     """
-    where = f"executor: range {trajectory_range.number}"
+    prefix = f"executor: range {trajectory_range.number}"
     collisions, errors = integrated if isinstance(integrated, tuple) and len(integrated) == 2 else (integrated, {})
     if not isinstance(collisions, CollisionResult):
-        raise StoreError(f"{where}: got {safe_text(type(collisions).__name__)}, expected CollisionResult")
+        raise StoreError(f"{prefix}: got {safe_text(type(collisions).__name__)}, expected CollisionResult")
     if not isinstance(errors, dict):
-        raise StoreError(f"{where}: got {safe_text(type(errors).__name__)}, expected a dict of errors")
+        raise StoreError(f"{prefix}: got {safe_text(type(errors).__name__)}, expected a dict of errors")
     blank = CollisionResult.blank(size)
     for name in TABLE_COLUMNS:
         got, expected = (_dtype_and_shape(getattr(result, name)) for result in (collisions, blank))
         if got != expected:
-            raise StoreError(f"{where}: {name}: got {got}, expected {expected}")
+            raise StoreError(f"{prefix}: {name}: got {got}, expected {expected}")
     unknown = np.setdiff1d(collisions.status, STATUSES)
     if unknown.size:
-        raise StoreError(f"{where}: status: got {unknown[0]}, expected one of {list(STATUSES)}")
+        raise StoreError(f"{prefix}: status: got {unknown[0]}, expected one of {list(STATUSES)}")
 
 
 def _dtype_and_shape(array: object) -> str:
-    """The dtype and shape of an array."""
+    """Describe an array, or name the type of something else."""
     if not isinstance(array, np.ndarray):
         return safe_text(type(array).__name__)
     return f"{array.dtype} of shape {array.shape}"
 
 
-def _build_submit(plan: Plan, backend: Backend) -> Callable[..., Future[Integrated]]:
-    """A function that submits trajectories of a plan to an executor of a backend."""
-    if backend.shares_memory:
+def _build_submit(
+    plan: Plan, maps: Sequence[TrajectoryMap], spec: ExecutorSpec
+) -> Callable[[Executor, TrajectoryRange, ReusedPart], Future[Integrated]]:
+    """Build the function that submits what is not reused of a range to an executor."""
+    integrate: Callable[[str, Columns], Integrated]
+    if spec.shares_memory:
         models = {model.key: model for model in plan.models}
 
-        def integrate_here(key: str, columns: Columns) -> Integrated:
+        def integrate(key: str, columns: Columns) -> Integrated:
             return integrate_columns(models[key], columns, plan.config.solver)
 
-        return lambda executor, key, columns: executor.submit(integrate_here, key, columns)
-    values = [plugin.model.key for plugin in plan.plugins.items if plugin.is_value]
-    if values:
-        raise UsageError(
-            f"{safe_text(', '.join(values))} is given as a Python value, which cannot be sent to other processes; "
-            "expected the file that it is in, or jobs=1"
-        )
-    integrate_there = partial(integrate_remotely, context=context_of(plan))
-    return lambda executor, key, columns: executor.submit(integrate_there, key, columns)
+    else:
+        values = [plugin.model.key for plugin in plan.plugins.items if plugin.is_value]
+        if values:
+            raise UsageError(
+                f"{safe_text(', '.join(values))} is given as a Python value, which cannot be sent to other "
+                "processes; expected the file that it is in, or jobs=1"
+            )
+        integrate = partial(integrate_remotely, context=context_of(plan))
+
+    def submit(executor: Executor, trajectory_range: TrajectoryRange, reused: ReusedPart) -> Future[Integrated]:
+        # the arguments are built here, so that waiting ranges take no memory
+        columns = columns_of(plan, maps, trajectory_range)
+        if reused is not None:
+            columns = {name: values[~reused[0]] for name, values in columns.items()}
+        return executor.submit(integrate, plan.models[trajectory_range.model].key, columns)
+
+    return submit
 
 
 def context_of(plan: Plan) -> WorkerContext:
-    """What workers need to integrate trajectories of a plan."""
+    """Collect what workers need to integrate trajectories of a plan."""
     plugins = plan.plugins
     return WorkerContext(
         __version__,

@@ -1,4 +1,4 @@
-"""Backends that integrate the blocks of a sweep: each provides an executor of concurrent.futures."""
+"""What integrates the trajectories of a sweep: this process, others or threads, by `concurrent.futures`."""
 
 from __future__ import annotations
 
@@ -12,34 +12,41 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from ..errors import UsageError
 
-# blocks submitted for each worker: the one being integrated, and those that follow while the driver is busy
-BLOCKS_IN_FLIGHT = 3
-# blocks submitted at a time to an executor with an unknown number of workers
-EXECUTOR_BLOCKS = 64
+# ranges submitted for each worker: the one being integrated, and those that follow while the driver is busy
+RANGES_IN_FLIGHT = 3
+# ranges submitted at a time to an executor with an unknown number of workers
+EXECUTOR_RANGES = 64
 
 
 @dataclass(frozen=True)
-class Backend:
-    """What integrates the blocks of a sweep.
+class ExecutorSpec:
+    """What integrates the ranges of a sweep; as a context manager, itself.
 
     Parameters
     ----------
-    executor : creates the executor; called again after `concurrent.futures.BrokenExecutor`
-    capacity : returns how many unfinished blocks the executor may have at the moment; 0 without workers
-    shares_memory : whether it runs in this process; otherwise blocks are sent as numbers, names and source
+    start : creates the executor; called again after `concurrent.futures.BrokenExecutor`
+    capacity : returns how many unfinished ranges the executor may have at the moment; 0 without workers
+    shares_memory : whether it runs in this process; otherwise ranges are sent as numbers, names and source
     """
 
-    executor: Callable[[], AbstractContextManager[Executor]]
+    start: Callable[[], AbstractContextManager[Executor]]
     capacity: Callable[[], int]
     shares_memory: bool = False
 
+    def __enter__(self) -> ExecutorSpec:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        pass
+
 
 class _SerialExecutor(Executor):
-    """An executor that runs a function during `submit`."""
+    """Runs a function during `submit`."""
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         future: Future[Any] = Future()
@@ -50,11 +57,11 @@ class _SerialExecutor(Executor):
         return future
 
 
-SERIAL = Backend(_SerialExecutor, lambda: 1, shares_memory=True)
+SERIAL = ExecutorSpec(_SerialExecutor, lambda: 1, shares_memory=True)
 
 
-def choose_backend(jobs: int = 1, threads: int = 1, executor: Executor | None = None) -> Backend:
-    """The backend for a number of processes, a number of threads, or an executor of any kind.
+def choose_executor(jobs: int = 1, threads: int = 1, executor: Executor | None = None) -> ExecutorSpec:
+    """Choose by a number of processes, a number of threads, or an executor of `concurrent.futures`.
 
     Raises
     ------
@@ -66,10 +73,10 @@ def choose_backend(jobs: int = 1, threads: int = 1, executor: Executor | None = 
         raise UsageError(f"got {' and '.join(arguments)}, expected one of them")
     if executor is not None:
         shares_memory = isinstance(executor, ThreadPoolExecutor)
-        return Backend(lambda: nullcontext(executor), lambda: EXECUTOR_BLOCKS, shares_memory)
+        return ExecutorSpec(lambda: nullcontext(executor), lambda: EXECUTOR_RANGES, shares_memory)
     if threads > 1:
-        return Backend(lambda: ThreadPoolExecutor(threads), lambda: BLOCKS_IN_FLIGHT * threads, shares_memory=True)
-    return Backend(lambda: _process_pool(jobs), lambda: BLOCKS_IN_FLIGHT * jobs) if jobs > 1 else SERIAL
+        return ExecutorSpec(partial(ThreadPoolExecutor, threads), lambda: RANGES_IN_FLIGHT * threads, True)
+    return ExecutorSpec(partial(_process_pool, jobs), lambda: RANGES_IN_FLIGHT * jobs) if jobs > 1 else SERIAL
 
 
 class _ProcessPool(ProcessPoolExecutor):

@@ -9,7 +9,6 @@ from ..contact.closed_forms.dashpot import gap_damping
 from ..contact.models.sources import CHRONO
 from ..errors import UsageError
 from ..formatting import number, quantity
-from ..text import safe_text
 from .code import Code, Collision, Parameters
 
 # system, contact force model, and whether coefficients follow from the properties of the material
@@ -48,7 +47,7 @@ def read_version(text: str) -> str:
     """
     match = re.fullmatch(r"v?(\d+\.\d+(\.\d+)?)", text)
     if match is None:
-        raise UsageError(f'got "{safe_text(text)}", expected a release, such as 9.0.1')
+        raise UsageError(f'got "{text}", expected a release, such as 9.0.1')
     if version_numbers(match[1]) < OLDEST:
         raise UsageError(f"got {match[1]}, expected 6.0.0 or later: older releases were not read")
     return match[1]
@@ -57,7 +56,7 @@ def read_version(text: str) -> str:
 def from_material(collision: Collision) -> bool:
     """Whether the coefficients follow from Young's modulus; a linear spring of its own stiffness has none."""
     _, force, of_material = SETTINGS[collision.model.key]
-    return of_material and not (force == "Hooke" and collision.has_own_K)
+    return of_material and not (force == "Hooke" and collision.has_user_stiffness)
 
 
 def parameters(collision: Collision) -> dict[str, float | str]:
@@ -141,35 +140,37 @@ def settings(collision: Collision, parameters: Parameters) -> list[str]:
 def notes(collision: Collision) -> list[str]:
     system, force, _ = SETTINGS[collision.model.key]
     multicore = system == "ChSystemMulticoreSMC"
-    said = ["in SI, C++; the material keeps its values in single precision"]
+    remarks = ["in SI, C++; the material keeps its values in single precision"]
     if from_material(collision):
-        said.append("two materials: E* = 1/((1 - nu1^2)/E1 + (1 - nu2^2)/E2), and the smaller restitution")
+        remarks.append("two materials: E* = 1/((1 - nu1^2)/E1 + (1 - nu2^2)/E2), and the smaller restitution")
         if not collision.has_materials:
-            said.append(f"the modulus gives K = {number(collision['K'])} with a Poisson ratio of {POISSON_RATIO}")
+            remarks.append(
+                f"the modulus gives K = {number(collision['K'])} with a Poisson ratio of {POISSON_RATIO}"
+            )
     else:
-        said.append("two materials: the arithmetic means of Kn and of Gn")
+        remarks.append("two materials: the arithmetic means of Kn and of Gn")
         factors = "Gn by m" if force == "Hooke" else "Kn by R* sqrt(delta), Gn by R* sqrt(delta) m"
-        said.append(f"the system multiplies {factors}, with m = m1 m2/(m1 + m2)")
+        remarks.append(f"the system multiplies {factors}, with m = m1 m2/(m1 + m2)")
     if force == "Hooke" and from_material(collision):
-        said.append("the stiffness follows from the characteristic impact velocity, by default 1 m/s")
+        remarks.append("the stiffness follows from the characteristic impact velocity, by default 1 m/s")
     if force == "PlainCoulomb":
-        said.append("the stiffness does not depend on the radii")
+        remarks.append("the stiffness does not depend on the radii")
     elif not multicore and (force == "Hertz" or from_material(collision)):
-        said.append("with Bullet, R* is one value for all contacts, by default 0.1 m, not that of the shapes")
+        remarks.append("with Bullet, R* is one value for all contacts, by default 0.1 m, not that of the shapes")
     if force == "Flores":
-        said += [
+        remarks += [
             "the damping is divided by characteristic_vel, in MultiStep by the larger of it and the closing speed",
             "ChSystemSMC has no Flores; it takes Hooke instead",
         ]
-    said += [
+    remarks += [
         "the force may pull before the contact ends; ChSystemSMC cuts that off, which is another law"
         if multicore
         else "the force is never negative, but for adhesion, by default 0; ChSystemMulticoreSMC lets it pull",
         "no speed switches the restitution off; SetMinBounceSpeed is of the other contact method, NSC",
     ]
     if math.inf in (collision["m1"], collision["m2"]):
-        said.append("m is taken with the mass of a fixed body too, by default 1 kg: it has to be large")
-    return [*said, "the same law in 6.0.0 to 10.0.0; before 9.0.0 the material was ChMaterialSurfaceSMC"]
+        remarks.append("m is taken with the mass of a fixed body too, by default 1 kg: it has to be large")
+    return [*remarks, "the same law in 6.0.0 to 10.0.0; before 9.0.0 the material was ChMaterialSurfaceSMC"]
 
 
 def warnings(collision: Collision) -> list[str]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from .code import Code, Collision, Parameters, python_package_version
+from .code import Code, Collision, Parameters
+from .programs import python_package_version
 
 TWO_BALLS = """\
 from pydrake.geometry import AddContactMaterial, ProximityProperties, Sphere
@@ -45,7 +46,7 @@ def parameters(collision: Collision) -> dict[str, float | str]:
     """
     c = collision
     k1, k2 = c["k1"], c["k2"]
-    if c.has_own_K:
+    if c.has_user_stiffness:
         k1, k2 = c["K"] * (1.0 + k1 / k2), c["K"] * (1.0 + k2 / k1)
     if c.model.key == "drake-point-contact":
         d1 = d2 = c["d"]
@@ -75,12 +76,6 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
     ]
 
 
-def script(collision: Collision, parameters: Parameters) -> str:
-    text = "\n".join(lines(collision, parameters))
-    second = "material2" if "point_stiffness2" in parameters else "material1"
-    return TWO_BALLS.format(**collision.script_values(), lines=text, material2=second)
-
-
 def notes(collision: Collision) -> list[str]:
     return [
         "point_stiffness [N/m] is of one ball, two equal balls act with half of it; dissipation is in s/m",
@@ -108,7 +103,7 @@ CODE = Code(
     parameters=parameters,
     lines=lines,
     notes=notes,
-    script=script,
+    template=TWO_BALLS,
     program="python",
     install="pip install drake",
     version_of=python_package_version("drake"),

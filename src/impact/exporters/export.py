@@ -4,19 +4,24 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 from .._version import __version__
-from ..config.input_names import InputName
+from ..atomic import check_outputs, write_file
 from ..contact.status import Status
 from ..errors import UsageError
 from ..formatting import decimals, number, quantity
 from ..inverse.timestep import TimestepRow, needed_steps, time_steps, timestep_rows
+from ..results.single_impact import ConfigSource
 from ..text import safe_text
 from .code import Collision, Parameters
-from .problem import ExportProblem
-from .verify import Verification, verify
+from .problem import ExportProblem, prepare_export
+from .registry import CODES, find_code
+from .releases import choose_version, installed_version
+from .verification import Verification, verify_scripts
 
 # steps per contact if no time step is given
 STEPS_PER_CONTACT = 50.0
@@ -75,7 +80,7 @@ class Export:
 
 
 def comment_lines(lines: Iterable[str], begin: str = "# ", end: str = "") -> list[str]:
-    r"""Lines as comments of a code: no text in a line ends its comment.
+    r"""Write lines as comments of a code: no text in a line ends its comment.
 
     >>> comment_lines(["a\nb"], "// "), comment_lines(["a --> b"], "<!-- ", " -->")
     (['// a\\x0ab'], ['<!-- a - -> b -->'])
@@ -85,41 +90,75 @@ def comment_lines(lines: Iterable[str], begin: str = "# ", end: str = "") -> lis
     return [f"{begin}{re.sub('-(?=-)', '- ', line) if end else line}{end}" for line in shown]
 
 
-def write_export(problem: ExportProblem, dt: float | None, program: str | None, *, with_script: bool) -> Export:
-    """The lines and the script of a law at a time step [s]; by default contact time/50.
+def export(
+    to: str,
+    model: str | None = None,
+    *,
+    source: ConfigSource = None,
+    at: Mapping[str, float | str] | None = None,
+    dt: float | None = None,
+    code_version: str | None = None,
+    script: bool = False,
+    verify: bool = False,
+    program: str | None = None,
+    output: str | Path | None = None,
+    overwrite: bool = False,
+    overrides: Sequence[str] = (),
+) -> Export:
+    """Write a law as a code takes it, with the restitution that the code delivers at its time step.
 
     Parameters
     ----------
-    problem : the law, the impact and the code
-    dt : time step [s]
-    program : runs scripts, which are compared with the prediction; None to run none
-    with_script : whether to write a script
+    to : name of the code, see `export_codes`
+    model : a law that the code has, by its key; by default the first one of the source, or without a source the
+        first one of `export_codes`, that the release of the code has
+    source, overrides : see `solve`
+    at : values of inputs by config name; an e for a law that takes none is reached by its damping parameter
+    dt : time step [s]; by default the contact time of the continuous law over 50
+    code_version : release of the code, letters, digits, spaces and `._+()-`; by default that of the program, or
+        else the newest known one
+    script : write a complete input with two balls that prints the e that it measures
+    verify : run such inputs at four phases, and compare their e with the prediction
+    program : what runs scripts, such as the file of lmp, or of a Python with the code's package; by default found
+    output : file to write the lines or the script to
+    overwrite : replace the output if it exists
+
+    Returns
+    -------
+    Export : parameters, lines, script and what the code delivers; `text` is what is written to `output`
 
     Raises
     ------
-    UsageError : the code cannot run such a collision, has no scripts, or a script fails
+    UsageError : the code or the law is unknown, no damping gives the e, the code is not installed, cannot run such
+        a collision, has no scripts, or its script fails, or the output exists
+    ConfigError : see `sweep`
+
+    What LAMMPS takes for a restitution of 0.6:
+
+    >>> import impact
+    >>> law, at = "lammps-coeff-restitution-hooke", {"e": 0.6, "K": 1e6}
+    >>> export = impact.export("lammps", law, at=at, code_version="22Jul2025")
+    >>> export.lines[1]
+    'pair_coeff      * * hooke 1000000.0 0.6 damping coeff_restitution tangential linear_nohistory 0.0 0.0'
+    >>> round(export.at_dt.e_mean, 4)
+    0.5985
     """
-    code, contact_time = problem.code, problem.law.contact_time
-    if (with_script or program is not None) and code.script is None:
+    # before a program is run
+    check_outputs([output], [source], overwrite=overwrite)
+    code = find_code(to)
+    found, version = choose_version(code, program, code_version, verify=verify)
+    problem = prepare_export(code, model, version, source, at or {}, overrides)
+    check_outputs([output], [source, *problem.config.files], overwrite=overwrite)
+    if (script or verify) and not code.template:
         raise UsageError(f"--script: there is none for {code.title}: {code.tested}")
+    contact_time = problem.law.contact_time
     (dt,) = time_steps(contact_time, [STEPS_PER_CONTACT] if dt is None else [], [] if dt is None else [dt])
     collision = problem.collision(dt, 0.5)
     parameters = code.parameters(collision)
     at_dt = _row(problem, dt)
-    warnings = list(code.warnings(collision))
-    if abs(problem.e_continuous - problem.wanted) > ASKED_TOL:
-        key, wanted = problem.model.key, number(problem.wanted)
-        warnings.append(
-            f"{key} delivers {number(problem.e_continuous)} where e = {wanted} is asked for; impact solve "
-            f"--model {key} --for e --target e_out={wanted} finds the e to ask for"
-        )
-    if at_dt.failed:
-        warnings.append(f"dt = {quantity(dt, 's')}: {_failure(problem, at_dt)}")
     header = _header(problem, collision, at_dt)
-    script = None
-    if with_script and code.script is not None:
-        script = "\n".join([*comment_lines(header), code.script(collision, parameters)])
-    return Export(
+    lines = [*comment_lines(header), code.script(collision, parameters)] if script else []
+    result = Export(
         code=code.name,
         version=problem.version,
         model=problem.model.key,
@@ -131,15 +170,59 @@ def write_export(problem: ExportProblem, dt: float | None, program: str | None, 
         parameters=parameters,
         header=tuple(header),
         lines=tuple(code.lines(collision, parameters)),
-        script=script,
-        warnings=tuple(warnings),
-        verification=None if program is None else verify(problem, program, dt),
+        script="\n".join(lines) if script else None,
+        warnings=tuple(_warnings(problem, collision, at_dt)),
+        verification=verify_scripts(problem, found, dt) if verify and found is not None else None,
         comment=code.comment,
     )
+    if output is not None:
+        write_file(Path(output), result.text.encode(), overwrite=overwrite)
+    return result
+
+
+def export_codes() -> list[dict[str, Any]]:
+    """The codes to which laws are exported, each with its laws, by key of the catalogue.
+
+    Returns
+    -------
+    list : for each code a dict of its name "code", "title", the "installed" and the "newest" known version,
+        the "scheme" of its time step, what was "tested", and what it calls each of its "laws"
+
+    >>> import impact
+    >>> (mujoco,) = (code for code in impact.export_codes() if code["code"] == "mujoco")
+    >>> mujoco["laws"]["mujoco-solref"]
+    'solref, standard format'
+    """
+    return [
+        {
+            "code": code.name,
+            "title": code.title,
+            "installed": installed_version(code),
+            "newest": code.newest,
+            "scheme": code.scheme,
+            "tested": code.tested,
+            "laws": dict(code.laws),
+        }
+        for code in CODES.values()
+    ]
+
+
+def _warnings(problem: ExportProblem, collision: Collision, row: TimestepRow) -> list[str]:
+    """List what a user has to know before using the lines."""
+    warnings = list(problem.code.warnings(collision))
+    if abs(problem.e_continuous - problem.requested_e) > ASKED_TOL:
+        key, requested = problem.model.key, number(problem.requested_e)
+        warnings.append(
+            f"{key} delivers {number(problem.e_continuous)} where e = {requested} is asked for; impact solve "
+            f"--model {key} --for e --target e_out={requested} finds the e to ask for"
+        )
+    if row.failed:
+        warnings.append(f"dt = {quantity(row.dt, 's')}: {_failure(problem, row)}")
+    return warnings
 
 
 def _row(problem: ExportProblem, dt: float) -> TimestepRow:
-    """What the code delivers at a time step [s]; NaN without a scheme."""
+    """Compute what the code delivers at a time step [s]; NaN without a scheme."""
     if problem.code.scheme is None:
         nan = math.nan
         return TimestepRow(dt, problem.law.contact_time / dt, nan, nan, nan, nan)
@@ -148,25 +231,25 @@ def _row(problem: ExportProblem, dt: float) -> TimestepRow:
 
 
 def _failure(problem: ExportProblem, row: TimestepRow) -> str:
-    """Why the code delivers no restitution at a time step, in words."""
+    """Say why the code delivers no restitution at a time step."""
     status = row.status.replace("_", " ")
     return f"{status} at {row.failed} of {problem.law.phases} phases, {Status[row.status.upper()].meaning}"
 
 
 def _header(problem: ExportProblem, collision: Collision, row: TimestepRow) -> list[str]:
-    """What a comment above the lines says."""
+    """Write what a comment above the lines says."""
     code, law = problem.code, problem.law
     header = [
         f"{code.title}, {problem.version}; written by impact {__version__}",
         f"law: {problem.model.key}, {problem.model.equation}",
     ]
-    if problem.missing:
-        header.append(f"release {problem.version} lacks the default law of {code.newest}, {problem.missing}")
-    if problem.first:
-        header.append(f"first value of each axis of the source: {', '.join(problem.first)}")
-    if problem.solved:
-        name = InputName.parse(problem.solved).key
-        header.append(f"{name} = {collision[name]!r} gives the e that is wanted")
+    if problem.missing_law:
+        header.append(f"release {problem.version} lacks the default law of {code.newest}, {problem.missing_law}")
+    if problem.defaulted_axes:
+        header.append(f"first value of each axis of the source: {', '.join(problem.defaulted_axes)}")
+    if problem.solved_parameter:
+        value = collision[problem.solved_parameter]
+        header.append(f"{problem.solved_parameter} = {value!r} gives the e that is wanted")
     asked = f"e = {number(law.e)} is asked for; " if law.has_e else ""
     contact_time = quantity(law.contact_time, "s")
     header.append(
@@ -180,11 +263,13 @@ def _header(problem: ExportProblem, collision: Collision, row: TimestepRow) -> l
         delivered = _failure(problem, row) if row.failed else f"mean e {decimals(row.e_mean)}, {spread}"
         header.append(f"{steps}: {delivered} ({code.scheme})")
         if row.e_to_ask == row.e_to_ask:
-            header.append(f"a mean of {number(problem.wanted)} at this dt: ask for e = {decimals(row.e_to_ask)}")
+            header.append(
+                f"a mean of {number(problem.requested_e)} at this dt: ask for e = {decimals(row.e_to_ask)}"
+            )
         # where the continuous law delivers another e, no step does what is advised
-        reachable = abs(problem.e_continuous - problem.wanted) < ADVISED_TOL * problem.wanted
+        reachable = abs(problem.e_continuous - problem.requested_e) < ADVISED_TOL * problem.requested_e
         needed = needed_steps(law, ADVISED_TOL, problem.e_continuous) if reachable else None
         if needed is not None:
-            within = f"within {number(100.0 * ADVISED_TOL)} % of {number(problem.wanted)}"
+            within = f"within {number(100.0 * ADVISED_TOL)} % of {number(problem.requested_e)}"
             header.append(f"advised: dt <= {quantity(needed.dt, 's', 3)}, where every phase is {within}")
     return [*header, *code.notes(collision), code.tested]

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 
 from ..errors import UsageError
-from .code import Code, Collision, Parameters, python_package_version
+from .code import Code, Collision, Parameters
+from .programs import python_package_version
 
 LAWS = {
     "kratos-hertz": "DEM_D_Hertz_viscous_Coulomb",
@@ -151,21 +152,19 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
     ]
 
 
-def script(collision: Collision, parameters: Parameters) -> str:
-    return TWO_BALLS.format(**collision.script_values(), lines="\n".join(lines(collision, parameters)))
-
-
 def notes(collision: Collision) -> list[str]:
-    said = [
+    remarks = [
         "in SI; material1, material2 and relation are the Variables of materials and of their relation in",
         "MaterialsDEM.json, parameters are keys of ProjectParametersDEM.json",
         "two materials: 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2; the restitution is that of the pair",
         "an e below 0.001 is raised to it, and above 0.999 there is no damping; the force is never negative",
     ]
     if collision.model.key == "kratos-linear":
-        said.append("Kratos finds the damping ratio by bisection to 1e-4")
-    said.append("a sphere finds its neighbours only every NeighbourSearchFrequency steps, within SearchTolerance")
-    return said
+        remarks.append("Kratos finds the damping ratio by bisection to 1e-4")
+    remarks.append(
+        "a sphere finds its neighbours only every NeighbourSearchFrequency steps, within SearchTolerance"
+    )
+    return remarks
 
 
 CODE = Code(
@@ -180,7 +179,7 @@ CODE = Code(
     parameters=parameters,
     lines=lines,
     notes=notes,
-    script=script,
+    template=TWO_BALLS,
     program="python",
     install="pip install KratosDEMApplication",
     version_of=python_package_version("KratosDEMApplication"),

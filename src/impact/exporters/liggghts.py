@@ -6,8 +6,8 @@ import re
 
 from ..errors import UsageError
 from ..formatting import number
-from ..text import safe_text
-from .code import Code, Collision, Parameters, output_of
+from .code import Code, Collision, Parameters
+from .programs import output_of
 
 # model of pair style gran, and its options, by key of the catalogue
 OPTIONS = {
@@ -45,13 +45,13 @@ print           "e_out = ${{e_out}}"
 
 
 def version_of(program: str) -> str | None:
-    match = re.search(r"LIGGGHTS-PUBLIC ([\d.]+)", output_of([program, "-help"]) or "")
+    match = re.search(r"LIGGGHTS-PUBLIC ([\d.]+)", output_of([program, "-help"]))
     return match[1] if match else None
 
 
 def read_version(text: str) -> str:
     if not re.fullmatch(r"\d+\.\d+\.\d+", text):
-        raise UsageError(f'got "{safe_text(text)}", expected a release such as 3.8.0')
+        raise UsageError(f'got "{text}", expected a release such as 3.8.0')
     if tuple(map(int, text.split("."))) < (3, 0, 0):
         raise UsageError(f"got {text}, expected 3.0.0 or later, whose laws were read")
     return text
@@ -108,31 +108,25 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
     ]
 
 
-def script(collision: Collision, parameters: Parameters) -> str:
-    skin = 0.1 * min(collision["R1"], collision["R2"])
-    text = "\n".join(lines(collision, parameters))
-    return TWO_BALLS.format(**collision.script_values(), skin=repr(skin), lines=text)
-
-
 def notes(collision: Collision) -> list[str]:
     model, options = OPTIONS[collision.model.key]
-    said = [
+    remarks = [
         "in SI (units si); the two atom types are those of ball 1 and ball 2",
         "two materials: 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2; coefficientRestitution is of each pair of types",
         f"refused: e <= {LEAST_E}, and Young's moduli outside 5e6 to 1e9 Pa without soft_ or hard_particles yes",
     ]
     if model == "hooke":
-        said.append("the stiffness follows from characteristicVelocity: set it to your speed of contact")
+        remarks.append("the stiffness follows from characteristicVelocity: set it to your speed of contact")
     if model == "edinburgh":
-        said.append("without its dashpot: coefficientRestitution is 1; UnloadingStiffness is k2/K")
+        remarks.append("without its dashpot: coefficientRestitution is 1; UnloadingStiffness is k2/K")
     else:
-        said.append(
+        remarks.append(
             "limitForce on: the force is never negative"
             if options
             else "the force pulls before the contact ends; limitForce on cuts that off, which is another law"
         )
-    said.append("no friction: replace tangential no_history and coefficientFriction by yours")
-    return said
+    remarks.append("no friction: replace tangential no_history and coefficientFriction by yours")
+    return remarks
 
 
 CODE = Code(
@@ -146,7 +140,7 @@ CODE = Code(
     lines=lines,
     read_version=read_version,
     notes=notes,
-    script=script,
+    template=TWO_BALLS,
     suffix=".in",
     program="liggghts",
     install="on Debian: apt-get install liggghts",

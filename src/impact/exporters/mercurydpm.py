@@ -39,26 +39,26 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
 
 def notes(collision: Collision) -> list[str]:
     c = collision
-    said = ["in SI, C++; the values are those of the pair"]
+    remarks = ["in SI, C++; the values are those of the pair"]
     if c.model.key == "mercurydpm-linear-viscoelastic":
-        said += [
+        remarks += [
             "two species: the mixed one has the harmonic means 2/(1/a + 1/b) of stiffness and dissipation",
             f"the mass is twice the effective one: 2 m1 m2/(m1 + m2) = {quantity(2.0 * c['m'], 'kg')}",
             "the setter stores a dissipation constant: other masses of the same species have another restitution",
             "after setConstantRestitution (since 2021) stiffness and dissipation are per mass 2 m1 m2/(m1 + m2)",
         ]
     else:
-        said += [
+        remarks += [
             "the modulus is E* = 1/((1 - nu1^2)/E1 + (1 - nu2^2)/E2)",
             "two species: the mixed one has the harmonic means 2/(1/a + 1/b), which is right for their own E*",
         ]
     if c.model.key == "tsuji-1992":
-        said.append("before September 2021 the setter was setElasticModulusAndRestitutionCoefficient")
+        remarks.append("before September 2021 the setter was setElasticModulusAndRestitutionCoefficient")
     if c.model.key == "kuwabara-kono-1987":
-        said.append("the force is never negative; the species exists since September 2022")
+        remarks.append("the force is never negative; the species exists since September 2022")
     else:
-        said.append("the force pulls before the contact ends")
-    return [*said, "no speed switches the restitution off"]
+        remarks.append("the force pulls before the contact ends")
+    return [*remarks, "no speed switches the restitution off"]
 
 
 CODE = Code(

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from ..errors import UsageError
-from .code import Code, Collision, Parameters, python_package_version
+from .code import Code, Collision, Parameters
+from .programs import python_package_version
 
 # least and largest impedance are equal: with the default, 0.9 and 0.95, the restitution depends on the indentation
 SOLIMP = "0.9 0.9 0.001 0.5 2"
@@ -55,10 +56,6 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
     ]
 
 
-def script(collision: Collision, parameters: Parameters) -> str:
-    return TWO_BALLS.format(**collision.script_values(), **parameters)
-
-
 def notes(collision: Collision) -> list[str]:
     return [
         "solref is per effective mass: the restitution does not depend on the masses, nor on the speed",
@@ -80,7 +77,7 @@ CODE = Code(
     lines=lines,
     comment=("<!-- ", " -->"),
     notes=notes,
-    script=script,
+    template=TWO_BALLS,
     program="python",
     install="pip install mujoco",
     version_of=python_package_version("mujoco"),

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from .code import Code, Collision, Parameters, python_package_version
+from .code import Code, Collision, Parameters
+from .programs import python_package_version
 
 MATERIALS = {
     "opensees-hertzdamp": "Hertzdamp",
@@ -73,26 +74,21 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
     ]
 
 
-def script(collision: Collision, parameters: Parameters) -> str:
-    text = "\n".join(lines(collision, parameters))
-    return TWO_MASSES.format(**collision.script_values(), gap=repr(collision.gap), lines=text)
-
-
 def notes(collision: Collision) -> list[str]:
-    said = [
+    remarks = [
         "in SI; the order of the arguments is that of the element: "
         f"{', '.join(name for name in parameters(collision) if name != 'n')}, gap"
         + (", n" if "n" in parameters(collision) else ""),
         "compression is negative: the gap, and delta_y, are numbers below 0; set the gap to yours",
     ]
     if collision.model.key == "opensees-jankowski-impact":
-        said.append("Meff is the effective mass m1 m2/(m1 + m2), not the sum")
+        remarks.append("Meff is the effective mass m1 m2/(m1 + m2), not the sum")
     if collision.model.key == "opensees-impact-material":
-        said.append("a bilinear spring for one indentation d only: another speed gives another restitution")
+        remarks.append("a bilinear spring for one indentation d only: another speed gives another restitution")
     if collision.model.key == "kelvin-voigt":
-        said.append("the force pulls before the gap opens")
-    said.append("make the element before the nodes have velocities, which it would subtract")
-    return said
+        remarks.append("the force pulls before the gap opens")
+    remarks.append("make the element before the nodes have velocities, which it would subtract")
+    return remarks
 
 
 CODE = Code(
@@ -105,7 +101,7 @@ CODE = Code(
     parameters=parameters,
     lines=lines,
     notes=notes,
-    script=script,
+    template=TWO_MASSES,
     program="python",
     install="pip install openseespy",
     version_of=python_package_version("openseespy"),

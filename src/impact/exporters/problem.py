@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
@@ -12,13 +11,13 @@ from ..contact.impacts import Impacts
 from ..contact.model import ForceModel
 from ..contact.models import find
 from ..engine.plugins import Plugins
-from ..errors import UsageError, did_you_mean
+from ..errors import UsageError
 from ..formatting import number
 from ..inverse.solve import placeholder, solve_input, unknown_of
 from ..inverse.timestep import FixedStepLaw, fixed_step_law
 from ..results.single_impact import ConfigSource, open_source, single_point
-from ..text import safe_text
 from .code import Code, Collision
+from .releases import first_law, law_of_code
 
 # phases over which the mean, the least and the largest restitution are taken
 PHASES = 400
@@ -36,30 +35,30 @@ class ExportProblem:
     ----------
     code, version : the code and its release
     law : the law, the impact and the contact time of the continuous law
-    e_continuous, peak : restitution [-] and peak indentation [m] of the continuous law
+    e_continuous, peak_indentation : [-] and [m], of the continuous law
     config : the config of the impact
-    solved : the parameter that was solved for, with the wanted e; "" for none
-    first : names of axes of the source that are at their first value
-    missing : the default law of the newest release, if none was asked for and this one has another; else ""
+    solved_parameter : what was solved for, with the requested e; "" for none
+    defaulted_axes : names of axes of the source that are at their first value
+    missing_law : the default law of the newest release, where this one lacks it and none was requested; else ""
     """
 
     code: Code
     version: str
     law: FixedStepLaw
     e_continuous: float
-    peak: float
+    peak_indentation: float
     config: Config
-    solved: str
-    first: tuple[str, ...]
-    missing: str
+    solved_parameter: str
+    defaulted_axes: tuple[str, ...]
+    missing_law: str
 
     @property
     def model(self) -> ForceModel:
         return self.law.model
 
     @property
-    def wanted(self) -> float:
-        """The e that is asked for, or that of the continuous law where none can be asked for."""
+    def requested_e(self) -> float:
+        """The e that was requested, or that of the continuous law where none can be."""
         return self.law.e if self.law.has_e else self.e_continuous
 
     def collision(self, dt: float, phase: float) -> Collision:
@@ -67,7 +66,7 @@ class ExportProblem:
         values = input_values(self.law.impact)
         for name in ("R1", "R2"):
             if math.isnan(values[name]):
-                values[name] = RADIUS_PER_PEAK * self.peak
+                values[name] = RADIUS_PER_PEAK * self.peak_indentation
         names = self.config.scalars
         material1, material2 = (
             str(names.get(f"material{ball}", names.get("material", ""))) for ball in ("1", "2")
@@ -77,7 +76,7 @@ class ExportProblem:
             version=self.version,
             values=values,
             materials=(material1, material2),
-            has_own_K="K" in names or f"{self.model.key}.K" in names,
+            has_user_stiffness="K" in names or f"{self.model.key}.K" in names,
             dt=dt,
             gap=(STEPS_BEFORE - phase) * dt * values["v0"],
             steps=STEPS_BEFORE + math.ceil(CONTACTS_RUN * self.law.contact_time / dt),
@@ -85,61 +84,10 @@ class ExportProblem:
 
 
 def input_values(impact: Impacts) -> dict[str, float]:
-    """All inputs and derived quantities of one impact, by name, in SI."""
+    """Return all inputs and derived quantities of one impact, by name, in SI."""
     names = [field.name for field in fields(impact) if field.name != "parameters"]
     names += ["m", "R_eff", "E_eff", "v0", *impact.parameters]
     return {name: float(impact.quantity(name)[0]) for name in names}
-
-
-def law_of_code(code: Code, model: str, version: str) -> str:
-    """The key of a code's law for a key of the catalogue, in a version of the code.
-
-    Parameters
-    ----------
-    code : the code
-    model : one of its laws, or a law of the catalogue that it has under a name of its own
-    version : of the code
-
-    Raises
-    ------
-    UsageError : the code, or this version of it, has no such law
-
-    >>> from impact.exporters.codes import find_code
-    >>> law_of_code(find_code("lammps"), "tsuji-1992", "20250722")
-    'lammps-coeff-restitution-hertz'
-    """
-    keys = list(code.laws)
-    key = model
-    if key not in keys:
-        wanted = find(key)
-        same = [k for k in keys if (find(k).same_as or k) == (wanted.same_as or wanted.key)]
-        if not same:
-            raise UsageError(f'{code.title} has no law "{safe_text(key)}"; {did_you_mean(key, keys)}')
-        key = same[0]
-    return code.entry(key, version)
-
-
-def first_law(code: Code, models: Sequence[str], version: str) -> str:
-    """The law of a code for the first of some models that a version of it has.
-
-    Raises
-    ------
-    UsageError : the code, or this version of it, has none of them
-
-    >>> from impact.exporters.codes import find_code
-    >>> lammps = find_code("lammps")
-    >>> [first_law(lammps, tuple(lammps.laws), version) for version in ("20250722", "20210929")]
-    ['lammps-coeff-restitution-hertz', 'lammps-tsuji-without-root']
-    """
-    laws = {find(key).same_as or key for key in code.laws}
-    common = [key for key in models if (find(key).same_as or key) in laws]
-    if not common:
-        shown = ", ".join(models[:3]) + (f" and {len(models) - 3} more" if len(models) > 3 else "")
-        raise UsageError(f"{code.title} has none of the laws {safe_text(shown)}; --model names one of its own")
-    for key in common:
-        with contextlib.suppress(UsageError):
-            return law_of_code(code, key, version)
-    return law_of_code(code, common[0], version)
 
 
 def prepare_export(
@@ -150,49 +98,49 @@ def prepare_export(
     at: Mapping[str, float | str],
     overrides: Sequence[str],
 ) -> ExportProblem:
-    """The law and the impact to write; where e is given for a law without it, its damping is solved for.
+    """Choose the law, and reduce the source to one impact; the damping of a law without e is solved for.
 
     Raises
     ------
     UsageError : the code has no such law, or no damping gives the e
     ConfigError : an input is not allowed
     """
-    plugins, laws, missing = Plugins(()), tuple(code.laws), ""
+    plugins, missing = Plugins(()), ""
     point_source = open_source(source, overrides, plugins)
     if model is not None:
         key = law_of_code(code, model, version)
     elif models := point_source.models:
         key = first_law(code, models, version)
     else:
-        key, newest = (first_law(code, laws, release) for release in (version, code.newest))
+        key, newest = (first_law(code, tuple(code.laws), release) for release in (version, code.newest))
         missing = "" if key == newest else newest
     law = find(key)
     at, solved = dict(at), ""
     if "e" in at and "e" not in law.quantities:
-        if key not in code.damping:
+        solved = code.damping.get(key, "")
+        if not solved:
             raise UsageError(f"--at e: {key} has no e, and no parameter that sets it")
-        parameter = code.damping[key]
-        solved = f"{key}.{parameter}"
-        if solved in at:
-            raise UsageError(f"--at: got e and {solved}, expected one of the two")
-        at |= placeholder(law, unknown_of(law, parameter))
-    config, first = single_point(point_source, key, at)
-    if solved:
-        wanted = float(config.scalars["e"])
-        result = solve_input(config, plugins, unknown_of(law, parameter), {"e_out": wanted})
+        name, unknown = f"{key}.{solved}", unknown_of(law, solved)
+        if name in at:
+            raise UsageError(f"--at: got e and {name}, expected one of the two")
+        config, defaulted_axes = single_point(point_source, key, {**at, **placeholder(law, unknown)})
+        requested_e = float(config.scalars["e"])
+        result = solve_input(config, plugins, unknown, {"e_out": requested_e})
         if not result.roots:
-            least, most = map(number, result.attainable)
-            raise UsageError(f"--at e={number(wanted)}: {key} delivers {least} to {most} at any {parameter}")
-        config = replace(config, scalars={**config.scalars, solved: result.roots[0].value})
+            lower, upper = map(number, result.attainable)
+            raise UsageError(f"--at e={number(requested_e)}: {key} delivers {lower} to {upper} at any {solved}")
+        config = replace(config, scalars={**config.scalars, name: result.roots[0].value})
+    else:
+        config, defaulted_axes = single_point(point_source, key, at)
     fixed, collision = fixed_step_law(config, PHASES, code.scheme)
     return ExportProblem(
         code=code,
         version=version,
         law=fixed,
         e_continuous=collision["e_out"],
-        peak=collision["peak_indentation"],
+        peak_indentation=collision["peak_indentation"],
         config=config,
-        solved=solved,
-        first=first,
-        missing=missing,
+        solved_parameter=solved,
+        defaulted_axes=defaulted_axes,
+        missing_law=missing,
     )

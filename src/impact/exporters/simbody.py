@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from ..errors import UsageError
-from .code import Code, Collision, Parameters, python_package_version
+from .code import Code, Collision, Parameters
+from .programs import python_package_version
 
 LAWS = {
     "simbody-hunt-crossley": "HuntCrossleyForce, equal materials",
@@ -89,10 +90,6 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
     ]
 
 
-def script(collision: Collision, parameters: Parameters) -> str:
-    return TWO_BALLS.format(**collision.script_values(), lines="\n".join(lines(collision, parameters)))
-
-
 def notes(collision: Collision) -> list[str]:
     return [
         "in SI; stiffness is the modulus of plane strain E/(1 - nu^2) of a sphere, not E and not K",
@@ -113,7 +110,7 @@ CODE = Code(
     lines=lines,
     comment=("<!-- ", " -->"),
     notes=notes,
-    script=script,
+    template=TWO_BALLS,
     program="python",
     install="pip install opensim",
     version_of=python_package_version("opensim"),

@@ -6,8 +6,8 @@ import math
 import re
 
 from ..errors import UsageError
-from ..text import safe_text
-from .code import Code, Collision, Parameters, output_of
+from .code import Code, Collision, Parameters
+from .programs import output_of
 
 LAWS = {
     "yade-en": "Law2_ScGeom_MindlinPhys_Mindlin, en",
@@ -27,10 +27,9 @@ HISTORY = (
 )
 TWO_BALLS = """\
 {lines}
-{materials}
 for x, radius, mass, speed, material in (
     ({x1}, {R1}, {m1}, {v1}, material1),
-    ({x2}, {R2}, {m2}, {v2}, material2),
+    ({x2}, {R2}, {m2}, {v2}, {material2}),
 ):
     ball = O.bodies[O.bodies.append(utils.sphere((x, 0, 0), radius, material=material))]
     ball.state.mass = mass
@@ -42,20 +41,20 @@ print("e_out =", (v2 - v1) / {v0})
 
 
 def version_of(program: str) -> str | None:
-    match = re.search(r"\d{4}\.\d{2}[a-z]?", output_of([program, "--version"]) or "")
+    match = re.search(r"\d{4}\.\d{2}[a-z]?", output_of([program, "--version"]))
     return match[0] if match else None
 
 
 def read_version(text: str) -> str:
     if not re.fullmatch(r"\d{4}\.\d{2}[a-z]?", text):
-        raise UsageError(f'got "{safe_text(text)}", expected a release such as 2023.02a, or its year and month')
+        raise UsageError(f'got "{text}", expected a release such as 2023.02a, or its year and month')
     return text
 
 
-def entry(key: str, version: str) -> str:
+def law_for_version(key: str, version: str) -> str:
     """The law of an option in a version.
 
-    >>> entry("yade-en", "2022.01a"), entry("yade-betan", "2011.05")
+    >>> law_for_version("yade-en", "2022.01a"), law_for_version("yade-betan", "2011.05")
     ('yade-en-clamped', 'yade-betan-pulling')
     """
     for periods in HISTORY:
@@ -120,23 +119,17 @@ def _arguments(values: Parameters) -> str:
     return ", ".join(f"{name}={value!r}" for name, value in values.items())
 
 
-def script(collision: Collision, parameters: Parameters) -> str:
-    same = "" if "young2" in parameters else "material2 = material1"
-    text = "\n".join(lines(collision, parameters))
-    return TWO_BALLS.format(**collision.script_values(), lines=text, materials=same)
-
-
 def notes(collision: Collision) -> list[str]:
-    said = ["in SI; NewtonIntegrator(damping=0): its default of 0.2 damps every motion"]
+    remarks = ["in SI; NewtonIntegrator(damping=0): its default of 0.2 damps every motion"]
     if "viscoelastic" in collision.model.key:
         return [
-            *said,
+            *remarks,
             "kn and cn are of one ball: two balls act in series, so that they are twice those of the contact",
             "en of ViscElMat finds its damping only roughly; kn and cn are exact",
             "the force is never negative (since January 2014)",
         ]
     return [
-        *said,
+        *remarks,
         "two materials: 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2; en and betan are set for each pair by MatchMaker",
         "set en or betan, not both; en of 2023.02a is by Thornton and others, before that by Tsuji and others",
         "the force is never negative (since September 2013); frictionAngle=0: replace it by yours",
@@ -157,10 +150,10 @@ CODE = Code(
     scheme="kick-drift",
     parameters=parameters,
     lines=lines,
-    entry=entry,
+    law_for_version=law_for_version,
     read_version=read_version,
     notes=notes,
-    script=script,
+    template=TWO_BALLS,
     program="yade",
     install="on Debian: apt-get install yade",
     version_of=version_of,

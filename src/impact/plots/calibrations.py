@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..array_types import Array
+from ..contact.variables import OUTPUTS
 from ..errors import UsageError, did_you_mean
 from ..formatting import decimals
 from ..results.calibration import calibration_title, fit_status
 from ..results.kinds import is_calibration
-from ..results.schema import SCHEMA, plain_unit
+from ..results.schema import plain_unit
 from ..text import safe_text
 from .curves import Curve, CurveData, Panel, model_label
 from .data import SIGMA, Points
@@ -85,7 +86,7 @@ def _panels(data: xr.Dataset, name: str, varied: str, choice: Choice, best: floa
     x, measured = (np.asarray(data[key].values, float) for key in (x_name, "measured"))
     sigma = np.asarray(data[SIGMA].values, float)
     grid = np.asarray(data["grid"].values, float) if varied else x
-    output = next(variable for variable in SCHEMA if variable.name == name)
+    output = OUTPUTS[name]
     curves, residuals = [], []
     for index, key in enumerate(map(str, data["model"].values)):
         law = data.isel(model=index)
@@ -120,7 +121,7 @@ def _panels(data: xr.Dataset, name: str, varied: str, choice: Choice, best: floa
     values = Panel(
         y_label="Delivered restitution" if name == "e_out" else output.meaning.capitalize(),
         curves=tuple(curves),
-        y_unit=plain_unit(output.unit),
+        y_unit=output.unit,
         y_name=name,
         y_log="y" in choice.log,
         band_name=BAND_NAME,

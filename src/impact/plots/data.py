@@ -13,9 +13,10 @@ import numpy as np
 from ..config.cases import COLUMN_HEADER, CsvTable, column_values, read_csv
 from ..config.quantities import Quantity, show
 from ..config.tables import SWEEP_QUANTITIES
+from ..contact.variables import HISTORY, OUTPUTS
 from ..errors import ConfigError, UsageError, did_you_mean
 from ..formatting import heading, number
-from ..results.schema import HISTORY_VARIABLES, SCHEMA, plain_unit
+from ..results.schema import plain_unit
 from ..text import safe_text
 
 if TYPE_CHECKING:
@@ -192,12 +193,11 @@ def _csv_table(points: pd.DataFrame | xr.Dataset) -> CsvTable:
 def _column_quantities() -> dict[str, Quantity]:
     """Names of columns, with their units."""
     outputs = {
-        variable.name: Quantity(plain_unit(variable.unit), variable.meaning)
-        for variable in SCHEMA
+        name: Quantity(variable.unit, variable.meaning)
+        for name, variable in (OUTPUTS | HISTORY).items()
         if variable.dtype == "f8"
     }
-    history = {name: Quantity(plain_unit(unit), meaning) for name, unit, meaning in HISTORY_VARIABLES}
     inputs = {name: Quantity(rule.unit, rule.meaning) for name, rule in SWEEP_QUANTITIES.items()}
     time, impulse = Quantity("s", "time"), Quantity("N s", "impulse")
     sigma = Quantity("1", "standard deviation", least=0.0)
-    return {**outputs, **history, **inputs, "t": time, "tau": impulse, SIGMA: sigma}
+    return {**outputs, **inputs, "t": time, "tau": impulse, SIGMA: sigma}

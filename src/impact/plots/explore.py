@@ -2,39 +2,48 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from html import escape
 from io import BytesIO
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..config.grid import SAMPLE
+from ..contact.model import ForceModel
 from ..errors import UsageError
 from ..formatting import quantity
 from ..results.schema import plain_unit
 from ..text import safe_text
 from .curves import STEP_AXES
+from .draw import plot
 from .kinds import KINDS, MAP_KINDS, MOTION_KINDS, STUDY_KINDS, default_kind
 from .slices import x_axis
 
 if TYPE_CHECKING:
     import xarray as xr
     from ipywidgets import VBox
-    from matplotlib.figure import Figure
 
 DPI = 110
 
 
-def explore(dataset: xr.Dataset, draw: Callable[..., Figure]) -> VBox:
-    """Controls and a picture, which follows them.
+def explore(dataset: xr.Dataset, *, plugins: Sequence[ForceModel | str | Path] = ()) -> VBox:
+    """Show a result with controls in a notebook: the kind of picture, the models, and a slider for each axis.
 
     Parameters
     ----------
     dataset : a result
-    draw : draws it, with the keywords kind, x, y, sel and models of `impact.plot`
+    plugins : see `plot`
+
+    Returns
+    -------
+    ipywidgets.VBox : a notebook shows it as the value of a cell; needs the extra `notebook`
 
     Raises
     ------
-    UsageError : the dataset has no models, or ipywidgets is not installed
+    UsageError : it is no result with models, or ipywidgets is not installed
+
+    >>> import impact
+    >>> controls = impact.explore(impact.sweep("configs/figure6.toml"))
     """
     try:
         import ipywidgets
@@ -68,9 +77,17 @@ def explore(dataset: xr.Dataset, draw: Callable[..., Figure]) -> VBox:
         for name, slider in sliders.items():
             slider.disabled = name in drawn
         sel = {name: slider.value for name, slider in sliders.items() if name not in drawn}
-        along = {} if kind.value == "timestep" else dict(zip(("x", "y"), drawn, strict=False))
+        along_x, along_y, *_ = (None, None) if kind.value == "timestep" else (*drawn, None, None)
         try:
-            figure = draw(kind=kind.value, models=list(models.value), sel=sel, **along)
+            figure = plot(
+                dataset,
+                kind=kind.value,
+                x=along_x,
+                y=along_y,
+                sel=sel,
+                models=list(models.value),
+                plugins=plugins,
+            )
         except UsageError as error:
             message.value = escape(safe_text(str(error), 400))
             return

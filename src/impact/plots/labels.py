@@ -11,6 +11,7 @@ from matplotlib.mathtext import MathTextParser
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from ..config.input_names import InputName
+from ..contact.variables import HISTORY, OUTPUTS
 from ..errors import UsageError
 from ..formatting import scaled_unit, typographic
 from ..text import safe_text, with_year
@@ -42,27 +43,14 @@ GREEK = frozenset(
 )
 # symbols of the paper for names that are words; v_post and abs_e_error are each a label of several variables
 MATH_SYMBOLS = {
-    "e_out": r"e_\mathrm{out}",
-    "e_error": r"e_\mathrm{out}-e",
+    **{name: variable.symbol for name, variable in (OUTPUTS | HISTORY).items() if variable.symbol},
     "abs_e_error": r"|e_\mathrm{out}-e|",
-    "v1_post": "v_1^+",
-    "v2_post": "v_2^+",
-    "v1_reference": "v_1^+",
-    "v2_reference": "v_2^+",
     "v_post": "v_i^+",
     "v_i": "v_i",
-    "v": r"\dot{\delta}",
-    "peak_indentation": r"\delta_m",
-    "permanent_indentation": r"\delta_p",
-    "peak_force": "f_m",
-    "stiffness": "K",
-    "damping_ratio": r"\chi",
     "E1": "E_1",
     "E2": "E_2",
     "dt": r"h",
     "phase": "s",
-    "e_kinetic": r"e_\mathrm{kinetic}",
-    "e_energetic": r"e_\mathrm{energetic}",
 }
 # name of the impulse-momentum solution in the paper
 REFERENCE = "Impulse-momentum"

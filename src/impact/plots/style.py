@@ -38,10 +38,6 @@ METADATA: dict[str, dict[str, None]] = {
     "eps": {},
     "pgf": {},
 }
-# limits of the width and height of a picture
-MIN_SIZE_INCHES, MAX_SIZE_INCHES = 1.0, 60.0
-LENGTH_PATTERN = re.compile(r"\s*([0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)?)\s*(mm|cm|in)\s*")
-INCHES_PER_UNIT = {"mm": 1.0 / 25.4, "cm": 1.0 / 2.54, "in": 1.0}
 
 
 @contextlib.contextmanager
@@ -76,27 +72,6 @@ def _style_of(style: str | Path | None) -> Mapping[Any, Any]:
         return rc_params_from_file(str(style), use_default_template=False)
     except (OSError, ValueError, KeyError) as error:
         raise UsageError(f"--style {shown}: cannot be read: {safe_text(str(error))}") from None
-
-
-def length(size: str | float | None, option: str) -> float | None:
-    """A size of a picture in inches: a number of them, a length with its unit, or the name of a journal's width.
-
-    Raises
-    ------
-    UsageError : it is none of these, or not between 1 and 60 inches
-
-    >>> round(length("84mm", "--width"), 4), length("single", "--width"), length(7.1, "--width")
-    (3.3071, 3.5, 7.1)
-    """
-    if size is None or size in WIDTHS:
-        return None if size is None else WIDTHS[str(size)]
-    parts = LENGTH_PATTERN.fullmatch(size) if isinstance(size, str) else None
-    inches = float(parts[1]) * INCHES_PER_UNIT[parts[2]] if parts else size
-    if isinstance(inches, str) or not MIN_SIZE_INCHES <= inches <= MAX_SIZE_INCHES:
-        expected = f"a length from 26mm to {MAX_SIZE_INCHES:g}in, such as 84mm, 8.4cm or 3.3in"
-        names = f", or {' or '.join(WIDTHS)}" if option.endswith("width") else ""
-        raise UsageError(f"{option}: got {safe_text(str(size))}, expected {expected}{names}")
-    return float(inches)
 
 
 def default_size() -> tuple[float, float | None]:

@@ -12,10 +12,11 @@ from matplotlib.axes import Axes
 
 from ..array_types import Array
 from ..config.grid import SAMPLE
+from ..contact.variables import OUTPUTS
 from ..errors import UsageError
 from ..formatting import heading
 from ..results.kinds import is_sensitivity
-from ..results.schema import SCHEMA, plain_unit
+from ..results.schema import plain_unit
 from ..results.selection import model_positions, select
 from ..results.sensitivity import distribution_texts
 from ..text import safe_text
@@ -71,8 +72,8 @@ def uncertainty_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
         raise UsageError(f"--x {safe_text(x)}: is an uncertain input, expected another axis")
     line, x_name, not_drawn = take_line(dataset, x or SAMPLE, choice.sel, choice.models, keep=(SAMPLE,))
     line = read(line, [name])
-    (variable,) = (variable for variable in SCHEMA if variable.name == name)
-    unit = plain_unit(variable.unit)
+    variable = OUTPUTS[name]
+    unit = variable.unit
     meaning = "Delivered restitution" if name == "e_out" else variable.meaning.capitalize()
     curves: list[Curve] = []
     for index in range(line.sizes["model"]):
@@ -230,7 +231,7 @@ def sensitivity_bars(dataset: xr.Dataset, choice: Choice) -> BarData:
     if not panels:
         raise UsageError(f"nothing to draw: {'; '.join(not_drawn)}")
     inputs = tuple(str(name).removeprefix("sweep.").removeprefix("model.") for name in data["input"].values)
-    (meaning,) = (variable.meaning for variable in SCHEMA if variable.name == data.attrs["of"])
+    meaning = OUTPUTS[data.attrs["of"]].meaning
     conditions = [", ".join(distribution_texts(data)), conditions_of(data.drop_vars("quantile"))]
     return BarData(
         f"Which uncertain input matters: {meaning}",

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import base64
 import math
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,21 +14,21 @@ from numpy.typing import NDArray
 
 from ..config.grid import SAMPLE
 from ..config.input_names import InputName, is_input
+from ..contact.model import ForceModel
 from ..contact.status import FIRST_FAILURE, NO_IMPACT
 from ..errors import ImpactError
 from ..formatting import label
 from ..plots.curves import MAX_RESTITUTIONS, STEP_AXES
-from ..plots.kinds import MAP_KINDS, WIDTHS, Choice, draw
+from ..plots.draw import draw, get_plot_data
+from ..plots.kinds import MAP_KINDS, Choice, Look
 from ..plots.style import encoded
-from ..results.kinds import is_calibration, is_sensitivity
+from ..results.kinds import has_fixed_steps, is_calibration, is_sensitivity
 from ..results.schema import columns_along, plain_unit
 from ..results.selection import model_positions
 from ..results.slabs import distinct_points, is_computed, slabs
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from ..plots.kinds import PlotData
 
 # kinds of figure, and what each shows
 FIGURES = {
@@ -63,22 +64,15 @@ class Figure:
 
 
 def figures_of(
-    dataset: xr.Dataset, keys: Sequence[str], get_plot_data: Callable[[str, Choice], PlotData]
+    dataset: xr.Dataset, keys: Sequence[str], plugins: Sequence[ForceModel | str | Path]
 ) -> tuple[list[Figure], list[str]]:
-    """The figures of a result, and a sentence for each figure that cannot be drawn.
-
-    Parameters
-    ----------
-    dataset : a result
-    keys : keys of the models to show
-    get_plot_data : returns the data of a figure, given its kind and which part of the result it shows
-    """
+    """Draw the figures of a result; returns them, and a sentence for each figure that cannot be drawn."""
     drawn, reasons = [], []
     for kind, choice, position in iterate_choices(dataset, keys):
         try:
-            plot_data = get_plot_data(kind, choice)
+            plot_data = get_plot_data(dataset, kind, choice, plugins)
             # title and conditions are in the caption; the figure is narrow, so that its text is legible on a phone
-            figure = draw(replace(plot_data, title="", conditions=""), WIDTHS["single"])
+            figure = draw(plot_data, Look(width="single", title=False))
         except ImpactError as error:
             reasons.append(f"The figure {kind} is left out: {'; '.join(error.problems)}")
             continue
@@ -142,7 +136,7 @@ def iterate_choices(dataset: xr.Dataset, keys: Sequence[str]) -> Iterator[tuple[
             continue
         if kind == "uncertainty" and SAMPLE not in dataset.dims:
             continue
-        if (kind == "timestep" and not steps) or (kind == "loop" and "integrator" in dataset.attrs):
+        if (kind == "timestep" and not steps) or (kind == "loop" and has_fixed_steps(dataset)):
             continue
         names = (x, y) if kind in MAP_KINDS else (steps, "phase", *few_e) if kind == "timestep" else (x,)
         drawn = list(dict.fromkeys(along[name].dims[0] for name in names if name in along))

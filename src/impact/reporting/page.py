@@ -6,9 +6,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from importlib.resources import files
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
@@ -17,16 +18,16 @@ from jinja2 import Environment, FunctionLoader, StrictUndefined, Template
 from markupsafe import Markup
 from numpy.typing import NDArray
 
+from ..atomic import check_outputs, write_file
 from ..config.input_names import InputName, is_input
 from ..config.tables import MATERIAL_QUANTITIES
+from ..contact.model import ForceModel
 from ..contact.models import catalogue
 from ..errors import UsageError
 from ..formatting import label, number
-from ..plots.kinds import Choice
 from ..results.attributes import read_attribute
 from ..results.calibration import (
     FIT_HEADINGS,
-    FIT_STATUSES,
     calibration_title,
     describe_data,
     fit_notes,
@@ -36,17 +37,16 @@ from ..results.kinds import is_calibration, is_sensitivity
 from ..results.plausibility import depth_summary, material_notes, result_notes
 from ..results.ranking import DEFAULT_TOL, Ranking, rank_models, rankable_parts
 from ..results.replay_command import describe_point
-from ..results.schema import count_points, exponents_of
+from ..results.schema import FIT_STATUSES, count_points, exponents_of
 from ..results.sensitivity import INDEX_HEADINGS, describe_design, describe_study, index_rows, iterate_studies
 from ..results.slabs import MAX_SUMMARY_POINTS, is_large
 from ..results.summary import Summary, extremes_of, summarize
+from ..results.xarray_backend import load
 from ..text import safe_text, with_year
 from .figures import at_text, coordinate_text, figures_of, unit_of, varying
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from ..plots.kinds import PlotData
 
 # the most that is shown: letters of a text and of a line of the config, values of an axis, failed points
 MAX_TEXT_LETTERS, MAX_LINE_LETTERS, MAX_VALUES, MAX_FAILED = 2000, 100_000, 8, 20
@@ -54,19 +54,45 @@ MAX_TEXT_LETTERS, MAX_LINE_LETTERS, MAX_VALUES, MAX_FAILED = 2000, 100_000, 8, 2
 MAX_FIGURE_MODELS, BEST_MODELS = 12, 8
 
 
-def page(dataset: xr.Dataset, get_plot_data: Callable[[str, Choice], PlotData]) -> str:
-    """A result as one page of HTML.
+def report(
+    dataset: xr.Dataset | str | Path,
+    *,
+    output: str | Path | None = None,
+    overwrite: bool = False,
+    plugins: Sequence[ForceModel | str | Path] = (),
+) -> str:
+    """A result as one page of HTML, which needs no network and runs no scripts.
 
     Parameters
     ----------
-    dataset : a result
-    get_plot_data : returns the data of a figure, given its kind and which part of the result it shows
+    dataset : a result, or the file of one
+    output : file to write the page to as well, whose name ends in .html
+    overwrite : replace the output if it exists
+    plugins : plug-in models that the result was computed with; without them the figures of a motion are left out
 
     Raises
     ------
-    UsageError : it is a time history
-    ResultError : its attributes are not those of a result
+    UsageError, ResultError : it is a time history, or its attributes are not those of a result; the output exists,
+        or has another ending
+
+    >>> import impact
+    >>> result = impact.sweep("configs/figure6.toml", overrides=["models=hertz", "sweep.e=[0.5, 1.0]"])
+    >>> "<h1>Final velocities comparison</h1>" in impact.report(result)
+    True
     """
+    if output is not None:
+        output = Path(output)
+        if output.suffix.lower() not in (".html", ".htm"):
+            raise UsageError(f"{output}: expected a name that ends in .html")
+        check_outputs([output], [dataset, *plugins], overwrite=overwrite)
+    text = page(load(dataset) if isinstance(dataset, str | Path) else dataset, plugins)
+    if output is not None:
+        write_file(output, text.encode(), overwrite=overwrite)
+    return text
+
+
+def page(dataset: xr.Dataset, plugins: Sequence[ForceModel | str | Path] = ()) -> str:
+    """Write a result as one page of HTML; for errors see `report`."""
     if "model" not in dataset.dims:
         raise UsageError("got a time history, expected the result of a sweep")
     summary, depths = summarize(dataset, MAX_FAILED), depth_summary(dataset)
@@ -80,7 +106,7 @@ def page(dataset: xr.Dataset, get_plot_data: Callable[[str, Choice], PlotData]) 
         best = [row.model for row in ranked.models] if ranked else keys
         selection = f"The figures show {BEST_MODELS} of the {len(keys)} models: {', '.join(best[:BEST_MODELS])}."
         keys = best[:BEST_MODELS]
-    drawn, left_out = figures_of(dataset, keys, get_plot_data)
+    drawn, left_out = figures_of(dataset, keys, plugins)
     models = [_model_section(dataset.isel(model=index)) for index in range(dataset.sizes["model"])]
     moduli = {str(name): dataset[name].values.tolist() for name in dataset.coords if str(name).endswith(".E")}
     lines = str(dataset.attrs.get("config", "")).replace("\r\n", "\n").expandtabs(4).split("\n")

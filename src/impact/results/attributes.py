@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -44,6 +45,21 @@ class SummaryRecord(BaseModel):
     extremes: dict[str, tuple[float | None, float | None, NonNegativeInt] | None]
 
 
+@dataclass(frozen=True)
+class LawRecord:
+    """What a factored file records about a law: all that its outputs depend on besides its trajectories."""
+
+    exponent: float | None
+    parameters: list[str]
+    domain: dict[str, tuple[float, float]]
+    asks_for_e: bool
+    is_permanent: bool
+    axes: list[str]
+    trajectories: int
+    is_shared: bool
+    stiffness_axes: list[str] | None
+
+
 ATTRIBUTE_TYPES: Mapping[str, Any] = {
     "axes": list[str],
     "config_set": list[str],
@@ -52,7 +68,7 @@ ATTRIBUTE_TYPES: Mapping[str, Any] = {
     "fit_bounds": dict[str, list[float]],
     "fit_paths": list[str],
     "inputs": dict[str, float | str],
-    "laws": dict[str, dict[str, Any]],
+    "laws": dict[str, LawRecord],
     "materials": dict[str, dict[str, Any]],
     "packages": dict[str, Any],
     "plugins": dict[str, PluginRecord],

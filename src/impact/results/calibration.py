@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 import xarray as xr
@@ -15,92 +14,20 @@ from ..config.input_names import InputName
 from ..config.load import Config
 from ..config.tables import DEFAULT_TITLE
 from ..contact.model import ForceModel
+from ..contact.variables import OUTPUTS
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins
 from ..formatting import decimals, number
 from ..text import safe_text
-from .schema import SCHEMA, coordinate_attributes, plan_coordinates, provenance_attributes
-
-# what became of a fit; its number is its position
-FIT_STATUSES = {
-    "ok": "the solver met its tolerance inside the bounds",
-    "at_bound": "a parameter is at a bound of the search: wider bounds would fit better",
-    "not_converged": "the solver did not meet its tolerance",
-    "too_few_points": "there are not more points than parameters",
-    "no_prediction": "the law has no result at a point",
-    "at_limit": "a parameter is at an end of its allowed values, where its interval ends too",
-}
-
-
-@dataclass(frozen=True)
-class CalibrationVariable:
-    """A variable of a calibration: its dimensions, unit and meaning, and how two of its values are compared.
-
-    A difference is judged in units of `scale`: the value and its interval; the standard deviations of two
-    parameters; the value; the value, or 1 if that is larger; or the largest measured value of the output.
-    Version 1.0 did not store the variables with `is_new`.
-    """
-
-    dims: tuple[str, ...]
-    unit: str
-    meaning: str
-    scale: Literal["exact", "itself + interval", "deviations", "itself", "max(1, itself)", "measured"]
-    is_new: bool = False
-
-
-_OF_PARAMETER = ("model", "parameter")
-_OF_CURVE = ("model", "output_name", "grid")
-CALIBRATION_VARIABLES = {
-    "estimate": CalibrationVariable(
-        _OF_PARAMETER, "SI", "best value of the parameter; NaN where the law does not have it", "itself + interval"
-    ),
-    "lower": CalibrationVariable(
-        _OF_PARAMETER, "SI", "lower end of the interval of 95 % by profile likelihood", "itself + interval"
-    ),
-    "upper": CalibrationVariable(
-        _OF_PARAMETER, "SI", "upper end of the interval of 95 % by profile likelihood", "itself + interval"
-    ),
-    "covariance": CalibrationVariable(
-        (*_OF_PARAMETER, "other_parameter"), "SI", "covariance in the linear approximation", "deviations"
-    ),
-    "identifiable": CalibrationVariable(
-        _OF_PARAMETER, "1", "1 if the data determine the parameter, -1 if it is not the law's", "exact"
-    ),
-    "fit_status": CalibrationVariable(("model",), "1", "outcome of the fit", "exact"),
-    "chi2_reduced": CalibrationVariable(
-        ("model",), "1", "squared residuals in variances per degree of freedom", "max(1, itself)"
-    ),
-    "p_value": CalibrationVariable(
-        ("model",), "1", "probability of a larger chi2 by the noise alone", "max(1, itself)", is_new=True
-    ),
-    "excess": CalibrationVariable(
-        ("model",), "SI", "standard deviation between specimens, besides that of the measurements", "itself"
-    ),
-    "aicc": CalibrationVariable(("model",), "1", "corrected information criterion of Akaike", "max(1, itself)"),
-    "weight": CalibrationVariable(("model",), "1", "Akaike weight among the laws", "max(1, itself)"),
-    "loo": CalibrationVariable(
-        ("model",),
-        "1",
-        "root mean square of leave-one-out residuals in given standard deviations; in SI units without one",
-        "max(1, itself)",
-    ),
-    "predicted": CalibrationVariable(("model", "point"), "SI", "output of the law at the point", "measured"),
-    "residual": CalibrationVariable(("model", "point"), "SI", "measured minus predicted", "measured"),
-    "loo_residual": CalibrationVariable(
-        ("model", "point"),
-        "1",
-        "residual of the point in the fit without it, in its own standard deviations",
-        "max(1, itself)",
-        is_new=True,
-    ),
-    "curve": CalibrationVariable(_OF_CURVE, "SI", "output of the law over the varied input", "measured"),
-    "curve_lower": CalibrationVariable(_OF_CURVE, "SI", "lower end of the band of 95 % of the curve", "measured"),
-    "curve_upper": CalibrationVariable(_OF_CURVE, "SI", "upper end of the band of 95 % of the curve", "measured"),
-}
-# coordinates besides those of models and inputs; those that are text
-CALIBRATION_TEXTS = frozenset({"parameter", "other_parameter", "output_name", "output", "determined", "specimen"})
-CALIBRATION_COORDINATES = CALIBRATION_TEXTS | {"point", "grid", "measured", "sigma", "line"}
-
+from .schema import (
+    CALIBRATION,
+    STUDY_COORDINATES,
+    coordinate_attributes,
+    plan_coordinates,
+    provenance_attributes,
+    template,
+    udunits,
+)
 
 # probability of chi2 below which a law is called rejected
 REJECTED_P = 1e-3
@@ -188,7 +115,7 @@ def _noise_notes(dataset: xr.Dataset) -> Iterator[str]:
     inputs = [
         np.asarray(coordinate.values)
         for name, coordinate in dataset.coords.items()
-        if coordinate.dims == ("point",) and name not in CALIBRATION_COORDINATES
+        if coordinate.dims == ("point",) and name not in STUDY_COORDINATES["calibration"]
     ]
     rows = list(zip(*inputs, strict=True)) or [()] * dataset.sizes["point"]
     repeated = sum(rows.count(row) > 1 for row in rows)
@@ -267,7 +194,6 @@ def calibration_template(
     }
     outputs = list(data.outputs)
     rows = len(data.lines)
-    units = {variable.name: variable.unit for variable in SCHEMA}
     new: dict[str, object] = {
         "parameter": ("parameter", parameters, {"long_name": "fitted parameter, by its config name"}),
         "other_parameter": ("other_parameter", parameters, {"long_name": "fitted parameter, by its config name"}),
@@ -285,30 +211,11 @@ def calibration_template(
         new["specimen"] = ("point", list(data.specimens), {"long_name": "specimen of the measured value"})
     for name, column in data.inputs.items():
         new[name] = ("point", np.tile(column, len(outputs)), coordinate_attributes(plan, name))
-    sizes = {"model": len(models), "parameter": len(parameters), "other_parameter": len(parameters)}
-    sizes |= {"point": rows * len(outputs), "output_name": len(outputs)}
     name, grid = varied
     if name:
-        sizes["grid"] = grid.size
         new["grid"] = ("grid", grid, coordinate_attributes(plan, name))
-        new["output_name"] = (
-            "output_name", outputs, {"long_name": "measured output", "units": " ".join(units[o] for o in outputs)},
-        )  # fmt: skip
-    variables = {}
-    for variable, of_variable in CALIBRATION_VARIABLES.items():
-        if set(of_variable.dims) <= sizes.keys() and (name or "grid" not in of_variable.dims):
-            about: dict[str, object] = {"units": of_variable.unit, "long_name": of_variable.meaning}
-            dtype = np.int8 if variable in ("identifiable", "fit_status") else float
-            if variable == "fit_status":
-                about |= {
-                    "flag_values": np.arange(len(FIT_STATUSES), dtype=np.int8),
-                    "flag_meanings": " ".join(FIT_STATUSES),
-                }
-            variables[variable] = (
-                of_variable.dims,
-                np.zeros([sizes[dim] for dim in of_variable.dims], dtype),
-                about,
-            )
+        units = " ".join(udunits(OUTPUTS[output].unit) for output in outputs)
+        new["output_name"] = ("output_name", outputs, {"long_name": "measured output", "units": units})
     attributes = provenance_attributes(plan) | {
         "noise": data.noise,
         "loss": data.loss,
@@ -317,4 +224,5 @@ def calibration_template(
         "fit_paths": json.dumps([InputName.parse(name).config_key for name in parameters]),
         "fit_bounds": json.dumps({name: list(ends) for name, ends in config.fits.items()}),
     }
-    return xr.Dataset(variables, {**coordinates, **new}, attributes)
+    coords = xr.Coordinates(coordinates | new)
+    return xr.Dataset(template(CALIBRATION.values(), coords.sizes, ()), coords, attributes)

@@ -6,25 +6,30 @@ import hashlib
 import io
 import pickle
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
+from ..config.grid import MAX_POINTS
+from ..contact.model import ForceModel
 from ..contact.simulate import TABLE_COLUMNS
-from ..engine.checkpoint import write_block
+from ..engine.checkpoint import write_range
 from ..engine.execute import context_of, integrate_columns, with_core
 from ..engine.plan import Plan
+from ..engine.run import Run, ignore
 from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryMap, columns_of, trajectory_maps, trajectory_ranges
 from .factored import factored_template
 from .schema import dataset_template, stored_variables
+from .sweep import prepare
 from .trajectory_table import expanded_slabs, table_of
 
 # numbers of workers for which the time is estimated
 WORKER_COUNTS = (1, 2, 8, 32, 128, 512)
-# the time of the driver for a block on a remote worker over the time that is measured by `estimate`: the rest is
+# the time of the driver for a range on a remote worker over the time that is measured by `estimate`: the rest is
 # spent in dask, see scripts/bench_scaling.py
 DASK_OVERHEAD = 2.0
 
@@ -79,14 +84,32 @@ class Estimate:
     by_workers: dict[int, float]
 
 
-def estimate(plan: Plan, jobs: int = 1) -> Estimate:
-    """Count a sweep, and time one range of its trajectories and one slab of its points.
+def estimate(
+    source: str | Path | Mapping[str, object],
+    *,
+    overrides: Sequence[str] = (),
+    plugins: Sequence[ForceModel | str | Path] = (),
+    jobs: int = 1,
+    max_points: int = MAX_POINTS,
+    on_note: Callable[[str], None] = ignore,
+) -> Estimate:
+    """Count the points and trajectories of a sweep, and estimate its size and time; nothing is written.
 
     Parameters
     ----------
-    plan : the sweep
-    jobs : processes or threads that integrate
+    source, overrides, plugins, max_points : see `sweep`
+    jobs : number of processes or threads that integrate
+    on_note : called with a sentence about each implausible value
+
+    Raises
+    ------
+    ConfigError, UsageError, ModelError : see `sweep`
+
+    >>> import impact
+    >>> impact.estimate("configs/figure6.toml").points
+    303
     """
+    plan = prepare(source, overrides, plugins, Run(max_points=max_points, on_note=on_note))
     maps = trajectory_maps(plan)
     plan = with_core(plan, maps)
     total = sum(trajectory_map.count for trajectory_map in maps)
@@ -97,15 +120,15 @@ def estimate(plan: Plan, jobs: int = 1) -> Estimate:
     # the first run loads or compiles the core
     for _ in range(2):
         with _timed() as integrating:
-            rebound, _ = integrate_columns(model, columns_of(plan, maps, chosen), plan.config.solver)
+            collisions, _ = integrate_columns(model, columns_of(plan, maps, chosen), plan.config.solver)
     with _timed() as driving:
         sent = len(pickle.dumps((columns_of(plan, maps, chosen), context_of(plan)), pickle.HIGHEST_PROTOCOL))
-        back = pickle.dumps(rebound, pickle.HIGHEST_PROTOCOL)
+        back = pickle.dumps(collisions, pickle.HIGHEST_PROTOCOL)
         pickle.loads(back)
-        write_block(io.BytesIO(), "", rebound)
+        write_range(io.BytesIO(), "", collisions)
     # the time of a slab does not depend on the values of its trajectories: repeat those of the range
     positions = np.arange(RANGE_TRAJECTORIES) % chosen.size
-    table = table_of(plan, maps, lambda _, start, stop: rebound.take(positions[: stop - start]))
+    table = table_of(plan, maps, lambda _, start, stop: collisions.take(positions[: stop - start]))
     with _timed() as assembling:
         _, _, _, values = next(expanded_slabs(table, stored_variables(plan)))
         for array in values.values():
@@ -115,7 +138,7 @@ def estimate(plan: Plan, jobs: int = 1) -> Estimate:
     each, seconds_per_trajectory_of_driver = integrating() / chosen.size, DASK_OVERHEAD * driving() / chosen.size
     writing_seconds = assembling() / slab * plan.stored_points if is_full else 0.0
     busy = min(max(round(each / seconds_per_trajectory_of_driver), 1), len(ranges))
-    work_folder_bytes = total * sum(getattr(rebound, name).itemsize for name in TABLE_COLUMNS)
+    work_folder_bytes = total * sum(getattr(collisions, name).itemsize for name in TABLE_COLUMNS)
     whole = dataset_template(plan)
     counts = [*(count for count in WORKER_COUNTS if count < busy), busy]
     return Estimate(

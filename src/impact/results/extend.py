@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -13,17 +14,19 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from .._version import __version__
+from ..atomic import check_outputs
 from ..config.files import override_text
 from ..config.grid import MAX_POINTS, Axis
 from ..config.input_names import InputName
 from ..config.tables import CORES
+from ..contact.model import ForceModel
 from ..contact.simulate import CollisionResult
 from ..contact.status import STATUS_OK, Status
-from ..engine.execute import never_stop
-from ..engine.executors import SERIAL, Backend
+from ..engine.execute import ReusedPart
+from ..engine.executors import SERIAL, ExecutorSpec
 from ..engine.plan import Inputs, Plan
-from ..engine.plugins import Plugins
-from ..engine.progress import ProgressCallback
+from ..engine.plugins import Plugins, read_plugins
+from ..engine.run import ProgressCallback, Run, ignore, never
 from ..engine.trajectories import TrajectoryMap, TrajectoryRange, check_count, columns_of, trajectory_maps
 from ..errors import ResultError, UsageError
 from ..text import safe_text
@@ -33,62 +36,126 @@ from .provenance import stored_config
 from .selection import IndexArray, match_labels
 from .summary import SweepOutcome
 from .sweep import Extension, SlabValues, sweep_into
-from .trajectory_table import TrajectoryTable
-from .xarray_backend import open_with_table
+from .trajectory_table import TrajectoryTable, table_of_result
+from .xarray_backend import load, open_result
 
 # statuses that are assigned before integration
 CHECKED_STATUSES = (Status.NO_IMPACT, Status.INVALID_PARAMETER, Status.OUT_OF_RANGE)
 
 
 def extend(
-    source: Path,
-    output: Path,
+    result: str | Path,
     overrides: Sequence[str],
-    plugins: Plugins,
     *,
-    resume: bool = False,
+    output: str | Path | None = None,
     overwrite: bool = False,
+    plugins: Sequence[ForceModel | str | Path] = (),
     max_points: int = MAX_POINTS,
-    backend: Backend = SERIAL,
-    on_progress: ProgressCallback = lambda progress: None,
-    should_stop: Callable[[], bool] = never_stop,
-) -> SweepOutcome:
-    """Add values to the axes of a result, or models to it.
+) -> xr.Dataset:
+    """Add values to the axes of a stored result, or models to it, and integrate only what it does not hold.
+
+    A result of layout "factored" holds trajectories, which new points may share; one of layout "full" has
+    values alone, and all trajectories of the new points are integrated.
 
     Parameters
     ----------
-    source : the result
-    output : the file of the extended result, which may be the same
-    overrides : changes to its config, such as "sweep.m2=[1.0, 2.0]"; values that the result has are kept
-    plugins : models that are not built in, including those of the result
-    resume, overwrite, backend, on_progress, should_stop : see `impact.results.sweep.sweep_into`
-    max_points : refuse a sweep of more points
+    result : the file
+    overrides : changes to its config, such as `"sweep.m2=[1.0, 2.0]"`; existing values are kept
+    output : file of the larger result; by default it replaces the smaller one
+    overwrite : replace the output if it exists
+    plugins : plug-in models, among them those that the result was computed with
+    max_points : the largest number of points, of all models together
 
     Returns
     -------
-    The extended result, with the same variables and coordinates as a single sweep of its config, and the number of
-    trajectories that were integrated for it. A result of layout `full` holds values of points and no trajectories:
-    those of all new points are integrated, also where a point of the result had the same one.
+    xarray.Dataset : the larger result, equal to that of a single sweep in all variables and coordinates
 
     Raises
     ------
-    ResultError : the source is not a readable result, or was written by another version of impact
-    UsageError : the overrides change more than values of axes and models; see also `sweep_into`
+    ResultError : the file is not a readable result, or was written by another version of this program
+    UsageError : the overrides change more than values of axes and models
+    StoreError : the disk is full or failed
+
+    >>> import impact, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     impact.save(impact.sweep("configs/figure6.toml"), f"{folder}/r.h5")
+    ...     impact.extend(f"{folder}/r.h5", ["sweep.m2=[1.0, 2.0]"]).sizes["m2"]
+    2
+    """
+    target = result if output is None else output
+    extend_to_file(result, overrides, output=target, overwrite=overwrite, plugins=plugins, max_points=max_points)
+    return load(target)
+
+
+def extend_to_file(
+    result: str | Path,
+    overrides: Sequence[str],
+    *,
+    output: str | Path | None = None,
+    overwrite: bool = False,
+    resume: bool = False,
+    plugins: Sequence[ForceModel | str | Path] = (),
+    backend: AbstractContextManager[ExecutorSpec] | None = None,
+    max_points: int = MAX_POINTS,
+    on_progress: ProgressCallback = ignore,
+    should_stop: Callable[[], bool] = never,
+) -> SweepOutcome:
+    """Extend a stored result as `extend` does, and summarize it, without reading the file again.
+
+    Parameters
+    ----------
+    result, overrides, output, overwrite, plugins, max_points : see `extend`
+    resume : continue with the work folder of an interrupted extension
+    backend, on_progress, should_stop : see `sweep_to_file`
+
+    Returns
+    -------
+    SweepOutcome : counts of points by status, largest errors, first failed points; `integrated` counts the
+        trajectories that were integrated
+
+    Raises
+    ------
+    ResultError, UsageError, StoreError : see `extend`
+    InUseError, UnfinishedError : see `sweep_to_file`
+
+    >>> import impact, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     outcome = impact.sweep_to_file("configs/figure6.toml", f"{folder}/r.h5")
+    ...     impact.extend_to_file(f"{folder}/r.h5", ["sweep.e=[0.123]"]).integrated
+    3
+    """
+    source, target = Path(result), Path(result if output is None else output)
+    run = Run(backend or SERIAL, resume, overwrite, max_points, on_progress, should_stop=should_stop)
+    check_outputs([target], plugins, overwrite=True)
+    plugin_set = read_plugins(plugins)
+    with run.connected() as connected:
+        outcome = _extend_into(target, source, overrides, plugin_set, connected)
+    run.check_stop(f"{safe_text(str(target))} is complete")
+    return outcome
+
+
+def _extend_into(output: Path, source: Path, overrides: Sequence[str], plugins: Plugins, run: Run) -> SweepOutcome:
+    """Write the extended result.
+
+    It has the same variables and coordinates as a single sweep of its config. A result of layout `full` holds
+    values of points and no trajectories: those of all new points are integrated, also where a point of the result
+    had the same one.
     """
     name = safe_text(str(source))
-    before, table = open_with_table(source)
+    before = open_result(source)
+    table = table_of_result(before)
     require_sweep(before, "extend")
     with before:
-        config = stored_config(before.attrs, [], plugins, str(source), max_points)
+        config = stored_config(before.attrs, [], plugins, str(source), run.max_points)
         old = Plan(config, plugins.of(config.models))
         _check_whole(before, old, name)
-        new = _extended_plan(before, old, overrides, plugins, source, max_points)
+        new = _extended_plan(before, old, overrides, plugins, source, run.max_points)
         if before.attrs.get("core") in CORES:
             # the existing trajectories were integrated by this core
             solver = replace(new.config.solver, core=str(before.attrs["core"]))
             new = replace(new, config=replace(new.config, solver=solver))
         _check_changes(old, new, name)
-        check_count(new, max_points, str(source))
+        check_count(new, run.max_points, str(source))
         axes = tuple(_axis_positions(axis, old.inputs, name) for axis in new.config.axes)
         _check_none_lost(old, axes, name)
         seal = str(before.encoding["seal"])
@@ -99,27 +166,18 @@ def extend(
         # a full result has no trajectories, only the values of its points
         fill = old_positions.filler(before) if table is None and new.layout == "full" else None
 
-        def find_reused(part: TrajectoryRange) -> tuple[NDArray[np.bool_], CollisionResult] | None:
+        def find_reused(trajectory_range: TrajectoryRange) -> ReusedPart:
             reused = None
             if table is not None:
-                reused = old_positions.from_table(part, table)
+                reused = old_positions.from_table(trajectory_range, table)
             elif fill is not None:
-                reused = old_positions.not_needed(part)
-            n_integrated[part.number] = part.size - (0 if reused is None else int(np.count_nonzero(reused[0])))
+                reused = old_positions.not_needed(trajectory_range)
+            count = 0 if reused is None else int(np.count_nonzero(reused[0]))
+            n_integrated[trajectory_range.number] = trajectory_range.size - count
             return reused
 
-        extension = Extension(seal, json.dumps(history), find_reused, fill)
-        outcome = sweep_into(
-            output,
-            new,
-            resume=resume,
-            overwrite=overwrite,
-            in_place=output == source,
-            backend=backend,
-            on_progress=on_progress,
-            should_stop=should_stop,
-            extension=extension,
-        )
+        extension = Extension(seal, json.dumps(history), find_reused, fill, replaces=output == source)
+        outcome = sweep_into(output, new, run, extension)
     layout = "full" if table is None else "factored"
     return replace(outcome, integrated=sum(n_integrated.values()), extended_layout=layout)
 
@@ -137,7 +195,7 @@ def _check_whole(before: xr.Dataset, old: Plan, name: str) -> None:
 def _extended_plan(
     before: xr.Dataset, old: Plan, overrides: Sequence[str], plugins: Plugins, source: Path, max_points: int
 ) -> Plan:
-    """The plan with the overrides, and all values and models of the result."""
+    """Plan the sweep with the overrides, and all values and models of the result."""
     config = stored_config(before.attrs, overrides, plugins, str(source), max_points)
     appended_overrides = []
     for axis in config.axes:
@@ -226,7 +284,7 @@ def _check_none_lost(old: Plan, axes: Sequence[_AxisPositions], name: str) -> No
 
 
 def _axis_positions(axis: Axis, old: Inputs, name: str) -> _AxisPositions:
-    """The positions that the values of an axis have in the old result.
+    """Find the positions that the values of an axis have in the old result.
 
     Raises
     ------
@@ -270,41 +328,43 @@ class _OldPositions:
     _rows: dict[int, IndexArray] = field(default_factory=dict)
 
     def model(self, model: int) -> int | None:
-        """The number that a model had in the old plan, or None."""
+        """Find the number that a model had in the old plan, or None."""
         keys = [model_of_old_plan.key for model_of_old_plan in self.old.models]
         key = self.new.models[model].key
         return keys.index(key) if key in keys else None
 
-    def from_table(
-        self, part: TrajectoryRange, table: TrajectoryTable
-    ) -> tuple[NDArray[np.bool_], CollisionResult] | None:
-        """The trajectories of a range that the old result has in its table."""
-        model = self.model(part.model)
+    def from_table(self, trajectory_range: TrajectoryRange, table: TrajectoryTable) -> ReusedPart:
+        """Take the trajectories of a range that the old result has in its table."""
+        model = self.model(trajectory_range.model)
         if model is None:
             return None
-        old_rows = self._old_rows(part, table.maps[model])
+        old_rows = self._old_rows(trajectory_range, table.maps[model])
         is_known = old_rows >= 0
-        held = table.rows.take(model, np.maximum(old_rows, 0))
+        stored = table.rows.take(model, np.maximum(old_rows, 0))
         # a status that was assigned before integration may differ between the two sweeps
-        status = columns_of(self.new, self.maps, part)["status"]
-        is_known &= np.where(status == STATUS_OK, ~np.isin(held.status, CHECKED_STATUSES), held.status == status)
-        rebound = CollisionResult.blank(part.size)
-        rebound.put(np.flatnonzero(is_known), held.take(np.flatnonzero(is_known)))
-        return is_known, rebound
+        status = columns_of(self.new, self.maps, trajectory_range)["status"]
+        is_known &= np.where(
+            status == STATUS_OK, ~np.isin(stored.status, CHECKED_STATUSES), stored.status == status
+        )
+        collisions = CollisionResult.blank(trajectory_range.size)
+        collisions.put(np.flatnonzero(is_known), stored.take(np.flatnonzero(is_known)))
+        return is_known, collisions
 
-    def not_needed(self, part: TrajectoryRange) -> tuple[NDArray[np.bool_], CollisionResult] | None:
-        """The trajectories of a range that are needed only by points that the old result holds in full."""
-        trajectory_map = self.maps[part.model]
+    def not_needed(self, trajectory_range: TrajectoryRange) -> ReusedPart:
+        """Mark the trajectories of a range that only points need which the old result holds in full."""
+        trajectory_map = self.maps[trajectory_range.model]
         others = [axis for axis in range(len(self.axes)) if axis not in trajectory_map.axes]
-        if self.model(part.model) is None or any((self.axes[axis].positions < 0).any() for axis in others):
+        if self.model(trajectory_range.model) is None or any(
+            (self.axes[axis].positions < 0).any() for axis in others
+        ):
             return None
         if trajectory_map.of_cell is None:
-            is_old = self._is_old(trajectory_map, np.arange(part.start, part.stop))
+            is_old = self._is_old(trajectory_map, np.arange(trajectory_range.start, trajectory_range.stop))
         else:
             needed = np.zeros(trajectory_map.count, bool)
             needed[trajectory_map.of_cell[~self._is_old(trajectory_map, np.arange(trajectory_map.cells))]] = True
-            is_old = ~needed[part.start : part.stop]
-        return is_old, CollisionResult.blank(part.size)
+            is_old = ~needed[trajectory_range.start : trajectory_range.stop]
+        return is_old, CollisionResult.blank(trajectory_range.size)
 
     def _is_old(self, trajectory_map: TrajectoryMap, cells: IndexArray) -> NDArray[np.bool_]:
         along = np.unravel_index(cells, trajectory_map.shape) if trajectory_map.shape else ()
@@ -313,21 +373,23 @@ class _OldPositions:
             is_old &= self.axes[axis].positions[coordinate] >= 0
         return is_old
 
-    def _old_rows(self, part: TrajectoryRange, old_map: TrajectoryMap) -> IndexArray:
-        trajectory_map = self.maps[part.model]
+    def _old_rows(self, trajectory_range: TrajectoryRange, old_map: TrajectoryMap) -> IndexArray:
+        trajectory_map = self.maps[trajectory_range.model]
         if trajectory_map.of_cell is None:
-            return self._rows_of_cells(trajectory_map, old_map, np.arange(part.start, part.stop))
-        if part.model not in self._rows:
+            return self._rows_of_cells(
+                trajectory_map, old_map, np.arange(trajectory_range.start, trajectory_range.stop)
+            )
+        if trajectory_range.model not in self._rows:
             rows = np.full(trajectory_map.count, -1, np.intp)
             of_cells = self._rows_of_cells(trajectory_map, old_map, np.arange(trajectory_map.cells))
             rows[trajectory_map.of_cell[of_cells >= 0]] = of_cells[of_cells >= 0]
-            self._rows[part.model] = rows
-        return self._rows[part.model][part.start : part.stop]
+            self._rows[trajectory_range.model] = rows
+        return self._rows[trajectory_range.model][trajectory_range.start : trajectory_range.stop]
 
     def _rows_of_cells(
         self, trajectory_map: TrajectoryMap, old_map: TrajectoryMap, cells: IndexArray
     ) -> IndexArray:
-        """The old row of each cell's trajectory, or -1."""
+        """Find the old row of each cell's trajectory, or -1."""
         coordinates = np.unravel_index(cells, trajectory_map.shape) if trajectory_map.shape else ()
         along = dict(zip(trajectory_map.axes, coordinates, strict=True))
         index = [np.zeros(cells.shape, np.intp) for _ in self.old.config.axes]
@@ -342,33 +404,32 @@ class _OldPositions:
         return np.where(self._is_old(trajectory_map, cells), rows, -1)
 
     def filler(self, before: xr.Dataset) -> Callable[[int, tuple[slice, ...], SlabValues], None]:
-        """A function that copies the values of the old result into the values of a slab."""
+        """Build the function that copies the values of the old result into the values of a slab."""
         names = [axis.name for axis in self.old.config.axes]
 
-        def fill(model: int, where: tuple[slice, ...], values: SlabValues) -> None:
+        def fill(model: int, region: tuple[slice, ...], values: SlabValues) -> None:
             old_model = self.model(model)
             if old_model is None:
                 return
-            parts = [axis.positions[part] for axis, part in zip(self.axes, where, strict=True)]
-            inside = np.ix_(*(np.flatnonzero(part >= 0) for part in parts))
-            if any(part.size == 0 for part in inside):
+            old_positions = [axis.positions[part] for axis, part in zip(self.axes, region, strict=True)]
+            inside = np.ix_(*(np.flatnonzero(positions >= 0) for positions in old_positions))
+            if any(positions.size == 0 for positions in inside):
                 return
             chosen: Mapping[Any, Any] = {
-                names[axis.axis]: part[part >= 0]
-                for axis, part in zip(self.axes, parts, strict=True)
+                names[axis.axis]: positions[positions >= 0]
+                for axis, positions in zip(self.axes, old_positions, strict=True)
                 if axis.axis is not None
             }
             # the order of the axes of the old result among those of this slab
-            order = [axis.axis for axis in self.axes if axis.axis is not None]
+            order = [names[axis.axis] for axis in self.axes if axis.axis is not None]
             for name, array in values.items():
-                variable = before[name]
-                if "model" not in variable.dims:
+                if "model" not in before[name].dims:
                     continue
-                held = variable.isel(model=old_model, **chosen).transpose(*(names[axis] for axis in order)).values
-                shape = tuple(part.size for part in inside)
+                old_values = before[name].isel(model=old_model, **chosen).transpose(*order).values
+                shape = tuple(positions.size for positions in inside)
                 if not array.flags.writeable:
                     # a view of computed values that was not copied
                     values[name] = array = array.copy()
-                array[inside or ...] = held.reshape(shape) if array.shape else held
+                array[inside or ...] = old_values.reshape(shape) if array.shape else old_values
 
         return fill

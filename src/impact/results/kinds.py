@@ -1,24 +1,42 @@
-"""What a dataset is: the result of a sweep, a calibration or a sensitivity study."""
+"""What a dataset is: the result of a sweep, a calibration or a sensitivity study, or a time history."""
 
 from __future__ import annotations
+
+from typing import Literal
 
 import xarray as xr
 
 from ..errors import UsageError
 
+Kind = Literal["sweep", "history", "calibration", "sensitivity study"]
+
+
+def kind_of(dataset: xr.Dataset) -> Kind:
+    """Tell the kind of a dataset by its dimensions."""
+    if "t" in dataset.dims:
+        return "history"
+    if "parameter" in dataset.dims:
+        return "calibration"
+    return "sensitivity study" if "input" in dataset.dims else "sweep"
+
 
 def is_calibration(dataset: xr.Dataset) -> bool:
     """Whether a dataset is the result of a calibration."""
-    return "parameter" in dataset.dims
+    return kind_of(dataset) == "calibration"
 
 
 def is_sensitivity(dataset: xr.Dataset) -> bool:
     """Whether a dataset is the result of a sensitivity study."""
-    return "input" in dataset.dims
+    return kind_of(dataset) == "sensitivity study"
+
+
+def has_fixed_steps(dataset: xr.Dataset) -> bool:
+    """Whether the points of a dataset are collisions at a fixed step; results of the continuous law do not say."""
+    return "integrator" in dataset.attrs
 
 
 def require_sweep(dataset: xr.Dataset, command: str) -> None:
     """Raise a UsageError where a command takes the result of a sweep, and got that of another command."""
-    for kind, is_kind in (("calibration", is_calibration), ("sensitivity study", is_sensitivity)):
-        if is_kind(dataset):
-            raise UsageError(f"{command}: this is a {kind}, expected the result of a sweep")
+    kind = kind_of(dataset)
+    if kind in ("calibration", "sensitivity study"):
+        raise UsageError(f"{command}: this is a {kind}, expected the result of a sweep")

@@ -1,4 +1,4 @@
-"""The SCHEMA of a result: its variables and their comparison scales, coordinates and attributes."""
+"""The SCHEMA of each kind of result: its variables, coordinates and attributes."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import json
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from importlib.metadata import version
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -22,12 +22,12 @@ from ..config.input_names import InputName, is_foreign, is_input
 from ..config.load import Config
 from ..config.tables import MATERIAL_KEYS
 from ..contact.materials import effective_mass
-from ..contact.outputs import BY_DEFAULT, UNITS
-from ..contact.status import Status
 from ..contact.timestep import EXACT
+from ..contact.variables import AXES, BY_DEFAULT, HISTORY, OUTPUTS, Variable, by_name
 from ..engine.build_impacts import mass_at, restitution_at
 from ..engine.plan import Index, Inputs, Plan
 from ..formatting import number
+from .kinds import Kind
 
 SCHEMA_VERSION = 2
 # longer lists of models with another exponent are abbreviated
@@ -36,114 +36,166 @@ MAX_EXPONENT_LETTERS = 48
 MODEL_METADATA = ("title", "year", "equation", "reference", "doi")
 
 
-@dataclass(frozen=True)
-class SchemaVariable:
-    """One variable of a result.
-
-    `per` states whether it depends on the model or on the axes only; `judged` how a comparison judges it: by its
-    difference relative to a scale, by a bound of its own value, exactly, or not at all.
-    """
-
-    name: str
-    per: Literal["model", "axes"]
-    judged: Literal[
-        "scaled by v0",
-        "scaled by 1",
-        "scaled by the peak",
-        "scaled by itself",
-        "scaled by m v0^2/2",
-        "bounded by 10 rtol",
+# the outcomes of a fit
+FIT_STATUSES = {
+    "ok": "the solver met its tolerance inside the bounds",
+    "at_bound": "a parameter is at a bound of the search: wider bounds would fit better",
+    "not_converged": "the solver did not meet its tolerance",
+    "too_few_points": "there are not more points than parameters",
+    "no_prediction": "the law has no result at a point",
+    "at_limit": "a parameter is at an end of its allowed values, where its interval ends too",
+}
+_LAWS, _PARAMETERS, _MEASURED = ("model",), ("model", "parameter"), ("model", "point")
+_CURVES = ("model", "output_name", "grid")
+CALIBRATION = by_name(
+    Variable(
+        "estimate",
+        _PARAMETERS,
+        "SI",
+        "itself + interval",
+        "best value of the parameter; NaN where the law does not have it",
+    ),
+    Variable(
+        "lower", _PARAMETERS, "SI", "itself + interval", "lower end of the interval of 95 % by profile likelihood"
+    ),
+    Variable(
+        "upper", _PARAMETERS, "SI", "itself + interval", "upper end of the interval of 95 % by profile likelihood"
+    ),
+    Variable(
+        "covariance",
+        (*_PARAMETERS, "other_parameter"),
+        "SI",
+        "deviations",
+        "covariance in the linear approximation",
+    ),
+    Variable(
+        "identifiable",
+        _PARAMETERS,
+        "1",
         "exact",
-        "reported",
-    ]
-    meaning: str
-    equation: str
-    dtype: str = "f8"
-
-    @property
-    def unit(self) -> str:
-        """Its unit in the spelling of netCDF."""
-        return udunits(UNITS[self.name])
-
-    @property
-    def by_default(self) -> bool:
-        """Whether it is stored if `[output] variables` is not set."""
-        return self.name in BY_DEFAULT
-
-
-SCHEMA = (
-    SchemaVariable("v1_post", "model", "scaled by v0", "velocity of ball 1 after the impact",
-             "v1+ = v1 - (1 + e_out)(m/m1) v0"),
-    SchemaVariable("v2_post", "model", "scaled by v0", "velocity of ball 2 after the impact",
-             "v2+ = v2 + (1 + e_out)(m/m2) v0"),
-    SchemaVariable("v1_reference", "axes", "scaled by v0", "velocity of ball 1 by impulse and momentum",
-             "v1+ = v1 - (1 + e)(m/m1) v0  (6)"),
-    SchemaVariable("v2_reference", "axes", "scaled by v0", "velocity of ball 2 by impulse and momentum",
-             "v2+ = v2 + (1 + e)(m/m2) v0  (7)"),
-    SchemaVariable("v1_error", "model", "scaled by v0", "error of the velocity of ball 1",
-             "v1_post - v1_reference"),
-    SchemaVariable("v2_error", "model", "scaled by v0", "error of the velocity of ball 2",
-             "v2_post - v2_reference"),
-    SchemaVariable("e_out", "model", "scaled by 1", "restitution that the model delivers",
-             "(v2+ - v1+)/(v1 - v2)  (5)"),
-    SchemaVariable("e_error", "model", "scaled by 1", "delivered minus requested restitution", "e_out - e"),
-    SchemaVariable("peak_indentation", "model", "scaled by the peak", "largest indentation", "δₘ at v = 0"),
-    SchemaVariable("permanent_indentation", "model", "scaled by the peak", "indentation at the release",
-             "δₚ at the end of the contact"),
-    SchemaVariable("peak_force", "model", "scaled by itself", "largest contact force",
-             "max F over the approach"),
-    SchemaVariable("contact_time", "model", "scaled by itself", "contact time",
-             "from first contact to release"),
-    SchemaVariable("energy_loss", "model", "scaled by m v0^2/2", "kinetic energy lost",
-             "m v0²(1 - e_out²)/2"),
-    SchemaVariable("stiffness", "model", "scaled by itself",
-             "contact stiffness used; n is the coordinate exponent; without K and with n other than 1.5 it is "
-             "F_m/delta_m^n at the Hertz peak", "K  (12)"),
-    SchemaVariable("damping_ratio", "model", "scaled by itself",
-             "dimensionless damping, where the law has one",
-             "χ = λ v0/K"),
-    SchemaVariable("energy_residual", "model", "bounded by 10 rtol", "residual of the work balance",
-             "[work of the force - m v0²(1 - e_out²)/2]/(m v0²/2)"),
-    SchemaVariable("closed_form_error", "model", "bounded by 10 rtol",
-             "distance from the closed form, where one exists", "e_out - exact e_out"),
-    SchemaVariable("status", "model", "exact", "outcome of the point", "see flag_meanings", "i1"),
-    SchemaVariable("in_domain", "model", "exact", "1 if the inputs are in the stated domain of the law",
-             "1 inside every stated interval", "i1"),
-    SchemaVariable("steps", "model", "reported", "accepted steps of the integrator",
-             "approach + restitution", "i4"),
-    SchemaVariable("e_kinetic", "model", "scaled by 1",
-             "kinetic restitution; the impulses are the changes of the momentum, so that it is e_out",
-             "τ_r/τ_c  (2)"),
-    SchemaVariable("e_energetic", "model", "scaled by 1",
-             "energetic restitution, from the integrated works of the two phases", "√(-W_r/W_c)  (3)"),
-    SchemaVariable("lambda", "model", "scaled by itself",
-             "damping factor, where the law has one; n is the coordinate exponent", "λ = χ K/v0  (18)"),
-    SchemaVariable("separation_time", "model", "scaled by itself", "time until the surfaces separate",
-             "contact_time + remaining indentation/(e_out v0)"),
-)  # fmt: skip
-
-# name, unit and meaning of the variables of a time history, over the time t
-HISTORY_VARIABLES = (
-    ("delta", "m", "indentation"),
-    ("v", "m s-1", "rate of the indentation"),
-    ("F", "N", "contact force"),
-    ("x1", "m", "displacement of ball 1 since first contact"),
-    ("x2", "m", "displacement of ball 2 since first contact"),
-    ("v1", "m s-1", "velocity of ball 1"),
-    ("v2", "m s-1", "velocity of ball 2"),
+        "1 if the data determine the parameter, -1 if it is not the law's",
+        dtype="i1",
+    ),
+    Variable(
+        "fit_status",
+        _LAWS,
+        "1",
+        "exact",
+        "outcome of the fit",
+        dtype="i1",
+        flags={name: number for number, name in enumerate(FIT_STATUSES)},
+    ),
+    Variable("chi2_reduced", _LAWS, "1", "max(1, itself)", "squared residuals in variances per degree of freedom"),
+    Variable(
+        "p_value", _LAWS, "1", "max(1, itself)", "probability of a larger chi2 by the noise alone", is_new=True
+    ),
+    Variable(
+        "excess", _LAWS, "SI", "itself", "standard deviation between specimens, besides that of the measurements"
+    ),
+    Variable("aicc", _LAWS, "1", "max(1, itself)", "corrected information criterion of Akaike"),
+    Variable("weight", _LAWS, "1", "max(1, itself)", "Akaike weight among the laws"),
+    Variable(
+        "loo",
+        _LAWS,
+        "1",
+        "max(1, itself)",
+        "root mean square of leave-one-out residuals in given standard deviations; in SI units without one",
+    ),
+    Variable("predicted", _MEASURED, "SI", "measured", "output of the law at the point"),
+    Variable("residual", _MEASURED, "SI", "measured", "measured minus predicted"),
+    Variable(
+        "loo_residual",
+        _MEASURED,
+        "1",
+        "max(1, itself)",
+        "residual of the point in the fit without it, in its own standard deviations",
+        is_new=True,
+    ),
+    Variable("curve", _CURVES, "SI", "measured", "output of the law over the varied input"),
+    Variable("curve_lower", _CURVES, "SI", "measured", "lower end of the band of 95 % of the curve"),
+    Variable("curve_upper", _CURVES, "SI", "measured", "upper end of the band of 95 % of the curve"),
 )
+_STUDIES, _INPUTS = ("model", AXES), ("model", AXES, "input")
+SENSITIVITY = by_name(
+    Variable(
+        "first", _INPUTS, "1", "reported", "first-order index: share of the variance that the input explains alone"
+    ),
+    Variable(
+        "first_lower",
+        _INPUTS,
+        "1",
+        "reported",
+        "lower end of the bootstrap interval of 95 % of the first-order index",
+    ),
+    Variable(
+        "first_upper",
+        _INPUTS,
+        "1",
+        "reported",
+        "upper end of the bootstrap interval of 95 % of the first-order index",
+    ),
+    Variable("first_half", _INPUTS, "1", "reported", "first-order index from the first half of the samples"),
+    Variable(
+        "total",
+        _INPUTS,
+        "1",
+        "reported",
+        "total index: share of the variance that is left if only the input is unknown",
+    ),
+    Variable(
+        "total_lower", _INPUTS, "1", "reported", "lower end of the bootstrap interval of 95 % of the total index"
+    ),
+    Variable(
+        "total_upper", _INPUTS, "1", "reported", "upper end of the bootstrap interval of 95 % of the total index"
+    ),
+    Variable("total_half", _INPUTS, "1", "reported", "total index from the first half of the samples"),
+    Variable("mean", _STUDIES, "output", "reported", "mean of the output"),
+    Variable("sd", _STUDIES, "output", "reported", "standard deviation of the output"),
+    Variable("quantiles", (*_STUDIES, "quantile"), "output", "reported", "quantiles of the output"),
+    Variable(
+        "failed",
+        _STUDIES,
+        "1",
+        "reported",
+        "points without a result; with any there is no mean and no index",
+        dtype="i8",
+    ),
+)
+# the variables of each kind of dataset, by name
+SCHEMA: Mapping[Kind, Mapping[str, Variable]] = {
+    "sweep": OUTPUTS,
+    "history": HISTORY,
+    "calibration": CALIBRATION,
+    "sensitivity study": SENSITIVITY,
+}
+# coordinates of studies besides those of models and inputs, with their dimensions; the first is the study's axis
+STUDY_COORDINATES: Mapping[Kind, Mapping[str, str]] = {
+    "calibration": {
+        "parameter": "parameter",
+        "other_parameter": "other_parameter",
+        "point": "point",
+        "line": "point",
+        "output": "point",
+        "measured": "point",
+        "sigma": "point",
+        "specimen": "point",
+        "determined": "model",
+        "grid": "grid",
+        "output_name": "output_name",
+    },
+    "sensitivity study": {"input": "input", "quantile": "quantile"},
+}
+CALIBRATION_TEXTS = ("parameter", "other_parameter", "output_name", "output", "determined", "specimen")
 
 RECORDED_PACKAGES = ("numpy", "h5py", "h5netcdf", "xarray")
 
 
-def scale_of(
-    variable: SchemaVariable, read: Callable[[str], NDArray[Any]], *, has_peak: bool
-) -> NDArray[np.float64]:
-    """The scale of a variable's differences in its own unit; its shape broadcasts to that of the points.
+def scale_of(variable: Variable, read: Callable[[str], NDArray[Any]], *, has_peak: bool) -> NDArray[np.float64]:
+    """The scale of the differences of an output in its own unit; its shape broadcasts to that of the points.
 
     Parameters
     ----------
-    variable : the variable
+    variable : the output
     read : returns values by name: v1, v2 [m/s], m1, m2 [kg], the variable itself, `peak_indentation` [m]; arrays
         that broadcast against each other
     has_peak : whether the result has `peak_indentation`
@@ -152,44 +204,57 @@ def scale_of(
     def number(name: str) -> NDArray[np.float64]:
         return np.asarray(read(name), float)
 
-    match variable.judged:
-        case "scaled by v0":
+    match variable.scale:
+        case "v0":
             return np.asarray(np.abs(number("v1") - number("v2")))
-        case "scaled by m v0^2/2":
+        case "m v0^2/2":
             v0 = number("v1") - number("v2")
             return np.asarray(0.5 * effective_mass(number("m1"), number("m2")) * v0 * v0)
-        case "scaled by the peak" if has_peak:
+        case "the peak" if has_peak:
             return np.asarray(np.abs(number("peak_indentation")))
-        case "scaled by itself" | "scaled by the peak":
+        case "itself" | "the peak":
             return np.asarray(np.abs(number(variable.name)))
     return np.ones(())
 
 
-def stored_variables(plan: Plan) -> tuple[SchemaVariable, ...]:
+def template(variables: Iterable[Variable], sizes: Mapping[Hashable, int], axes: Sequence[str]) -> dict[str, Any]:
+    """The data of a dataset with placeholder values: by name, dimensions, zeros that take no memory, attributes.
+
+    Parameters
+    ----------
+    variables : those with a dimension that has no size are left out
+    sizes : by dimension
+    axes : the dimensions in place of `AXES`
+    """
+    arrays = {}
+    for variable in variables:
+        dims = tuple(dim for part in variable.dims for dim in (axes if part == AXES else (part,)))
+        if sizes.keys() >= {*dims}:
+            zeros = np.broadcast_to(np.zeros((), variable.dtype), [sizes[dim] for dim in dims])
+            arrays[variable.name] = (dims, zeros, attributes_of(variable))
+    return arrays
+
+
+def stored_variables(plan: Plan) -> tuple[Variable, ...]:
     """The variables of the result of a plan; always with the status, which explains NaNs."""
     chosen = {"status", *(plan.config.output.variables or BY_DEFAULT)}
     return tuple(
         replace(variable, dtype=plan.config.output.dtype if variable.dtype == "f8" else variable.dtype)
-        for variable in SCHEMA
-        if variable.name in chosen
+        for name, variable in OUTPUTS.items()
+        if name in chosen
     )
 
 
 def dataset_template(plan: Plan) -> xr.Dataset:
-    """The dataset of a plan with placeholder values: read-only zeros that take no memory.
+    """The dataset of a plan with placeholder values.
 
     It has no index: storing it needs none, and building one takes longer than everything else.
     """
-    axes = tuple(axis.name for axis in plan.config.axes)
-    variables = {}
-    for variable in stored_variables(plan):
-        dims, shape = (
-            (axes, plan.shape) if variable.per == "axes" else (("model", *axes), (len(plan.models), *plan.shape))
-        )
-        zeros = np.broadcast_to(np.zeros((), variable.dtype), shape)
-        variables[variable.name] = (dims, zeros, attributes_of(variable))
-    # in one call: xarray merges the whole dataset in each call; the coordinates come first in a file
-    return xr.Dataset(coords=plan_coordinates(plan), attrs=provenance_attributes(plan)).assign(variables)
+    # the coordinates come first in a file
+    dataset = xr.Dataset(coords=plan_coordinates(plan), attrs=provenance_attributes(plan))
+    axes = [axis.name for axis in plan.config.axes]
+    # in one call: xarray merges the whole dataset in each call
+    return dataset.assign(template(stored_variables(plan), dataset.sizes, axes))
 
 
 def plan_coordinates(plan: Plan) -> xr.Coordinates:
@@ -197,18 +262,14 @@ def plan_coordinates(plan: Plan) -> xr.Coordinates:
     return xr.Coordinates(_coordinates_by_name(plan), indexes={})
 
 
-def attributes_of(variable: SchemaVariable) -> dict[str, object]:
-    attributes: dict[str, object] = {
-        "units": variable.unit,
-        "long_name": variable.meaning,
-        "equation": variable.equation,
-    }
-    if variable.name == "status":
-        attributes["flag_values"] = np.array([int(status) for status in Status], np.int8)
-        attributes["flag_meanings"] = " ".join(status.name.lower() for status in Status)
-    if variable.name == "in_domain":
-        attributes["flag_values"] = np.array([0, 1], np.int8)
-        attributes["flag_meanings"] = "outside_claimed_domain within_claimed_domain"
+def attributes_of(variable: Variable) -> dict[str, object]:
+    """The attributes of a stored variable."""
+    attributes: dict[str, object] = {"units": udunits(variable.unit), "long_name": variable.meaning}
+    if variable.equation:
+        attributes["equation"] = variable.equation
+    if variable.flags:
+        attributes["flag_values"] = np.array([*variable.flags.values()], np.int8)
+        attributes["flag_meanings"] = " ".join(variable.flags)
     return attributes
 
 

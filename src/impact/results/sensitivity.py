@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 import xarray as xr
@@ -10,11 +11,12 @@ import xarray as xr
 from ..config.grid import SAMPLE
 from ..config.input_names import InputName
 from ..contact.units import with_numbers
+from ..contact.variables import OUTPUTS
 from ..engine.plan import Plan
 from ..formatting import decimals, number
 from ..text import safe_text
 from .attributes import read_attribute
-from .schema import SCHEMA, plan_coordinates, provenance_attributes
+from .schema import SENSITIVITY, plan_coordinates, provenance_attributes, template
 
 # probabilities of the quantiles
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -23,22 +25,6 @@ LEAST_SAMPLES = 64
 NO_BREAK = "\N{NO-BREAK SPACE}"
 # indices from the first half of the samples
 HALF = ("first_half", "total_half")
-# name: the dimension besides those of the models and axes, and the meaning
-SENSITIVITY_VARIABLES = {
-    "first": ("input", "first-order index: share of the variance that the input explains alone"),
-    "first_lower": ("input", "lower end of the bootstrap interval of 95 % of the first-order index"),
-    "first_upper": ("input", "upper end of the bootstrap interval of 95 % of the first-order index"),
-    "first_half": ("input", "first-order index from the first half of the samples"),
-    "total": ("input", "total index: share of the variance that is left if only the input is unknown"),
-    "total_lower": ("input", "lower end of the bootstrap interval of 95 % of the total index"),
-    "total_upper": ("input", "upper end of the bootstrap interval of 95 % of the total index"),
-    "total_half": ("input", "total index from the first half of the samples"),
-    "mean": ("", "mean of the output"),
-    "sd": ("", "standard deviation of the output"),
-    "quantiles": ("quantile", "quantiles of the output"),
-    "failed": ("", "points without a result; with any there is no mean and no index"),
-}
-SENSITIVITY_COORDINATES = ("input", "quantile")
 
 
 def sensitivity_template(plan: Plan, of: str, others: Sequence[str]) -> xr.Dataset:
@@ -57,22 +43,17 @@ def sensitivity_template(plan: Plan, of: str, others: Sequence[str]) -> xr.Datas
         for name, coordinate in plan_coordinates(plan).variables.items()
         if SAMPLE not in coordinate.dims
     }
-    sizes = {axis.name: axis.size for axis in config.axes} | {"model": len(config.models)}
     paths = [InputName.parse(name).config_key for name in config.distributions]
     new = {
         "input": ("input", paths, {"long_name": "uncertain input, by its path in the config"}),
         "quantile": ("quantile", list(QUANTILES), {"long_name": "probability", "units": "1"}),
     }
-    sizes |= {"input": len(paths), "quantile": len(QUANTILES)}
-    (unit,) = (variable.unit for variable in SCHEMA if variable.name == of)
-    variables = {}
-    for name, (dimension, meaning) in SENSITIVITY_VARIABLES.items():
-        dims = ("model", *others, *filter(None, (dimension,)))
-        of_output = dimension != "input" and name != "failed"
-        about = {"units": unit if of_output else "1", "long_name": meaning}
-        dtype = np.int64 if name == "failed" else float
-        variables[name] = (dims, np.zeros([sizes[dim] for dim in dims], dtype), about)
-    return xr.Dataset(variables, {**coordinates, **new}, provenance_attributes(plan) | {"of": of})
+    variables = [
+        replace(variable, unit=OUTPUTS[of].unit) if variable.unit == "output" else variable
+        for variable in SENSITIVITY.values()
+    ]
+    coords = xr.Coordinates(coordinates | new)
+    return xr.Dataset(template(variables, coords.sizes, others), coords, provenance_attributes(plan) | {"of": of})
 
 
 def distribution_texts(dataset: xr.Dataset) -> list[str]:

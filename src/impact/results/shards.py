@@ -9,29 +9,33 @@ from __future__ import annotations
 import json
 import re
 import shlex
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ..atomic import atomic_write, check_output
+from ..atomic import atomic_write, check_outputs
+from ..config.grid import MAX_POINTS
 from ..config.tables import CORES
+from ..contact.model import ForceModel
 from ..engine.checkpoint import WorkFolder, lock_work_folder, open_work_folder
-from ..engine.execute import never_stop, with_core
-from ..engine.executors import SERIAL, Backend
+from ..engine.execute import with_core
+from ..engine.executors import SERIAL, ExecutorSpec
 from ..engine.plan import Plan
-from ..engine.plugins import Plugins
-from ..engine.progress import ProgressCallback, ProgressCounter, report_kept_blocks
+from ..engine.plugins import read_plugins
+from ..engine.run import ProgressCallback, ProgressCounter, Run, ignore, never, report_kept_ranges
 from ..engine.trajectories import TrajectoryRange, trajectory_maps, trajectory_ranges
 from ..errors import ResultError, StoreError, UnfinishedError, UsageError
 from ..text import safe_text
 from .provenance import stored_config
 from .schema import dataset_template
 from .summary import SweepOutcome
-from .sweep import check_storable, complete_ranges, range_reader, reload_range, store_result
+from .sweep import check_storable, complete_ranges, prepare, range_reader, reload_range, store_result
 from .trajectory_table import table_of
 
-# describes the shard of a work folder, beside the plan
+# describes the shard of a work folder, next to the plan
 SHARD_FILE_NAME = "shard.json"
 MAX_LISTED_SHARDS = 5  # missing shards that a message lists
 RECORDED_ATTRIBUTES = ("config", "config_set", "plugins", "fingerprint")
@@ -48,10 +52,6 @@ class Shard:
     def parse(cls, text: str) -> Shard:
         """Parse a text such as "3/16".
 
-        Raises
-        ------
-        UsageError : it is not a shard
-
         >>> Shard.parse("3/16")
         Shard(number=3, of=16)
         """
@@ -61,11 +61,11 @@ class Shard:
             raise UsageError(f"--shard {safe_text(text)}: expected K/N with K from 1 to N, such as 3/16")
         return shard
 
-    def has(self, part: TrajectoryRange) -> bool:
-        return part.number % self.of == self.number - 1
+    def has(self, trajectory_range: TrajectoryRange) -> bool:
+        return trajectory_range.number % self.of == self.number - 1
 
     def folder(self, output: Path) -> Path:
-        """Its work folder."""
+        """Name its work folder."""
         return output.with_name(f"{output.name}.{self.number}-of-{self.of}.work")
 
     def __str__(self) -> str:
@@ -85,39 +85,65 @@ class ShardProgress:
 
 
 def sweep_shard(
-    output: Path,
-    plan: Plan,
-    shard: Shard,
-    command: Sequence[str],
+    source: str | Path | Mapping[str, object],
+    shard: str,
+    output: str | Path,
     *,
+    overrides: Sequence[str] = (),
+    plugins: Sequence[ForceModel | str | Path] = (),
+    backend: AbstractContextManager[ExecutorSpec] | None = None,
+    max_points: int = MAX_POINTS,
     overwrite: bool = False,
-    backend: Backend = SERIAL,
-    on_progress: ProgressCallback = lambda progress: None,
-    should_stop: Callable[[], bool] = never_stop,
+    on_progress: ProgressCallback = ignore,
+    on_note: Callable[[str], None] = ignore,
+    should_stop: Callable[[], bool] = never,
 ) -> ShardProgress:
-    """Integrate a shard of a plan into its work folder, and resume it if the folder exists.
+    """Integrate one shard of a sweep into its work folder; `merge` joins the folders of all shards.
 
     Parameters
     ----------
-    output : the result that the shards make; the work folder is beside it
-    plan : of the whole sweep
-    shard : the part to integrate
-    command : words of the command that runs the whole sweep, for messages about missing shards
-    overwrite : start again
-    backend, on_progress, should_stop : see `impact.results.sweep.sweep_into`
+    shard : "K/N", the part K of N, such as "3/16"
+    output : file of the whole result; the work folder is next to it
+    overwrite : start the shard again
+    source, overrides, plugins, max_points, backend, on_progress, on_note, should_stop : see `sweep_to_file`
+
+    Returns
+    -------
+    ShardProgress : the work folder, and its finished part
 
     Raises
     ------
-    UsageError, InUseError, StoreError, UnfinishedError : see there
+    ConfigError, UsageError, ModelError, InUseError, StoreError, UnfinishedError : see `sweep_to_file`
+
+    >>> import impact, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     impact.sweep_shard("configs/figure6.toml", "1/1", f"{folder}/results.h5").trajectories
+    303
     """
+    run = Run(backend or SERIAL, not overwrite, overwrite, max_points, on_progress, on_note, should_stop)
+    plan = prepare(source, overrides, plugins, run)
+    chosen = Shard.parse(shard)
+    # the command of the whole sweep: `merge` reports it for a missing shard
+    config = str(source) if isinstance(source, str | Path) else "CONFIG.toml"
+    command = ["impact", "sweep", config, "-o", str(output)]
+    command += [word for change in overrides for word in ("--set", change)]
+    command += [word for path in plugins if isinstance(path, str | Path) for word in ("--plugin", str(path))]
+    with run.connected() as connected:
+        progress = _complete_shard(Path(output), plan, chosen, command, connected)
+    run.check_stop(f"{safe_text(str(progress.folder))} is complete")
+    return progress
+
+
+def _complete_shard(output: Path, plan: Plan, shard: Shard, command: Sequence[str], run: Run) -> ShardProgress:
+    """Integrate what the work folder of a shard does not have yet."""
     check_storable(plan)
     maps = trajectory_maps(plan)
     plan = with_core(plan, maps)
-    blocks = list(trajectory_ranges(maps))
-    shard_blocks = [block for block in blocks if shard.has(block)]
-    counter = ProgressCounter.start(sum(block.size for block in shard_blocks), plan.points, on_progress)
+    all_ranges = list(trajectory_ranges(maps))
+    ranges = [trajectory_range for trajectory_range in all_ranges if shard.has(trajectory_range)]
+    counter = ProgressCounter.start(ranges, plan.points, run)
     folder = shard.folder(output)
-    with open_work_folder(folder, plan, resume=not overwrite, overwrite=overwrite) as work_folder:
+    with open_work_folder(folder, plan, run) as work_folder:
         attributes = dataset_template(plan).attrs
         record = {
             "shard": [shard.number, shard.of],
@@ -127,10 +153,10 @@ def sweep_shard(
         }
         with atomic_write(folder / SHARD_FILE_NAME, overwrite=True) as sink:
             sink.write(json.dumps(record).encode())
-        with report_kept_blocks(folder, counter, "the same command", lambda error: []):
-            complete_ranges(work_folder, plan, maps, shard_blocks, counter, backend, should_stop)
+        with report_kept_ranges(folder, counter, "the same command", lambda error: []):
+            complete_ranges(work_folder, plan, maps, ranges, counter, run)
     progress = counter.progress
-    return ShardProgress(folder, len(shard_blocks), len(blocks), progress.trajectories, progress.failed, shard)
+    return ShardProgress(folder, len(ranges), len(all_ranges), progress.trajectories, progress.failed, shard)
 
 
 @dataclass(frozen=True)
@@ -144,46 +170,54 @@ class _ShardRecord:
 
 
 def merge(
-    folders: Sequence[Path],
-    output: Path,
-    plugins: Plugins,
+    folders: Sequence[str | Path],
+    output: str | Path,
     *,
+    plugins: Sequence[ForceModel | str | Path] = (),
     overwrite: bool = False,
-    on_progress: ProgressCallback = lambda progress: None,
-    should_stop: Callable[[], bool] = never_stop,
-) -> tuple[SweepOutcome, int]:
-    """Merge shards into a result; their work folders are not modified.
+    on_progress: ProgressCallback = ignore,
+    should_stop: Callable[[], bool] = never,
+) -> SweepOutcome:
+    """Join the shards of a sweep into a file, and summarize it; the work folders are kept.
 
     Parameters
     ----------
-    folders : of the shards, in any order
+    folders : the work folders of all shards, in any order
     output : the file
-    plugins : models that are not built in, including those of the sweep
+    plugins : the plug-in models that the shards were integrated with
     overwrite : replace the file if it exists
-    on_progress, should_stop : see `impact.results.sweep.sweep_into`
+    on_progress, should_stop : see `sweep_to_file`
 
     Returns
     -------
-    The result, and the number of blocks that several folders have, with the same bits.
+    SweepOutcome : counts of points by status, largest errors, first failed points
 
     Raises
     ------
-    UsageError : a folder is not a shard, or of another sweep; or shards are missing or unfinished: the message has
-        the command for each of them
-    ResultError : two folders have the same block with different bits
-    InUseError : a shard is still running
-    StoreError, UnfinishedError : nothing was stored; the folders keep all finished trajectories
+    UsageError : a folder is not a shard, or of another sweep; or shards are missing or unfinished
+    ResultError : a range is in two folders, with different bits
+    InUseError, StoreError, UnfinishedError : see `sweep_to_file`
+
+    >>> import impact, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     output = f"{folder}/results.h5"
+    ...     shards = [impact.sweep_shard("configs/figure6.toml", f"{k}/2", output) for k in (1, 2)]
+    ...     impact.merge([shard.folder for shard in shards], output).summary.points
+    303
     """
-    check_output(output, overwrite=overwrite)
-    records = {folder: _read_record(folder) for folder in {path.resolve(): path for path in folders}.values()}
+    check_outputs([output], plugins, overwrite=overwrite)
+    output, run = Path(output), Run(overwrite=overwrite, on_progress=on_progress, should_stop=should_stop)
+    plugin_set = read_plugins(plugins)
+    distinct = {Path(folder).resolve(): Path(folder) for folder in folders}.values()
+    records = {folder: _read_record(folder) for folder in distinct}
     first, first_record = next(iter(records.items()))
-    config = stored_config(first_record.attributes, [], plugins, str(first))
+    config = stored_config(first_record.attributes, [], plugin_set, str(first))
     # the core that the shards were integrated by, which may not be the default of this machine
     config = replace(config, solver=replace(config.solver, core=first_record.core))
-    plan = Plan(config, plugins.of(config.models))
+    plan = Plan(config, plugin_set.of(config.models))
     maps = trajectory_maps(plan)
-    blocks = list(trajectory_ranges(maps))
-    counter = ProgressCounter.start(sum(trajectory_map.count for trajectory_map in maps), plan.points, on_progress)
+    ranges = list(trajectory_ranges(maps))
+    counter = ProgressCounter.start(ranges, plan.points, run)
     for folder, record in records.items():
         if record.attributes["fingerprint"] != first_record.attributes["fingerprint"]:
             # a difference in the trajectories is reported first, by its name
@@ -193,26 +227,25 @@ def merge(
                     "expected the folders of one sweep"
                 )
     # folders are locked one after the other: there may be more of them than the limit of open files
-    where, n_repeated = _locate_ranges([*records], plan, blocks, counter, should_stop)
-    missing = [part for part in blocks if part.number not in where]
+    folder_of, repeated = _locate_ranges([*records], plan, ranges, counter, run)
+    missing = [trajectory_range for trajectory_range in ranges if trajectory_range.number not in folder_of]
     if missing:
         raise UsageError(*_missing_shards(output, missing, records))
-    table = table_of(plan, maps, range_reader(maps, lambda number: reload_range(where[number], blocks[number])))
+    table = table_of(
+        plan, maps, range_reader(maps, lambda number: reload_range(folder_of[number], ranges[number]))
+    )
     try:
-        return store_result(output, plan, table, None, overwrite, counter, should_stop), n_repeated
+        outcome = store_result(output, plan, table, counter, run)
     except (StoreError, UnfinishedError) as error:
         raise type(error)(
             "; ".join(filter(None, [str(error), "the work folders keep all finished trajectories"]))
         ) from error
+    run.check_stop(f"{safe_text(str(output))} is complete")
+    return replace(outcome, repeated_blocks=repeated)
 
 
 def _read_record(folder: Path) -> _ShardRecord:
-    """Read the record of a shard, validated since the folder may come from anywhere.
-
-    Raises
-    ------
-    UsageError : the folder is not a shard
-    """
+    """Read the record of a shard; it is validated, since the folder may come from anywhere."""
     try:
         if not (folder / SHARD_FILE_NAME).is_file():
             raise ValueError
@@ -237,61 +270,51 @@ def _read_record(folder: Path) -> _ShardRecord:
 
 
 def _locate_ranges(
-    folders: Sequence[Path],
-    plan: Plan,
-    blocks: Sequence[TrajectoryRange],
-    counter: ProgressCounter,
-    should_stop: Callable[[], bool],
+    folders: Sequence[Path], plan: Plan, ranges: Sequence[TrajectoryRange], counter: ProgressCounter, run: Run
 ) -> tuple[dict[int, WorkFolder], int]:
-    """The work folder of each range, and the number of ranges that are in several folders."""
-    where: dict[int, WorkFolder] = {}
+    """Find the work folder of each range, and count the ranges that are in several folders."""
+    folder_of: dict[int, WorkFolder] = {}
     repeated: set[int] = set()
     for folder in folders:
         with lock_work_folder(folder, plan) as work_folder:
-            for part in blocks:
-                if should_stop():
-                    raise UnfinishedError("nothing was written")
-                trajectories = work_folder.load(part)
-                if trajectories is None:
+            for trajectory_range in ranges:
+                run.check_stop("nothing was written")
+                collisions, number = work_folder.load(trajectory_range), trajectory_range.number
+                if collisions is None:
                     continue
-                if part.number not in where:
-                    where[part.number] = work_folder
-                    counter.count(part, trajectories)
+                if number not in folder_of:
+                    folder_of[number] = work_folder
+                    counter.count(trajectory_range, collisions)
                     counter.report()
                     continue
-                repeated.add(part.number)
-                other = reload_range(where[part.number], part)
-                if any(
-                    values.tobytes() != vars(other)[name].tobytes() for name, values in vars(trajectories).items()
-                ):
+                repeated.add(number)
+                other = vars(reload_range(folder_of[number], trajectory_range))
+                if any(values.tobytes() != other[name].tobytes() for name, values in vars(collisions).items()):
                     raise ResultError(
-                        f"{safe_text(str(work_folder.path(part.number)))}: differs from "
-                        f"{safe_text(str(where[part.number].path(part.number)))}; expected both to "
-                        "be computed on the same type of processor"
+                        f"{safe_text(str(work_folder.path(number)))}: differs from "
+                        f"{safe_text(str(folder_of[number].path(number)))}; expected both to be computed on the "
+                        "same type of processor"
                     )
-    return where, len(repeated)
+    return folder_of, len(repeated)
 
 
 def _missing_shards(
     output: Path, missing: Sequence[TrajectoryRange], records: Mapping[Path, _ShardRecord]
 ) -> list[str]:
-    """A line for each shard that is missing or unfinished, with the command that completes it."""
+    """List the shards that are missing or unfinished, each with the command that completes it."""
     first_record = next(iter(records.values()))
     folders = {record.shard: folder for folder, record in records.items()}
-    blocks: dict[Shard, int] = {}
-    for part in missing:
-        shard = Shard(part.number % first_record.shard.of + 1, first_record.shard.of)
-        blocks[shard] = blocks.get(shard, 0) + 1
+    n_shards = first_record.shard.of
+    counts = Counter(trajectory_range.number % n_shards + 1 for trajectory_range in missing)
     lines = []
-    for shard in sorted(blocks, key=lambda shard: shard.number)[:MAX_LISTED_SHARDS]:
+    for number in sorted(counts)[:MAX_LISTED_SHARDS]:
+        shard = Shard(number, n_shards)
         again = safe_text(shlex.join([*first_record.command, "--shard", str(shard)]), 500)
-        lacks = f"lacks {blocks[shard]:,} block{'' if blocks[shard] == 1 else 's'}"
+        lacks = f"lacks {counts[number]:,} block{'' if counts[number] == 1 else 's'}"
         if shard in folders:
             lines.append(f"{safe_text(str(folders[shard]))}: shard {shard} {lacks}; {again} finishes it")
         else:
             lines.append(f"{safe_text(str(output))}: shard {shard} is missing; {again} computes it")
-    return (
-        [*lines, f"and {len(blocks) - MAX_LISTED_SHARDS:,} more shards"]
-        if len(blocks) > MAX_LISTED_SHARDS
-        else lines
-    )
+    if len(counts) > MAX_LISTED_SHARDS:
+        lines.append(f"and {len(counts) - MAX_LISTED_SHARDS:,} more shards")
+    return lines

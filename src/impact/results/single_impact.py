@@ -31,6 +31,7 @@ from ..contact.outputs import collide
 from ..contact.status import Status
 from ..contact.timestep import EXACT
 from ..contact.units import with_numbers
+from ..contact.variables import HISTORY, OUTPUTS
 from ..engine.build_impacts import build_impacts, fixed_steps_at
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins
@@ -39,7 +40,7 @@ from ..formatting import number, quantity
 from ..text import html_table, safe_text
 from .kinds import require_sweep
 from .provenance import changed_plugins, stored_draft, unknown_plugins
-from .schema import HISTORY_VARIABLES, SCHEMA, SCHEMA_VERSION, is_case, plain_unit
+from .schema import SCHEMA_VERSION, attributes_of, is_case, plain_unit
 from .seal import is_result
 from .xarray_backend import open_result
 
@@ -126,10 +127,9 @@ class Impact:
             if self.derived[name] == self.derived[name] and name not in self.point:
                 rows[name] = f"{quantity(self.derived[name], self._with_numbers(plain_unit(unit)), 10)}  {meaning}"
         rows["status"] = f"{self.status.name.lower()}: {self.status.meaning}"
-        for variable in SCHEMA:
-            if variable.dtype == "f8" and variable.name not in ("e_kinetic", "e_energetic"):
-                unit = self._with_numbers(plain_unit(variable.unit))
-                rows[variable.name] = quantity(self.values[variable.name], unit, 10)
+        for name, variable in OUTPUTS.items():
+            if variable.dtype == "f8" and name not in ("e_kinetic", "e_energetic"):
+                rows[name] = quantity(self.values[name], self._with_numbers(variable.unit), 10)
         rows["e_kinematic"] = quantity(self.e_kinematic, "1", 12) + "  (1), from the velocities"
         rows["e_kinetic"] = quantity(self.e_kinetic, "1", 12) + "  (2), tau_r/tau_c"
         rows["e_energetic"] = quantity(self.e_energetic, "1", 12) + "  (3), the root of -W_r/W_c"
@@ -247,10 +247,7 @@ def history_dataset(history: History, model: str, point: Mapping[str, float | st
     point : the inputs of the impact by their config names, stored in the attribute `inputs`
     """
     dataset = xr.Dataset(
-        {
-            name: ("t", getattr(history, name), {"units": unit, "long_name": meaning})
-            for name, unit, meaning in HISTORY_VARIABLES
-        },
+        {name: ("t", getattr(history, name), attributes_of(variable)) for name, variable in HISTORY.items()},
         coords={"t": ("t", history.t, {"units": "s", "long_name": "time since first contact"}), "model": model},
     )
     dataset.attrs = {

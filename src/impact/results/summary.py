@@ -15,7 +15,7 @@ from ..contact.status import FIRST_FAILURE, Status
 from .attributes import SummaryRecord
 from .schema import parts_of_models
 from .slabs import MAX_SUMMARY_POINTS, distinct_points, is_computed, slabs
-from .trajectory_table import TrajectoryTable, expand, summary_of_variable
+from .trajectory_table import TrajectoryTable, computed_array, expand
 
 # variables of which the largest absolute value is reported
 ERROR_VARIABLES = ("e_error", "v1_error", "v2_error", "closed_form_error", "energy_residual")
@@ -172,7 +172,7 @@ def extremes_of(dataset: xr.Dataset, name: str) -> Extremes | None:
 
     None for a computed variable that varies over more than `MAX_SUMMARY_POINTS` points of all models together.
     """
-    record = summary_of_variable(dataset.variables[name])
+    record = _stored_record(dataset.variables[name])
     if record is not None and name in record.extremes:
         stored = record.extremes[name]
         return stored and Extremes(_from_json(stored[0]), _from_json(stored[1]), stored[2])
@@ -257,9 +257,15 @@ def summary_record(
     )
 
 
+def _stored_record(variable: xr.Variable) -> SummaryRecord | None:
+    """Find the summary in the file of a variable."""
+    array = computed_array(variable)
+    return None if array is None else array.table.summary
+
+
 def _common_record(dataset: xr.Dataset, names: Sequence[str]) -> SummaryRecord | None:
     """The summary in the file of some variables, if it has one and none of them is a selection."""
-    records = [summary_of_variable(dataset.variables[name]) for name in names]
+    records = [_stored_record(dataset.variables[name]) for name in names]
     return records[0] if records and all(record is records[0] for record in records) else None
 
 

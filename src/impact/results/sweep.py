@@ -1,11 +1,13 @@
-"""Run a sweep into a file: finished trajectories are kept, and the file appears when it is complete."""
+"""Run a sweep: in memory, or into a file that appears when it is complete; finished trajectories are kept."""
 
 from __future__ import annotations
 
 import errno
 import os
 import shutil
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -14,32 +16,39 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ..atomic import atomic_write, check_output
+from ..atomic import atomic_write, check_output, check_outputs
+from ..config.grid import MAX_POINTS
 from ..config.input_names import InputName
+from ..config.load import read_config
 from ..contact.impacts import Impacts
+from ..contact.model import ForceModel
 from ..contact.simulate import TABLE_COLUMNS, CollisionResult
-from ..engine.checkpoint import WorkFolder, open_work_folder, partial_file_of, remove_work_folder, work_folder_of
-from ..engine.execute import FindReused, integrate_ranges, never_stop, with_core
-from ..engine.executors import SERIAL, Backend
+from ..contact.variables import Variable
+from ..engine import checkpoint
+from ..engine.execute import FindReused, integrate_ranges, reuse_nothing, with_core
+from ..engine.executors import SERIAL, ExecutorSpec, choose_executor
 from ..engine.plan import Plan
-from ..engine.progress import ProgressCallback, ProgressCounter, report_kept_blocks
+from ..engine.plugins import read_plugins
+from ..engine.run import DEFAULT_RUN, ProgressCallback, ProgressCounter, Run, ignore, never, report_kept_ranges
 from ..engine.trajectories import (
     RANGE_TRAJECTORIES,
     TrajectoryMap,
     TrajectoryRange,
+    check_count,
     even_size,
     trajectory_maps,
     trajectory_ranges,
 )
 from ..errors import ResultError, StoreError, UnfinishedError, UsageError
 from ..text import safe_text
-from .factored import check_factored, factored_template, table_values
+from .factored import factored_template, stored_stiffness, table_values
 from .netcdf import MAX_LABEL_BYTES, encode_text, is_text
-from .schema import SchemaVariable, dataset_template, plan_coordinates, stored_variables
+from .plausibility import material_notes
+from .schema import dataset_template, plan_coordinates, stored_variables
 from .summary import Summary, SweepOutcome, summarize, summarize_table, summary_record
 from .trajectory_table import TrajectoryTable, expanded_slabs, in_memory, lazy_dataset, table_of
 from .validation import is_name
-from .xarray_backend import MAX_LOADED_BYTES, check_readable, open_result, write_sealed
+from .xarray_backend import MAX_LOADED_BYTES, check_readable, load, open_result, write_sealed
 
 # approximate bytes of a result besides its values
 OVERHEAD_BYTES = 2**16
@@ -51,7 +60,7 @@ SlabValues = dict[str, NDArray[Any]]
 
 @dataclass(frozen=True)
 class Extension:
-    """What a sweep takes over from an old result, see `impact.results.extend`.
+    """What a sweep takes over from an old result, see `impact.results.extend`; by default nothing.
 
     Parameters
     ----------
@@ -60,137 +69,191 @@ class Extension:
     find_reused : returns the trajectories of a range that are not integrated again
     fill : copies old values into a slab: `fill(model, region, values)`; None if all values are computed from
         trajectories
+    replaces : whether the new result replaces the old one
     """
 
-    seal: str
-    note: str
-    find_reused: FindReused
+    seal: str = ""
+    note: str = ""
+    find_reused: FindReused = reuse_nothing
     fill: Callable[[int, tuple[slice, ...], SlabValues], None] | None = None
+    replaces: bool = False
 
 
-def sweep_into(
-    output: Path,
-    plan: Plan,
+NO_EXTENSION = Extension()
+
+
+def sweep(
+    source: str | Path | Mapping[str, object],
     *,
+    output: str | Path | None = None,
+    overrides: Sequence[str] = (),
+    plugins: Sequence[ForceModel | str | Path] = (),
+    jobs: int = 1,
+    threads: int = 1,
+    executor: Executor | None = None,
+    max_points: int = MAX_POINTS,
     resume: bool = False,
     overwrite: bool = False,
-    in_place: bool = False,
-    backend: Backend = SERIAL,
-    on_progress: ProgressCallback = lambda progress: None,
-    should_stop: Callable[[], bool] = never_stop,
-    extension: Extension | None = None,
-) -> SweepOutcome:
-    """Run a plan, and store its result.
+    progress: bool = False,
+) -> xr.Dataset:
+    """Run a sweep; the result is in memory, or in a file and of any size.
 
     Parameters
     ----------
-    output : the file
-    plan : what to run
-    resume : continue with the work folder that an interrupted sweep left
-    overwrite : replace the file if it exists, and a work folder if it is not to be resumed
-    in_place : replace the file, but not a work folder
-    backend : processes, threads or workers that integrate
-    on_progress : called with the progress from time to time
-    should_stop : the sweep stops if it returns True; ranges that are running are finished and kept
-    extension : values and trajectories of an old result
+    source : path of a TOML file, or a mapping of the same shape
+    output : file to write; by default the result stays in memory
+    overrides : changes to the config, such as `"sweep.e=0.5"`
+    plugins : plug-in models, which the config may name, and paths of Python files with such models, which are
+        executed
+    jobs : number of processes that integrate; with more than one a script needs the usual
+        `if __name__ == "__main__":`
+    threads : number of threads that integrate, instead of processes; they run in parallel if the core is compiled
+    executor : an executor of the interface of `concurrent.futures` that integrates instead, such as dask's
+        `client.get_executor(pure=False)` or that of mpi4py; it is not shut down
+    max_points : the largest number of points, of all models together
+    resume : continue an interrupted sweep into `output`
+    overwrite : replace `output` if it exists
+    progress : show a bar if it takes more than a second, in a terminal or, with ipywidgets, in a notebook; else
+        print a line every ten seconds
+
+    Returns
+    -------
+    xarray.Dataset : see docs/schema.md; of a large file the values are read when they are indexed
 
     Raises
     ------
-    UsageError : the output or the work folder exists and must not be replaced
-    InUseError : another process writes the output
-    StoreError : the disk is full or failed, or processes were killed; finished ranges are kept
-    UnfinishedError : the sweep was stopped; finished ranges are kept
-    """
-    check_output(output, overwrite=overwrite or in_place)
-    check_storable(plan)
-    maps = trajectory_maps(plan)
-    plan = with_core(plan, maps)
-    ranges = list(trajectory_ranges(maps))
-    total = sum(trajectory_map.count for trajectory_map in maps)
-    counter = ProgressCounter.start(total, plan.points, on_progress)
-    find_reused = extension.find_reused if extension else lambda part: None
-    few = plan.stored_points <= NO_CHECKPOINT_POINTS or plan.layout == "factored"
-    if total <= RANGE_TRAJECTORIES and few and not os.path.lexists(work_folder_of(output)):
-        finished = {}
-        for part, rebound in integrate_ranges(plan, maps, ranges, find_reused=find_reused):
-            finished[part.number] = rebound
-            counter.count(part, rebound)
-        table = table_of(plan, maps, range_reader(maps, finished.__getitem__))
-        try:
-            return store_result(output, plan, table, None, overwrite or in_place, counter, should_stop, extension)
-        except UnfinishedError:
-            raise UnfinishedError("nothing was written") from None
+    ConfigError : with all problems of the config
+    UsageError, ModelError : a plug-in cannot be read or is invalid; more than one of jobs, threads and executor;
+        `output` exists
+    StoreError : the disk is full or failed; or processes were killed repeatedly
 
-    folder = work_folder_of(output)
-    with open_work_folder(
-        folder, plan, resume=resume, overwrite=overwrite, extends=extension.seal if extension else ""
-    ) as work_folder:
-        # another process may have stored it in the meantime
-        check_output(output, overwrite=overwrite or in_place)
-        # without --overwrite, an existing result would be refused
-        again = "--resume --overwrite" if os.path.lexists(output) and not extension else "--resume"
-        with report_kept_blocks(
-            folder, counter, again, lambda error: _missing_space(error, output, plan, counter)
-        ):
-            complete_ranges(work_folder, plan, maps, ranges, counter, backend, should_stop, find_reused)
-            table = table_of(
-                plan, maps, range_reader(maps, lambda number: reload_range(work_folder, ranges[number]))
-            )
-            outcome = store_result(
-                output,
-                plan,
-                table,
-                partial_file_of(output),
-                overwrite or in_place,
-                counter,
-                should_stop,
-                extension,
-            )
-        remove_work_folder(folder)
+    >>> import impact
+    >>> result = impact.sweep({
+    ...     "models": ["lankarani-nikravesh-1990"],
+    ...     "sweep": {"e": [0.1, 0.9], "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6e9},
+    ... })
+    >>> result["e_out"].values.round(6).tolist()
+    [[0.665265, 0.913177]]
+    """
+    if output is None and (resume or overwrite):
+        raise UsageError("resume and overwrite: got no output, expected one as well")
+    backend = choose_executor(jobs, threads, executor)
+    with _progress(shown=progress) as on_progress:
+        if output is None:
+            run = Run(backend, max_points=max_points, on_progress=on_progress)
+            return sweep_in_memory(prepare(source, overrides, plugins, run), run)
+        sweep_to_file(
+            source,
+            output,
+            overrides=overrides,
+            plugins=plugins,
+            backend=backend,
+            max_points=max_points,
+            resume=resume,
+            overwrite=overwrite,
+            on_progress=on_progress,
+        )
+    return load(output)
+
+
+def _progress(*, shown: bool) -> AbstractContextManager[ProgressCallback]:
+    """Show a bar, or nothing; rich is imported for a bar only."""
+    if not shown:
+        return nullcontext(ignore)
+    from ..progress_display import progress_bar
+
+    return progress_bar()
+
+
+def sweep_to_file(
+    source: str | Path | Mapping[str, object],
+    output: str | Path,
+    *,
+    overrides: Sequence[str] = (),
+    plugins: Sequence[ForceModel | str | Path] = (),
+    backend: AbstractContextManager[ExecutorSpec] | None = None,
+    max_points: int = MAX_POINTS,
+    resume: bool = False,
+    overwrite: bool = False,
+    on_progress: ProgressCallback = ignore,
+    on_note: Callable[[str], None] = ignore,
+    should_stop: Callable[[], bool] = never,
+) -> SweepOutcome:
+    """Run a sweep into a file and summarize it, without reading the file again.
+
+    A file that already contains this sweep is not modified.
+
+    Parameters
+    ----------
+    source, overrides, plugins, max_points : see `sweep`
+    output : the file
+    backend : what integrates, entered when it is needed; by default this process
+    resume : continue with the work folder of an interrupted sweep
+    overwrite : replace the file if it exists
+    on_progress : called from time to time with the progress
+    on_note : called with a sentence about each implausible value
+    should_stop : returns whether to stop; finished ranges stay in the work folder
+
+    Returns
+    -------
+    SweepOutcome : counts of points by status, largest errors, first failed points
+
+    Raises
+    ------
+    ConfigError : with all problems of the config
+    UsageError, ModelError : see `sweep`
+    InUseError : another process writes the file
+    StoreError : the disk is full or failed, or processes were killed; finished ranges stay in the work folder
+    UnfinishedError : `should_stop` stopped it
+
+    >>> import impact, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     outcome = impact.sweep_to_file("configs/figure6.toml", f"{folder}/results.h5")
+    >>> outcome.summary.points, outcome.trajectories, outcome.is_new
+    (303, 303, True)
+    """
+    run = Run(backend or SERIAL, resume, overwrite, max_points, on_progress, on_note, should_stop)
+    plan = prepare(source, overrides, plugins, run)
+    output = Path(output)
+    shown = safe_text(str(output))
+    outcome = None if overwrite else find_finished(output, plan)
+    if outcome is not None:
+        checkpoint.remove_stale_work_folder(output, plan)
+        run.check_stop(f"{shown} already contains this sweep")
+        return outcome
+    check_outputs([output], [source, *plugins, *plan.config.files], overwrite=overwrite)
+    with run.connected() as connected:
+        outcome = sweep_into(output, plan, connected)
+    run.check_stop(f"{shown} is complete")
     return outcome
 
 
-def complete_ranges(
-    work_folder: WorkFolder,
-    plan: Plan,
-    maps: Sequence[TrajectoryMap],
-    ranges: Sequence[TrajectoryRange],
-    counter: ProgressCounter,
-    backend: Backend,
-    should_stop: Callable[[], bool],
-    find_reused: FindReused = lambda part: None,
-) -> None:
-    """Integrate the ranges that a work folder does not have yet.
+def prepare(
+    source: str | Path | Mapping[str, object],
+    overrides: Sequence[str] = (),
+    plugins: Sequence[ForceModel | str | Path] = (),
+    run: Run = DEFAULT_RUN,
+) -> Plan:
+    """Read a config and its plug-ins, and report values that are implausible.
 
     Raises
     ------
-    StoreError, UsageError : see `sweep_into`
-    UnfinishedError : the sweep was stopped
+    ConfigError : with all problems of the config
+    UsageError : more than `run.max_points` trajectories would be integrated
     """
-    todo: list[TrajectoryRange] = []
-    for part in ranges:
-        before = None if should_stop() else work_folder.load(part)
-        if before is None:
-            todo.append(part)
-        else:
-            counter.count(part, before)
-    counter.report()
-    for part, rebound in integrate_ranges(
-        plan, maps, todo, backend=backend, should_stop=should_stop, find_reused=find_reused
-    ):
-        work_folder.store(part, rebound)
-        counter.count(part, rebound)
-        counter.report()
-    if not counter.is_full:
-        raise UnfinishedError
+    source = Path(source) if isinstance(source, str) else source
+    plugin_set = read_plugins(plugins)
+    config = read_config(source, overrides, plugin_set.models, run.max_points)
+    plan = Plan(config, plugin_set.of(config.models))
+    check_count(plan, run.max_points, str(source) if isinstance(source, Path) else "config")
+    columns = {name: values for axis in config.axes for name, values in axis.columns.items()}
+    for note in material_notes(plan.material_record, columns):
+        run.on_note(note)
+    return plan
 
 
-def sweep_in_memory(
-    plan: Plan, *, backend: Backend = SERIAL, on_progress: ProgressCallback, should_stop: Callable[[], bool]
-) -> xr.Dataset:
+def sweep_in_memory(plan: Plan, run: Run = DEFAULT_RUN) -> xr.Dataset:
     """Run a plan; a small result is in memory, a large one is computed when it is indexed.
-
-    For the parameters see `sweep_into`.
 
     Raises
     ------
@@ -199,25 +262,100 @@ def sweep_in_memory(
     check_labels(plan)
     maps = trajectory_maps(plan)
     plan = with_core(plan, maps)
-    counter = ProgressCounter.start(sum(trajectory_map.count for trajectory_map in maps), plan.points, on_progress)
+    ranges = list(trajectory_ranges(maps))
+    counter = ProgressCounter.start(ranges, plan.points, run)
     finished: dict[int, CollisionResult] = {}
-    for part, rebound in integrate_ranges(
-        plan, maps, trajectory_ranges(maps), backend=backend, should_stop=should_stop
-    ):
-        finished[part.number] = rebound
-        counter.count(part, rebound)
+    for trajectory_range, collisions in integrate_ranges(plan, maps, ranges, run):
+        finished[trajectory_range.number] = collisions
+        counter.count(trajectory_range, collisions)
         counter.report()
-    if not counter.is_full or should_stop():
+    if not counter.is_full or run.should_stop():
         raise UnfinishedError("nothing was written")
     table, variables = table_of(plan, maps, range_reader(maps, finished.__getitem__)), stored_variables(plan)
     dataset = lazy_dataset(dataset_template(plan), table, variables)
-    return in_memory(dataset, table, variables) if dataset.nbytes <= MAX_LOADED_BYTES else dataset
+    return in_memory(dataset) if dataset.nbytes <= MAX_LOADED_BYTES else dataset
+
+
+def sweep_into(
+    output: Path, plan: Plan, run: Run = DEFAULT_RUN, extension: Extension = NO_EXTENSION
+) -> SweepOutcome:
+    """Run a plan, and store its result; raises what `sweep_to_file` does."""
+    may_replace = run.overwrite or extension.replaces
+    check_output(output, overwrite=may_replace)
+    check_storable(plan)
+    maps = trajectory_maps(plan)
+    plan = with_core(plan, maps)
+    ranges = list(trajectory_ranges(maps))
+    counter = ProgressCounter.start(ranges, plan.points, run)
+    few = plan.stored_points <= NO_CHECKPOINT_POINTS or plan.layout == "factored"
+    folder = checkpoint.work_folder_of(output)
+    if counter.progress.of_trajectories <= RANGE_TRAJECTORIES and few and not os.path.lexists(folder):
+        finished = {}
+        for trajectory_range, collisions in integrate_ranges(
+            plan, maps, ranges, DEFAULT_RUN, extension.find_reused
+        ):
+            finished[trajectory_range.number] = collisions
+            counter.count(trajectory_range, collisions)
+        table = table_of(plan, maps, range_reader(maps, finished.__getitem__))
+        try:
+            return store_result(output, plan, table, counter, run, extension)
+        except UnfinishedError:
+            raise UnfinishedError("nothing was written") from None
+
+    with checkpoint.open_work_folder(folder, plan, run, extension.seal) as work_folder:
+        # another process may have stored it in the meantime
+        check_output(output, overwrite=may_replace)
+        # without --overwrite, an existing result would be refused
+        again = "--resume --overwrite" if os.path.lexists(output) and not extension.seal else "--resume"
+        with report_kept_ranges(
+            folder, counter, again, lambda error: _missing_space(error, output, plan, counter)
+        ):
+            complete_ranges(work_folder, plan, maps, ranges, counter, run, extension.find_reused)
+            table = table_of(
+                plan, maps, range_reader(maps, lambda number: reload_range(work_folder, ranges[number]))
+            )
+            outcome = store_result(
+                output, plan, table, counter, run, extension, checkpoint.partial_file_of(output)
+            )
+        checkpoint.remove_work_folder(folder)
+    return outcome
+
+
+def complete_ranges(
+    work_folder: checkpoint.WorkFolder,
+    plan: Plan,
+    maps: Sequence[TrajectoryMap],
+    ranges: Sequence[TrajectoryRange],
+    counter: ProgressCounter,
+    run: Run,
+    find_reused: FindReused = reuse_nothing,
+) -> None:
+    """Integrate the ranges that a work folder does not have yet.
+
+    Raises
+    ------
+    StoreError, UsageError, UnfinishedError : see `sweep_to_file`
+    """
+    todo: list[TrajectoryRange] = []
+    for trajectory_range in ranges:
+        stored = None if run.should_stop() else work_folder.load(trajectory_range)
+        if stored is None:
+            todo.append(trajectory_range)
+        else:
+            counter.count(trajectory_range, stored)
+    counter.report()
+    for trajectory_range, collisions in integrate_ranges(plan, maps, todo, run, find_reused):
+        work_folder.store(trajectory_range, collisions)
+        counter.count(trajectory_range, collisions)
+        counter.report()
+    if not counter.is_full:
+        raise UnfinishedError
 
 
 def range_reader(
     maps: Sequence[TrajectoryMap], load: Callable[[int], CollisionResult]
 ) -> Callable[[int, int, int], CollisionResult]:
-    """The `read` function of `TrajectoryRows` for finished ranges; `load` returns a range by its number."""
+    """Build the `read` function of `TrajectoryRows`; `load` returns a finished range by its number."""
     first_range = np.cumsum([0, *(-(-trajectory_map.count // RANGE_TRAJECTORIES) for trajectory_map in maps)])
 
     def read(model: int, start: int, stop: int) -> CollisionResult:
@@ -226,38 +364,24 @@ def range_reader(
     return read
 
 
-def reload_range(work_folder: WorkFolder, part: TrajectoryRange) -> CollisionResult:
-    """Load a finished range.
-
-    Raises
-    ------
-    StoreError : it is damaged
-    """
-    rebound = work_folder.load(part)
-    if rebound is None:
-        raise StoreError(f"{safe_text(str(work_folder.path(part.number)))}: can no longer be read")
-    return rebound
+def reload_range(work_folder: checkpoint.WorkFolder, trajectory_range: TrajectoryRange) -> CollisionResult:
+    """Load a finished range, or raise a `StoreError` if it is damaged."""
+    collisions = work_folder.load(trajectory_range)
+    if collisions is None:
+        raise StoreError(f"{safe_text(str(work_folder.path(trajectory_range.number)))}: can no longer be read")
+    return collisions
 
 
 def check_storable(plan: Plan) -> None:
-    """Refuse a plan whose result could not be stored, before integration.
-
-    Raises
-    ------
-    UsageError : its labels are too long, or a law cannot be factored
-    """
+    """Refuse a plan whose labels are too long or whose laws cannot be factored, before integration."""
     check_labels(plan)
     if plan.layout == "factored":
-        check_factored(plan.inputs, plan.models)
+        for law in plan.models:
+            stored_stiffness(plan.inputs, law)
 
 
 def check_labels(plan: Plan) -> None:
-    """Refuse a plan whose labels could not be read again, before integration.
-
-    Raises
-    ------
-    UsageError : they are too long, or a material with an axis has a name that a file cannot hold
-    """
+    """Refuse labels that are too long, and axes of materials with names that a file cannot hold."""
     columns = [name for axis in plan.config.axes for name in axis.columns]
     odd = [name for name in columns if InputName.parse(name).material and not is_name(name)]
     if odd:
@@ -273,7 +397,7 @@ def check_labels(plan: Plan) -> None:
 
 
 def find_finished(path: Path, plan: Plan) -> SweepOutcome | None:
-    """The result in a file, if it is the whole result of a plan; else None."""
+    """Open and summarize a file that has the whole result of a plan; None for any other file."""
     # a model without a hash cannot be compared; pathlib would raise an error for a name that is too long
     if None in plan.plugins.hashes.values() or os.path.islink(path) or not os.path.isfile(path):
         return None
@@ -289,11 +413,11 @@ def find_finished(path: Path, plan: Plan) -> SweepOutcome | None:
         dataset.close()
         return None
     trajectories = sum(trajectory_map.count for trajectory_map in trajectory_maps(plan))
-    return SweepOutcome(dataset, summarize(dataset), trajectories)
+    return SweepOutcome(dataset, summarize(dataset), trajectories, is_new=False)
 
 
 def _missing_space(error: Exception, output: Path, plan: Plan, counter: ProgressCounter) -> list[str]:
-    """A sentence with the missing disk space, if the disk is full."""
+    """State the missing disk space, if the disk is full."""
     cause = error.__cause__
     if not isinstance(cause, OSError) or cause.errno not in (errno.ENOSPC, errno.EDQUOT):
         return []
@@ -308,38 +432,36 @@ def store_result(
     output: Path,
     plan: Plan,
     table: TrajectoryTable,
-    part: Path | None,
-    overwrite: bool,
     counter: ProgressCounter,
-    should_stop: Callable[[], bool],
-    extension: Extension | None = None,
+    run: Run,
+    extension: Extension = NO_EXTENSION,
+    part: Path | None = None,
 ) -> SweepOutcome:
-    """Write the result of a trajectory table in the layout of its plan."""
-    at, variables, summary = counter.progress, stored_variables(plan), Summary()
+    """Write the result of a trajectory table in the layout of its plan; `part` is the temporary name."""
+    progress, variables, summary = counter.progress, stored_variables(plan), Summary()
     whole = dataset_template(plan)
-    if extension:
+    if extension.note:
         whole = whole.assign_attrs(extended=extension.note)
 
     def check(points: int) -> None:
-        counter.on_progress(replace(at, points=points, failed=max(summary.failed, at.failed)))
-        if should_stop():
-            raise UnfinishedError
+        run.on_progress(replace(progress, points=points, failed=max(summary.failed, progress.failed)))
+        run.check_stop()
 
     def full() -> Iterator[tuple[str, tuple[int | slice, ...], NDArray[Any]]]:
         chunks = plan.config.output.chunks
         lengths = [chunks.get(axis.name, axis.size) for axis in plan.config.axes] if chunks else []
-        for model, where, impacts, values in expanded_slabs(table, variables, lengths):
-            if extension and extension.fill:
-                extension.fill(model, where, values)
+        for model, region, impacts, values in expanded_slabs(table, variables, lengths):
+            if extension.fill:
+                extension.fill(model, region, values)
             for name, array in values.items():
-                yield name, (model, *where) if "model" in whole[name].dims else where, array
+                yield name, (model, *region) if "model" in whole[name].dims else region, array
             axes = plan.inputs.axes_of_model(table.laws[model].key)
-            _add_slab(summary, axes, model, where, impacts, values)
+            _add_slab(summary, axes, model, region, impacts, values)
             check(summary.points)
 
-    def factored() -> Iterator[tuple[str, tuple[slice], NDArray[Any]]]:
-        for name, where, array in table_values(table, variables):
-            yield name, (where,), array
+    def factored() -> Iterator[tuple[str, tuple[int | slice, ...], NDArray[Any]]]:
+        for stored in table_values(table, variables):
+            yield stored
             check(0)
 
     is_full = plan.layout == "full"
@@ -353,19 +475,19 @@ def store_result(
             summary, extremes = summarize_table(whole, table)
             record = summary_record(summary, extremes, whole)
             template = template.assign_attrs(summary=record.model_dump_json())
-    with atomic_write(output, overwrite=overwrite, part=part) as sink:
+    with atomic_write(output, overwrite=run.overwrite or extension.replaces, part=part) as sink:
         seal = write_sealed(sink, template, full() if is_full else factored(), plan.config.output)
         check_readable(sink, output)
     whole.encoding = {"source": str(output), "seal": seal, "layout": plan.layout}
-    return SweepOutcome(whole, summary, at.of_trajectories)
+    return SweepOutcome(whole, summary, progress.of_trajectories)
 
 
-def _summarize_points(table: TrajectoryTable, variables: Sequence[SchemaVariable]) -> Summary:
+def _summarize_points(table: TrajectoryTable, variables: Sequence[Variable]) -> Summary:
     """Summarize a trajectory table point by point; unlike `summarize` this has the radii."""
     summary = Summary()
-    for model, where, impacts, values in expanded_slabs(table, variables):
+    for model, region, impacts, values in expanded_slabs(table, variables):
         axes = table.inputs.axes_of_model(table.laws[model].key)
-        _add_slab(summary, axes, model, where, impacts, values)
+        _add_slab(summary, axes, model, region, impacts, values)
     return summary
 
 
@@ -373,14 +495,14 @@ def _add_slab(
     summary: Summary,
     axes: Collection[int],
     model: int,
-    where: tuple[slice, ...],
+    region: tuple[slice, ...],
     impacts: Impacts,
     values: SlabValues,
 ) -> None:
     """Add the points of a slab; points that differ only by parameters of other models count once."""
-    if any(part.start > 0 for axis, part in enumerate(where) if axis not in axes):
+    if any(part.start > 0 for axis, part in enumerate(region) if axis not in axes):
         return
-    first = tuple(slice(None) if axis in axes else slice(1) for axis in range(len(where)))
+    first = tuple(slice(None) if axis in axes else slice(1) for axis in range(len(region)))
     counted = {name: array[first or ...] for name, array in values.items()}
     radius = np.fmin(impacts.R1, impacts.R2)
-    summary.add(counted, model, [part.start for part in where], radius)
+    summary.add(counted, model, [part.start for part in region], radius)

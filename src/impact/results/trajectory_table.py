@@ -28,11 +28,12 @@ from ..contact.model import Law
 from ..contact.outputs import Outputs, outputs
 from ..contact.simulate import CollisionResult
 from ..contact.status import Status
+from ..contact.variables import Variable
 from ..engine.build_impacts import Stiffness, build_impacts, has_stiffness_rule
 from ..engine.plan import Index, Inputs, Plan, dimensions
 from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryMap, axes_of_arrays, even_size, probe_index
 from .attributes import SummaryRecord
-from .schema import SchemaVariable, attributes_of
+from .schema import attributes_of
 from .slabs import ORIGINAL_DIMS, VARIES_ALONG, aligned_slabs, slabs
 
 # a law's rule of K is evaluated as a whole, and stored in a file, up to this many values
@@ -274,9 +275,9 @@ class ExpandedArray(BackendArray):
     variable : the variable to compute
     """
 
-    def __init__(self, table: TrajectoryTable, variable: SchemaVariable) -> None:
+    def __init__(self, table: TrajectoryTable, variable: Variable) -> None:
         self.table, self.variable = table, variable
-        self.shape = ((len(table.laws),) if variable.per == "model" else ()) + table.inputs.shape
+        self.shape = ((len(table.laws),) if variable.per_model else ()) + table.inputs.shape
         self.dtype = np.dtype(variable.dtype)
 
     def __getitem__(self, key: indexing.ExplicitIndexer) -> Any:
@@ -287,7 +288,7 @@ class ExpandedArray(BackendArray):
         shape = tuple(part.size for part in positions)
         check_memory(self.variable.name, shape, self.dtype)
         values = np.empty(shape, self.dtype)
-        of_models = self.variable.per == "model"
+        of_models = self.variable.per_model
         models, axes = (positions[0], positions[1:]) if of_models else (np.zeros(1, np.intp), positions)
         for row, model in enumerate(models.tolist()):
             # a view, also if there is no axis
@@ -302,13 +303,20 @@ class ExpandedArray(BackendArray):
         return np.asarray(values[selected])
 
 
-def summary_of_variable(variable: xr.Variable) -> SummaryRecord | None:
-    """The summary in the file of a variable, if it has one and the variable is not a selection."""
+def computed_array(variable: xr.Variable) -> ExpandedArray | None:
+    """Find what computes a variable; None if it is stored or a selection."""
     data = variable._data
     if not isinstance(data, indexing.LazilyIndexedArray) or not isinstance(data.array, ExpandedArray):
         return None
     is_whole = all(isinstance(part, slice) and part == slice(None) for part in data.key.tuple)
-    return data.array.table.summary if is_whole else None
+    return data.array if is_whole else None
+
+
+def table_of_result(dataset: xr.Dataset) -> TrajectoryTable | None:
+    """Find the trajectory table that a whole result is computed from; None if its values are stored."""
+    arrays = [computed_array(variable.variable) for variable in dataset.values()]
+    tables = [None if array is None else array.table for array in arrays]
+    return tables[0] if tables and all(table is tables[0] for table in tables) else None
 
 
 def _without_dummy_axis(values: NDArray[Any], where: tuple[slice, ...]) -> NDArray[Any]:
@@ -340,7 +348,7 @@ def max_indexed_bytes() -> int:
     return min(MAX_INDEXED_BYTES, whole // 2)
 
 
-def lazy_dataset(template: xr.Dataset, table: TrajectoryTable, variables: Sequence[SchemaVariable]) -> xr.Dataset:
+def lazy_dataset(template: xr.Dataset, table: TrajectoryTable, variables: Sequence[Variable]) -> xr.Dataset:
     """A result whose variables are computed when they are read.
 
     Parameters
@@ -354,7 +362,7 @@ def lazy_dataset(template: xr.Dataset, table: TrajectoryTable, variables: Sequen
     along = [varies_along(table, model, names) for model in range(len(table.laws))]
     computed = {}
     for variable in variables:
-        dims = ["model", *axes] if variable.per == "model" else axes
+        dims = ["model", *axes] if variable.per_model else axes
         by_model = {
             law.key: tuple(axes[axis] for axis in axes_by_variable[variable.name])
             for law, axes_by_variable in zip(table.laws, along, strict=True)
@@ -370,7 +378,7 @@ def lazy_dataset(template: xr.Dataset, table: TrajectoryTable, variables: Sequen
 
 
 def expanded_slabs(
-    table: TrajectoryTable, variables: Sequence[SchemaVariable], lengths: Sequence[int] = ()
+    table: TrajectoryTable, variables: Sequence[Variable], lengths: Sequence[int] = ()
 ) -> Iterator[tuple[int, tuple[slice, ...], Impacts, dict[str, NDArray[Any]]]]:
     """All values of a result, slab by slab: number of the model, region, impacts, and values by name.
 
@@ -385,7 +393,7 @@ def expanded_slabs(
     for model in range(len(table.laws)):
         for slab in aligned_slabs(sizes, lengths) if lengths else slabs(sizes):
             where = tuple(slab.values())
-            slab_variables = [variable for variable in variables if variable.per == "model" or model == 0]
+            slab_variables = [variable for variable in variables if variable.per_model or model == 0]
             index = table.inputs.index(where)
             impacts, arrays = _expand(table, model, index, [variable.name for variable in slab_variables])
             shape = tuple(part.stop - part.start for part in where)
@@ -397,13 +405,16 @@ def expanded_slabs(
             yield model, where, impacts, values
 
 
-def in_memory(dataset: xr.Dataset, table: TrajectoryTable, variables: Sequence[SchemaVariable]) -> xr.Dataset:
-    """A result with all of its values in memory."""
-    arrays = {variable.name: np.empty(dataset[variable.name].shape, variable.dtype) for variable in variables}
-    for model, where, _, values in expanded_slabs(table, variables):
-        for name, part in values.items():
+def in_memory(dataset: xr.Dataset) -> xr.Dataset:
+    """Compute all values of a result that is computed from a trajectory table."""
+    computed = {str(name): computed_array(variable.variable) for name, variable in dataset.items()}
+    expanded = [array for array in computed.values() if array is not None]
+    values = {array.variable.name: np.empty(array.shape, array.dtype) for array in expanded}
+    # all variables of a slab together: they share most of the computation
+    for model, where, _, parts in expanded_slabs(expanded[0].table, [array.variable for array in expanded]):
+        for name, part in parts.items():
             region: tuple[Any, ...] = (model, *where) if "model" in dataset[name].dims else where
-            arrays[name][region or ...] = part
+            values[name][region or ...] = part
     return dataset.assign(
-        {name: (dataset[name].dims, array, dataset[name].attrs) for name, array in arrays.items()}
+        {name: (dataset[name].dims, array, dataset[name].attrs) for name, array in values.items()}
     )

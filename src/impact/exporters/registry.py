@@ -1,9 +1,8 @@
-"""The codes that laws are exported to."""
+"""The list of the codes that laws are exported to."""
 
 from __future__ import annotations
 
 from ..errors import UsageError, did_you_mean
-from ..text import safe_text
 from . import (
     adams,
     chrono,
@@ -43,12 +42,12 @@ CODES: dict[str, Code] = {
 
 
 def find_code(name: str) -> Code:
-    """A code by its name.
+    """Find a code by its name.
 
     Raises
     ------
     UsageError : there is none of this name
     """
     if name not in CODES:
-        raise UsageError(f'--to: no code "{safe_text(name)}"; {did_you_mean(name, list(CODES))}')
+        raise UsageError(f'--to: no code "{name}"; {did_you_mean(name, list(CODES))}')
     return CODES[name]

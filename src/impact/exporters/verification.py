@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 import re
 import subprocess
@@ -15,9 +14,9 @@ import numpy as np
 from ..array_types import Array
 from ..errors import UsageError
 from ..formatting import number, quantity
-from ..text import safe_text
-from .code import Code, run_program
+from .code import Code
 from .problem import ExportProblem
+from .programs import run_program
 
 # phases (i + 1/2)/4 at which a script is run
 PHASES = 4
@@ -28,15 +27,15 @@ FLOOR = 1e-7
 
 @dataclass(frozen=True)
 class Verification:
-    """What a code delivers, beside what is predicted.
+    """What a code delivers, next to what is predicted.
 
     Parameters
     ----------
     program : that ran the scripts
     dt : time steps [s], one for each row
     phases : phases of a step, one for each row; NaN for an extrapolation to dt = 0 of the mean over the phases
-    measured, predicted : the restitution by the code and by this program; one that is no number differs
-    uncertainty : the largest difference that is no disagreement
+    measured, predicted : the restitution by the code and by this program; one that is not a number differs
+    uncertainty : tolerance on the restitution
     """
 
     program: str
@@ -48,7 +47,7 @@ class Verification:
 
     @property
     def difference(self) -> float:
-        """The largest difference between measured and predicted; NaN if one of them is no number."""
+        """The largest difference between measured and predicted; NaN if one of them is not a number."""
         with np.errstate(invalid="ignore"):
             return float(np.abs(np.subtract(self.measured, self.predicted)).max())
 
@@ -58,62 +57,17 @@ class Verification:
 
     @property
     def not_numbers(self) -> str:
-        """The first row whose measured or predicted restitution is no number, in words; "" for none."""
+        """The first row whose measured or predicted restitution is not a number, in words; "" for none."""
         rows = zip(self.dt, self.phases, self.measured, self.predicted, strict=True)
         for dt, phase, measured, predicted in rows:
             if not (math.isfinite(measured) and math.isfinite(predicted)):
-                where = f"at the phase {number(phase)} of dt = {quantity(dt, 's')}"
-                return f"{where} e_out is {measured}, predicted {number(predicted)}"
+                position = f"at the phase {number(phase)} of dt = {quantity(dt, 's')}"
+                return f"{position} e_out is {measured}, predicted {number(predicted)}"
         return ""
 
 
-def installed_version(code: Code) -> str | None:
-    """The version of a code that is installed here; None also for a program that reports no release."""
-    program = code.find_program(None) if code.program else None
-    with contextlib.suppress(UsageError):
-        return None if program is None else _version_of(code, program)
-    return None
-
-
-def _version_of(code: Code, program: str) -> str | None:
-    """The version that a program reports, in the form in which versions are compared."""
-    text = code.version_of(program)
-    return None if text is None else code.release(text, f"version of {safe_text(program)}")
-
-
-def choose_version(
-    code: Code, program: str | None, version: str | None, *, verify: bool
-) -> tuple[str | None, str]:
-    """The program that runs scripts, None if there is none, and the version that lines are written for.
-
-    Parameters
-    ----------
-    code : the code
-    program, version : as the user gives them
-    verify : whether scripts are to be run
-
-    Raises
-    ------
-    UsageError : scripts are to be run, and the code is not installed or has another version
-    """
-    if version is not None:
-        version = code.release(version, "--code-version")
-        if not verify:
-            return None, version
-    if not code.program and (verify or program is not None):
-        raise UsageError(f"--verify: no script for {code.title}: {code.tested}")
-    found = code.find_program(program) if code.program else None
-    installed = None if found is None else _version_of(code, found)
-    if installed is None and (verify or program is not None):
-        name = "" if program is None else f'"{safe_text(program)}": '
-        raise UsageError(f"{name}no {code.title} there; {code.install}, or --program FILE")
-    if verify and version is not None and version != installed:
-        raise UsageError(f"--code-version: got {version}, but {installed} is what --verify runs")
-    return found, version or installed or code.newest
-
-
 def run_script(code: Code, program: str, script: str) -> float:
-    """The restitution that a script prints, run in an empty folder.
+    """Run a script in an empty folder, and return the restitution that it prints.
 
     Raises
     ------
@@ -125,19 +79,17 @@ def run_script(code: Code, program: str, script: str) -> float:
         try:
             done = run_program(code.command(program, file), folder, TIMEOUT_S)
         except (OSError, subprocess.SubprocessError) as error:
-            raise UsageError(f"--verify: {code.title}: {safe_text(str(error), 300)}") from None
+            raise UsageError(f"--verify: {code.title}: {error}") from None
     e_out = _restitution((done.stdout.strip().splitlines() or [""])[-1])
     if done.returncode or e_out is None:
         lines = (done.stderr.strip() or done.stdout.strip() or "no output").splitlines()
         error_lines = [line for line in lines if "error" in line.lower()] or lines[-1:]
-        raise UsageError(
-            f"--verify: {code.title} ended with exit code {done.returncode}: {safe_text(error_lines[0], 300)}"
-        )
+        raise UsageError(f"--verify: {code.title} ended with exit code {done.returncode}: {error_lines[0]}")
     return e_out
 
 
 def _restitution(line: str) -> float | None:
-    """The restitution that a line says, also nan or inf; None if it says none."""
+    """Read the restitution in a line, also nan or inf; None if it has none."""
     match = re.fullmatch(r"e_out = (\S+)", line)
     try:
         return float(match[1]) if match else None
@@ -145,7 +97,7 @@ def _restitution(line: str) -> float | None:
         return None
 
 
-def verify(problem: ExportProblem, program: str, dt: float) -> Verification:
+def verify_scripts(problem: ExportProblem, program: str, dt: float) -> Verification:
     """Run scripts at several phases and compare them with the map of the code's scheme.
 
     Without a scheme, they are run at dt, dt/2 and dt/4, the mean over the phases is extrapolated to a step of
@@ -189,7 +141,7 @@ def verify(problem: ExportProblem, program: str, dt: float) -> Verification:
 
 
 def extrapolate(restitutions: Array, order: int = 1) -> tuple[float, float]:
-    """The restitution at a step of zero and its uncertainty, from runs at h, h/2 and h/4.
+    """Extrapolate to the restitution at a step of zero and its uncertainty, from runs at h, h/2 and h/4.
 
     Parameters
     ----------
@@ -203,7 +155,6 @@ def extrapolate(restitutions: Array, order: int = 1) -> tuple[float, float]:
 
 
 def _measure(problem: ExportProblem, program: str, dt: float, phase: float) -> float:
-    code = problem.code
-    assert code.script is not None
-    collision = problem.collision(dt, phase)
+    """Run the script of a collision that begins at a phase of a step dt [s], and return its restitution."""
+    code, collision = problem.code, problem.collision(dt, phase)
     return run_script(code, program, code.script(collision, code.parameters(collision)))

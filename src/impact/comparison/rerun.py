@@ -1,0 +1,92 @@
+"""Repeat the computation of a result, and compare the new values with it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import xarray as xr
+
+from ..config.grid import MAX_POINTS
+from ..contact.model import ForceModel
+from ..engine.plan import Plan
+from ..engine.plugins import Plugins, read_plugins
+from ..engine.trajectories import check_count
+from ..results.kinds import is_calibration, require_sweep
+from ..results.provenance import config_of_part, stored_config
+from ..results.replay_command import command_start
+from ..results.sweep import sweep_in_memory
+from ..results.xarray_backend import load
+from .compare import compare
+from .tolerances import Tolerances
+from .verdict import Verdict
+
+
+def rerun(
+    result: str | Path,
+    *,
+    plugins: Sequence[ForceModel | str | Path] = (),
+    tol: float | Tolerances | None = None,
+    subset: bool = False,
+    max_points: int = MAX_POINTS,
+    execute: Callable[[Plan], xr.Dataset] = sweep_in_memory,
+) -> Verdict:
+    """Repeat the sweep or the calibration of a result from its file alone, and compare the new values with it.
+
+    Of a sweep, only the points in the file are repeated, even if its config has more.
+
+    Parameters
+    ----------
+    result : the file
+    plugins : the plug-in models that it was computed with; a note of the verdict names a changed one
+    tol, subset : see `compare`
+    max_points : the largest number of points
+    execute : function that runs a plan; by default it is run in this process
+
+    Raises
+    ------
+    ResultError : the file is not a readable result
+    UsageError : it is a time history, or a plug-in is missing or a different one
+    ConfigError : this version does not have a model of the result, or cannot read its config
+
+    >>> import impact, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     impact.save(impact.sweep("configs/figure6.toml"), f"{folder}/stored.h5")
+    ...     print(impact.rerun(f"{folder}/stored.h5"))
+    equal: 19 variables, 5,353 values, none differs
+    """
+    stored = load(result)
+    plugin_set = read_plugins(plugins)
+    if is_calibration(stored):
+        new = _repeat_calibration(stored, plugin_set, str(result))
+        return replace(compare(new, stored, tol=tol, subset=subset), new="the rerun", baseline=str(result))
+    require_sweep(stored, "rerun")
+    # models by key, because "all" may include new models; the tolerances that were used
+    keys = stored["model"].values.tolist() if "model" in stored.dims else []
+    solver = (f"solver.{name}={stored.attrs.get(name)}" for name in ("rtol", "max_steps"))
+    # any core gives the same result
+    changes = [f"models={json.dumps(keys)}", *solver, 'solver.core="auto"']
+    config = stored_config(stored.attrs, changes, plugin_set, str(result), max_points, allow_changed_plugins=True)
+    whole = Plan(config, plugin_set.of(config.models))
+    plan = replace(whole, config=config_of_part(config, stored))
+    check_count(plan, max_points, str(result))
+    verdict = compare(execute(plan), stored, tol=tol, subset=subset)
+    if plan.points < whole.points:
+        part = f"repeated {plan.points:,} of {whole.points:,} points of the config: the file holds no others"
+        verdict = replace(verdict, notes=(part, *verdict.notes))
+    files = [word for path in plugins if isinstance(path, str | Path) for word in ("--plugin", str(path))]
+    command = ("impact", "run", str(result), *files) if command_start(str(result), stored) else ()
+    return replace(verdict, new="the rerun", baseline=str(result), repeats=command)
+
+
+def _repeat_calibration(stored: xr.Dataset, plugins: Plugins, name: str) -> xr.Dataset:
+    """Repeat a calibration with the models and the tolerances of the result."""
+    # its modules import scipy.optimize, which is slow to import
+    from ..inverse.calibrate import calibrate_config
+
+    changes = [f"models={json.dumps(stored['model'].values.tolist())}"]
+    changes += [f"solver.{key}={stored.attrs.get(key)}" for key in ("rtol", "max_steps")]
+    config = stored_config(stored.attrs, changes, plugins, name, allow_changed_plugins=True, purpose="calibrate")
+    return calibrate_config(config, plugins.of(config.models))

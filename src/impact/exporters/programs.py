@@ -1,0 +1,99 @@
+"""Run the programs of other codes: find one, ask for its version, and run a script in it."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from importlib import metadata
+from pathlib import Path
+from typing import IO
+
+from ..formatting import number
+
+# time that a program has to report its version
+VERSION_TIMEOUT_S = 60
+# a program that prints more than the first is stopped; of its output, the end is kept
+MAX_OUTPUT_BYTES, KEPT_OUTPUT_BYTES = 2**26, 2**20
+POLL_INTERVAL_S = 0.05
+
+
+def find_program(name: str, given: str | None) -> str | None:
+    """Find the program that runs a script: the given one, or else the one that is installed under a name.
+
+    "python" is the interpreter that runs this; others are searched for next to it and on the path.
+    """
+    if given is not None:
+        path = shutil.which(given)
+        # it is run in another folder
+        return None if path is None else str(Path(path).absolute())
+    if name == "python":
+        return sys.executable
+    return shutil.which(name, path=str(Path(sys.executable).parent)) or shutil.which(name)
+
+
+def output_of(command: Sequence[str]) -> str:
+    """Return what a command prints on stdout, run in an empty folder; "" if it cannot be run."""
+    # LIGGGHTS writes a log into the folder in which it is asked for its help
+    with tempfile.TemporaryDirectory(prefix="impact-version-") as folder:
+        try:
+            return run_program(command, folder, VERSION_TIMEOUT_S).stdout
+        except (OSError, subprocess.SubprocessError):
+            return ""
+
+
+def python_package_version(package: str) -> Callable[[str], str | None]:
+    """Make a function that asks a Python interpreter for the version of a package."""
+
+    def version_of(program: str) -> str | None:
+        if program == sys.executable:
+            try:
+                return metadata.version(package)
+            except metadata.PackageNotFoundError:
+                return None
+        words = f"from importlib.metadata import version; print(version({package!r}))"
+        return output_of([program, "-c", words]).strip() or None
+
+    return version_of
+
+
+def run_program(command: Sequence[str], folder: str, timeout_s: float) -> subprocess.CompletedProcess[str]:
+    """Run a command in a folder, without input, and return the end of what it prints.
+
+    Its output goes through files, whose size is watched, so that it takes no memory.
+
+    Raises
+    ------
+    OSError, subprocess.SubprocessError : it cannot be started, takes longer, or prints more than MAX_OUTPUT_BYTES
+    """
+    deadline = time.monotonic() + timeout_s
+    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
+        process = subprocess.Popen(
+            command, cwd=folder, stdin=subprocess.DEVNULL, stdout=out, stderr=err, start_new_session=True
+        )
+        try:
+            while process.poll() is None:
+                if time.monotonic() > deadline:
+                    raise subprocess.SubprocessError(f"stopped after {number(timeout_s)} s")
+                if any(os.fstat(file.fileno()).st_size > MAX_OUTPUT_BYTES for file in (out, err)):
+                    raise subprocess.SubprocessError(f"stopped after it printed {MAX_OUTPUT_BYTES >> 20} MiB")
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    process.wait(POLL_INTERVAL_S)
+        except BaseException:
+            # also what a wrapper has started
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+            raise
+        return subprocess.CompletedProcess(command, process.returncode, _end_of(out), _end_of(err))
+
+
+def _end_of(file: IO[bytes]) -> str:
+    """Read the last KEPT_OUTPUT_BYTES of a file."""
+    file.seek(max(0, os.fstat(file.fileno()).st_size - KEPT_OUTPUT_BYTES))
+    return file.read(KEPT_OUTPUT_BYTES).decode("utf-8", errors="replace")

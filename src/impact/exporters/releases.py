@@ -1,0 +1,131 @@
+"""The release of a code that lines are written for, and the laws that it has."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+from collections.abc import Sequence
+
+from ..contact.models import find
+from ..errors import UsageError, did_you_mean
+from .code import Code
+from .programs import find_program
+
+# releases as codes write them; the text becomes part of a comment in the lines and the script
+RELEASE = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+() -]{0,49}")
+
+
+def read_release(code: Code, text: str, origin: str) -> str:
+    """Read a version into the form in which versions are compared, and that is safe in a comment of any code.
+
+    Parameters
+    ----------
+    text : as the user or the program writes it
+    origin : what the message about a wrong text begins with
+
+    Raises
+    ------
+    UsageError : it is not a release
+    """
+    try:
+        if RELEASE.fullmatch(text) is None:
+            raise UsageError(f'got "{text}", expected a release, such as {code.newest}')
+        return code.read_version(text)
+    except UsageError as error:
+        raise UsageError(f"{origin}: {error}") from None
+
+
+def installed_version(code: Code) -> str | None:
+    """Find the version of a code that is installed here; None also for a program that reports no release."""
+    program = find_program(code.program, None) if code.program else None
+    with contextlib.suppress(UsageError):
+        return None if program is None else _version_of(code, program)
+    return None
+
+
+def _version_of(code: Code, program: str) -> str | None:
+    """Ask a program for its version, in the form in which versions are compared."""
+    text = code.version_of(program)
+    return None if text is None else read_release(code, text, f"version of {program}")
+
+
+def choose_version(
+    code: Code, program: str | None, version: str | None, *, verify: bool
+) -> tuple[str | None, str]:
+    """Choose the program that runs scripts, None if there is none, and the version that lines are written for.
+
+    Parameters
+    ----------
+    program, version : as the user gives them
+    verify : whether scripts are to be run
+
+    Raises
+    ------
+    UsageError : scripts are to be run, and the code is not installed or has another version
+    """
+    if version is not None:
+        version = read_release(code, version, "--code-version")
+        if not verify:
+            return None, version
+    must_run = verify or program is not None
+    if not code.program and must_run:
+        raise UsageError(f"--verify: no script for {code.title}: {code.tested}")
+    path = find_program(code.program, program) if code.program else None
+    installed = None if path is None else _version_of(code, path)
+    if installed is None and must_run:
+        name = "" if program is None else f'"{program}": '
+        raise UsageError(f"{name}no {code.title} there; {code.install}, or --program FILE")
+    if verify and version is not None and version != installed:
+        raise UsageError(f"--code-version: got {version}, but {installed} is what --verify runs")
+    return path, version or installed or code.newest
+
+
+def law_of_code(code: Code, model: str, version: str) -> str:
+    """Find the key of a code's law for a key of the catalogue, in a version of the code.
+
+    Parameters
+    ----------
+    model : a law of the code, or one of the catalogue that it has under a name of its own
+
+    Raises
+    ------
+    UsageError : the code, or this version of it, has no such law
+
+    >>> from impact.exporters.registry import find_code
+    >>> law_of_code(find_code("lammps"), "tsuji-1992", "20250722")
+    'lammps-coeff-restitution-hertz'
+    """
+    if model not in code.laws:
+        aliases = [key for key in code.laws if _law(key) == _law(model)]
+        if not aliases:
+            raise UsageError(f'{code.title} has no law "{model}"; {did_you_mean(model, list(code.laws))}')
+        model = aliases[0]
+    return code.law_for_version(model, version)
+
+
+def first_law(code: Code, models: Sequence[str], version: str) -> str:
+    """Find the law of a code for the first of some models that a version of it has.
+
+    Raises
+    ------
+    UsageError : the code, or this version of it, has none of them
+
+    >>> from impact.exporters.registry import find_code
+    >>> lammps = find_code("lammps")
+    >>> [first_law(lammps, tuple(lammps.laws), version) for version in ("20250722", "20210929")]
+    ['lammps-coeff-restitution-hertz', 'lammps-tsuji-without-root']
+    """
+    laws = {_law(key) for key in code.laws}
+    common = [key for key in models if _law(key) in laws]
+    if not common:
+        shown = ", ".join(models[:3]) + (f" and {len(models) - 3} more" if len(models) > 3 else "")
+        raise UsageError(f"{code.title} has none of the laws {shown}; --model names one of its own")
+    for key in common:
+        with contextlib.suppress(UsageError):
+            return law_of_code(code, key, version)
+    return law_of_code(code, common[0], version)
+
+
+def _law(key: str) -> str:
+    """Return the key of a law, or of the one that it is another name of."""
+    return find(key).same_as or key

@@ -1,0 +1,182 @@
+"""Draw a picture of a result: its data, its panels and its texts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..contact.model import ForceModel
+from ..engine.plugins import read_plugins
+from ..errors import UsageError
+from ..results.single_impact import Impact, histories
+from . import curves, maps, uncertainty
+from .data import Points, read_points
+from .kinds import Choice, Look, default_kind, plot_data_of
+from .labels import check_labels, escape_mathtext, pretty_conditions
+from .layout import Picture
+from .style import default_size, styled
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+    from .kinds import PlotData
+
+DEFAULT_LOOK = Look()
+
+
+def plot(
+    dataset: xr.Dataset | Impact,
+    *,
+    kind: str | None = None,
+    x: str | None = None,
+    y: str | None = None,
+    variable: str | None = None,
+    sel: Mapping[str, float | str] | None = None,
+    models: Sequence[str] | None = None,
+    log: str = "",
+    points: str | Path | pd.DataFrame | xr.Dataset | None = None,
+    width: float | str | None = None,
+    height: float | str | None = None,
+    style: str | Path | None = None,
+    title: bool = True,
+    labels: Mapping[str, str] | None = None,
+    equations: bool = False,
+    ax: Axes | Sequence[Axes] | None = None,
+    plugins: Sequence[ForceModel | str | Path] = (),
+) -> Figure:
+    """Draw a result; by default the final-velocity comparison, Figure 6 of the paper.
+
+    Parameters
+    ----------
+    dataset : a result, a time history, or an impact of `run`
+    kind : one of `impact.plots.kinds.KINDS`; by default "final-velocities", "uncertainty" for samples of uncertain
+        inputs, "loop" for an impact, or "calibration" or "sensitivity" for the result of that function
+    x : the coordinate to draw over; by default e, else the first numeric axis
+    y : second axis of a map, or of the kind validity; by default the next one
+    variable : name of the variable that a map or a band shows; by default e_error for a map, e_out for a band
+    sel : values of the other axes, such as `{"m2": 1.0}`; the default is the first value. A loop, a history
+        or an impulse may be at a point that is not on the grid
+    models : keys of the models to show; by default all
+    log : which axes are logarithmic, such as "x" or "xy"; axes with logarithmic spacing are in any case
+    points : measured points over the curves: a CSV file, or a table of pandas or xarray, whose columns have names
+        such as "v1 [m/s]", "e_out" and "sigma"
+    width : width of the figure [in], or a length such as "84mm", "single" or "double"; by default that of rcParams
+        if it was changed, else "double"
+    height : height of the figure [in], or a length; by default it depends on the kind
+    style : a style sheet of matplotlib, or the name of one; rcParams changed by the user are respected in any case
+    title : write the title and the conditions
+    labels : texts by the name of an axis, of a variable whose name is beside its curve, the key of a law,
+        "reference" or "title"
+    equations : name the laws with the numbers of their equations in the paper
+    ax : axes of an existing figure to draw into, one for each panel, in the style of that figure
+    plugins : plug-in models that the result was computed with, needed to draw a loop, a history or an impulse
+
+    Returns
+    -------
+    matplotlib.figure.Figure : `figure.savefig("results.png")` writes it; a notebook shows it
+
+    Raises
+    ------
+    UsageError : the result does not contain what the arguments select
+
+    >>> import impact
+    >>> figure = impact.plot(impact.sweep("configs/figure6.toml"))
+    >>> figure.axes[0].get_xlabel()
+    'Coefficient of restitution $e$'
+    """
+    if isinstance(dataset, Impact):
+        if dataset.history is None:
+            raise UsageError(f"no motion to draw: {dataset.why_no_history}")
+        dataset = dataset.history
+    choice = Choice(x, y, variable, sel, models, log, equations)
+    look = Look(width, height, style, title, labels)
+    return draw(get_plot_data(dataset, kind or default_kind(dataset), choice, plugins), look, points, ax)
+
+
+def get_plot_data(
+    dataset: xr.Dataset, kind: str, choice: Choice, plugins: Sequence[ForceModel | str | Path] = ()
+) -> PlotData:
+    """Get the data of a picture; see `plot`."""
+    plugin_set = read_plugins(plugins)
+    return plot_data_of(
+        kind, dataset, choice, lambda: histories(dataset, choice.models, choice.sel or {}, plugin_set)
+    )
+
+
+def label_keys(plot_data: PlotData, look: Look) -> set[str]:
+    """List the names in a picture whose text a user can replace."""
+    return {*(["title"] if look.title else []), *plot_data.names}
+
+
+def draw(
+    plot_data: PlotData,
+    look: Look = DEFAULT_LOOK,
+    points: str | Path | pd.DataFrame | xr.Dataset | Points | None = None,
+    ax: Axes | Sequence[Axes] | None = None,
+) -> Figure:
+    """Draw a picture, in a new figure or into the user's axes.
+
+    Raises
+    ------
+    UsageError : an option is invalid, or does not apply to the picture
+    """
+    labels = look.labels or {}
+    check_labels(labels, label_keys(plot_data, look))
+    measured = points if points is None or isinstance(points, Points) else read_points(points)
+    if measured is not None and not isinstance(plot_data, curves.CurveData):
+        raise UsageError(f"{measured.source}: measured points are drawn over curves only")
+    heading = labels.get("title", escape_mathtext(plot_data.title))
+    count = 2 if isinstance(plot_data, maps.MapData) and plot_data.closest else len(plot_data.panels)
+    if ax is not None:
+        all_axes = _check_axes(ax, count)
+        entries = _draw_panels(plot_data, all_axes, labels, measured)
+        if look.title:
+            all_axes[0].set_title(heading)
+        if entries:
+            all_axes[0].legend(*zip(*entries, strict=True), fontsize="small")
+        figure = all_axes[0].get_figure(root=True)
+        assert figure is not None
+        return figure
+    with styled(look.style):
+        (width, height), (default_width, default_height) = look.size, default_size()
+        width, height = width or default_width, height or default_height
+        texts = (heading, pretty_conditions(plot_data.conditions)) if look.title else ()
+        picture = Picture(width, *texts)
+        if isinstance(plot_data, curves.CurveData):
+            heights = [panel.height for panel in plot_data.panels]
+            all_axes = list(
+                picture.subplots(count, sharex=count > 1, squeeze=False, height_ratios=heights).ravel()
+            )
+            aspect = curves.PANEL_ASPECT if count == 1 else curves.STACKED_PANEL_ASPECT
+            body = sum(heights) * width * aspect + 0.3
+        elif isinstance(plot_data, uncertainty.BarData):
+            all_axes = list(picture.subplots(count, sharex=True, squeeze=False).ravel())
+            body = uncertainty.bars_height(plot_data)
+        else:
+            all_axes, body = maps.place_panels(picture, plot_data, width, count)
+        picture.add_legend(body, height, _draw_panels(plot_data, all_axes, labels, measured))
+    return picture
+
+
+def _draw_panels(
+    plot_data: PlotData, all_axes: Sequence[Axes], labels: Mapping[str, str], measured: Points | None
+) -> Any:
+    if isinstance(plot_data, curves.CurveData):
+        return curves.draw_curves(plot_data, all_axes, labels, measured)
+    if isinstance(plot_data, uncertainty.BarData):
+        return uncertainty.draw_bars(plot_data, all_axes, labels)
+    return maps.draw_maps(plot_data, all_axes, labels)
+
+
+def _check_axes(ax: Axes | Sequence[Axes], count: int) -> list[Axes]:
+    """Check that the user's axes are one for each panel."""
+    all_axes = list(np.ravel(np.asarray(ax, object)))
+    if len(all_axes) != count:
+        raise UsageError(f"ax: got {len(all_axes)} axes, expected {count}, one for each panel")
+    return all_axes

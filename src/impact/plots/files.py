@@ -1,0 +1,169 @@
+"""Draw a stored result into files: a picture of each kind, and the numbers behind it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from ..atomic import check_outputs, write_file
+from ..contact.model import ForceModel
+from ..errors import UsageError
+from ..results.xarray_backend import load
+from .data import check_table, encode_table, read_points
+from .draw import draw, get_plot_data, label_keys
+from .kinds import MOTION_KINDS, Choice, Look, check_kind, default_kind
+from .labels import check_labels
+from .style import check_picture, save_figure
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from .kinds import PlotData
+
+Plugins = Sequence[ForceModel | str | Path]
+
+
+class PlotFiles(NamedTuple):
+    """Pictures in files and their data, by kind, and the reason why a kind was left out."""
+
+    pictures: dict[str, Path]
+    plot_data: dict[str, PlotData]
+    left_out: dict[str, str]
+
+
+def plot_to_files(
+    result: str | Path,
+    output: str | Path | None = None,
+    *,
+    kinds: Sequence[str] = (),
+    x: str | None = None,
+    y: str | None = None,
+    variable: str | None = None,
+    sel: Mapping[str, float | str] | None = None,
+    models: Sequence[str] | None = None,
+    log: str = "",
+    points: str | Path | None = None,
+    width: float | str | None = None,
+    height: float | str | None = None,
+    style: str | Path | None = None,
+    title: bool = True,
+    labels: Mapping[str, str] | None = None,
+    equations: bool = False,
+    data: str | Path | None = None,
+    data_form: str = "wide",
+    overwrite: bool = False,
+    plugins: Sequence[ForceModel | str | Path] = (),
+) -> PlotFiles:
+    """Draw a stored result into a file for each kind of picture.
+
+    Kinds that the result does not have the data for are left out; it is an error if none can be drawn. Of
+    several kinds, one that `sel` leaves no axis, while another is drawn, is drawn over the whole axis.
+
+    Parameters
+    ----------
+    result : file of a result, or of a time history
+    output : the picture, with the ending of its format; by default the result's name with .png. The name of each
+        of several kinds has the kind in it
+    kinds : see `impact.plots.kinds.KINDS`
+    data : file for the numbers behind the picture: .csv, .tex or .parquet
+    data_form : "wide", a column for each curve, or "long", a row for each point
+    overwrite : replace existing files
+    x, y, variable, sel, models, log, points, width, height, style, title, labels, equations, plugins : see `plot`
+
+    Returns
+    -------
+    PlotFiles : by kind the picture and its data, and the reason why a kind is left out
+
+    Raises
+    ------
+    UsageError : no kind can be drawn, an argument is invalid, or a file exists
+    ResultError : the result is not readable
+    StoreError : the disk is full or failed
+
+    >>> import impact, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     impact.save(impact.sweep("configs/figure6.toml"), f"{folder}/r.h5")
+    ...     [path.name for path in impact.plot_to_files(f"{folder}/r.h5").pictures.values()]
+    ['r.png']
+    """
+    choice = Choice(x, y, variable, sel, models, log, equations)
+    look = Look(width, height, style, title, labels)
+    kinds = list(dict.fromkeys(kinds))
+    for kind in kinds:
+        check_kind(kind)
+    result = Path(result)
+    output = Path(output) if output is not None else result.with_suffix(".png")
+    check_picture(output)
+    table = Path(data) if data is not None else None
+    if table is not None:
+        check_table(table, data_form)
+    # the default kind depends on the result, which is read after the paths are checked
+    targets = [_with_kind(path, kind, kinds) for path in (output, table) if path for kind in kinds or [""]]
+    check_outputs(targets, [result, points], overwrite=overwrite)
+    measured = None if points is None else read_points(points)
+    dataset = load(result)
+    kinds = kinds or [default_kind(dataset)]
+    plot_data, left_out = _read_kinds(kinds, dataset, choice, plugins)
+    if plot_data:
+        check_labels(look.labels or {}, set().union(*(label_keys(shown, look) for shown in plot_data.values())))
+    pictures: dict[str, Path] = {}
+    for kind, shown in plot_data.items():
+        keys = label_keys(shown, look)
+        own_look = replace(look, labels={key: text for key, text in (labels or {}).items() if key in keys})
+        try:
+            figure = draw(shown, own_look, measured)
+            numbers = encode_table(shown, table.suffix.lower(), data_form) if table else b""
+        except UsageError as error:
+            left_out[kind] = str(error)
+            continue
+        pictures[kind] = _with_kind(output, kind, kinds)
+        save_figure(figure, pictures[kind], overwrite=overwrite, style=style)
+        if table:
+            write_file(_with_kind(table, kind, kinds), numbers, overwrite=overwrite)
+    if not pictures:
+        raise UsageError(*dict.fromkeys(left_out.values()))
+    return PlotFiles(pictures, {kind: plot_data[kind] for kind in pictures}, left_out)
+
+
+def _with_kind(path: Path, kind: str, kinds: Sequence[str]) -> Path:
+    """Put the kind into the name of a file if there are several kinds."""
+    return path if len(kinds) < 2 else path.with_name(f"{path.stem}-{kind}{path.suffix}")
+
+
+def _read_kinds(
+    kinds: Sequence[str], dataset: xr.Dataset, choice: Choice, plugins: Plugins
+) -> tuple[dict[str, PlotData], dict[str, str]]:
+    """Read the data of several kinds, and the reasons why others cannot be drawn.
+
+    If the selected values are for one of the pictures, such as the point of a loop, others that they leave no axis
+    ignore them.
+    """
+    plot_data: dict[str, PlotData] = {}
+    reasons: dict[str, str] = {}
+    for kind in kinds:
+        try:
+            plot_data[kind] = get_plot_data(dataset, kind, choice, plugins)
+        except UsageError as error:
+            reasons[kind] = str(error)
+    if plot_data and choice.sel:
+        for kind in reasons.keys() - {*MOTION_KINDS}:
+            with suppress(UsageError):
+                plot_data[kind] = _over_selected_axes(kind, dataset, choice, plugins)
+    return (
+        {kind: plot_data[kind] for kind in kinds if kind in plot_data},
+        {kind: reason for kind, reason in reasons.items() if kind not in plot_data},
+    )
+
+
+def _over_selected_axes(kind: str, dataset: xr.Dataset, choice: Choice, plugins: Plugins) -> PlotData:
+    """Read the data of a picture over axes at which a value is selected: over all their values."""
+    whole = get_plot_data(dataset, kind, replace(choice, sel=None), plugins)
+    drawn = {dataset[name].dims for name in whole.names if name in dataset.coords}
+    sel = dict(choice.sel or {})
+    ignored = [name for name in sel if name in dataset.coords and dataset[name].dims in drawn]
+    remarks = tuple(f"--sel {name}={sel.pop(name)}, a point on its axis" for name in ignored)
+    plot_data = get_plot_data(dataset, kind, replace(choice, sel=sel), plugins)
+    return replace(plot_data, not_drawn=(*plot_data.not_drawn, *remarks))
