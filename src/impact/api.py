@@ -116,13 +116,11 @@ def models(
     if pattern.startswith("family:"):
         pattern, family = "*", pattern.removeprefix("family:")
     if family is not None and family not in families:
-        raise UsageError(f'--family: no family "{safe_text(family)}"; {did_you_mean(family, families)}')
+        raise UsageError(f'--family: no family "{family}"; {did_you_mean(family, families)}')
     of_family = {key: model for key, model in all_models.items() if family in (None, model.family)}
     matching = {key: model for key, model in of_family.items() if fnmatchcase(key, pattern)}
     if not matching:
-        raise UsageError(
-            f'no model matches "{safe_text(pattern)}"; {did_you_mean(pattern.strip("*?"), list(of_family))}'
-        )
+        raise UsageError(f'no model matches "{pattern}"; {did_you_mean(pattern.strip("*?"), list(of_family))}')
     if search is not None:
         words = search.casefold().split()
         matching = {key: model for key, model in matching.items() if _contains(model, words)}

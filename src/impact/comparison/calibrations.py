@@ -72,7 +72,7 @@ def _tolerance(tol: float | Tolerances | None) -> float:
     for name, value in requested.items():
         if name != ALL_VARIABLES:
             text = "got a tolerance for one variable, expected one for all, such as --tol 1e-5"
-            raise UsageError(f"--tol {safe_text(str(name))}: {text}")
+            raise UsageError(f"--tol {name}: {text}")
         if not 0.0 <= value < math.inf:
             raise UsageError(f"--tol {value}: expected a number >= 0, such as --tol 1e-5")
     return float(requested.get(ALL_VARIABLES, DEFAULT_TOLERANCE))

@@ -134,23 +134,22 @@ def check_comparable(dataset: xr.Dataset, name: str) -> None:
     ------
     UsageError : it is a time history, or lacks coordinates or axes that every result has
     """
-    shown = safe_text(name)
-    require_sweep(dataset, shown)
+    require_sweep(dataset, name)
     is_current = _attributes_equal(dataset.attrs.get("schema_version"), SCHEMA_VERSION)
     if not is_current or "rtol" not in dataset.attrs:
         about = "a time history" if "t" in dataset.coords else "not a result"
-        raise UsageError(f"{shown}: is {about}, expected the result of a sweep")
+        raise UsageError(f"{name}: is {about}, expected the result of a sweep")
     for coordinate in ("model", "v1", "v2", "m1", "m2"):
         if coordinate not in dataset.coords:
-            raise UsageError(f"{shown}: has no coordinate {coordinate}, expected a whole result")
+            raise UsageError(f"{name}: has no coordinate {coordinate}, expected a whole result")
         if coordinate != "model" and dataset[coordinate].dtype.kind not in "fiu":
-            raise UsageError(f"{shown}: {coordinate}: got {dataset[coordinate].dtype}, expected numbers")
-    axes = {dim for name, v in dataset.variables.items() if is_input(name) for dim in v.dims}
-    for name in OUTPUTS:
-        if name in dataset and dataset[name].dtype.kind not in "fiu":
-            raise UsageError(f"{shown}: {name}: got {dataset[name].dtype}, expected numbers")
-        if name in dataset and not axes <= set(dataset[name].dims):
-            raise UsageError(f"{shown}: {name} does not vary along all axes, expected a whole result")
+            raise UsageError(f"{name}: {coordinate}: got {dataset[coordinate].dtype}, expected numbers")
+    axes = {dim for key, v in dataset.variables.items() if is_input(key) for dim in v.dims}
+    for variable in OUTPUTS:
+        if variable in dataset and dataset[variable].dtype.kind not in "fiu":
+            raise UsageError(f"{name}: {variable}: got {dataset[variable].dtype}, expected numbers")
+        if variable in dataset and not axes <= set(dataset[variable].dims):
+            raise UsageError(f"{name}: {variable} does not vary along all axes, expected a whole result")
 
 
 def _unknown_variables(dataset: xr.Dataset) -> list[str]:

@@ -11,7 +11,6 @@ import numpy as np
 from ..contact.variables import OUTPUTS
 from ..errors import ResultError, UsageError, did_you_mean
 from ..results.attributes import read_attribute
-from ..text import safe_text
 
 Tolerances = Mapping[str, float]
 
@@ -65,10 +64,10 @@ def _check_tolerances(tolerances: Mapping[str, Any]) -> None:
                 "reported": "has no tolerance, it is not judged;",
             }
             how = has_none[OUTPUTS[name].scale] if name in OUTPUTS else "not a variable of a result;"
-            raise UsageError(f"--tol {safe_text(str(name))}: {how} {did_you_mean(str(name), TOLERANCE_VARIABLES)}")
+            raise UsageError(f"--tol {name}: {how} {did_you_mean(str(name), TOLERANCE_VARIABLES)}")
         if not _is_number(value) or not 0.0 <= value <= sys.float_info.max:
             shown = value if name == ALL_VARIABLES else f"{name}={value}"
-            raise UsageError(f"--tol {safe_text(str(shown))}: expected a number >= 0, such as --tol 1e-8")
+            raise UsageError(f"--tol {shown}: expected a number >= 0, such as --tol 1e-8")
 
 
 def _is_number(value: object) -> TypeGuard[float]:

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from pydantic import ValidationError
 
 from ..contact.variables import BY_DEFAULT
+from ..errors import did_you_mean
 from .input_names import InputName
-from .quantities import MAX_PROBLEMS, ConfigProblem, Names, Numbers, Quantity, Range, show, suggest
+from .quantities import MAX_PROBLEMS, ConfigProblem, Names, Numbers, Quantity, Range, show
 
 # default limit of the points of all models together
 MAX_POINTS = 10**9
@@ -190,7 +191,7 @@ def chunk_problems(
     sizes, path = {axis.name: axis.size for axis in axes}, ("output", "chunks")
     unknown = [name for name in chunks if name not in sizes]
     if unknown or not chunks:
-        return [((*path, name), f"no axis of this sweep; {suggest(name, list(sizes))}") for name in unknown]
+        return [((*path, name), f"no axis of this sweep; {did_you_mean(name, list(sizes))}") for name in unknown]
     size = math.prod(min(chunks.get(name, length), length) for name, length in sizes.items())
     count = math.prod(-(-length // chunks.get(name, length)) for name, length in sizes.items())
     count *= n_models * n_variables
@@ -225,7 +226,7 @@ def _zip_groups(
             size = sizes.get(name)
             if name not in config_names:
                 axes = [key for key in config_names if sizes.get(key) is not None]
-                suggestion = suggest(name, axes or list(config_names))
+                suggestion = did_you_mean(name, axes or list(config_names))
                 problems.append((path, f"got {show(name)}, expected an axis; {suggestion}"))
             elif name in member_of:
                 problems.append((path, f"got {show(name)} twice, expected each name once"))

@@ -9,9 +9,10 @@ from collections.abc import Iterable, Mapping
 from pydantic import ValidationError
 
 from ..contact.model import ForceModel
+from ..errors import did_you_mean
 from ..text import safe_text
 from . import quantities
-from .quantities import VALUE_FORMS, Column, ConfigProblem, KeyPath, show, suggest
+from .quantities import VALUE_FORMS, Column, ConfigProblem, KeyPath, show
 from .tables import (
     MATERIAL_QUANTITIES,
     MODELS_EXPECTED,
@@ -224,4 +225,4 @@ def _unknown_key_hint(location: KeyPath, models: Mapping[str, ForceModel]) -> st
             keys = model_quantities(models[str(key)])
         case (table, *_):
             keys = vars(Solver() if table == "solver" else Output())
-    return suggest(name, list(keys), KEY_SYNONYMS)
+    return did_you_mean(name, list(keys), KEY_SYNONYMS)

@@ -6,7 +6,6 @@ import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
 from fractions import Fraction
 from functools import cache, lru_cache
 from typing import Annotated, Any, TypeAlias, cast
@@ -153,26 +152,6 @@ def _raise_or_skip(info: ValidationInfo, error: PydanticCustomError, value: Any)
     raise error
 
 
-def suggest(word: str, choices: Sequence[str], synonyms: Mapping[str, str] | None = None) -> str:
-    """`did_you_mean` for a key, which also finds it in another case and by a synonym.
-
-    Parameters
-    ----------
-    word : what was written
-    choices : the valid keys
-    synonyms : other words for some of them
-
-    >>> suggest("masss1", ["m1", "v1"], {"mass1": "m1"})
-    'did you mean "m1"?'
-    """
-    spellings = {name.lower(): name for name in choices[:1000]}
-    spellings |= {synonym: name for synonym, name in (synonyms or {}).items() if name in choices}
-    matches = get_close_matches(word[:64].lower(), list(spellings), n=1, cutoff=0.6)
-    if not choices:
-        return "none are defined"
-    return safe_text(did_you_mean(spellings[matches[0]] if matches else word[:64], choices[:1000]), 800)
-
-
 def expected(text: str) -> WrapValidator:
     """Replace the message of pydantic's own errors about a value; errors inside the value are not changed.
 
@@ -204,7 +183,7 @@ def known_name(description: str, choices_of: Callable[[ValidationInfo], Sequence
             return value
         expectation = f"the name of {description}"
         if isinstance(value, str):
-            expectation = f"{description}; {suggest(value, choices)}"
+            expectation = f"{description}; {did_you_mean(value, choices)}"
         return str(_raise_or_skip(info, mismatch_error(value, expectation), ""))
 
     return BeforeValidator(check)

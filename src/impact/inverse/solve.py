@@ -37,7 +37,6 @@ from ..errors import UsageError, did_you_mean
 from ..formatting import number, quantity
 from ..results.single_impact import open_source, single_point
 from ..results.sweep import sweep_in_memory
-from ..text import safe_text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -207,9 +206,7 @@ def unknown_of(model: ForceModel, name: str) -> Parameter:
     if "e" in model.quantities:
         unknowns["e"] = Parameter("e", "1", "restitution to ask for", default=0.5, least=0.0, most=1.0)
     if name not in unknowns:
-        raise UsageError(
-            f'--for: {model.key} has no parameter "{safe_text(name)}"; {did_you_mean(name, list(unknowns))}'
-        )
+        raise UsageError(f'--for: {model.key} has no parameter "{name}"; {did_you_mean(name, list(unknowns))}')
     return unknowns[name]
 
 
@@ -234,9 +231,9 @@ def check_target(target: Mapping[str, float]) -> tuple[str, float]:
         raise UsageError(f"--target: got {len(target)} targets, expected one, such as e_out=0.6")
     ((name, value),) = target.items()
     if name not in names:
-        raise UsageError(f'--target: no output "{safe_text(name)}"; {did_you_mean(name, names)}')
+        raise UsageError(f'--target: no output "{name}"; {did_you_mean(name, names)}')
     if not (isinstance(value, int | float) and math.isfinite(value)):
-        raise UsageError(f"--target {name}: got {safe_text(str(value))}, expected a finite number")
+        raise UsageError(f"--target {name}: got {value}, expected a finite number")
     return name, float(value)
 
 

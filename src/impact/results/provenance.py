@@ -119,7 +119,7 @@ def check_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str)
         )
         ways = " and ".join(sorted({_how_to_supply(record) for record in missing.values()}))
         again = "it" if len(missing) == 1 else "them"
-        raise UsageError(f"{safe_text(name)}: made with {safe_text(named)}; give {again} again with {ways}")
+        raise UsageError(f"{name}: made with {safe_text(named)}; give {again} again with {ways}")
 
 
 def changed_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str) -> tuple[str, ...]:
