@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from ..array_types import Array
 from ..errors import ModelError, UsageError, did_you_mean
-from ..text import safe_text
 from .formula import Formula, argument_names
 from .model import ForceModel
 from .motion import MotionLaw, force_at_peak, indentation, unloading_state
@@ -109,7 +108,7 @@ class FixedStepResult:
 def check_scheme(model: ForceModel, n: float, scheme: str) -> None:
     """Raise a UsageError if there is no such scheme, or if it does not take the law."""
     if scheme not in SCHEMES:
-        raise UsageError(f'no scheme "{safe_text(scheme)}"; {did_you_mean(scheme, list(SCHEMES))}')
+        raise UsageError(f'no scheme "{scheme}"; {did_you_mean(scheme, list(SCHEMES))}')
     if not has_scheme(model, n, scheme):
         raise UsageError(law_problem(model, scheme))
 

@@ -17,7 +17,6 @@ from ..contact.variables import HISTORY, OUTPUTS
 from ..errors import ConfigError, UsageError, did_you_mean
 from ..formatting import heading, number
 from ..results.schema import plain_unit
-from ..text import safe_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -44,11 +43,9 @@ def check_table(path: Path, form: str) -> None:
     """
     if path.suffix.lower() not in TABLE_SUFFIXES:
         *most, last = TABLE_SUFFIXES
-        raise UsageError(
-            f"--data {safe_text(str(path))}: expected a name that ends in {', '.join(most)} or {last}"
-        )
+        raise UsageError(f"--data {path}: expected a name that ends in {', '.join(most)} or {last}")
     if form not in TABLE_FORMS:
-        raise UsageError(f"--data-form: got {safe_text(form)}, expected {' or '.join(TABLE_FORMS)}")
+        raise UsageError(f"--data-form: got {form}, expected {' or '.join(TABLE_FORMS)}")
 
 
 def encode_table(plot_data: PlotData, suffix: str, form: str = "wide") -> bytes:
@@ -117,7 +114,7 @@ class Points:
         if panel.x_name not in self.columns or not shown:
             needs = f"{panel.x_name} and {' or '.join(variables)}"
             has = ", ".join(self.columns)
-            raise UsageError(f"{self.source}: the picture shows {safe_text(needs)}, and the points have {has}")
+            raise UsageError(f"{self.source}: the picture shows {needs}, and the points have {has}")
         if SIGMA in self.columns and len(shown) > 1:
             raise UsageError(f"{self.source}: {SIGMA} of which, {' or '.join(shown)}? expected one of them")
         artists: dict[str, Artist] = {}

@@ -130,7 +130,7 @@ def extend_to_file(
     plugin_set = read_plugins(plugins)
     with run.connected() as connected:
         outcome = _extend_into(target, source, overrides, plugin_set, connected)
-    run.check_stop(f"{safe_text(str(target))} is complete")
+    run.check_stop(f"{target} is complete")
     return outcome
 
 
@@ -141,7 +141,7 @@ def _extend_into(output: Path, source: Path, overrides: Sequence[str], plugins: 
     values of points and no trajectories: those of all new points are integrated, also where a point of the result
     had the same one.
     """
-    name = safe_text(str(source))
+    name = str(source)
     before = open_result(source)
     table = table_of_result(before)
     require_sweep(before, "extend")
@@ -252,7 +252,7 @@ def _check_changes(old: Plan, new: Plan, name: str) -> None:
     ]
     if changed or moved:
         raise UsageError(
-            f"{name}: --set changes {safe_text(', '.join([*changed, *moved]))}, expected more values of an axis, "
+            f"{name}: --set changes {', '.join([*changed, *moved])}, expected more values of an axis, "
             "such as --set 'sweep.m2=[1.0, 2.0]', or more models"
         )
     if old.models == new.models and old.config.axes == new.config.axes:
@@ -292,11 +292,11 @@ def _axis_positions(axis: Axis, old: Inputs, name: str) -> _AxisPositions:
     """
     axes = {axis_number for column in axis.columns for axis_number in old.axes_of(column)}
     if len(axes) > 1:
-        shown = safe_text(", ".join(map(str, axis.columns)))
+        shown = ", ".join(map(str, axis.columns))
         raise UsageError(f"{name}: {shown} vary together now and did not before; sweep the new config")
     numbered = {old.axes[axis_number].numbered for axis_number in axes}
     if numbered - {axis.numbered}:
-        raise UsageError(f"{name}: the points of {safe_text(axis.name)} had other labels; sweep the new config")
+        raise UsageError(f"{name}: the points of {axis.name} had other labels; sweep the new config")
     columns = [np.atleast_1d(old.values(column)).tolist() for column in axis.columns]
     size = max(map(len, columns))
     before = [*zip(*(values * size if len(values) == 1 else values for values in columns), strict=True)]
@@ -306,7 +306,7 @@ def _axis_positions(axis: Axis, old: Inputs, name: str) -> _AxisPositions:
         changed = [number for number, row in enumerate(before) if rows[number : number + 1] != [row]]
         if changed:
             raise UsageError(
-                f"{name}: --set changes {safe_text(axis.name)} {changed[0]}, expected the cases that the result "
+                f"{name}: --set changes {axis.name} {changed[0]}, expected the cases that the result "
                 "has, in their order, and more after them"
             )
         positions = [number if number < size else -1 for number in range(axis.size)]

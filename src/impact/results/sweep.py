@@ -40,7 +40,6 @@ from ..engine.trajectories import (
     trajectory_ranges,
 )
 from ..errors import ResultError, StoreError, UnfinishedError, UsageError
-from ..text import safe_text
 from .factored import factored_template, stored_stiffness, table_values
 from .netcdf import MAX_LABEL_BYTES, encode_text, is_text
 from .plausibility import material_notes
@@ -215,16 +214,15 @@ def sweep_to_file(
     run = Run(backend or SERIAL, resume, overwrite, max_points, on_progress, on_note, should_stop)
     plan = prepare(source, overrides, plugins, run)
     output = Path(output)
-    shown = safe_text(str(output))
     outcome = None if overwrite else find_finished(output, plan)
     if outcome is not None:
         checkpoint.remove_stale_work_folder(output, plan)
-        run.check_stop(f"{shown} already contains this sweep")
+        run.check_stop(f"{output} already contains this sweep")
         return outcome
     check_outputs([output], [source, *plugins, *plan.config.files], overwrite=overwrite)
     with run.connected() as connected:
         outcome = sweep_into(output, plan, connected)
-    run.check_stop(f"{shown} is complete")
+    run.check_stop(f"{output} is complete")
     return outcome
 
 
@@ -368,7 +366,7 @@ def reload_range(work_folder: checkpoint.WorkFolder, trajectory_range: Trajector
     """Load a finished range, or raise a `StoreError` if it is damaged."""
     collisions = work_folder.load(trajectory_range)
     if collisions is None:
-        raise StoreError(f"{safe_text(str(work_folder.path(trajectory_range.number)))}: can no longer be read")
+        raise StoreError(f"{work_folder.path(trajectory_range.number)}: can no longer be read")
     return collisions
 
 
@@ -385,9 +383,7 @@ def check_labels(plan: Plan) -> None:
     columns = [name for axis in plan.config.axes for name in axis.columns]
     odd = [name for name in columns if InputName.parse(name).material and not is_name(name)]
     if odd:
-        raise UsageError(
-            f"{safe_text(odd[0])}: expected a material name without spaces and slashes, to be an axis"
-        )
+        raise UsageError(f"{odd[0]}: expected a material name without spaces and slashes, to be an axis")
     coordinates = plan_coordinates(plan).values()
     size = sum(encode_text(coordinate).size for coordinate in coordinates if is_text(coordinate))
     if size > MAX_LABEL_BYTES:

@@ -98,12 +98,10 @@ def save(
     """
     path = Path(path)
     if "schema_version" not in dataset.attrs:
-        raise UsageError(
-            f"{safe_text(str(path))}: this dataset is not a result of impact: it has no schema_version"
-        )
+        raise UsageError(f"{path}: this dataset is not a result of impact: it has no schema_version")
     violation = schema_violation(dataset)
     if violation:
-        raise UsageError(f"{safe_text(str(path))}: {violation}; dataset.to_netcdf(path) stores any dataset")
+        raise UsageError(f"{path}: {violation}; dataset.to_netcdf(path) stores any dataset")
     check_output(path, overwrite=overwrite)
 
     def parts() -> Iterator[tuple[str, tuple[slice, ...], NDArray[Any]]]:
@@ -147,7 +145,7 @@ def check_readable(sink: Sink, path: Path) -> None:
         with h5py.File(sink, "r") as file:
             read_variables(file, read)
     except ResultError as error:
-        raise UsageError(f"{safe_text(str(path))}: could not be read again: {error}") from None
+        raise UsageError(f"{path}: could not be read again: {error}") from None
 
 
 def open_result(path: str | Path) -> xr.Dataset:
