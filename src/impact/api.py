@@ -24,7 +24,7 @@ from .contact.powers import power as power
 from .engine.plan import Plan
 from .engine.plugins import read_plugins
 from .errors import ImpactError as ImpactError, UsageError, did_you_mean
-from .results.single_impact import STARTER_CONFIG, Impact as Impact, run_single_impact, single_point
+from .results.single_impact import STARTER_CONFIG, Impact as Impact, open_source, run_single_impact, single_point
 from .results.xarray_backend import load as load, save as save
 from .text import html_table, safe_text
 
@@ -66,7 +66,7 @@ def run(
     if times is not None and times < 2:
         raise UsageError(f"times: got {times}, expected a whole number >= 2")
     plugin_set = read_plugins(plugins)
-    config, first = single_point(source, overrides, plugin_set, model, at)
+    config, first = single_point(open_source(source, overrides, plugin_set), model, at)
     return run_single_impact(Plan(config, plugin_set.of(config.models)), first, times)
 
 

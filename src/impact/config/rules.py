@@ -22,6 +22,11 @@ def _sets_stiffness(draft: Draft, model: ForceModel) -> bool:
     return "K" in as_table(draft.table("model").get(model.key))
 
 
+def has_other_stiffness(draft: Draft, model: ForceModel) -> bool:
+    """Whether K of [sweep] has another unit than that of a model, because the model has its own exponent."""
+    return model.exponent not in (None, draft.exponent) and not _sets_stiffness(draft, model)
+
+
 def materials_of(draft: Draft, ball: str) -> list[str]:
     """List the names of the materials that a ball, "1" or "2", may have."""
     sweep = draft.table("sweep")
@@ -94,7 +99,7 @@ def _stiffness_problems(draft: Draft) -> Iterable[ConfigProblem]:
             "its unit N/m^n depends on n, which is an axis; expected one K for each n, zipped with it",
         )
     for model in draft.models:
-        if model.exponent is not None and model.exponent != n and not _sets_stiffness(draft, model):
+        if has_other_stiffness(draft, model):
             exponent = "an axis n" if n is None else f"n = {n:g}"
             # setting n of the sweep helps unless two models have different fixed exponents
             serves = n is not None and {other.exponent for other in draft.models} <= {None, model.exponent}

@@ -23,7 +23,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import NamedTuple
 
-from ..config.quantities import show
+from ..config.quantities import as_text
 from ..contact.model import ForceModel
 from ..contact.models import catalogue
 from ..errors import NOT_OF_A_PLUGIN, ImpactError, ModelError, UsageError
@@ -202,11 +202,13 @@ def _check_storable(model: ForceModel, name: str) -> None:
     for field, text in texts.items():
         if not isinstance(text, str) or re.search("[\0\ud800-\udfff]", text):
             raise ModelError(
-                f"{name}: model {model.key}: {field}: got {show(text)}, expected text without NUL and "
+                f"{name}: model {model.key}: {field}: got {as_text(text)}, expected text without NUL and "
                 "lone surrogates"
             )
     if not isinstance(model.year, int) or not 0 <= model.year <= 9999:
-        raise ModelError(f"{name}: model {model.key}: year: got {show(model.year)}, expected a year, such as 2026")
+        raise ModelError(
+            f"{name}: model {model.key}: year: got {as_text(model.year)}, expected a year, such as 2026"
+        )
 
 
 def _plugins_of_file(source: PythonFile) -> list[Plugin]:
