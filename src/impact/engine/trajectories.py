@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..contact.deduplicate import deduplicate
+from ..contact.dimensionless import dimensionless_values, exponent_names
 from ..contact.impacts import CHECKS, check_inputs
 from ..contact.model import ForceModel
-from ..contact.scaling import dimensionless_values, exponent_names
 from ..errors import UsageError
 from .build_impacts import build_impacts, fixed_steps_at
 from .plan import Index, Inputs, Plan, dimensions
