@@ -24,12 +24,12 @@ from .contact.powers import power as power
 from .engine.plan import Plan
 from .engine.plugins import read_plugins
 from .errors import ImpactError as ImpactError, UsageError, did_you_mean
-from .results.single_impact import STARTER_CONFIG, Impact as Impact, run_single_impact, single_point
+from .results.single_impact import STARTER_CONFIG, Impact as Impact, open_source, run_single_impact, single_point
 from .results.xarray_backend import load as load, save as save
 from .text import html_table, safe_text
 
 if TYPE_CHECKING:
-    from .contact.checks import Finding
+    from .contact.checks import ClauseResult
 
 
 def run(
@@ -66,7 +66,7 @@ def run(
     if times is not None and times < 2:
         raise UsageError(f"times: got {times}, expected a whole number >= 2")
     plugin_set = read_plugins(plugins)
-    config, first = single_point(source, overrides, plugin_set, model, at)
+    config, first = single_point(open_source(source, overrides, plugin_set), model, at)
     return run_single_impact(Plan(config, plugin_set.of(config.models)), first, times)
 
 
@@ -138,12 +138,12 @@ def _contains(model: ForceModel, words: Sequence[str]) -> bool:
     return all(word in text for word in words)
 
 
-def check_model(model: ForceModel) -> list[Finding]:
+def check_model(model: ForceModel) -> list[ClauseResult]:
     """Check a model, such as a plug-in, against every clause of the contract, with forty dissimilar impacts.
 
     Returns
     -------
-    list of Finding : the clause, the largest deviation, its bound, and whether the clause holds
+    list of ClauseResult : the clause, the largest deviation, its bound, and whether the clause holds
 
     Warns
     -----
@@ -154,9 +154,9 @@ def check_model(model: ForceModel) -> list[Finding]:
     True
     """
     # its module integrates, which a program that only imports impact does without
-    from .contact.checks import contract
+    from .contact.checks import check_contract
 
-    return list(contract(model))
+    return list(check_contract(model))
 
 
 def materials() -> dict[str, dict[str, float | str]]:

@@ -35,7 +35,7 @@ from ..engine.plan import Inputs, Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..errors import UsageError, did_you_mean
 from ..formatting import number, quantity
-from ..results.single_impact import single_point
+from ..results.single_impact import open_source, single_point
 from ..results.sweep import sweep_in_memory
 
 if TYPE_CHECKING:
@@ -185,8 +185,8 @@ def solve(
     plugin_set = read_plugins(plugins)
     law = find(model, plugin_set.models)
     unknown = unknown_of(law, name)
-    changes = [*placeholder_override(law, unknown), *overrides]
-    config, _ = single_point(source, changes, plugin_set, model, at, over)
+    inputs = {**placeholder(law, unknown), **(at or {})}
+    config, _ = single_point(open_source(source, overrides, plugin_set), model, inputs, over)
     return solve_input(config, plugin_set.of(config.models), unknown, target)
 
 
@@ -210,13 +210,13 @@ def unknown_of(model: ForceModel, name: str) -> Parameter:
     return unknowns[name]
 
 
-def placeholder_override(model: ForceModel, unknown: Parameter) -> list[str]:
-    """The override that gives the unknown a valid value, so that the config needs none."""
+def placeholder(model: ForceModel, unknown: Parameter) -> dict[str, float]:
+    """Give the unknown a valid value by its config name, so that the config needs none."""
     if unknown.name == "K":
-        return []
+        return {}
     value = next((v for v in (unknown.default, unknown.typical) if v is not None), 1.0)
-    value = min(max(value, unknown.least), unknown.most)
-    return [f"sweep.e={value!r}" if unknown.name == "e" else f"model.{model.key}.{unknown.name}={value!r}"]
+    name = "e" if unknown.name == "e" else f"{model.key}.{unknown.name}"
+    return {name: min(max(value, unknown.least), unknown.most)}
 
 
 def check_target(target: Mapping[str, float]) -> tuple[str, float]:
