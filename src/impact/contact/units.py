@@ -54,10 +54,6 @@ def dimension(unit: str, values: Mapping[str, Array | float]) -> Dimension:
     Dimension(mass=1.0, length=-0.5, time=-2.0)
     >>> dimension("N s^p/m^(n+p)", {"n": 1.5, "p": 2.0})
     Dimension(mass=1.0, length=-2.5, time=0.0)
-
-    Raises
-    ------
-    ModelError : the unit is not a product of powers of kg, m, s, N, Pa, J, Hz, 1, or an exponent has no value
     """
     total: list[Array | float] = [0.0, 0.0, 0.0]
     position = 0
@@ -110,12 +106,7 @@ def _exponent_value(text: str, values: Mapping[str, Array | float], unit: str) -
 
 
 def _evaluate(node: ast.expr, values: Mapping[str, Array | float]) -> Array | float:
-    """The value of an expression.
-
-    Raises
-    ------
-    KeyError : a part of it is neither a number, a name of `values` nor + - * /
-    """
+    """The value of an expression."""
     match node:
         case ast.Constant(value=int() | float() as number):
             return float(number)
