@@ -256,7 +256,7 @@ def _rank_key(ranked: Ranked) -> tuple[float, ...]:
 
 
 def _asks_for_e(dataset: xr.Dataset) -> bool:
-    """Whether any point has a target e."""
+    """Check whether any point has a target e."""
     e, _ = distinct_points(dataset, "e")
     return any(not np.isnan(e.isel(where).values).all() for where in slabs(e.sizes))
 
@@ -268,7 +268,7 @@ def _select_model(dataset: xr.Dataset, position: int) -> xr.Dataset:
 
 
 def _reduce_dims(of_model: xr.Dataset) -> tuple[xr.Dataset, int]:
-    """The ranked variables of a model, over the axes along which they or e vary, and the weight of each point."""
+    """Keep the axes along which the ranked variables or e vary; return also the weight of each point."""
     along_one = of_model.variables["e"].ndim == 1
     return over_varying_dims(
         of_model, RANKED_VARIABLES, *(of_model.variables["e"].dims if along_one else varying_dims(of_model, "e"))
@@ -300,7 +300,7 @@ def _judge_slab(evaluated: xr.Dataset, where: Slab, sizes: Mapping[Hashable, int
 
 
 def _best_parameters(of_model: xr.Dataset, parameter_dims: Sequence[Hashable], tol: float) -> dict[Hashable, int]:
-    """The index on each axis of a model's own parameters at which it ranks best over all other axes."""
+    """Find the index on each axis of a model's own parameters at which it ranks best over all other axes."""
     evaluated, _ = over_varying_dims(of_model, RANKED_VARIABLES, *parameter_dims, *varying_dims(of_model, "e"))
     shape = tuple(evaluated.sizes[dim] for dim in parameter_dims)
     if math.prod(shape) > MAX_PARAMETER_COMBINATIONS:
@@ -326,13 +326,13 @@ def _best_parameters(of_model: xr.Dataset, parameter_dims: Sequence[Hashable], t
 
 
 def _varies_parameters(of_model: xr.Dataset, dim: Hashable) -> bool:
-    """Whether only parameters of the model, and perhaps of others, vary along a dimension."""
+    """Check whether only parameters of the model, and perhaps of others, vary along a dimension."""
     models = {InputName.parse(name).model for name in columns_along(of_model, dim)}
     return str(of_model["model"].item()) in models and "" not in models
 
 
 def _rank_model(of_model: xr.Dataset, tol: float) -> Ranked:
-    """The rank of a model, from its e_error and status and from the target e."""
+    """Rank a model by its e_error, its status and the target e."""
     key = str(of_model["model"].item())
     parameter_dims = [dim for dim in of_model.variables["e_error"].dims if _varies_parameters(of_model, dim)]
     best = _best_parameters(of_model, parameter_dims, tol) if parameter_dims else {}
@@ -394,7 +394,7 @@ def _rank_model(of_model: xr.Dataset, tol: float) -> Ranked:
 
 
 def _read_slab(variable: xr.Variable, where: Slab, sizes: Mapping[Hashable, int]) -> NDArray[Any]:
-    """The values of a slab, with all dimensions in the order of `sizes`."""
+    """Read the values of a slab, with all dimensions in the order of `sizes`."""
     part = variable.isel({dim: where[dim] for dim in variable.dims})
     shape = {dim: where[dim].stop - where[dim].start for dim in sizes}
     return np.asarray(xr.Variable(part.dims, part.values).set_dims(shape).values)  # type: ignore[no-untyped-call]
@@ -423,7 +423,7 @@ def _exact_sum(values: NDArray[np.float64]) -> Fraction:
 
 
 def _swept_inputs(of_model: xr.Dataset, positions: Mapping[Hashable, int]) -> dict[str, float | str]:
-    """The swept inputs at a position along each axis, without the parameters of other models."""
+    """List the swept inputs at a position along each axis, without the parameters of other models."""
     variables, key = of_model.variables, str(of_model["model"].item())
     return {
         name: variables[name].values[position].item()
@@ -434,7 +434,7 @@ def _swept_inputs(of_model: xr.Dataset, positions: Mapping[Hashable, int]) -> di
 
 
 def _served_ranges(e: NDArray[Any], asked: Mask, missed: Mask) -> tuple[tuple[float, float], ...]:
-    """The ranges of neighbouring values of e at which every point that counts is within the tolerance."""
+    """Find the ranges of neighbouring values of e at which every point that counts is within the tolerance."""
     # sorted, each value once: several combinations of alpha and speeds may give the same e
     values, value_index = np.unique(e[asked], return_inverse=True)
     served = np.bincount(value_index, missed[asked], values.size) == 0

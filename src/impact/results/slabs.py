@@ -64,17 +64,17 @@ def _tiles(sizes: Mapping[Hashable, int], lengths: Sequence[int]) -> Iterator[Sl
 
 
 def is_lazy(variable: xr.Variable) -> bool:
-    """Whether the values of a variable are computed, or read, when they are indexed."""
+    """Check whether the values of a variable are computed, or read, when they are indexed."""
     return not variable._in_memory
 
 
 def is_computed(variable: xr.Variable) -> bool:
-    """Whether a variable is computed when it is indexed, and the axes along which it varies are known."""
+    """Check whether a variable is computed when it is indexed, and the axes along which it varies are known."""
     return is_lazy(variable) and VARIES_ALONG in variable.encoding
 
 
 def is_large(variable: xr.Variable) -> bool:
-    """Whether a variable is lazy and has more values than one slab."""
+    """Check whether a variable is lazy and has more values than one slab."""
     return is_lazy(variable) and variable.size > SLAB_POINTS
 
 
@@ -96,12 +96,7 @@ def varying_dims(dataset: xr.Dataset, name: str) -> tuple[Hashable, ...]:
 
 
 def distinct_points(dataset: xr.Dataset, name: str) -> tuple[xr.Variable, int]:
-    """A variable, reduced to the first position along each dimension on which it does not vary.
-
-    Returns
-    -------
-    (xarray.Variable, int) : with all dimensions of the variable, and the weight of each of its points
-    """
+    """Take the first position along dimensions on which a variable does not vary; return also the weight."""
     varying, variable = varying_dims(dataset, name), dataset.variables[name]
     fixed = [dim for dim in variable.dims if dim not in varying]
     weight = math.prod(variable.sizes[dim] for dim in fixed)
@@ -109,16 +104,7 @@ def distinct_points(dataset: xr.Dataset, name: str) -> tuple[xr.Variable, int]:
 
 
 def over_varying_dims(dataset: xr.Dataset, names: Sequence[str], *more: Hashable) -> tuple[xr.Dataset, int]:
-    """Some variables over the dimensions along which any of them varies, and the weight of each point.
-
-    The other dimensions are at their first position.
-
-    Parameters
-    ----------
-    dataset : a result
-    names : of the variables
-    more : dimensions that are never reduced
-    """
+    """Reduce variables to dimensions along which any of them varies, and some `more`; return also the weight."""
     varying = {*more, *(dim for name in names for dim in varying_dims(dataset, name))}
     dims = dict.fromkeys(dim for name in names for dim in dataset.variables[name].dims)
     fixed = [dim for dim in dims if dim not in varying]
