@@ -22,7 +22,7 @@ from .._version import __version__
 from ..array_types import Array
 from ..config.grid import Axis
 from ..config.input_names import is_input
-from ..contact.formula import Formula
+from ..contact.formula_calls import Formula
 from ..contact.materials import Material
 from ..contact.model import Law, Parameter
 from ..contact.simulate import TABLE_COLUMNS, CollisionResult

@@ -24,7 +24,7 @@ Slab = dict[Hashable, slice]
 
 
 def slabs(sizes: Mapping[Hashable, int], points: int = SLAB_POINTS) -> Iterator[Slab]:
-    """All points in C order, in slabs of at most `points` points.
+    """Divide all points, in C order, into slabs of at most `points` points.
 
     >>> list(slabs({"e": 2, "v1": 3}, 2))[:2]
     [{'e': slice(0, 1, None), 'v1': slice(0, 2, None)}, {'e': slice(0, 1, None), 'v1': slice(2, 3, None)}]
@@ -42,7 +42,7 @@ def slabs(sizes: Mapping[Hashable, int], points: int = SLAB_POINTS) -> Iterator[
 def aligned_slabs(
     sizes: Mapping[Hashable, int], lengths: Sequence[int], points: int = SLAB_POINTS
 ) -> Iterator[Slab]:
-    """All points, in slabs of whole chunks with the given lengths along the axes, of about `points` points.
+    """Divide all points into slabs of about `points` points, of whole chunks with the given lengths.
 
     >>> [where["v1"] for where in aligned_slabs({"e": 2, "v1": 4}, (2, 2), 4)]
     [slice(0, 2, None), slice(2, 4, None)]
@@ -64,25 +64,22 @@ def _tiles(sizes: Mapping[Hashable, int], lengths: Sequence[int]) -> Iterator[Sl
 
 
 def is_lazy(variable: xr.Variable) -> bool:
-    """Check whether the values of a variable are computed, or read, when they are indexed."""
+    """Whether the values of a variable are computed, or read, when they are indexed."""
     return not variable._in_memory
 
 
 def is_computed(variable: xr.Variable) -> bool:
-    """Check whether a variable is computed when it is indexed, and the axes along which it varies are known."""
+    """Whether a variable is computed when it is indexed, and the axes along which it varies are known."""
     return is_lazy(variable) and VARIES_ALONG in variable.encoding
 
 
 def is_large(variable: xr.Variable) -> bool:
-    """Check whether a variable is lazy and has more values than one slab."""
+    """Whether a variable is lazy and has more values than one slab."""
     return is_lazy(variable) and variable.size > SLAB_POINTS
 
 
 def varying_dims(dataset: xr.Dataset, name: str) -> tuple[Hashable, ...]:
-    """The dimensions along which a variable varies, as far as known; all dimensions of one in memory.
-
-    They depend on the model: call it for one model at a time, `dataset.isel(model=number)`.
-    """
+    """Name the dimensions along which a variable of one model varies, as far as known; all of one in memory."""
     variable = dataset.variables[name]
     if not is_computed(variable) or "model" not in dataset.coords:
         return variable.dims
@@ -96,7 +93,7 @@ def varying_dims(dataset: xr.Dataset, name: str) -> tuple[Hashable, ...]:
 
 
 def distinct_points(dataset: xr.Dataset, name: str) -> tuple[xr.Variable, int]:
-    """Take the first position along dimensions on which a variable does not vary; return also the weight."""
+    """Reduce a variable to the points at which it differs; the second result is the weight of each of them."""
     varying, variable = varying_dims(dataset, name), dataset.variables[name]
     fixed = [dim for dim in variable.dims if dim not in varying]
     weight = math.prod(variable.sizes[dim] for dim in fixed)
@@ -104,7 +101,7 @@ def distinct_points(dataset: xr.Dataset, name: str) -> tuple[xr.Variable, int]:
 
 
 def over_varying_dims(dataset: xr.Dataset, names: Sequence[str], *more: Hashable) -> tuple[xr.Dataset, int]:
-    """Reduce variables to dimensions along which any of them varies, and some `more`; return also the weight."""
+    """Reduce variables to the dimensions along which any varies, and `more`; with the weight of each point."""
     varying = {*more, *(dim for name in names for dim in varying_dims(dataset, name))}
     dims = dict.fromkeys(dim for name in names for dim in dataset.variables[name].dims)
     fixed = [dim for dim in dims if dim not in varying]
