@@ -24,7 +24,7 @@ from .results.xarray_backend import load as load, save as save
 from .text import html_table, safe_text
 
 if TYPE_CHECKING:
-    from .contact.checks import Finding
+    from .contact.checks import ClauseResult
 
 
 class Models(dict[str, ForceModel]):
@@ -95,12 +95,12 @@ def _contains(model: ForceModel, words: Sequence[str]) -> bool:
     return all(word in text for word in words)
 
 
-def check_model(model: ForceModel) -> list[Finding]:
+def check_model(model: ForceModel) -> list[ClauseResult]:
     """Check a model, such as a plug-in, against every clause of the contract, with forty dissimilar impacts.
 
     Returns
     -------
-    list of Finding : the clause, the largest deviation, its bound, and whether the clause holds
+    list of ClauseResult : the clause, the largest deviation, its bound, and whether the clause holds
 
     Warns
     -----
@@ -111,6 +111,6 @@ def check_model(model: ForceModel) -> list[Finding]:
     True
     """
     # its module integrates, which a program that only imports impact does without
-    from .contact.checks import contract
+    from .contact.checks import check_contract
 
-    return list(contract(model))
+    return list(check_contract(model))

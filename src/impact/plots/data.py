@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..config.columns import columns_of_table, read_csv
-from ..config.quantities import Quantity, show
+from ..config.quantities import Quantity, as_text
 from ..config.tables import SWEEP_QUANTITIES
 from ..contact.variables import HISTORY, OUTPUTS
 from ..errors import ConfigError, UsageError, did_you_mean
@@ -154,7 +154,7 @@ def read_points(points: str | Path | pd.DataFrame | xr.Dataset) -> Points:
     variable = ""
     for name in columns.units:
         if name not in quantities:
-            raise ConfigError(columns.problem(f"got {show(name)}; {did_you_mean(name, sorted(quantities))}"))
+            raise ConfigError(columns.problem(f"got {as_text(name)}; {did_you_mean(name, sorted(quantities))}"))
         quantity, unit = quantities[name], ""
         if name == SIGMA and variable:
             quantity, unit = replace(quantity, unit=quantities[variable].unit), columns.units[variable]

@@ -21,8 +21,8 @@ from ..config.load import Config, build, inline_files
 from ..config.rules import has_other_stiffness
 from ..config.starter import STARTER_CONFIG
 from ..config.tables import MATERIAL_QUANTITIES, SWEEP_DEFAULTS, expand_models, model_quantities
-from ..contact.force_expressions import returning, stiffer
-from ..contact.history import History, follow
+from ..contact.force_expressions import unload_to_residual, unload_with_stiffness
+from ..contact.history import History, integrate_history
 from ..contact.impacts import Impacts
 from ..contact.materials import Material
 from ..contact.model import ForceModel
@@ -207,7 +207,7 @@ def run_single_impact(plan: Plan, first: tuple[str, ...], times: int | None = No
     ----------
     plan : without axes
     first : names of axes of the source that are at their first value
-    times : number of points in time of the history, see `impact.contact.history.follow`
+    times : number of points in time of the history, see `impact.contact.history.integrate_history`
     """
     config = plan.config
     law = config.models[0]
@@ -228,7 +228,11 @@ def run_single_impact(plan: Plan, first: tuple[str, ...], times: int | None = No
         warnings.warn(error, stacklevel=2)
     # a history is that of the continuous law
     going = values["status"] == Status.OK and solver.integrator == EXACT
-    history = follow(law, impacts, rtol=solver.rtol, max_steps=solver.max_steps, times=times) if going else None
+    history = (
+        integrate_history(law, impacts, rtol=solver.rtol, max_steps=solver.max_steps, times=times)
+        if going
+        else None
+    )
     v0 = impacts.v0[0].item()
     # a law may have its own n, which replaces that of the config
     point = {**config.scalars, "n": impacts.n[0].item()}
@@ -257,7 +261,10 @@ def _derived_quantities(
 ) -> dict[str, float]:
     """The values of DERIVED_QUANTITIES."""
     quantities = {name: getattr(impacts, name)[0].item() for name in ("m1", "m2", "R1", "R2", "m")}
-    if law.unloading in (returning, stiffer) and values["status"] in (Status.OK, Status.LIMIT):
+    if law.unloading in (unload_to_residual, unload_with_stiffness) and values["status"] in (
+        Status.OK,
+        Status.LIMIT,
+    ):
         recovered = values["peak_indentation"] - values["permanent_indentation"]
         quantities["K_r"] = values["peak_force"] / recovered ** impacts.n[0].item() if recovered else math.inf
     if history is not None:
