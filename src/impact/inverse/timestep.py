@@ -20,10 +20,10 @@ from scipy.optimize import elementwise
 
 from ..array_types import Array
 from ..config.load import Config
+from ..contact.dimensionless import dimensionless_values
 from ..contact.impacts import Impacts
 from ..contact.model import ForceModel
 from ..contact.outputs import collide
-from ..contact.scaling import dimensionless_values
 from ..contact.status import FIRST_FAILURE, Status
 from ..contact.timestep import (
     KICK_DRIFT,
