@@ -1,4 +1,8 @@
-"""The time history of an impact, and three restitutions computed from it independently."""
+"""The time history of an impact, and three restitutions computed from it independently.
+
+The history samples the interpolant of the integrator. Force and power are integrated over each step by Gauss
+points, independently of the quadratures of the integrator, and give the restitutions of equations (2) and (3).
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,10 @@
-"""Simulate collisions: dimensionless impacts through both phases, each distinct one integrated once."""
+"""Simulate collisions: dimensionless impacts through both phases, each distinct one integrated once.
+
+In units of m, v₀ and δ* = (m v₀²/K)^(1/(n+1)) the motion of every law is x'' = −f(x, x'; groups), x(0) = 0,
+x'(0) = 1, where the groups are a few pure numbers, such as χ. Impacts with the same groups are one trajectory. It
+ends its approach at zero velocity, where a law with an unloading branch changes to it, and its restitution at zero
+indentation or zero force, as the law declares. For the coordinates see `impact.contact.motion`.
+"""
 
 from __future__ import annotations
 

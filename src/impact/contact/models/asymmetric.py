@@ -1,4 +1,4 @@
-"""Laws with different forces on approach and on restitution, without a permanent indentation."""
+"""Asymmetric laws: different forces on approach and on restitution, without a permanent indentation."""
 
 from __future__ import annotations
 
