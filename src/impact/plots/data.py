@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import Field, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 from ..config.cases import COLUMN_HEADER, CsvTable, column_values, read_csv
 from ..config.quantities import Quantity, show
@@ -24,15 +22,58 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
-
-    from .curves import Panel
-    from .kinds import PlotData
+    from matplotlib.figure import Figure
 
 # suffixes of a table, and its forms
 TABLE_SUFFIXES = (".csv", ".tex", ".parquet")
 TABLE_FORMS = ("wide", "long")
 SIGMA = "sigma"
 MEASURED = "Measured"
+
+
+class PlotData(Protocol):
+    """The data of a picture: a frozen dataclass that makes its tables and draws itself."""
+
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
+    # whether measured points can be drawn over it
+    takes_points: ClassVar[bool]
+
+    @property
+    def title(self) -> str: ...
+
+    @property
+    def conditions(self) -> str: ...
+
+    @property
+    def not_drawn(self) -> tuple[str, ...]:
+        """What is left out, and why."""
+
+    @property
+    def panel_count(self) -> int: ...
+
+    @property
+    def names(self) -> set[str]:
+        """The names whose text a user can replace: axes, variables and models."""
+
+    def long_table(self) -> pd.DataFrame:
+        """Make a tidy table: a row for each point."""
+
+    def wide_table(self) -> pd.DataFrame:
+        """Make a table with a column for each curve, whose names are ASCII and have the unit."""
+
+    def place_panels(self, figure: Figure, width: float) -> tuple[list[Axes], float]:
+        """Add the axes of all panels to a figure; also returns the height of all panels [in]."""
+
+    def draw(
+        self, all_axes: Sequence[Axes], labels: Mapping[str, str], points: Points | None
+    ) -> list[tuple[Artist, str]]:
+        """Draw the panels; returns handles and names of the legend.
+
+        Parameters
+        ----------
+        labels : texts that replace those of axes, variables and laws, by name
+        points : measured points
+        """
 
 
 def check_table(path: Path, form: str) -> None:
@@ -52,24 +93,13 @@ def check_table(path: Path, form: str) -> None:
 
 
 def encode_table(plot_data: PlotData, suffix: str, form: str = "wide") -> bytes:
-    """The data of a picture as the bytes of a table; all digits are written, except to .tex.
-
-    Parameters
-    ----------
-    plot_data : the data
-    suffix : one of TABLE_SUFFIXES
-    form : "wide", one column per curve, whose names are ASCII and have the unit; or "long", one row per point
+    """Encode the data of a picture as the bytes of a table; all digits are written, except to .tex.
 
     Raises
     ------
     UsageError : the table needs a package that is not installed
     """
-    import pandas as pd
-
-    if form == "long":
-        frame = pd.DataFrame(plot_data.rows(), columns=list(plot_data.columns))
-    else:
-        frame = pd.DataFrame({name: pd.Series(values) for name, values in plot_data.table().items()})
+    frame = plot_data.long_table() if form == "long" else plot_data.wide_table()
     if suffix == ".tex":
         text: str = frame.to_latex(index=False, escape=True, na_rep="", float_format=number)
         return text.encode()
@@ -103,40 +133,7 @@ class Points:
     """Measured points: columns in SI, by the names of inputs, variables and sigma, and where they come from."""
 
     source: str
-    columns: Mapping[str, np.ndarray]
-
-    def draw(self, axes: Axes, panel: Panel) -> dict[str, Artist]:
-        """Draw the points over the curves of a panel, with error bars where there is a sigma.
-
-        Raises
-        ------
-        UsageError : the points lack what the panel shows
-        """
-        variables = list(dict.fromkeys(curve.variable for curve in panel.curves if curve.model))
-        shown = [name for name in variables if name in self.columns]
-        if panel.x_name not in self.columns or not shown:
-            needs = f"{panel.x_name} and {' or '.join(variables)}"
-            has = ", ".join(self.columns)
-            raise UsageError(f"{self.source}: the picture shows {safe_text(needs)}, and the points have {has}")
-        if SIGMA in self.columns and len(shown) > 1:
-            raise UsageError(f"{self.source}: {SIGMA} of which, {' or '.join(shown)}? expected one of them")
-        artists: dict[str, Artist] = {}
-        for index, name in enumerate(shown):
-            bars = axes.errorbar(
-                self.columns[panel.x_name],
-                self.columns[name],
-                self.columns.get(SIGMA),
-                color="black",
-                zorder=3,
-                marker="o",
-                markersize=4.0,
-                linestyle="none",
-                elinewidth=0.9,
-                capsize=2.0,
-                markerfacecolor="black" if index == 0 else "white",
-            )
-            artists[MEASURED if len(shown) == 1 else f"{MEASURED} {name}"] = bars[0]
-        return artists
+    columns: Mapping[str, tuple[float, ...]]
 
 
 def read_points(points: str | Path | pd.DataFrame | xr.Dataset) -> Points:
@@ -166,7 +163,7 @@ def read_points(points: str | Path | pd.DataFrame | xr.Dataset) -> Points:
     table = replace(table, units=units)
     return Points(
         table.name,
-        {name: np.array(column_values(table, name, quantities[name], None), float) for name in table.units},
+        {name: tuple(map(float, column_values(table, name, quantities[name], None))) for name in table.units},
     )
 
 
