@@ -12,7 +12,7 @@ import pytest
 
 SOURCE = Path(__file__).parent.parent / "src" / "impact"
 LAYERS = (
-    {"_version", "array_types", "atomic", "errors", "formatting", "text"},
+    {"_version", "array_types", "atomic", "display", "errors", "formatting", "text"},
     {"ode"},
     {"contact"},
     {"config"},
@@ -32,8 +32,8 @@ LAYERS = (
 HEIGHT = {part: height for height, parts in enumerate(LAYERS) for part in parts}
 # where each library may be imported
 LIBRARIES = {
-    "typer": {"cli"}, "rich": {"cli", "progress_display"}, "matplotlib": {"plots"}, "pandas": {"plots"},
-    "ipywidgets": {"plots"}, "jinja2": {"reporting"}, "markupsafe": {"reporting"},
+    "typer": {"cli"}, "rich": {"cli", "display", "progress_display"}, "matplotlib": {"plots"},
+    "pandas": {"display", "plots"}, "ipywidgets": {"plots"}, "jinja2": {"reporting"}, "markupsafe": {"reporting"},
     "xarray": {"results", "comparison", "inverse", "uncertainty", "pytest_plugin"},
     "h5py": {"results"}, "h5netcdf": {"results"}, "tomllib": {"config"}, "pydantic": {"config", "results"},
     "pydantic_core": {"config"},

@@ -10,7 +10,7 @@ import yaml
 
 import impact
 from impact.cli import exits
-from impact.config import cases, files, grid, quantities
+from impact.config import columns, files, grid, quantities
 from impact.results import netcdf
 from impact.results.schema import SCHEMA_VERSION
 
@@ -103,7 +103,7 @@ def test_the_limits_of_the_page_on_security_are_those_of_the_code() -> None:
     assert f"| {netcdf.MAX_ATTRIBUTE_VALUES}, {netcdf.MAX_ATTRIBUTE_BYTES // 10**6} MB |" in page
     assert f"| labels | {netcdf.MAX_LABEL_BYTES // 10**6} MB |" in page
     assert f"{netcdf.ALWAYS_ALLOWED_BYTES // 2**20} MiB" in page
-    assert f"| CSV table | {cases.MAX_CSV_BYTES // 10**6} MB |" in page
+    assert f"| CSV table | {columns.MAX_CSV_BYTES // 10**6} MB |" in page
     assert f"| config | {files.MAX_CONFIG_BYTES // 10**6} MB, {files.MAX_DEPTH} levels" in page
     assert f"{quantities.MAX_UNIT_LENGTH} characters" in page
     assert f"10,000,000, {grid.MAX_AXES} |" in page

@@ -196,7 +196,7 @@ def test_the_size_and_order_of_ranges_change_no_bit(wide: xr.Dataset, size: int,
     # the overrides of the config are an attribute
     template = dataset_template(plan).assign_attrs(config_set=wide.attrs["config_set"])
     dataset = lazy_dataset(template, table, stored_variables(plan))
-    assert in_memory(dataset, table, stored_variables(plan)).identical(wide)
+    assert in_memory(dataset).identical(wide)
     # a part has the numbers of the whole
     part = {"e": [2, 0], "v1": slice(None, None, -1), "material2": 1}
     assert dataset.isel(part).load().identical(wide.isel(part))

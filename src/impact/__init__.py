@@ -9,16 +9,12 @@ from ._version import __version__ as __version__
 
 if TYPE_CHECKING:
     from .api import (
-        calibrate as calibrate,
         check_model as check_model,
         init as init,
         materials as materials,
         models as models,
         run as run,
         schema as schema,
-        sensitivity as sensitivity,
-        solve as solve,
-        timestep as timestep,
     )
     from .comparison.bless import bless as bless
     from .comparison.compare import compare as compare
@@ -30,11 +26,15 @@ if TYPE_CHECKING:
     from .contact.powers import power as power
     from .errors import ImpactError as ImpactError
     from .exporters.export import export as export, export_codes as export_codes
+    from .inverse.calibrate import calibrate as calibrate
+    from .inverse.solve import solve as solve
+    from .inverse.timestep import timestep as timestep
     from .plots.draw import plot as plot
     from .plots.explore import explore as explore
     from .plots.files import plot_to_files as plot_to_files
     from .progress_display import progress_bar as progress_bar
     from .reporting.page import report as report
+    from .results.describe import describe as describe
     from .results.estimate import estimate as estimate
     from .results.extend import extend as extend, extend_to_file as extend_to_file
     from .results.info import info as info
@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from .results.shards import merge as merge, sweep_shard as sweep_shard
     from .results.sweep import sweep as sweep, sweep_to_file as sweep_to_file
     from .results.xarray_backend import expand as expand, load as load, save as save
+    from .uncertainty.sensitivity import sensitivities as sensitivities, sensitivity as sensitivity
 
 # the module of each public name, which is imported on first use: `import impact` and `impact --help` need no numpy
 _MODULES = {
@@ -51,9 +52,10 @@ _MODULES = {
     "Parameter": "contact.model",
     "Verdict": "comparison.verdict",
     "bless": "comparison.bless",
-    "calibrate": "api",
+    "calibrate": "inverse.calibrate",
     "check_model": "api",
     "compare": "comparison.compare",
+    "describe": "results.describe",
     "estimate": "results.estimate",
     "expand": "results.xarray_backend",
     "explore": "plots.explore",
@@ -78,12 +80,13 @@ _MODULES = {
     "run": "api",
     "save": "results.xarray_backend",
     "schema": "api",
-    "sensitivity": "api",
-    "solve": "api",
+    "sensitivities": "uncertainty.sensitivity",
+    "sensitivity": "uncertainty.sensitivity",
+    "solve": "inverse.solve",
     "sweep": "results.sweep",
     "sweep_shard": "results.shards",
     "sweep_to_file": "results.sweep",
-    "timestep": "api",
+    "timestep": "inverse.timestep",
 }
 __all__ = list(_MODULES)
 

@@ -16,8 +16,9 @@ exceptions to exit codes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
+from types import MappingProxyType
 
 from .text import escape_controls, safe_text
 
@@ -87,13 +88,22 @@ class Interruption(BaseException):
 NOT_OF_A_PLUGIN = (KeyboardInterrupt, MemoryError, Interruption)
 
 
-def did_you_mean(word: str, choices: Sequence[str]) -> str:
-    """The end of a message about an unknown name: the most similar choice, otherwise all choices.
+def did_you_mean(word: str, choices: Sequence[str], synonyms: Mapping[str, str] = MappingProxyType({})) -> str:
+    """End a message about an unknown name: with the most similar choice in any case, otherwise with all choices.
 
-    >>> did_you_mean("hetrz", ["hertz", "bilinear"])
-    'did you mean "hertz"?'
+    Parameters
+    ----------
+    synonyms : other words for some of the choices
+
+    >>> did_you_mean("Hetrz", ["hertz", "bilinear"]), did_you_mean("masss1", ["m1", "v1"], {"mass1": "m1"})
+    ('did you mean "hertz"?', 'did you mean "m1"?')
     >>> did_you_mean("x", ["hertz", "bilinear"])
     'known: bilinear, hertz'
     """
-    matches = get_close_matches(word, choices, n=1, cutoff=0.6)
-    return safe_text(f'did you mean "{matches[0]}"?' if matches else f"known: {', '.join(sorted(choices))}", 800)
+    if not choices:
+        return "none are defined"
+    spellings = {name.lower(): name for name in choices[:1000]}
+    spellings |= {synonym: name for synonym, name in synonyms.items() if name in choices}
+    matches = get_close_matches(word[:64].lower(), spellings, n=1, cutoff=0.6)
+    all_choices = f"known: {', '.join(sorted(choices[:1000]))}"
+    return safe_text(f'did you mean "{spellings[matches[0]]}"?' if matches else all_choices, 800)

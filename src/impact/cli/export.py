@@ -12,7 +12,6 @@ import impact
 
 from ..errors import UsageError
 from ..formatting import decimals, number
-from ..text import safe_text
 from . import exits
 from .completion import complete_code, complete_model
 from .console import cell, console, dump, table
@@ -104,7 +103,7 @@ def export(
     for warning in result.warnings:
         exits.print_line(f"warning: {warning}")
     if output is not None:
-        exits.print_line(f"{safe_text(str(output))}: written")
+        exits.print_line(f"{output}: written")
     if as_json:
         print(dump(export_json(result)))
     elif result.verification is not None:

@@ -10,6 +10,7 @@ import typer
 
 import impact
 
+from ..display import show
 from ..formatting import label, number
 from .console import cell, console, dump, print_rows, table
 from .options import JsonOption
@@ -53,8 +54,6 @@ def print_info(dataset: xr.Dataset, path: Path) -> None:
     from ..results.attributes import read_attribute
     from ..results.kinds import is_calibration, is_sensitivity
     from ..results.schema import exponents_of, plain_unit
-    from .calibrate import print_fits
-    from .sensitivity import print_studies
     from .summary import worst_errors
 
     description = impact.info(dataset)
@@ -97,12 +96,9 @@ def print_info(dataset: xr.Dataset, path: Path) -> None:
     if description["worst"]:
         out.print()
         out.print(worst_errors(description["worst"]))
-    if is_calibration(dataset):
+    if is_calibration(dataset) or is_sensitivity(dataset):
         out.print()
-        print_fits(dataset)
-    elif is_sensitivity(dataset):
-        out.print()
-        print_studies(dataset)
+        show(impact.describe(dataset))
 
 
 def _values_text(dataset: xr.Dataset, name: str) -> str:

@@ -10,7 +10,6 @@ import typer
 import impact
 
 from ..errors import UsageError, did_you_mean
-from ..text import safe_text
 from .console import dump
 from .options import JsonOption
 
@@ -26,7 +25,7 @@ def materials(
 
     catalogue = impact.materials()
     if name is not None and name not in catalogue:
-        raise UsageError(f'no material "{safe_text(name)}"; {did_you_mean(name, list(catalogue))}')
+        raise UsageError(f'no material "{name}"; {did_you_mean(name, list(catalogue))}')
     shown = catalogue if name is None else {name: catalogue[name]}
     if as_json:
         print(dump(shown))

@@ -22,7 +22,7 @@ from .options import JsonOption, PluginOption
 if TYPE_CHECKING:
     from rich.text import Text
 
-    from ..contact.checks import Finding
+    from ..contact.checks import ClauseResult
     from ..contact.model import ForceModel, Parameter
 
 # where a table of the catalogue shows the delivered restitution
@@ -110,7 +110,7 @@ def _delivered(model: ForceModel) -> dict[str, float]:
     """The exact delivered restitution by the e asked for; empty where there is none."""
     import numpy as np
 
-    from ..contact.scaling import delivered
+    from ..contact.dimensionless import delivered
 
     values = delivered(model, np.array(E_VALUES))
     return {} if values is None else {number(e): out for e, out in zip(E_VALUES, values.tolist(), strict=True)}
@@ -276,6 +276,6 @@ def _check_contract(models: Sequence[ForceModel], *, as_json: bool) -> None:
 CLOSED_FORM = "agrees with its closed form"
 
 
-def _clauses(findings: Sequence[Finding]) -> Iterator[dict[str, Any]]:
+def _clauses(findings: Sequence[ClauseResult]) -> Iterator[dict[str, Any]]:
     for finding in findings:
         yield {"clause": finding.clause, "holds": finding.holds, "worst": finding.worst, "bound": finding.bound}

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..text import safe_text
+import impact
+
+from ..display import dump, show
 from . import exits
 from .completion import complete_output
-from .console import cell, console, dump, table
 from .options import (
     AllowFailedOption,
     JobsOption,
@@ -74,11 +74,9 @@ def sensitivity(
 
                 return sweep_in_memory(plan, Run(executor, on_progress=on_progress, should_stop=should_stop))
 
-        from ..api import sensitivities
-
-        results = sensitivities(
+        results = impact.sensitivities(
             config,
-            of=outputs,
+            outputs,
             output=output,
             overwrite=overwrite,
             overrides=sets or (),
@@ -86,64 +84,16 @@ def sensitivity(
             max_points=max_points,
             execute=run_plan,
         )
+    descriptions = [impact.describe(result) for result in results]
     if as_json:
-        studies = [study for result in results for study in studies_json(result)]
+        studies = [study for description in descriptions for study in description.as_dict()["studies"]]
         print(dump(studies[0] if len(studies) == 1 else studies))
     else:
-        for position, result in enumerate(results):
+        for position, description in enumerate(descriptions):
             if position:
                 print()
-            print_studies(result)
+            show(description)
     if output is not None:
-        exits.print_line(f"{safe_text(str(output))}: written")
+        exits.print_line(f"{output}: written")
     if any(int(result["failed"].sum()) for result in results) and not allow_failed:
         raise typer.Exit(exits.EXIT_POINTS_FAILED)
-
-
-def studies_json(result: xr.Dataset) -> list[dict[str, Any]]:
-    """The study of each model at each point of the other axes as plain data."""
-    from ..results.attributes import read_attribute
-    from ..results.sensitivity import HALF, iterate_studies
-
-    design = read_attribute(result.attrs, "design")
-    studies = []
-    for point, study in iterate_studies(result):
-        ends = [f"{name}{end}" for name in ("first", "total") for end in ("", "_lower", "_upper")]
-        studies.append(
-            {
-                "model": point.pop("model"),
-                "at": point,
-                "of": result.attrs["of"],
-                **{name: design[name] for name in ("n", "method", "seed")},
-                "failed": int(study["failed"]),
-                "mean": float(study["mean"]),
-                "sd": float(study["sd"]),
-                "quantiles": {
-                    f"{probability:g}": float(value)
-                    for probability, value in zip(study["quantile"].values, study["quantiles"].values, strict=True)
-                },
-                "indices": [
-                    {"input": str(row["input"].item())} | {name: float(row[name]) for name in (*ends, *HALF)}
-                    for row in (study.isel(input=position) for position in range(study.sizes["input"]))
-                ],
-            }
-        )
-    return studies
-
-
-def print_studies(result: xr.Dataset) -> None:
-    """Print a table of indices for each model and each point of the other axes."""
-    from ..results.replay_command import describe_point
-    from ..results.sensitivity import INDEX_HEADINGS, describe_design, describe_study, index_rows, iterate_studies
-
-    out = console(sys.stdout)
-    out.print(cell(describe_design(result)), soft_wrap=True)
-    for point, study in iterate_studies(result):
-        out.print()
-        out.print(cell(describe_point(point)), soft_wrap=True)
-        out.print(cell(describe_study(study)), soft_wrap=True)
-        if study["total"].notnull().any():
-            rows = table(*INDEX_HEADINGS)
-            for row in index_rows(study):
-                rows.add_row(*map(cell, row))
-            out.print(rows)

@@ -12,7 +12,6 @@ from rich.table import Table
 
 from ..contact.status import FIRST_FAILURE, Status
 from ..formatting import label, number
-from ..text import safe_text
 from . import exits
 from .console import cell, console, dump, table
 
@@ -65,7 +64,7 @@ def conclude(outcome: SweepOutcome, output: Path, *, quiet: bool, as_json: bool,
             for note in result_notes(outcome.summary):
                 exits.print_line(f"note: {note}")
         else:
-            exits.print_line(f"{safe_text(str(output))}: already contains this sweep; nothing to do")
+            exits.print_line(f"{output}: already contains this sweep; nothing to do")
     if as_json:
         print(dump(fields))
     if fields["failed"] and not allow_failed:
@@ -78,7 +77,7 @@ def failed_line(fields: Mapping[str, Any]) -> str:
     """One line with the number of failed points by status."""
     reasons = (f"{n:,} {name}" for name, n in fields["status"].items() if Status[name.upper()] >= FIRST_FAILURE)
     counts = f"{fields['failed']:,} of {fields['points']:,} points failed ({', '.join(reasons)})"
-    return f"{safe_text(fields['output'])}: {counts}"
+    return f"{fields['output']}: {counts}"
 
 
 def print_summary(outcome: SweepOutcome, fields: Mapping[str, Any]) -> None:

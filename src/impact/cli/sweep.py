@@ -14,7 +14,6 @@ import typer
 import impact
 
 from ..errors import UnfinishedError, UsageError
-from ..text import safe_text
 from . import exits
 from .console import cell, console, dump, table
 from .executor_options import ExecutorOptions
@@ -82,7 +81,7 @@ def sweep(
 
         def print_note(note: str) -> None:
             if not quiet:
-                exits.print_line(f"note: {safe_text(str(config))}: {note}")
+                exits.print_line(f"note: {config}: {note}")
 
         executor = ExecutorOptions(jobs, threads, scheduler, scheduler_file)
         inputs: dict[str, Any] = {
@@ -93,9 +92,7 @@ def sweep(
         }
         if dry_run:
             if shard is not None:
-                raise UsageError(
-                    f"--shard {safe_text(shard)}: got --dry-run as well, which estimates the whole sweep"
-                )
+                raise UsageError(f"--shard {shard}: got --dry-run as well, which estimates the whole sweep")
             expected = impact.estimate(config, jobs=max(jobs, threads), **inputs)
             if as_json:
                 print(dump(asdict(expected)))
@@ -125,9 +122,9 @@ def _print_shard(done: ShardProgress, output: Path, *, quiet: bool, as_json: boo
         failed = f", {done.failed:,} failed" if done.failed else ""
         every = output.with_name(f"{shlex.quote(output.name)}.*-of-{done.shard.of}.work")
         exits.print_line(
-            f"{safe_text(str(done.folder))}: {done.blocks:,} of {done.of_blocks:,} blocks, {done.trajectories:,} "
-            f"trajectories{failed}; with all {done.shard.of:,} shards: impact merge {safe_text(str(every))} "
-            f"-o {safe_text(shlex.quote(str(output)))}"
+            f"{done.folder}: {done.blocks:,} of {done.of_blocks:,} blocks, {done.trajectories:,} "
+            f"trajectories{failed}; with all {done.shard.of:,} shards: impact merge {every} "
+            f"-o {shlex.quote(str(output))}"
         )
 
 

@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-import sys
-from dataclasses import asdict
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
 import impact
 
-from ..formatting import decimals, number, quantity
+from ..display import show
 from . import exits
 from .completion import complete_scheme
-from .console import cell, console, dump, table
 from .options import AtOption, JsonOption, ModelKeyOption, PluginOption, SetOption, SourceArgument
 from .params import parse_number, parse_whole_number
-
-if TYPE_CHECKING:
-    from ..inverse.timestep import TimestepResult
 
 
 def timestep(
@@ -93,58 +87,6 @@ def timestep(
         overrides=sets or (),
         plugins=plugins or (),
     )
-    if as_json:
-        print(dump(timestep_json(result)))
-    else:
-        _print_table(result, phases, tol)
+    show(result, as_json=as_json)
     if any(row.failed for row in result.rows):
         raise typer.Exit(exits.EXIT_POINTS_FAILED)
-
-
-def timestep_json(result: TimestepResult) -> dict[str, Any]:
-    """The result as plain data; numbers that do not apply are null."""
-    return {
-        "model": result.model,
-        "scheme": result.scheme,
-        "e": result.e,
-        "e_continuous": result.e_continuous,
-        "contact_time": result.contact_time,
-        "rows": [asdict(row) for row in result.rows],
-        "needed": None if result.needed is None else asdict(result.needed),
-    }
-
-
-def _print_table(result: TimestepResult, phases: int, tol: float | None) -> None:
-    """Print the continuous law, a line for each step, the steps that fail, and the number of steps needed."""
-    from ..contact.status import Status
-
-    out = console(sys.stdout)
-    asked = "" if result.e != result.e else f"e = {number(result.e)}, "
-    contact = quantity(result.contact_time, "s")
-    out.print(
-        cell(f"{result.model}: {asked}e_out = {number(result.e_continuous)} in a contact time of {contact}"),
-        soft_wrap=True,
-    )
-    out.print(cell(f"scheme: {result.scheme}"), soft_wrap=True)
-    out.print()
-    rows = table("steps per contact", "dt [s]", "e mean", "e least", "e largest", "e to ask")
-    rows.columns[0].justify = "right"
-    for row in result.rows:
-        mean, *others = map(decimals, (row.e_mean, row.e_least, row.e_largest, row.e_to_ask))
-        shown = row.status if row.failed else mean
-        rows.add_row(number(row.steps_per_contact), number(row.dt), shown, *others)
-    out.print(rows)
-    failures = [row for row in result.rows if row.failed]
-    if failures:
-        out.print()
-    for row in failures:
-        count = f"{row.failed} of {phases} phases fail at {number(row.steps_per_contact)} steps per contact"
-        out.print(cell(f"{count}; {Status[row.status.upper()].meaning}"), soft_wrap=True)
-    if tol is not None:
-        out.print()
-        if result.needed is None:
-            line = f"no number of steps per contact keeps every phase within {number(100 * tol)} %"
-        else:
-            steps, dt = result.needed.steps_per_contact, quantity(result.needed.dt, "s")
-            line = f"within {number(100 * tol)} % at every phase: {steps} steps per contact, dt <= {dt}"
-        out.print(cell(line), soft_wrap=True)

@@ -84,10 +84,9 @@ def rerun(
 def _repeat_calibration(stored: xr.Dataset, plugins: Plugins, name: str) -> xr.Dataset:
     """Repeat a calibration with the models and the tolerances of the result."""
     # its modules import scipy.optimize, which is slow to import
-    from ..inverse.calibrate import calibrate_config, calibration_dataset
+    from ..inverse.calibrate import calibrate_config
 
     changes = [f"models={json.dumps(stored['model'].values.tolist())}"]
     changes += [f"solver.{key}={stored.attrs.get(key)}" for key in ("rtol", "max_steps")]
     config = stored_config(stored.attrs, changes, plugins, name, allow_changed_plugins=True, purpose="calibrate")
-    of_config = plugins.of(config.models)
-    return calibration_dataset(calibrate_config(config, of_config), of_config)
+    return calibrate_config(config, plugins.of(config.models))

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..contact.model import ForceModel
+from ..errors import did_you_mean
 from .files import as_table
-from .quantities import KeyPath, Quantity, suggest
+from .quantities import KeyPath, Quantity
 from .tables import MATERIAL_KEYS, MATERIAL_QUANTITIES, SWEEP_QUANTITIES, model_quantities
 
 # keys of the inputs in [sweep]
@@ -98,7 +99,7 @@ class InputName:
             names = [f"{self.owner}.{parameter}" for parameter in model_quantities(models[self.owner])]
         elif self.owner:
             name, names = self.owner, list(models)
-        return f"no such input; {suggest(name, names)}"
+        return f"no such input; {did_you_mean(name, names)}"
 
 
 def is_foreign(names: Iterable[str], model: str) -> bool:

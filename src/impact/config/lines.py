@@ -9,9 +9,10 @@ from collections.abc import Iterable, Mapping
 from pydantic import ValidationError
 
 from ..contact.model import ForceModel
+from ..errors import did_you_mean
 from ..text import safe_text
 from . import quantities
-from .quantities import VALUE_FORMS, Column, ConfigProblem, KeyPath, show, suggest
+from .quantities import VALUE_FORMS, Column, ConfigProblem, KeyPath, as_text
 from .tables import (
     MATERIAL_QUANTITIES,
     MODELS_EXPECTED,
@@ -188,9 +189,9 @@ def validation_problems(error: ValidationError, models: Mapping[str, ForceModel]
                 yield path, f"unknown key; {hint}"
             case "literal_error":
                 choices = ", ".join(re.findall("'([^']*)'", detail["ctx"]["expected"]))
-                yield path, f"got {show(detail['input'])}, expected one of {choices}"
+                yield path, f"got {as_text(detail['input'])}, expected one of {choices}"
             case _:
-                yield path, f"got {show(detail['input'])}, expected a table"
+                yield path, f"got {as_text(detail['input'])}, expected a table"
 
 
 def _unknown_key_hint(location: KeyPath, models: Mapping[str, ForceModel]) -> str:
@@ -224,4 +225,4 @@ def _unknown_key_hint(location: KeyPath, models: Mapping[str, ForceModel]) -> st
             keys = model_quantities(models[str(key)])
         case (table, *_):
             keys = vars(Solver() if table == "solver" else Output())
-    return suggest(name, list(keys), KEY_SYNONYMS)
+    return did_you_mean(name, list(keys), KEY_SYNONYMS)

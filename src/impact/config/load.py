@@ -15,10 +15,10 @@ from ..contact.model import ForceModel
 from ..contact.numba.dispatch import is_installed
 from ..contact.timestep import EXACT
 from ..contact.variables import BY_DEFAULT
-from . import cases, measurements
+from .columns import expand_cases, named_files, read_files
 from .design import design_problems, distribution_paths, draw_columns, unit_samples
 from .draft import Draft, Setting, add_library_materials, open_config, open_text
-from .files import as_table
+from .files import as_table, override_text, set_value
 from .grid import MAX_POINTS, Axis, build_grid, chunk_problems
 from .input_names import InputName
 from .library import library
@@ -28,6 +28,8 @@ from .measurements import (
     count_problems,
     fit_paths,
     purpose_problems,
+    read_data_file,
+    read_measurements,
 )
 from .quantities import (
     Column,
@@ -183,8 +185,7 @@ def build(draft: Draft, max_points: int = MAX_POINTS, purpose: Purpose = "sweep"
         draft = draft.with_problems(purpose_problems(draft.data))
     if draft.problems:
         raise draft.error()
-    files = tuple((draft.folder or Path()) / file for file in cases.named_files(draft.data))
-    for step in (_inline_files, add_library_materials, _expand_cases, _expand_measurements):
+    for step in (inline_files, add_library_materials, _expand_cases, _expand_measurements):
         draft = step(draft)
     document, invalid_values = _validate(draft)
     draft = check_rules(draft.with_problems(invalid_values))
@@ -246,29 +247,37 @@ def build(draft: Draft, max_points: int = MAX_POINTS, purpose: Purpose = "sweep"
         data=draft.measurements,
         design=document.design,
         distributions=distributions,
-        files=files,
+        files=draft.files or (),
     )
 
 
-def _inline_files(draft: Draft) -> Draft:
-    for inline in (cases.inline_files, measurements.inline_measurements):
-        data, texts, lines = inline(draft.data, draft.folder, draft.known_models, draft.exponent)
-        settings = (*draft.settings, *map(Setting.parse, texts))
-        draft = replace(draft, data=data, settings=settings, lines=(*draft.lines, *lines))
+def inline_files(draft: Draft) -> Draft:
+    """Replace the names of CSV files by the values in them."""
+    if draft.files is not None:
+        return draft
+    draft = replace(draft, files=tuple((draft.folder or Path()) / file for file in named_files(draft.data)))
+    for read in (read_files, read_data_file):
+        values, lines = read(draft.data, draft.folder, draft.known_models, draft.exponent)
+        draft = replace(draft, lines=(*draft.lines, *lines))
+        for path, value in values.items():
+            setting = Setting(path, value, "", override_text(path, value))
+            data, _ = set_value(draft.data, path, value)
+            draft = replace(draft, data=data, settings=(*draft.settings, setting))
     return draft
 
 
 def _expand_cases(draft: Draft) -> Draft:
-    data, names, problems = cases.expand_cases(draft.data, draft.known_models)
-    paths: dict[KeyPath, KeyPath] = {
-        InputName.parse(name).path: ("sweep", "cases", column) for name, column in names.items()
-    }
+    data, paths, problems = expand_cases(draft.data, draft.known_models)
     return replace(draft, data=data, cases=paths).with_problems(problems)
 
 
 def _expand_measurements(draft: Draft) -> Draft:
-    data, found, problems = measurements.expand_measurements(draft.data, draft.known_models, draft.exponent)
-    return replace(draft, data=data, measurements=found).with_problems(problems)
+    measurements, problems = read_measurements(draft.data, draft.known_models, draft.exponent)
+    data = draft.data
+    for name, values in measurements.inputs.items() if measurements is not None else ():
+        # rules between inputs apply to the first value
+        data, _ = set_value(data, InputName.parse(name).path, values[0])
+    return replace(draft, data=data, measurements=measurements).with_problems(problems)
 
 
 def _validate(draft: Draft) -> tuple[Document | None, list[ConfigProblem]]:

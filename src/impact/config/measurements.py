@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -12,19 +11,13 @@ from pydantic_core import PydanticCustomError
 
 from ..contact.model import ForceModel, with_base_quantities
 from ..contact.variables import OUTPUTS
-from ..errors import ConfigError
+from ..errors import ConfigError, did_you_mean
 from ..formatting import number
 from ..text import safe_text
-from .cases import (
-    CsvTable,
-    column_quantity,
-    column_values,
-    contains_path,
-    read_csv,
-)
-from .files import as_table, override_text, set_value
+from .columns import Cells, Columns, column_quantity, contains_path, read_cells, read_csv, unit_expected
+from .files import as_table
 from .input_names import InputName, input_values
-from .quantities import MAX_PROBLEMS, ConfigProblem, KeyPath, Quantity, show, suggest, value_error
+from .quantities import MAX_PROBLEMS, ConfigProblem, KeyPath, Quantity, as_text, value_error
 from .tables import LOSSES, MAX_MEASURED, MIN_SIGMA, NOISES, SWEEP_QUANTITIES
 
 Noise = Literal["given", "scale", "excess"]
@@ -73,12 +66,24 @@ class Measurements:
 
 
 @dataclass(frozen=True)
-class _DataColumn:
-    """What a column holds: values of an input or an output, standard deviations of an output, or specimens."""
+class _Column:
+    """What a column of [data] holds.
+
+    Parameters
+    ----------
+    name : of the input, of the output, or of the output whose standard deviations they are
+    quantity : of its values
+    values : in SI units, or names of specimens
+    """
 
     kind: Literal["input", "output", "sigma", "specimen"]
     name: str
     quantity: Quantity
+    values: tuple[Any, ...] = ()
+
+
+# the header of a column, or "" for all together; the index of a cell, or None for the whole column; and a message
+_Problem = tuple[str, int | None, str]
 
 
 def fit_paths(data: Mapping[str, Any]) -> Iterator[KeyPath]:
@@ -96,238 +101,204 @@ def purpose_problems(data: Mapping[str, Any]) -> list[ConfigProblem]:
     return [(path, f"got a fit, expected a value or an axis; {takes}") for path in fit_paths(data)][:1]
 
 
-def _columns_of(
-    names: Sequence[str], data: Mapping[str, Any], models: Mapping[str, ForceModel]
-) -> tuple[dict[str, _DataColumn], list[tuple[str, str]]]:
-    """The columns with these names, and problems: messages with the name of a column, or "" for all together."""
-    columns: dict[str, _DataColumn] = {}
-    problems: list[tuple[str, str]] = []
-    outputs = [name for name in names if name in MEASURED_OUTPUTS]
-    for name in names:
+def _read_columns(
+    columns: Columns, data: Mapping[str, Any], models: Mapping[str, ForceModel], n: float | None, *, is_text: bool
+) -> tuple[list[_Column], list[_Problem]]:
+    """Read columns of a file, which are text and have units, or lists of a config, and report all problems."""
+    kinds: dict[str, _Column] = {}
+    problems: list[_Problem] = []
+    outputs = [header for header in columns.cells if header in MEASURED_OUTPUTS]
+    for header in columns.cells:
         try:
-            columns[name] = column = _column_of(name, outputs, models)
+            column = _column_of(header, outputs, models)
+            twin = next((key for key, c in kinds.items() if (c.kind, c.name) == (column.kind, column.name)), None)
+            if twin is not None:
+                raise value_error(f"got a second column of {column.name}, next to {as_text(twin)}, expected one")
+            kinds[header] = column
+            name = InputName.parse(column.name)
+            if column.kind == "input" and contains_path(data, name.path):
+                raise value_error(f"set together with {name.config_key}, expected one of the two")
         except PydanticCustomError as error:
-            problems.append((name, error.message()))
-            continue
-        other = next(
-            key for key, before in columns.items() if (before.kind, before.name) == (column.kind, column.name)
-        )
-        if other != name:
-            problems.append((name, f"got a second column of {column.name}, beside {show(other)}, expected one"))
-        elif column.kind == "input" and contains_path(data, InputName.parse(name).path):
-            problems.append(
-                (name, f"set together with {InputName.parse(name).config_key}, expected one of the two")
-            )
+            problems.append((header, None, error.message()))
     if not outputs and not problems:
-        problems.append(("", "got no column of an output, expected one, such as e_out or contact_time"))
-    return columns, problems
+        problems.append(("", None, "got no column of an output, expected one, such as e_out or contact_time"))
+    n = None if any(column.name == "n" for column in kinds.values()) else n
+    result: list[_Column] = []
+    for header, column in kinds.items():
+        # a standard deviation has the unit of its output
+        unit = columns.units.get(header) or (columns.units.get(column.name, "") if column.kind == "sigma" else "")
+        values, column_problems = _read_column(columns.cells[header], column, header, unit, n, is_text=is_text)
+        problems += [(header, index, message) for index, message in column_problems]
+        result.append(replace(column, values=tuple(values)))
+    return result, problems
 
 
-def _column_of(name: str, outputs: Sequence[str], models: Mapping[str, ForceModel]) -> _DataColumn:
-    """What the column with a name holds; `outputs` are the outputs that have a column."""
-    if name in MEASURED_OUTPUTS:
-        return _DataColumn("output", name, MEASURED_OUTPUTS[name])
-    if name == SPECIMEN:
-        return _DataColumn("specimen", name, Quantity("1", "name of a specimen"))
-    if name == SIGMA or name.removeprefix(f"{SIGMA}_") in MEASURED_OUTPUTS:
-        if name == SIGMA and len(outputs) > 1:
+def _read_column(
+    cells: Sequence[object], column: _Column, header: str, unit: str, n: float | None, *, is_text: bool
+) -> tuple[Sequence[object], Sequence[tuple[int | None, str]]]:
+    """Read a column; problems have the index of a cell, or None for the header."""
+    if column.kind == SPECIMEN:
+        specimens = [cell if isinstance(cell, str) else number(cell) for cell in cells]
+        return specimens, [(index, SPECIMEN_EXPECTED) for index, name in enumerate(specimens) if not name]
+    si_unit, unit = column.quantity.unit, "" if unit in ("-", "1") else unit
+    if unit.lower() in ("%", "percent", "pct", "per cent"):
+        expected = f'a fraction: divide the column by 100 and write "{safe_text(header, 60)}"'
+        return (), [(None, f"got [{safe_text(unit)}], expected {expected}")]
+    if is_text and not unit and si_unit != "1":
+        expected = f'one in brackets, such as "{safe_text(header, 60)} [{si_unit}]"'
+        return (), [(None, f"got no unit, expected {expected}")]
+    wrong_unit = unit_expected(column.quantity, unit, n)
+    if wrong_unit:
+        return (), [(None, f"got [{safe_text(unit)}], expected {wrong_unit}")]
+    return _read_measured(cells, column.quantity, n, unit, is_text=is_text)
+
+
+def _read_measured(
+    cells: Sequence[object], quantity: Quantity, n: float | None, unit: str = "", *, is_text: bool = False
+) -> Cells:
+    """Read measured values, of which none is in percent."""
+    for index, cell in enumerate(cells):
+        if _is_in_percent(cell, quantity):
+            # the first stands for the whole column
+            return [], [(index, _percent_message(str(cell)))]
+    return read_cells(cells, quantity, n, unit, is_text=is_text)
+
+
+def _column_of(header: str, outputs: Sequence[str], models: Mapping[str, ForceModel]) -> _Column:
+    """Find what the column with a header holds; `outputs` are the outputs that have a column."""
+    if header in MEASURED_OUTPUTS:
+        return _Column("output", header, MEASURED_OUTPUTS[header])
+    if header == SPECIMEN:
+        return _Column("specimen", header, Quantity("1", "name of a specimen"))
+    if header == SIGMA or header.removeprefix(f"{SIGMA}_") in MEASURED_OUTPUTS:
+        if header == SIGMA and len(outputs) > 1:
             expected = " or ".join(f"{SIGMA}_{output}" for output in outputs)
             raise value_error(f"got {len(outputs)} outputs, expected {expected}")
-        output = name.removeprefix(f"{SIGMA}_") if name != SIGMA else next(iter(outputs), "e_out")
+        output = header.removeprefix(f"{SIGMA}_") if header != SIGMA else next(iter(outputs), "e_out")
         if outputs and output not in outputs:
-            raise value_error(f"got no column {output}, expected one beside its standard deviation")
-        return _DataColumn(
-            "sigma",
-            output,
-            Quantity(OUTPUTS[output].unit, "standard deviation", least=MIN_SIGMA, most=MAX_MEASURED),
-        )
-    if not name:
+            raise value_error(f"got no column {output}, expected one next to its standard deviation")
+        return _Column("sigma", output, _deviation(output))
+    if not header:
         raise value_error("got a column without a name, expected that of an input or an output")
-    input_name = InputName.parse(name)
+    name = InputName.parse(header)
     try:
-        quantity = input_name.quantity(models)
+        quantity = name.quantity(models)
     except KeyError:
-        if input_name.owner:
-            raise value_error(input_name.unknown_message(models)) from None
-        choices = [
-            *MEASURED_OUTPUTS,
-            SIGMA,
-            SPECIMEN,
-            *SWEEP_QUANTITIES,
-            *(f"{SIGMA}_{output}" for output in outputs),
-        ]
-        raise value_error(f"no such input or output; {suggest(name, choices)}") from None
+        if name.owner:
+            raise value_error(name.unknown_message(models)) from None
+        deviations = [f"{SIGMA}_{output}" for output in outputs]
+        choices = [*MEASURED_OUTPUTS, SIGMA, SPECIMEN, *SWEEP_QUANTITIES, *deviations]
+        raise value_error(f"no such input or output; {did_you_mean(header, choices)}") from None
     if quantity is None:
         raise value_error("got names of materials, expected numbers; all points have the materials of [sweep]")
-    return _DataColumn("input", str(input_name), replace(quantity, infinite=False))
+    return _Column("input", str(name), replace(quantity, infinite=False))
 
 
-def inline_measurements(
+def _deviation(output: str) -> Quantity:
+    return Quantity(OUTPUTS[output].unit, "standard deviation", least=MIN_SIGMA, most=MAX_MEASURED)
+
+
+def read_data_file(
     data: Mapping[str, Any], folder: Path | None, models: Mapping[str, ForceModel], n: float | None
-) -> tuple[dict[str, Any], list[str], list[str]]:
-    """Replace the file of [data] by its values; parameters and returned values are those of `inline_files`."""
+) -> tuple[dict[KeyPath, object], list[str]]:
+    """Read the file of [data]; parameters and returned values are those of `columns.read_files`."""
     table = as_table(data.get("data"))
     file = table.get("file")
     if not isinstance(file, str) or "columns" in table:
-        return dict(data), [], []
+        return {}, []
     if folder is None:
-        return dict(data), [], [f"{safe_text(file)}: not read; a stored config contains values, not file names"]
+        return {}, [f"{file}: not read; a stored config contains values, not file names"]
     try:
-        table_of_file = read_csv(folder / file, partial(column_quantity, models=models))
-        values, lines = _read_values(table_of_file, data, models, n)
-        stored: dict[KeyPath, object] = {("data", "columns"): values, ("data", "lines"): lines}
-        overrides = [override_text(path, value) for path, value in stored.items()]
+        columns = read_csv(folder / file, column_quantity(models))
     except ConfigError as error:
-        return dict(data), [], list(error.problems)
-    for path, value in stored.items():
-        data, _ = set_value(data, path, value)
-    return dict(data), overrides, []
-
-
-def _read_values(
-    table: CsvTable, data: Mapping[str, Any], models: Mapping[str, ForceModel], n: float | None
-) -> tuple[dict[str, list[float | str]], list[int]]:
-    """The values of all columns of a CSV file in SI units, and the lines of its points.
-
-    Raises
-    ------
-    ConfigError : with the line of each problem
-    """
-    columns, named_problems = _columns_of(list(table.units), data, models)
-    problems = [
-        ": ".join(part for part in (f"{table.name}:1", safe_text(name, 60), message) if part)
-        for name, message in named_problems
-    ]
-    n = None if "n" in table.units else n
-    units = {name: "" if unit in ("-", "1") else unit for name, unit in table.units.items()}
-    for name, column in columns.items():
-        if column.kind == "sigma":
-            units[name] = units[name] or units.get(column.name, "")
-    values: dict[str, list[float | str]] = {}
-    for name, column in columns.items():
-        shown, unit, expected_unit = safe_text(name, 60), units[name], column.quantity.unit
-        if column.kind == SPECIMEN:
-            values[name] = [cell.strip() for _, cell in table.cells[name]]
-            problems += [
-                f"{table.name}:{line}: {shown}: {SPECIMEN_EXPECTED}"
-                for line, cell in table.cells[name]
-                if not cell.strip()
-            ]
-            continue
-        percent = [(line, cell) for line, cell in table.cells[name] if _is_in_percent(cell, column.quantity)]
-        if _is_percent(unit):
-            expected = f'a fraction: divide the column by 100 and write "{shown}"'
-            problems.append(f"{table.name}:1: {shown}: got [{safe_text(unit)}], expected {expected}")
-        elif not unit and expected_unit != "1":
-            expected = f'one in brackets, such as "{shown} [{expected_unit}]"'
-            problems.append(f"{table.name}:1: {shown}: got no unit, expected {expected}")
-        elif percent:
-            # the first stands for the whole column
-            problems += [f"{table.name}:{line}: {shown}: {_percent_message(cell)}" for line, cell in percent[:1]]
-        else:
-            try:
-                values[name] = column_values(replace(table, units=units), name, column.quantity, n)
-            except ConfigError as error:
-                problems += error.problems
+        return {}, [*error.problems]
+    read, problems = _read_columns(columns, data, models, n, is_text=True)
     if problems:
-        raise ConfigError(*problems[:MAX_PROBLEMS])
-    return values, [line for line, _ in next(iter(table.cells.values()))]
+        return {}, [columns.problem(text, header, row) for header, row, text in problems[:MAX_PROBLEMS]]
+    values = {header: list(column.values) for header, column in zip(columns.cells, read, strict=True)}
+    return {("data", "columns"): values, ("data", "lines"): list(columns.lines)}, []
 
 
-def _is_percent(unit: str) -> bool:
-    return unit.lower() in ("%", "percent", "pct", "per cent")
-
-
-def _is_in_percent(element: object, quantity: Quantity) -> bool:
-    """Whether a value has the sign %, or is too large for a fraction."""
-    if not isinstance(element, str | int | float):
+def _is_in_percent(cell: object, quantity: Quantity) -> bool:
+    """Check whether a value has the sign %, or is too large for a fraction."""
+    if not isinstance(cell, str | int | float):
         return False
-    if "%" in str(element):
+    if "%" in str(cell):
         return True
     try:
-        return quantity.most == _INTERVALS["fraction"]["most"] and float(element) > quantity.most
+        return quantity.most == _INTERVALS["fraction"]["most"] and float(cell) > quantity.most
     except (ValueError, OverflowError):
         return False
 
 
 def _percent_message(text: str) -> str:
-    """The message about a value in percent, with the fraction to write instead."""
+    """Describe a value in percent, and suggest the fraction."""
     try:
-        fraction = f", such as {number(float(text.strip().removesuffix('%')) / 100.0)}"
+        fraction = f", such as {number(float(text.removesuffix('%')) / 100.0)}"
     except ValueError:
         fraction = ""
-    return f"got {show(text.strip())}, expected a fraction{fraction}"
+    return f"got {as_text(text)}, expected a fraction{fraction}"
 
 
-def expand_measurements(
+def read_measurements(
     data: Mapping[str, Any], models: Mapping[str, ForceModel], n: float | None
-) -> tuple[dict[str, Any], Measurements | None, list[ConfigProblem]]:
-    """The measurements of a config.
+) -> tuple[Measurements | None, list[ConfigProblem]]:
+    """Read the measurements of a config, in which the values of the file of [data] are, and report problems.
 
     Parameters
     ----------
-    data : plain data of a config, with the values of the file of [data]
+    data : plain data of a config
     models : all models by key
     n : the exponent that units may contain
-
-    Returns
-    -------
-    The data with the first value of each measured input at the path of the input, so that rules between inputs
-    apply to it; the measurements; and problems. Without valid measurements the data is unchanged.
     """
     table = as_table(data.get("data"))
     if isinstance(data.get("data"), dict) and not {"file", "columns"} & table.keys():
-        return dict(data), None, [(("data",), 'got neither file nor columns, expected such as file = "drops.csv"')]
+        return None, [(("data",), 'got neither file nor columns, expected such as file = "drops.csv"')]
     lists = table.get("columns")
     if not isinstance(lists, dict) or not lists or not all(isinstance(v, list) and v for v in lists.values()):
-        return dict(data), None, []
+        return None, []
     path: KeyPath = ("data", "columns")
-    columns, named_problems = _columns_of(list(lists), data, models)
-    problems: list[ConfigProblem] = [((*path, name) if name else path, text) for name, text in named_problems]
-    if any(column.name == "n" for column in columns.values()):
-        n = None
+    columns, column_problems = _read_columns(Columns("", 0, (), {}, lists), data, models, n, is_text=False)
+    problems: list[ConfigProblem] = [
+        ((*path, *([header] if header else []), *([] if index is None else [index])), message)
+        for header, index, message in column_problems
+    ]
     n_points = len(next(iter(lists.values())))
-    for name, elements in lists.items():
-        if len(elements) != n_points:
-            problems.append(
-                ((*path, name), f"got {len(elements)} values, expected {n_points}, as in the first column")
-            )
-    values: dict[str, tuple[float, ...]] = {}
-    specimens: tuple[str, ...] = ()
-    for name, column in columns.items():
-        if column.kind == SPECIMEN:
-            specimens = tuple(element if isinstance(element, str) else f"{element:g}" for element in lists[name])
-            problems += [((*path, name, index), SPECIMEN_EXPECTED) for index, s in enumerate(specimens) if not s]
-            continue
-        values[name], value_problems = _read_list(lists[name], (*path, name), column.quantity, n)
-        problems += value_problems
+    problems += [
+        ((*path, name), f"got {len(cells)} values, expected {n_points}, as in the first column")
+        for name, cells in lists.items()
+        if len(cells) != n_points
+    ]
     lines = table.get("lines")
     if "file" in table and lines is None:
         problems.append((path, "set together with file, expected one of the two"))
     if isinstance(lines, list) and len(lines) != n_points:
         problems.append((("data", "lines"), f"got {len(lines)} values, expected {n_points}, one for each point"))
 
-    def of_kind(kind: str) -> dict[str, tuple[float, ...]]:
-        return {column.name: values[name] for name, column in columns.items() if column.kind == kind}
+    def of_kind(kind: str) -> dict[str, tuple[Any, ...]]:
+        return {column.name: column.values for column in columns if column.kind == kind}
 
     outputs, sigma = of_kind("output"), of_kind("sigma")
+    specimens = of_kind(SPECIMEN).get(SPECIMEN, ())
     if "sigma" in table and outputs:
         first = next(iter(outputs))
-        deviations, sigma_problems = _read_sigma(table["sigma"], first, n_points)
         if first in sigma:
-            sigma_problems = [
+            problems.append(
                 (("data", "sigma"), f"set together with a column for {first}, expected one of the two")
-            ]
-        sigma[first] = deviations
-        problems += sigma_problems
+            )
+        else:
+            sigma[first], sigma_problems = _read_sigma(table["sigma"], first, n_points)
+            problems += sigma_problems
     noise = table.get("noise", "excess" if specimens else "given" if sigma else "scale")
     loss = table.get("loss", "linear")
     problems += _noise_problems(noise, list(outputs), list(sigma), specimens)
     if loss != "linear" and noise != "given":
-        problems.append((("data", "loss"), f'got {show(loss)} with noise = "{noise}", expected noise = "given"'))
+        problems.append(
+            (("data", "loss"), f'got {as_text(loss)} with noise = "{noise}", expected noise = "given"')
+        )
     if problems or noise not in NOISES or loss not in LOSSES:
-        return dict(data), None, problems[:MAX_PROBLEMS]
-    measurements = Measurements(
+        return None, problems[:MAX_PROBLEMS]
+    return Measurements(
         file=str(table.get("file", "")),
         lines=tuple(lines) if isinstance(lines, list) else tuple(range(1, n_points + 1)),
         inputs=of_kind("input"),
@@ -336,54 +307,19 @@ def expand_measurements(
         noise=noise,
         specimens=specimens,
         loss=loss,
-    )
-    for name, column_of_input in measurements.inputs.items():
-        data, _ = set_value(data, InputName.parse(name).path, column_of_input[0])
-    return dict(data), measurements, []
+    ), []
 
 
-def _read_list(
-    elements: Sequence[object], path: KeyPath, quantity: Quantity, n: float | None
-) -> tuple[tuple[float, ...], list[ConfigProblem]]:
-    """The numbers of a list in SI units, and problems."""
-    values: list[float] = []
-    problems: list[ConfigProblem] = []
-    for index, element in enumerate(elements):
-        try:
-            if _is_in_percent(element, quantity):
-                problems.append(((*path, index), _percent_message(str(element))))
-                break
-            values.append(quantity.read(element, n))
-        except PydanticCustomError as error:
-            problems.append(((*path, index), error.message()))
-            if len(problems) >= MAX_PROBLEMS:
-                break
-    return tuple(values), problems
-
-
-def _deviation_of(output: str) -> Quantity:
-    """Describe the standard deviation of a measured output."""
-    return Quantity(OUTPUTS[output].unit, "standard deviation", least=MIN_SIGMA, most=MAX_MEASURED)
-
-
-def _read_sigma(value: object, output: str, n_points: int) -> tuple[tuple[float, ...], list[ConfigProblem]]:
-    """The standard deviations of an output from the key `sigma`, and problems that validation does not report."""
+def _read_sigma(value: object, output: str, n_points: int) -> tuple[tuple[Any, ...], list[ConfigProblem]]:
+    """Read the key `sigma`, one number or one for each point; the validation of [data] reports invalid numbers."""
     path: KeyPath = ("data", "sigma")
-    if isinstance(value, list) and len(value) != n_points:
-        return (), [(path, f"got {len(value)} values, expected {n_points}, one for each point")]
-    quantity = _deviation_of(output)
-    elements = value if isinstance(value, list) else [value]
-    deviations, problems = _read_list(elements, path, quantity, None)
     if not isinstance(value, list):
-        problems = [(path, message) for _, message in problems]
-    # invalid numbers are reported by the validation of the table
-    problems = [(at, message) for at, message in problems if _is_text(value, at)]
-    return deviations if isinstance(value, list) else deviations * n_points, problems
-
-
-def _is_text(value: object, path: KeyPath) -> bool:
-    index = path[-1]
-    return isinstance(value[index] if isinstance(value, list) and isinstance(index, int) else value, str)
+        values, problems = _read_measured([value], _deviation(output), None)
+        return tuple(values) * n_points, [(path, message) for _, message in problems if isinstance(value, str)]
+    if len(value) != n_points:
+        return (), [(path, f"got {len(value)} values, expected {n_points}, one for each point")]
+    values, problems = _read_measured(value, _deviation(output), None)
+    return tuple(values), [((*path, index), text) for index, text in problems if isinstance(value[index], str)]
 
 
 def _noise_problems(
@@ -394,7 +330,7 @@ def _noise_problems(
     if noise == "excess" and len(outputs) > 1:
         return [(path, f'got "excess" with {len(outputs)} outputs, expected one, whose unit the deviation has')]
     if specimens and noise != "excess":
-        return [(path, f'got {show(noise)} with a column {SPECIMEN}, expected "excess" or no such column')]
+        return [(path, f'got {as_text(noise)} with a column {SPECIMEN}, expected "excess" or no such column')]
     if specimens and len({*specimens}) < 2:
         return [(("data",), f"got one specimen, expected at least two in the column {SPECIMEN}")]
     missing = [name for name in outputs if name not in with_sigma]

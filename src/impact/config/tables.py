@@ -25,6 +25,7 @@ from ..contact.model import ForceModel
 from ..contact.models import built_in, catalogue
 from ..contact.timestep import EXACT, MAX_STEPS_PER_CONTACT, SCHEMES
 from ..contact.variables import OUTPUTS
+from ..errors import did_you_mean
 from .quantities import (
     MAX_AXIS_VALUES,
     MAX_PROBLEMS,
@@ -45,7 +46,6 @@ from .quantities import (
     mismatch_error,
     name_or_names,
     simplify_schema,
-    suggest,
     value_error,
 )
 
@@ -473,7 +473,7 @@ def _models_matching(word: object, models: Mapping[str, ForceModel]) -> dict[str
         members = {key: model for key, model in laws.items() if model.family == family}
         if not members:
             families = sorted({model.family for model in laws.values()})
-            raise mismatch_error(word, f"a family of models; {suggest(family, families)}")
+            raise mismatch_error(word, f"a family of models; {did_you_mean(family, families)}")
         return members
     if any(letter in word for letter in "*?["):
         matching = {key: model for key, model in models.items() if fnmatchcase(key, word[:MAX_UNIT_LENGTH])}
@@ -481,5 +481,5 @@ def _models_matching(word: object, models: Mapping[str, ForceModel]) -> dict[str
             raise mismatch_error(word, "a pattern that some model matches")
         return matching
     if word not in models:
-        raise mismatch_error(word, f"a model; {suggest(word, list(models))}")
+        raise mismatch_error(word, f"a model; {did_you_mean(word, list(models))}")
     return {word: models[word]}

@@ -24,7 +24,7 @@ ROUNDING_ERROR = 1e-12
 
 
 @dataclass(frozen=True)
-class Finding:
+class ClauseResult:
     """One clause of the contract: its text, the largest deviation of the model, and the bound on it."""
 
     clause: str
@@ -82,8 +82,8 @@ def _parameter_values(model: ForceModel, parameter: Parameter, impacts: Impacts)
     return np.clip(least + np.linspace(0.0, 4.0, len(impacts)) * size, parameter.least, parameter.most)
 
 
-def contract(model: ForceModel) -> Iterator[Finding]:
-    """Check every clause of the contract; yields the findings.
+def check_contract(model: ForceModel) -> Iterator[ClauseResult]:
+    """Check every clause of the contract; yields a result for each.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def contract(model: ForceModel) -> Iterator[Finding]:
     UserWarning : a formula of the law raised an error; once for each distinct error
 
     >>> from impact.contact.models import find
-    >>> all(finding.holds for finding in contract(find("bilinear")))
+    >>> all(finding.holds for finding in check_contract(find("bilinear")))
     True
     """
     reported: set[str] = set()
@@ -110,7 +110,7 @@ def contract(model: ForceModel) -> Iterator[Finding]:
     impacts = sample(model)
     base = collided(impacts)
     ended = base["status"] < FIRST_FAILURE
-    yield Finding("every impact ends", float(np.count_nonzero(~ended)), 0)
+    yield ClauseResult("every impact ends", float(np.count_nonzero(~ended)), 0)
 
     def worst(values: Array) -> float:
         return float(np.max(np.abs(values[ended]), initial=0.0))
@@ -124,19 +124,21 @@ def contract(model: ForceModel) -> Iterator[Finding]:
     )
     size = np.abs(momenta_before[0]) + np.abs(momenta_before[1])
     lost = np.abs(momenta_before[0] + momenta_before[1] - momenta_after[0] - momenta_after[1]) / size
-    yield Finding("momentum is conserved (4)", float(np.max(lost)), ROUNDING_ERROR)
+    yield ClauseResult("momentum is conserved (4)", float(np.max(lost)), ROUNDING_ERROR)
     rebound = (base["v2_post"] - base["v1_post"]) / impacts.v0 - base["e_out"]
     scale = 1.0 + (np.abs(impacts.v1) + np.abs(impacts.v2)) / impacts.v0
-    yield Finding("velocities part by e_out v0 (5)", worst(rebound / scale), ROUNDING_ERROR)
-    yield Finding(
+    yield ClauseResult("velocities part by e_out v0 (5)", worst(rebound / scale), ROUNDING_ERROR)
+    yield ClauseResult(
         "no energy is gained", float(np.max(base["e_out"][ended], initial=0.0) - 1.0), 10 * CONTRACT_RTOL
     )
-    yield Finding("work balances energy", worst(base["energy_residual"]), 10 * CONTRACT_RTOL)
+    yield ClauseResult("work balances energy", worst(base["energy_residual"]), 10 * CONTRACT_RTOL)
     if model.oracle is not None:
-        yield Finding("agrees with its closed form", worst(base["closed_form_error"]), 10 * CONTRACT_RTOL)
+        yield ClauseResult("agrees with its closed form", worst(base["closed_form_error"]), 10 * CONTRACT_RTOL)
 
     other = collided(in_other_units(model, impacts))
-    yield Finding("a change of units changes nothing", worst(other["e_out"] - base["e_out"]), 10 * CONTRACT_RTOL)
+    yield ClauseResult(
+        "a change of units changes nothing", worst(other["e_out"] - base["e_out"]), 10 * CONTRACT_RTOL
+    )
     swapped = replace(
         impacts,
         v1=-impacts.v2,
@@ -153,16 +155,18 @@ def contract(model: ForceModel) -> Iterator[Finding]:
         yield_strength2=impacts.yield_strength1,
     )
     other = collided(swapped)
-    yield Finding(
+    yield ClauseResult(
         "swapped balls swap velocities", worst((other["v1_post"] + base["v2_post"]) / impacts.v0), ROUNDING_ERROR
     )
     elastic = collided(replace(impacts, e=np.ones(len(impacts))))
     # the parameters of a law may damp it to its limit at any e
     odd = elastic["status"] != Status.OK if "e" in model.quantities else elastic["status"] >= FIRST_FAILURE
-    yield Finding("at e = 1 the status is OK", float(np.count_nonzero(odd)), 0)
+    yield ClauseResult("at e = 1 the status is OK", float(np.count_nonzero(odd)), 0)
     tight = collided(impacts, CONTRACT_RTOL / 100)
-    yield Finding("a tighter tolerance moves nothing", worst(tight["e_out"] - base["e_out"]), 10 * CONTRACT_RTOL)
-    yield Finding(
+    yield ClauseResult(
+        "a tighter tolerance moves nothing", worst(tight["e_out"] - base["e_out"]), 10 * CONTRACT_RTOL
+    )
+    yield ClauseResult(
         "an impact alone has the bits that it has in a batch", float(_alone_differs(collided, impacts, base)), 0
     )
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..array_types import Array
-from ..contact.formula import argument_names, call_by_name
+from ..contact.formula_calls import argument_names, call_by_name
 from ..contact.impacts import Impacts, stiffness as hertz_or_secant
 from ..contact.materials import effective_mass, hertz_stiffness, sphere_mass, sphere_radius
 from ..contact.model import Law

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from .._version import __version__
 from ..errors import ImpactError, StoreError, UnfinishedError, UsageError
-from ..text import safe_text
 from .execute import other_version
 from .executors import RANGES_IN_FLIGHT, ExecutorSpec
 from .run import ignore, never
@@ -71,7 +70,7 @@ def cluster(
         version of this package
     UnfinishedError : `should_stop` returned True
     """
-    scheduler_name = safe_text(str(scheduler))
+    scheduler_name = str(scheduler)
     if find_spec("distributed") is None:
         extra = 'pip install "impact-sweep[distributed]"'
         raise UsageError(
@@ -165,8 +164,7 @@ def _connect(
         else:
             client = Client(scheduler, set_as_default=False, timeout=timeout)
     except (OSError, ValueError, TypeError, ImportError) as error:
-        reason = safe_text(str(error), 300)
-        raise UsageError(f"{scheduler_name}: {reason}; expected {ADDRESS_EXPECTED}") from None
+        raise UsageError(f"{scheduler_name}: {error}; expected {ADDRESS_EXPECTED}") from None
     try:
         _check_versions(client)
         return client, client.scheduler_info(), len(client.nthreads())
@@ -205,9 +203,7 @@ def _check_versions(client: Client) -> None:
         versions = {"the scheduler": error}
     for location, version in (versions | client.run(eval, VERSION_EXPRESSION, on_error="return")).items():
         if isinstance(version, BaseException):
-            raise UsageError(
-                f"{location}: has no impact: {safe_text(str(version))}; expected impact {__version__}"
-            )
+            raise UsageError(f"{location}: has no impact: {version}; expected impact {__version__}")
         if version != __version__:
             raise UsageError(other_version(location, str(version), __version__))
 

@@ -26,7 +26,6 @@ from ..contact.numba.dispatch import is_installed, serves
 from ..contact.simulate import TABLE_COLUMNS, CollisionResult, simulate
 from ..contact.status import STATUSES
 from ..errors import StoreError, UsageError
-from ..text import safe_text
 from .build_impacts import exponents
 from .executors import ExecutorSpec
 from .plan import Plan
@@ -118,15 +117,13 @@ def models_of_context(context: WorkerContext) -> Mapping[str, ForceModel]:
     plugins = read_plugins([PythonFile(*source) for source in context.sources])
     missing_models = [key for key, sha256 in context.hashes if plugins.hashes.get(key) != sha256]
     if missing_models:
-        raise UsageError(
-            f"{host}: {safe_text(', '.join(missing_models))}: expected their package in the same version"
-        )
+        raise UsageError(f"{host}: {', '.join(missing_models)}: expected their package in the same version")
     return catalogue(plugins.models)
 
 
 def other_version(location: str, location_version: str, this_version: str) -> str:
     """State that a worker or scheduler has another version."""
-    return f"{location}: has impact {safe_text(location_version)}, this is {this_version}; expected the same"
+    return f"{location}: has impact {location_version}, this is {this_version}; expected the same"
 
 
 def with_core(plan: Plan, maps: Sequence[TrajectoryMap]) -> Plan:
@@ -265,9 +262,9 @@ def _check_integrated(trajectory_range: TrajectoryRange, integrated: object, siz
     prefix = f"executor: range {trajectory_range.number}"
     collisions, errors = integrated if isinstance(integrated, tuple) and len(integrated) == 2 else (integrated, {})
     if not isinstance(collisions, CollisionResult):
-        raise StoreError(f"{prefix}: got {safe_text(type(collisions).__name__)}, expected CollisionResult")
+        raise StoreError(f"{prefix}: got {type(collisions).__name__}, expected CollisionResult")
     if not isinstance(errors, dict):
-        raise StoreError(f"{prefix}: got {safe_text(type(errors).__name__)}, expected a dict of errors")
+        raise StoreError(f"{prefix}: got {type(errors).__name__}, expected a dict of errors")
     blank = CollisionResult.blank(size)
     for name in TABLE_COLUMNS:
         got, expected = (_dtype_and_shape(getattr(result, name)) for result in (collisions, blank))
@@ -281,7 +278,7 @@ def _check_integrated(trajectory_range: TrajectoryRange, integrated: object, siz
 def _dtype_and_shape(array: object) -> str:
     """Describe an array, or name the type of something else."""
     if not isinstance(array, np.ndarray):
-        return safe_text(type(array).__name__)
+        return type(array).__name__
     return f"{array.dtype} of shape {array.shape}"
 
 
@@ -300,7 +297,7 @@ def _build_submit(
         values = [plugin.model.key for plugin in plan.plugins.items if plugin.is_value]
         if values:
             raise UsageError(
-                f"{safe_text(', '.join(values))} is given as a Python value, which cannot be sent to other "
+                f"{', '.join(values)} is given as a Python value, which cannot be sent to other "
                 "processes; expected the file that it is in, or jobs=1"
             )
         integrate = partial(integrate_remotely, context=context_of(plan))

@@ -23,7 +23,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import NamedTuple
 
-from ..config.quantities import show
+from ..config.quantities import as_text
 from ..contact.model import ForceModel
 from ..contact.models import catalogue
 from ..errors import NOT_OF_A_PLUGIN, ImpactError, ModelError, UsageError
@@ -124,14 +124,14 @@ def read_plugins(sources: Sequence[ForceModel | str | Path | PythonFile]) -> Plu
     True
     """
     if isinstance(sources, str | Path | ForceModel):
-        raise UsageError(f"plugins: got {safe_text(repr(sources))}, expected a list of models and paths")
+        raise UsageError(f"plugins: got {sources!r}, expected a list of models and paths")
     origins = dict.fromkeys(catalogue(), "built in")
     plugins: list[Plugin] = []
     named_plugins = [(str(plugin.package), plugin) for plugin in installed()]
     for index, source in enumerate(sources):
         named_plugins += _plugins_of_source(source, f"plugins[{index}]")
-    for origin, plugin in named_plugins:
-        name, key = safe_text(origin), plugin.model.key
+    for name, plugin in named_plugins:
+        key = plugin.model.key
         _check_storable(plugin.model, name)
         if key in origins:
             raise ModelError(
@@ -152,8 +152,7 @@ def _plugins_of_source(source: object, argument: str) -> list[tuple[str, Plugin]
             return [(source.name, plugin) for plugin in _plugins_of_file(source)]
         case str() | Path():
             return [(str(source), plugin) for plugin in _plugins_of_file(_read_source(Path(source)))]
-    got = safe_text(repr(source))
-    raise UsageError(f"{argument}: got {got}, expected a ForceModel or the path of a Python file")
+    raise UsageError(f"{argument}: got {source!r}, expected a ForceModel or the path of a Python file")
 
 
 @cache
@@ -173,7 +172,7 @@ def installed() -> tuple[Plugin, ...]:
 
 def _plugins_of_entry_point(point: EntryPoint) -> list[Plugin]:
     package = f"{point.dist.name} {point.dist.version}" if point.dist else "a package without a name"
-    location = safe_text(f"{package}: entry point {point.name} = {point.value}")
+    location = f"{package}: entry point {point.name} = {point.value}"
     try:
         loaded = point.load()
     except NOT_OF_A_PLUGIN:
@@ -203,39 +202,39 @@ def _check_storable(model: ForceModel, name: str) -> None:
     for field, text in texts.items():
         if not isinstance(text, str) or re.search("[\0\ud800-\udfff]", text):
             raise ModelError(
-                f"{name}: model {model.key}: {safe_text(field)}: got {show(text)}, expected text without NUL and "
+                f"{name}: model {model.key}: {field}: got {as_text(text)}, expected text without NUL and "
                 "lone surrogates"
             )
     if not isinstance(model.year, int) or not 0 <= model.year <= 9999:
-        raise ModelError(f"{name}: model {model.key}: year: got {show(model.year)}, expected a year, such as 2026")
+        raise ModelError(
+            f"{name}: model {model.key}: year: got {as_text(model.year)}, expected a year, such as 2026"
+        )
 
 
 def _plugins_of_file(source: PythonFile) -> list[Plugin]:
     """The models at the top level of a Python file, in order of definition."""
-    name = safe_text(source.name)
     sha256 = hashlib.sha256(source.content).hexdigest()
-    models = _models_among(vars(_execute_module(source, name, sha256)).values())
+    models = _models_among(vars(_execute_module(source, sha256)).values())
     if not models:
-        raise ModelError(f"{name}: contains no model, expected a ForceModel at its top level")
+        raise ModelError(f"{source.name}: contains no model, expected a ForceModel at its top level")
     return [Plugin(model, sha256, source) for model in models]
 
 
 def _read_source(path: Path) -> PythonFile:
     """Read a Python file."""
-    name = safe_text(str(path))
     if path.suffix != ".py":
-        raise UsageError(f"{name}: its name does not end in .py, expected a Python file")
+        raise UsageError(f"{path}: its name does not end in .py, expected a Python file")
     try:
         # reading something other than a regular file might never end
         if path.exists() and not path.is_file():
-            raise UsageError(f"{name}: not a regular file, expected a Python file")
+            raise UsageError(f"{path}: not a regular file, expected a Python file")
         return PythonFile(str(path), path.read_bytes())
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise UsageError(f"{name}: cannot be read: {safe_text(reason)}") from None
+        raise UsageError(f"{path}: cannot be read: {reason}") from None
 
 
-def _execute_module(source: PythonFile, name: str, sha256: str) -> ModuleType:
+def _execute_module(source: PythonFile, sha256: str) -> ModuleType:
     """Execute exactly the bytes that were hashed as a module, without storing bytecode.
 
     Its folder is not searched for modules: a plug-in is a single file, so that the hash covers all of it.
@@ -248,7 +247,7 @@ def _execute_module(source: PythonFile, name: str, sha256: str) -> ModuleType:
         line = getattr(error, "lineno", None) or 1
         text = safe_text((getattr(error, "text", None) or "").strip(), 60)
         message = error.msg if isinstance(error, SyntaxError) else f"{type(error).__name__}: {error}"
-        raise ModelError(f"{name}:{line}: not Python: {safe_text(message)}{text and f': {text}'}") from None
+        raise ModelError(f"{source.name}:{line}: not Python: {message}{text and f': {text}'}") from None
     module = ModuleType(f"_impact_plugin_{sha256[:16]}")
     module.__file__ = file
     # dataclasses and inspect look a module up by its name
@@ -261,7 +260,7 @@ def _execute_module(source: PythonFile, name: str, sha256: str) -> ModuleType:
         sys.modules.pop(module.__name__, None)
         frames = traceback.walk_tb(error.__traceback__)
         line = [number for frame, number in frames if frame.f_code.co_filename == file][-1]
-        raise ModelError(f"{name}:{line}: {_error_message(error)}") from None
+        raise ModelError(f"{source.name}:{line}: {_error_message(error)}") from None
     return module
 
 

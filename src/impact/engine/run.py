@@ -13,7 +13,6 @@ from ..config.grid import MAX_POINTS
 from ..contact.simulate import CollisionResult
 from ..contact.status import FIRST_FAILURE
 from ..errors import StoreError, UnfinishedError, UsageError
-from ..text import safe_text
 from .executors import SERIAL, ExecutorSpec
 from .trajectories import TrajectoryRange
 
@@ -125,7 +124,7 @@ def report_kept_ranges(
         yield
     except (StoreError, UnfinishedError, UsageError, MemoryError) as error:
         share = f"{counter.progress.trajectories:,} of {counter.progress.of_trajectories:,} trajectories"
-        kept = f"{share} are kept in {safe_text(str(folder))}; {command} continues"
+        kept = f"{share} are kept in {folder}; {command} continues"
         is_memory = isinstance(error, MemoryError)
         lines = ["out of memory" if is_memory else "", str(error), *details(error), kept]
         raise (StoreError if is_memory else type(error))("; ".join(filter(None, lines))) from error

@@ -15,11 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..contact.deduplicate import deduplicate
+from ..contact.dimensionless import dimensionless_values, exponent_names
 from ..contact.impacts import CHECKS, check_inputs
 from ..contact.model import ForceModel
-from ..contact.scaling import dimensionless_values, exponent_names
 from ..errors import UsageError
-from ..text import safe_text
 from .build_impacts import build_impacts, fixed_steps_at
 from .plan import Index, Inputs, Plan, dimensions
 
@@ -116,8 +115,7 @@ def check_count(plan: Plan, most: int, name: str) -> None:
         total += cells if cells > MAX_CELLS else 0
     if total > most:
         raise UsageError(
-            f"{safe_text(name)}: sweep: got {total:,} trajectories to integrate, expected at most {most:,} "
-            "(--max-points)"
+            f"{name}: sweep: got {total:,} trajectories to integrate, expected at most {most:,} (--max-points)"
         )
 
 

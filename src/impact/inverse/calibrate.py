@@ -7,15 +7,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from fractions import Fraction
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
 from ..array_types import Array
+from ..atomic import check_outputs, write_file
 from ..config.files import override_text, toml_document
 from ..config.grid import Axis
 from ..config.input_names import InputName
-from ..config.load import Config, parse_config
+from ..config.load import Config, parse_config, read_config
 from ..config.measurements import fitted_parameters
 from ..config.quantities import KeyPath, Quantity
 from ..contact.model import ForceModel
@@ -25,9 +27,10 @@ from ..engine.build_impacts import build_impacts
 from ..engine.execute import WorkerContext, context_of, models_of_context
 from ..engine.executors import choose_executor
 from ..engine.plan import Inputs, Plan
-from ..engine.plugins import Plugins
+from ..engine.plugins import Plugins, read_plugins
 from ..results.calibration import calibration_template
 from ..results.schema import FIT_STATUSES
+from ..results.xarray_backend import save
 from .batch import VectorFunction
 from .fit import Bounds, DataPoints, Fit, Problem, fit_all, half_widths
 
@@ -58,44 +61,76 @@ class FittedLaw:
     curve: Array
 
 
-@dataclass(frozen=True)
-class Calibration:
-    """The fits of laws to measurements.
+def calibrate(
+    source: str | Path | Mapping[str, object],
+    *,
+    output: str | Path | None = None,
+    best: str | Path | None = None,
+    overwrite: bool = False,
+    overrides: Sequence[str] = (),
+    plugins: Sequence[ForceModel | str | Path] = (),
+    jobs: int = 1,
+) -> xr.Dataset:
+    """Fit laws to measurements: which law fits, with which parameters, and what the data cannot determine.
 
     Parameters
     ----------
-    config : with the measurements and the parameters to fit
-    laws : by key
-    varied : the input of the curves, and its values; "" where the data vary with more than one input or none
+    source : a TOML file, or a mapping with the same keys, with `[data]` and values `{ fit = [least, most] }`
+    output : result file to write
+    best : TOML file to write, with the config of the best law and its parameters, for `sweep` and `export`
+    overwrite : replace files that exist
+    overrides, plugins : see `sweep`
+    jobs : number of processes; the result has the same bits for any number
+
+    Returns
+    -------
+    Dataset : of dimensions model, parameter and point, the best law first; see docs/calibrate.md
+
+    Raises
+    ------
+    ConfigError : with one line for each problem
+    UsageError, StoreError : a file exists or cannot be written
+
+    The restitution that a linear spring and dashpot was asked for, from three measurements of it:
+
+    >>> import impact
+    >>> fit = impact.calibrate({
+    ...     "models": "anagnostopoulos-1988",
+    ...     "sweep": {"v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 1e6, "n": 1.0, "e": {"fit": [0.1, 1.0]}},
+    ...     "data": {"columns": {"e_out": [0.49, 0.5, 0.51], "sigma": [0.01, 0.01, 0.01]}},
+    ... })
+    >>> round(fit["estimate"].item(), 6), round(fit["chi2_reduced"].item(), 6)
+    (0.5, 1.0)
     """
+    plugin_set = read_plugins(plugins)
+    read = Path(source) if isinstance(source, str) else source
+    config = read_config(read, overrides, plugin_set.models, purpose="calibrate")
+    check_outputs([output, best], [source, *plugins, *config.files], overwrite=overwrite)
+    result = calibrate_config(config, plugin_set.of(config.models), jobs)
+    if output is not None:
+        save(result, output, overwrite=overwrite)
+    if best is not None:
+        write_file(Path(best), best_config(config, result).encode(), overwrite=overwrite)
+    return result
 
-    config: Config
-    laws: Mapping[str, FittedLaw]
-    varied: tuple[str, Array]
 
-    @property
-    def ranked(self) -> list[str]:
-        """The keys of the laws, best first: by AICc, those without one last, by chi2.
+def calibrate_config(config: Config, plugins: Plugins, jobs: int = 1) -> xr.Dataset:
+    """Fit the laws of a config to its measurements; see `calibrate`.
 
-        A law at a bound is ranked by what it reaches there: a wider search can only improve it.
-        """
-
-        def order(key: str) -> list[float]:
-            fit = self.laws[key].fit
-            return [math.inf if math.isnan(value) else value for value in (fit.aicc, fit.chi2_reduced)]
-
-        return sorted(self.laws, key=order)
-
-    @property
-    def weights(self) -> dict[str, float]:
-        """Akaike weights of the laws; 0 for those without an AICc."""
-        criteria = {key: law.fit.aicc for key, law in self.laws.items()}
-        least = min((aicc for aicc in criteria.values() if not math.isnan(aicc)), default=0.0)
-        likelihood = {
-            key: np.exp(-0.5 * np.nan_to_num(aicc - least, nan=np.inf)) for key, aicc in criteria.items()
-        }
-        total = sum(likelihood.values())
-        return {key: float(value / total) if total else 0.0 for key, value in likelihood.items()}
+    Parameters
+    ----------
+    config, plugins : the config, and its models that are not built in
+    jobs : number of processes; a law is fitted in one of them, and its fit does not depend on the others
+    """
+    if jobs > 1 and len(config.models) > 1:
+        context = context_of(Plan(config, plugins))
+        with choose_executor(jobs).start() as executor:
+            fit = partial(_fit_remotely, text=config.text, overrides=config.overrides, context=context)
+            keys = [model.key for model in config.models]
+            laws = dict(zip(keys, executor.map(fit, keys), strict=True))
+    else:
+        laws = fit_laws(config)
+    return _calibration_dataset(config, plugins, laws)
 
 
 def prediction(
@@ -144,26 +179,6 @@ def prediction(
         )
 
     return predict
-
-
-def calibrate_config(config: Config, plugins: Plugins, jobs: int = 1) -> Calibration:
-    """Fit the laws of a config to its measurements; see `impact.calibrate`.
-
-    Parameters
-    ----------
-    config, plugins : the config, and its models that are not built in
-    jobs : number of processes; a law is fitted in one of them, and its fit does not depend on the others
-    """
-    if jobs > 1 and len(config.models) > 1:
-        context = context_of(Plan(config, plugins))
-        with choose_executor(jobs).start() as executor:
-            fit = partial(_fit_remotely, text=config.text, overrides=config.overrides, context=context)
-            keys = [model.key for model in config.models]
-            laws = dict(zip(keys, executor.map(fit, keys), strict=True))
-    else:
-        laws = fit_laws(config)
-    assert config.data is not None
-    return Calibration(config, laws, varied_input(config.data.inputs))
 
 
 def _fit_remotely(key: str, text: str, overrides: Sequence[str], context: WorkerContext) -> FittedLaw:
@@ -337,24 +352,24 @@ def _factors(powers: Sequence[tuple[str, Fraction]]) -> str:
     return f"({text})" if len(words) > 1 else text
 
 
-def best_config(calibration: Calibration) -> str:
-    """A config in TOML with the best law and its parameters; inputs that vary in the data are axes.
+def best_config(config: Config, result: xr.Dataset) -> str:
+    """Write a config in TOML with the best law and its parameters; inputs that vary in the data are axes.
 
     It has all values in SI units, and needs no other file.
     """
-    config, key = calibration.config, calibration.ranked[0]
     assert config.data is not None
-    values: dict[str, object] = dict(config.scalars)
-    values |= {name: sorted(set(column)) for name, column in config.data.inputs.items()}
-    law = calibration.laws[key]
-    values |= dict(zip(law.names, map(float, law.fit.estimate), strict=True))
+    best = result.isel(model=0)
+    key = str(best["model"].item())
+    fitted = best.isel(parameter=best["identifiable"].values >= 0)
+    estimates = dict(zip(map(str, fitted["parameter"].values), fitted["estimate"].values.tolist(), strict=True))
+    columns = {name: sorted(set(column)) for name, column in config.data.inputs.items()}
     tables: dict[KeyPath, dict[str, object]] = {(): {"models": [key], "title": config.title}, ("sweep",): {}}
     for name, material in config.materials.items():
         known = {field: value for field, value in asdict(material).items() if value is not None and value == value}
         tables["materials", name] = known
-    for name, value in values.items():
+    for name, value in {**config.scalars, **columns, **estimates}.items():
         parsed = InputName.parse(name)
-        if not parsed.applies_to(key) or (name in config.fits and name not in law.names):
+        if not parsed.applies_to(key) or (name in config.fits and name not in estimates):
             continue
         if isinstance(value, list) and len(value) == 1:
             (value,) = value
@@ -362,31 +377,34 @@ def best_config(calibration: Calibration) -> str:
     return toml_document(tables)
 
 
-def calibration_dataset(calibration: Calibration, plugins: Plugins) -> xr.Dataset:
-    """The result of a calibration, with the laws in the order of their rank."""
-    config = calibration.config
+def _calibration_dataset(config: Config, plugins: Plugins, laws: Mapping[str, FittedLaw]) -> xr.Dataset:
+    """Store the fits of laws, the best law first: by AICc, those without one last, by chi2.
+
+    A law at a bound is ranked by what it reaches there: a wider search can only improve it.
+    """
     assert config.data is not None
-    keys = calibration.ranked
-    by_key = {model.key: model for model in config.models}
+    models = {model.key: model for model in config.models}
+
+    def rank(key: str) -> list[float]:
+        fit = laws[key].fit
+        return [math.inf if math.isnan(value) else value for value in (fit.aicc, fit.chi2_reduced)]
+
+    keys = sorted(laws, key=rank)
+    fits = [laws[key].fit for key in keys]
     parameters = list(config.fits)
+    varied = varied_input(config.data.inputs)
+    dataset = calibration_template(config, [models[key] for key in keys], plugins, varied)
     shape = (len(keys), len(parameters))
-    dataset = calibration_template(config, [by_key[key] for key in keys], plugins, calibration.varied)
     arrays = {name: np.full(shape, np.nan) for name in ("estimate", "lower", "upper")}
     covariance = np.full((*shape, len(parameters)), np.nan)
     identifiable = np.full(shape, -1, np.int8)
-    for row, key in enumerate(keys):
-        fit = calibration.laws[key].fit
-        where = [parameters.index(name) for name in calibration.laws[key].names]
-        for name, column in arrays.items():
-            column[row, where] = getattr(fit, name)
-        covariance[row][np.ix_(where, where)] = fit.covariance
-        identifiable[row, where] = fit.identifiable
-    fits = [calibration.laws[key].fit for key in keys]
-    weights = calibration.weights
-    groups = [
-        "; ".join(determined_groups(config, by_key[key], law.names, law.fit))
-        for key, law in ((key, calibration.laws[key]) for key in keys)
-    ]
+    for row, (key, fit) in enumerate(zip(keys, fits, strict=True)):
+        columns = [parameters.index(name) for name in laws[key].names]
+        for name, array in arrays.items():
+            array[row, columns] = getattr(fit, name)
+        covariance[row][np.ix_(columns, columns)] = fit.covariance
+        identifiable[row, columns] = fit.identifiable
+    weights = akaike_weights({key: law.fit.aicc for key, law in laws.items()})
     values: dict[str, object] = {
         **arrays,
         "covariance": covariance,
@@ -395,9 +413,22 @@ def calibration_dataset(calibration: Calibration, plugins: Plugins) -> xr.Datase
         "weight": np.array([weights[key] for key in keys]),
         **{name: np.array([getattr(fit, name) for fit in fits]) for name in FIT_VARIABLES},
     }
-    if calibration.varied[0]:
-        curve, lower, upper = np.stack([calibration.laws[key].curve for key in keys], axis=1)
+    if varied[0]:
+        curve, lower, upper = np.stack([laws[key].curve for key in keys], axis=1)
         values |= {"curve": curve, "curve_lower": lower, "curve_upper": upper}
+    groups = ["; ".join(determined_groups(config, models[key], laws[key].names, laws[key].fit)) for key in keys]
     return dataset.assign(
         {name: (dataset[name].dims, array, dataset[name].attrs) for name, array in values.items()}
     ).assign_coords(determined=("model", groups))
+
+
+def akaike_weights(aicc: Mapping[str, float]) -> dict[str, float]:
+    """Weights of laws from their AICc; 0 for those without one.
+
+    >>> akaike_weights({"hertz": 3.0, "tsuji-1992": 3.0, "bilinear": math.nan})
+    {'hertz': 0.5, 'tsuji-1992': 0.5, 'bilinear': 0.0}
+    """
+    smallest = min((value for value in aicc.values() if not math.isnan(value)), default=0.0)
+    likelihood = {key: np.exp(-0.5 * np.nan_to_num(value - smallest, nan=np.inf)) for key, value in aicc.items()}
+    total = sum(likelihood.values())
+    return {key: float(value / total) if total else 0.0 for key, value in likelihood.items()}

@@ -1,10 +1,18 @@
-"""Solve for an input of a law: the value of a parameter, of K, or the e to ask for, that gives a wanted output."""
+"""Solve for an input of a law: the value of a parameter, of K, or the e to ask for, that gives a wanted output.
+
+The output is scanned at logarithmically spaced values of the input. Interior extrema of the scan are refined by
+the method of Chandrupatla (1998), Computer Methods in Applied Mechanics and Engineering 152, 211-217, and roots
+between neighbours on different sides of the target by that of Chandrupatla (1997), Advances in Engineering
+Software 28, 145-149. Both are those of `scipy.optimize.elementwise`, which refines all brackets in one batch. Over
+a range of conditions the largest distance from the target is minimized instead, by Brent's bounded search.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NoReturn, TypeAlias
 
 import numpy as np
@@ -16,16 +24,19 @@ from ..config.grid import Axis
 from ..config.input_names import InputName
 from ..config.load import Config, Output
 from ..contact.model import ForceModel, Parameter
+from ..contact.models import find
 from ..contact.status import Status
 from ..contact.timestep import EXACT
 from ..contact.units import with_numbers
 from ..contact.variables import OUTPUTS
+from ..display import Block, Displayed
 from ..engine.build_impacts import build_impacts
 from ..engine.plan import Inputs, Plan
-from ..engine.plugins import Plugins
+from ..engine.plugins import Plugins, read_plugins
 from ..errors import UsageError, did_you_mean
+from ..formatting import number, quantity
+from ..results.single_impact import open_source, single_point
 from ..results.sweep import sweep_in_memory
-from ..text import safe_text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -59,7 +70,7 @@ class Root:
 
 
 @dataclass(frozen=True)
-class SolveResult:
+class SolveResult(Displayed):
     """The values of an input with which a law gives a wanted output.
 
     Parameters
@@ -85,6 +96,99 @@ class SolveResult:
     attainable: tuple[float, float]
     over: tuple[Mapping[str, float], ...] | None
 
+    def as_dict(self) -> dict[str, Any]:
+        """The result as plain data."""
+        return {
+            "model": self.model,
+            "for": self.name,
+            "unit": self.unit,
+            "target": dict(self.target),
+            "status": self.status,
+            "roots": [asdict(root) for root in self.roots],
+            "attainable": self.attainable,
+            "over": None if self.over is None else [dict(condition) for condition in self.over],
+        }
+
+    def records(self) -> Sequence[Mapping[str, Any]]:
+        """The conditions of a range of inputs; without one the roots."""
+        return self.over if self.over is not None else [asdict(root) for root in self.roots]
+
+    def blocks(self, width: int) -> Iterator[Block]:
+        """A line for each root, or the range that can be attained."""
+        ((variable, value),) = self.target.items()
+        target = f"{variable} = {number(value)}"
+        for root in self.roots:
+            # a minimum has half the digits of a root
+            line = f"{self.name} = {quantity(root.value, self.unit, 10 if self.over is None else 6)}"
+            if self.over is None:
+                at_bound = ", its bound" if self.status == "at_bound" else ""
+                e_out = f", e_out = {number(root.e_out)}" if variable != "e_out" else ""
+                yield f"{line}{at_bound}: {target}{e_out}"
+            else:
+                name = next(iter(self.over[0]))
+                ends = (
+                    f"{number(condition[variable])} at {name} = {number(condition[name])}"
+                    for condition in (self.over[0], self.over[-1])
+                )
+                yield f"{line}: {variable} from {' to '.join(ends)}"
+        if not self.roots:
+            smallest, largest = map(number, self.attainable)
+            yield (
+                f"{self.model}: no value of {self.name} gives {target}; {variable} is from {smallest} to {largest}"
+            )
+
+
+def solve(
+    model: str,
+    name: str,
+    target: Mapping[str, float],
+    *,
+    source: str | Path | Mapping[str, object] | None = None,
+    at: Mapping[str, float | str] | None = None,
+    over: Mapping[str, object] | None = None,
+    overrides: Sequence[str] = (),
+    plugins: Sequence[ForceModel | str | Path] = (),
+) -> SolveResult:
+    """Find the value of an input of a law that gives a target: which coefficient gives the rebound I want?
+
+    Parameters
+    ----------
+    model : key of the law
+    name : what to solve for: a parameter of the law, the restitution "e" to ask it for, or the stiffness "K"
+    target : the value of one output, such as `{"e_out": 0.6}`
+    source : a TOML file, a mapping, or a result; by default the two balls of Table 1 of the paper
+    at : values of the other inputs by config name, such as `{"v1": 1.0}`
+    over : values of one input, such as `{"v1": {"linspace": [0.1, 3, 30]}}`, for which one value is found, with
+        the smallest largest distance from the target
+    overrides, plugins : see `sweep`
+
+    Returns
+    -------
+    SolveResult : the status, the roots with the e_out of each, the range of the target that was found, and the
+        outputs over the range of inputs
+
+    Raises
+    ------
+    UsageError : the law has no such parameter, or the target is no output
+    ConfigError, ModelError : see `sweep`
+
+    The law of Gharib and Hurmuzlu delivers less than it is asked for, and never 0.6:
+
+    >>> import impact
+    >>> round(impact.solve("gharib-hurmuzlu-2012", "e", {"e_out": 0.5}).roots[0].value, 6)
+    0.697958
+    >>> print(impact.solve("gharib-hurmuzlu-2012", "e", {"e_out": 0.6}))
+    gharib-hurmuzlu-2012: no value of e gives e_out = 0.6; e_out is from 0 to 0.593624
+    """
+    if over is not None and len(over) != 1:
+        raise UsageError(f"--over: got {len(over)} inputs, expected one")
+    plugin_set = read_plugins(plugins)
+    law = find(model, plugin_set.models)
+    unknown = unknown_of(law, name)
+    inputs = {**placeholder(law, unknown), **(at or {})}
+    config, _ = single_point(open_source(source, overrides, plugin_set), model, inputs, over)
+    return solve_input(config, plugin_set.of(config.models), unknown, target)
+
 
 def unknown_of(model: ForceModel, name: str) -> Parameter:
     """The input to solve for, as a parameter with its unit and bounds.
@@ -102,19 +206,17 @@ def unknown_of(model: ForceModel, name: str) -> Parameter:
     if "e" in model.quantities:
         unknowns["e"] = Parameter("e", "1", "restitution to ask for", default=0.5, least=0.0, most=1.0)
     if name not in unknowns:
-        raise UsageError(
-            f'--for: {model.key} has no parameter "{safe_text(name)}"; {did_you_mean(name, list(unknowns))}'
-        )
+        raise UsageError(f'--for: {model.key} has no parameter "{name}"; {did_you_mean(name, list(unknowns))}')
     return unknowns[name]
 
 
-def placeholder_override(model: ForceModel, unknown: Parameter) -> list[str]:
-    """The override that gives the unknown a valid value, so that the config needs none."""
+def placeholder(model: ForceModel, unknown: Parameter) -> dict[str, float]:
+    """Give the unknown a valid value by its config name, so that the config needs none."""
     if unknown.name == "K":
-        return []
+        return {}
     value = next((v for v in (unknown.default, unknown.typical) if v is not None), 1.0)
-    value = min(max(value, unknown.least), unknown.most)
-    return [f"sweep.e={value!r}" if unknown.name == "e" else f"model.{model.key}.{unknown.name}={value!r}"]
+    name = "e" if unknown.name == "e" else f"{model.key}.{unknown.name}"
+    return {name: min(max(value, unknown.least), unknown.most)}
 
 
 def check_target(target: Mapping[str, float]) -> tuple[str, float]:
@@ -129,9 +231,9 @@ def check_target(target: Mapping[str, float]) -> tuple[str, float]:
         raise UsageError(f"--target: got {len(target)} targets, expected one, such as e_out=0.6")
     ((name, value),) = target.items()
     if name not in names:
-        raise UsageError(f'--target: no output "{safe_text(name)}"; {did_you_mean(name, names)}')
+        raise UsageError(f'--target: no output "{name}"; {did_you_mean(name, names)}')
     if not (isinstance(value, int | float) and math.isfinite(value)):
-        raise UsageError(f"--target {name}: got {safe_text(str(value))}, expected a finite number")
+        raise UsageError(f"--target {name}: got {value}, expected a finite number")
     return name, float(value)
 
 
@@ -153,9 +255,9 @@ def solve_input(config: Config, plugins: Plugins, unknown: Parameter, target: Ma
     ------
     UsageError : all integrations fail
     """
-    variable, wanted = check_target(target)
+    variable, value = check_target(target)
     problem = _Problem(config, plugins, unknown, variable)
-    return _best_over_axis(problem, wanted) if config.axes else _all_roots(problem, wanted)
+    return _best_over_axis(problem, value) if config.axes else _all_roots(problem, value)
 
 
 @dataclass(frozen=True)
@@ -257,7 +359,7 @@ class _Problem:
         return unit if 0.0 < unit < math.inf else 1.0
 
 
-def _all_roots(problem: _Problem, wanted: float) -> SolveResult:
+def _all_roots(problem: _Problem, target: float) -> SolveResult:
     """All values that give the target."""
     scan = problem.scan_values()
     values = problem.target_values(scan, is_scan=True)
@@ -265,14 +367,14 @@ def _all_roots(problem: _Problem, wanted: float) -> SolveResult:
         problem.raise_failure(scan)
     # a value at which the integration fails, often for want of steps, hides no root between its neighbours
     scan, values = scan[~np.isnan(values)], values[~np.isnan(values)]
-    scale = 1.0 if problem.variable.startswith("e_") else abs(wanted)
+    scale = 1.0 if problem.variable.startswith("e_") else abs(target)
     tolerance = TARGET_TOLERANCE * problem.config.solver.rtol * scale
-    is_exact = np.abs(values - wanted) <= SCAN_TOLERANCE * scale
+    is_exact = np.abs(values - target) <= SCAN_TOLERANCE * scale
     is_exact[[values.argmin(), values.argmax()]] = True
     exact = problem.target_values(scan[is_exact])
     values[is_exact] = np.where(np.isnan(exact), values[is_exact], exact)
-    scan, values = _with_extrema(problem, scan, values, np.abs(values - wanted) <= tolerance)
-    distance = values - wanted
+    scan, values = _with_extrema(problem, scan, values, np.abs(values - target) <= tolerance)
+    distance = values - target
     reached = np.abs(distance) <= tolerance
     bounds = {problem.unknown.least, problem.unknown.most}
     roots, ends = _runs(reached, scan, bounds)
@@ -282,7 +384,7 @@ def _all_roots(problem: _Problem, wanted: float) -> SolveResult:
         is_end = np.arange(left.size) >= between.size
 
         def function(x: Array, is_end: Mask) -> Array:
-            of_x = problem.target_values(x) - wanted
+            of_x = problem.target_values(x) - target
             return np.where(is_end, np.abs(of_x) - tolerance, of_x)
 
         refined = elementwise.find_root(
@@ -300,7 +402,7 @@ def _all_roots(problem: _Problem, wanted: float) -> SolveResult:
     status: SolveStatus = "no_root" if not roots else "several_roots" if len(roots) > 1 else "ok"
     if status == "ok" and roots[0] in bounds:
         status = "at_bound"
-    return _result(problem, wanted, status, map(Root, roots, e_out), values)
+    return _result(problem, target, status, map(Root, roots, e_out), values)
 
 
 def _with_extrema(problem: _Problem, scan: Array, values: Array, reached: Mask) -> tuple[Array, Array]:
@@ -358,7 +460,7 @@ def _runs(reached: Mask, scan: Array, bounds: set[float]) -> tuple[list[float], 
     return roots, ends
 
 
-def _best_over_axis(problem: _Problem, wanted: float) -> SolveResult:
+def _best_over_axis(problem: _Problem, target: float) -> SolveResult:
     """The value for which the largest distance from the target over the axis of the config is least."""
     (axis,) = problem.config.axes
     conditions = np.arange(axis.size)
@@ -367,7 +469,7 @@ def _best_over_axis(problem: _Problem, wanted: float) -> SolveResult:
         """Over all conditions, shape (n,); infinite where an integration fails."""
         trials = np.repeat(values, axis.size)
         of_target = problem.target_values(trials, np.tile(conditions, values.size), is_scan=is_scan)
-        distances = np.abs(of_target - wanted).reshape(values.size, axis.size)
+        distances = np.abs(of_target - target).reshape(values.size, axis.size)
         return np.where(np.isnan(distances).any(axis=1), np.inf, distances.max(axis=1))
 
     scan = problem.scan_values()
@@ -397,12 +499,12 @@ def _best_over_axis(problem: _Problem, wanted: float) -> SolveResult:
     )
     status: SolveStatus = "at_bound" if value in (problem.unknown.least, problem.unknown.most) else "ok"
     root = Root(value, float(outputs["e_out"].values.mean()))
-    return _result(problem, wanted, status, (root,), outputs[problem.variable].values, over)
+    return _result(problem, target, status, (root,), outputs[problem.variable].values, over)
 
 
 def _result(
     problem: _Problem,
-    wanted: float,
+    target: float,
     status: SolveStatus,
     roots: Iterable[Root],
     values: Array,
@@ -412,7 +514,7 @@ def _result(
         model=problem.model.key,
         name=problem.unknown.name,
         unit=problem.unit(),
-        target={problem.variable: wanted},
+        target={problem.variable: target},
         status=status,
         roots=tuple(roots),
         attainable=_extremes(values),

@@ -1,10 +1,18 @@
-"""What a code with a fixed time step delivers, how small a step has to be, and which e to ask for."""
+"""What a code with a fixed time step delivers, how small a step has to be, and which e to ask for.
+
+A collision is integrated at every phase, the part of a step in which the contact begins, by the scheme of a code
+(`impact.contact.timestep`), in one batch over all steps and phases. The e to ask for is a root of the mean over
+the phases: a scan over e brackets it, and the method of Chandrupatla (1997), Advances in Engineering Software 28,
+145-149, refines it. The number of steps needed is found by bisection.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +20,10 @@ from scipy.optimize import elementwise
 
 from ..array_types import Array
 from ..config.load import Config
+from ..contact.dimensionless import dimensionless_values
 from ..contact.impacts import Impacts
 from ..contact.model import ForceModel
 from ..contact.outputs import collide
-from ..contact.scaling import dimensionless_values
 from ..contact.status import FIRST_FAILURE, Status
 from ..contact.timestep import (
     KICK_DRIFT,
@@ -26,15 +34,18 @@ from ..contact.timestep import (
     collide_at_fixed_step,
     default_scheme,
 )
+from ..display import Block, Displayed, Table
 from ..engine.build_impacts import build_impacts
 from ..engine.plan import Plan
+from ..engine.plugins import read_plugins
 from ..errors import UsageError
-from ..formatting import number
+from ..formatting import decimals, number, quantity
+from ..results.single_impact import open_source, single_point
 
 # steps per contact if none are given
 STEPS_PER_CONTACT = (10.0, 20.0, 50.0, 100.0)
-# values of e between which the one to ask for is searched; many laws take the logarithm of e
-LEAST_E, TRIED_E = 1e-6, 33
+# the e to ask for is searched between so many values from here to 1; many laws take the logarithm of e
+MIN_E, N_SCAN = 1e-6, 33
 # largest jump of the mean over the phases that is taken for a root
 MAX_JUMP = 1e-2
 
@@ -64,6 +75,13 @@ class TimestepRow:
     status: str = Status.OK.name.lower()
     failed: int = 0
 
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """The row in a table; a step at which a collision fails has its status."""
+        mean = self.status if self.failed else decimals(self.e_mean)
+        others = map(decimals, (self.e_least, self.e_largest, self.e_to_ask))
+        return (number(self.steps_per_contact), number(self.dt), mean, *others)
+
 
 @dataclass(frozen=True)
 class NeededSteps:
@@ -75,7 +93,7 @@ class NeededSteps:
 
 
 @dataclass(frozen=True)
-class TimestepResult:
+class TimestepResult(Displayed):
     """What a law delivers at fixed time steps.
 
     Parameters
@@ -87,6 +105,8 @@ class TimestepResult:
     contact_time : of the continuous law, until its own end [s]
     rows : one for each step
     needed : for a tolerance; None without one, or if no number of steps up to `MAX_STEPS_PER_CONTACT` is enough
+    phases : number of phases of each row
+    tol : the tolerance; None without one
     """
 
     model: str
@@ -96,6 +116,118 @@ class TimestepResult:
     contact_time: float
     rows: tuple[TimestepRow, ...]
     needed: NeededSteps | None
+    phases: int
+    tol: float | None
+
+    def as_dict(self) -> dict[str, Any]:
+        """The result as plain data; numbers that do not apply are NaN."""
+        return {
+            "model": self.model,
+            "scheme": self.scheme,
+            "e": self.e,
+            "e_continuous": self.e_continuous,
+            "contact_time": self.contact_time,
+            "rows": self.records(),
+            "needed": None if self.needed is None else asdict(self.needed),
+        }
+
+    def records(self) -> Sequence[Mapping[str, Any]]:
+        """The rows, one for each step."""
+        return [asdict(row) for row in self.rows]
+
+    def blocks(self, width: int) -> Iterator[Block]:
+        """The continuous law, a row for each step, the steps that fail, and the number of steps needed."""
+        e = f"e = {number(self.e)}, " if self.e == self.e else ""
+        contact_time = quantity(self.contact_time, "s")
+        yield f"{self.model}: {e}e_out = {number(self.e_continuous)} in a contact time of {contact_time}"
+        yield f"scheme: {self.scheme}"
+        yield ""
+        headings = ("steps per contact", "dt [s]", "e mean", "e least", "e largest", "e to ask")
+        yield Table([row.cells for row in self.rows], headings, text=())
+        failures = [row for row in self.rows if row.failed]
+        if failures:
+            yield ""
+        for row in failures:
+            count = (
+                f"{row.failed} of {self.phases} phases fail at {number(row.steps_per_contact)} steps per contact"
+            )
+            yield f"{count}; {Status[row.status.upper()].meaning}"
+        if self.tol is None:
+            return
+        yield ""
+        percent = f"{number(100 * self.tol)} %"
+        if self.needed is None:
+            yield f"no number of steps per contact keeps every phase within {percent}"
+        else:
+            steps, dt = self.needed.steps_per_contact, quantity(self.needed.dt, "s")
+            yield f"within {percent} at every phase: {steps} steps per contact, dt <= {dt}"
+
+
+def timestep(
+    model: str,
+    *,
+    source: str | Path | Mapping[str, object] | None = None,
+    at: Mapping[str, float | str] | None = None,
+    steps_per_contact: Sequence[float] = (),
+    dt: Sequence[float] = (),
+    phases: int = 400,
+    tol: float | None = None,
+    scheme: str | None = None,
+    overrides: Sequence[str] = (),
+    plugins: Sequence[ForceModel | str | Path] = (),
+) -> TimestepResult:
+    """Show what a code with a fixed time step delivers: mean, smallest and largest restitution over the phase.
+
+    The phase is the part of a step in which the contact begins: a code sees an overlap at its first step after it.
+    The scheme "kick-drift" is that of LAMMPS, LIGGGHTS, YADE and MuJoCo, "drake-tamsi" and "drake-sap" are those
+    of Drake's discrete solvers; `impact.contact.timestep.SCHEMES` has what they do in a step.
+
+    Parameters
+    ----------
+    model : key of the law
+    source, at, overrides, plugins : see `solve`
+    steps_per_contact : contact times of the continuous law over dt; by default 10, 20, 50 and 100
+    dt : further time steps [s]
+    phases : number of phases, (i + 1/2)/phases
+    tol : relative tolerance for which the smallest number of steps per contact is found
+    scheme : its name; by default "drake-tamsi" for the laws of Drake, "kick-drift" for all others
+
+    Returns
+    -------
+    TimestepResult : a row for each step, those of `steps_per_contact` first, and the number of steps needed; a row
+        at which the collision fails at some phase has a status and no restitution
+
+    Raises
+    ------
+    UsageError : a step is not positive, the scheme does not take the law, or the law has no rebound at these
+        inputs
+    ConfigError, ModelError : see `sweep`
+
+    A linear spring and dashpot that is asked for 0.5, with twenty steps per contact:
+
+    >>> import impact
+    >>> (row,) = impact.timestep("anagnostopoulos-1988", at={"e": 0.5}, steps_per_contact=[20]).rows
+    >>> round(row.e_mean, 4), round(row.e_least, 3), round(row.e_largest, 3), round(row.e_to_ask, 4)
+    (0.4945, 0.48, 0.519, 0.5054)
+    """
+    if phases < 1:
+        raise UsageError(f"--phases: got {phases}, expected a whole number >= 1")
+    config, _ = single_point(open_source(source, overrides, read_plugins(plugins)), model, at)
+    law, collision = fixed_step_law(config, phases, scheme)
+    if not steps_per_contact and not dt:
+        steps_per_contact = STEPS_PER_CONTACT
+    steps = time_steps(law.contact_time, steps_per_contact, dt)
+    return TimestepResult(
+        model=law.model.key,
+        scheme=law.scheme,
+        e=law.e,
+        e_continuous=collision["e_out"],
+        contact_time=law.contact_time,
+        rows=timestep_rows(law, steps),
+        needed=None if tol is None else needed_steps(law, tol, collision["e_out"]),
+        phases=phases,
+        tol=tol,
+    )
 
 
 @dataclass(frozen=True)
@@ -162,7 +294,7 @@ def timestep_rows(law: FixedStepLaw, dt: Sequence[float]) -> tuple[TimestepRow, 
     result = law.collide(steps)
     delivered = result.e_out.reshape(steps.size, law.phases)
     statuses = result.status.reshape(steps.size, law.phases)
-    to_ask = e_to_ask(law, steps)
+    e_compensated = compensated_e(law, steps)
     return tuple(
         TimestepRow(
             dt=float(steps[row]),
@@ -170,7 +302,7 @@ def timestep_rows(law: FixedStepLaw, dt: Sequence[float]) -> tuple[TimestepRow, 
             e_mean=float(e.mean()),
             e_least=float(e.min()),
             e_largest=float(e.max()),
-            e_to_ask=float(to_ask[row]),
+            e_to_ask=float(e_compensated[row]),
             status=_shared_status(statuses[row]).name.lower(),
             failed=int(np.count_nonzero(statuses[row] >= FIRST_FAILURE)),
         )
@@ -184,7 +316,7 @@ def _shared_status(statuses: NDArray[np.int8]) -> Status:
     return Status(int(np.bincount(failures).argmax())) if failures.size else Status.OK
 
 
-def e_to_ask(law: FixedStepLaw, dt: Array) -> Array:
+def compensated_e(law: FixedStepLaw, dt: Array) -> Array:
     """The e to ask for at each step dt [s] for a mean over the phases that is the e of the impact, shape (k,).
 
     NaN where there is none. Where e changes the number of steps of a phase, its e_out jumps: if the mean jumps
@@ -192,19 +324,19 @@ def e_to_ask(law: FixedStepLaw, dt: Array) -> Array:
     """
     if not law.has_e:
         return np.full(dt.size, np.nan)
-    wanted = law.e
+    target = law.e
 
     def distance(e: Array, steps: Array) -> Array:
         e, steps = np.broadcast_arrays(e, steps)
         means: Array = law.restitution(steps.ravel(), e.ravel()).mean(axis=1)
-        return means.reshape(e.shape) - wanted
+        return means.reshape(e.shape) - target
 
-    tried = np.linspace(LEAST_E, 1.0, TRIED_E)
-    distances = distance(tried, dt[:, None])
+    scan = np.linspace(MIN_E, 1.0, N_SCAN)
+    distances = distance(scan, dt[:, None])
     is_crossed = distances[:, :-1] * distances[:, 1:] <= 0.0
     # of several, the largest e
-    last = TRIED_E - 2 - np.argmax(is_crossed[:, ::-1], axis=1)
-    solution = elementwise.find_root(distance, (tried[last], tried[last + 1]), args=(dt,))
+    last = N_SCAN - 2 - np.argmax(is_crossed[:, ::-1], axis=1)
+    solution = elementwise.find_root(distance, (scan[last], scan[last + 1]), args=(dt,))
     is_root = is_crossed.any(axis=1) & (np.abs(solution.f_x) <= MAX_JUMP)
     return np.where(is_root, solution.x, np.nan)
 
@@ -220,23 +352,23 @@ def needed_steps(law: FixedStepLaw, tol: float, e_continuous: float) -> NeededSt
     tol : largest accepted |e_out - e|/e
     e_continuous : restitution of the continuous law, which replaces e for a law without one
     """
-    wanted = law.e if law.has_e else e_continuous
-    if not wanted > 0.0:
+    target = law.e if law.has_e else e_continuous
+    if not target > 0.0:
         raise UsageError("--tol is relative to e, expected e > 0")
 
     def is_within(steps: int) -> bool:
         e = law.restitution(np.array([law.contact_time / steps]))
-        return bool((np.abs(e - wanted) <= tol * wanted).all())
+        return bool((np.abs(e - target) <= tol * target).all())
 
-    least, most = 1, 2
-    while not is_within(most):
-        least, most = most, 2 * most
-        if most > MAX_STEPS_PER_CONTACT:
+    lower, upper = 1, 2
+    while not is_within(upper):
+        lower, upper = upper, 2 * upper
+        if upper > MAX_STEPS_PER_CONTACT:
             return None
-    while most - least > 1:
-        middle = (least + most) // 2
-        least, most = (least, middle) if is_within(middle) else (middle, most)
-    return NeededSteps(tol, most, law.contact_time / most)
+    while upper - lower > 1:
+        middle = (lower + upper) // 2
+        lower, upper = (lower, middle) if is_within(middle) else (middle, upper)
+    return NeededSteps(tol, upper, law.contact_time / upper)
 
 
 def fixed_step_law(
@@ -283,37 +415,3 @@ def time_steps(contact_time: float, steps_per_contact: Sequence[float], dt: Sequ
     if most > MAX_STEPS_PER_CONTACT:
         raise UsageError(f"got {number(most)} steps per contact, expected at most {MAX_STEPS_PER_CONTACT:,}")
     return steps
-
-
-def timestep_study(
-    config: Config,
-    *,
-    steps_per_contact: Sequence[float],
-    dt: Sequence[float],
-    phases: int,
-    tol: float | None,
-    scheme: str | None = None,
-) -> TimestepResult:
-    """What the law of a config without axes delivers at fixed steps; see `impact.timestep`.
-
-    Raises
-    ------
-    UsageError : a step is not positive, the scheme does not take the law, or the continuous law does not end with
-        a rebound
-    """
-    if phases < 1:
-        raise UsageError(f"--phases: got {phases}, expected a whole number >= 1")
-    law, collision = fixed_step_law(config, phases, scheme)
-    contact_time, e_continuous = law.contact_time, collision["e_out"]
-    if not steps_per_contact and not dt:
-        steps_per_contact = STEPS_PER_CONTACT
-    steps = time_steps(contact_time, steps_per_contact, dt)
-    return TimestepResult(
-        model=law.model.key,
-        scheme=law.scheme,
-        e=law.e,
-        e_continuous=e_continuous,
-        contact_time=contact_time,
-        rows=timestep_rows(law, steps),
-        needed=None if tol is None else needed_steps(law, tol, e_continuous),
-    )

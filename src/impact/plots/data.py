@@ -8,14 +8,13 @@ from dataclasses import Field, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
-from ..config.cases import COLUMN_HEADER, CsvTable, column_values, read_csv
-from ..config.quantities import Quantity, show
+from ..config.columns import columns_of_table, read_csv
+from ..config.quantities import Quantity, as_text
 from ..config.tables import SWEEP_QUANTITIES
 from ..contact.variables import HISTORY, OUTPUTS
 from ..errors import ConfigError, UsageError, did_you_mean
 from ..formatting import heading, number
 from ..results.schema import plain_unit
-from ..text import safe_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -85,11 +84,9 @@ def check_table(path: Path, form: str) -> None:
     """
     if path.suffix.lower() not in TABLE_SUFFIXES:
         *most, last = TABLE_SUFFIXES
-        raise UsageError(
-            f"--data {safe_text(str(path))}: expected a name that ends in {', '.join(most)} or {last}"
-        )
+        raise UsageError(f"--data {path}: expected a name that ends in {', '.join(most)} or {last}")
     if form not in TABLE_FORMS:
-        raise UsageError(f"--data-form: got {safe_text(form)}, expected {' or '.join(TABLE_FORMS)}")
+        raise UsageError(f"--data-form: got {form}, expected {' or '.join(TABLE_FORMS)}")
 
 
 def encode_table(plot_data: PlotData, suffix: str, form: str = "wide") -> bytes:
@@ -149,42 +146,18 @@ def read_points(points: str | Path | pd.DataFrame | xr.Dataset) -> Points:
     """
     quantities = _column_quantities()
     is_file = isinstance(points, str | Path)
-    table = read_csv(Path(points), quantities.__getitem__) if is_file else _csv_table(points)
-    for column in table.units:
-        if column not in quantities:
-            location = f"{table.name}:1: " if is_file else f"{table.name}: "
-            raise ConfigError(f"{location}got {show(column)}; {did_you_mean(column, sorted(quantities))}")
-    units, previous = dict(table.units), ""
-    for column in table.units:
-        if column == SIGMA and previous:
-            quantities[SIGMA] = Quantity(quantities[previous].unit, "standard deviation", least=0.0)
-            units[SIGMA] = units[SIGMA] or units[previous]
-        previous = column
-    table = replace(table, units=units)
-    return Points(
-        table.name,
-        {name: tuple(map(float, column_values(table, name, quantities[name], None))) for name in table.units},
-    )
-
-
-def _csv_table(points: pd.DataFrame | xr.Dataset) -> CsvTable:
-    """A table of pandas or xarray as a CSV table, whose line numbers are those of its rows."""
-    units: dict[str, str] = {}
-    frame: Any = points
-    if hasattr(points, "data_vars"):
-        dataset: Any = points
-        units = {
-            str(name): plain_unit(str(variable.attrs.get("units", "")))
-            for name, variable in dataset.variables.items()
-        }
-        frame = dataset.to_dataframe().reset_index()
-    cells: dict[str, list[tuple[int, str]]] = {}
-    for name, values in frame.items():
-        parts = COLUMN_HEADER.fullmatch(str(name))
-        assert parts is not None
-        units[parts[1]] = parts[2] or units.get(parts[1], "")
-        cells[parts[1]] = [(row, repr(value)) for row, value in enumerate(values.tolist(), 1)]
-    return CsvTable("points", {name: units[name] for name in cells}, cells)
+    columns = read_csv(Path(points), quantities.__getitem__) if is_file else columns_of_table(points, "points")
+    values: dict[str, tuple[float, ...]] = {}
+    variable = ""
+    for name in columns.units:
+        if name not in quantities:
+            raise ConfigError(columns.problem(f"got {as_text(name)}; {did_you_mean(name, sorted(quantities))}"))
+        quantity, unit = quantities[name], ""
+        if name == SIGMA and variable:
+            quantity, unit = replace(quantity, unit=quantities[variable].unit), columns.units[variable]
+        values[name] = tuple(map(float, columns.values(name, quantity, None, unit)))
+        variable = name
+    return Points(columns.source, values)
 
 
 def _column_quantities() -> dict[str, Quantity]:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, NonNegativeInt, TypeAdapter, ValidationError
 
 from ..errors import ResultError
-from ..text import safe_text
 
 
 class PluginRecord(BaseModel):
@@ -44,6 +44,21 @@ class SummaryRecord(BaseModel):
     extremes: dict[str, tuple[float | None, float | None, NonNegativeInt] | None]
 
 
+@dataclass(frozen=True)
+class LawRecord:
+    """What a factored file records about a law: all that its outputs depend on besides its trajectories."""
+
+    exponent: float | None
+    parameters: list[str]
+    domain: dict[str, tuple[float, float]]
+    asks_for_e: bool
+    is_permanent: bool
+    axes: list[str]
+    trajectories: int
+    is_shared: bool
+    stiffness_axes: list[str] | None
+
+
 ATTRIBUTE_TYPES: Mapping[str, Any] = {
     "axes": list[str],
     "config_set": list[str],
@@ -52,7 +67,7 @@ ATTRIBUTE_TYPES: Mapping[str, Any] = {
     "fit_bounds": dict[str, list[float]],
     "fit_paths": list[str],
     "inputs": dict[str, float | str],
-    "laws": dict[str, dict[str, Any]],
+    "laws": dict[str, LawRecord],
     "materials": dict[str, dict[str, Any]],
     "packages": dict[str, Any],
     "plugins": dict[str, PluginRecord],
@@ -91,7 +106,7 @@ def read_attribute(attributes: Mapping[Any, Any], name: str, source: str = "", *
     except ValidationError:
         pass
     what = "missing" if text is None else "not JSON of the expected type"
-    raise ResultError(f"{safe_text(source)}{': ' if source else ''}attribute {name}: {what}")
+    raise ResultError(f"{source}{': ' if source else ''}attribute {name}: {what}")
 
 
 @cache

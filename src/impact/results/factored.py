@@ -1,4 +1,4 @@
-"""The factored layout: a file of axes, trajectory table and law metadata, for any number of points.
+"""The trajectory table in a file of the factored layout: axes, trajectories and laws, for any number of points.
 
 Some points, the witnesses, are stored in full. When a file is opened they are computed again: if they differ, the
 file was written by a version that computes other numbers, and is refused.
@@ -6,10 +6,11 @@ file was written by a version that computes other numbers, and is refused.
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 import operator
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,7 +22,7 @@ from .._version import __version__
 from ..array_types import Array
 from ..config.grid import Axis
 from ..config.input_names import is_input
-from ..contact.formula import Formula
+from ..contact.formula_calls import Formula
 from ..contact.materials import Material
 from ..contact.model import Law, Parameter
 from ..contact.simulate import TABLE_COLUMNS, CollisionResult
@@ -33,7 +34,8 @@ from ..engine.trajectories import TrajectoryMap
 from ..errors import ResultError, UsageError
 from ..formatting import number
 from ..text import safe_text
-from .attributes import SummaryRecord, read_attribute
+from .attributes import LawRecord, SummaryRecord, read_attribute
+from .netcdf import RegionValues
 from .schema import attributes_of, count_points, derived_names, scale_of
 from .trajectory_table import MAX_STIFFNESS_VALUES, TrajectoryRows, TrajectoryTable, expand, whole_stiffness
 
@@ -43,19 +45,10 @@ WITNESS_TOLERANCE = 1e-12
 SLAB_ROWS = 2**16
 # by the bits of a status, whether it is one
 IS_STATUS = np.isin(np.arange(2**8), STATUSES)
-# fields of a law in the JSON attribute `laws`, and their types
-LAW_FIELD_TYPES: Mapping[str, type] = {
-    "parameters": list,
-    "domain": dict,
-    "asks_for_e": bool,
-    "is_permanent": bool,
-    "axes": list,
-    "trajectories": int,
-    "is_shared": bool,
-}
 
-ReadVariable = Callable[[str, slice], NDArray[Any]]
-TakeRows = Callable[[str, NDArray[np.intp]], NDArray[Any]]
+# reads some values of a variable of the table, by its name; and the parts of some lengths that it consists of
+ReadVariable = Callable[[str, slice | NDArray[np.intp]], NDArray[Any]]
+ReadParts = Callable[[str, Sequence[int]], Iterator[NDArray[Any]]]
 
 
 @dataclass(frozen=True)
@@ -71,126 +64,119 @@ class StoredLaw:
     stiffness: Formula | None = None
 
 
+def stored_stiffness(
+    inputs: Inputs, law: Law, rule: Stiffness | None = None
+) -> tuple[tuple[int, ...], Array] | None:
+    """Evaluate K [N/m^n] by a law's own rule, over the axes that it depends on; None for a law without a rule.
+
+    Raises
+    ------
+    UsageError : it takes too many values to be stored
+    """
+    if rule is None and not has_stiffness_rule(inputs, law):
+        return None
+    axes, K = whole_stiffness(inputs, law, rule)
+    if K is None:
+        raise UsageError(
+            f"output.layout: {law.key} has a rule of K that takes more than {MAX_STIFFNESS_VALUES:,} values, "
+            'the limit of the factored layout; set output.layout = "full"'
+        )
+    return axes, K
+
+
+def _stiffness_of_laws(table: TrajectoryTable) -> list[tuple[tuple[int, ...], Array] | None]:
+    """Evaluate the rules of K of all laws of a table; see `stored_stiffness`."""
+    return [
+        stored_stiffness(table.inputs, law, rule) for law, rule in zip(table.laws, table.stiffness, strict=True)
+    ]
+
+
 def factored_template(
     result_template: xr.Dataset, table: TrajectoryTable, variables: Sequence[Variable]
 ) -> xr.Dataset:
-    """The dataset of a factored file: coordinates, attributes, and variables with placeholder values.
-
-    Parameters
-    ----------
-    result_template : coordinates and attributes of the result
-    table : of the sweep
-    variables : of the result
+    """Build the dataset of a factored file, with placeholder values, from the coordinates of the result.
 
     Raises
     ------
     UsageError : a law's rule of K takes too many values to be stored
     """
-    laws, stiffness = {}, 0
-    for law, trajectory_map, rule in zip(table.laws, table.maps, table.stiffness, strict=True):
-        about: dict[str, Any] = {
-            "exponent": law.exponent,
-            "parameters": [parameter.name for parameter in law.parameters],
-            "domain": {name: list(ends) for name, ends in law.domain.items()},
-            "asks_for_e": "e" in law.quantities,
-            "is_permanent": law.is_permanent,
-            "axes": [table.inputs.axes[axis].name for axis in trajectory_map.axes],
-            "trajectories": trajectory_map.count,
-            "is_shared": trajectory_map.is_shared,
-            "stiffness_axes": None,
-        }
-        if rule is not None or has_stiffness_rule(table.inputs, law):
-            axes, K = whole_stiffness(table.inputs, law, rule)
-            if K is None:
-                raise _too_many_stiffness_values(law)
-            about["stiffness_axes"] = [table.inputs.axes[axis].name for axis in axes]
-            stiffness += K.size
-        laws[law.key] = about
+    names = [axis.name for axis in table.inputs.axes]
+    laws = {}
+    stiffness = _stiffness_of_laws(table)
+    for law, trajectory_map, rule in zip(table.laws, table.maps, stiffness, strict=True):
+        laws[law.key] = LawRecord(
+            exponent=law.exponent,
+            parameters=[parameter.name for parameter in law.parameters],
+            domain=dict(law.domain),
+            asks_for_e="e" in law.quantities,
+            is_permanent=law.is_permanent,
+            axes=[names[axis] for axis in trajectory_map.axes],
+            trajectories=trajectory_map.count,
+            is_shared=trajectory_map.is_shared,
+            stiffness_axes=None if rule is None else [names[axis] for axis in rule[0]],
+        )
     rows = sum(trajectory_map.count for trajectory_map in table.maps)
     cells = sum(trajectory_map.cells for trajectory_map in table.maps if trajectory_map.is_shared)
     witnesses = len(witness_indices(len(table.laws) * table.inputs.cells))
     blank = CollisionResult.blank(1)
-    variables_of_file: dict[str, Any] = {
-        f"trajectory_{name}": _placeholder(
+
+    def placeholder(dim: str, size: int, dtype: Any, attributes: Mapping[str, object] | str) -> tuple[Any, ...]:
+        described = {"long_name": attributes} if isinstance(attributes, str) else attributes
+        return dim, np.broadcast_to(np.zeros((), dtype), size), described
+
+    stored = {
+        f"trajectory_{name}": placeholder(
             "trajectory", rows, getattr(blank, name).dtype, f"{name} of a trajectory"
         )
         for name in TABLE_COLUMNS
     }
     if cells:
-        variables_of_file["trajectory_of_cell"] = _placeholder(
-            "cell", cells, np.dtype("i4"), "number of the trajectory of a cell"
-        )
-    if stiffness:
-        variables_of_file["law_stiffness"] = _placeholder(
-            "stiffness_value", stiffness, np.dtype("f8"), "K by the rules of the laws"
-        )
-    variables_of_file["witness_index"] = _placeholder(
-        "witness", witnesses, np.dtype("i8"), "place in C order of (model, axes)"
-    )
+        stored["trajectory_of_cell"] = placeholder("cell", cells, "i4", "number of the trajectory of a cell")
+    if values := sum(rule[1].size for rule in stiffness if rule is not None):
+        stored["law_stiffness"] = placeholder("stiffness_value", values, "f8", "K by the rules of the laws")
+    stored["witness_index"] = placeholder("witness", witnesses, "i8", "place in C order of (model, axes)")
     for variable in variables:
-        attributes = attributes_of(variable)
-        variables_of_file[f"witness_{variable.name}"] = (
-            "witness",
-            np.broadcast_to(np.zeros((), variable.dtype), witnesses),
-            attributes,
+        stored[f"witness_{variable.name}"] = placeholder(
+            "witness", witnesses, variable.dtype, attributes_of(variable)
         )
-    order = [axis.name for axis in table.inputs.axes]
-    attributes = {**result_template.attrs, "axes": json.dumps(order), "laws": json.dumps(laws)}
-    template = xr.Dataset(variables_of_file, result_template.coords, attributes)
+    laws_text = json.dumps({key: vars(law) for key, law in laws.items()})
+    attributes = {**result_template.attrs, "axes": json.dumps(names), "laws": laws_text}
+    template = xr.Dataset(stored, result_template.coords, attributes)
     # readers of netCDF take coordinates that no variable names for variables
-    names = [str(name) for name in result_template.coords if name not in result_template.dims]
-    return template.assign_attrs(coordinates=" ".join(names))
+    others = [str(name) for name in result_template.coords if name not in result_template.dims]
+    return template.assign_attrs(coordinates=" ".join(others))
 
 
-def check_factored(inputs: Inputs, laws: Sequence[Law]) -> None:
-    """Refuse laws that cannot be stored in this layout, before integration.
-
-    Raises
-    ------
-    UsageError : a law's rule of K takes too many values to be stored
-    """
-    for law in laws:
-        if has_stiffness_rule(inputs, law) and whole_stiffness(inputs, law)[1] is None:
-            raise _too_many_stiffness_values(law)
-
-
-def _too_many_stiffness_values(law: Law) -> UsageError:
-    return UsageError(
-        f"output.layout: {law.key} has a rule of K that takes more than {MAX_STIFFNESS_VALUES:,} values, "
-        'the limit of the factored layout; set output.layout = "full"'
-    )
-
-
-def _placeholder(dim: str, size: int, dtype: np.dtype[Any], meaning: str) -> tuple[Any, ...]:
-    return dim, np.broadcast_to(np.zeros((), dtype), size), {"long_name": meaning}
-
-
-def table_values(
-    table: TrajectoryTable, variables: Sequence[Variable]
-) -> Iterator[tuple[str, slice, NDArray[Any]]]:
-    """The values of a factored file, a few at a time: name of the variable, region and values."""
-    start = cell = 0
+def table_values(table: TrajectoryTable, variables: Sequence[Variable]) -> Iterator[RegionValues]:
+    """Yield the values of a factored file, a few at a time: name of the variable, region and values."""
+    start = 0
     for model, trajectory_map in enumerate(table.maps):
         for first in range(0, trajectory_map.count, SLAB_ROWS):
             rows = np.arange(first, min(first + SLAB_ROWS, trajectory_map.count))
             part = table.rows.take(model, rows)
             for name in TABLE_COLUMNS:
-                yield f"trajectory_{name}", slice(start + first, start + first + rows.size), getattr(part, name)
+                region = slice(start + first, start + first + rows.size)
+                yield f"trajectory_{name}", (region,), getattr(part, name)
         start += trajectory_map.count
-        if trajectory_map.of_cell is not None:
-            yield "trajectory_of_cell", slice(cell, cell + trajectory_map.cells), trajectory_map.of_cell
-            cell += trajectory_map.cells
-    value = 0
-    for law, rule in zip(table.laws, table.stiffness, strict=True):
-        if rule is not None or has_stiffness_rule(table.inputs, law):
-            K = whole_stiffness(table.inputs, law, rule)[1]
-            assert K is not None
-            yield "law_stiffness", slice(value, value + K.size), K.reshape(-1)
-            value += K.size
+    cells = [trajectory_map.of_cell for trajectory_map in table.maps if trajectory_map.of_cell is not None]
+    stiffness = [rule[1].reshape(-1) for rule in _stiffness_of_laws(table) if rule is not None]
+    stored: dict[str, Sequence[NDArray[Any]]] = {"trajectory_of_cell": cells, "law_stiffness": stiffness}
+    for name, arrays in stored.items():
+        for region, array in zip(_consecutive([array.size for array in arrays]), arrays, strict=True):
+            yield name, (region,), array
     indices = witness_indices(len(table.laws) * table.inputs.cells)
-    yield "witness_index", slice(0, len(indices)), indices
+    yield "witness_index", (slice(0, indices.size),), indices
     for name, values in witness_values(table, variables, indices).items():
-        yield f"witness_{name}", slice(0, len(indices)), values
+        yield f"witness_{name}", (slice(0, indices.size),), values
+
+
+def _consecutive(sizes: Sequence[int]) -> list[slice]:
+    """Place parts of some sizes one after another.
+
+    >>> _consecutive([2, 3])
+    [slice(0, 2, None), slice(2, 5, None)]
+    """
+    return [slice(stop - size, stop) for size, stop in zip(sizes, itertools.accumulate(sizes), strict=True)]
 
 
 def witness_indices(points: int) -> NDArray[np.int64]:
@@ -211,19 +197,19 @@ def witness_indices(points: int) -> NDArray[np.int64]:
 def witness_values(
     table: TrajectoryTable, variables: Sequence[Variable], indices: NDArray[np.int64]
 ) -> dict[str, NDArray[Any]]:
-    """The values of some points of a result, by name; arrays of shape (len(indices),)."""
+    """Compute the values of some points of a result, by name; arrays of shape (len(indices),)."""
     models, cells = np.divmod(indices, table.inputs.cells)
     values_by_name = {variable.name: np.empty(indices.size, variable.dtype) for variable in variables}
     for model in np.unique(models).tolist():
-        where = np.flatnonzero(models == model)
-        values = expand(table, model, _unravel_cells(table.inputs, cells[where]), list(values_by_name))
+        rows = np.flatnonzero(models == model)
+        values = expand(table, model, _unravel_cells(table.inputs, cells[rows]), list(values_by_name))
         for name, array in values_by_name.items():
-            array[where] = np.broadcast_to(values[name], where.shape)
+            array[rows] = np.broadcast_to(values[name], rows.shape)
     return values_by_name
 
 
 def _unravel_cells(inputs: Inputs, cells: NDArray[np.int64]) -> Index:
-    """The index of some cells along each axis, from their index in C order."""
+    """Convert indices of cells in C order to indices along each axis."""
     index = []
     for size in reversed(inputs.shape):
         cells, position = np.divmod(cells, size)
@@ -231,80 +217,83 @@ def _unravel_cells(inputs: Inputs, cells: NDArray[np.int64]) -> Index:
     return tuple(reversed(index))
 
 
-def stored_table(
-    dataset: xr.Dataset, sizes: Mapping[str, int], read: ReadVariable, take: TakeRows
-) -> TrajectoryTable:
-    """The trajectory table of a factored file.
+def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: ReadVariable) -> TrajectoryTable:
+    """Read the trajectory table of a factored file, without its rows, which are read when they are needed.
 
     Parameters
     ----------
     dataset : coordinates and attributes of the file
-    sizes : lengths of the variables of the table
-    read : returns a slice of a variable of the table: `read(name, slice)`
-    take : returns a few values of it at increasing positions: `take(name, rows)`
+    sizes : lengths of the variables of the table, without the witnesses
+    read : returns values of a variable of the table, in a slice or at increasing positions
 
     Raises
     ------
     ResultError : the attribute `laws` does not fit the variables
     """
-    laws = _read_laws(dataset)
-    inputs = read_inputs(dataset)
-    axis_numbers = {axis.name: number for number, axis in enumerate(inputs.axes)}
-    maps, rules, stored = [], [], []
-    starts = [0]
-    cell = value = 0
-    try:
-        for model, (key, about) in enumerate(laws.items()):
-            if any(type(about[name]) is not kind for name, kind in LAW_FIELD_TYPES.items()):
-                raise TypeError
-            axes = tuple(axis_numbers[name] for name in about["axes"])
-            if len({*axes}) < len(axes):
-                raise ValueError
-            shape = tuple(inputs.shape[axis] for axis in axes)
-            trajectory_map = TrajectoryMap(model, axes, shape)
-            if about["is_shared"]:
-                of_cell = read("trajectory_of_cell", slice(cell, cell + trajectory_map.cells))
-                count = int(about["trajectories"])
-                # the first cell of a trajectory is not needed to read it
-                trajectory_map = TrajectoryMap(model, axes, shape, np.broadcast_to(np.intp(0), count), of_cell)
-                cell += trajectory_map.cells
-                if of_cell.dtype.kind != "i" or of_cell.shape != (trajectory_map.cells,):
-                    raise ValueError
-                if of_cell.min() < 0 or of_cell.max() >= count:
-                    raise ValueError
-            maps.append(trajectory_map)
-            starts.append(starts[-1] + trajectory_map.count)
-            rule = None
-            if about["stiffness_axes"] is not None:
-                chosen = tuple(axis_numbers[name] for name in about["stiffness_axes"])
-                size = math.prod(inputs.shape[axis] for axis in chosen)
-                rule = _stiffness_lookup(inputs, chosen, read("law_stiffness", slice(value, value + size)))
-                value += size
-            rules.append(rule)
-            stored.append(_stored_law(key, about))
-        expected_sizes = {f"trajectory_{name}": starts[-1] for name in TABLE_COLUMNS}
-        expected_sizes |= {"trajectory_of_cell": cell} if cell else {}
-        expected_sizes |= {"law_stiffness": value} if value else {}
-        if expected_sizes != {name: size for name, size in sizes.items() if not name.startswith("witness_")}:
+    laws: dict[str, LawRecord] = read_attribute(dataset.attrs, "laws", required=True)
+    if list(laws) != [str(key) for key in dataset["model"].values]:
+        raise ResultError("is not a readable result (laws: not those of its models)")
+    inputs = read_inputs(dataset, _stored_axis_names(dataset))
+
+    def parts(name: str, lengths: Sequence[int]) -> Iterator[NDArray[Any]]:
+        if sizes.get(name, 0) != sum(lengths):
             raise ValueError
-        _check_trajectory_statuses(sizes["trajectory_status"], read)
-    except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError):
+        return (read(name, part) for part in _consecutive(lengths))
+
+    try:
+        maps = _stored_maps(inputs, laws.values(), parts)
+        rules = _stored_rules(inputs, laws.values(), parts)
+        rows = _consecutive([trajectory_map.count for trajectory_map in maps])
+        if {sizes[f"trajectory_{name}"] for name in TABLE_COLUMNS} != {rows[-1].stop}:
+            raise ValueError
+        _check_trajectory_statuses(rows[-1].stop, read)
+    except (KeyError, TypeError, ValueError, IndexError, OverflowError):
         raise ResultError("is not a readable result (its laws do not fit its table)") from None
 
-    def read_rows(model: int, start: int, stop: int) -> CollisionResult:
-        part = slice(starts[model] + start, starts[model] + stop)
-        return CollisionResult(**{name: read(f"trajectory_{name}", part) for name in TABLE_COLUMNS})
+    def read_rows(model: int, part: slice | NDArray[np.intp]) -> CollisionResult:
+        start = rows[model].start
+        chosen = slice(start + part.start, start + part.stop) if isinstance(part, slice) else start + part
+        return CollisionResult(**{name: read(f"trajectory_{name}", chosen) for name in TABLE_COLUMNS})
 
-    def pick_rows(model: int, rows: NDArray[np.intp]) -> CollisionResult:
-        return CollisionResult(
-            **{name: take(f"trajectory_{name}", starts[model] + rows) for name in TABLE_COLUMNS}
-        )
-
-    rows = TrajectoryRows(maps, read_rows, pick=pick_rows)
+    trajectory_rows = TrajectoryRows(maps, lambda model, *ends: read_rows(model, slice(*ends)), pick=read_rows)
     summary = read_attribute(dataset.attrs, "summary") or None
     if summary is not None:
         _check_summary(summary, dataset, inputs.shape)
-    return TrajectoryTable(inputs, tuple(stored), tuple(maps), rows, tuple(rules), summary)
+    stored_laws = tuple(_stored_law(key, law) for key, law in laws.items())
+    return TrajectoryTable(inputs, stored_laws, tuple(maps), trajectory_rows, tuple(rules), summary)
+
+
+def _axis_numbers(inputs: Inputs, names: Sequence[str]) -> tuple[int, ...]:
+    """Find the numbers of axes; raise a KeyError for an unknown one, a ValueError for a repeated one."""
+    numbers = {axis.name: number for number, axis in enumerate(inputs.axes)}
+    if len({*names}) < len(names):
+        raise ValueError
+    return tuple(numbers[name] for name in names)
+
+
+def _stored_maps(inputs: Inputs, laws: Collection[LawRecord], parts: ReadParts) -> list[TrajectoryMap]:
+    """Read the trajectory of each cell, of each law; raise a ValueError for one that does not exist."""
+    maps = []
+    for model, law in enumerate(laws):
+        axes = _axis_numbers(inputs, law.axes)
+        maps.append(TrajectoryMap(model, axes, tuple(inputs.shape[axis] for axis in axes)))
+    shared = [model for model, law in enumerate(laws) if law.is_shared]
+    cells = parts("trajectory_of_cell", [maps[model].cells for model in shared])
+    for model, of_cell in zip(shared, cells, strict=True):
+        count = [*laws][model].trajectories
+        if of_cell.dtype.kind != "i" or of_cell.min() < 0 or of_cell.max() >= count:
+            raise ValueError
+        # the first cell of a trajectory is not needed to read it
+        maps[model] = replace(maps[model], first=np.broadcast_to(np.intp(0), count), of_cell=of_cell)
+    return maps
+
+
+def _stored_rules(inputs: Inputs, laws: Collection[LawRecord], parts: ReadParts) -> list[Stiffness | None]:
+    """Read K of each law with a rule for it, over the axes that it depends on."""
+    axes = [None if law.stiffness_axes is None else _axis_numbers(inputs, law.stiffness_axes) for law in laws]
+    lengths = [math.prod(inputs.shape[axis] for axis in numbers) for numbers in axes if numbers is not None]
+    values = parts("law_stiffness", lengths)
+    return [None if numbers is None else _stiffness_lookup(inputs, numbers, next(values)) for numbers in axes]
 
 
 def _check_summary(summary: SummaryRecord, dataset: xr.Dataset, shape: tuple[int, ...]) -> None:
@@ -333,59 +322,48 @@ def _check_trajectory_statuses(rows: int, read: ReadVariable) -> None:
             raise ValueError
 
 
-def _read_laws(dataset: xr.Dataset) -> dict[str, dict[str, Any]]:
-    laws: dict[str, dict[str, Any]] = read_attribute(dataset.attrs, "laws", required=True)
-    if list(laws) != [str(key) for key in dataset["model"].values]:
-        raise ResultError("is not a readable result (laws: not those of its models)")
-    return laws
-
-
-def _stored_law(key: str, about: Mapping[str, Any]) -> StoredLaw:
-    return StoredLaw(
-        key=key,
-        exponent=None if about["exponent"] is None else float(about["exponent"]),
-        parameters=tuple(Parameter(str(name), "1", "") for name in about["parameters"]),
-        domain={str(name): (float(low), float(high)) for name, (low, high) in about["domain"].items()},
-        quantities=frozenset({"e"} if about["asks_for_e"] else ()),
-        is_permanent=bool(about["is_permanent"]),
-    )
+def _stored_law(key: str, law: LawRecord) -> StoredLaw:
+    """Build a law without formulas from its record in a file."""
+    parameters = tuple(Parameter(name, "1", "") for name in law.parameters)
+    quantities = frozenset({"e"} if law.asks_for_e else ())
+    return StoredLaw(key, law.exponent, parameters, law.domain, quantities, law.is_permanent)
 
 
 def _stiffness_lookup(inputs: Inputs, axes: tuple[int, ...], values: Array) -> Stiffness:
-    """A function that looks K up at some cells, from its values over the axes that it depends on."""
+    """Return a function that looks K up at some cells, from its values over the axes that it depends on."""
     K = values.reshape([size if axis in axes else 1 for axis, size in enumerate(inputs.shape)] or (1,))
 
-    def at(index: Index) -> Array:
+    def look_up(index: Index) -> Array:
         if not index:
             return K
         zero = np.zeros((1,) * index[0].ndim, np.intp)
         return np.asarray(K[tuple(positions if axis in axes else zero for axis, positions in enumerate(index))])
 
-    return at
+    return look_up
 
 
-def read_inputs(dataset: xr.Dataset) -> Inputs:
-    """The inputs of a sweep, from the coordinates of its result."""
+def read_inputs(dataset: xr.Dataset, axis_names: Sequence[str]) -> Inputs:
+    """Read the inputs of a sweep along some axes from the coordinates of its result."""
     derived = derived_names(dataset.coords)
     scalars: dict[str, Any] = {}
-    axes: dict[str, dict[str, Any]] = {name: {} for name in read_axis_names(dataset)}
+    axes: dict[str, dict[str, Any]] = {name: {} for name in axis_names}
     for name, variable in dataset.coords.items():
+        name = str(name)
         if not is_input(name) or name in derived:
             continue
         if variable.ndim == 0:
-            scalars[str(name)] = variable.values.item()
+            scalars[name] = variable.values.item()
         elif variable.dims[0] in axes and variable.ndim == 1:
-            axes[str(variable.dims[0])][str(name)] = tuple(variable.values.tolist())
+            axes[str(variable.dims[0])][name] = tuple(variable.values.tolist())
         else:
-            raise ResultError(
-                f"is not a readable result ({safe_text(str(name), 40)}: does not lie along one axis)"
-            )
+            raise ResultError(f"is not a readable result ({safe_text(name, 40)}: does not lie along one axis)")
     try:
         stored = read_attribute(dataset.attrs, "materials", required=True)
-        materials = {
-            name: Material(**{"E": np.nan, "nu": np.nan, **_fixed_properties(about)})
-            for name, about in stored.items()
-        }
+        materials = {}
+        for name, properties in stored.items():
+            # properties that are axes have no value
+            fixed = {key: value for key, value in properties.items() if value is not None}
+            materials[name] = Material(**{"E": np.nan, "nu": np.nan, **fixed})
     except (TypeError, ValueError):
         raise ResultError("is not a readable result (materials: not JSON of the expected type)") from None
     # an axis that is not numbered has the name of its first column
@@ -397,13 +375,8 @@ def read_inputs(dataset: xr.Dataset) -> Inputs:
     return Inputs(scalars, tuple(ordered), materials)
 
 
-def _fixed_properties(properties: Mapping[str, float | None]) -> dict[str, float]:
-    """The properties of a material that are not axes."""
-    return {key: value for key, value in properties.items() if value is not None}
-
-
-def read_axis_names(dataset: xr.Dataset) -> list[str]:
-    """The axes of the grid of a factored file, in their order."""
+def _stored_axis_names(dataset: xr.Dataset) -> list[str]:
+    """Read the names of the axes of the grid of a factored file, in their order."""
     names: list[str] = read_attribute(dataset.attrs, "axes", required=True)
     along = [name for name in names if name in dataset.coords and dataset.coords[name].dims == (name,)]
     if along != names or len({*names}) < len(names):
@@ -412,18 +385,7 @@ def read_axis_names(dataset: xr.Dataset) -> list[str]:
 
 
 def check_witnesses(table: TrajectoryTable, variables: Sequence[Variable], stored: xr.Dataset) -> None:
-    """Refuse a file whose witnesses expand to other numbers than those stored.
-
-    Parameters
-    ----------
-    table : of the file
-    variables : of the result
-    stored : the variables of the witnesses, and the attributes of the result
-
-    Raises
-    ------
-    ResultError : a witness differs; the message names both versions
-    """
+    """Refuse a file whose witnesses, stored with their index, expand to other numbers; name both versions."""
     indices = np.asarray(stored["witness_index"].values, np.int64)
     points = len(table.laws) * table.inputs.cells
     if not np.array_equal(indices, witness_indices(points)):
@@ -445,17 +407,17 @@ def check_witnesses(table: TrajectoryTable, variables: Sequence[Variable], store
             allowed = np.maximum(WITNESS_TOLERANCE, 2.0 * rounding) * np.abs(scale)
             same = (got == expected) | (np.isnan(got) & np.isnan(expected)) | (np.abs(got - expected) <= allowed)
         if not same.all():
-            at = int(np.argmin(same))
+            worst = int(np.argmin(same))
             version = safe_text(str(stored.attrs.get("impact_version", "unknown")), 40)
             raise ResultError(
-                f"its witnesses have other values: {variable.name} is {number(got[at], 12)}, the file has "
-                f"{number(expected[at], 12)}; it was written by impact {version}, this is {__version__}: sweep "
+                f"its witnesses have other values: {variable.name} is {number(got[worst], 12)}, the file has "
+                f"{number(expected[worst], 12)}; it was written by impact {version}, this is {__version__}: sweep "
                 "its config again, or expand it with that version (impact expand)"
             )
 
 
 def witness_variables(stored: xr.Dataset) -> tuple[Variable, ...]:
-    """The variables of a file's witnesses, with their dtypes in the file."""
+    """List the variables of a file's witnesses, with their dtypes in the file."""
     return tuple(
         replace(variable, dtype=stored[f"witness_{name}"].dtype.str[1:])
         for name, variable in OUTPUTS.items()

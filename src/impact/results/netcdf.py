@@ -33,6 +33,8 @@ from .trajectory_table import check_memory
 from .validation import TABLE_VARIABLES, is_name
 
 Region = tuple[int | slice, ...]
+# the name of a variable, a region of it and its values there
+RegionValues = tuple[str, Region, NDArray[Any]]
 WriteRegion = Callable[[str, Region, NDArray[Any]], None]
 # values per chunk of a compressed variable, if the config does not set chunks
 CHUNK_VALUES = 2**16
@@ -192,40 +194,24 @@ class StoredArray(BackendArray):
             range(size)[part] if isinstance(part, slice) else np.atleast_1d(part)
             for size, part in zip(self.shape, key, strict=True)
         ]
-        return self._read(tuple(map(len, positions)), positions, lambda: np.asarray(self.dataset[key]))
-
-    def take(self, rows: NDArray[np.intp]) -> NDArray[Any]:
-        """Read a few values of a variable with one axis, at increasing positions.
-
-        Raises
-        ------
-        ResultError, MemoryError : see `read`
-        """
-
-        def read_points() -> NDArray[Any]:
-            values, space = np.empty(rows.size, self.dtype), self.dataset.id.get_space()
-            # a list of positions as a key of h5py takes ten times as long
-            space.select_elements(rows[:, np.newaxis].astype(np.uint64))
-            self.dataset.id.read(h5s.create_simple(values.shape), space, values)
-            return values
-
-        return self._read((rows.size,), [rows], read_points)
-
-    def _read(
-        self,
-        shape: tuple[int, ...],
-        positions: Sequence[range | NDArray[np.intp]],
-        read: Callable[[], NDArray[Any]],
-    ) -> NDArray[Any]:
-        """Read values of a shape at some positions along each axis, after the checks of memory and of chunks."""
-        check_memory(self.name, shape, self.dtype)
+        check_memory(self.name, [*map(len, positions)], self.dtype)
         try:
             self._check_chunks(positions)
-            return read()
+            if len(key) == 1 and isinstance(key[0], np.ndarray) and key[0].size:
+                return self._read_points(key[0])
+            return np.asarray(self.dataset[key])
         except (OSError, RuntimeError, ValueError, zlib.error) as error:
             path = safe_text(str(self.dataset.file.filename)) if self.dataset else "the result"
             reason = f"{safe_text(self.name, 40)}: {safe_text(str(error), 80)}"
             raise ResultError(f"{path}: is not a readable result ({reason})") from error
+
+    def _read_points(self, positions: NDArray[np.intp]) -> NDArray[Any]:
+        """Read some values of a variable with one axis."""
+        values, space = np.empty(positions.size, self.dtype), self.dataset.id.get_space()
+        # a list of positions as a key of h5py takes ten times as long
+        space.select_elements(positions[:, np.newaxis].astype(np.uint64))
+        self.dataset.id.read(h5s.create_simple(values.shape), space, values)
+        return values
 
     def _check_chunks(self, positions: Sequence[range | NDArray[np.intp]]) -> None:
         """Check that the chunks of some values decompress to exactly their declared size.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -69,7 +68,7 @@ def depth_summary(dataset: xr.Dataset) -> Summary:
     summary = Summary()
     axes = [str(dim) for dim in dataset.sizes if dim != "model"]
     try:
-        inputs = read_inputs(dataset.assign_attrs(axes=json.dumps(axes)))
+        inputs = read_inputs(dataset, axes)
         varied = axes_of_arrays([smaller_radius_at(inputs, probe_index(inputs))])
     except (ResultError, ModelError, KeyError):
         # a part of a result, or one that was changed, may lack what the radii follow from

@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
+from ..config.draft import Draft, Setting, open_text
 from ..config.grid import MAX_POINTS
-from ..config.load import Config, Purpose, parse_config
+from ..config.load import Config, Purpose, build
 from ..engine.plugins import Plugins
 from ..errors import ResultError, UsageError
 from ..text import safe_text
@@ -44,17 +45,23 @@ def stored_config(
     UsageError : it is a time history, or one of its plug-ins is missing or has changed
     ResultError, ConfigError : the stored config cannot be read, or is invalid in this version
     """
-    text = attributes.get("config")
-    if text is None:
-        raise UsageError(f"{safe_text(name)}: contains no config, it is a time history")
-    if not isinstance(text, str):
-        raise ResultError(f"{safe_text(name)}: its attribute config is not text")
-    check_plugins(attributes, plugins, name)
+    draft = stored_draft(attributes, plugins, name)
     if not allow_changed_plugins:
         for reason in (*changed_plugins(attributes, plugins, name), *unknown_plugins(attributes, plugins, name)):
             raise UsageError(reason)
+    return build(draft.with_settings(map(Setting.parse, overrides)), max_points, purpose)
+
+
+def stored_draft(attributes: Mapping[str, object], plugins: Plugins, name: str) -> Draft:
+    """Open the config that a result came from; parameters and exceptions are those of `stored_config`."""
+    text = attributes.get("config")
+    if text is None:
+        raise UsageError(f"{name}: contains no config, it is a time history")
+    if not isinstance(text, str):
+        raise ResultError(f"{name}: its attribute config is not text")
+    check_plugins(attributes, plugins, name)
     stored = read_attribute(attributes, "config_set", name, required=True)
-    return parse_config(text, [*stored, *overrides], plugins.models, name, max_points, purpose)
+    return open_text(text, name, plugins.models).with_settings(map(Setting.parse, stored))
 
 
 def config_of_part(config: Config, dataset: xr.Dataset) -> Config:
@@ -112,7 +119,7 @@ def check_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str)
         )
         ways = " and ".join(sorted({_how_to_supply(record) for record in missing.values()}))
         again = "it" if len(missing) == 1 else "them"
-        raise UsageError(f"{safe_text(name)}: made with {safe_text(named)}; give {again} again with {ways}")
+        raise UsageError(f"{name}: made with {safe_text(named)}; give {again} again with {ways}")
 
 
 def changed_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ from ..contact.status import FIRST_FAILURE, Status
 from .attributes import SummaryRecord
 from .schema import parts_of_models
 from .slabs import MAX_SUMMARY_POINTS, distinct_points, is_computed, slabs
-from .trajectory_table import TrajectoryTable, expand, summary_of_variable
+from .trajectory_table import ExpandedSlab, TrajectoryTable, computed_array, expand
 
 # variables of which the largest absolute value is reported
 ERROR_VARIABLES = ("e_error", "v1_error", "v2_error", "closed_form_error", "energy_residual")
@@ -105,6 +105,17 @@ class Summary:
         by_model[model] = float(np.fmax(by_model.get(model, np.nan), largest))
 
 
+def add_slab(summary: Summary, table: TrajectoryTable, slab: ExpandedSlab) -> None:
+    """Add the points of a slab; points that differ only by parameters of other models count once."""
+    axes = table.inputs.axes_of_model(table.laws[slab.model].key)
+    if any(part.start > 0 for axis, part in enumerate(slab.region) if axis not in axes):
+        return
+    first = tuple(slice(None) if axis in axes else slice(1) for axis in range(len(slab.region)))
+    counted = {name: array[first or ...] for name, array in slab.values.items()}
+    radius = np.fmin(slab.impacts.R1, slab.impacts.R2)
+    summary.add(counted, slab.model, [part.start for part in slab.region], radius)
+
+
 def summarize(
     dataset: xr.Dataset, max_failed_at: int = MAX_FAILED_AT, max_points: float = MAX_SUMMARY_POINTS
 ) -> Summary:
@@ -172,7 +183,7 @@ def extremes_of(dataset: xr.Dataset, name: str) -> Extremes | None:
 
     None for a computed variable that varies over more than `MAX_SUMMARY_POINTS` points of all models together.
     """
-    record = summary_of_variable(dataset.variables[name])
+    record = _stored_record(dataset.variables[name])
     if record is not None and name in record.extremes:
         stored = record.extremes[name]
         return stored and Extremes(_from_json(stored[0]), _from_json(stored[1]), stored[2])
@@ -257,9 +268,15 @@ def summary_record(
     )
 
 
+def _stored_record(variable: xr.Variable) -> SummaryRecord | None:
+    """Find the summary in the file of a variable."""
+    array = computed_array(variable)
+    return None if array is None else array.table.summary
+
+
 def _common_record(dataset: xr.Dataset, names: Sequence[str]) -> SummaryRecord | None:
     """The summary in the file of some variables, if it has one and none of them is a selection."""
-    records = [summary_of_variable(dataset.variables[name]) for name in names]
+    records = [_stored_record(dataset.variables[name]) for name in names]
     return records[0] if records and all(record is records[0] for record in records) else None
 
 

@@ -6,32 +6,29 @@ import contextlib
 import math
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from xarray.backends import BackendEntrypoint
 
 from ..atomic import Sink, atomic_write, check_output, check_outputs
 from ..config.files import RESULT_MAGIC
 from ..config.grid import MAX_POINTS
 from ..config.tables import Output
-from ..contact.variables import OUTPUTS
 from ..errors import ResultError, UnfinishedError, UsageError
 from ..text import safe_text
-from .factored import check_witnesses, stored_table, witness_variables
-from .hdf5_structure import ReadBytes, byte_reader, check_root
+from .hdf5_structure import byte_reader, check_root
 from .kinds import require_sweep
-from .netcdf import StoredArray, open_for_writing, read_variables
+from .layouts import LAYOUTS
+from .netcdf import RegionValues, open_for_writing, read_variables
 from .seal import check_seal, write_seal
 from .selection import model_positions, select
 from .slabs import slabs
-from .trajectory_table import TrajectoryTable, in_memory, lazy_dataset
-from .validation import FACTORED_ATTRIBUTES, TABLE_VARIABLES, is_quantity, schema_violation
+from .trajectory_table import in_memory, table_of_result
+from .validation import schema_violation
 
 DEFAULT_OUTPUT = Output()
 # larger results are not loaded into memory
@@ -43,7 +40,7 @@ COPY_BUFFER_BYTES = 2**22
 def write_sealed(
     sink: Sink,
     template: xr.Dataset,
-    values: Iterable[tuple[str, tuple[int | slice, ...], NDArray[Any]]],
+    values: Iterable[RegionValues],
     output: Output = DEFAULT_OUTPUT,
 ) -> str:
     """Write and seal a dataset.
@@ -100,15 +97,13 @@ def save(
     """
     path = Path(path)
     if "schema_version" not in dataset.attrs:
-        raise UsageError(
-            f"{safe_text(str(path))}: this dataset is not a result of impact: it has no schema_version"
-        )
+        raise UsageError(f"{path}: this dataset is not a result of impact: it has no schema_version")
     violation = schema_violation(dataset)
     if violation:
-        raise UsageError(f"{safe_text(str(path))}: {violation}; dataset.to_netcdf(path) stores any dataset")
+        raise UsageError(f"{path}: {violation}; dataset.to_netcdf(path) stores any dataset")
     check_output(path, overwrite=overwrite)
 
-    def parts() -> Iterator[tuple[str, tuple[slice, ...], NDArray[Any]]]:
+    def parts() -> Iterator[RegionValues]:
         for name, variable in dataset.data_vars.items():
             for where in slabs(variable.sizes):
                 if should_stop():
@@ -149,7 +144,7 @@ def check_readable(sink: Sink, path: Path) -> None:
         with h5py.File(sink, "r") as file:
             read_variables(file, read)
     except ResultError as error:
-        raise UsageError(f"{safe_text(str(path))}: could not be read again: {error}") from None
+        raise UsageError(f"{path}: could not be read again: {error}") from None
 
 
 def open_result(path: str | Path) -> xr.Dataset:
@@ -169,11 +164,6 @@ def open_result(path: str | Path) -> xr.Dataset:
     -----
     UserWarning : it holds variables that are not part of a result; they are ignored
     """
-    return open_with_table(path)[0]
-
-
-def open_with_table(path: str | Path) -> tuple[xr.Dataset, TrajectoryTable | None]:
-    """Open a result, and the trajectory table of a factored file."""
     path = Path(path)
     shown = safe_text(str(path))
     with contextlib.ExitStack() as opened:
@@ -188,7 +178,9 @@ def open_with_table(path: str | Path) -> tuple[xr.Dataset, TrajectoryTable | Non
         except OSError as error:
             raise ResultError(f"{shown}: is not a readable result ({safe_text(str(error), 80)})") from error
         try:
-            dataset, table, unknown = _read_dataset(file, read)
+            variables, attributes, unknown = read_variables(file, read)
+            layout = "factored" if "laws" in attributes else "full"
+            dataset = LAYOUTS[layout].read(variables, attributes)
             violation = schema_violation(dataset)
             if violation:
                 raise ResultError(f"is not a readable result ({violation})")
@@ -205,9 +197,9 @@ def open_with_table(path: str | Path) -> tuple[xr.Dataset, TrajectoryTable | Non
     if unknown:
         names = safe_text(", ".join(unknown))
         warnings.warn(f"{shown}: ignored variables that are not part of a result: {names}", stacklevel=2)
-    dataset.encoding = {"source": str(path), "seal": seal, "layout": dataset.encoding["layout"]}
+    dataset.encoding = {"source": str(path), "seal": seal, "layout": layout}
     dataset.set_close(file.close)
-    return dataset, table
+    return dataset
 
 
 def _with_file_name(shown: str, error: ResultError) -> ResultError:
@@ -226,21 +218,13 @@ def load(path: str | Path) -> xr.Dataset:
     Traceback (most recent call last):
     impact.errors.ResultError: README.md: is not a readable result ...
     """
-    dataset, table = open_with_table(path)
+    dataset = open_result(path)
     if dataset.nbytes > MAX_LOADED_BYTES:
         return dataset
     with dataset:
         shown = safe_text(str(path))
         try:
-            if table is None:
-                return dataset.load()
-            # all variables of a slab together: they share most of the computation
-            variables = [
-                replace(variable, dtype=dataset[name].dtype.str[1:])
-                for name, variable in OUTPUTS.items()
-                if name in dataset
-            ]
-            return in_memory(dataset, table, variables)
+            return dataset.load() if table_of_result(dataset) is None else in_memory(dataset)
         except MemoryError:
             raise
         except ResultError as error:
@@ -304,38 +288,6 @@ def expand(
         )
     save(dataset, output, overwrite=overwrite, should_stop=should_stop)
     return points
-
-
-def _read_dataset(file: h5py.File, read: ReadBytes) -> tuple[xr.Dataset, TrajectoryTable | None, tuple[str, ...]]:
-    """The dataset in a file, its trajectory table if it has one, and names that are not part of a result."""
-    variables, attributes, unknown = read_variables(file, read)
-    dims = {name: tuple(map(str, variable.dims)) for name, variable in variables.items()}
-    coordinate_names = [name for name in variables if not is_quantity(name, dims[name])]
-    table_names = {name for name in variables if name in TABLE_VARIABLES}
-    coordinates = {name: variables[name].load() for name in coordinate_names if name not in table_names}
-    if "laws" not in attributes:
-        computed = {name: variable for name, variable in variables.items() if name not in coordinates}
-        dataset = xr.Dataset(computed, coordinates, attributes)
-        dataset.encoding = {"layout": "full"}
-        return dataset, None, unknown
-    witnesses = {name: variables[name].load() for name in table_names if name.startswith("witness_")}
-    stored = xr.Dataset(witnesses, coordinates, attributes)
-
-    arrays = {name: StoredArray(name, file[name]) for name in table_names}
-    sizes = {name: array.shape[0] for name, array in arrays.items()}
-    trajectory_table = stored_table(
-        stored,
-        sizes,
-        lambda name, part: arrays[name].read((part,)),
-        lambda name, rows: arrays[name].take(rows),
-    )
-    quantities = witness_variables(stored)
-    check_witnesses(trajectory_table, quantities, stored)
-    template = stored.drop_vars(witnesses).drop_attrs(deep=False)
-    dataset_attributes = {name: value for name, value in attributes.items() if name not in FACTORED_ATTRIBUTES}
-    dataset = lazy_dataset(template.assign_attrs(dataset_attributes), trajectory_table, quantities)
-    dataset.encoding = {"layout": "factored"}
-    return dataset, trajectory_table, unknown
 
 
 class ImpactBackend(BackendEntrypoint):

@@ -2,36 +2,145 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
 from ..array_types import Array
+from ..atomic import check_outputs
 from ..config.design import draw_columns, unit_samples
-from ..config.grid import SAMPLE
+from ..config.grid import MAX_POINTS, SAMPLE
 from ..config.input_names import InputName
 from ..config.lines import path_text
 from ..config.load import Config
 from ..config.tables import power_of_two_problem
+from ..contact.model import ForceModel
 from ..contact.variables import OUTPUTS
 from ..engine.plan import Plan
+from ..engine.run import Run
 from ..engine.trajectories import check_count
 from ..errors import ConfigError, UsageError, did_you_mean
 from ..results.sensitivity import HALF, QUANTILES, sensitivity_template
-from ..text import safe_text
+from ..results.sweep import prepare, sweep_in_memory
+from ..results.xarray_backend import save
 from .indices import indices_of, mixed_rows
 
 # an output whose standard deviation is a smaller multiple of rtol and of its largest value is constant
 CONSTANT_FACTOR = 10.0
 
 
+def sensitivity(
+    source: str | Path | Mapping[str, object],
+    *,
+    of: str = "e_out",
+    output: str | Path | None = None,
+    overwrite: bool = False,
+    overrides: Sequence[str] = (),
+    plugins: Sequence[ForceModel | str | Path] = (),
+    max_points: int = MAX_POINTS,
+    execute: Callable[[Plan], xr.Dataset] = sweep_in_memory,
+) -> xr.Dataset:
+    """Find which uncertain input matters: Sobol indices of an output, its mean and quantiles, for every model.
+
+    For n samples of d uncertain inputs, n (d + 2) points are computed for each model and each point of the other
+    axes.
+
+    Parameters
+    ----------
+    source : a TOML file, or a mapping with the same keys, with distributions and `[design]`
+    of : name of the output
+    output : result file to write
+    overwrite : replace it if it exists
+    overrides, plugins : see `sweep`
+    max_points : the largest number of points
+    execute : function that runs a plan; by default it is run in this process
+
+    Returns
+    -------
+    Dataset : of dimensions model, the axes of the config, and input; see docs/uncertainty.md
+
+    Raises
+    ------
+    ConfigError : with one line for each problem; there is no design, or its n is no power of two from 2 on
+    UsageError, StoreError : there is no such output, or the file exists or cannot be written
+
+    The peak force of Hertz' law is proportional to K^0.4 v^1.2:
+
+    >>> import impact
+    >>> study = impact.sensitivity({
+    ...     "models": "hertz",
+    ...     "sweep": {"v1": {"uniform": [0.8, 1.2]}, "m1": 1.0, "m2": 1.0, "K": {"uniform": [5e5, 1.5e6]}},
+    ...     "design": {"n": 1024},
+    ... }, of="peak_force")
+    >>> study["first"].values.round(2).tolist()
+    [[0.56, 0.43]]
+    """
+    (result,) = sensitivities(
+        source,
+        [of],
+        output=output,
+        overwrite=overwrite,
+        overrides=overrides,
+        plugins=plugins,
+        max_points=max_points,
+        execute=execute,
+    )
+    return result
+
+
+def sensitivities(
+    source: str | Path | Mapping[str, object],
+    of: Sequence[str],
+    *,
+    output: str | Path | None = None,
+    overwrite: bool = False,
+    overrides: Sequence[str] = (),
+    plugins: Sequence[ForceModel | str | Path] = (),
+    max_points: int = MAX_POINTS,
+    execute: Callable[[Plan], xr.Dataset] = sweep_in_memory,
+) -> list[xr.Dataset]:
+    """Find the `sensitivity` of several outputs, whose points are computed once.
+
+    Parameters
+    ----------
+    of : names of the outputs; of one alone the result can be written
+    source, output, overwrite, overrides, plugins, max_points, execute : see `sensitivity`
+
+    Raises
+    ------
+    ConfigError, UsageError, StoreError : see `sensitivity`
+
+    >>> import impact
+    >>> studies = impact.sensitivities({
+    ...     "models": "hertz",
+    ...     "sweep": {"v1": {"uniform": [0.8, 1.2]}, "m1": 1.0, "m2": 1.0, "K": {"uniform": [5e5, 1.5e6]}},
+    ...     "design": {"n": 64},
+    ... }, ["peak_force", "contact_time"])
+    >>> [round(study["mean"].item(), 5) for study in studies]
+    [187.75797, 0.00998]
+    """
+    for name in of:
+        check_output_name(name)
+    if output is not None and len(of) > 1:
+        raise UsageError(f"--output: got {len(of)} outputs (--of), expected one for a file")
+    plan = prepare(source, overrides, plugins, Run(max_points=max_points))
+    plan = sensitivity_plan(plan, of, max_points, str(source) if isinstance(source, str | Path) else "config")
+    check_outputs([output], [source, *plugins, *plan.config.files], overwrite=overwrite)
+    swept = execute(plan)
+    results = [sensitivity_of(plan, name, swept) for name in of]
+    if output is not None:
+        save(results[0], output, overwrite=overwrite)
+    return results
+
+
 def check_output_name(of: str) -> None:
     """Raise a UsageError, which names the nearest output, if there is no such output."""
     if of not in OUTPUTS or of in ("status", "in_domain"):
         outputs = [name for name in OUTPUTS if name not in ("status", "in_domain")]
-        raise UsageError(f'--of: no output "{safe_text(of)}"; {did_you_mean(of, outputs)}')
+        raise UsageError(f'--of: no output "{of}"; {did_you_mean(of, outputs)}')
 
 
 def sensitivity_plan(plan: Plan, of: Sequence[str], max_points: int, name: str) -> Plan:
@@ -99,7 +208,7 @@ def sensitivity_of(plan: Plan, of: str, swept: xr.Dataset) -> xr.Dataset:
     shape = [outputs.sizes["model"], *(outputs.sizes[dim] for dim in others)]
     values = np.asarray(outputs.values, float).reshape(-1, len(inputs) + 2, n)
     result = sensitivity_template(plan, of, others)
-    found = _statistics(values, config)
+    statistics = _statistics(values, config)
     return result.assign(
         {
             name: (
@@ -107,7 +216,7 @@ def sensitivity_of(plan: Plan, of: str, swept: xr.Dataset) -> xr.Dataset:
                 np.asarray(array).reshape([*shape, *array.shape[1:]]).astype(result[name].dtype),
                 result[name].attrs,
             )
-            for name, array in found.items()
+            for name, array in statistics.items()
         }
     )
 
@@ -128,7 +237,7 @@ def _statistics(values: Array, config: Config) -> dict[str, Array]:
     varies = deviation > resolution
     changes = np.abs(values[:, 2:] - values[:, :1]).max(axis=2) > resolution[:, None]
     values = np.concatenate([values[:, :2], np.where(changes[..., None], values[:, 2:], values[:, :1])], axis=1)
-    found = {
+    statistics = {
         "failed": failed,
         "mean": mean,
         "sd": deviation,
@@ -138,10 +247,10 @@ def _statistics(values: Array, config: Config) -> dict[str, Array]:
     if n > 2:
         half = indices_of(np.ascontiguousarray(values[varies][..., : n // 2]))
     for name in ("first", "total", "first_lower", "first_upper", "total_lower", "total_upper"):
-        found[name] = np.full((outputs, blocks - 2), np.nan)
-        found[name][varies] = getattr(whole, name)
+        statistics[name] = np.full((outputs, blocks - 2), np.nan)
+        statistics[name][varies] = getattr(whole, name)
     for name in HALF:
-        found[name] = np.full((outputs, blocks - 2), np.nan)
+        statistics[name] = np.full((outputs, blocks - 2), np.nan)
         if half is not None:
-            found[name][varies] = getattr(half, name.removesuffix("_half"))
-    return found
+            statistics[name][varies] = getattr(half, name.removesuffix("_half"))
+    return statistics

@@ -1,0 +1,398 @@
+"""Named columns of values with units: of CSV files, of tables of pandas and xarray, and of lists in a config.
+
+The values of a file replace its name in a config, and are stored with it as an override such as
+`sweep.cases={v1 = [1.0, 2.0], m1 = [0.1, 0.2]}`, so that a stored config needs no other file.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from pydantic_core import PydanticCustomError
+
+from ..contact.model import ForceModel
+from ..contact.variables import OUTPUTS
+from ..errors import ConfigError, did_you_mean
+from ..text import safe_text
+from .files import as_table, read_text, set_value
+from .input_names import InputName, input_values
+from .quantities import MAX_PROBLEMS, ConfigProblem, KeyPath, Quantity, as_text, mismatch_error
+
+MAX_CSV_BYTES = 2_000_000  # size of a CSV file, whose values a result stores
+COLUMN_HEADER = re.compile(r"\s*(.*?)\s*(?:\[\s*(.*?)\s*\])?\s*", re.DOTALL)
+ROUND_BRACKETS = re.compile(r"(.*\S)\s*\(\s*(.*?)\s*\)", re.DOTALL)
+
+# the quantity of a column by its name, None for names of materials; KeyError for an unknown name
+QuantityOf = Callable[[str], Quantity | None]
+# values in SI units or names of materials, and problems: the index of a cell and a message
+Cells = tuple[list[float | str], list[tuple[int, str]]]
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Columns of values, by name.
+
+    Parameters
+    ----------
+    source : name of the file or the table
+    header : line of the names; 0 for a table
+    lines : of each row; for a table its number, from 1
+    units : unit of each column; empty for SI
+    cells : the values of each column; the cells of a file are text
+    is_known : whether a column has the name of an input or an output. Otherwise it may be any file, such as one
+        with passwords, that a config of unknown origin names: messages contain nothing of it
+    """
+
+    source: str
+    header: int
+    lines: Sequence[int]
+    units: Mapping[str, str]
+    cells: Mapping[str, Sequence[object]]
+    is_known: bool = True
+
+    def problem(self, message: str, column: str = "", row: int | None = None) -> str:
+        """Say where a problem is."""
+        line = self.header if row is None else self.lines[row]
+        place = f"{self.source}:{line}" if line else self.source
+        return ": ".join(part for part in (place, safe_text(column, 60), message) if part)
+
+    def values(self, column: str, quantity: Quantity | None, n: float | None, unit: str = "") -> list[Any]:
+        """Convert a column to SI units, or to names of materials.
+
+        Parameters
+        ----------
+        n : the exponent that the unit may contain; None where it varies
+        unit : of a column without one
+
+        Raises
+        ------
+        ConfigError : the unit has another dimension, or the quantity does not allow the values of some cells
+        """
+        unit = self.units[column] or unit
+        if self.is_known:
+            expected = unit_expected(quantity, unit, n)
+            if expected:
+                raise ConfigError(self.problem(f"got [{safe_text(unit)}], expected {expected}", column))
+        elif quantity is None:
+            raise ConfigError(self.problem("got no known column, expected such as material1 or v1 [m/s]"))
+        values, problems = read_cells(self.cells[column], quantity, n, unit, is_text=True)
+        if problems and quantity is not None and not self.is_known:
+            raise ConfigError(self.problem(f"expected {quantity.expected}", row=problems[0][0]))
+        if problems:
+            raise ConfigError(*(self.problem(message, column, row) for row, message in problems))
+        return values
+
+
+def read_cells(
+    cells: Iterable[object], quantity: Quantity | None, n: float | None, unit: str = "", *, is_text: bool = False
+) -> Cells:
+    """Convert cells to SI units or to names of materials; text without a unit is a number only with `is_text`."""
+    values: list[float | str] = []
+    problems: list[tuple[int, str]] = []
+    for index, cell in enumerate(cells):
+        try:
+            values.append(_read_cell(cell, quantity, n, unit, is_text=is_text))
+        except PydanticCustomError as error:
+            problems.append((index, error.message()))
+            if len(problems) >= MAX_PROBLEMS:
+                break
+    return values, problems
+
+
+def _read_cell(
+    cell: object, quantity: Quantity | None, n: float | None, unit: str, *, is_text: bool
+) -> float | str:
+    if is_text and cell in (None, ""):
+        raise mismatch_error(None, "the name of a material" if quantity is None else quantity.expected)
+    if quantity is None:
+        return str(cell)
+    number = cell
+    if is_text and isinstance(cell, str):
+        try:
+            number = float(cell)
+        except ValueError:
+            # a cell may have its own unit where its column has none
+            if unit:
+                raise mismatch_error(cell, quantity.expected) from None
+    return quantity.read(f"{cell} {unit}" if unit else number, n)
+
+
+def unit_expected(quantity: Quantity | None, unit: str, n: float | None = math.nan) -> str:
+    """Describe the units that a quantity may have; empty if `unit` is one of them."""
+    if quantity is not None and unit:
+        try:
+            Quantity(quantity.unit, "").read(f"1 {unit}", n)
+        except PydanticCustomError as error:
+            return error.message().partition(", expected ")[2]
+    return ""
+
+
+def read_csv(path: Path, quantity_of: QuantityOf, *, with_any_names: bool = False) -> Columns:
+    """Read the columns of a CSV file, whose first line names them, with their units in brackets.
+
+    Raises
+    ------
+    ConfigError : the file cannot be read, is too large, has no rows, has rows of another length than the header,
+        or has no known names (unless `with_any_names`)
+    """
+    reader = csv.reader(io.StringIO(read_text(path, "CSV", MAX_CSV_BYTES), newline=""), strict=True)
+    try:
+        numbered = [(reader.line_num, row) for row in reader if row]
+    except csv.Error as error:
+        raise ConfigError(f"{path}:{reader.line_num}: not CSV: {error}") from None
+    if len(numbered) < 2:
+        raise ConfigError(
+            f"{path}: got {len(numbered)} lines, expected a line of names and at least one of values"
+        )
+    (first, headers), *numbered = numbered
+    rows, header = dict(numbered), f"{path}:{first}"
+    if headers[0].lstrip().startswith("#"):
+        raise ConfigError(f"{header}: got a comment, expected the names of the columns")
+    separator = next((mark for mark in ";\t" if mark in headers[0]), "")
+    if len(headers) == 1 and separator:
+        got = f'columns separated by {as_text(separator)}, expected ","'
+        raise ConfigError(f"{header}: got {got}, and a point in numbers, such as 0.5")
+    names = [split_header(text) for text in headers]
+    with_square_brackets = {name: _with_square_brackets(name, quantity_of) for name, _ in names}
+    is_known = any(_is_known(name, quantity_of) or with_square_brackets[name] for name, _ in names)
+    if not (is_known or with_any_names):
+        expected = "names of inputs or outputs, such as v1 [m/s] or e_out"
+        raise ConfigError(f"{header}: got no known column, expected {expected}")
+    problems = [
+        f"{header}: {safe_text(name, 60)}: got round brackets, expected {as_text(expected)}"
+        for name, expected in with_square_brackets.items()
+        if expected
+    ]
+    for name, count in Counter(name for name, _ in names).items():
+        if count > 1:
+            got = f"{as_text(name) if is_known else 'a name'} {'twice' if count == 2 else f'{count} times'}"
+            problems.append(f"{header}: got {got}, expected each column once")
+    problems += _length_problems(path, rows, len(headers))
+    if problems:
+        raise ConfigError(*problems[:MAX_PROBLEMS])
+    columns = zip(*rows.values(), strict=True)
+    cells = {name: [cell.strip() for cell in column] for (name, _), column in zip(names, columns, strict=True)}
+    return Columns(str(path), first, list(rows), dict(names), cells, is_known)
+
+
+def split_header(text: str) -> tuple[str, str]:
+    """Split the header of a column into its name and its unit.
+
+    >>> split_header("v1 [mm/s]"), split_header("e")
+    (('v1', 'mm/s'), ('e', ''))
+    """
+    match = COLUMN_HEADER.fullmatch(text)
+    assert match is not None, "any text matches"
+    return match[1], match[2] or ""
+
+
+def _is_known(column: str, quantity_of: QuantityOf) -> bool:
+    try:
+        quantity_of(column)
+    except KeyError:
+        return False
+    return True
+
+
+def _with_square_brackets(column: str, quantity_of: QuantityOf) -> str:
+    """Put the unit of a header in square brackets, if it is in round ones and the name is known; else empty."""
+    match = ROUND_BRACKETS.fullmatch(column)
+    if match is None or not _is_known(match[1], quantity_of):
+        return ""
+    quantity, unit = quantity_of(match[1]), match[2]
+    return f"{match[1]} [{quantity.unit if quantity is not None and unit_expected(quantity, unit) else unit}]"
+
+
+def _length_problems(path: Path, rows: Mapping[int, Sequence[str]], n_columns: int) -> list[str]:
+    """List each wrong number of values in a row, with its first line, and each comment."""
+    expected = f"expected {n_columns}, one for each column"
+    problems: list[str] = []
+    lines_by_length: dict[int, list[int]] = {}
+    for line, row in rows.items():
+        if len(row) != n_columns and row[0].lstrip().startswith("#"):
+            problems.append(f"{path}:{line}: got a comment, {expected.replace(',', ' values,')}")
+        elif len(row) != n_columns:
+            lines_by_length.setdefault(len(row), []).append(line)
+    for n_values, (line, *others) in lines_by_length.items():
+        also = f"; also on {len(others)} other line{'s' * (len(others) > 1)}" if others else ""
+        problems.append(f"{path}:{line}: got {n_values} values, {expected}{also}")
+    return problems
+
+
+def columns_of_table(table: Any, source: str) -> Columns:
+    """Take the columns of a DataFrame, or of a dataset of xarray, whose units are attributes."""
+    units: dict[str, str] = {}
+    if hasattr(table, "data_vars"):
+        units = {str(name): str(variable.attrs.get("units", "")) for name, variable in table.variables.items()}
+        table = table.to_dataframe().reset_index()
+    cells = {split_header(str(header)): values.tolist() for header, values in table.items()}
+    return Columns(
+        source,
+        0,
+        range(1, len(table) + 1),
+        {name: unit or units.get(name, "") for name, unit in cells},
+        {name: values for (name, _), values in cells.items()},
+    )
+
+
+def column_quantity(models: Mapping[str, ForceModel]) -> QuantityOf:
+    """Define the quantity of a column that has the name of an output or an input."""
+    return lambda name: (
+        Quantity(OUTPUTS[name].unit, "") if name in OUTPUTS else InputName.parse(name).quantity(models)
+    )
+
+
+def read_files(
+    data: Mapping[str, Any], folder: Path | None, models: Mapping[str, ForceModel], n: float | None
+) -> tuple[dict[KeyPath, object], list[str]]:
+    """Read the CSV files of cases and of single columns.
+
+    Parameters
+    ----------
+    data : plain data of a config
+    folder : of the files; None if no file may be read, as for a config stored in a result
+    models : all models by key
+    n : the exponent that units may contain
+
+    Returns
+    -------
+    The values that replace the names of files, by path, and problems. A file that cannot be read has no values.
+    """
+
+    @cache
+    def open_csv(file: str, *, with_any_names: bool = False) -> Columns:
+        if folder is None:
+            raise ConfigError(f"{file}: not read; a stored config contains values, not file names")
+        return read_csv(folder / file, column_quantity(models), with_any_names=with_any_names)
+
+    values: dict[KeyPath, object] = {}
+    problems: list[str] = []
+    cases = as_table(data.get("sweep")).get("cases")
+    if isinstance(cases, str):
+        try:
+            values["sweep", "cases"] = _read_cases(open_csv(cases), models, n)
+        except ConfigError as error:
+            problems += error.problems
+    for name, file, column in _file_columns(data):
+        try:
+            columns = open_csv(file, with_any_names=True)
+            found = _find_column(columns, column if column is not None else str(name), is_only=column is None)
+            list_of_values = columns.values(found, name.quantity(models), n)
+            values[name.path] = list_of_values if column is not None else {"empirical": list_of_values}
+        except ConfigError as error:
+            problems += error.problems
+        except KeyError:
+            continue  # an unknown key is reported with the others
+    return values, list(dict.fromkeys(problems))
+
+
+def _find_column(columns: Columns, name: str, *, is_only: bool) -> str:
+    """Find a column by its name; with `is_only`, the single column of a file may have any name."""
+    if is_only and len(columns.units) == 1:
+        return next(iter(columns.units))
+    if name in columns.units:
+        return name
+    hint = f"; {did_you_mean(name, list(columns.units))}" if columns.is_known else ""
+    if any(header.startswith(f"{name} (") for header in columns.units):
+        hint = f'; a unit is in square brackets: "{safe_text(name, 60)} [UNIT]"'
+    raise ConfigError(columns.problem(f"got {as_text(name)}, expected one of its columns{hint}"))
+
+
+def _read_cases(
+    columns: Columns, models: Mapping[str, ForceModel], n: float | None
+) -> dict[str, list[float | str]]:
+    """Convert all columns of a table of cases to SI units."""
+    problems: list[str] = []
+    values: dict[str, list[float | str]] = {}
+    # n may be one of the columns
+    n = None if "n" in columns.units else n
+    for name in columns.units:
+        try:
+            values[name] = columns.values(name, InputName.parse(name).quantity(models), n)
+        except ConfigError as error:
+            problems += error.problems
+        except KeyError:
+            problems.append(columns.problem(InputName.parse(name).unknown_message(models), name))
+    if problems:
+        raise ConfigError(*problems)
+    return values
+
+
+def _file_columns(data: Mapping[str, Any]) -> Iterator[tuple[InputName, str, str | None]]:
+    """Yield name, file and column of every `{ file = ..., column = ... }` and `{ empirical = file }`."""
+    for name, reference in input_values(data):
+        match reference:
+            case {"file": str(file), "column": str(column), **others} if not others:
+                yield name, file, column
+            case {"empirical": str(file), **others} if not others:
+                yield name, file, None
+
+
+def named_files(data: Mapping[str, Any]) -> list[str]:
+    """List the names of all CSV files in the plain data of a config."""
+    names = [as_table(data.get("sweep")).get("cases"), as_table(data.get("data")).get("file")]
+    names += [file for _, file, _ in _file_columns(data)]
+    return list(dict.fromkeys(name for name in names if isinstance(name, str)))
+
+
+class Cases(NamedTuple):
+    """The data of a config with each column of its cases at the path of its input.
+
+    Parameters
+    ----------
+    data : plain data
+    paths : where the values of an input are in the table of cases, by the path of the input
+    problems : names that are unknown or have another value, and columns of another length than the first
+    """
+
+    data: dict[str, Any]
+    paths: dict[KeyPath, KeyPath]
+    problems: list[ConfigProblem]
+
+
+def expand_cases(data: Mapping[str, Any], models: Mapping[str, ForceModel]) -> Cases:
+    """Replace `sweep.cases` by its columns."""
+    sweep = as_table(data.get("sweep"))
+    cases = sweep.get("cases")
+    if not isinstance(cases, dict) or not cases or not all(isinstance(values, list) for values in cases.values()):
+        return Cases(dict(data), {}, [])
+    problems: list[ConfigProblem] = []
+    paths: dict[KeyPath, KeyPath] = {}
+    # the columns that belong to [sweep] take the position of the table
+    in_sweep = {column: values for column, values in cases.items() if not InputName.parse(column).owner}
+    position, items = list(sweep).index("cases"), list(sweep.items())
+    new = {**data, "sweep": {**dict(items[:position]), **in_sweep, **dict(items[position + 1 :])}}
+    n_cases = len(next(iter(cases.values())))
+    for column, values in cases.items():
+        name, path = InputName.parse(column), ("sweep", "cases", column)
+        try:
+            name.quantity(models)
+        except KeyError:
+            problems.append((path, name.unknown_message(models)))
+            new["sweep"].pop(column, None)
+            continue
+        if contains_path(data, name.path):
+            problems.append((path, f"set together with {name.config_key}, expected one of the two"))
+        if len(values) != n_cases or not values:
+            expected = f"{n_cases or 'at least one'}, as in the first column"
+            problems.append((path, f"got {len(values)} values, expected {expected}"))
+        if name.owner:
+            new, _ = set_value(new, name.path, values)
+        paths[name.path] = path
+    return Cases(new, paths, problems)
+
+
+def contains_path(data: Mapping[str, Any], path: KeyPath) -> bool:
+    """Check whether the data has a value at a path."""
+    for key in path[:-1]:
+        data = as_table(data.get(str(key)))
+    return path[-1] in data
