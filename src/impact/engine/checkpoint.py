@@ -54,7 +54,7 @@ class WorkFolder:
         return self.folder / f"{number:08d}.npz"
 
     def _header(self, trajectory_range: TrajectoryRange) -> str:
-        """The text in a file that identifies its sweep and its range."""
+        """Identify the sweep and the range of a file by a line of text."""
         fields = trajectory_range.number, trajectory_range.model, trajectory_range.start, trajectory_range.stop
         return " ".join(map(str, (*fields, self.key)))
 
@@ -75,21 +75,7 @@ class WorkFolder:
 
 @contextlib.contextmanager
 def open_work_folder(folder: Path, plan: Plan, run: Run, extends: str = "") -> Iterator[WorkFolder]:
-    """Create or reopen a work folder, and lock it.
-
-    Parameters
-    ----------
-    folder : its path
-    plan : the plan whose ranges it contains
-    run : with `resume` the finished ranges are kept; `overwrite` removes them if they are not resumed
-    extends : seal of the result that is extended, if any, whose trajectories the folder does not contain
-
-    Raises
-    ------
-    InUseError : another process has locked the folder
-    UsageError : the folder exists, and neither `resume` nor `overwrite` is set, or it belongs to another sweep
-    StoreError : the disk is full or failed
-    """
+    """Create or reopen the work folder of a plan, and lock it; `extends` is the seal of an extended result."""
     _check_is_work_folder(folder)
     record = _sweep_record(plan, extends)
     with _locked(folder):

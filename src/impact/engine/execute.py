@@ -55,19 +55,13 @@ def reuse_nothing(trajectory_range: TrajectoryRange) -> ReusedPart:
 
 @dataclass(frozen=True)
 class WorkerContext:
-    """What a worker needs to integrate ranges of a sweep.
-
-    Parameters
-    ----------
-    version : of this package
-    solver : settings of the solver
-    sources : name and content of the Python files of plug-in models
-    hashes : key and SHA-256 of the models that are not built in
-    """
+    """What a worker needs to integrate ranges of a sweep."""
 
     version: str
     solver: Solver
+    # name and content of the Python files of plug-in models
     sources: tuple[tuple[str, bytes], ...] = ()
+    # key and SHA-256 of the models that are not built in
     hashes: tuple[tuple[str, str | None], ...] = ()
 
 
@@ -91,18 +85,13 @@ def integrate_columns(model: ForceModel, columns: Columns, solver: Solver) -> In
 
 
 def integrate_remotely(key: str, columns: Columns, context: WorkerContext) -> Integrated:
-    """Integrate trajectories of the model of a key: a pure function, which may run in any process, and repeatedly.
-
-    Raises
-    ------
-    UsageError : this process has another version or other models, or lacks numba where `context` requires it
-    """
+    """Integrate trajectories of the model of a key, in any process, and with the same bits if repeated."""
     return integrate_columns(models_of_context(context)[key], columns, context.solver)
 
 
 @lru_cache(maxsize=4)
 def models_of_context(context: WorkerContext) -> Mapping[str, ForceModel]:
-    """All models of a sweep by key, cached for the most recent sweeps."""
+    """Collect all models of a sweep by key, cached for the most recent sweeps."""
     host = socket.gethostname()
     if context.version != __version__:
         raise UsageError(other_version(host, __version__, context.version))
@@ -161,16 +150,8 @@ def integrate_ranges(
 ) -> Iterator[tuple[TrajectoryRange, CollisionResult]]:
     """Integrate ranges of trajectories, and yield each when it is finished: in order in this process alone.
 
-    `find_reused` returns the trajectories of a range that are not integrated, with their results.
-
-    Raises
-    ------
-    UsageError : a model is a Python value, which cannot be sent to a worker; or a worker cannot run the sweep
-    StoreError : workers were killed repeatedly, cannot be reached any more, or return invalid results
-
-    Warns
-    -----
-    UserWarning : a law raised an error; once for each law and distinct error
+    `find_reused` returns the trajectories of a range that are not integrated, with their results. A killed process
+    gets its ranges again, a few times; a warning states each distinct error that a law raised.
     """
     remaining, attempts = deque(todo), Counter[int]()
     reported: set[str] = set()
@@ -253,12 +234,7 @@ def _merge_reused(
 
 
 def _check_integrated(trajectory_range: TrajectoryRange, integrated: object, size: int) -> None:
-    """Refuse a return value of an executor that cannot be the results of `size` trajectories.
-
-    Raises
-    ------
-    StoreError : it has another type, or its arrays have another shape or dtype, or contain an unknown status
-    """
+    """Refuse a return value of an executor that cannot be the results of `size` trajectories."""
     prefix = f"executor: range {trajectory_range.number}"
     collisions, errors = integrated if isinstance(integrated, tuple) and len(integrated) == 2 else (integrated, {})
     if not isinstance(collisions, CollisionResult):

@@ -45,17 +45,10 @@ class PythonFile(NamedTuple):
 
 @dataclass(frozen=True)
 class Plugin:
-    """A model that is not built in, with its origin and a hash of its definition.
-
-    Parameters
-    ----------
-    model : the model
-    sha256 : of the file that defines the model; see `value_hash` for a Python value; None if no file defines it
-    source : the Python file, if the model comes from one
-    package : name and version of the installed package, if the model comes from one
-    """
+    """A model that is not built in, with the Python file, or the name and version of the package, that has it."""
 
     model: ForceModel
+    # of the file that defines the model, or `value_hash`; None if no file defines it
     sha256: str | None
     source: PythonFile | None = None
     package: str | None = None
@@ -99,25 +92,15 @@ class Plugins:
         return {plugin.model.key: plugin.record for plugin in self.items}
 
     def of(self, models: Sequence[ForceModel]) -> Plugins:
-        """Those that are among `models`."""
+        """Keep those that are among `models`."""
         keys = {model.key for model in models}
         return Plugins(tuple(plugin for plugin in self.items if plugin.model.key in keys))
 
 
 def read_plugins(sources: Sequence[ForceModel | str | Path | PythonFile]) -> Plugins:
-    """The models of installed packages, and those of `sources`.
+    """Collect the models of installed packages, those of `sources`, and all at the top level of its files.
 
     The packages are imported and the files executed: never pass files that a data file names.
-
-    Parameters
-    ----------
-    sources : models, paths of Python files, or files that were read elsewhere; from a file, every `ForceModel` at
-        the top level is taken
-
-    Raises
-    ------
-    UsageError : a file is missing, cannot be read or is not a Python file
-    ModelError : a file or package has a syntax error, raises an error, contains no model, or one with a key in use
 
     >>> law = ForceModel("mine", "Mine", 2026, "F = K δⁿ", "", force=lambda elastic: elastic)
     >>> read_plugins([law]).record["mine"]["file"] is None
@@ -144,7 +127,7 @@ def read_plugins(sources: Sequence[ForceModel | str | Path | PythonFile]) -> Plu
 
 
 def _plugins_of_source(source: object, argument: str) -> list[tuple[str, Plugin]]:
-    """The plug-ins of a source, each with the name of the source in messages."""
+    """Read the plug-ins of a source, each with the name of the source in messages."""
     match source:
         case ForceModel():
             return [(argument, Plugin(source, value_hash(source)))]
@@ -157,12 +140,7 @@ def _plugins_of_source(source: object, argument: str) -> list[tuple[str, Plugin]
 
 @cache
 def installed() -> tuple[Plugin, ...]:
-    """The models of all installed packages.
-
-    Raises
-    ------
-    ModelError : a package cannot be imported, or its entry point is no model; it has to be fixed or uninstalled
-    """
+    """Import the models of all installed packages; a `ModelError` names a package that has to be repaired."""
     plugins: dict[int, Plugin] = {}
     for point in sorted(entry_points(group=ENTRY_POINT_GROUP), key=lambda point: (point.value, point.name)):
         for plugin in _plugins_of_entry_point(point):
@@ -189,7 +167,7 @@ def _plugins_of_entry_point(point: EntryPoint) -> list[Plugin]:
 
 
 def _models_among(values: Iterable[object]) -> list[ForceModel]:
-    """The models among some values, each once, without built-in models, which a file may import to modify."""
+    """Find the models among some values, each once, without built-in models, which a file may import to modify."""
     built_in = {id(model) for model in catalogue().values()}
     models = {id(value): value for value in values if isinstance(value, ForceModel)}
     return [model for identity, model in models.items() if identity not in built_in]
@@ -212,7 +190,7 @@ def _check_storable(model: ForceModel, name: str) -> None:
 
 
 def _plugins_of_file(source: PythonFile) -> list[Plugin]:
-    """The models at the top level of a Python file, in order of definition."""
+    """Execute a Python file, and take the models at its top level, in order of definition."""
     sha256 = hashlib.sha256(source.content).hexdigest()
     models = _models_among(vars(_execute_module(source, sha256)).values())
     if not models:
@@ -235,10 +213,8 @@ def _read_source(path: Path) -> PythonFile:
 
 
 def _execute_module(source: PythonFile, sha256: str) -> ModuleType:
-    """Execute exactly the bytes that were hashed as a module, without storing bytecode.
-
-    Its folder is not searched for modules: a plug-in is a single file, so that the hash covers all of it.
-    """
+    """Execute exactly the bytes that were hashed as a module, without storing bytecode."""
+    # the folder is not searched for modules: a plug-in is a single file, so that the hash covers all of it
     file = str(Path(source.name).absolute())
     try:
         code = compile(source.content, file, "exec", dont_inherit=True)
@@ -265,7 +241,7 @@ def _execute_module(source: PythonFile, sha256: str) -> ModuleType:
 
 
 def _error_message(error: BaseException) -> str:
-    """The message of an error that a plug-in raised."""
+    """State an error that a plug-in raised."""
     text = safe_text(str(error), MAX_ERROR_LENGTH)
     if isinstance(error, ImpactError):
         return text

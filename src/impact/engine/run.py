@@ -111,15 +111,7 @@ class ProgressCounter:
 def report_kept_ranges(
     folder: Path, counter: ProgressCounter, command: str, details: Callable[[Exception], list[str]]
 ) -> Iterator[None]:
-    """Add to the message of an error how many finished trajectories the work folder contains.
-
-    Parameters
-    ----------
-    folder : the work folder
-    counter : counts the finished trajectories
-    command : option or command that continues the sweep
-    details : returns further sentences about an error
-    """
+    """Add to an error how many finished trajectories the folder has, and the option or command that continues."""
     try:
         yield
     except (StoreError, UnfinishedError, UsageError, MemoryError) as error:

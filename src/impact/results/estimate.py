@@ -154,7 +154,7 @@ def estimate(
 
 @contextmanager
 def _timed() -> Iterator[Callable[[], float]]:
-    """A function that returns the seconds that the block took."""
+    """Measure the seconds that a with block takes."""
     begun = time.perf_counter()
     ended = begun
     yield lambda: ended - begun

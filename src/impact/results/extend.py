@@ -136,11 +136,10 @@ def extend_to_file(
 
 
 def _extend_into(output: Path, source: Path, overrides: Sequence[str], plugins: Plugins, run: Run) -> SweepOutcome:
-    """Write the extended result.
+    """Write the extended result: that of a single sweep of its config.
 
-    It has the same variables and coordinates as a single sweep of its config. A result of layout `full` holds
-    values of points and no trajectories: those of all new points are integrated, also where a point of the result
-    had the same one.
+    A result of layout `full` holds values of points and no trajectories: those of all new points are integrated,
+    also where a point of the result had the same one.
     """
     name = str(source)
     before = open_result(source)
@@ -285,12 +284,7 @@ def _check_none_lost(old: Plan, axes: Sequence[_AxisPositions], name: str) -> No
 
 
 def _axis_positions(axis: Axis, old: Inputs, name: str) -> _AxisPositions:
-    """Find the positions that the values of an axis have in the old result.
-
-    Raises
-    ------
-    UsageError : its columns were several axes, or its points had other labels or another order
-    """
+    """Find the positions that the values of an axis have in the old result."""
     axes = {axis_number for column in axis.columns for axis_number in old.axes_of(column)}
     if len(axes) > 1:
         shown = ", ".join(map(str, axis.columns))

@@ -226,13 +226,7 @@ def prepare(
     plugins: Sequence[ForceModel | str | Path] = (),
     run: Run = DEFAULT_RUN,
 ) -> Plan:
-    """Read a config and its plug-ins, and report values that are implausible.
-
-    Raises
-    ------
-    ConfigError : with all problems of the config
-    UsageError : more than `run.max_points` trajectories would be integrated
-    """
+    """Read a config and its plug-ins, and report values that are implausible."""
     source = Path(source) if isinstance(source, str) else source
     plugin_set = read_plugins(plugins)
     config = read_config(source, overrides, plugin_set.models, run.max_points)
@@ -245,12 +239,7 @@ def prepare(
 
 
 def sweep_in_memory(plan: Plan, run: Run = DEFAULT_RUN) -> xr.Dataset:
-    """Run a plan; a small result is in memory, a large one is computed when it is indexed.
-
-    Raises
-    ------
-    UnfinishedError : the sweep was stopped; nothing is kept
-    """
+    """Run a plan; a small result is in memory, a large one is computed when it is indexed."""
     check_labels(plan)
     maps = trajectory_maps(plan)
     plan = with_core(plan, maps)
@@ -322,12 +311,7 @@ def complete_ranges(
     run: Run,
     find_reused: FindReused = reuse_nothing,
 ) -> None:
-    """Integrate the ranges that a work folder does not have yet.
-
-    Raises
-    ------
-    StoreError, UsageError, UnfinishedError : see `sweep_to_file`
-    """
+    """Integrate the ranges that a work folder does not have yet."""
     todo: list[TrajectoryRange] = []
     for trajectory_range in ranges:
         stored = None if run.should_stop() else work_folder.load(trajectory_range)
