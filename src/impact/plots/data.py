@@ -66,22 +66,11 @@ class PlotData(Protocol):
     def draw(
         self, all_axes: Sequence[Axes], labels: Mapping[str, str], points: Points | None
     ) -> list[tuple[Artist, str]]:
-        """Draw the panels; returns handles and names of the legend.
-
-        Parameters
-        ----------
-        labels : texts that replace those of axes, variables and laws, by name
-        points : measured points
-        """
+        """Draw the panels, with labels that replace those of names; returns handles and names of the legend."""
 
 
 def check_table(path: Path, form: str) -> None:
-    """Check the suffix and the form of a table.
-
-    Raises
-    ------
-    UsageError : one of them is unknown
-    """
+    """Check the suffix and the form of a table."""
     if path.suffix.lower() not in TABLE_SUFFIXES:
         *most, last = TABLE_SUFFIXES
         raise UsageError(f"--data {path}: expected a name that ends in {', '.join(most)} or {last}")
@@ -90,12 +79,7 @@ def check_table(path: Path, form: str) -> None:
 
 
 def encode_table(plot_data: PlotData, suffix: str, form: str = "wide") -> bytes:
-    """Encode the data of a picture as the bytes of a table; all digits are written, except to .tex.
-
-    Raises
-    ------
-    UsageError : the table needs a package that is not installed
-    """
+    """Encode the data of a picture as a table, with all digits except in .tex."""
     frame = plot_data.long_table() if form == "long" else plot_data.wide_table()
     if suffix == ".tex":
         text: str = frame.to_latex(index=False, escape=True, na_rep="", float_format=number)
@@ -112,10 +96,7 @@ def encode_table(plot_data: PlotData, suffix: str, form: str = "wide") -> bytes:
 
 
 def encode_history(history: xr.Dataset) -> bytes:
-    """A time history as the bytes of a CSV table: columns with their units, and all digits.
-
-    `read_points` reads it again.
-    """
+    """Write a time history as a CSV table with units and all digits, which `read_points` reads again."""
     frame = history.drop_vars("model").to_dataframe().reset_index()
     units = {name: plain_unit(str(history[name].attrs["units"])) for name in frame.columns}
     return _csv_bytes(frame.rename(columns={name: heading(name, unit=unit) for name, unit in units.items()}))
@@ -134,15 +115,11 @@ class Points:
 
 
 def read_points(points: str | Path | pd.DataFrame | xr.Dataset) -> Points:
-    """Measured points, of a CSV file or of a table of pandas or xarray.
+    """Read measured points of a CSV file or of a table of pandas or xarray.
 
     The names of the columns are those of inputs and variables, with their units in brackets: "v1 [mm/s]". Without
     a unit a column is in SI. `sigma` is the standard deviation of the variable in the
     column before it, by default in its unit.
-
-    Raises
-    ------
-    ConfigError : the file cannot be read, or a name, a unit or a number is invalid
     """
     quantities = _column_quantities()
     is_file = isinstance(points, str | Path)
@@ -161,7 +138,7 @@ def read_points(points: str | Path | pd.DataFrame | xr.Dataset) -> Points:
 
 
 def _column_quantities() -> dict[str, Quantity]:
-    """Names of columns, with their units."""
+    """Define the columns that points may have."""
     outputs = {
         name: Quantity(variable.unit, variable.meaning)
         for name, variable in (OUTPUTS | HISTORY).items()
