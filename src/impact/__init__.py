@@ -10,16 +10,15 @@ from ._version import __version__ as __version__
 if TYPE_CHECKING:
     from .api import (
         check_model as check_model,
-        init as init,
-        materials as materials,
         models as models,
-        run as run,
-        schema as schema,
     )
     from .comparison.bless import bless as bless
     from .comparison.compare import compare as compare
     from .comparison.rerun import rerun as rerun
     from .comparison.verdict import Verdict as Verdict
+    from .config.library import materials as materials
+    from .config.starter import init as init
+    from .config.tables import schema as schema
     from .contact.evidence import Evidence as Evidence
     from .contact.model import ForceModel as ForceModel, Parameter as Parameter
     from .contact.models.hysteresis import hysteresis as hysteresis
@@ -40,6 +39,7 @@ if TYPE_CHECKING:
     from .results.info import info as info
     from .results.ranking import recommend as recommend
     from .results.shards import merge as merge, sweep_shard as sweep_shard
+    from .results.single_impact import run as run
     from .results.sweep import sweep as sweep, sweep_to_file as sweep_to_file
     from .results.xarray_backend import expand as expand, load as load, save as save
     from .uncertainty.sensitivity import sensitivities as sensitivities, sensitivity as sensitivity
@@ -65,9 +65,9 @@ _MODULES = {
     "extend_to_file": "results.extend",
     "hysteresis": "contact.models.hysteresis",
     "info": "results.info",
-    "init": "api",
+    "init": "config.starter",
     "load": "results.xarray_backend",
-    "materials": "api",
+    "materials": "config.library",
     "merge": "results.shards",
     "models": "api",
     "plot": "plots.draw",
@@ -77,9 +77,9 @@ _MODULES = {
     "recommend": "results.ranking",
     "report": "reporting.page",
     "rerun": "comparison.rerun",
-    "run": "api",
+    "run": "results.single_impact",
     "save": "results.xarray_backend",
-    "schema": "api",
+    "schema": "config.tables",
     "sensitivities": "uncertainty.sensitivity",
     "sensitivity": "uncertainty.sensitivity",
     "solve": "inverse.solve",

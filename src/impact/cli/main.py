@@ -1,4 +1,4 @@
-"""The command line: each command parses, calls the function of the same name in `impact.api`, and prints."""
+"""The command line: each command parses, calls the function of the same name in `impact`, and prints."""
 
 from __future__ import annotations
 

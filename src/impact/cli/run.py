@@ -19,7 +19,7 @@ from .options import AtOption, JsonOption, OverwriteOption, PluginOption, SetOpt
 from .params import parse_whole_number
 
 if TYPE_CHECKING:
-    from ..api import Impact
+    from ..results.single_impact import Impact
 
 # files of a time history: netCDF-4, which is HDF5, and a table
 HISTORY_SUFFIXES = (".h5", ".hdf5", ".nc", ".csv")

@@ -54,7 +54,6 @@ from .tables import (
     Output,
     Solver,
     document_type,
-    json_schema,
 )
 
 __all__ = [
@@ -65,7 +64,6 @@ __all__ = [
     "Output",
     "Purpose",
     "Solver",
-    "json_schema",
     "parse_config",
     "read_config",
 ]

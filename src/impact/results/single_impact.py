@@ -7,7 +7,6 @@ import math
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from importlib.resources import files
 from pathlib import Path
 
 import xarray as xr
@@ -20,6 +19,7 @@ from ..config.grid import Axis
 from ..config.input_names import SWEEP_INPUTS, InputName, input_values
 from ..config.load import Config, build, inline_files
 from ..config.rules import has_other_stiffness
+from ..config.starter import STARTER_CONFIG
 from ..config.tables import MATERIAL_QUANTITIES, SWEEP_DEFAULTS, expand_models, model_quantities
 from ..contact.force_expressions import unload_to_residual, unload_with_stiffness
 from ..contact.history import History, integrate_history
@@ -34,7 +34,7 @@ from ..contact.units import with_numbers
 from ..contact.variables import HISTORY, OUTPUTS
 from ..engine.build_impacts import build_impacts, fixed_steps_at
 from ..engine.plan import Plan
-from ..engine.plugins import Plugins
+from ..engine.plugins import Plugins, read_plugins
 from ..errors import UsageError, did_you_mean
 from ..formatting import number, quantity
 from ..text import html_table, safe_text
@@ -44,7 +44,6 @@ from .schema import SCHEMA_VERSION, attributes_of, is_case, plain_unit
 from .seal import is_result
 from .xarray_backend import open_result
 
-STARTER_CONFIG = files("impact") / "config" / "starter.toml"
 STARTER_E = Setting(("sweep", "e"), 0.5, "--set sweep.e=0.5")
 
 ConfigSource = str | Path | Mapping[str, object] | xr.Dataset | None
@@ -156,6 +155,44 @@ class Impact:
             InputName.parse(name).key: value for name, value in self.point.items() if isinstance(value, float)
         }
         return with_numbers(unit, {**values, "n": self.exponent})
+
+
+def run(
+    source: str | Path | Mapping[str, object] | None = None,
+    *,
+    model: str | None = None,
+    at: Mapping[str, float | str] | None = None,
+    overrides: Sequence[str] = (),
+    plugins: Sequence[ForceModel | str | Path] = (),
+    times: int | None = None,
+) -> Impact:
+    """Run one impact and record its time history.
+
+    Parameters
+    ----------
+    source : a TOML file, a mapping, or a result; by default the two balls of Table 1 of the paper, at e = 0.5
+    model : key of the model; by default the first one of the source
+    at : values by config name, such as `{"e": 0.05}`; the default of an axis is its first value
+    overrides : changes to the config, such as `"sweep.m2=2"`
+    plugins : plug-in models, and paths of Python files with such models; a result that was computed with them
+        needs them again, and a changed one gives a warning with both hashes
+    times : number of points of the history, uniform from first contact to release; by default the steps of the
+        integrator
+
+    Raises
+    ------
+    ConfigError, UsageError, ModelError, ResultError : the source, a plug-in, a name or a value is invalid
+
+    >>> import impact
+    >>> shot = impact.run(model="gharib-hurmuzlu-2012", at={"e": 0.5})
+    >>> round(shot.values["e_out"], 6), round(shot.e_energetic, 6)
+    (0.41072, 0.41072)
+    """
+    if times is not None and times < 2:
+        raise UsageError(f"times: got {times}, expected a whole number >= 2")
+    plugin_set = read_plugins(plugins)
+    config, first = single_point(open_source(source, overrides, plugin_set), model, at)
+    return run_single_impact(Plan(config, plugin_set.of(config.models)), first, times)
 
 
 def no_motion(integrator: str) -> str:
