@@ -1,8 +1,8 @@
 """Collisions as codes with a fixed time step integrate them, with one evaluation of the force per step.
 
 A step first changes the velocity, then the position with the new velocity, see `SCHEMES`: "kick-drift" takes the
-force at the start of the step, Drake's schemes the force at its end, whose root is known in closed form for the laws
-that they take. The restitution depends on the phase, the part of a step at which the contact begins.
+force at the start of the step, Drake's schemes the force at its end, whose root is known in closed form for the
+laws that they take. The restitution depends on the phase, the part of a step at which the contact begins.
 """
 
 from __future__ import annotations
