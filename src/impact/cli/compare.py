@@ -12,10 +12,10 @@ import typer
 import impact
 
 from ..atomic import check_output
+from ..display import dump, show
 from ..errors import ImpactError, UsageError
 from ..text import safe_text
 from . import exits
-from .console import dump
 from .options import MaxPointsOption, PluginOption, QuietOption, ResultArgument, ToleranceOption
 
 if TYPE_CHECKING:
@@ -24,10 +24,6 @@ if TYPE_CHECKING:
     from ..comparison.formats import Report
     from ..comparison.verdict import Verdict
     from ..engine.plan import Plan
-
-
-# a narrower terminal shows no table
-MIN_TABLE_WIDTH = 76
 
 
 class Format(StrEnum):
@@ -83,13 +79,13 @@ def bless(
 ) -> None:
     """Show how a result differs from its baseline, then replace the baseline by it."""
 
-    def show(verdict: Verdict) -> None:
-        print_verdict(verdict)
+    def show_verdict(verdict: Verdict) -> None:
+        show(verdict)
         sys.stdout.flush()
 
     try:
         verdict = impact.bless(
-            new, baseline, reason=reason, tol=dict(tol or ()) or None, allow_failed=allow_failed, show=show
+            new, baseline, reason=reason, tol=dict(tol or ()) or None, allow_failed=allow_failed, show=show_verdict
         )
     except (BrokenPipeError, SystemExit):
         raise UsageError(
@@ -153,7 +149,7 @@ def _report_verdict(verdict: Verdict, format: Format, plot: Path | None) -> None
 
     with exits.ignore_broken_pipe():
         if format is Format.table:
-            print_verdict(verdict)
+            show(verdict)
         else:
             _print_report(formats.report_of(verdict), format)
     if plot is not None and not verdict.worst_along:
@@ -181,22 +177,3 @@ def _print_report(printed: Report, format: Format) -> None:
             print(formats.as_markdown(printed), end="")
         case Format.github:
             print(formats.as_github(printed))
-
-
-def print_verdict(verdict: Verdict) -> None:
-    """Print the headline, the differences with the commands that repeat them, and a table of changed variables."""
-    from ..comparison.verdict import VERDICT_HEADINGS
-    from .console import cell, console, table
-
-    out = console(sys.stdout)
-    for line in (verdict.headline, *verdict.lines, *(f"note: {note}" for note in verdict.notes)):
-        # no wrapping, so that commands can be copied
-        out.print(line, soft_wrap=True)
-    changed = verdict.rows()
-    if changed and out.width >= MIN_TABLE_WIDTH:
-        rows = table(*VERDICT_HEADINGS)
-        rows.columns[1].justify = "left"
-        for row in changed:
-            rows.add_row(*map(cell, row))
-        out.print()
-        out.print(rows)

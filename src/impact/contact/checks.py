@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
 from ..array_types import Array
+from ..display import Block, Displayed, Styled, Table
+from ..formatting import number
 from .impacts import Impacts, stiffness
 from .materials import effective_mass, hertz_stiffness, sphere_radius
 from .model import QUANTITIES, ForceModel, Parameter
@@ -21,10 +24,11 @@ from .variables import OUTPUTS
 CONTRACT_RTOL, CONTRACT_MAX_STEPS = 1e-10, 10_000
 # largest error of an identity by rounding, relative to its largest term
 ROUNDING_ERROR = 1e-12
+CLOSED_FORM = "agrees with its closed form"
 
 
 @dataclass(frozen=True)
-class Finding:
+class ClauseResult:
     """One clause of the contract: its text, the largest deviation of the model, and the bound on it."""
 
     clause: str
@@ -82,21 +86,75 @@ def _parameter_values(model: ForceModel, parameter: Parameter, impacts: Impacts)
     return np.clip(least + np.linspace(0.0, 4.0, len(impacts)) * size, parameter.least, parameter.most)
 
 
-def contract(model: ForceModel) -> Iterator[Finding]:
-    """Check every clause of the contract; yields the findings.
+class ContractResult(list[ClauseResult], Displayed):
+    """The result of each clause of the contract for one model."""
 
-    Parameters
-    ----------
-    model : the law; it is checked with the forty impacts of `sample` at rtol 1e-10
+    HEADINGS = ("model", "clause", "", "worst", "bound")
+
+    def __init__(self, model: ForceModel, results: Iterable[ClauseResult]) -> None:
+        super().__init__(results)
+        self.model = model
+
+    @property
+    def holds(self) -> bool:
+        return all(result.holds for result in self)
+
+    def as_dict(self) -> dict[str, Any]:
+        """The clauses as plain data."""
+        return {"model": self.model.key, "holds": self.holds, "clauses": self.records()}
+
+    def records(self) -> Sequence[Mapping[str, Any]]:
+        """The clauses."""
+        return [
+            {"clause": result.clause, "holds": result.holds, "worst": result.worst, "bound": result.bound}
+            for result in self
+        ]
+
+    def rows(self) -> list[tuple[str | Styled, ...]]:
+        """Write a row for each clause, under HEADINGS; the model is named once."""
+        return [
+            (
+                "" if index else self.model.key,
+                result.clause,
+                Styled("holds", "green") if result.holds else Styled("broken", "red"),
+                number(result.worst, 2),
+                number(result.bound, 2),
+            )
+            for index, result in enumerate(self)
+        ]
+
+    def sections(self, width: int) -> Iterator[Block]:
+        """A row for each clause, and what was not checked."""
+        yield Table(self.rows(), self.HEADINGS, text=(0, 1))
+        yield from self.notes()
+
+    def notes(self) -> list[str]:
+        """Say what was not checked."""
+        if any(result.clause == CLOSED_FORM for result in self):
+            return []
+        return [f"{self.model.key}: has no oracle, so that its restitution was compared with no closed form"]
+
+
+def check_model(model: ForceModel) -> ContractResult:
+    """Check a model, such as a plug-in, against every clause of the contract, with forty dissimilar impacts.
+
+    Returns
+    -------
+    list of ClauseResult : the clause, the largest deviation, its bound, and whether the clause holds
 
     Warns
     -----
-    UserWarning : a formula of the law raised an error; once for each distinct error
+    UserWarning : a formula raised an error, with its file, line and text
 
-    >>> from impact.contact.models import find
-    >>> all(finding.holds for finding in contract(find("bilinear")))
+    >>> import impact
+    >>> all(result.holds for result in impact.check_model(impact.models()["bilinear"]))
     True
     """
+    return ContractResult(model, _check_clauses(model))
+
+
+def _check_clauses(model: ForceModel) -> Iterator[ClauseResult]:
+    """Check every clause of the contract with the forty impacts of `sample`."""
     reported: set[str] = set()
 
     def collided(impacts: Impacts, rtol: float = CONTRACT_RTOL) -> Outputs:
@@ -110,7 +168,7 @@ def contract(model: ForceModel) -> Iterator[Finding]:
     impacts = sample(model)
     base = collided(impacts)
     ended = base["status"] < FIRST_FAILURE
-    yield Finding("every impact ends", float(np.count_nonzero(~ended)), 0)
+    yield ClauseResult("every impact ends", float(np.count_nonzero(~ended)), 0)
 
     def worst(values: Array) -> float:
         return float(np.max(np.abs(values[ended]), initial=0.0))
@@ -124,19 +182,21 @@ def contract(model: ForceModel) -> Iterator[Finding]:
     )
     size = np.abs(momenta_before[0]) + np.abs(momenta_before[1])
     lost = np.abs(momenta_before[0] + momenta_before[1] - momenta_after[0] - momenta_after[1]) / size
-    yield Finding("momentum is conserved (4)", float(np.max(lost)), ROUNDING_ERROR)
+    yield ClauseResult("momentum is conserved (4)", float(np.max(lost)), ROUNDING_ERROR)
     rebound = (base["v2_post"] - base["v1_post"]) / impacts.v0 - base["e_out"]
     scale = 1.0 + (np.abs(impacts.v1) + np.abs(impacts.v2)) / impacts.v0
-    yield Finding("velocities part by e_out v0 (5)", worst(rebound / scale), ROUNDING_ERROR)
-    yield Finding(
+    yield ClauseResult("velocities part by e_out v0 (5)", worst(rebound / scale), ROUNDING_ERROR)
+    yield ClauseResult(
         "no energy is gained", float(np.max(base["e_out"][ended], initial=0.0) - 1.0), 10 * CONTRACT_RTOL
     )
-    yield Finding("work balances energy", worst(base["energy_residual"]), 10 * CONTRACT_RTOL)
+    yield ClauseResult("work balances energy", worst(base["energy_residual"]), 10 * CONTRACT_RTOL)
     if model.oracle is not None:
-        yield Finding("agrees with its closed form", worst(base["closed_form_error"]), 10 * CONTRACT_RTOL)
+        yield ClauseResult(CLOSED_FORM, worst(base["closed_form_error"]), 10 * CONTRACT_RTOL)
 
     other = collided(in_other_units(model, impacts))
-    yield Finding("a change of units changes nothing", worst(other["e_out"] - base["e_out"]), 10 * CONTRACT_RTOL)
+    yield ClauseResult(
+        "a change of units changes nothing", worst(other["e_out"] - base["e_out"]), 10 * CONTRACT_RTOL
+    )
     swapped = replace(
         impacts,
         v1=-impacts.v2,
@@ -153,16 +213,18 @@ def contract(model: ForceModel) -> Iterator[Finding]:
         yield_strength2=impacts.yield_strength1,
     )
     other = collided(swapped)
-    yield Finding(
+    yield ClauseResult(
         "swapped balls swap velocities", worst((other["v1_post"] + base["v2_post"]) / impacts.v0), ROUNDING_ERROR
     )
     elastic = collided(replace(impacts, e=np.ones(len(impacts))))
     # the parameters of a law may damp it to its limit at any e
     odd = elastic["status"] != Status.OK if "e" in model.quantities else elastic["status"] >= FIRST_FAILURE
-    yield Finding("at e = 1 the status is OK", float(np.count_nonzero(odd)), 0)
+    yield ClauseResult("at e = 1 the status is OK", float(np.count_nonzero(odd)), 0)
     tight = collided(impacts, CONTRACT_RTOL / 100)
-    yield Finding("a tighter tolerance moves nothing", worst(tight["e_out"] - base["e_out"]), 10 * CONTRACT_RTOL)
-    yield Finding(
+    yield ClauseResult(
+        "a tighter tolerance moves nothing", worst(tight["e_out"] - base["e_out"]), 10 * CONTRACT_RTOL
+    )
+    yield ClauseResult(
         "an impact alone has the bits that it has in a batch", float(_alone_differs(collided, impacts, base)), 0
     )
 

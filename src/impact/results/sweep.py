@@ -43,9 +43,10 @@ from ..errors import ResultError, StoreError, UnfinishedError, UsageError
 from ..text import safe_text
 from .factored import factored_template, stored_stiffness, table_values
 from .netcdf import MAX_LABEL_BYTES, encode_text, is_text
+from .outcome import SweepOutcome
 from .plausibility import material_notes
 from .schema import dataset_template, plan_coordinates, stored_variables
-from .summary import Summary, SweepOutcome, summarize, summarize_table, summary_record
+from .summary import Summary, summarize, summarize_table, summary_record
 from .trajectory_table import TrajectoryTable, expanded_slabs, in_memory, lazy_dataset, table_of
 from .validation import is_name
 from .xarray_backend import MAX_LOADED_BYTES, check_readable, load, open_result, write_sealed
@@ -413,7 +414,7 @@ def find_finished(path: Path, plan: Plan) -> SweepOutcome | None:
         dataset.close()
         return None
     trajectories = sum(trajectory_map.count for trajectory_map in trajectory_maps(plan))
-    return SweepOutcome(dataset, summarize(dataset), trajectories, is_new=False)
+    return SweepOutcome(dataset, summarize(dataset), trajectories, is_new=False, output=path)
 
 
 def _missing_space(error: Exception, output: Path, plan: Plan, counter: ProgressCounter) -> list[str]:
@@ -479,7 +480,7 @@ def store_result(
         seal = write_sealed(sink, template, full() if is_full else factored(), plan.config.output)
         check_readable(sink, output)
     whole.encoding = {"source": str(output), "seal": seal, "layout": plan.layout}
-    return SweepOutcome(whole, summary, progress.of_trajectories)
+    return SweepOutcome(whole, summary, progress.of_trajectories, output=output)
 
 
 def _summarize_points(table: TrajectoryTable, variables: Sequence[Variable]) -> Summary:
