@@ -11,11 +11,11 @@ import numpy as np
 
 import impact
 from impact.array_types import Array
+from impact.contact.dimensionless import delivered
 from impact.contact.impacts import dimensionless_exponents, stiffness
 from impact.contact.materials import effective_mass, hertz_stiffness, sphere_radius
 from impact.contact.model import ForceModel
 from impact.contact.models import catalogue
-from impact.contact.scaling import delivered
 
 GRID = np.arange(1, 201) / 200
 SPEEDS = np.logspace(-2, 1, 25)

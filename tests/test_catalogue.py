@@ -22,9 +22,9 @@ from impact.contact.closed_forms.dashpot import (
 )
 from impact.contact.closed_forms.hysteresis import WORK_SERIES_BELOW_CHI, approach_damped_restitution
 from impact.contact.closed_forms.viscoelastic import pade_damping, pade_restitution
+from impact.contact.dimensionless import delivered
 from impact.contact.models import catalogue, find
 from impact.contact.outputs import collide
-from impact.contact.scaling import delivered
 from impact.contact.status import Status
 from impact.exporters.registry import CODES
 

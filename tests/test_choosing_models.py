@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 import impact
-from impact.api import Impact
 from impact.config.load import Config, read_config
 from impact.config.tables import expand_models
 from impact.contact.models import built_in, catalogue, find
 from impact.errors import ConfigError, ModelError
+from impact.results.single_impact import Impact
 
 BALLS = {"v1": 1.0, "v2": -0.5, "m1": 1.0, "m2": 2.0}
 ALIASES = {key: model.same_as for key, model in catalogue().items() if model.same_as}

@@ -298,7 +298,7 @@ def test_points_of_the_same_trajectory_are_read_once_and_all_counted() -> None:
     by_name = {variable.name: variable for variable in verdict.variables}
     for name, times in (("e_out", 1000.0), ("v1_post", 500.0)):
         assert (by_name[name].points, by_name[name].different) == (3 * 10**12, 10**9)
-        assert by_name[name].times == pytest.approx(times)
+        assert by_name[name].ratio == pytest.approx(times)
         assert by_name[name].at == {"model": "b", "e": 500 / 999, "v1": 1.0, "m1": 1.0, "m2": 1.0}
     assert by_name["stiffness"].points == 3 * 10**12
     assert by_name["status"].different == 0
@@ -307,7 +307,7 @@ def test_points_of_the_same_trajectory_are_read_once_and_all_counted() -> None:
     panels = difference_data(verdict).panels
     assert [panel.label.split()[0].lower() for panel in panels] == ["model", *EVERY]
     assert np.flatnonzero(panels[1].ratios["e_out"]).tolist() == [500]
-    assert set(panels[4].ratios["v1_post"]) == {by_name["v1_post"].times}
+    assert set(panels[4].ratios["v1_post"]) == {by_name["v1_post"].ratio}
 
 
 def test_a_constant_value_is_judged_with_the_status_of_every_point() -> None:

@@ -11,10 +11,10 @@ from scipy.optimize import brentq
 import impact
 from impact.contact.closed_forms.dashpot import force_restitution, limited_restitution
 from impact.contact.closed_forms.hysteresis import delivered_restitution
+from impact.contact.dimensionless import delivered
 from impact.contact.impulse import velocities_after
 from impact.contact.models import find
 from impact.contact.outputs import Outputs, collide
-from impact.contact.scaling import delivered
 from impact.contact.status import Status
 from impact.errors import ConfigError
 

@@ -40,6 +40,6 @@ def test_an_internal_error_is_a_failure(tmp_path: Path, monkeypatch: pytest.Monk
     path = write_files(tmp_path, text, {})
     assert judge(outcomes, 0, path, timed=False, with_fit=False) == "planned"
     assert not outcomes.failures
-    monkeypatch.setattr("impact.api.Plan", broken)
+    monkeypatch.setattr("impact.results.sweep.Plan", broken)
     assert judge(outcomes, 7, path, timed=False, with_fit=False) == "failed: KeyError"
     assert outcomes.failures[0].startswith("7: KeyError: 'of our own'")

@@ -29,7 +29,7 @@ import numpy as np
 import pytest
 
 import impact
-from impact.contact.scaling import dimensionless_values
+from impact.contact.dimensionless import dimensionless_values
 from impact.contact.timestep import collide_at_fixed_step
 from impact.engine.build_impacts import build_impacts
 from impact.results.sweep import prepare

@@ -207,7 +207,7 @@ def test_a_bad_plug_in_is_one_line_and_nothing_is_written(forked: ForkServer, fo
         ("config.toml", "config.toml: its name does not end in .py, expected a Python file"),
         ("my_model", "my_model: its name does not end in .py, expected a Python file"),
         ("a\x1b[31m\u202e.py", r"a\x1b[31m\u202e.py: cannot be read: No such file"),
-        ("x" * 300 + ".py", "x" * 199 + "…: cannot be read: File name too long"),
+        ("x" * 300 + ".py", "x" * 300 + ".py: cannot be read: File name too long"),
     ],
 )
 def test_a_path_that_is_no_python_file_is_an_error(forked: ForkServer, folder: Path, path: str, line: str) -> None:

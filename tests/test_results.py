@@ -66,9 +66,7 @@ def test_variables_stored_on_request_only() -> None:
 
 
 def test_variables_stored_on_request_are_in_the_json_schema_and_in_suggestions() -> None:
-    from impact.config.load import json_schema
-
-    known = json_schema()["$defs"]["Output"]["properties"]["variables"]["items"]["enum"]  # type: ignore[index]
+    known = impact.schema()["$defs"]["Output"]["properties"]["variables"]["items"]["enum"]
     assert ON_REQUEST.keys() <= set(known)
     with pytest.raises(impact.ImpactError, match='did you mean "separation_time"'):
         impact.sweep({"models": "hertz", "sweep": TABLE1, "output": {"variables": ["separation_tim"]}})

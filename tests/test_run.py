@@ -294,3 +294,15 @@ def test_at_selects_a_case_by_its_number_and_a_material_by_its_property(cli: Run
     collision = impact.run(result.isel(case=1))
     assert collision.point["v1"] == 2.0
     assert collision.first == ("materials.steel.E",)
+
+
+def test_values_of_numpy_are_values() -> None:
+    e, speeds = np.float64(0.6), np.array([1.0, 2.0])
+    assert impact.run(model="bilinear", at={"e": e}).point == impact.run(model="bilinear", at={"e": 0.6}).point
+    roots = [
+        impact.solve("gharib-hurmuzlu-2012", "e", {"e_out": 0.5}, over={"v1": over}).roots
+        for over in (speeds, speeds.tolist())
+    ]
+    assert roots[0] == roots[1] != ()
+    with pytest.raises(impact.ImpactError, match=r"^--at e=1\.5: sweep\.e: got 1\.5, expected"):
+        impact.run(model="bilinear", at={"e": np.float64(1.5)})

@@ -16,11 +16,12 @@ import jsonschema
 import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
-from impact.config.load import json_schema, parse_config, read_config
+import impact
+from impact.config.load import parse_config, read_config
 from impact.config.quantities import DISTRIBUTION_FORMS
 from impact.errors import ConfigError
 
-SCHEMA: dict[str, Any] = json_schema()
+SCHEMA: dict[str, Any] = impact.schema()
 VALIDATOR = jsonschema.Draft202012Validator(SCHEMA)
 GOOD: dict[str, Any] = {
     "models": ["lankarani-nikravesh-1990"],

@@ -14,7 +14,7 @@ import h5py
 import pytest
 
 import impact
-from impact.comparison.judge import MAX_COMPARED_POINTS as MAX_COMPARED
+from impact.comparison.values import MAX_COMPARED_POINTS as MAX_COMPARED
 from impact.config.grid import MAX_AXES, MAX_CHUNK_POINTS, MAX_COUNTED_POINTS, MAX_POINTS, MAX_STORED_CHUNKS
 from impact.config.quantities import MAX_AXIS_VALUES
 from impact.engine.plan import MAX_FULL_POINTS

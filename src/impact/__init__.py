@@ -8,16 +8,13 @@ from typing import TYPE_CHECKING, Any
 from ._version import __version__ as __version__
 
 if TYPE_CHECKING:
-    from .api import (
-        init as init,
-        materials as materials,
-        run as run,
-        schema as schema,
-    )
     from .comparison.bless import bless as bless
     from .comparison.compare import compare as compare
     from .comparison.rerun import rerun as rerun
     from .comparison.verdict import Verdict as Verdict
+    from .config.library import materials as materials
+    from .config.starter import init as init
+    from .config.tables import schema as schema
     from .contact.checks import check_model as check_model
     from .contact.evidence import Evidence as Evidence
     from .contact.model import ForceModel as ForceModel, Parameter as Parameter
@@ -40,6 +37,7 @@ if TYPE_CHECKING:
     from .results.info import info as info
     from .results.ranking import recommend as recommend
     from .results.shards import merge as merge, sweep_shard as sweep_shard
+    from .results.single_impact import run as run
     from .results.sweep import sweep as sweep, sweep_to_file as sweep_to_file
     from .results.xarray_backend import expand as expand, load as load, save as save
     from .uncertainty.sensitivity import sensitivities as sensitivities, sensitivity as sensitivity
@@ -65,9 +63,9 @@ _MODULES = {
     "extend_to_file": "results.extend",
     "hysteresis": "contact.models.hysteresis",
     "info": "results.info",
-    "init": "api",
+    "init": "config.starter",
     "load": "results.xarray_backend",
-    "materials": "api",
+    "materials": "config.library",
     "merge": "results.shards",
     "models": "engine.catalogue",
     "plot": "plots.draw",
@@ -77,9 +75,9 @@ _MODULES = {
     "recommend": "results.ranking",
     "report": "reporting.page",
     "rerun": "comparison.rerun",
-    "run": "api",
+    "run": "results.single_impact",
     "save": "results.xarray_backend",
-    "schema": "api",
+    "schema": "config.tables",
     "sensitivities": "uncertainty.sensitivity",
     "sensitivity": "uncertainty.sensitivity",
     "solve": "inverse.solve",

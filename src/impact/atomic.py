@@ -153,7 +153,6 @@ def atomic_write(path: Path, *, overwrite: bool, part: Path | None = None) -> It
     StoreError : the disk is full or failed; no file is left under either name, unless the message says that the
         file is written
     """
-    shown = safe_text(str(path))
     try:
         if part is None:
             _remove_stale_parts(path)
@@ -175,14 +174,14 @@ def atomic_write(path: Path, *, overwrite: bool, part: Path | None = None) -> It
             with contextlib.suppress(FileNotFoundError):
                 part.unlink()
     except FileExistsError:
-        raise UsageError(f"{shown}: was created by another process, and is not modified") from None
+        raise UsageError(f"{path}: was created by another process, and is not modified") from None
     except OSError as error:
-        raise StoreError(f"{shown}: not written: {error.strerror}") from error
+        raise StoreError(f"{path}: not written: {error.strerror}") from error
     try:
         sync_folder(path.parent)
     except OSError as error:
         raise StoreError(
-            f"{shown}: written, but its name may not be on the disk: {error.strerror}; a power cut may undo it"
+            f"{path}: written, but its name may not be on the disk: {error.strerror}; a power cut may undo it"
         ) from error
 
 
@@ -193,25 +192,24 @@ def check_output(path: Path, *, overwrite: bool, source: Path | None = None) -> 
     ------
     UsageError : it exists and must not be overwritten, is not a regular file, or its folder is not writable
     """
-    shown = safe_text(str(path))
     folder = path.parent
     if not folder.is_dir():
-        raise UsageError(f"{shown}: the folder {safe_text(str(folder))} does not exist")
+        raise UsageError(f"{path}: the folder {folder} does not exist")
     if not os.access(folder, os.W_OK | os.X_OK):
-        raise UsageError(f"{shown}: the folder {safe_text(str(folder))} cannot be written to")
+        raise UsageError(f"{path}: the folder {folder} cannot be written to")
     _check_name_length(path)
     try:
         mode = path.lstat().st_mode
     except FileNotFoundError:
         return
     except OSError as error:
-        raise UsageError(f"{shown}: {error.strerror}") from None
+        raise UsageError(f"{path}: {error.strerror}") from None
     if not stat.S_ISREG(mode):
-        raise UsageError(f"{shown}: is not a regular file, and is not modified")
+        raise UsageError(f"{path}: is not a regular file, and is not modified")
     if source is not None and source.exists() and path.samefile(source):
-        raise UsageError(f"{shown}: is the file to be read, and is not modified")
+        raise UsageError(f"{path}: is the file to be read, and is not modified")
     if not overwrite:
-        raise UsageError(f"{shown}: exists; give another name, or overwrite it (--overwrite)")
+        raise UsageError(f"{path}: exists; give another name, or overwrite it (--overwrite)")
 
 
 def check_outputs(outputs: Iterable[str | Path | None], inputs: Iterable[object], *, overwrite: bool) -> None:
@@ -233,7 +231,7 @@ def check_outputs(outputs: Iterable[str | Path | None], inputs: Iterable[object]
         for source in sources or [None]:
             check_output(path, overwrite=overwrite, source=source)
     for path in {path for path in paths if paths.count(path) > 1}:
-        raise UsageError(f"{safe_text(str(path))}: is named for two outputs")
+        raise UsageError(f"{path}: is named for two outputs")
 
 
 def _check_name_length(path: Path) -> None:

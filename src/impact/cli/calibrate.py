@@ -10,7 +10,6 @@ import typer
 import impact
 
 from ..display import show
-from ..text import safe_text
 from . import exits
 from .options import JobsOption, JsonOption, OverwriteOption, PluginOption, SetOption
 
@@ -47,4 +46,4 @@ def calibrate(
     show(impact.describe(result), as_json=as_json)
     for path in (output, best):
         if path is not None:
-            exits.print_line(f"{safe_text(str(path))}: written")
+            exits.print_line(f"{path}: written")

@@ -14,7 +14,6 @@ import impact
 from ..atomic import check_output
 from ..display import dump, show
 from ..errors import ImpactError, UsageError
-from ..text import safe_text
 from . import exits
 from .options import MaxPointsOption, PluginOption, QuietOption, ResultArgument, ToleranceOption
 
@@ -89,10 +88,10 @@ def bless(
         )
     except (BrokenPipeError, SystemExit):
         raise UsageError(
-            f"{safe_text(str(baseline))}: not replaced, the output was closed before the end of the verdict"
+            f"{baseline}: not replaced, the output was closed before the end of the verdict"
         ) from None
     word = "made" if verdict is None else "replaced"
-    exits.print_line(f"{safe_text(str(baseline))}: {word}, with the reason")
+    exits.print_line(f"{baseline}: {word}, with the reason")
 
 
 def rerun(
@@ -159,7 +158,7 @@ def _report_verdict(verdict: Verdict, format: Format, plot: Path | None) -> None
         from ..plots import differences, style
 
         style.save_figure(differences.draw_differences(differences.difference_data(verdict)), plot)
-        exits.print_line(f"{safe_text(str(plot))}: {'drawn' if verdict.equal else 'where the differences lie'}")
+        exits.print_line(f"{plot}: {'drawn' if verdict.equal else 'where the differences lie'}")
     if not verdict.equal:
         raise typer.Exit(exits.EXIT_NOT_EQUAL)
 

@@ -10,7 +10,6 @@ import typer
 
 import impact
 
-from ..text import safe_text
 from . import exits
 from .options import OverwriteOption
 
@@ -22,7 +21,7 @@ def init(
     """Write a commented starter config, ready to sweep."""
 
     impact.init(path, overwrite=overwrite)
-    exits.print_line(f"{safe_text(str(path))}: written; next: impact sweep {safe_text(str(path))}")
+    exits.print_line(f"{path}: written; next: impact sweep {path}")
 
 
 def schema(
@@ -35,4 +34,4 @@ def schema(
     if output is None:
         print(json.dumps(json_schema, indent=2, ensure_ascii=False))
     else:
-        exits.print_line(f"{safe_text(str(output))}: written")
+        exits.print_line(f"{output}: written")

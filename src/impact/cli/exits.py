@@ -19,7 +19,7 @@ from typing import TextIO
 from typer import TyperException
 
 from ..errors import ImpactError, Interruption, InUseError, StoreError, UnfinishedError
-from ..text import safe_text
+from ..text import escape_controls, safe_text
 
 # a shell reports 130 and 143 for a process that SIGINT or SIGTERM ended
 EXIT_OK, EXIT_NOT_EQUAL, EXIT_USAGE, EXIT_POINTS_FAILED, EXIT_STORAGE, EXIT_IN_USE = 0, 1, 2, 3, 4, 5
@@ -65,7 +65,8 @@ def catch_signals() -> Iterator[Callable[[], bool]]:
 
 
 def print_line(line: str, *, error: bool = False) -> None:
-    """Print a line on stderr; an error is red if the terminal shows colours."""
+    """Print a line on stderr, escaped; an error is red if the terminal shows colours."""
+    line = escape_controls(line)
     red = error and sys.stderr.isatty() and not os.environ.get("NO_COLOR")
     try:
         print(f"\x1b[31m{line}\x1b[0m" if red else line, file=sys.stderr, flush=True)

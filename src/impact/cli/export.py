@@ -11,7 +11,6 @@ import impact
 
 from ..display import Table, dump, print_blocks, show
 from ..errors import UsageError
-from ..text import safe_text
 from . import exits
 from .completion import complete_code, complete_model
 from .options import AtOption, JsonOption, OverwriteOption, SetOption, SourceArgument
@@ -98,7 +97,7 @@ def export(
     for warning in result.warnings:
         exits.print_line(f"warning: {warning}")
     if output is not None:
-        exits.print_line(f"{safe_text(str(output))}: written")
+        exits.print_line(f"{output}: written")
     if as_json or result.verification is not None:
         show(result, as_json=as_json)
     elif output is None:

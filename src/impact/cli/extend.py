@@ -9,7 +9,6 @@ import typer
 
 import impact
 
-from ..text import safe_text
 from . import exits
 from .executor_options import ExecutorOptions
 from .options import (
@@ -47,7 +46,7 @@ def expand(
             max_points=max_points,
             should_stop=should_stop,
         )
-    exits.print_line(f"{safe_text(str(output))}: {points:,} points, {output.stat().st_size:,} bytes")
+    exits.print_line(f"{output}: {points:,} points, {output.stat().st_size:,} bytes")
 
 
 def extend(

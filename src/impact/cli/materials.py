@@ -12,7 +12,6 @@ import impact
 
 from ..display import Table, dump, print_blocks
 from ..errors import UsageError, did_you_mean
-from ..text import safe_text
 from .options import JsonOption
 
 DISPLAY_UNITS = {"E": "GPa", "nu": "-", "rho": "kg/m3", "yield_strength": "MPa"}
@@ -27,7 +26,7 @@ def materials(
 
     catalogue = impact.materials()
     if name is not None and name not in catalogue:
-        raise UsageError(f'no material "{safe_text(name)}"; {did_you_mean(name, list(catalogue))}')
+        raise UsageError(f'no material "{name}"; {did_you_mean(name, list(catalogue))}')
     shown = catalogue if name is None else {name: catalogue[name]}
     if as_json:
         print(dump(shown))

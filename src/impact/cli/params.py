@@ -105,7 +105,7 @@ def reject_duplicates(settings: list[T] | None) -> list[T] | None:
     names = [name for name, _ in settings or ()]
     for name in names:
         if names.count(name) > 1:
-            raise typer.BadParameter(f"got {safe_text(name)} twice, expected each name once")
+            raise typer.BadParameter(f"got {name} twice, expected each name once")
     return settings
 
 

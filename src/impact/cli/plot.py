@@ -170,7 +170,7 @@ def _parse_labels(options: list[str] | None) -> dict[str, str]:
     for option in options or ():
         key, equals, text = option.partition("=")
         if not (key and equals and text):
-            raise UsageError(f"--label: got {safe_text(option)}, expected KEY=TEXT, such as e='Restitution $e$'")
+            raise UsageError(f"--label: got {option}, expected KEY=TEXT, such as e='Restitution $e$'")
         labels[key] = text
     return labels
 

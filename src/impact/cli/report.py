@@ -9,7 +9,6 @@ import typer
 
 import impact
 
-from ..text import safe_text
 from . import exits
 from .options import OverwriteOption, PluginOption
 
@@ -31,4 +30,4 @@ def report(
     page = impact.report(result, output=output, overwrite=overwrite, plugins=plugin or ())
     figures = page.count("<figure>")
     size = f"{len(page.encode()) / 1000:,.0f} kB"
-    exits.print_line(f"{safe_text(str(output))}: {figures} figure{'' if figures == 1 else 's'}, {size}")
+    exits.print_line(f"{output}: {figures} figure{'' if figures == 1 else 's'}, {size}")

@@ -12,7 +12,6 @@ import impact
 from ..atomic import check_output, write_file
 from ..display import show
 from ..errors import UsageError
-from ..text import safe_text
 from . import exits
 from .completion import complete_model
 from .options import AtOption, JsonOption, OverwriteOption, PluginOption, SetOption, SourceArgument
@@ -64,7 +63,7 @@ def run(
         if history.suffix.lower() not in HISTORY_SUFFIXES:
             *most, last = HISTORY_SUFFIXES
             expected = f"expected a name that ends in {', '.join(most)} or {last}"
-            raise UsageError(f"--history {safe_text(str(history))}: {expected}")
+            raise UsageError(f"--history {history}: {expected}")
     result = impact.run(
         source, model=model, at=dict(at or ()), overrides=sets or (), plugins=plugins or (), times=times
     )
@@ -78,4 +77,4 @@ def run(
             write_file(history, encode_history(result.history), overwrite=overwrite)
         else:
             impact.save(result.history, history, overwrite=overwrite)
-        exits.print_line(f"{safe_text(str(history))}: {result.history.sizes['t']} points in time")
+        exits.print_line(f"{history}: {result.history.sizes['t']} points in time")

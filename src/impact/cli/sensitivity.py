@@ -10,7 +10,6 @@ import typer
 import impact
 
 from ..display import dump, show
-from ..text import safe_text
 from . import exits
 from .completion import complete_output
 from .options import (
@@ -95,6 +94,6 @@ def sensitivity(
                 print()
             show(description)
     if output is not None:
-        exits.print_line(f"{safe_text(str(output))}: written")
+        exits.print_line(f"{output}: written")
     if any(int(result["failed"].sum()) for result in results) and not allow_failed:
         raise typer.Exit(exits.EXIT_POINTS_FAILED)

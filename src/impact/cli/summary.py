@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import typer
 
 from ..display import dump, show
-from ..text import safe_text
 from . import exits
 
 if TYPE_CHECKING:
@@ -22,10 +21,10 @@ def print_summary_and_exit(outcome: SweepOutcome, *, quiet: bool, as_json: bool,
             with exits.ignore_broken_pipe(sys.stderr):
                 show(outcome, stream=sys.stderr)
         else:
-            exits.print_line(f"{safe_text(str(outcome.output))}: already contains this sweep; nothing to do")
+            exits.print_line(f"{outcome.output}: already contains this sweep; nothing to do")
     if as_json:
         print(dump(outcome))
     if outcome.summary.failed and not allow_failed:
         if quiet or not outcome.is_new:
-            exits.print_line(safe_text(outcome.failed_line), error=True)
+            exits.print_line(outcome.failed_line, error=True)
         raise typer.Exit(exits.EXIT_POINTS_FAILED)

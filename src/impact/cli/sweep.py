@@ -11,7 +11,6 @@ import impact
 
 from ..display import Wrapped, dump, print_blocks, show
 from ..errors import UnfinishedError, UsageError
-from ..text import safe_text
 from . import exits
 from .executor_options import ExecutorOptions
 from .options import (
@@ -68,7 +67,7 @@ def sweep(
 
         def print_note(note: str) -> None:
             if not quiet:
-                exits.print_line(f"note: {safe_text(str(config))}: {note}")
+                exits.print_line(f"note: {config}: {note}")
 
         executor = ExecutorOptions(jobs, threads, scheduler, scheduler_file)
         inputs: dict[str, Any] = {
@@ -79,9 +78,7 @@ def sweep(
         }
         if dry_run:
             if shard is not None:
-                raise UsageError(
-                    f"--shard {safe_text(shard)}: got --dry-run as well, which estimates the whole sweep"
-                )
+                raise UsageError(f"--shard {shard}: got --dry-run as well, which estimates the whole sweep")
             expected = impact.estimate(config, jobs=max(jobs, threads), **inputs)
             show(expected, as_json=as_json)
             if not as_json and (scheduler or scheduler_file):

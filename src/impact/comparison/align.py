@@ -1,22 +1,23 @@
-"""Align two results by their labels, and list the differences between their inputs."""
+"""Align two results of sweeps by their labels, and list the differences between their inputs."""
 
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from ..array_types import Array
 from ..config.input_names import InputName, is_input
-from ..contact.variables import OUTPUTS, Variable
+from ..contact.variables import OUTPUTS
 from ..formatting import number
 from ..results.attributes import read_attribute
 from ..results.schema import MODEL_METADATA, columns_along, is_case
 from ..results.selection import LABEL_RTOL, NUMBER_DTYPE_KINDS, IndexArray, Labels, match_labels
 from ..text import safe_text
-from .verdict import Fault, FaultKind
+from .verdict import Difference, DifferenceKind
 
 MAX_NAMED_LABELS = 3  # labels of one side that a message lists
 # coordinates that vary with the model
@@ -24,12 +25,12 @@ MODEL_COORDINATES = ("model", "exponent", *MODEL_METADATA)
 
 
 @dataclass(frozen=True)
-class Side:
+class AlignedResult:
     """One of two results, at their common points.
 
     Parameters
     ----------
-    dataset : the result; which may be lazy
+    dataset : the result, which may be lazy
     coords : its coordinates at the common points, in memory; inputs that only the other result varies have an axis
         of length one
     positions : by axis, the positions of the common points in the result, in the order of the baseline
@@ -39,35 +40,35 @@ class Side:
     coords: xr.Dataset
     positions: Mapping[str, IndexArray]
 
-    def read(self, name: str, where: Mapping[str, slice]) -> Labels:
+    def read(self, name: str, region: Mapping[str, slice]) -> Labels:
         """Read the values of a variable or a coordinate at some of the common points.
 
         Parameters
         ----------
         name : of the variable
-        where : the part of each axis; the values have length one along axes that the variable does not have
+        region : slices of the axes; the values have length one along axes that the variable does not have
         """
         if name in self.coords:
             variable = self.coords.variables[name]
-            index: dict[Hashable, Any] = {dim: where[str(dim)] for dim in variable.dims}
+            index: dict[Hashable, Any] = {dim: region[str(dim)] for dim in variable.dims}
         else:
             variable = self.dataset.variables[name]
-            index = {dim: _as_slice(self.positions[str(dim)][where[str(dim)]]) for dim in variable.dims}
+            index = {dim: _as_slice(self.positions[str(dim)][region[str(dim)]]) for dim in variable.dims}
         # loaded before it is transposed: a transposed lazy array would be read point by point
         values = np.asarray(variable.isel(index).values)
-        values = values.transpose([variable.dims.index(dim) for dim in where if dim in variable.dims])
-        return values[tuple(slice(None) if dim in variable.dims else np.newaxis for dim in where)]
+        values = values.transpose([variable.dims.index(dim) for dim in region if dim in variable.dims])
+        return values[tuple(slice(None) if dim in variable.dims else np.newaxis for dim in region)]
 
 
 def _as_slice(positions: IndexArray) -> IndexArray | slice:
-    """Neighbouring positions as a slice, which files and computed variables read faster."""
+    """Convert neighbouring positions to a slice, which files and computed variables read faster."""
     first = int(positions[0])
     is_range = np.array_equal(positions, np.arange(first, first + len(positions)))
     return slice(first, first + len(positions)) if is_range else positions
 
 
 @dataclass(frozen=True)
-class Aligned:
+class Alignment:
     """Two results at their common points, and the differences between their inputs.
 
     Parameters
@@ -77,17 +78,19 @@ class Aligned:
     dims : by common variable, its axes in the order of the baseline, without variables that vary along different
         axes; empty if the results have no common point
     faults : the differences between the inputs
+    scales : by variable of a calibration, the scale of each value; NaN if the data do not determine the value
     """
 
-    new: Side
-    baseline: Side
+    new: AlignedResult
+    baseline: AlignedResult
     sizes: Mapping[str, int]
     dims: Mapping[str, tuple[str, ...]]
-    faults: tuple[Fault, ...]
+    faults: tuple[Difference, ...]
+    scales: Mapping[str, Array] = field(default_factory=dict)
 
 
-def align(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Aligned:
-    """Align two results by their coordinates; values of variables are not read.
+def align_sweeps(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Alignment:
+    """Align two results of sweeps by their coordinates; values of variables are not read.
 
     Parameters
     ----------
@@ -96,54 +99,53 @@ def align(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Aligned:
     """
     new, baseline = _drop_foreign_axes(new, baseline), _drop_foreign_axes(baseline, new)
     a, b = _comparable_coordinates(new, baseline), _comparable_coordinates(baseline, new)
-    faults = _faults_of_missing_inputs(a, b)
+    faults = _missing_inputs(a, b)
     positions: dict[str, tuple[IndexArray, IndexArray]] = {}
     for axis in map(str, dict.fromkeys((*b.dims, *baseline.dims, *a.dims, *new.dims))):
         columns = _label_columns(a, axis), _label_columns(b, axis)
         if columns[0] != columns[1] or not columns[0]:
             text = f"what varies along the axis {safe_text(axis)} is {_join_names(columns[0])}"
-            faults.append(Fault("nothing in common", axis, f"{text}, in BASELINE {_join_names(columns[1])}"))
+            faults.append(Difference("nothing in common", axis, f"{text}, in BASELINE {_join_names(columns[1])}"))
             continue
         positions[axis] = match_labels(
             [a[name].values for name in columns[0]], [b[name].values for name in columns[0]]
         )
         # the column that gives the axis its name comes first
-        names = [*(n for n in columns[0] if n == axis), *(n for n in columns[0] if n != axis)]
+        names = sorted(columns[0], key=lambda name: name != axis)
         labels = [[coords[name].values for name in names] for coords in (a, b)]
-        faults += _label_faults(labels[0], labels[1], names, positions[axis], subset=subset)
-    for name in sorted(str(name) for name in a.coords.keys() & b.coords.keys() if is_input(name)):
-        if a[name].ndim == b[name].ndim == 0 and not _labels_agree(a[name].values, b[name].values):
-            kind: FaultKind = "nothing in common" if subset else "physics config"
-            values = f"{_format_value(a[name].values)}, in BASELINE {_format_value(b[name].values)}"
-            text = f"{safe_text(name)} is {values}"
-            faults.append(Fault(kind, name, text))
+        faults += _unmatched_labels(labels[0], labels[1], names, positions[axis], subset=subset)
+    faults += _changed_scalars(a, b, "nothing in common" if subset else "physics config")
     if any(fault.kind == "nothing in common" for fault in faults):
-        nowhere = Side(new, xr.Dataset(), {}), Side(baseline, xr.Dataset(), {})
-        return Aligned(*nowhere, {}, {}, tuple(faults))
+        nowhere = AlignedResult(new, xr.Dataset(), {}), AlignedResult(baseline, xr.Dataset(), {})
+        return Alignment(*nowhere, {}, {}, tuple(faults))
     new_positions, baseline_positions = ({axis: pair[side] for axis, pair in positions.items()} for side in (0, 1))
     a, b = a.isel(new_positions), b.isel(baseline_positions)
-    faults += _derived_faults(a, b)
+    faults += _changed_columns(a, b)
     dims = {}
-    for variable in OUTPUTS.values():
-        if variable.name in new and variable.name in baseline:
-            axes = _axes_of_both(variable, baseline, new)
-            if set(axes) == set(_axes_of_both(variable, new, baseline)):
-                dims[variable.name] = axes
-            else:
-                faults.append(Fault("labels", variable.name, f"{variable.name} varies along other axes"))
-    sizes = {axis: len(pair[0]) for axis, pair in positions.items()}
-    return Aligned(Side(new, a, new_positions), Side(baseline, b, baseline_positions), sizes, dims, tuple(faults))
+    for name in (name for name in OUTPUTS if name in new and name in baseline):
+        axes = _axes_of_both(name, baseline, new)
+        if set(axes) == set(_axes_of_both(name, new, baseline)):
+            dims[name] = axes
+        else:
+            faults.append(Difference("labels", name, f"{name} varies along other axes"))
+    return Alignment(
+        AlignedResult(new, a, new_positions),
+        AlignedResult(baseline, b, baseline_positions),
+        {axis: len(pair[0]) for axis, pair in positions.items()},
+        dims,
+        tuple(faults),
+    )
 
 
 def _drop_foreign_axes(result: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
-    """A result without the parameters of models that the other one lacks; other models do not depend on them."""
+    """Drop the parameters of models that the other result lacks; other models do not depend on them."""
     models = {str(key) for key in np.ravel(other["model"].values)}
     foreign = [str(name) for name in result.coords if InputName.parse(name).model not in models | {""}]
     return result.isel({name: 0 for name in foreign if name in result.dims}).drop_vars(foreign)
 
 
 def _comparable_coordinates(result: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
-    """The coordinates of a result, in memory; a single value that the other varies is an axis of length one."""
+    """Load the coordinates of a result; a single value that the other varies becomes an axis of length one."""
     materials = read_attribute(result.attrs, "materials")
     coords = _with_materials(result.coords.to_dataset().compute(), materials, other)
     if "model" not in result.dims:
@@ -166,7 +168,7 @@ def _comparable_coordinates(result: xr.Dataset, other: xr.Dataset) -> xr.Dataset
 
 
 def _with_materials(coords: xr.Dataset, materials: Mapping[str, Any], other: xr.Dataset) -> xr.Dataset:
-    """Coordinates, with the properties of materials that are coordinates of the other result only."""
+    """Add the properties of materials that are coordinates of the other result only."""
     for name in map(str, other.coords):
         parsed = InputName.parse(name)
         properties = materials.get(parsed.material)
@@ -177,49 +179,61 @@ def _with_materials(coords: xr.Dataset, materials: Mapping[str, Any], other: xr.
 
 
 def _with_axis(coords: xr.Dataset, axis: str, names: Iterable[Hashable]) -> xr.Dataset:
-    """Coordinates, some of them with an additional axis of length one."""
+    """Give some coordinates an additional axis of length one."""
     variables = {name: coords.variables[name] for name in names if name in coords}
     return coords.assign_coords(
         {n: xr.Variable((axis, *v.dims), v.values[np.newaxis], v.attrs) for n, v in variables.items()}
     )
 
 
-def _axes_of_both(variable: Variable, result: xr.Dataset, other: xr.Dataset) -> tuple[str, ...]:
-    """The axes of a variable, after additional axes of length one along which only the other result varies."""
+def _axes_of_both(name: str, result: xr.Dataset, other: xr.Dataset) -> tuple[str, ...]:
+    """List the axes of a variable, after axes of length one along which only the other result varies."""
     added = [str(dim) for dim in dict.fromkeys(("model", *other.dims)) if dim not in result.dims]
-    of_variable = [dim for dim in added if dim != "model" or variable.per_model]
-    return (*reversed(of_variable), *map(str, result.variables[variable.name].dims))
+    of_variable = [dim for dim in added if dim != "model" or OUTPUTS[name].per_model]
+    return (*reversed(of_variable), *map(str, result.variables[name].dims))
 
 
-def _faults_of_missing_inputs(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
+def _missing_inputs(new: xr.Dataset, baseline: xr.Dataset) -> list[Difference]:
+    """List the inputs that only one result has."""
     faults = []
     for name in sorted(str(name) for name in new.coords.keys() ^ baseline.coords.keys()):
         if is_input(name):
             side = "NEW" if name in new.coords else "BASELINE"
-            faults.append(Fault("physics config", name, f"{safe_text(name)} is given in {side} only"))
+            faults.append(Difference("physics config", name, f"{safe_text(name)} is given in {side} only"))
+    return faults
+
+
+def _changed_scalars(new: xr.Dataset, baseline: xr.Dataset, kind: DifferenceKind) -> list[Difference]:
+    """List the inputs with one value in each result that differ."""
+    faults = []
+    for name in sorted(str(name) for name in new.coords.keys() & baseline.coords.keys() if is_input(name)):
+        a, b = new[name], baseline[name]
+        if a.ndim == b.ndim == 0 and not _labels_agree(a.values, b.values):
+            text = f"{safe_text(name)} is {_format_value(a.values)}, in BASELINE {_format_value(b.values)}"
+            faults.append(Difference(kind, name, text))
     return faults
 
 
 def _label_columns(dataset: xr.Dataset, axis: str) -> list[str]:
-    """The coordinates that identify the points of an axis: their numbers, or all columns of the axis."""
+    """List the coordinates that identify the points of an axis: their numbers, or all columns of the axis."""
     if axis == "model" or (is_case(axis) and axis in dataset.coords):
         return [axis]
     return sorted(columns_along(dataset, axis))
 
 
-def _label_faults(
+def _unmatched_labels(
     new: Sequence[Labels],
     baseline: Sequence[Labels],
     names: Sequence[str],
     positions: tuple[IndexArray, IndexArray],
     *,
     subset: bool,
-) -> list[Fault]:
-    """The labels of an axis that only one result has; labels of a zip group with all columns."""
+) -> list[Difference]:
+    """List the labels of an axis that only one result has; labels of a zip group with all columns."""
     axis = names[0]
     if not len(positions[0]):
         sides = f"{_first_labels(new, names)}, in BASELINE {_first_labels(baseline, names)}"
-        return [Fault("nothing in common", axis, f"no value of {safe_text(axis)} is in both: {sides}")]
+        return [Difference("nothing in common", axis, f"no value of {safe_text(axis)} is in both: {sides}")]
     if subset:
         return []
     texts = []
@@ -229,11 +243,11 @@ def _label_faults(
             texts.append(
                 f"{len(unmatched[0])} of {len(columns[0])} in {side} only: {_first_labels(unmatched, names)}"
             )
-    return [Fault("labels", axis, f"{safe_text(axis)}: {'; '.join(texts)}")] if texts else []
+    return [Difference("labels", axis, f"{safe_text(axis)}: {'; '.join(texts)}")] if texts else []
 
 
-def _derived_faults(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
-    """Coordinates along several axes or models that differ: e from alpha, the exponent."""
+def _changed_columns(new: xr.Dataset, baseline: xr.Dataset) -> list[Difference]:
+    """List the coordinates along several axes or models that differ: e from alpha, the exponent."""
     faults = []
     for name in sorted(str(name) for name in new.coords.keys() & baseline.coords.keys()):
         if name == "exponent" or (is_input(name) and baseline[name].ndim):
@@ -241,38 +255,37 @@ def _derived_faults(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
             # e = 1 - alpha v0 has the absolute rounding error of 1
             rounding = LABEL_RTOL if name == "e" else 0.0
             if set(a.dims) != set(b.dims) or not _labels_agree(a.transpose(*b.dims).values, b.values, rounding):
-                faults.append(_value_fault(name, a, b))
+                faults.append(_changed_values(name, a, b))
     return faults
 
 
-def _value_fault(name: str, new: xr.DataArray, baseline: xr.DataArray) -> Fault:
-    """A fault of a coordinate that differs; of an input of numbered points, with the values."""
+def _changed_values(name: str, new: xr.DataArray, baseline: xr.DataArray) -> Difference:
+    """Describe how a coordinate differs; of an input of numbered points, with the values."""
     axis = str(baseline.dims[0])
     if not is_case(axis) or new.dims != (axis,) or baseline.dims != (axis,):
-        return Fault("labels", name, f"the coordinate {safe_text(name)} has other values")
-    differ = [
-        n for n in range(baseline.size) if not _labels_agree(new.values[n : n + 1], baseline.values[n : n + 1])
-    ]
+        return Difference("labels", name, f"the coordinate {safe_text(name)} has other values")
+    pairs = zip(new.values, baseline.values, strict=True)
+    differ = [index for index, (a, b) in enumerate(pairs) if not _labels_agree(np.asarray(a), np.asarray(b))]
     numbers, a, b = (
-        [_format_value(array.values[n]) for n in differ[:MAX_NAMED_LABELS]]
+        [_format_value(array.values[index]) for index in differ[:MAX_NAMED_LABELS]]
         for array in (baseline[axis], new, baseline)
     )
     shown = "; ".join(
         f"{x} at {axis} {number}, in BASELINE {y}" for number, x, y in zip(numbers, a, b, strict=True)
     )
     more = f"; and {len(differ) - MAX_NAMED_LABELS} more" if len(differ) > MAX_NAMED_LABELS else ""
-    return Fault("physics config", name, f"{safe_text(name)} is {shown}{more}")
+    return Difference("physics config", name, f"{safe_text(name)} is {shown}{more}")
 
 
 def _labels_agree(a: Labels, b: Labels, rounding: float = 0.0) -> bool:
-    """Whether all labels agree within the relative tolerance of labels and an absolute tolerance `rounding`."""
+    """Whether all labels agree within their relative tolerance, and an absolute tolerance `rounding`."""
     if a.dtype.kind in NUMBER_DTYPE_KINDS and b.dtype.kind in NUMBER_DTYPE_KINDS:
         return bool(np.isclose(a, b, rtol=LABEL_RTOL, atol=rounding, equal_nan=True).all())
     return bool(np.all(a.astype(str) == b.astype(str)))
 
 
 def _first_labels(columns: Sequence[Labels], names: Sequence[str]) -> str:
-    """The first few labels."""
+    """List the first few labels, with all columns."""
     shown = []
     for first, *others in zip(*(values[:MAX_NAMED_LABELS] for values in columns), strict=True):
         more = (f" with {safe_text(n)}={_format_value(v)}" for n, v in zip(names[1:], others, strict=True))
@@ -281,8 +294,10 @@ def _first_labels(columns: Sequence[Labels], names: Sequence[str]) -> str:
 
 
 def _format_value(value: Any) -> str:
+    """Write a label."""
     return safe_text(number(np.asarray(value).item(), 12), 60)
 
 
 def _join_names(names: Sequence[str]) -> str:
+    """List names, or say that there is none."""
     return safe_text(", ".join(names)) or "nothing"

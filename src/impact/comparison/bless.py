@@ -84,14 +84,14 @@ def _check_no_failures(result: xr.Dataset, path: Path) -> None:
     summary = summarize(result[["status"]] if "status" in result else result)
     if summary.not_counted:
         count = f"{summary.not_counted:,} points are too many to look for failures"
-        raise UsageError(f"{safe_text(str(path))}: {count}; expected fewer, or --allow-failed")
+        raise UsageError(f"{path}: {count}; expected fewer, or --allow-failed")
     if summary.failed:
         status, model, indices = summary.failed_at[0]
         point = result["status"].isel(dict(zip(result["status"].dims, (model, *indices), strict=True)))
         at = describe_point(inputs_of_model({str(dim): point[dim].item() for dim in result["status"].dims}))
         count = f"{summary.failed:,} of {summary.points:,} points failed"
         first = f"the first at {at} ({status.name.lower()})"
-        raise UsageError(f"{safe_text(str(path))}: {count}, {first}; expected none, or --allow-failed")
+        raise UsageError(f"{path}: {count}, {first}; expected none, or --allow-failed")
 
 
 def _load_baseline(baseline: Path) -> xr.Dataset | None:

@@ -1,9 +1,7 @@
-"""Compare two calibrations: the same measurements, laws and bounds, and equal estimates and criteria."""
+"""Align two calibrations law by law: the same measurements, parameters and bounds, and the scale of each value."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -11,156 +9,102 @@ import xarray as xr
 
 from ..array_types import Array
 from ..config.input_names import is_input
-from ..errors import UsageError
 from ..results.attributes import read_attribute
 from ..results.calibration import fit_status
 from ..results.schema import CALIBRATION
 from ..text import safe_text
-from .tolerances import ALL_VARIABLES, Tolerances
-from .verdict import Fault, Judged, Verdict
+from .align import AlignedResult, Alignment
+from .verdict import Difference
 
-# ten times the relative accuracy of the ends of profile intervals
-DEFAULT_TOLERANCE = 1e-5
 # coordinates along the measured values, which have to be equal
 DATA_COORDINATES = ("output", "measured", "sigma")
 
 
-def compare_calibrations(
-    new: xr.Dataset,
-    baseline: xr.Dataset,
-    names: tuple[str, str],
-    tol: float | Tolerances | None = None,
-    *,
-    subset: bool = False,
-) -> Verdict:
-    """Compare two calibrations law by law; their order does not matter.
-
-    A value that the data do not determine is not judged. The scale of each variable is that of
-    `impact.results.schema.CALIBRATION`.
+def align_calibrations(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Alignment:
+    """Align two calibrations by their laws, whose order does not matter.
 
     Parameters
     ----------
     new, baseline : calibrations
-    names : of their files
-    tol : one tolerance, relative to the scale; by default 1e-5
-    subset : compare the laws that both have
-
-    Raises
-    ------
-    UsageError : a tolerance for one variable, or one that is no number >= 0
+    subset : ignore laws that only one of them has
     """
-    tolerance = _tolerance(tol)
-    faults = [*_data_faults(new, baseline)]
+    faults = _data_faults(new, baseline)
+    is_same_data = all(fault.kind != "labels" for fault in faults)
     keys = [list(map(str, dataset["model"].values)) for dataset in (new, baseline)]
-    common = [key for key in keys[1] if key in keys[0]]
-    for here, there, side in ((keys[0], keys[1], "NEW"), (keys[1], keys[0], "BASELINE")):
-        only = [key for key in here if key not in there]
+    for own, others, side in ((keys[0], keys[1], "NEW"), (keys[1], keys[0], "BASELINE")):
+        only = ", ".join(key for key in own if key not in others)
         if only and not subset:
-            faults.append(Fault("labels", "model", f"model: in {side} only: {safe_text(', '.join(only), 400)}"))
+            faults.append(Difference("labels", "model", f"model: in {side} only: {safe_text(only, 400)}"))
+    common = common_laws(new, baseline)
     if not common:
-        faults.append(Fault("nothing in common", "", "the two have no law in common"))
-    judged: tuple[Judged, ...] = ()
-    if common and not any(fault.kind == "labels" and fault.name != "model" for fault in faults):
-        sides = new.sel(model=common), baseline.sel(model=common)
-        judged = tuple(_judge(name, *sides, tolerance) for name in CALIBRATION if name in new and name in baseline)
-    return Verdict(names[0], names[1], tuple(faults), judged, tuple(_notes(new, baseline, common)))
+        faults.append(Difference("nothing in common", "", "the two have no law in common"))
+    new, baseline = new.sel(model=common), baseline.sel(model=common)
+    names = [name for name in CALIBRATION if name in new and name in baseline] if common and is_same_data else []
+    labels = {dim: baseline.variables[dim] for dim in baseline.dims if dim in baseline.coords}
+    coords = xr.Dataset(coords=xr.Coordinates(labels, indexes={}))
+    positions = {str(dim): np.arange(size) for dim, size in baseline.sizes.items()}
+    return Alignment(
+        AlignedResult(new, coords, positions),
+        AlignedResult(baseline, coords, positions),
+        {str(dim): size for dim, size in baseline.sizes.items()},
+        {name: CALIBRATION[name].dims for name in names},
+        tuple(faults),
+        {name: np.broadcast_to(_scale(name, baseline), baseline[name].shape) for name in names},
+    )
 
 
-def _tolerance(tol: float | Tolerances | None) -> float:
-    """The tolerance for all variables."""
-    requested = tol if isinstance(tol, Mapping) else {} if tol is None else {ALL_VARIABLES: tol}
-    for name, value in requested.items():
-        if name != ALL_VARIABLES:
-            text = "got a tolerance for one variable, expected one for all, such as --tol 1e-5"
-            raise UsageError(f"--tol {safe_text(str(name))}: {text}")
-        if not 0.0 <= value < math.inf:
-            raise UsageError(f"--tol {value}: expected a number >= 0, such as --tol 1e-5")
-    return float(requested.get(ALL_VARIABLES, DEFAULT_TOLERANCE))
+def common_laws(new: xr.Dataset, baseline: xr.Dataset) -> list[str]:
+    """List the laws that two calibrations have, in the order of the baseline."""
+    return [key for key in map(str, baseline["model"].values) if key in new["model"].values]
 
 
-def _data_faults(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
-    """Differences between the measurements, the parameters, their bounds and the noise."""
-    faults = []
+def _data_faults(new: xr.Dataset, baseline: xr.Dataset) -> list[Difference]:
+    """List the differences between the measurements, the parameters, their bounds and the noise."""
+    faults: list[Difference] = []
+
+    def add(name: str, label: str, a: Any, b: Any) -> None:
+        faults.append(Difference("physics config", name, safe_text(f"{label} {a}, in BASELINE {b}")))
+
     bounds = [read_attribute(dataset.attrs, "fit_bounds") for dataset in (new, baseline)]
     if list(bounds[0]) != list(bounds[1]):
         got, expected = (safe_text(", ".join(table), 400) for table in bounds)
-        faults.append(Fault("labels", "parameter", f"parameter: {got}, in BASELINE {expected}"))
+        faults.append(Difference("labels", "parameter", f"parameter: {got}, in BASELINE {expected}"))
     else:
         for name in bounds[0]:
             if bounds[0][name] != bounds[1][name]:
-                text = f"bounds of {name}: {bounds[0][name]}, in BASELINE {bounds[1][name]}"
-                faults.append(Fault("physics config", name, safe_text(text)))
+                add(name, f"bounds of {name}:", bounds[0][name], bounds[1][name])
     # version 1.0 had no other loss
     for key, default in (("noise", None), ("loss", "linear")):
         a, b = (dataset.attrs.get(key, default) for dataset in (new, baseline))
         if a != b:
-            faults.append(Fault("physics config", key, safe_text(f"{key} is {a}, in BASELINE {b}")))
-    of_points = [
-        {str(name): v for name, v in dataset.coords.items() if v.dims == ("point",)} for dataset in (new, baseline)
+            add(key, f"{key} is", a, b)
+    columns = [
+        {str(name): v.values for name, v in dataset.coords.items() if v.dims == ("point",)}
+        for dataset in (new, baseline)
     ]
-    inputs = [name for name in of_points[1] if name not in ("point", "line", *DATA_COORDINATES)]
+    inputs = [name for name in columns[1] if name not in ("point", "line", *DATA_COORDINATES)]
     for name in (*DATA_COORDINATES, *inputs):
-        first, second = (np.asarray(c[name].values) if name in c else np.array([]) for c in of_points)
+        first, second = (column.get(name, np.array([])) for column in columns)
         if not np.array_equal(first, second, equal_nan=first.dtype.kind == second.dtype.kind == "f"):
-            faults.append(Fault("labels", name, f"{name}: the measured points differ"))
-    for name in baseline.coords.keys() & new.coords.keys():
-        a, b = new.coords[name], baseline.coords[name]
-        if is_input(name) and a.ndim == b.ndim == 0 and a.item() != b.item():
-            text = f"{name} is {a.item()}, in BASELINE {b.item()}"
-            faults.append(Fault("physics config", str(name), safe_text(text)))
+            faults.append(Difference("labels", name, f"{name}: the measured points differ"))
+    for name in map(str, baseline.coords.keys() & new.coords.keys()):
+        scalars = new.coords[name], baseline.coords[name]
+        if is_input(name) and scalars[0].ndim == scalars[1].ndim == 0 and scalars[0].item() != scalars[1].item():
+            add(name, f"{name} is", scalars[0].item(), scalars[1].item())
     return faults
 
 
-def _judge(name: str, new: xr.Dataset, baseline: xr.Dataset, tolerance: float) -> Judged:
-    """The comparison of one variable of the same laws."""
-    variable = CALIBRATION[name]
-    a, b = (np.asarray(dataset[name].values, float) for dataset in (new, baseline))
-    is_exact = variable.scale == "exact"
-    scale = np.broadcast_to(np.zeros(1) if is_exact else _scale(name, baseline), b.shape)
-    # the value of a parameter that the data do not determine is arbitrary
-    is_judged = np.isfinite(scale)
-    with np.errstate(invalid="ignore"):
-        difference = np.abs(a - b)
-    same = (a == b) | (np.isnan(a) & np.isnan(b))
-    difference = np.where(same, 0.0, np.where(np.isnan(difference), np.inf, difference))
-    allowed = tolerance * scale
-    times = np.divide(difference, allowed, out=np.where(difference > 0.0, np.inf, 0.0), where=allowed > 0.0)
-    times = np.where(is_judged, times, 0.0)
-    index = np.unravel_index(int(times.argmax()), times.shape)
-    at: dict[str, float | str] = {}
-    if times.any():
-        at = {
-            dim: _label(baseline, dim, int(position)) for dim, position in zip(variable.dims, index, strict=True)
-        }
-    return Judged(
-        name=name,
-        judged="exact" if is_exact else f"scaled by {variable.scale}",
-        tolerance=math.nan if is_exact else tolerance,
-        points=int(is_judged.sum()),
-        different=int((times > 1.0).sum()),
-        worst=abs(float(a[index] - b[index])) if times.any() else 0.0,
-        times=float(times[index]),
-        at=at,
-        new=float(a[index]),
-        baseline=float(b[index]),
-    )
-
-
-def _label(dataset: xr.Dataset, dim: str, position: int) -> Any:
-    label = dataset[dim].values[position] if dim in dataset.coords else position
-    return str(label) if isinstance(label, str) else float(label)
-
-
 def _scale(name: str, baseline: xr.Dataset) -> Array:
-    """The scale of each value of a variable, NaN where it is not judged."""
+    """Compute the scale of each value of a variable; NaN if the data do not determine the value."""
     variable = CALIBRATION[name]
     values = np.abs(np.asarray(baseline[name].values, float))
-    identified = baseline["identifiable"].values == 1
     match variable.scale:
+        case "exact":
+            return np.zeros(())
         case "itself + interval":
             width = np.asarray((baseline["upper"] - baseline["lower"]).values, float)
             estimate = np.abs(np.asarray(baseline["estimate"].values, float))
-            scale = np.where(identified, estimate + np.nan_to_num(width), np.nan)
+            scale = np.where(baseline["identifiable"].values == 1, estimate + np.nan_to_num(width), np.nan)
         case "deviations":
             deviation = np.sqrt(np.diagonal(np.asarray(baseline[name].values, float), axis1=-2, axis2=-1))
             scale = deviation[..., :, None] * deviation[..., None, :]
@@ -175,17 +119,13 @@ def _scale(name: str, baseline: xr.Dataset) -> Array:
             scale = np.where(values > 1.0, values, 1.0)
         case _:
             scale = values
-    return np.asarray(scale)
+    return np.where(np.isfinite(scale), scale, np.nan)
 
 
-def _notes(new: xr.Dataset, baseline: xr.Dataset, common: list[str]) -> list[str]:
-    """Differences that do not affect equality: versions, ranks and what a fit came to."""
+def fit_notes(new: xr.Dataset, baseline: xr.Dataset) -> list[str]:
+    """Name the laws whose fits ended with another status."""
     notes = []
-    for name in ("rtol", "impact_version"):
-        a, b = (dataset.attrs.get(name) for dataset in (new, baseline))
-        if a != b:
-            notes.append(safe_text(f"{name} is {a}, in BASELINE {b}", 400))
-    for key in common:
+    for key in common_laws(new, baseline):
         a, b = (fit_status(dataset.sel(model=key)) for dataset in (new, baseline))
         if a != b:
             notes.append(f"the fit of {key} is {a}, in BASELINE {b}")

@@ -1,4 +1,4 @@
-"""Compare a result with a baseline, each variable as the SCHEMA prescribes."""
+"""Compare a result with a baseline, each variable as its entry in the SCHEMA prescribes."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from ..contact.variables import OUTPUTS
 from ..errors import UsageError
 from ..formatting import number
 from ..results.attributes import read_attribute
-from ..results.kinds import is_calibration, require_sweep
+from ..results.kinds import is_calibration, kind_of, require_sweep
 from ..results.replay_command import command_start
-from ..results.schema import MODEL_METADATA, SCHEMA_VERSION, is_case
+from ..results.schema import MODEL_METADATA, SCHEMA, SCHEMA_VERSION, is_case
 from ..results.xarray_backend import load
 from ..text import safe_text
-from .align import MODEL_COORDINATES, align
-from .calibrations import compare_calibrations
-from .judge import group_size, judge, representative_regions
-from .tolerances import ALL_VARIABLES, Tolerances, effective_tolerances
-from .verdict import Fault, Judged, Verdict
+from .align import MODEL_COORDINATES, Alignment, align_sweeps
+from .calibrations import align_calibrations, fit_notes
+from .tolerances import ALL_VARIABLES, Tolerances, calibration_tolerances, effective_tolerances
+from .values import compare_values, group_size, representative_regions
+from .verdict import Difference, VariableComparison, Verdict
 
 
 def compare(
@@ -75,48 +75,53 @@ def compare(
     names = files[0] or "NEW", files[1] or "BASELINE"
     a, b = (load(source) if isinstance(source, str | Path) else source for source in (new, baseline))
     if is_calibration(a) and is_calibration(b):
-        return compare_calibrations(a, b, names, tol, subset=subset)
-    for dataset, name in zip((a, b), names, strict=True):
-        check_comparable(dataset, name)
-    strange = sorted({*_unknown_variables(a), *_unknown_variables(b)})
-    a, b = a.drop_vars(_unknown_variables(a)), b.drop_vars(_unknown_variables(b))
-    tolerances = effective_tolerances(tol, b.attrs)
-    aligned = align(a, b, subset=subset)
-    faults = [*aligned.faults, *_material_faults(a, b), *_unit_faults(a, b)]
-    notes = [*_attribute_notes(a, b), *_model_metadata_notes(aligned.new.coords, aligned.baseline.coords)]
-    notes += [safe_text(f"not judged: {', '.join(strange)}")] if strange else []
-    if any(fault.kind == "labels" for fault in faults) and not subset:
-        notes.append("--subset compares only what both results contain")
-    for name in OUTPUTS:
-        sides = [side for side, dataset in (("NEW", a), ("BASELINE", b)) if name in dataset]
-        if len(sides) == 1 and subset:
-            notes.append(f"{name} is in {sides[0]} only")
-        elif len(sides) == 1:
-            faults.append(Fault("missing variable", name, f"{name} is in {sides[0]} only"))
-    judged: list[Judged] = []
-    largest: dict[str, Mapping[str, np.ndarray]] = {}
-    common = [variable for variable in OUTPUTS.values() if variable.name in aligned.dims]
+        tolerances = calibration_tolerances(tol)
+        aligned = align_calibrations(a, b, subset=subset)
+        faults = [*aligned.faults]
+        notes = [*_attribute_notes(a.attrs, b.attrs, {"rtol": None, "impact_version": None}), *fit_notes(a, b)]
+        repeats: tuple[str, ...] = ()
+    else:
+        for dataset, name in zip((a, b), names, strict=True):
+            check_comparable(dataset, name)
+        unknown = sorted({*_unknown_variables(a), *_unknown_variables(b)})
+        a, b = (dataset.drop_vars(unknown, errors="ignore") for dataset in (a, b))
+        tolerances = effective_tolerances(tol, b.attrs)
+        aligned = align_sweeps(a, b, subset=subset)
+        faults = [*aligned.faults, *_material_faults(a, b), *_unit_faults(a, b)]
+        notes = _sweep_notes(a, b, aligned)
+        notes += [safe_text(f"not judged: {', '.join(unknown)}")] if unknown else []
+        if any(fault.kind == "labels" for fault in faults) and not subset:
+            notes.append("--subset compares only what both results contain")
+        missing = _missing_variables(a, b)
+        notes += [fault.text for fault in missing] if subset else []
+        faults += [] if subset else missing
+        repeats = command_start(files[0], a) or command_start(files[1], b)
+    schema = SCHEMA[kind_of(b)]
+    variables = [schema[name] for name in schema if name in aligned.dims]
     # for all variables before the first comparison, so that a refusal comes early
-    regions = representative_regions(common, aligned)
-    for variable in common:
+    regions = representative_regions(variables, aligned)
+    comparisons: list[VariableComparison] = []
+    largest: dict[str, Mapping[str, np.ndarray]] = {}
+    for variable in variables:
         tolerance = tolerances.get(variable.name, tolerances[ALL_VARIABLES])
-        outcome, largest[variable.name] = judge(variable, aligned, tolerance, regions[variable.name])
-        judged.append(outcome)
-    if not judged and not faults:
-        faults.append(Fault("nothing in common", "", "the two have no variable in common"))
+        comparison, ratios = compare_values(variable, aligned, tolerance, regions[variable.name])
+        comparisons.append(comparison)
+        largest[variable.name] = ratios
+    if not comparisons and not faults:
+        faults.append(Difference("nothing in common", "", "the two have no variable in common"))
     return Verdict(
         new=names[0],
         baseline=names[1],
         faults=tuple(faults),
-        variables=tuple(judged),
+        variables=tuple(comparisons),
         notes=tuple(notes),
-        repeats=command_start(files[0], a) or command_start(files[1], b),
-        worst_along=_along_axes(largest, aligned.baseline.coords),
+        repeats=repeats,
+        worst_along={} if is_calibration(b) else _along_axes(largest, aligned.baseline.coords),
     )
 
 
 def _along_axes(largest: Mapping[str, Mapping[str, np.ndarray]], coords: xr.Dataset) -> dict[str, xr.Dataset]:
-    """The largest ratios along each axis, by variable, with the labels of the baseline."""
+    """Collect the largest ratios along each axis, by variable, with the labels of the baseline."""
     along = {}
     for axis in dict.fromkeys(axis for by_axis in largest.values() for axis in by_axis):
         columns = {name: (axis, by_axis[axis]) for name, by_axis in largest.items() if axis in by_axis}
@@ -134,34 +139,33 @@ def check_comparable(dataset: xr.Dataset, name: str) -> None:
     ------
     UsageError : it is a time history, or lacks coordinates or axes that every result has
     """
-    shown = safe_text(name)
-    require_sweep(dataset, shown)
+    require_sweep(dataset, name)
     is_current = _attributes_equal(dataset.attrs.get("schema_version"), SCHEMA_VERSION)
     if not is_current or "rtol" not in dataset.attrs:
-        about = "a time history" if "t" in dataset.coords else "not a result"
-        raise UsageError(f"{shown}: is {about}, expected the result of a sweep")
+        description = "a time history" if "t" in dataset.coords else "not a result"
+        raise UsageError(f"{name}: is {description}, expected the result of a sweep")
     for coordinate in ("model", "v1", "v2", "m1", "m2"):
         if coordinate not in dataset.coords:
-            raise UsageError(f"{shown}: has no coordinate {coordinate}, expected a whole result")
+            raise UsageError(f"{name}: has no coordinate {coordinate}, expected a whole result")
         if coordinate != "model" and dataset[coordinate].dtype.kind not in "fiu":
-            raise UsageError(f"{shown}: {coordinate}: got {dataset[coordinate].dtype}, expected numbers")
-    axes = {dim for name, v in dataset.variables.items() if is_input(name) for dim in v.dims}
-    for name in OUTPUTS:
-        if name in dataset and dataset[name].dtype.kind not in "fiu":
-            raise UsageError(f"{shown}: {name}: got {dataset[name].dtype}, expected numbers")
-        if name in dataset and not axes <= set(dataset[name].dims):
-            raise UsageError(f"{shown}: {name} does not vary along all axes, expected a whole result")
+            raise UsageError(f"{name}: {coordinate}: got {dataset[coordinate].dtype}, expected numbers")
+    axes = {dim for key, v in dataset.variables.items() if is_input(key) for dim in v.dims}
+    for variable in OUTPUTS:
+        if variable in dataset and dataset[variable].dtype.kind not in "fiu":
+            raise UsageError(f"{name}: {variable}: got {dataset[variable].dtype}, expected numbers")
+        if variable in dataset and not axes <= set(dataset[variable].dims):
+            raise UsageError(f"{name}: {variable} does not vary along all axes, expected a whole result")
 
 
 def _unknown_variables(dataset: xr.Dataset) -> list[str]:
-    """The variables that are not part of a result."""
+    """List the variables that are not part of a result."""
     standard_names = {*MODEL_COORDINATES, *OUTPUTS}
     names = [str(name) for name in dataset.variables if name not in standard_names]
     return [name for name in names if not (is_input(name) or is_case(name))]
 
 
-def _material_faults(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
-    """Properties that differ between materials of the same name."""
+def _material_faults(new: xr.Dataset, baseline: xr.Dataset) -> list[Difference]:
+    """List the properties that differ between materials of the same name."""
     materials = [read_attribute(dataset.attrs, "materials") for dataset in (new, baseline)]
     faults = []
     for name in materials[0].keys() & materials[1].keys():
@@ -172,35 +176,50 @@ def _material_faults(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
             if a.get(field) != b.get(field) and not (path in new.coords or path in baseline.coords):
                 shown = [number(v, 12) for v in (a.get(field), b.get(field))]
                 text = f"{path} is {shown[0]}, in BASELINE {shown[1]}"
-                faults.append(Fault("physics config", path, safe_text(text)))
+                faults.append(Difference("physics config", path, safe_text(text)))
     return sorted(faults, key=lambda fault: fault.name)
 
 
-def _unit_faults(new: xr.Dataset, baseline: xr.Dataset) -> list[Fault]:
+def _missing_variables(new: xr.Dataset, baseline: xr.Dataset) -> list[Difference]:
+    """List the variables that only one result has."""
+    return [
+        Difference("missing variable", name, f"{name} is in {'NEW' if name in new else 'BASELINE'} only")
+        for name in OUTPUTS
+        if (name in new) != (name in baseline)
+    ]
+
+
+def _unit_faults(new: xr.Dataset, baseline: xr.Dataset) -> list[Difference]:
+    """List the variables whose units differ."""
     faults = []
     for name in [str(name) for name in baseline.variables if name in new.variables]:
         a, b = (dataset.variables[name].attrs.get("units") for dataset in (new, baseline))
         if not _attributes_equal(a, b):
             text = f"{name} is in {a}, in BASELINE in {b}"
-            faults.append(Fault("units", name, safe_text(text)))
+            faults.append(Difference("units", name, safe_text(text)))
     return faults
 
 
-def _attribute_notes(new: xr.Dataset, baseline: xr.Dataset) -> list[str]:
-    """Differences between attributes, which may explain differences between values."""
-    notes = []
+def _sweep_notes(new: xr.Dataset, baseline: xr.Dataset, aligned: Alignment) -> list[str]:
+    """List what may explain differences between values: solver, versions, and metadata of models."""
     # results of the continuous law have no attribute `integrator`
-    for name, default in (("rtol", None), ("max_steps", None), ("integrator", EXACT), ("impact_version", None)):
-        a, b = (dataset.attrs.get(name, default) for dataset in (new, baseline))
-        if not _attributes_equal(a, b):
-            notes.append(safe_text(f"{name} is {a}, in BASELINE {b}", 400))
+    defaults = {"rtol": None, "max_steps": None, "integrator": EXACT, "impact_version": None}
+    notes = _attribute_notes(new.attrs, baseline.attrs, defaults)
     for name in ("packages", "plugins"):
         a, b = (read_attribute(dataset.attrs, name) for dataset in (new, baseline))
-        notes += [
-            safe_text(f"{key} is {a.get(key)}, in BASELINE {b.get(key)}", 400)
-            for key in sorted(a.keys() | b.keys())
-            if a.get(key) != b.get(key)
-        ]
+        notes += _attribute_notes(a, b, dict.fromkeys(sorted({*a, *b})))
+    return notes + _model_metadata_notes(aligned.new.coords, aligned.baseline.coords)
+
+
+def _attribute_notes(
+    new: Mapping[Any, Any], baseline: Mapping[Any, Any], defaults: Mapping[str, object]
+) -> list[str]:
+    """List the attributes that differ, of some with their defaults."""
+    notes = []
+    for name, default in defaults.items():
+        a, b = (attributes.get(name, default) for attributes in (new, baseline))
+        if not _attributes_equal(a, b):
+            notes.append(safe_text(f"{name} is {a}, in BASELINE {b}", 400))
     return notes
 
 
@@ -210,7 +229,7 @@ def _attributes_equal(a: Any, b: Any) -> bool:
 
 
 def _model_metadata_notes(new: xr.Dataset, baseline: xr.Dataset) -> list[str]:
-    """Differences between the metadata of models."""
+    """List the metadata of models that differ."""
     notes = []
     for name in MODEL_METADATA:
         if name in new.coords and name in baseline.coords:

@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 
 from ..formatting import number
 from ..text import safe_text
-from .verdict import FAULT_KINDS, Judged, Verdict
+from .verdict import DIFFERENCE_KINDS, VariableComparison, Verdict
 
 PROGRAM = "impact compare"
 # what a test of JUnit claims: that there is no fault of a kind
@@ -44,14 +44,14 @@ class Report:
     headline: str
     cases: tuple[ReportCase, ...] = ()
     notes: tuple[str, ...] = ()
-    variables: tuple[Judged, ...] = ()
+    variables: tuple[VariableComparison, ...] = ()
 
 
 def report_of(verdict: Verdict) -> Report:
     """The report of a verdict: a case for each kind of fault, and for each variable, the worst first."""
     faults = (
         ReportCase(kind, tuple(fault.text for fault in verdict.faults if fault.kind == kind))
-        for kind in FAULT_KINDS
+        for kind in DIFFERENCE_KINDS
         if kind != "values"
     )
     values = (
@@ -86,12 +86,12 @@ def as_data(report: Report) -> dict[str, Any]:
         "faults": [
             {"kind": case.name, "text": text}
             for case in report.cases
-            if case.name in FAULT_KINDS
+            if case.name in DIFFERENCE_KINDS
             for text in case.texts
         ],
         "variables": [
             {
-                **vars(variable),
+                **{"times" if name == "ratio" else name: value for name, value in vars(variable).items()},
                 "at": _safe_inputs(variable.at),
                 "equal": variable.is_equal,
                 "text": variable.text,
@@ -143,7 +143,10 @@ def as_markdown(report: Report) -> str:
     lines = [f"### {sign} {PROGRAM}: {_escape_markdown(report.headline)}", ""]
     lines += [f"`{_escape_code(report.new)}` against the baseline `{_escape_code(report.baseline)}`", ""]
     fault_lines = [
-        f"- {_escape_markdown(text)}" for case in report.cases if case.name in FAULT_KINDS for text in case.texts
+        f"- {_escape_markdown(text)}"
+        for case in report.cases
+        if case.name in DIFFERENCE_KINDS
+        for text in case.texts
     ]
     lines += [*fault_lines, ""] if fault_lines else []
     differing = [variable for variable in report.variables if not variable.is_equal]
@@ -153,7 +156,7 @@ def as_markdown(report: Report) -> str:
             "|---|--:|--:|--:|---|--:|--:|",
         ]
         for variable in differing:
-            numbers = f"{number(variable.worst, 3)} | {number(variable.times, 3)}"
+            numbers = f"{number(variable.worst, 3)} | {number(variable.ratio, 3)}"
             values = f"{number(variable.new, 12)} | {number(variable.baseline, 12)}"
             counts, point = f"{variable.different} of {variable.points}", _escape_markdown(variable.location)
             lines.append(f"| `{variable.name}` | {counts} | {numbers} | {point} | {values} |")

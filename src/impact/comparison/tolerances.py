@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Mapping
 from typing import Any, TypeGuard
@@ -11,7 +12,6 @@ import numpy as np
 from ..contact.variables import OUTPUTS
 from ..errors import ResultError, UsageError, did_you_mean
 from ..results.attributes import read_attribute
-from ..text import safe_text
 
 Tolerances = Mapping[str, float]
 
@@ -19,6 +19,8 @@ Tolerances = Mapping[str, float]
 ALL_VARIABLES = "all"
 # the default tolerance is this many times the solver's rtol
 DEFAULT_RTOL_FACTOR = 10.0
+# ten times the relative accuracy of the ends of profile intervals
+CALIBRATION_TOLERANCE = 1e-5
 TOLERANCE_VARIABLES = [name for name, variable in OUTPUTS.items() if variable.has_tolerance]
 
 
@@ -42,7 +44,7 @@ def effective_tolerances(tol: float | Tolerances | None, attributes: Mapping[str
     >>> effective_tolerances(None, {"rtol": 1e-10})
     {'all': 1e-09}
     """
-    requested = dict(tol or {}) if isinstance(tol, Mapping | None) else {ALL_VARIABLES: tol}
+    requested = _by_variable(tol)
     _check_tolerances(requested)
     if ALL_VARIABLES in requested:
         return requested
@@ -57,7 +59,30 @@ def effective_tolerances(tol: float | Tolerances | None, attributes: Mapping[str
     return {ALL_VARIABLES: DEFAULT_RTOL_FACTOR * float(rtol), **stored, **requested}
 
 
+def calibration_tolerances(tol: float | Tolerances | None) -> dict[str, float]:
+    """The tolerance of all variables of a calibration, relative to their scales; by default 1e-5.
+
+    Raises
+    ------
+    UsageError : a tolerance for one variable, or one that is not a number >= 0
+    """
+    requested = _by_variable(tol)
+    for name, value in requested.items():
+        if name != ALL_VARIABLES:
+            expected = "expected one for all, such as --tol 1e-5"
+            raise UsageError(f"--tol {name}: got a tolerance for one variable, {expected}")
+        if not 0.0 <= value < math.inf:
+            raise UsageError(f"--tol {value}: expected a number >= 0, such as --tol 1e-5")
+    return {ALL_VARIABLES: CALIBRATION_TOLERANCE} | requested
+
+
+def _by_variable(tol: float | Tolerances | None) -> dict[str, float]:
+    """Convert what a caller passed to tolerances by name."""
+    return dict(tol or {}) if isinstance(tol, Mapping | None) else {ALL_VARIABLES: tol}
+
+
 def _check_tolerances(tolerances: Mapping[str, Any]) -> None:
+    """Refuse names without a tolerance, and values that are not a number >= 0."""
     for name, value in tolerances.items():
         if name != ALL_VARIABLES and name not in TOLERANCE_VARIABLES:
             has_none = {
@@ -65,11 +90,12 @@ def _check_tolerances(tolerances: Mapping[str, Any]) -> None:
                 "reported": "has no tolerance, it is not judged;",
             }
             how = has_none[OUTPUTS[name].scale] if name in OUTPUTS else "not a variable of a result;"
-            raise UsageError(f"--tol {safe_text(str(name))}: {how} {did_you_mean(str(name), TOLERANCE_VARIABLES)}")
+            raise UsageError(f"--tol {name}: {how} {did_you_mean(str(name), TOLERANCE_VARIABLES)}")
         if not _is_number(value) or not 0.0 <= value <= sys.float_info.max:
             shown = value if name == ALL_VARIABLES else f"{name}={value}"
-            raise UsageError(f"--tol {safe_text(str(shown))}: expected a number >= 0, such as --tol 1e-8")
+            raise UsageError(f"--tol {shown}: expected a number >= 0, such as --tol 1e-8")
 
 
 def _is_number(value: object) -> TypeGuard[float]:
+    """Whether a value is a real number."""
     return isinstance(value, int | float | np.number) and not isinstance(value, bool)

@@ -15,9 +15,9 @@ from ..formatting import number
 from ..results.replay_command import describe_point, replay_command
 from ..text import safe_text
 
-FaultKind = Literal["nothing in common", "physics config", "labels", "units", "missing variable", "values"]
+DifferenceKind = Literal["nothing in common", "physics config", "labels", "units", "missing variable", "values"]
 # in the order of a verdict: kinds that explain others first
-FAULT_KINDS: tuple[FaultKind, ...] = (
+DIFFERENCE_KINDS: tuple[DifferenceKind, ...] = (
     "nothing in common",
     "physics config",
     "labels",
@@ -26,32 +26,32 @@ FAULT_KINDS: tuple[FaultKind, ...] = (
     "values",
 )
 VERDICT_HEADINGS = ("variable", "judged", "tolerance", "differ", "worst", "x tolerance")
-MAX_NAMED_FAULTS = 4  # names per kind in the first line
+MAX_NAMES = 4  # names per kind in the first line
 # a narrower terminal shows no table
 MIN_TABLE_WIDTH = 76
 
 
 @dataclass(frozen=True)
-class Fault:
+class Difference:
     """One difference between two results, other than a value: its kind, name and a sentence."""
 
-    kind: FaultKind
+    kind: DifferenceKind
     name: str
     text: str
 
 
 @dataclass(frozen=True)
-class Judged:
+class VariableComparison:
     """One variable, compared at all common points.
 
     Parameters
     ----------
     name : of the variable
-    judged : how it is compared, see `impact.results.schema.SCHEMA`
+    judged : how it is compared, see `impact.contact.variables.Variable`
     tolerance : relative to the scale of a point; NaN if there is none (exact, reported)
     points, different : number of common points, and of those that differ
     worst : |new - baseline| at the worst point, in the variable's unit
-    times : the same over the tolerance at that point; inf if no difference is allowed, or one value is NaN
+    ratio : the same over the tolerance at that point; inf if no difference is allowed, or one value is NaN
     at : the inputs of the worst point by config name, and its model; empty if all points are equal
     new, baseline : the values at the worst point
     """
@@ -62,23 +62,24 @@ class Judged:
     points: int
     different: int
     worst: float
-    times: float
+    ratio: float
     at: Mapping[str, float | str]
     new: float
     baseline: float
 
     @property
+    def times(self) -> float:
+        """The ratio, by its name in version 1.0."""
+        return self.ratio
+
+    @property
     def is_equal(self) -> bool:
+        """Whether all values agree within the tolerance, or are not judged."""
         return self.different == 0 or self.judged == "reported"
 
     @property
     def location(self) -> str:
-        """The coordinates of the worst point.
-
-        >>> steps = Judged("steps", "reported", 0.0, 9, 1, 2.0, 0.0, {"model": "hertz", "e": 0.1 + 0.2}, 5, 7)
-        >>> steps.location
-        'model=hertz, e=0.3'
-        """
+        """The coordinates of the worst point."""
         return describe_point(self.at)
 
     @property
@@ -96,11 +97,12 @@ class Judged:
             return f"{text}, which their statuses do not explain" if both else text
         if self.judged == "reported":
             return f"{many}, by {number(self.worst)} at most{at} (not judged)"
-        times = f"{number(self.times, 3)} x tolerance" if self.times < float("inf") else "where none is allowed"
-        return f"{many}, worst {number(self.worst, 2)} = {times}{at}"
+        ratio = f"{number(self.ratio, 3)} x tolerance" if self.ratio < float("inf") else "where none is allowed"
+        return f"{many}, worst {number(self.worst, 2)} = {ratio}{at}"
 
 
 def _format_outcome(name: str, value: float) -> str:
+    """Write a value that has no size: a status by its name."""
     if name == "status" and value in set(Status):
         return Status(int(value)).name.lower()
     return "NaN" if value != value else number(value, 10)
@@ -133,25 +135,26 @@ class Verdict(Displayed):
 
     new: str
     baseline: str
-    faults: tuple[Fault, ...]
-    variables: tuple[Judged, ...]
+    faults: tuple[Difference, ...]
+    variables: tuple[VariableComparison, ...]
     notes: tuple[str, ...] = ()
     repeats: tuple[str, ...] = ()
     worst_along: Mapping[str, xr.Dataset] = field(default_factory=dict, repr=False, compare=False)
 
     @property
     def equal(self) -> bool:
+        """Whether nothing differs."""
         return not self.faults and not self.differing
 
     @property
-    def differing(self) -> tuple[Judged, ...]:
+    def differing(self) -> tuple[VariableComparison, ...]:
         """The variables whose values differ, the worst first."""
         # among equal ratios the status comes first, since it explains the NaNs of other variables
         different = (variable for variable in self.variables if not variable.is_equal)
-        return tuple(sorted(different, key=lambda variable: (-variable.times, variable.judged != "exact")))
+        return tuple(sorted(different, key=lambda variable: (-variable.ratio, variable.judged != "exact")))
 
     @property
-    def ranked(self) -> tuple[Judged, ...]:
+    def ranked(self) -> tuple[VariableComparison, ...]:
         """All variables: those whose values differ, the worst first, then the others."""
         return (*self.differing, *(variable for variable in self.variables if variable.is_equal))
 
@@ -162,27 +165,27 @@ class Verdict(Displayed):
             judged = [variable for variable in self.variables if variable.judged != "reported"]
             values = sum(variable.points for variable in judged)
             count = f"equal: {len(judged)} variables, {values:,} values"
-            closest = max(judged, key=lambda variable: variable.times, default=None)
-            if closest is None or not closest.times:
+            closest = max(judged, key=lambda variable: variable.ratio, default=None)
+            if closest is None or not closest.ratio:
                 return f"{count}, none differs"
             at = f" at {closest.location}" if closest.location else ""
-            return f"{count}, largest difference {number(closest.times, 2)} x tolerance: {closest.name}{at}"
-        by_kind: dict[FaultKind, dict[str, None]] = {}
+            return f"{count}, largest difference {number(closest.ratio, 2)} x tolerance: {closest.name}{at}"
+        by_kind: dict[DifferenceKind, dict[str, None]] = {}
         for fault in self.faults:
             by_kind.setdefault(fault.kind, {})[safe_text(fault.name, 60)] = None
         for variable in self.differing:
             by_kind.setdefault("values", {})[safe_text(variable.name, 60)] = None
         parts = []
-        for kind in (kind for kind in FAULT_KINDS if kind in by_kind):
+        for kind in (kind for kind in DIFFERENCE_KINDS if kind in by_kind):
             names = [name for name in by_kind[kind] if name]
-            more = f" and {len(names) - MAX_NAMED_FAULTS} more" if len(names) > MAX_NAMED_FAULTS else ""
-            parts.append(f"{kind} ({', '.join(names[:MAX_NAMED_FAULTS])}{more})" if names else kind)
+            more = f" and {len(names) - MAX_NAMES} more" if len(names) > MAX_NAMES else ""
+            parts.append(f"{kind} ({', '.join(names[:MAX_NAMES])}{more})" if names else kind)
         return f"not equal: {', '.join(parts)}"
 
     @property
     def lines(self) -> tuple[str, ...]:
         """The differences, a line each; after a variable the command that runs its worst point again."""
-        faults = sorted(self.faults, key=lambda fault: FAULT_KINDS.index(fault.kind))
+        faults = sorted(self.faults, key=lambda fault: DIFFERENCE_KINDS.index(fault.kind))
         lines = [f"{fault.kind}: {fault.text}" for fault in faults]
         for variable in self.differing:
             command = f"  {self.replay(variable)}"
@@ -199,10 +202,10 @@ class Verdict(Displayed):
                 number(variable.tolerance, 3),
                 f"{variable.different} of {variable.points}",
                 number(variable.worst, 3),
-                number(variable.times if variable.tolerance == variable.tolerance else math.nan, 3),
+                number(variable.ratio if variable.tolerance == variable.tolerance else math.nan, 3),
             )
             for variable in self.ranked
-            if variable.times
+            if variable.ratio
         ]
 
     def as_dict(self) -> dict[str, Any]:
@@ -223,7 +226,7 @@ class Verdict(Displayed):
             yield ""
             yield Table(rows, VERDICT_HEADINGS, text=(0, 1))
 
-    def replay(self, variable: Judged) -> str:
+    def replay(self, variable: VariableComparison) -> str:
         """The command that runs the worst point of a variable again; empty if there is none."""
         if not self.repeats or not variable.at:
             return ""

@@ -25,7 +25,7 @@ from ..errors import ConfigError, did_you_mean
 from ..text import safe_text
 from .files import as_table, read_text, set_value
 from .input_names import InputName, input_values
-from .quantities import MAX_PROBLEMS, ConfigProblem, KeyPath, Quantity, mismatch_error, show
+from .quantities import MAX_PROBLEMS, ConfigProblem, KeyPath, Quantity, as_text, mismatch_error
 
 MAX_CSV_BYTES = 2_000_000  # size of a CSV file, whose values a result stores
 COLUMN_HEADER = re.compile(r"\s*(.*?)\s*(?:\[\s*(.*?)\s*\])?\s*", re.DOTALL)
@@ -159,7 +159,7 @@ def read_csv(path: Path, quantity_of: QuantityOf, *, with_any_names: bool = Fals
         raise ConfigError(f"{header}: got a comment, expected the names of the columns")
     separator = next((mark for mark in ";\t" if mark in headers[0]), "")
     if len(headers) == 1 and separator:
-        got = f'columns separated by {show(separator)}, expected ","'
+        got = f'columns separated by {as_text(separator)}, expected ","'
         raise ConfigError(f"{header}: got {got}, and a point in numbers, such as 0.5")
     names = [split_header(text) for text in headers]
     with_square_brackets = {name: _with_square_brackets(name, quantity_of) for name, _ in names}
@@ -168,13 +168,13 @@ def read_csv(path: Path, quantity_of: QuantityOf, *, with_any_names: bool = Fals
         expected = "names of inputs or outputs, such as v1 [m/s] or e_out"
         raise ConfigError(f"{header}: got no known column, expected {expected}")
     problems = [
-        f"{header}: {safe_text(name, 60)}: got round brackets, expected {show(expected)}"
+        f"{header}: {safe_text(name, 60)}: got round brackets, expected {as_text(expected)}"
         for name, expected in with_square_brackets.items()
         if expected
     ]
     for name, count in Counter(name for name, _ in names).items():
         if count > 1:
-            got = f"{show(name) if is_known else 'a name'} {'twice' if count == 2 else f'{count} times'}"
+            got = f"{as_text(name) if is_known else 'a name'} {'twice' if count == 2 else f'{count} times'}"
             problems.append(f"{header}: got {got}, expected each column once")
     problems += _length_problems(path, rows, len(headers))
     if problems:
@@ -304,7 +304,7 @@ def _find_column(columns: Columns, name: str, *, is_only: bool) -> str:
     hint = f"; {did_you_mean(name, list(columns.units))}" if columns.is_known else ""
     if any(header.startswith(f"{name} (") for header in columns.units):
         hint = f'; a unit is in square brackets: "{safe_text(name, 60)} [UNIT]"'
-    raise ConfigError(columns.problem(f"got {show(name)}, expected one of its columns{hint}"))
+    raise ConfigError(columns.problem(f"got {as_text(name)}, expected one of its columns{hint}"))
 
 
 def _read_cases(

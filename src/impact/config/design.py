@@ -10,7 +10,7 @@ import numpy as np
 
 from ..array_types import Array
 from .input_names import input_values
-from .quantities import DISTRIBUTION_FORMS, ConfigProblem, Distribution, KeyPath, Quantity, show
+from .quantities import DISTRIBUTION_FORMS, ConfigProblem, Distribution, KeyPath, Quantity, as_text
 from .tables import Design
 
 # samples of a unit interval stay this far from its ends, half the resolution of a Sobol sequence, so that no value
@@ -121,6 +121,6 @@ def draw_columns(
         above = drawn > quantity.least if quantity.above else drawn >= quantity.least
         refused = drawn[~(above & (drawn <= quantity.most) & np.isfinite(drawn))]
         if refused.size:
-            got = f"{refused.size:,} of {drawn.size:,} samples such as {show(float(refused[0]))}"
+            got = f"{refused.size:,} of {drawn.size:,} samples such as {as_text(float(refused[0]))}"
             problems[name] = f"got {got}, expected a distribution whose values are each {quantity.expected}"
     return columns, problems

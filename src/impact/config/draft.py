@@ -89,6 +89,7 @@ class Draft:
     folder : of the files that it names; None if no file may be read
     settings : those applied so far, in the order in which they are stored
     origins : the setting of each path that a setting changed, in the order in which they were applied
+    files : the CSV files whose values are in the data; None before they are read
     cases : the path of each input that is a column of a table of cases, and where its values are in that table
     measurements : of a config with valid measurements
     problems : paths and messages
@@ -102,6 +103,7 @@ class Draft:
     folder: Path | None = None
     settings: tuple[Setting, ...] = ()
     origins: Mapping[KeyPath, Setting] = field(default_factory=dict)
+    files: tuple[Path, ...] | None = None
     cases: Mapping[KeyPath, KeyPath] = field(default_factory=dict)
     measurements: Measurements | None = None
     problems: tuple[ConfigProblem, ...] = ()

@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import ConfigError
 from ..text import safe_text
 from .lines import BARE_KEY
-from .quantities import ConfigProblem, KeyPath, show
+from .quantities import ConfigProblem, KeyPath, as_text
 
 MAX_CONFIG_BYTES = 1_000_000  # size of a TOML file
 MAX_OVERRIDE_LENGTH = 4_000_000  # characters of the value of an override
@@ -134,7 +134,7 @@ def to_plain_data(value: object, path: KeyPath = ()) -> tuple[Any, list[ConfigPr
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, str) and not _is_storable(value):
-        return value, [(path, f"got {show(value)}, expected text without NUL and lone surrogates")]
+        return value, [(path, f"got {as_text(value)}, expected text without NUL and lone surrogates")]
     if not isinstance(value, Mapping | list | tuple):
         return value, []
     if len(path) >= MAX_DEPTH:
@@ -152,7 +152,7 @@ def to_plain_data(value: object, path: KeyPath = ()) -> tuple[Any, list[ConfigPr
     table: dict[str, object] = {}
     for key, element in value.items():
         if not isinstance(key, str) or not _is_storable(key):
-            problems.append((path, f"got the key {show(key)}, expected text without NUL and lone surrogates"))
+            problems.append((path, f"got the key {as_text(key)}, expected text without NUL and lone surrogates"))
         else:
             table[key], element_problems = to_plain_data(element, (*path, key))
             problems += element_problems

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from ..contact.variables import BY_DEFAULT
 from ..errors import did_you_mean
 from .input_names import InputName
-from .quantities import MAX_PROBLEMS, ConfigProblem, Names, Numbers, Quantity, Range, show
+from .quantities import MAX_PROBLEMS, ConfigProblem, Names, Numbers, Quantity, Range, as_text
 
 # default limit of the points of all models together
 MAX_POINTS = 10**9
@@ -227,13 +227,13 @@ def _zip_groups(
             if name not in config_names:
                 axes = [key for key in config_names if sizes.get(key) is not None]
                 suggestion = did_you_mean(name, axes or list(config_names))
-                problems.append((path, f"got {show(name)}, expected an axis; {suggestion}"))
+                problems.append((path, f"got {as_text(name)}, expected an axis; {suggestion}"))
             elif name in member_of:
-                problems.append((path, f"got {show(name)} twice, expected each name once"))
+                problems.append((path, f"got {as_text(name)} twice, expected each name once"))
             elif name in together:
-                problems.append((path, f"got {show(name)}, {together[name]}; those vary together already"))
+                problems.append((path, f"got {as_text(name)}, {together[name]}; those vary together already"))
             elif name in sizes and size is None:
-                message = f"got {show(name)}, which is a scalar, expected an axis: a list or a range"
+                message = f"got {as_text(name)}, which is a scalar, expected an axis: a list or a range"
                 problems.append((path, message))
             elif size is not None:
                 lengths[name] = size
@@ -249,6 +249,11 @@ def _repetition_problems(name: str, values: AxisValues) -> list[ConfigProblem]:
     seen: set[object] = set()
     for index, value in enumerate(values):
         if value in seen:
-            return [((*InputName.parse(name).path, index), f"got {show(value)} twice, expected each value once")]
+            return [
+                (
+                    (*InputName.parse(name).path, index),
+                    f"got {as_text(value)} twice, expected each value once",
+                )
+            ]
         seen.add(value)
     return []

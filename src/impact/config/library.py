@@ -23,3 +23,16 @@ def library() -> Mapping[str, Mapping[str, float | str]]:
         name: {key: value for key, value in record.items() if key in MATERIAL_QUANTITIES}
         for name, record in records().items()
     }
+
+
+def materials() -> dict[str, dict[str, float | str]]:
+    """List common materials in SI units, which a config can name without a table [materials.NAME].
+
+    Returns
+    -------
+    By name: E [Pa], nu, rho [kg/m3], yield_strength [Pa] if known, about, source
+
+    >>> materials()["glass"]["E"]
+    72000000000.0
+    """
+    return {name: dict(record) for name, record in records().items()}

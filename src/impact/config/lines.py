@@ -12,7 +12,7 @@ from ..contact.model import ForceModel
 from ..errors import did_you_mean
 from ..text import safe_text
 from . import quantities
-from .quantities import VALUE_FORMS, Column, ConfigProblem, KeyPath, show
+from .quantities import VALUE_FORMS, Column, ConfigProblem, KeyPath, as_text
 from .tables import (
     MATERIAL_QUANTITIES,
     MODELS_EXPECTED,
@@ -189,9 +189,9 @@ def validation_problems(error: ValidationError, models: Mapping[str, ForceModel]
                 yield path, f"unknown key; {hint}"
             case "literal_error":
                 choices = ", ".join(re.findall("'([^']*)'", detail["ctx"]["expected"]))
-                yield path, f"got {show(detail['input'])}, expected one of {choices}"
+                yield path, f"got {as_text(detail['input'])}, expected one of {choices}"
             case _:
-                yield path, f"got {show(detail['input'])}, expected a table"
+                yield path, f"got {as_text(detail['input'])}, expected a table"
 
 
 def _unknown_key_hint(location: KeyPath, models: Mapping[str, ForceModel]) -> str:

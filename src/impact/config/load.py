@@ -54,7 +54,6 @@ from .tables import (
     Output,
     Solver,
     document_type,
-    json_schema,
 )
 
 __all__ = [
@@ -65,7 +64,6 @@ __all__ = [
     "Output",
     "Purpose",
     "Solver",
-    "json_schema",
     "parse_config",
     "read_config",
 ]
@@ -185,8 +183,7 @@ def build(draft: Draft, max_points: int = MAX_POINTS, purpose: Purpose = "sweep"
         draft = draft.with_problems(purpose_problems(draft.data))
     if draft.problems:
         raise draft.error()
-    files = tuple((draft.folder or Path()) / file for file in named_files(draft.data))
-    for step in (_inline_files, add_library_materials, _expand_cases, _expand_measurements):
+    for step in (inline_files, add_library_materials, _expand_cases, _expand_measurements):
         draft = step(draft)
     document, invalid_values = _validate(draft)
     draft = check_rules(draft.with_problems(invalid_values))
@@ -248,11 +245,15 @@ def build(draft: Draft, max_points: int = MAX_POINTS, purpose: Purpose = "sweep"
         data=draft.measurements,
         design=document.design,
         distributions=distributions,
-        files=files,
+        files=draft.files or (),
     )
 
 
-def _inline_files(draft: Draft) -> Draft:
+def inline_files(draft: Draft) -> Draft:
+    """Replace the names of CSV files by the values in them."""
+    if draft.files is not None:
+        return draft
+    draft = replace(draft, files=tuple((draft.folder or Path()) / file for file in named_files(draft.data)))
     for read in (read_files, read_data_file):
         values, lines = read(draft.data, draft.folder, draft.known_models, draft.exponent)
         draft = replace(draft, lines=(*draft.lines, *lines))

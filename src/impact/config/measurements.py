@@ -17,7 +17,7 @@ from ..text import safe_text
 from .columns import Cells, Columns, column_quantity, contains_path, read_cells, read_csv, unit_expected
 from .files import as_table
 from .input_names import InputName, input_values
-from .quantities import MAX_PROBLEMS, ConfigProblem, KeyPath, Quantity, show, value_error
+from .quantities import MAX_PROBLEMS, ConfigProblem, KeyPath, Quantity, as_text, value_error
 from .tables import LOSSES, MAX_MEASURED, MIN_SIGMA, NOISES, SWEEP_QUANTITIES
 
 Noise = Literal["given", "scale", "excess"]
@@ -113,7 +113,7 @@ def _read_columns(
             column = _column_of(header, outputs, models)
             twin = next((key for key, c in kinds.items() if (c.kind, c.name) == (column.kind, column.name)), None)
             if twin is not None:
-                raise value_error(f"got a second column of {column.name}, next to {show(twin)}, expected one")
+                raise value_error(f"got a second column of {column.name}, next to {as_text(twin)}, expected one")
             kinds[header] = column
             name = InputName.parse(column.name)
             if column.kind == "input" and contains_path(data, name.path):
@@ -237,7 +237,7 @@ def _percent_message(text: str) -> str:
         fraction = f", such as {number(float(text.removesuffix('%')) / 100.0)}"
     except ValueError:
         fraction = ""
-    return f"got {show(text)}, expected a fraction{fraction}"
+    return f"got {as_text(text)}, expected a fraction{fraction}"
 
 
 def read_measurements(
@@ -293,7 +293,9 @@ def read_measurements(
     loss = table.get("loss", "linear")
     problems += _noise_problems(noise, list(outputs), list(sigma), specimens)
     if loss != "linear" and noise != "given":
-        problems.append((("data", "loss"), f'got {show(loss)} with noise = "{noise}", expected noise = "given"'))
+        problems.append(
+            (("data", "loss"), f'got {as_text(loss)} with noise = "{noise}", expected noise = "given"')
+        )
     if problems or noise not in NOISES or loss not in LOSSES:
         return None, problems[:MAX_PROBLEMS]
     return Measurements(
@@ -328,7 +330,7 @@ def _noise_problems(
     if noise == "excess" and len(outputs) > 1:
         return [(path, f'got "excess" with {len(outputs)} outputs, expected one, whose unit the deviation has')]
     if specimens and noise != "excess":
-        return [(path, f'got {show(noise)} with a column {SPECIMEN}, expected "excess" or no such column')]
+        return [(path, f'got {as_text(noise)} with a column {SPECIMEN}, expected "excess" or no such column')]
     if specimens and len({*specimens}) < 2:
         return [(("data",), f"got one specimen, expected at least two in the column {SPECIMEN}")]
     missing = [name for name in outputs if name not in with_sigma]

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache, lru_cache
-from typing import Annotated, Any, TypeAlias, cast
+from typing import Annotated, Any, ClassVar, Self, TypeAlias, cast
 
 import numpy as np
 from pydantic import (
@@ -100,10 +100,10 @@ class ValidationContext:
     n_errors: int = 0
 
 
-def show(value: object) -> str:
+def as_text(value: object) -> str:
     """The value as text for a message: short, and without control characters.
 
-    >>> show(True), show(0.5), show("steel"), show([1, 2]), show(16**6000)
+    >>> as_text(True), as_text(0.5), as_text("steel"), as_text([1, 2]), as_text(16**6000)
     ('true', '0.5', '"steel"', 'a list', 'an integer of 24001 bits')
     """
     match value:
@@ -128,7 +128,7 @@ def show(value: object) -> str:
 
 def mismatch_error(value: object, expected: str) -> PydanticCustomError:
     """The error of a value that differs from what is expected."""
-    return value_error(f"got {show(value)}, expected {expected}")
+    return value_error(f"got {as_text(value)}, expected {expected}")
 
 
 def value_error(message: str) -> PydanticCustomError:
@@ -242,48 +242,60 @@ class Column(Table):
     column: Annotated[str, expected("the name of a column")] = Field(description="a name in its first line")
 
 
-def _range_schema(schema: dict[str, Any]) -> None:
+def _one_form_schema(schema: dict[str, Any]) -> None:
     simplify_schema(schema)
     schema.update(minProperties=1, maxProperties=1)
 
 
-class Range(Table):
-    """A range, which is counted before it is written out: exactly one of its fields is given."""
+class _OneForm(Table):
+    """A table that describes several numbers in one of several forms: exactly one of its fields is given."""
 
-    model_config = ConfigDict(json_schema_extra=_range_schema)
-
-    linspace: tuple[float, float, int] | None = None
-    geomspace: tuple[float, float, int] | None = None
-    arange: tuple[float, float, float] | None = None
+    model_config = ConfigDict(json_schema_extra=_one_form_schema)
+    FORMS: ClassVar[Mapping[str, str]]
+    EXPECTED: ClassVar[str]
 
     @model_validator(mode="after")
-    def _check_numbers(self) -> Range:
+    def _check(self) -> Self:
         if len(self.model_fields_set) != 1:
-            got = " and ".join(name for name in RANGE_FORMS if name in self.model_fields_set) or "an empty table"
-            choices = ", ".join(f"{name} = {form}" for name, form in RANGE_FORMS.items())
-            raise value_error(f"got {got}, expected one of {choices}")
-        first, last, step_or_count = self.numbers
-        if self.kind == "geomspace" and min(first, last) <= 0 <= max(first, last):
-            raise self._range_error(
-                f"got {first:g} to {last:g}, expected two ends of the same sign, neither of them 0"
-            )
-        if self.kind == "arange" and step_or_count == 0:
-            raise located_errors([(("arange", 2), "got 0, expected a step other than 0")])
-        if self.size < 1:
-            got = f"no value from {first:g} to {last:g} by {step_or_count:g}"
-            raise self._range_error(f"got {got}, expected at least one")
-        if self.size > MAX_AXIS_VALUES:
-            size = f"{self.size:,}" if self.size <= MAX_PRINTED_COUNT else f"more than {MAX_PRINTED_COUNT:,}"
-            raise self._range_error(f"got {size} values, expected at most {MAX_AXIS_VALUES:,} on an axis")
+            got = " and ".join(name for name in self.FORMS if name in self.model_fields_set) or "an empty table"
+            raise value_error(f"got {got}, expected {self.EXPECTED}")
+        self._check_numbers()
         return self
 
-    def _range_error(self, message: str) -> ValidationError:
-        return located_errors([((self.kind,), message)])
+    def _check_numbers(self) -> None:
+        raise NotImplementedError
 
     @property
     def kind(self) -> str:
         """Name of the field that is set."""
-        return next(name for name in RANGE_FORMS if getattr(self, name) is not None)
+        return next(name for name in self.FORMS if getattr(self, name) is not None)
+
+    def _error(self, message: str, *path: int) -> ValidationError:
+        return located_errors([((self.kind, *path), message)])
+
+
+class Range(_OneForm):
+    """A range, which is counted before it is written out: exactly one of its fields is given."""
+
+    FORMS = RANGE_FORMS
+    EXPECTED = f"one of {', '.join(f'{name} = {form}' for name, form in RANGE_FORMS.items())}"
+    linspace: tuple[float, float, int] | None = None
+    geomspace: tuple[float, float, int] | None = None
+    arange: tuple[float, float, float] | None = None
+
+    def _check_numbers(self) -> None:
+        first, last, step_or_count = self.numbers
+        ends = f"got {first:g} to {last:g}"
+        if self.kind == "geomspace" and min(first, last) <= 0 <= max(first, last):
+            raise self._error(f"{ends}, expected two ends of the same sign, neither of them 0")
+        if self.kind == "arange" and step_or_count == 0:
+            raise self._error("got 0, expected a step other than 0", 2)
+        if self.size < 1:
+            got = f"no value from {first:g} to {last:g} by {step_or_count:g}"
+            raise self._error(f"got {got}, expected at least one")
+        if self.size > MAX_AXIS_VALUES:
+            size = f"{self.size:,}" if self.size <= MAX_PRINTED_COUNT else f"more than {MAX_PRINTED_COUNT:,}"
+            raise self._error(f"got {size} values, expected at most {MAX_AXIS_VALUES:,} on an axis")
 
     @property
     def numbers(self) -> tuple[float, float, float]:
@@ -300,9 +312,7 @@ class Range(Table):
         return max(math.ceil(size), 0) if math.isfinite(size) else 2 * MAX_PRINTED_COUNT
 
     def values(self, quantity: Quantity) -> tuple[float, ...]:
-        """The values of the range.
-
-        Those between the ends are rounded to 15 significant digits, so that 0.3 is 0.3.
+        """Write the range out; values between the ends are rounded to 15 significant digits, so that 0.3 is 0.3.
 
         Raises
         ------
@@ -322,16 +332,16 @@ class Range(Table):
                 case _:
                     values = np.arange(first, last, step_or_count)
         if not np.isfinite(values).all():
-            raise self._range_error(f"got {first:g} to {last:g}, expected a range that does not overflow")
+            raise self._error(f"got {first:g} to {last:g}, expected a range that does not overflow")
         # the ends are kept as they were written
         inner = slice(1, None if self.kind == "arange" else -1)
         values[inner] = [float(f"{value:.15g}") for value in values[inner].tolist()]
         for extreme in (float(values.min()), float(values.max())):
             if not quantity.allows(extreme):
-                raise self._range_error(f"got a value {extreme!r}, expected {quantity.expected}")
+                raise self._error(f"got a value {extreme!r}, expected {quantity.expected}")
         repeated = np.flatnonzero(np.diff(values) == 0)
         if repeated.size:
-            raise self._range_error(f"got {float(values[repeated[0]])!r} twice, expected each value once")
+            raise self._error(f"got {float(values[repeated[0]])!r} twice, expected each value once")
         return tuple((values + 0.0).tolist())
 
 
@@ -343,12 +353,11 @@ class FitRange(Table):
     @model_validator(mode="after")
     def _check_order(self) -> FitRange:
         least, most = self.fit
+        got = f"got {least:g} to {most:g}"
         if least >= most:
-            raise located_errors([(("fit",), f"got {least:g} to {most:g}, expected {FIT_FORM} with least < most")])
+            raise located_errors([(("fit",), f"{got}, expected {FIT_FORM} with least < most")])
         if not math.isfinite(most - least) or (least > 0.0 and not math.isfinite(most / least)):
-            raise located_errors(
-                [(("fit",), f"got {least:g} to {most:g}, expected bounds that are closer together")]
-            )
+            raise located_errors([(("fit",), f"{got}, expected bounds that are closer together")])
         return self
 
     @property
@@ -364,37 +373,25 @@ class FitRange(Table):
         return 0.5 * least + 0.5 * most
 
 
-class Distribution(Table):
+class Distribution(_OneForm):
     """The distribution of an uncertain input, from which [design] draws: exactly one of its fields is given."""
 
-    model_config = ConfigDict(json_schema_extra=_range_schema)
-
+    FORMS = DISTRIBUTION_FORMS
+    EXPECTED = "one distribution"
     uniform: tuple[float, float] | None = None
     normal: tuple[float, float] | None = None
     lognormal: tuple[float, float] | None = None
     triangular: tuple[float, float, float] | None = None
     empirical: str | tuple[float, ...] | None = None
 
-    @model_validator(mode="after")
-    def _check_numbers(self) -> Distribution:
-        if len(self.model_fields_set) != 1:
-            got = " and ".join(name for name in DISTRIBUTION_FORMS if name in self.model_fields_set)
-            raise value_error(f"got {got}, expected one distribution")
-        form = DISTRIBUTION_FORMS[self.kind]
-        numbers = [part for part in self.parameters if isinstance(part, float)]
-        if self.kind in ("uniform", "triangular") and not (
-            sorted(numbers) == numbers and numbers[0] < numbers[-1]
-        ):
+    def _check_numbers(self) -> None:
+        numbers = [number for number in self.parameters if isinstance(number, float)]
+        is_ordered = numbers == sorted(numbers) and numbers[:1] < numbers[-1:]
+        if self.kind in ("uniform", "triangular") and not is_ordered:
             got = " to ".join(f"{number:g}" for number in numbers)
-            raise located_errors([((self.kind,), f"got {got}, expected {form} in ascending order")])
+            raise self._error(f"got {got}, expected {self.FORMS[self.kind]} in ascending order")
         if self.kind == "lognormal" and numbers[0] <= 0.0:
-            raise located_errors([((self.kind, 0), f"got {numbers[0]:g}, expected a median > 0")])
-        return self
-
-    @property
-    def kind(self) -> str:
-        """Name of the field that is set."""
-        return next(name for name in DISTRIBUTION_FORMS if getattr(self, name) is not None)
+            raise self._error(f"got {numbers[0]:g}, expected a median > 0", 0)
 
     @property
     def parameters(self) -> tuple[float | str, ...]:
@@ -630,68 +627,72 @@ def number_type(quantity: Quantity) -> Any:
 
 @cache
 def numbers_type(quantity: Quantity) -> TypeAdapter[Any]:
-    """The type of a number, list, range, column, fit or distribution; its form decides which type validates it."""
+    """Build the type of a number, list, range, column, fit or distribution, which its form tells apart."""
     number, end = number_type(quantity), number_type(replace(quantity, infinite=False))
     any_number, count = number_type(Quantity(quantity.unit, "")), bounded_int(1).type
-    numbers_of = cast(Any, tuple)
-    types = {
-        "linspace": numbers_of[end, end, count],
-        "geomspace": numbers_of[end, end, count],
-        # the stop and the step of arange need not be allowed values
-        "arange": numbers_of[end, any_number, any_number],
-    }
-    fields: dict[str, Any] = {}
-    for kind, numbers in types.items():
-        form = Field(description=RANGE_FORMS[kind], strict=False)
-        fields[kind] = Annotated[numbers, form, BeforeValidator(_list_of_length(3, RANGE_FORMS[kind]))], None
+    spread = number_type(Quantity(quantity.unit, "", 0.0, above=True))
+    ratio = number_type(Quantity("1", "", 1.0, above=True))
     of_quantity = quantity.expected.removeprefix("a ")
-    range_type = create_model(f"Range of {of_quantity}", __base__=Range, **fields)
+    range_type = create_model(
+        f"Range of {of_quantity}",
+        __base__=Range,
+        **_fields(
+            RANGE_FORMS,
+            linspace=(end, end, count),
+            geomspace=(end, end, count),
+            # the stop and the step of arange need not be allowed values
+            arange=(end, any_number, any_number),
+        ),
+    )
+    file: Any = Annotated[str, expected(DISTRIBUTION_FORMS["empirical"]), Tag(SCALAR)]
+    values: Any = Annotated[_list_of(end, quantity.expected), Tag(LIST)]
+    either = Annotated[file | values, Discriminator(lambda value: SCALAR if isinstance(value, str) else LIST)]
+    distributions = _fields(
+        DISTRIBUTION_FORMS,
+        uniform=(end, end),
+        normal=(end, spread),
+        lognormal=(end, ratio),
+        triangular=(end, end, end),
+    )
+    distributions["empirical"] = Annotated[either, Field(description=DISTRIBUTION_FORMS["empirical"])], None
+    distribution_type = create_model(f"Distribution of {of_quantity}", __base__=Distribution, **distributions)
     bounds = Field(description=f"{FIT_FORM}, between which impact calibrate fits it", strict=False)
-    fit_field: Any = Annotated[numbers_of[end, end], bounds, BeforeValidator(_list_of_length(2, FIT_FORM))]
-    fit_type = create_model(f"Fit of {of_quantity}", __base__=FitRange, fit=(fit_field, ...))
+    fit: Any = Annotated[cast(Any, tuple)[end, end], bounds, BeforeValidator(_list_of_length(2, FIT_FORM))]
+    fit_type = create_model(f"Fit of {of_quantity}", __base__=FitRange, fit=(fit, ...))
     any_form: Any = Annotated[
         Annotated[number, Tag(SCALAR)]
         | Annotated[_list_of(number, quantity.expected), Tag(LIST)]
         | Annotated[range_type, Tag(RANGE)]
         | Annotated[Column, Tag(COLUMN)]
         | Annotated[fit_type, Tag(FIT)]
-        | Annotated[_distribution_type(quantity, end), Tag(DISTRIBUTION)],
+        | Annotated[distribution_type, Tag(DISTRIBUTION)],
         Discriminator(value_form),
     ]
     return TypeAdapter(any_form, config=ConfigDict(strict=True))
 
 
-def _distribution_type(quantity: Quantity, end: Any) -> type[Distribution]:
-    """The type of a distribution of a quantity; `end` is the type of one of its finite values."""
-    spread = number_type(Quantity(quantity.unit, "", 0.0, above=True))
-    ratio = number_type(Quantity("1", "", 1.0, above=True))
-    numbers_of = cast(Any, tuple)
-    types = {
-        "uniform": numbers_of[end, end],
-        "normal": numbers_of[end, spread],
-        "lognormal": numbers_of[end, ratio],
-        "triangular": numbers_of[end, end, end],
+def _fields(forms: Mapping[str, str], **numbers: tuple[Any, ...]) -> dict[str, Any]:
+    """Define optional fields, each a list of numbers of these types in its form."""
+    return {
+        name: (
+            Annotated[
+                cast(Any, tuple)[types],
+                Field(description=forms[name], strict=False),
+                BeforeValidator(_list_of_length(len(types), forms[name])),
+            ],
+            None,
+        )
+        for name, types in numbers.items()
     }
-    fields: dict[str, Any] = {}
-    for kind, numbers in types.items():
-        form = DISTRIBUTION_FORMS[kind]
-        check = BeforeValidator(_list_of_length(3 if kind == "triangular" else 2, form))
-        fields[kind] = Annotated[numbers, Field(description=form, strict=False), check], None
-    file: Any = Annotated[str, expected(DISTRIBUTION_FORMS["empirical"]), Tag(SCALAR)]
-    values: Any = Annotated[_list_of(end, quantity.expected), Tag(LIST)]
-    either = Annotated[file | values, Discriminator(lambda value: SCALAR if isinstance(value, str) else LIST)]
-    fields["empirical"] = Annotated[either, Field(description=DISTRIBUTION_FORMS["empirical"])], None
-    of_quantity = quantity.expected.removeprefix("a ")
-    return create_model(f"Distribution of {of_quantity}", __base__=Distribution, **fields)
 
 
 def _list_of_length(length: int, form: str) -> Callable[[object], object]:
-    """A check that the list of a range, a fit or a distribution has as many numbers as its form."""
+    """Check that the list of a range, a fit or a distribution has as many numbers as its form."""
 
     def check(value: object) -> object:
         if isinstance(value, list | tuple) and len(value) == length:
             return value
-        got = f"a list of {len(value)}" if isinstance(value, list | tuple) else show(value)
+        got = f"a list of {len(value)}" if isinstance(value, list | tuple) else as_text(value)
         raise value_error(f"got {got}, expected {form}")
 
     return check

@@ -6,10 +6,10 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
-from ..contact.formula import argument_names
+from ..contact.dimensionless import required_quantities
+from ..contact.formula_calls import argument_names
 from ..contact.materials import hertz_stiffness
 from ..contact.model import ForceModel, with_base_quantities
-from ..contact.scaling import required_quantities
 from ..contact.timestep import EXACT, SCHEMES, has_scheme, law_problem
 from .draft import Draft, listed_names
 from .files import as_table
@@ -20,6 +20,11 @@ from .tables import FIXED_STEP_INPUTS, MATERIAL_QUANTITIES, SWEEP_QUANTITIES, mo
 def _sets_stiffness(draft: Draft, model: ForceModel) -> bool:
     """Whether [model.KEY] has a K."""
     return "K" in as_table(draft.table("model").get(model.key))
+
+
+def has_other_stiffness(draft: Draft, model: ForceModel) -> bool:
+    """Whether K of [sweep] has another unit than that of a model, because the model has its own exponent."""
+    return model.exponent not in (None, draft.exponent) and not _sets_stiffness(draft, model)
 
 
 def materials_of(draft: Draft, ball: str) -> list[str]:
@@ -94,7 +99,7 @@ def _stiffness_problems(draft: Draft) -> Iterable[ConfigProblem]:
             "its unit N/m^n depends on n, which is an axis; expected one K for each n, zipped with it",
         )
     for model in draft.models:
-        if model.exponent is not None and model.exponent != n and not _sets_stiffness(draft, model):
+        if has_other_stiffness(draft, model):
             exponent = "an axis n" if n is None else f"n = {n:g}"
             # setting n of the sweep helps unless two models have different fixed exponents
             serves = n is not None and {other.exponent for other in draft.models} <= {None, model.exponent}

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import field
 from fnmatch import fnmatchcase
+from pathlib import Path
 from typing import Annotated, Any, Literal, cast
 
 from pydantic import (
@@ -21,6 +23,7 @@ from pydantic import (
 from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
+from ..atomic import write_file
 from ..contact.model import ForceModel
 from ..contact.models import built_in, catalogue
 from ..contact.timestep import EXACT, MAX_STEPS_PER_CONTACT, SCHEMES
@@ -387,23 +390,41 @@ def document_type(models_by_key: Mapping[str, ForceModel], with_tables: Sequence
     )
 
 
-def json_schema() -> dict[str, object]:
-    """JSON Schema (draft 2020-12) of a config, for completion and checks in editors.
+def schema(output: str | Path | None = None, *, overwrite: bool = False) -> dict[str, Any]:
+    """Describe a config by a JSON Schema (draft 2020-12), from which editors complete and check it.
 
     Except for required keys, it does not cover conditions between keys: the rules of `impact.config.rules`, names
     of materials and columns, numbers of points. Nor does it cover the dimension and value of a string with a unit,
     and the size and overflow of a range.
+
+    Parameters
+    ----------
+    output : file to write it to as well
+    overwrite : replace the output if it exists
+
+    Raises
+    ------
+    UsageError : the output exists, or cannot be written there
+    StoreError : the disk is full or failed
+
+    >>> import impact
+    >>> impact.schema()["required"]
+    ['models', 'sweep']
     """
     models = catalogue()
-    schema = document_type(models, list(models)).model_json_schema()
     # these inputs have alternative keys; measurements may contain them
     alternatives = (("v1", "cases"), ("m1", "R1", "cases"), ("m2", "R2", "cases"))
     required = [{"anyOf": [{"required": [key]} for key in keys]} for keys in alternatives]
-    schema |= {
+    content = {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **document_type(models, list(models)).model_json_schema(),
         "if": {"not": {"required": ["data"]}},
         "then": {"properties": {"sweep": {"allOf": required}}},
     }
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+    if output is not None:
+        text = json.dumps(content, indent=2, ensure_ascii=False) + "\n"
+        write_file(Path(output), text.encode(), overwrite=overwrite)
+    return content
 
 
 def _model_names(models: Mapping[str, ForceModel]) -> Any:

@@ -21,15 +21,15 @@ def dragged(elastic: Array, power_of_x: Array, v: Array, c: Array) -> Array:
     return elastic + c * power_of_x * v
 
 
-def stiffer(stretch: Array, n: float, Kr: Array) -> Array:
+def unload_with_stiffness(stretch: Array, n: float, Kr: Array) -> Array:
     """Kᵣ δⁿ above the permanent indentation."""
     return Kr * power(stretch, n)
 
 
-def returning(stretch: Array, recovered: Array, n: float, force_at_peak: Array) -> Array:
+def unload_to_residual(stretch: Array, recovered: Array, n: float, force_at_peak: Array) -> Array:
     """Fₘ ((δ − δₚ)/(δₘ − δₚ))ⁿ."""
     return force_at_peak * power(stretch / recovered, n)
 
 
 # unloading branches that are a constant times the n-th power of the stretch, the recovered indentation
-POWER_LAWS = (spring, stiffer, returning)
+POWER_LAWS = (spring, unload_with_stiffness, unload_to_residual)

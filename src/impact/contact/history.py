@@ -10,9 +10,9 @@ import numpy as np
 from ..array_types import Array
 from ..ode.problem import Params, Problem, Step
 from . import motion
+from .dimensionless import dimensionless_values, with_coefficients, with_units
 from .impacts import Impacts
 from .model import ForceModel
-from .scaling import dimensionless_values, with_coefficients, with_units
 from .simulate import integrate_phases
 from .status import Status
 from .velocity_coordinates import is_strong
@@ -49,7 +49,7 @@ class History:
     e_energetic: float
 
 
-def follow(
+def integrate_history(
     model: ForceModel, impacts: Impacts, *, rtol: float, max_steps: int, times: int | None = None
 ) -> History | None:
     """The time history of a single impact.

@@ -9,7 +9,7 @@ from typing import Literal, NotRequired, Protocol, TypedDict
 
 from ..errors import ModelError, did_you_mean
 from .evidence import Evidence
-from .formula import Formula, argument_names
+from .formula_calls import Formula, argument_names
 from .units import dimension
 
 # arguments of formulas besides the law's own parameters and coefficients, and their units

@@ -19,7 +19,7 @@ from ..array_types import Array, Mask
 from ..errors import ModelError
 from ..ode.events import choose
 from ..ode.problem import Params, Problem, Rates
-from .formula import Formula, argument_names, call_by_name
+from .formula_calls import Formula, argument_names, call_by_name
 from .model import FORCE_ARGUMENTS, ForceModel
 from .piecewise import BREAKPOINT_TOLERANCE, Breakpoint
 from .powers import integer_power, power

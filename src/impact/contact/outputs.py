@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..array_types import Array, Mask
-from .formula import argument_names
+from .dimensionless import dimensionless_values
+from .formula_calls import argument_names
 from .impacts import Impacts, check_inputs
 from .impulse import velocities_after
 from .model import ForceModel, Law
 from .powers import all_within
-from .scaling import dimensionless_values
 from .simulate import CollisionResult, simulate
 from .status import FIRST_FAILURE, LIMIT, NO_IMPACT, STATUS_OK
 from .timestep import EXACT
@@ -88,7 +88,7 @@ def collide(
         `impact.contact.timestep.SCHEMES`
     fixed_step : the phase and the step of a scheme by name, see `impact.contact.simulate.simulate`, each of shape
         (n,)
-    errors : receives a line for each distinct error that the law raised, see `impact.contact.formula.explained`
+    errors : receives a line for each distinct error of the law, see `impact.contact.formula_calls.describe_error`
     names : names of the outputs
 
     Returns

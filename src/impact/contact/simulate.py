@@ -15,12 +15,12 @@ from ..ode.problem import Params, Problem, Solution, Termination
 from ..ode.rk45 import Workspace, integrate
 from . import motion
 from .deduplicate import deduplicate
-from .formula import argument_names, explained
+from .dimensionless import LawValues, chi_of, exact_restitution, with_coefficients, with_units
+from .formula_calls import argument_names, describe_error
 from .model import ForceModel
 from .numba import dispatch
 from .piecewise import in_parts
 from .powers import distinct_values
-from .scaling import LawValues, chi_of, exact_restitution, with_coefficients, with_units
 from .status import LIMIT, STATUS_OK, Status
 from .timestep import EXACT, MAX_CONTACTS, FixedStepResult, collide_at_fixed_step
 from .velocity_coordinates import VelocityCoordinate, is_strong
@@ -211,7 +211,7 @@ def _isolate_failures(
         result = CollisionResult.blank(count)
         if count == 1:
             result.status[:] = Status.MODEL_ERROR
-            errors.setdefault(*explained(model.key, error))
+            errors.setdefault(*describe_error(model.key, error))
             return result
         for half in np.array_split(np.arange(count), 2):
             part = _isolate_failures(
@@ -321,9 +321,9 @@ def _collide_at_fixed_steps(
         )
         _put_fixed_steps(result, where, fixed, step[where], limits >= max_steps)
 
-    going = np.flatnonzero(status == STATUS_OK)
-    if going.size:
-        collide(going)
+    active = np.flatnonzero(status == STATUS_OK)
+    if active.size:
+        collide(active)
     if STEP in values:
         # the contact time is needed only where the balls do not separate within many of those of a linear spring
         unfinished = np.flatnonzero(result.status == Status.NOT_SEPARATED)

@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 
 from ..array_types import Array
 from ..errors import ModelError, UsageError, did_you_mean
-from ..text import safe_text
-from .formula import Formula, argument_names
+from .dimensionless import with_coefficients, with_units
+from .formula_calls import Formula, argument_names
 from .model import ForceModel
 from .motion import MotionLaw, force_at_peak, indentation, unloading_state
 from .powers import power
-from .scaling import with_coefficients, with_units
 from .status import Status
 from .velocity_coordinates import force_form
 
@@ -109,7 +108,7 @@ class FixedStepResult:
 def check_scheme(model: ForceModel, n: float, scheme: str) -> None:
     """Raise a UsageError if there is no such scheme, or if it does not take the law."""
     if scheme not in SCHEMES:
-        raise UsageError(f'no scheme "{safe_text(scheme)}"; {did_you_mean(scheme, list(SCHEMES))}')
+        raise UsageError(f'no scheme "{scheme}"; {did_you_mean(scheme, list(SCHEMES))}')
     if not has_scheme(model, n, scheme):
         raise UsageError(law_problem(model, scheme))
 
@@ -134,7 +133,7 @@ def collide_at_fixed_step(
     ----------
     model : the law
     n : compliance exponent
-    values : `impact.contact.scaling.dimensionless_values`, each of shape (k,)
+    values : `impact.contact.dimensionless.dimensionless_values`, each of shape (k,)
     step : time step, in the contact's own unit of time, shape (k,)
     phase : where in its step the contact begins, 0 < phase <= 1, shape (k,)
     max_steps : steps that a collision may take, for all or of shape (k,); one that takes more never separates
@@ -177,7 +176,7 @@ class _Contacts:
         self.peak, self.residual = x.copy(), np.zeros_like(x)
         self.largest_force = np.full_like(x, -np.inf)
         # the force before the last step, the displacement in it, and its growing part
-        self.last_force, self.moved, self.moved_in = np.zeros_like(x), x.copy(), x.copy()
+        self.last_force, self.displacement, self.approach_displacement = np.zeros_like(x), x.copy(), x.copy()
         # twice the work against the force, and its part while the indentation grows
         self.work, self.approach_work = np.zeros_like(x), np.zeros_like(x)
         self.rows = np.arange(x.size)
@@ -219,8 +218,8 @@ class _Contacts:
 
     def restitution_work(self) -> Array:
         """Twice the work while the indentation falls, of contacts that end in this step, inside it."""
-        out = self.residual - (self.x - self.moved)
-        beyond = self.last_force * (out - self.moved) + self.force_at(self.residual) * out
+        out = self.residual - (self.x - self.displacement)
+        beyond = self.last_force * (out - self.displacement) + self.force_at(self.residual) * out
         return self.work - self.approach_work + beyond
 
     def _formula(self, formula: Formula, params: tuple[Array, ...], extra: Mapping[str, Array]) -> Array:
@@ -237,9 +236,9 @@ class _Contacts:
         """One step of all collisions."""
         force = self.force()
         self.u = self.next_velocity(force)
-        moved = self.step * self.u
-        self.x = self.x + moved
-        self._add_work(force, moved)
+        displacement = self.step * self.u
+        self.x = self.x + displacement
+        self._add_work(force, displacement)
         np.maximum(self.peak, self.x, out=self.peak)
         if self.law.model.unloading is not None:
             turned = ~self.unloads & (self.u <= 0.0)
@@ -266,13 +265,13 @@ class _Contacts:
             return np.where(x + reach * u <= 0.0, u, (u - h * x) / (1.0 + h * reach))
         return u - h * force
 
-    def _add_work(self, force: Array, moved: Array) -> None:
+    def _add_work(self, force: Array, displacement: Array) -> None:
         """Add the work of the force before a step: half of it in the step before, half in the step itself."""
         np.maximum(self.largest_force, force, out=self.largest_force)
-        moved_in = np.maximum(moved, 0.0)
-        self.work += force * (self.moved + moved)
-        self.approach_work += force * (self.moved_in + moved_in)
-        self.last_force, self.moved, self.moved_in = force, moved, moved_in
+        approach_displacement = np.maximum(displacement, 0.0)
+        self.work += force * (self.displacement + displacement)
+        self.approach_work += force * (self.approach_displacement + approach_displacement)
+        self.last_force, self.displacement, self.approach_displacement = force, displacement, approach_displacement
 
     def _turn(self, turned: NDArray[np.bool_]) -> None:
         """Begin the unloading branch of some collisions at the largest indentation that they reached."""
@@ -286,12 +285,12 @@ class _Contacts:
         self.residual[turned] = residual
         self.unloads |= turned
 
-    def keep(self, going: NDArray[np.bool_]) -> None:
+    def keep(self, active: NDArray[np.bool_]) -> None:
         """Remove the collisions that have ended."""
         for name in KEPT_ARRAYS:
-            setattr(self, name, getattr(self, name)[going])
-        self.params = tuple(column[going] for column in self.params)
-        self.branch = tuple(column[going] for column in self.branch)
+            setattr(self, name, getattr(self, name)[active])
+        self.params = tuple(column[active] for column in self.params)
+        self.branch = tuple(column[active] for column in self.branch)
 
 
 # the arrays of `_Contacts` besides the params
@@ -304,8 +303,8 @@ KEPT_ARRAYS = (
     "residual",
     "largest_force",
     "last_force",
-    "moved",
-    "moved_in",
+    "displacement",
+    "approach_displacement",
     "work",
     "approach_work",
     "rows",
@@ -325,12 +324,12 @@ def _run(contacts: _Contacts) -> FixedStepResult:
         steps=contacts.limit.astype(np.int32),
         status=np.full(count, Status.NOT_SEPARATED, np.int8),
     )
-    going = np.ones(count, bool)
+    active = np.ones(count, bool)
     contacts.begin_work()
     for step in range(1, int(contacts.limit.max(initial=0)) + 1):
         contacts.advance()
         is_finite = np.isfinite(contacts.x) & np.isfinite(contacts.u)
-        has_ended = going & ((contacts.x <= contacts.residual) | ~is_finite)
+        has_ended = active & ((contacts.x <= contacts.residual) | ~is_finite)
         is_over = has_ended | (contacts.limit <= step)
         if is_over.any():
             ended = copy(contacts)
@@ -346,10 +345,10 @@ def _run(contacts: _Contacts) -> FixedStepResult:
             result.restitution_work[rows] = ended.restitution_work()
             result.steps[rows] = step
             result.status[rows] = status
-            going &= ~is_over
-            if not going.any():
+            active &= ~is_over
+            if not active.any():
                 break
-            if np.count_nonzero(going) < (1.0 - COMPACTION_SHARE) * going.size:
-                contacts.keep(going)
-                going = np.ones(contacts.x.size, bool)
+            if np.count_nonzero(active) < (1.0 - COMPACTION_SHARE) * active.size:
+                contacts.keep(active)
+                active = np.ones(contacts.x.size, bool)
     return result

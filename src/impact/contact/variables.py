@@ -38,13 +38,12 @@ class Variable:
 
     Parameters
     ----------
-    name : in files, configs and tables
+    name, meaning, equation : in files, configs and tables
     dims : its dimensions, with `AXES` in place of the swept axes
     unit : SI unit in the spelling of configs; "SI" if it depends on the parameter or the output, and "output" for
         the unit of the output that a study is about
     scale : how `compare` judges a difference: relative to this scale at the baseline's point, by a bound of its
         own value, exactly, or not at all
-    meaning, equation : texts for readers
     dtype : of the stored values; "f8" may be stored in single precision
     symbol : its mathtext; "" if the name is a symbol, or there is none
     measured : the interval of measured values; "" if it cannot be measured
@@ -55,10 +54,10 @@ class Variable:
     """
 
     name: str
-    dims: tuple[str, ...]
-    unit: str
-    scale: Scale
     meaning: str
+    dims: tuple[str, ...] = ("model", AXES)
+    unit: str = "1"
+    scale: Scale = "reported"
     equation: str = ""
     dtype: str = "f8"
     symbol: str = ""
@@ -94,71 +93,69 @@ _POINTS, _TIMES = ("model", AXES), ("t",)
 
 # outputs of a collision, in the order of a file
 OUTPUTS = by_name(
-    Variable("v1_post", _POINTS, "m/s", "v0", "velocity of ball 1 after the impact",
+    Variable("v1_post", "velocity of ball 1 after the impact", _POINTS, "m/s", "v0",
              "v1+ = v1 - (1 + e_out)(m/m1) v0", symbol="v_1^+", measured="any"),
-    Variable("v2_post", _POINTS, "m/s", "v0", "velocity of ball 2 after the impact",
+    Variable("v2_post", "velocity of ball 2 after the impact", _POINTS, "m/s", "v0",
              "v2+ = v2 + (1 + e_out)(m/m2) v0", symbol="v_2^+", measured="any"),
-    Variable("v1_reference", (AXES,), "m/s", "v0", "velocity of ball 1 by impulse and momentum",
+    Variable("v1_reference", "velocity of ball 1 by impulse and momentum", (AXES,), "m/s", "v0",
              "v1+ = v1 - (1 + e)(m/m1) v0  (6)", symbol="v_1^+"),
-    Variable("v2_reference", (AXES,), "m/s", "v0", "velocity of ball 2 by impulse and momentum",
+    Variable("v2_reference", "velocity of ball 2 by impulse and momentum", (AXES,), "m/s", "v0",
              "v2+ = v2 + (1 + e)(m/m2) v0  (7)", symbol="v_2^+"),
-    Variable("v1_error", _POINTS, "m/s", "v0", "error of the velocity of ball 1",
+    Variable("v1_error", "error of the velocity of ball 1", _POINTS, "m/s", "v0",
              "v1_post - v1_reference", may_be_nan=True),
-    Variable("v2_error", _POINTS, "m/s", "v0", "error of the velocity of ball 2",
+    Variable("v2_error", "error of the velocity of ball 2", _POINTS, "m/s", "v0",
              "v2_post - v2_reference", may_be_nan=True),
-    Variable("e_out", _POINTS, "1", "1", "restitution that the model delivers",
+    Variable("e_out", "restitution that the model delivers", _POINTS, "1", "1",
              "(v2+ - v1+)/(v1 - v2)  (5)", symbol=r"e_\mathrm{out}", measured="fraction"),
-    Variable("e_error", _POINTS, "1", "1", "delivered minus requested restitution",
+    Variable("e_error", "delivered minus requested restitution", _POINTS, "1", "1",
              "e_out - e", symbol=r"e_\mathrm{out}-e", may_be_nan=True),
-    Variable("peak_indentation", _POINTS, "m", "the peak", "largest indentation",
+    Variable("peak_indentation", "largest indentation", _POINTS, "m", "the peak",
              "δₘ at v = 0", symbol=r"\delta_m", measured="positive"),
-    Variable("permanent_indentation", _POINTS, "m", "the peak", "indentation at the release",
+    Variable("permanent_indentation", "indentation at the release", _POINTS, "m", "the peak",
              "δₚ at the end of the contact", symbol=r"\delta_p", measured="any"),
-    Variable("peak_force", _POINTS, "N", "itself", "largest contact force",
+    Variable("peak_force", "largest contact force", _POINTS, "N", "itself",
              "max F over the approach", symbol="f_m", measured="positive"),
-    Variable("contact_time", _POINTS, "s", "itself", "contact time",
+    Variable("contact_time", "contact time", _POINTS, "s", "itself",
              "from first contact to release", measured="positive"),
-    Variable("energy_loss", _POINTS, "J", "m v0^2/2", "kinetic energy lost",
+    Variable("energy_loss", "kinetic energy lost", _POINTS, "J", "m v0^2/2",
              "m v0²(1 - e_out²)/2", measured="any"),
-    Variable("stiffness", _POINTS, "N/m^n", "itself",
+    Variable("stiffness",
              "contact stiffness used; n is the coordinate exponent; without K and with n other than 1.5 it is "
              "F_m/delta_m^n at the Hertz peak",
-             "K  (12)", symbol="K"),
-    Variable("damping_ratio", _POINTS, "1", "itself", "dimensionless damping, where the law has one",
+             _POINTS, "N/m^n", "itself", "K  (12)", symbol="K"),
+    Variable("damping_ratio", "dimensionless damping, where the law has one", _POINTS, "1", "itself",
              "χ = λ v0/K", symbol=r"\chi", may_be_nan=True),
-    Variable("energy_residual", _POINTS, "1", "bounded by 10 rtol", "residual of the work balance",
+    Variable("energy_residual", "residual of the work balance", _POINTS, "1", "bounded by 10 rtol",
              "[work of the force - m v0²(1 - e_out²)/2]/(m v0²/2)"),
-    Variable("closed_form_error", _POINTS, "1", "bounded by 10 rtol",
-             "distance from the closed form, where one exists",
-             "e_out - exact e_out", may_be_nan=True),
-    Variable("status", _POINTS, "1", "exact", "outcome of the point",
-             "see flag_meanings", "i1", flags={status.name.lower(): int(status) for status in Status}),
-    Variable("in_domain", _POINTS, "1", "exact", "1 if the inputs are in the stated domain of the law",
-             "1 inside every stated interval", "i1",
+    Variable("closed_form_error", "distance from the closed form, where one exists", _POINTS, "1",
+             "bounded by 10 rtol", "e_out - exact e_out", may_be_nan=True),
+    Variable("status", "outcome of the point", _POINTS, "1", "exact",
+             "see flag_meanings", dtype="i1", flags={status.name.lower(): int(status) for status in Status}),
+    Variable("in_domain", "1 if the inputs are in the stated domain of the law", _POINTS, "1", "exact",
+             "1 inside every stated interval", dtype="i1",
              flags={"outside_claimed_domain": 0, "within_claimed_domain": 1}),
-    Variable("steps", _POINTS, "1", "reported", "accepted steps of the integrator",
-             "approach + restitution", "i4"),
-    Variable("e_kinetic", _POINTS, "1", "1",
-             "kinetic restitution; the impulses are the changes of the momentum, so that it is e_out",
-             "τ_r/τ_c  (2)", symbol=r"e_\mathrm{kinetic}", measured="fraction", on_request=True),
-    Variable("e_energetic", _POINTS, "1", "1",
-             "energetic restitution, from the integrated works of the two phases",
-             "√(-W_r/W_c)  (3)", symbol=r"e_\mathrm{energetic}", measured="fraction", on_request=True),
-    Variable("lambda", _POINTS, "N s/m^(n+1)", "itself",
-             "damping factor, where the law has one; n is the coordinate exponent",
-             "λ = χ K/v0  (18)", may_be_nan=True, on_request=True),
-    Variable("separation_time", _POINTS, "s", "itself", "time until the surfaces separate",
+    Variable("steps", "accepted steps of the integrator", _POINTS, "1", "reported",
+             "approach + restitution", dtype="i4"),
+    Variable("e_kinetic", "kinetic restitution; the impulses are the changes of the momentum, so that it is e_out",
+             _POINTS, "1", "1", "τ_r/τ_c  (2)",
+             symbol=r"e_\mathrm{kinetic}", measured="fraction", on_request=True),
+    Variable("e_energetic", "energetic restitution, from the integrated works of the two phases",
+             _POINTS, "1", "1", "√(-W_r/W_c)  (3)",
+             symbol=r"e_\mathrm{energetic}", measured="fraction", on_request=True),
+    Variable("lambda", "damping factor, where the law has one; n is the coordinate exponent",
+             _POINTS, "N s/m^(n+1)", "itself", "λ = χ K/v0  (18)", may_be_nan=True, on_request=True),
+    Variable("separation_time", "time until the surfaces separate", _POINTS, "s", "itself",
              "contact_time + remaining indentation/(e_out v0)", measured="positive", on_request=True),
 )  # fmt: skip
 BY_DEFAULT = tuple(name for name, variable in OUTPUTS.items() if not variable.on_request)
 
 # a time history, over the time since first contact
 HISTORY = by_name(
-    Variable("delta", _TIMES, "m", "reported", "indentation"),
-    Variable("v", _TIMES, "m/s", "reported", "rate of the indentation", symbol=r"\dot{\delta}"),
-    Variable("F", _TIMES, "N", "reported", "contact force"),
-    Variable("x1", _TIMES, "m", "reported", "displacement of ball 1 since first contact"),
-    Variable("x2", _TIMES, "m", "reported", "displacement of ball 2 since first contact"),
-    Variable("v1", _TIMES, "m/s", "reported", "velocity of ball 1"),
-    Variable("v2", _TIMES, "m/s", "reported", "velocity of ball 2"),
+    Variable("delta", "indentation", _TIMES, "m"),
+    Variable("v", "rate of the indentation", _TIMES, "m/s", symbol=r"\dot{\delta}"),
+    Variable("F", "contact force", _TIMES, "N"),
+    Variable("x1", "displacement of ball 1 since first contact", _TIMES, "m"),
+    Variable("x2", "displacement of ball 2 since first contact", _TIMES, "m"),
+    Variable("v1", "velocity of ball 1", _TIMES, "m/s"),
+    Variable("v2", "velocity of ball 2", _TIMES, "m/s"),
 )

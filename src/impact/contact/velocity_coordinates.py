@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..array_types import Array
-from .formula import call_by_name
+from .formula_calls import call_by_name
 from .model import COORDINATE_COEFFICIENTS, ForceModel
 from .powers import integer_power, power
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..array_types import Array
-from ..contact.formula import argument_names, call_by_name
+from ..contact.formula_calls import argument_names, call_by_name
 from ..contact.impacts import Impacts, stiffness as hertz_or_secant
 from ..contact.materials import effective_mass, hertz_stiffness, sphere_mass, sphere_radius
 from ..contact.model import Law
@@ -22,7 +22,7 @@ Stiffness = Callable[[Index], Array]
 
 
 def build_impacts(inputs: Inputs, model: Law, index: Index, stiffness: Stiffness | None = None) -> Impacts:
-    """The impacts of a model at cells of the grid; arrays have length 1 along axes on which they do not vary.
+    """Build the impacts of a model at cells; arrays have length 1 along axes on which they do not vary.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def build_impacts(inputs: Inputs, model: Law, index: Index, stiffness: Stiffness
 
 
 def fixed_steps_at(inputs: Inputs, impacts: Impacts, index: Index) -> dict[str, Array]:
-    """The fixed step and the phase of the impacts at cells, by the names of `simulate`; empty without a scheme."""
+    """Compute the fixed step and the phase at cells, by the names of `simulate`; empty without a scheme."""
     names = inputs.names()
     if "phase" not in names:
         return {}
@@ -100,14 +100,14 @@ def fixed_steps_at(inputs: Inputs, impacts: Impacts, index: Index) -> dict[str, 
 
 
 def values_at(inputs: Inputs, name: str, index: Index) -> Array:
-    """The numbers of a config name at cells; NaN for a name without a value."""
+    """Look up the numbers of a config name at cells; NaN for a name without a value."""
     if name not in inputs.names():
         return np.full((1,) * dimensions(index), np.nan)
     return np.asarray(inputs.column(name, index), float)
 
 
 def property_at(inputs: Inputs, ball: str, key: str, index: Index) -> Array:
-    """A property of the material of a ball, "1" or "2", at cells, such as E [Pa]; NaN where it is unknown."""
+    """Look up a property of a ball's material at cells, such as E [Pa]; NaN where it is unknown."""
     names = inputs.names()
     name = "material" if "material" in names else f"material{ball}"
     if name not in names:
@@ -125,7 +125,7 @@ def property_at(inputs: Inputs, ball: str, key: str, index: Index) -> Array:
 
 
 def mass_at(inputs: Inputs, ball: str, index: Index) -> Array:
-    """The mass of a ball, "1" or "2", at cells [kg]; if the config has none, that of a sphere of its radius.
+    """Compute the mass of a ball at cells [kg]; if the config has none, that of a sphere of its radius.
 
     Raises
     ------
@@ -140,19 +140,19 @@ def mass_at(inputs: Inputs, ball: str, index: Index) -> Array:
 
 
 def radius_at(inputs: Inputs, ball: str, index: Index, mass: Array) -> Array:
-    """The radius of a ball, "1" or "2", at cells [m]; if the config has none, that of a sphere of its mass."""
+    """Compute the radius of a ball at cells [m]; if the config has none, that of a sphere of its mass."""
     if f"R{ball}" in inputs.names():
         return values_at(inputs, f"R{ball}", index)
     return sphere_radius(mass, property_at(inputs, ball, "rho", index))
 
 
 def smaller_radius_at(inputs: Inputs, index: Index) -> Array:
-    """The radius of the smaller ball at cells [m]; NaN where it is unknown."""
+    """Compute the radius of the smaller ball at cells [m]; NaN where it is unknown."""
     return np.fmin(*(radius_at(inputs, ball, index, mass_at(inputs, ball, index)) for ball in "12"))
 
 
 def restitution_at(inputs: Inputs, index: Index) -> Array:
-    """The requested restitution at cells: e, or e = 1 - alpha (v1 - v2), equation (24)."""
+    """Compute the requested restitution at cells: e, or e = 1 - alpha (v1 - v2), equation (24)."""
     if "e" in inputs.names():
         return values_at(inputs, "e", index)
     speed = values_at(inputs, "v1", index) - values_at(inputs, "v2", index)
@@ -165,7 +165,7 @@ def has_stiffness_rule(inputs: Inputs, model: Law) -> bool:
 
 
 def exponents(inputs: Inputs, model: Law) -> tuple[float, ...]:
-    """The compliance exponents of a model in the sweep."""
+    """List the compliance exponents of a model in the sweep."""
     if model.exponent is not None:
         return (model.exponent,)
     return tuple(np.unique(np.asarray(inputs.values("n"), float)).tolist())

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from ..contact.dimensionless import delivered
 from ..contact.evidence import count_states
 from ..contact.model import ForceModel, Parameter
 from ..contact.models import catalogue
 from ..contact.numba.dispatch import serves
-from ..contact.scaling import delivered
 from ..display import Block, Displayed, Styled, Table, Wrapped, html_of
 from ..errors import ModelError, UsageError, did_you_mean
 from ..formatting import decimals, number

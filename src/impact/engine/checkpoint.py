@@ -54,7 +54,7 @@ class WorkFolder:
         return self.folder / f"{number:08d}.npz"
 
     def _header(self, trajectory_range: TrajectoryRange) -> str:
-        """The text in a file that identifies its sweep and its range."""
+        """Identify the sweep and the range of a file by a line of text."""
         fields = trajectory_range.number, trajectory_range.model, trajectory_range.start, trajectory_range.stop
         return " ".join(map(str, (*fields, self.key)))
 
@@ -75,21 +75,7 @@ class WorkFolder:
 
 @contextlib.contextmanager
 def open_work_folder(folder: Path, plan: Plan, run: Run, extends: str = "") -> Iterator[WorkFolder]:
-    """Create or reopen a work folder, and lock it.
-
-    Parameters
-    ----------
-    folder : its path
-    plan : the plan whose ranges it contains
-    run : with `resume` the finished ranges are kept; `overwrite` removes them if they are not resumed
-    extends : seal of the result that is extended, if any, whose trajectories the folder does not contain
-
-    Raises
-    ------
-    InUseError : another process has locked the folder
-    UsageError : the folder exists, and neither `resume` nor `overwrite` is set, or it belongs to another sweep
-    StoreError : the disk is full or failed
-    """
+    """Create or reopen the work folder of a plan, and lock it; `extends` is the seal of an extended result."""
     _check_is_work_folder(folder)
     record = _sweep_record(plan, extends)
     with _locked(folder):
@@ -103,7 +89,7 @@ def lock_work_folder(folder: Path, plan: Plan) -> Iterator[WorkFolder]:
     record = _sweep_record(plan)
     difference = _difference_from(folder, record)
     if difference:
-        raise UsageError(f"{safe_text(str(folder))}: {difference}; expected the folders of one sweep")
+        raise UsageError(f"{folder}: {difference}; expected the folders of one sweep")
     with _locked(folder):
         yield WorkFolder(folder, _record_digest(record))
 
@@ -124,14 +110,13 @@ def remove_stale_work_folder(output: Path, plan: Plan) -> None:
 
 def _check_is_work_folder(folder: Path) -> None:
     """Refuse a file, link or foreign folder that has the name of a work folder."""
-    shown = safe_text(str(folder))
     if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
-        raise UsageError(f"{shown}: is not a folder, and is not modified")
+        raise UsageError(f"{folder}: is not a folder, and is not modified")
     if folder.is_dir() and not os.path.lexists(folder / PLAN_FILE):
         names = [path.name for path in folder.iterdir()]
         foreign = [name for name in names if name != LOCK_FILE and not name.endswith(".part")]
         if foreign:
-            raise UsageError(f"{shown}: contains {safe_text(foreign[0])} and no {PLAN_FILE}, and is not modified")
+            raise UsageError(f"{folder}: contains {foreign[0]} and no {PLAN_FILE}, and is not modified")
 
 
 def remove_work_folder(folder: Path) -> None:
@@ -152,11 +137,9 @@ def _locked(folder: Path) -> Iterator[None]:
             sync_folder(folder.parent)
             lock.acquire()
         except Timeout:
-            raise InUseError(
-                f"{safe_text(str(folder.with_suffix('')))}: is being written by another process"
-            ) from None
+            raise InUseError(f"{folder.with_suffix('')}: is being written by another process") from None
         except OSError as error:
-            raise StoreError(f"{safe_text(str(folder))}: {error.strerror}") from error
+            raise StoreError(f"{folder}: {error.strerror}") from error
         yield
     finally:
         lock.release()
@@ -164,12 +147,12 @@ def _locked(folder: Path) -> Iterator[None]:
 
 def _prepare_folder(folder: Path, record: Mapping[str, Any], run: Run) -> None:
     """Write the plan to a folder, and remove ranges that are not resumed."""
-    shown = safe_text(str(folder))
     try:
         has_leftovers = any(path.name != LOCK_FILE for path in folder.iterdir())
         if has_leftovers and not run.resume and not run.overwrite:
             raise UsageError(
-                f"{shown}: is left of an interrupted sweep; use --resume to continue or --overwrite to start again"
+                f"{folder}: is left of an interrupted sweep; use --resume to continue or --overwrite to start "
+                "again"
             )
         if has_leftovers and _can_resume(folder, record, resume=run.resume):
             return
@@ -179,7 +162,7 @@ def _prepare_folder(folder: Path, record: Mapping[str, Any], run: Run) -> None:
         with atomic_write(folder / PLAN_FILE, overwrite=True) as sink:
             sink.write(json.dumps(record).encode())
     except OSError as error:
-        raise StoreError(f"{shown}: {error.strerror}") from error
+        raise StoreError(f"{folder}: {error.strerror}") from error
 
 
 def _sweep_record(plan: Plan, extends: str = "") -> dict[str, Any]:
@@ -212,7 +195,7 @@ def _can_resume(folder: Path, record: Mapping[str, Any], *, resume: bool) -> boo
         return False
     difference = _difference_from(folder, record)
     if difference:
-        raise UsageError(f"{safe_text(str(folder))}: {difference}; {OTHER_SWEEP_HINT}")
+        raise UsageError(f"{folder}: {difference}; {OTHER_SWEEP_HINT}")
     return True
 
 
@@ -220,7 +203,7 @@ def _difference_from(folder: Path, record: Mapping[str, Any]) -> str | None:
     """State how the sweep of a folder differs from the one of a record; None if they are the same."""
     unknown = [key for key, digest in record["physics"]["plugins"].items() if digest is None]
     if unknown:
-        return f"the model {safe_text(unknown[0])} has no file, so it cannot be compared"
+        return f"the model {unknown[0]} has no file, so it cannot be compared"
     try:
         if not (folder / PLAN_FILE).is_file():
             raise ValueError
@@ -267,7 +250,7 @@ def record_differences(stored: object, current: object, path: str = "") -> Itera
         for index, (stored_element, current_element) in enumerate(zip(stored, current, strict=True)):
             yield from record_differences(stored_element, current_element, f"{path}[{index}]")
     elif stored != current and not (stored != stored and current != current):
-        yield f"{safe_text(path)}: {_short_json(stored)} there, {_short_json(current)} here"
+        yield f"{path}: {_short_json(stored)} there, {_short_json(current)} here"
 
 
 def _short_json(value: object) -> str:

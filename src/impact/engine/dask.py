@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from .._version import __version__
 from ..errors import ImpactError, StoreError, UnfinishedError, UsageError
-from ..text import safe_text
 from .execute import other_version
 from .executors import RANGES_IN_FLIGHT, ExecutorSpec
 from .run import ignore, never
@@ -56,22 +55,8 @@ ResultT = TypeVar("ResultT")
 def cluster(
     scheduler: str | Path, should_stop: Callable[[], bool] = never, on_note: Callable[[str], None] = ignore
 ) -> Iterator[ExecutorSpec]:
-    """Connect to the workers of a scheduler.
-
-    Parameters
-    ----------
-    scheduler : its address, such as "tcp://host:8786"; the path of its scheduler file; or "local", for a temporary
-        scheduler with a worker for each processor of this machine
-    should_stop : when it returns True, connecting is given up
-    on_note : called with the number of workers and the address of the dashboard
-
-    Raises
-    ------
-    UsageError : it cannot be reached or does not answer, dask.distributed is missing, or a worker has another
-        version of this package
-    UnfinishedError : `should_stop` returned True
-    """
-    scheduler_name = safe_text(str(scheduler))
+    """Connect to a scheduler by its address or file, or start a "local" one; `on_note` gets its size."""
+    scheduler_name = str(scheduler)
     if find_spec("distributed") is None:
         extra = 'pip install "impact-sweep[distributed]"'
         raise UsageError(
@@ -114,13 +99,7 @@ def _answer_timeout() -> float:
 def _run_with_timeout(
     limit: float, action: Callable[[], ResultT], should_stop: Callable[[], bool] = never
 ) -> ResultT:
-    """The result of an action that may wait forever; it runs in a daemon thread, which is abandoned then.
-
-    Raises
-    ------
-    TimeoutError : the action takes longer than `limit` seconds
-    UnfinishedError : `should_stop` returned True
-    """
+    """Run an action that may never return in a daemon thread, which is abandoned after `limit` seconds."""
     future: Future[ResultT] = Future()
 
     def run() -> None:
@@ -140,7 +119,7 @@ def _run_with_timeout(
 
 
 def _start_local_cluster(stack: contextlib.ExitStack) -> LocalCluster:
-    """A temporary scheduler that other machines cannot reach; the stack closes it."""
+    """Start a temporary scheduler that other machines cannot reach; the stack closes it."""
     import dask.config
     from distributed import LocalCluster
 
@@ -154,7 +133,7 @@ def _start_local_cluster(stack: contextlib.ExitStack) -> LocalCluster:
 def _connect(
     scheduler: str | Path | LocalCluster, scheduler_name: str, limit: float
 ) -> tuple[Client, dict[str, Any], int]:
-    """A client of a scheduler with workers of this version, the scheduler's info, and the number of workers."""
+    """Connect to a scheduler with workers of this version; returns its info and the number of workers as well."""
     from distributed import Client
 
     timeout = min(CONNECT_TIMEOUT_S, limit)
@@ -165,8 +144,7 @@ def _connect(
         else:
             client = Client(scheduler, set_as_default=False, timeout=timeout)
     except (OSError, ValueError, TypeError, ImportError) as error:
-        reason = safe_text(str(error), 300)
-        raise UsageError(f"{scheduler_name}: {reason}; expected {ADDRESS_EXPECTED}") from None
+        raise UsageError(f"{scheduler_name}: {error}; expected {ADDRESS_EXPECTED}") from None
     try:
         _check_versions(client)
         return client, client.scheduler_info(), len(client.nthreads())
@@ -205,15 +183,13 @@ def _check_versions(client: Client) -> None:
         versions = {"the scheduler": error}
     for location, version in (versions | client.run(eval, VERSION_EXPRESSION, on_error="return")).items():
         if isinstance(version, BaseException):
-            raise UsageError(
-                f"{location}: has no impact: {safe_text(str(version))}; expected impact {__version__}"
-            )
+            raise UsageError(f"{location}: has no impact: {version}; expected impact {__version__}")
         if version != __version__:
             raise UsageError(other_version(location, str(version), __version__))
 
 
 def _capacity(client: Client, scheduler_name: str) -> Callable[[], int]:
-    """A function that returns how many unfinished ranges the workers may have: workers join and leave.
+    """Build the function that returns how many unfinished ranges the workers may have: workers join and leave.
 
     A thread polls the scheduler, which may never answer. All workers of a local cluster must not be gone for long.
     """

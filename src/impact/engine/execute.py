@@ -26,7 +26,6 @@ from ..contact.numba.dispatch import is_installed, serves
 from ..contact.simulate import TABLE_COLUMNS, CollisionResult, simulate
 from ..contact.status import STATUSES
 from ..errors import StoreError, UsageError
-from ..text import safe_text
 from .build_impacts import exponents
 from .executors import ExecutorSpec
 from .plan import Plan
@@ -56,19 +55,13 @@ def reuse_nothing(trajectory_range: TrajectoryRange) -> ReusedPart:
 
 @dataclass(frozen=True)
 class WorkerContext:
-    """What a worker needs to integrate ranges of a sweep.
-
-    Parameters
-    ----------
-    version : of this package
-    solver : settings of the solver
-    sources : name and content of the Python files of plug-in models
-    hashes : key and SHA-256 of the models that are not built in
-    """
+    """What a worker needs to integrate ranges of a sweep."""
 
     version: str
     solver: Solver
+    # name and content of the Python files of plug-in models
     sources: tuple[tuple[str, bytes], ...] = ()
+    # key and SHA-256 of the models that are not built in
     hashes: tuple[tuple[str, str | None], ...] = ()
 
 
@@ -92,18 +85,13 @@ def integrate_columns(model: ForceModel, columns: Columns, solver: Solver) -> In
 
 
 def integrate_remotely(key: str, columns: Columns, context: WorkerContext) -> Integrated:
-    """Integrate trajectories of the model of a key: a pure function, which may run in any process, and repeatedly.
-
-    Raises
-    ------
-    UsageError : this process has another version or other models, or lacks numba where `context` requires it
-    """
+    """Integrate trajectories of the model of a key, in any process, and with the same bits if repeated."""
     return integrate_columns(models_of_context(context)[key], columns, context.solver)
 
 
 @lru_cache(maxsize=4)
 def models_of_context(context: WorkerContext) -> Mapping[str, ForceModel]:
-    """All models of a sweep by key, cached for the most recent sweeps."""
+    """Collect all models of a sweep by key, cached for the most recent sweeps."""
     host = socket.gethostname()
     if context.version != __version__:
         raise UsageError(other_version(host, __version__, context.version))
@@ -118,15 +106,13 @@ def models_of_context(context: WorkerContext) -> Mapping[str, ForceModel]:
     plugins = read_plugins([PythonFile(*source) for source in context.sources])
     missing_models = [key for key, sha256 in context.hashes if plugins.hashes.get(key) != sha256]
     if missing_models:
-        raise UsageError(
-            f"{host}: {safe_text(', '.join(missing_models))}: expected their package in the same version"
-        )
+        raise UsageError(f"{host}: {', '.join(missing_models)}: expected their package in the same version")
     return catalogue(plugins.models)
 
 
 def other_version(location: str, location_version: str, this_version: str) -> str:
     """State that a worker or scheduler has another version."""
-    return f"{location}: has impact {safe_text(location_version)}, this is {this_version}; expected the same"
+    return f"{location}: has impact {location_version}, this is {this_version}; expected the same"
 
 
 def with_core(plan: Plan, maps: Sequence[TrajectoryMap]) -> Plan:
@@ -164,16 +150,8 @@ def integrate_ranges(
 ) -> Iterator[tuple[TrajectoryRange, CollisionResult]]:
     """Integrate ranges of trajectories, and yield each when it is finished: in order in this process alone.
 
-    `find_reused` returns the trajectories of a range that are not integrated, with their results.
-
-    Raises
-    ------
-    UsageError : a model is a Python value, which cannot be sent to a worker; or a worker cannot run the sweep
-    StoreError : workers were killed repeatedly, cannot be reached any more, or return invalid results
-
-    Warns
-    -----
-    UserWarning : a law raised an error; once for each law and distinct error
+    `find_reused` returns the trajectories of a range that are not integrated, with their results. A killed process
+    gets its ranges again, a few times; a warning states each distinct error that a law raised.
     """
     remaining, attempts = deque(todo), Counter[int]()
     reported: set[str] = set()
@@ -256,18 +234,13 @@ def _merge_reused(
 
 
 def _check_integrated(trajectory_range: TrajectoryRange, integrated: object, size: int) -> None:
-    """Refuse a return value of an executor that cannot be the results of `size` trajectories.
-
-    Raises
-    ------
-    StoreError : it has another type, or its arrays have another shape or dtype, or contain an unknown status
-    """
+    """Refuse a return value of an executor that cannot be the results of `size` trajectories."""
     prefix = f"executor: range {trajectory_range.number}"
     collisions, errors = integrated if isinstance(integrated, tuple) and len(integrated) == 2 else (integrated, {})
     if not isinstance(collisions, CollisionResult):
-        raise StoreError(f"{prefix}: got {safe_text(type(collisions).__name__)}, expected CollisionResult")
+        raise StoreError(f"{prefix}: got {type(collisions).__name__}, expected CollisionResult")
     if not isinstance(errors, dict):
-        raise StoreError(f"{prefix}: got {safe_text(type(errors).__name__)}, expected a dict of errors")
+        raise StoreError(f"{prefix}: got {type(errors).__name__}, expected a dict of errors")
     blank = CollisionResult.blank(size)
     for name in TABLE_COLUMNS:
         got, expected = (_dtype_and_shape(getattr(result, name)) for result in (collisions, blank))
@@ -281,7 +254,7 @@ def _check_integrated(trajectory_range: TrajectoryRange, integrated: object, siz
 def _dtype_and_shape(array: object) -> str:
     """Describe an array, or name the type of something else."""
     if not isinstance(array, np.ndarray):
-        return safe_text(type(array).__name__)
+        return type(array).__name__
     return f"{array.dtype} of shape {array.shape}"
 
 
@@ -300,7 +273,7 @@ def _build_submit(
         values = [plugin.model.key for plugin in plan.plugins.items if plugin.is_value]
         if values:
             raise UsageError(
-                f"{safe_text(', '.join(values))} is given as a Python value, which cannot be sent to other "
+                f"{', '.join(values)} is given as a Python value, which cannot be sent to other "
                 "processes; expected the file that it is in, or jobs=1"
             )
         integrate = partial(integrate_remotely, context=context_of(plan))

@@ -61,12 +61,7 @@ SERIAL = ExecutorSpec(_SerialExecutor, lambda: 1, shares_memory=True)
 
 
 def choose_executor(jobs: int = 1, threads: int = 1, executor: Executor | None = None) -> ExecutorSpec:
-    """Choose by a number of processes, a number of threads, or an executor of `concurrent.futures`.
-
-    Raises
-    ------
-    UsageError : more than one of the three is set
-    """
+    """Choose by a number of processes, a number of threads, or an executor of `concurrent.futures`."""
     is_set = {f"jobs = {jobs}": jobs > 1, f"threads = {threads}": threads > 1, "an executor": executor is not None}
     arguments = [argument for argument, is_requested in is_set.items() if is_requested]
     if len(arguments) > 1:

@@ -36,14 +36,7 @@ def dimensions(index: Index) -> int:
 
 @dataclass(frozen=True)
 class Inputs:
-    """The inputs of a sweep: scalars, and the axes of its grid.
-
-    Parameters
-    ----------
-    scalars : by config name
-    axes : the dimensions of the grid in config order
-    materials : by name
-    """
+    """The inputs of a sweep: scalars by config name, and the axes of its grid in config order."""
 
     scalars: Mapping[str, float | str]
     axes: tuple[Axis, ...]
@@ -60,7 +53,7 @@ class Inputs:
         return math.prod(self.shape)
 
     def axes_of_model(self, key: str) -> tuple[int, ...]:
-        """The axes along which the points of a model lie: all but those of other models' parameters."""
+        """List the axes along which the points of a model lie: all but those of other models' parameters."""
         return tuple(number for number, axis in enumerate(self.axes) if not is_foreign(axis.columns, key))
 
     def points_of(self, key: str) -> int:
@@ -68,22 +61,22 @@ class Inputs:
         return math.prod(self.shape[axis] for axis in self.axes_of_model(key))
 
     def names(self) -> tuple[str, ...]:
-        """All config names that have a value, those of axes first."""
+        """List all config names that have a value, those of axes first."""
         return (*(name for axis in self.axes for name in axis.columns), *self.scalars)
 
     def axes_of(self, name: str) -> tuple[int, ...]:
-        """The axes along which a name varies: none for a scalar."""
+        """List the axes along which a name varies: none for a scalar."""
         return tuple(number for number, axis in enumerate(self.axes) if name in axis.columns)
 
     def column(self, name: str, index: Index) -> NDArray[np.generic]:
-        """The values of a name at cells; the array has length 1 along the axes on which the name does not vary."""
+        """Look up the values of a name at cells; of length 1 along the axes on which it does not vary."""
         if name in self.scalars:
             return np.full((1,) * dimensions(index), self.scalars[name])
         (number,) = self.axes_of(name)
         return self._arrays[name][index[number]]
 
     def values(self, name: str) -> NDArray[np.generic]:
-        """All values of a name: those of its axis, or a single value, which is None for a name without a value."""
+        """Look up all values of a name: those of its axis, or a single one, None for a name without a value."""
         if name in self._arrays:
             return self._arrays[name]
         parsed = InputName.parse(name)
@@ -92,11 +85,11 @@ class Inputs:
         return np.asarray(self.scalars.get(name, constant))
 
     def materials_of(self, ball: str) -> frozenset[str]:
-        """The materials that a ball, "1" or "2", has in any cell."""
+        """List the materials that a ball, "1" or "2", has in any cell."""
         return self._ball_materials[ball]
 
     def index(self, slices: Sequence[slice] | None = None) -> Index:
-        """The places of a part of the grid, one array along each axis; by default of the whole grid."""
+        """Index a part of the grid, one array along each axis; by default of the whole grid."""
         slices = [slice(None)] * len(self.axes) if slices is None else slices
         return np.ix_(*(np.arange(size)[cells] for size, cells in zip(self.shape, slices, strict=True)))
 
@@ -115,13 +108,7 @@ class Inputs:
 
 @dataclass(frozen=True)
 class Plan:
-    """A config with the plug-ins that it uses.
-
-    Parameters
-    ----------
-    config : the config
-    plugins : models that are not built in
-    """
+    """A config with the plug-ins that it uses, models that are not built in."""
 
     config: Config
     plugins: Plugins = field(default_factory=Plugins)

@@ -23,7 +23,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import NamedTuple
 
-from ..config.quantities import show
+from ..config.quantities import as_text
 from ..contact.model import ForceModel
 from ..contact.models import catalogue
 from ..errors import NOT_OF_A_PLUGIN, ImpactError, ModelError, UsageError
@@ -45,17 +45,10 @@ class PythonFile(NamedTuple):
 
 @dataclass(frozen=True)
 class Plugin:
-    """A model that is not built in, with its origin and a hash of its definition.
-
-    Parameters
-    ----------
-    model : the model
-    sha256 : of the file that defines the model; see `value_hash` for a Python value; None if no file defines it
-    source : the Python file, if the model comes from one
-    package : name and version of the installed package, if the model comes from one
-    """
+    """A model that is not built in, with the Python file, or the name and version of the package, that has it."""
 
     model: ForceModel
+    # of the file that defines the model, or `value_hash`; None if no file defines it
     sha256: str | None
     source: PythonFile | None = None
     package: str | None = None
@@ -99,39 +92,29 @@ class Plugins:
         return {plugin.model.key: plugin.record for plugin in self.items}
 
     def of(self, models: Sequence[ForceModel]) -> Plugins:
-        """Those that are among `models`."""
+        """Keep those that are among `models`."""
         keys = {model.key for model in models}
         return Plugins(tuple(plugin for plugin in self.items if plugin.model.key in keys))
 
 
 def read_plugins(sources: Sequence[ForceModel | str | Path | PythonFile]) -> Plugins:
-    """The models of installed packages, and those of `sources`.
+    """Collect the models of installed packages, those of `sources`, and all at the top level of its files.
 
     The packages are imported and the files executed: never pass files that a data file names.
-
-    Parameters
-    ----------
-    sources : models, paths of Python files, or files that were read elsewhere; from a file, every `ForceModel` at
-        the top level is taken
-
-    Raises
-    ------
-    UsageError : a file is missing, cannot be read or is not a Python file
-    ModelError : a file or package has a syntax error, raises an error, contains no model, or one with a key in use
 
     >>> law = ForceModel("mine", "Mine", 2026, "F = K δⁿ", "", force=lambda elastic: elastic)
     >>> read_plugins([law]).record["mine"]["file"] is None
     True
     """
     if isinstance(sources, str | Path | ForceModel):
-        raise UsageError(f"plugins: got {safe_text(repr(sources))}, expected a list of models and paths")
+        raise UsageError(f"plugins: got {sources!r}, expected a list of models and paths")
     origins = dict.fromkeys(catalogue(), "built in")
     plugins: list[Plugin] = []
     named_plugins = [(str(plugin.package), plugin) for plugin in installed()]
     for index, source in enumerate(sources):
         named_plugins += _plugins_of_source(source, f"plugins[{index}]")
-    for origin, plugin in named_plugins:
-        name, key = safe_text(origin), plugin.model.key
+    for name, plugin in named_plugins:
+        key = plugin.model.key
         _check_storable(plugin.model, name)
         if key in origins:
             raise ModelError(
@@ -144,7 +127,7 @@ def read_plugins(sources: Sequence[ForceModel | str | Path | PythonFile]) -> Plu
 
 
 def _plugins_of_source(source: object, argument: str) -> list[tuple[str, Plugin]]:
-    """The plug-ins of a source, each with the name of the source in messages."""
+    """Read the plug-ins of a source, each with the name of the source in messages."""
     match source:
         case ForceModel():
             return [(argument, Plugin(source, value_hash(source)))]
@@ -152,18 +135,12 @@ def _plugins_of_source(source: object, argument: str) -> list[tuple[str, Plugin]
             return [(source.name, plugin) for plugin in _plugins_of_file(source)]
         case str() | Path():
             return [(str(source), plugin) for plugin in _plugins_of_file(_read_source(Path(source)))]
-    got = safe_text(repr(source))
-    raise UsageError(f"{argument}: got {got}, expected a ForceModel or the path of a Python file")
+    raise UsageError(f"{argument}: got {source!r}, expected a ForceModel or the path of a Python file")
 
 
 @cache
 def installed() -> tuple[Plugin, ...]:
-    """The models of all installed packages.
-
-    Raises
-    ------
-    ModelError : a package cannot be imported, or its entry point is no model; it has to be fixed or uninstalled
-    """
+    """Import the models of all installed packages; a `ModelError` names a package that has to be repaired."""
     plugins: dict[int, Plugin] = {}
     for point in sorted(entry_points(group=ENTRY_POINT_GROUP), key=lambda point: (point.value, point.name)):
         for plugin in _plugins_of_entry_point(point):
@@ -173,7 +150,7 @@ def installed() -> tuple[Plugin, ...]:
 
 def _plugins_of_entry_point(point: EntryPoint) -> list[Plugin]:
     package = f"{point.dist.name} {point.dist.version}" if point.dist else "a package without a name"
-    location = safe_text(f"{package}: entry point {point.name} = {point.value}")
+    location = f"{package}: entry point {point.name} = {point.value}"
     try:
         loaded = point.load()
     except NOT_OF_A_PLUGIN:
@@ -190,7 +167,7 @@ def _plugins_of_entry_point(point: EntryPoint) -> list[Plugin]:
 
 
 def _models_among(values: Iterable[object]) -> list[ForceModel]:
-    """The models among some values, each once, without built-in models, which a file may import to modify."""
+    """Find the models among some values, each once, without built-in models, which a file may import to modify."""
     built_in = {id(model) for model in catalogue().values()}
     models = {id(value): value for value in values if isinstance(value, ForceModel)}
     return [model for identity, model in models.items() if identity not in built_in]
@@ -203,43 +180,41 @@ def _check_storable(model: ForceModel, name: str) -> None:
     for field, text in texts.items():
         if not isinstance(text, str) or re.search("[\0\ud800-\udfff]", text):
             raise ModelError(
-                f"{name}: model {model.key}: {safe_text(field)}: got {show(text)}, expected text without NUL and "
+                f"{name}: model {model.key}: {field}: got {as_text(text)}, expected text without NUL and "
                 "lone surrogates"
             )
     if not isinstance(model.year, int) or not 0 <= model.year <= 9999:
-        raise ModelError(f"{name}: model {model.key}: year: got {show(model.year)}, expected a year, such as 2026")
+        raise ModelError(
+            f"{name}: model {model.key}: year: got {as_text(model.year)}, expected a year, such as 2026"
+        )
 
 
 def _plugins_of_file(source: PythonFile) -> list[Plugin]:
-    """The models at the top level of a Python file, in order of definition."""
-    name = safe_text(source.name)
+    """Execute a Python file, and take the models at its top level, in order of definition."""
     sha256 = hashlib.sha256(source.content).hexdigest()
-    models = _models_among(vars(_execute_module(source, name, sha256)).values())
+    models = _models_among(vars(_execute_module(source, sha256)).values())
     if not models:
-        raise ModelError(f"{name}: contains no model, expected a ForceModel at its top level")
+        raise ModelError(f"{source.name}: contains no model, expected a ForceModel at its top level")
     return [Plugin(model, sha256, source) for model in models]
 
 
 def _read_source(path: Path) -> PythonFile:
     """Read a Python file."""
-    name = safe_text(str(path))
     if path.suffix != ".py":
-        raise UsageError(f"{name}: its name does not end in .py, expected a Python file")
+        raise UsageError(f"{path}: its name does not end in .py, expected a Python file")
     try:
         # reading something other than a regular file might never end
         if path.exists() and not path.is_file():
-            raise UsageError(f"{name}: not a regular file, expected a Python file")
+            raise UsageError(f"{path}: not a regular file, expected a Python file")
         return PythonFile(str(path), path.read_bytes())
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise UsageError(f"{name}: cannot be read: {safe_text(reason)}") from None
+        raise UsageError(f"{path}: cannot be read: {reason}") from None
 
 
-def _execute_module(source: PythonFile, name: str, sha256: str) -> ModuleType:
-    """Execute exactly the bytes that were hashed as a module, without storing bytecode.
-
-    Its folder is not searched for modules: a plug-in is a single file, so that the hash covers all of it.
-    """
+def _execute_module(source: PythonFile, sha256: str) -> ModuleType:
+    """Execute exactly the bytes that were hashed as a module, without storing bytecode."""
+    # the folder is not searched for modules: a plug-in is a single file, so that the hash covers all of it
     file = str(Path(source.name).absolute())
     try:
         code = compile(source.content, file, "exec", dont_inherit=True)
@@ -248,7 +223,7 @@ def _execute_module(source: PythonFile, name: str, sha256: str) -> ModuleType:
         line = getattr(error, "lineno", None) or 1
         text = safe_text((getattr(error, "text", None) or "").strip(), 60)
         message = error.msg if isinstance(error, SyntaxError) else f"{type(error).__name__}: {error}"
-        raise ModelError(f"{name}:{line}: not Python: {safe_text(message)}{text and f': {text}'}") from None
+        raise ModelError(f"{source.name}:{line}: not Python: {message}{text and f': {text}'}") from None
     module = ModuleType(f"_impact_plugin_{sha256[:16]}")
     module.__file__ = file
     # dataclasses and inspect look a module up by its name
@@ -261,12 +236,12 @@ def _execute_module(source: PythonFile, name: str, sha256: str) -> ModuleType:
         sys.modules.pop(module.__name__, None)
         frames = traceback.walk_tb(error.__traceback__)
         line = [number for frame, number in frames if frame.f_code.co_filename == file][-1]
-        raise ModelError(f"{name}:{line}: {_error_message(error)}") from None
+        raise ModelError(f"{source.name}:{line}: {_error_message(error)}") from None
     return module
 
 
 def _error_message(error: BaseException) -> str:
-    """The message of an error that a plug-in raised."""
+    """State an error that a plug-in raised."""
     text = safe_text(str(error), MAX_ERROR_LENGTH)
     if isinstance(error, ImpactError):
         return text

@@ -13,7 +13,6 @@ from ..config.grid import MAX_POINTS
 from ..contact.simulate import CollisionResult
 from ..contact.status import FIRST_FAILURE
 from ..errors import StoreError, UnfinishedError, UsageError
-from ..text import safe_text
 from .executors import SERIAL, ExecutorSpec
 from .trajectories import TrajectoryRange
 
@@ -112,20 +111,12 @@ class ProgressCounter:
 def report_kept_ranges(
     folder: Path, counter: ProgressCounter, command: str, details: Callable[[Exception], list[str]]
 ) -> Iterator[None]:
-    """Add to the message of an error how many finished trajectories the work folder contains.
-
-    Parameters
-    ----------
-    folder : the work folder
-    counter : counts the finished trajectories
-    command : option or command that continues the sweep
-    details : returns further sentences about an error
-    """
+    """Add to an error how many finished trajectories the folder has, and the option or command that continues."""
     try:
         yield
     except (StoreError, UnfinishedError, UsageError, MemoryError) as error:
         share = f"{counter.progress.trajectories:,} of {counter.progress.of_trajectories:,} trajectories"
-        kept = f"{share} are kept in {safe_text(str(folder))}; {command} continues"
+        kept = f"{share} are kept in {folder}; {command} continues"
         is_memory = isinstance(error, MemoryError)
         lines = ["out of memory" if is_memory else "", str(error), *details(error), kept]
         raise (StoreError if is_memory else type(error))("; ".join(filter(None, lines))) from error

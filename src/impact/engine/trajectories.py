@@ -15,11 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..contact.deduplicate import deduplicate
+from ..contact.dimensionless import dimensionless_values, exponent_names
 from ..contact.impacts import CHECKS, check_inputs
 from ..contact.model import ForceModel
-from ..contact.scaling import dimensionless_values, exponent_names
 from ..errors import UsageError
-from ..text import safe_text
 from .build_impacts import build_impacts, fixed_steps_at
 from .plan import Index, Inputs, Plan, dimensions
 
@@ -66,7 +65,7 @@ class TrajectoryMap:
         return self.of_cell is not None
 
     def rows(self, index: Index) -> NDArray[np.intp]:
-        """The trajectories of cells of the grid; the array has length 1 along axes on which they do not depend."""
+        """Look up the trajectories of cells; of length 1 along axes on which they do not depend."""
         cell = np.zeros((1,) * dimensions(index), np.intp)
         for axis, size in zip(self.axes, self.shape, strict=True):
             cell = cell * size + index[axis]
@@ -88,23 +87,12 @@ class TrajectoryRange:
 
 
 def trajectory_maps(plan: Plan) -> tuple[TrajectoryMap, ...]:
-    """The trajectories of every model of a plan, in the order of the models."""
+    """Find the trajectories of every model of a plan, in the order of the models."""
     return tuple(_build_map(plan, index, model) for index, model in enumerate(plan.models))
 
 
 def check_count(plan: Plan, most: int, name: str) -> None:
-    """Refuse a plan with too many trajectories, before any array is allocated.
-
-    Parameters
-    ----------
-    plan : the plan
-    most : limit of the number of trajectories
-    name : of the config, for the message
-
-    Raises
-    ------
-    UsageError : there are more
-    """
+    """Refuse a plan of too many trajectories before any array is allocated; `name` is that of the config."""
     if plan.points <= most:
         return
     total = 0
@@ -116,8 +104,7 @@ def check_count(plan: Plan, most: int, name: str) -> None:
         total += cells if cells > MAX_CELLS else 0
     if total > most:
         raise UsageError(
-            f"{safe_text(name)}: sweep: got {total:,} trajectories to integrate, expected at most {most:,} "
-            "(--max-points)"
+            f"{name}: sweep: got {total:,} trajectories to integrate, expected at most {most:,} (--max-points)"
         )
 
 
@@ -135,7 +122,7 @@ def _build_map(plan: Plan, model_index: int, model: ForceModel) -> TrajectoryMap
 
 
 def trajectory_ranges(maps: Sequence[TrajectoryMap], size: int = RANGE_TRAJECTORIES) -> Iterator[TrajectoryRange]:
-    """All trajectories in order, in ranges of at most `size`."""
+    """Divide all trajectories, in order, into ranges of at most `size`."""
     number = 0
     for trajectory_map in maps:
         step = even_size(trajectory_map.count, size)
@@ -145,7 +132,7 @@ def trajectory_ranges(maps: Sequence[TrajectoryMap], size: int = RANGE_TRAJECTOR
 
 
 def even_size(count: int, most: int) -> int:
-    """The size of ranges of at most `most` that divide `count` evenly, since a small last range would be slow.
+    """Divide `count` evenly into ranges of at most `most`, since a small last range would be slow; their size.
 
     >>> even_size(20_000, 16_384), even_size(100, 16_384)
     (10000, 100)
@@ -154,7 +141,7 @@ def even_size(count: int, most: int) -> int:
 
 
 def columns_of(plan: Plan, maps: Sequence[TrajectoryMap], trajectory_range: TrajectoryRange) -> Columns:
-    """The dimensionless problems of a range of trajectories, arrays of shape (trajectory_range.size,)."""
+    """Build the dimensionless problems of a range of trajectories, arrays of shape (trajectory_range.size,)."""
     trajectory_map, model = maps[trajectory_range.model], plan.models[trajectory_range.model]
     cells = np.arange(trajectory_range.start, trajectory_range.stop)
     if trajectory_map.first is not None:
@@ -168,14 +155,7 @@ def columns_of(plan: Plan, maps: Sequence[TrajectoryMap], trajectory_range: Traj
 
 
 def columns_at(plan: Plan, model: ForceModel, axes: Sequence[int], index: Index) -> Columns:
-    """The dimensionless problems of a model at cells of the grid, arrays that broadcast against each other.
-
-    Parameters
-    ----------
-    plan, model : the plan and one of its models
-    axes : the axes on which the values of the law depend; inputs that vary along others are not checked
-    index : the cells
-    """
+    """Build the problems of a model at cells, arrays that broadcast; only inputs along `axes` are checked."""
     impacts = build_impacts(plan.inputs, model, index)
     with np.errstate(all="ignore"):
         checks = frozenset(
@@ -200,12 +180,12 @@ def probe_index(inputs: Inputs, swept_names: Iterable[str] = ()) -> Index:
 
 
 def axes_of_arrays(arrays: Iterable[NDArray[Any]]) -> frozenset[int]:
-    """The axes along which any of the arrays varies; the arrays have as many axes as the grid."""
+    """Find the axes along which any of the arrays varies; the arrays have as many axes as the grid."""
     return frozenset(axis for array in arrays for axis, size in enumerate(array.shape) if size > 1)
 
 
 def axes_of_law(inputs: Inputs, model: ForceModel) -> tuple[int, ...]:
-    """The axes on which the values of a law and of its fixed step depend."""
+    """Find the axes on which the values of a law and of its fixed step depend."""
     index = _probe_index(inputs, model)
     impacts = build_impacts(inputs, model, index)
     with np.errstate(all="ignore"):
@@ -214,7 +194,7 @@ def axes_of_law(inputs: Inputs, model: ForceModel) -> tuple[int, ...]:
 
 
 def axes_of_checks(inputs: Inputs, model: ForceModel) -> Mapping[str, frozenset[int]]:
-    """The axes on which each check of `check_inputs` depends."""
+    """Find the axes on which each check of `check_inputs` depends."""
     impacts = build_impacts(inputs, model, _probe_index(inputs, model))
     with np.errstate(all="ignore"):
         checked_arrays = {

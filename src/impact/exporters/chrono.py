@@ -6,7 +6,7 @@ import math
 import re
 
 from ..contact.closed_forms.dashpot import gap_damping
-from ..contact.models.sources import CHRONO
+from ..contact.models.cited_sources import CHRONO
 from ..errors import UsageError
 from ..formatting import number, quantity
 from .code import Code, Collision, Parameters

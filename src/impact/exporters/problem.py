@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 from ..config.load import Config
 from ..contact.impacts import Impacts
@@ -13,9 +13,9 @@ from ..contact.models import find
 from ..engine.plugins import Plugins
 from ..errors import UsageError
 from ..formatting import number
-from ..inverse.solve import placeholder_override, solve_input, unknown_of
+from ..inverse.solve import placeholder, solve_input, unknown_of
 from ..inverse.timestep import FixedStepLaw, fixed_step_law
-from ..results.single_impact import ConfigSource, models_of_source, single_point
+from ..results.single_impact import ConfigSource, open_source, single_point
 from .code import Code, Collision
 from .releases import first_law, law_of_code
 
@@ -106,9 +106,10 @@ def prepare_export(
     ConfigError : an input is not allowed
     """
     plugins, missing = Plugins(()), ""
+    point_source = open_source(source, overrides, plugins)
     if model is not None:
         key = law_of_code(code, model, version)
-    elif models := models_of_source(source, overrides, plugins):
+    elif models := point_source.models:
         key = first_law(code, models, version)
     else:
         key, newest = (first_law(code, tuple(code.laws), release) for release in (version, code.newest))
@@ -122,16 +123,15 @@ def prepare_export(
         name, unknown = f"{key}.{solved}", unknown_of(law, solved)
         if name in at:
             raise UsageError(f"--at: got e and {name}, expected one of the two")
-        changes = [*placeholder_override(law, unknown), *overrides]
-        config, _ = single_point(source, changes, plugins, key, at)
-        del at["e"]
+        config, defaulted_axes = single_point(point_source, key, {**at, **placeholder(law, unknown)})
         requested_e = float(config.scalars["e"])
         result = solve_input(config, plugins, unknown, {"e_out": requested_e})
         if not result.roots:
             lower, upper = map(number, result.attainable)
             raise UsageError(f"--at e={number(requested_e)}: {key} delivers {lower} to {upper} at any {solved}")
-        at[name] = result.roots[0].value
-    config, defaulted_axes = single_point(source, overrides, plugins, key, at)
+        config = replace(config, scalars={**config.scalars, name: result.roots[0].value})
+    else:
+        config, defaulted_axes = single_point(point_source, key, at)
     fixed, collision = fixed_step_law(config, PHASES, code.scheme)
     return ExportProblem(
         code=code,

@@ -35,9 +35,8 @@ from ..engine.plan import Inputs, Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..errors import UsageError, did_you_mean
 from ..formatting import number, quantity
-from ..results.single_impact import single_point
+from ..results.single_impact import open_source, single_point
 from ..results.sweep import sweep_in_memory
-from ..text import safe_text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -186,8 +185,8 @@ def solve(
     plugin_set = read_plugins(plugins)
     law = find(model, plugin_set.models)
     unknown = unknown_of(law, name)
-    changes = [*placeholder_override(law, unknown), *overrides]
-    config, _ = single_point(source, changes, plugin_set, model, at, over)
+    inputs = {**placeholder(law, unknown), **(at or {})}
+    config, _ = single_point(open_source(source, overrides, plugin_set), model, inputs, over)
     return solve_input(config, plugin_set.of(config.models), unknown, target)
 
 
@@ -207,19 +206,17 @@ def unknown_of(model: ForceModel, name: str) -> Parameter:
     if "e" in model.quantities:
         unknowns["e"] = Parameter("e", "1", "restitution to ask for", default=0.5, least=0.0, most=1.0)
     if name not in unknowns:
-        raise UsageError(
-            f'--for: {model.key} has no parameter "{safe_text(name)}"; {did_you_mean(name, list(unknowns))}'
-        )
+        raise UsageError(f'--for: {model.key} has no parameter "{name}"; {did_you_mean(name, list(unknowns))}')
     return unknowns[name]
 
 
-def placeholder_override(model: ForceModel, unknown: Parameter) -> list[str]:
-    """The override that gives the unknown a valid value, so that the config needs none."""
+def placeholder(model: ForceModel, unknown: Parameter) -> dict[str, float]:
+    """Give the unknown a valid value by its config name, so that the config needs none."""
     if unknown.name == "K":
-        return []
+        return {}
     value = next((v for v in (unknown.default, unknown.typical) if v is not None), 1.0)
-    value = min(max(value, unknown.least), unknown.most)
-    return [f"sweep.e={value!r}" if unknown.name == "e" else f"model.{model.key}.{unknown.name}={value!r}"]
+    name = "e" if unknown.name == "e" else f"{model.key}.{unknown.name}"
+    return {name: min(max(value, unknown.least), unknown.most)}
 
 
 def check_target(target: Mapping[str, float]) -> tuple[str, float]:
@@ -234,9 +231,9 @@ def check_target(target: Mapping[str, float]) -> tuple[str, float]:
         raise UsageError(f"--target: got {len(target)} targets, expected one, such as e_out=0.6")
     ((name, value),) = target.items()
     if name not in names:
-        raise UsageError(f'--target: no output "{safe_text(name)}"; {did_you_mean(name, names)}')
+        raise UsageError(f'--target: no output "{name}"; {did_you_mean(name, names)}')
     if not (isinstance(value, int | float) and math.isfinite(value)):
-        raise UsageError(f"--target {name}: got {safe_text(str(value))}, expected a finite number")
+        raise UsageError(f"--target {name}: got {value}, expected a finite number")
     return name, float(value)
 
 

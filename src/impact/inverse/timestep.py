@@ -20,10 +20,10 @@ from scipy.optimize import elementwise
 
 from ..array_types import Array
 from ..config.load import Config
+from ..contact.dimensionless import dimensionless_values
 from ..contact.impacts import Impacts
 from ..contact.model import ForceModel
 from ..contact.outputs import collide
-from ..contact.scaling import dimensionless_values
 from ..contact.status import FIRST_FAILURE, Status
 from ..contact.timestep import (
     KICK_DRIFT,
@@ -40,7 +40,7 @@ from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
 from ..errors import UsageError
 from ..formatting import decimals, number, quantity
-from ..results.single_impact import single_point
+from ..results.single_impact import open_source, single_point
 
 # steps per contact if none are given
 STEPS_PER_CONTACT = (10.0, 20.0, 50.0, 100.0)
@@ -212,7 +212,7 @@ def timestep(
     """
     if phases < 1:
         raise UsageError(f"--phases: got {phases}, expected a whole number >= 1")
-    config, _ = single_point(source, overrides, read_plugins(plugins), model, at)
+    config, _ = single_point(open_source(source, overrides, read_plugins(plugins)), model, at)
     law, collision = fixed_step_law(config, phases, scheme)
     if not steps_per_contact and not dt:
         steps_per_contact = STEPS_PER_CONTACT

@@ -51,7 +51,7 @@ def calibration_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     keys = [str(key) for key in dataset["model"].values]
     for key in choice.models or ():
         if key not in keys:
-            raise UsageError(f'no model "{safe_text(key)}" in this calibration; {did_you_mean(key, keys)}')
+            raise UsageError(f'no model "{key}" in this calibration; {did_you_mean(key, keys)}')
     shown = [key for key in keys if key in choice.models] if choice.models else keys[:MAX_LAWS]
     not_drawn = tuple(f"{key}, rank {keys.index(key) + 1}" for key in keys if key not in shown)
     data = dataset.load().sel(model=shown)

@@ -11,13 +11,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..config.columns import columns_of_table, read_csv
-from ..config.quantities import Quantity, show
+from ..config.quantities import Quantity, as_text
 from ..config.tables import SWEEP_QUANTITIES
 from ..contact.variables import HISTORY, OUTPUTS
 from ..errors import ConfigError, UsageError, did_you_mean
 from ..formatting import heading, number
 from ..results.schema import plain_unit
-from ..text import safe_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -44,11 +43,9 @@ def check_table(path: Path, form: str) -> None:
     """
     if path.suffix.lower() not in TABLE_SUFFIXES:
         *most, last = TABLE_SUFFIXES
-        raise UsageError(
-            f"--data {safe_text(str(path))}: expected a name that ends in {', '.join(most)} or {last}"
-        )
+        raise UsageError(f"--data {path}: expected a name that ends in {', '.join(most)} or {last}")
     if form not in TABLE_FORMS:
-        raise UsageError(f"--data-form: got {safe_text(form)}, expected {' or '.join(TABLE_FORMS)}")
+        raise UsageError(f"--data-form: got {form}, expected {' or '.join(TABLE_FORMS)}")
 
 
 def encode_table(plot_data: PlotData, suffix: str, form: str = "wide") -> bytes:
@@ -117,7 +114,7 @@ class Points:
         if panel.x_name not in self.columns or not shown:
             needs = f"{panel.x_name} and {' or '.join(variables)}"
             has = ", ".join(self.columns)
-            raise UsageError(f"{self.source}: the picture shows {safe_text(needs)}, and the points have {has}")
+            raise UsageError(f"{self.source}: the picture shows {needs}, and the points have {has}")
         if SIGMA in self.columns and len(shown) > 1:
             raise UsageError(f"{self.source}: {SIGMA} of which, {' or '.join(shown)}? expected one of them")
         artists: dict[str, Artist] = {}
@@ -157,7 +154,7 @@ def read_points(points: str | Path | pd.DataFrame | xr.Dataset) -> Points:
     variable = ""
     for name in columns.units:
         if name not in quantities:
-            raise ConfigError(columns.problem(f"got {show(name)}; {did_you_mean(name, sorted(quantities))}"))
+            raise ConfigError(columns.problem(f"got {as_text(name)}; {did_you_mean(name, sorted(quantities))}"))
         quantity, unit = quantities[name], ""
         if name == SIGMA and variable:
             quantity, unit = replace(quantity, unit=quantities[variable].unit), columns.units[variable]

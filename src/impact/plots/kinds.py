@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
 from ..errors import UsageError, did_you_mean
-from ..text import safe_text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -71,7 +70,7 @@ class Choice:
 
     def __post_init__(self) -> None:
         if self.log not in ("", *LOG_AXES):
-            raise UsageError(f"--log: got {safe_text(self.log)}, expected {', '.join(LOG_AXES)}")
+            raise UsageError(f"--log: got {self.log}, expected {', '.join(LOG_AXES)}")
 
 
 @dataclass(frozen=True)
@@ -115,14 +114,14 @@ def length(size: str | float | None, option: str) -> float | None:
     if isinstance(inches, str) or not MIN_SIZE_INCHES <= inches <= MAX_SIZE_INCHES:
         expected = f"a length from 26mm to {MAX_SIZE_INCHES:g}in, such as 84mm, 8.4cm or 3.3in"
         names = f", or {' or '.join(WIDTHS)}" if option.endswith("width") else ""
-        raise UsageError(f"{option}: got {safe_text(str(size))}, expected {expected}{names}")
+        raise UsageError(f"{option}: got {size}, expected {expected}{names}")
     return float(inches)
 
 
 def check_kind(kind: str) -> None:
     """Raise a UsageError, which names the nearest kind, if there is no such kind of picture."""
     if kind not in KINDS:
-        raise UsageError(f'--kind: no kind "{safe_text(kind)}"; {did_you_mean(kind, list(KINDS))}')
+        raise UsageError(f'--kind: no kind "{kind}"; {did_you_mean(kind, list(KINDS))}')
 
 
 def default_kind(dataset: xr.Dataset) -> str:

@@ -93,13 +93,13 @@ def check_labels(labels: Mapping[str, str], shown: Collection[str]) -> None:
     """
     for key, text in labels.items():
         if key not in shown:
-            known = safe_text(", ".join(sorted(shown)), 800)
-            raise UsageError(f'--label: nothing in the picture is called "{safe_text(key)}"; known: {known}')
+            known = ", ".join(sorted(shown))
+            raise UsageError(f'--label: nothing in the picture is called "{key}"; known: {known}')
         try:
             MathTextParser("path").parse(text)
         except ValueError as error:
-            reason = safe_text(str(error).strip().splitlines()[-1])
-            raise UsageError(f"--label {safe_text(f'{key}={text}')}: is not valid mathtext: {reason}") from None
+            reason = str(error).strip().splitlines()[-1]
+            raise UsageError(f"--label {key}={text}: is not valid mathtext: {reason}") from None
 
 
 def axis_text(meaning: str, name: str, unit: str, labels: Mapping[str, str]) -> str:

@@ -191,7 +191,7 @@ def _map_data(
         raise UsageError(NO_SWEEP)
     if variable not in dataset.data_vars:
         hint = did_you_mean(variable, [str(name) for name in dataset.data_vars])
-        raise UsageError(f'no variable "{safe_text(variable)}" in this result; {hint}')
+        raise UsageError(f'no variable "{variable}" in this result; {hint}')
     data, x, y, not_drawn = take_plane(dataset, kind, choice.x, choice.y, choice.sel, choice.models)
     field, plane = data[variable], (*data[y].dims, *data[x].dims)
     left_out: tuple[str, ...] = ()
@@ -210,7 +210,7 @@ def _map_data(
         raise UsageError(f"cannot draw {what}: it has no value there")
     for letter, name in (("x", x), ("y", y)):
         if letter in choice.log and data[name].values[0] <= 0.0:
-            raise UsageError(f"--log {letter}: {safe_text(name)} got values <= 0, expected values > 0")
+            raise UsageError(f"--log {letter}: {name} got values <= 0, expected values > 0")
     names: list[tuple[str, str | None]] = [(f"{REFERENCE} (6), (7)" if choice.equations else REFERENCE, None)]
     if "model" in field.dims:
         by_model = (data.isel(model=index) for index in range(field.sizes["model"]))

@@ -57,7 +57,7 @@ def take_line(
     kept = [dataset[name].dims[0] for name in keep if name in dataset.coords and dataset[name].ndim == 1]
     line, not_drawn = _sorted_along(_drop_other_axes(dataset, [dataset[x].dims[0], *kept]), x)
     if not line[x].size:
-        raise UsageError(f"{safe_text(x)} has no finite value to draw over")
+        raise UsageError(f"{x} has no finite value to draw over")
     return line, x, not_drawn
 
 
@@ -83,11 +83,11 @@ def take_plane(
         try:
             along.append(x_axis(plain.isel(dict.fromkeys(taken, 0)), None))
         except UsageError:
-            has = f"{safe_text(along[0])} alone; sweep a second" if along else "none; sweep e and another"
+            has = f"{along[0]} alone; sweep a second" if along else "none; sweep e and another"
             raise UsageError(f"{kind} needs two axes; this result has {has}, or use --kind restitution") from None
         dims.append(dataset[along[-1]].dims[0])
     if dims[0] == dims[1]:
-        raise UsageError(f"{kind} needs two axes; {safe_text(f'{along[0]} and {along[1]} vary together')}")
+        raise UsageError(f"{kind} needs two axes; {along[0]} and {along[1]} vary together")
     plane = _drop_other_axes(dataset, dims)
     not_drawn: tuple[str, ...] = ()
     for name in along:
@@ -96,7 +96,7 @@ def take_plane(
         different = np.unique(finite).size
         if different < max(2, finite.size):
             has = "has a value twice" if different > 1 else f"has {different} that can be drawn"
-            raise UsageError(f"{kind} needs different values along each axis; {safe_text(name)} {has}")
+            raise UsageError(f"{kind} needs different values along each axis; {name} {has}")
         plane, left_out = _sorted_along(plane, name)
         not_drawn += left_out
     first, second = along if x is not None or y is None else along[::-1]
@@ -175,10 +175,8 @@ def x_axis(dataset: xr.Dataset, x: str | None) -> str:
         if x not in lines:
             if x in dataset.coords and dataset[x].ndim > 1:
                 dims = ", ".join(str(dim) for dim in dataset[x].dims)
-                raise UsageError(
-                    f"cannot draw over {safe_text(x)}, which varies over {dims}; select one with --sel"
-                )
-            raise UsageError(f'cannot draw over "{safe_text(x)}"; {did_you_mean(x, lines)}')
+                raise UsageError(f"cannot draw over {x}, which varies over {dims}; select one with --sel")
+            raise UsageError(f'cannot draw over "{x}"; {did_you_mean(x, lines)}')
         return x
     # prefer floats: an integer axis only numbers the points; axes come before parameters of single laws
     for name in ("e", *(dim for dim in dataset.sizes if dim in lines and _is_float(dataset, str(dim))), *lines):

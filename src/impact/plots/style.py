@@ -20,7 +20,6 @@ from matplotlib.figure import Figure
 from ..atomic import write_file
 from ..contact.models import catalogue
 from ..errors import UsageError
-from ..text import safe_text
 from .kinds import WIDTHS
 
 # the colours of Okabe and Ito without yellow, which is invisible on white; the number of markers is coprime to
@@ -65,13 +64,12 @@ def _style_of(style: str | Path | None) -> Mapping[Any, Any]:
 
     if str(style) in styles.library:
         return styles.library[str(style)]
-    shown = safe_text(str(style))
     if not Path(style).is_file():
-        raise UsageError(f"--style {shown}: no such file, and no style of matplotlib")
+        raise UsageError(f"--style {style}: no such file, and no style of matplotlib")
     try:
         return rc_params_from_file(str(style), use_default_template=False)
     except (OSError, ValueError, KeyError) as error:
-        raise UsageError(f"--style {shown}: cannot be read: {safe_text(str(error))}") from None
+        raise UsageError(f"--style {style}: cannot be read: {error}") from None
 
 
 def default_size() -> tuple[float, float | None]:
@@ -126,14 +124,14 @@ def check_picture(path: Path) -> str:
     ------
     UsageError : the ending is not one of METADATA, or the format needs a program that is not installed
     """
-    kind, shown = path.suffix.lower().removeprefix("."), safe_text(str(path))
+    kind = path.suffix.lower().removeprefix(".")
     if kind not in METADATA:
         *most, last = (f".{name}" for name in METADATA)
-        raise UsageError(f"{shown}: expected a name that ends in {', '.join(most)} or {last}")
+        raise UsageError(f"{path}: expected a name that ends in {', '.join(most)} or {last}")
     latex = str(rcParams["pgf.texsystem"])
     if kind == "pgf" and shutil.which(latex) is None:
         raise UsageError(
-            f"{shown}: .pgf needs {latex} of LaTeX, which is not installed; .pdf and .eps do without it"
+            f"{path}: .pgf needs {latex} of LaTeX, which is not installed; .pdf and .eps do without it"
         )
     return kind
 
@@ -153,7 +151,7 @@ def encoded(figure: Figure, kind: str, style: str | Path | None = None) -> bytes
             figure.savefig(buffer, format=kind, **options)
         except RuntimeError as error:
             # LaTeX runs for the format .pgf, and if the user sets text.usetex
-            reason = safe_text(" ".join(str(error).split()), 300)
+            reason = " ".join(str(error).split())
             raise UsageError(f"the picture cannot be drawn as .{kind}: {reason}") from None
     if kind == "eps":
         return re.sub(rb"(?m)^%%CreationDate:.*\n", b"", buffer.getvalue())

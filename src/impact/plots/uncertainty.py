@@ -61,7 +61,7 @@ def uncertainty_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
         raise UsageError(NEEDS_SAMPLES)
     name = choice.variable or "e_out"
     if name not in dataset.data_vars:
-        raise UsageError(f'no variable "{safe_text(name)}" in this result')
+        raise UsageError(f'no variable "{name}" in this result')
     x = choice.x
     if x is None:
         chosen = select(dataset, choice.sel or {})
@@ -69,7 +69,7 @@ def uncertainty_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
         free = [key for key in lines if chosen[key].dims[0] not in (SAMPLE, "model") and chosen[key].size > 1]
         x = "e" if "e" in free else next(iter(free), None)
     elif x in dataset.coords and dataset[x].dims == (SAMPLE,):
-        raise UsageError(f"--x {safe_text(x)}: is an uncertain input, expected another axis")
+        raise UsageError(f"--x {x}: is an uncertain input, expected another axis")
     line, x_name, not_drawn = take_line(dataset, x or SAMPLE, choice.sel, choice.models, keep=(SAMPLE,))
     line = read(line, [name])
     variable = OUTPUTS[name]

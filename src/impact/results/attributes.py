@@ -10,7 +10,6 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, NonNegativeInt, TypeAdapter, ValidationError
 
 from ..errors import ResultError
-from ..text import safe_text
 
 
 class PluginRecord(BaseModel):
@@ -107,7 +106,7 @@ def read_attribute(attributes: Mapping[Any, Any], name: str, source: str = "", *
     except ValidationError:
         pass
     what = "missing" if text is None else "not JSON of the expected type"
-    raise ResultError(f"{safe_text(source)}{': ' if source else ''}attribute {name}: {what}")
+    raise ResultError(f"{source}{': ' if source else ''}attribute {name}: {what}")
 
 
 @cache

@@ -24,7 +24,7 @@ from ..engine.execute import context_of, integrate_columns, with_core
 from ..engine.plan import Plan
 from ..engine.run import Run, ignore
 from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryMap, columns_of, trajectory_maps, trajectory_ranges
-from .factored import factored_template
+from .layouts import LAYOUTS
 from .schema import dataset_template, stored_variables
 from .sweep import prepare
 from .trajectory_table import expanded_slabs, table_of
@@ -179,22 +179,20 @@ def estimate(
     positions = np.arange(RANGE_TRAJECTORIES) % chosen.size
     table = table_of(plan, maps, lambda _, start, stop: collisions.take(positions[: stop - start]))
     with _timed() as assembling:
-        _, _, _, values = next(expanded_slabs(table, stored_variables(plan)))
+        values = next(expanded_slabs(table, stored_variables(plan))).values
         for array in values.values():
             hashlib.sha256(array.tobytes())
     slab = values["status"].size
-    is_full = plan.layout == "full"
     each, seconds_per_trajectory_of_driver = integrating() / chosen.size, DASK_OVERHEAD * driving() / chosen.size
-    writing_seconds = assembling() / slab * plan.stored_points if is_full else 0.0
+    writing_seconds = assembling() / slab * plan.stored_points if plan.layout == "full" else 0.0
     busy = min(max(round(each / seconds_per_trajectory_of_driver), 1), len(ranges))
     work_folder_bytes = total * sum(getattr(collisions, name).itemsize for name in TABLE_COLUMNS)
-    whole = dataset_template(plan)
     counts = [*(count for count in WORKER_COUNTS if count < busy), busy]
     return Estimate(
         plan.points,
         total,
         tuple(_model_counts(plan, trajectory_map) for trajectory_map in maps),
-        (whole if is_full else factored_template(whole, table, stored_variables(plan))).nbytes,
+        LAYOUTS[plan.layout].template(dataset_template(plan), plan, table).nbytes,
         work_folder_bytes,
         each * total / jobs + writing_seconds,
         plan.config.solver.core,
@@ -205,7 +203,7 @@ def estimate(
 
 @contextmanager
 def _timed() -> Iterator[Callable[[], float]]:
-    """A function that returns the seconds that the block took."""
+    """Measure the seconds that a with block takes."""
     begun = time.perf_counter()
     ended = begun
     yield lambda: ended - begun

@@ -32,11 +32,12 @@ from ..errors import ResultError, UsageError
 from ..text import safe_text
 from .attributes import read_attribute
 from .kinds import require_sweep
+from .layouts import FillSlab
 from .outcome import SweepOutcome
 from .provenance import stored_config
 from .selection import IndexArray, match_labels
-from .sweep import Extension, SlabValues, sweep_into
-from .trajectory_table import TrajectoryTable, table_of_result
+from .sweep import Extension, sweep_into
+from .trajectory_table import ExpandedSlab, TrajectoryTable, table_of_result
 from .xarray_backend import load, open_result
 
 # statuses that are assigned before integration
@@ -130,18 +131,17 @@ def extend_to_file(
     plugin_set = read_plugins(plugins)
     with run.connected() as connected:
         outcome = _extend_into(target, source, overrides, plugin_set, connected)
-    run.check_stop(f"{safe_text(str(target))} is complete")
+    run.check_stop(f"{target} is complete")
     return outcome
 
 
 def _extend_into(output: Path, source: Path, overrides: Sequence[str], plugins: Plugins, run: Run) -> SweepOutcome:
-    """Write the extended result.
+    """Write the extended result: that of a single sweep of its config.
 
-    It has the same variables and coordinates as a single sweep of its config. A result of layout `full` holds
-    values of points and no trajectories: those of all new points are integrated, also where a point of the result
-    had the same one.
+    A result of layout `full` holds values of points and no trajectories: those of all new points are integrated,
+    also where a point of the result had the same one.
     """
-    name = safe_text(str(source))
+    name = str(source)
     before = open_result(source)
     table = table_of_result(before)
     require_sweep(before, "extend")
@@ -252,7 +252,7 @@ def _check_changes(old: Plan, new: Plan, name: str) -> None:
     ]
     if changed or moved:
         raise UsageError(
-            f"{name}: --set changes {safe_text(', '.join([*changed, *moved]))}, expected more values of an axis, "
+            f"{name}: --set changes {', '.join([*changed, *moved])}, expected more values of an axis, "
             "such as --set 'sweep.m2=[1.0, 2.0]', or more models"
         )
     if old.models == new.models and old.config.axes == new.config.axes:
@@ -284,19 +284,14 @@ def _check_none_lost(old: Plan, axes: Sequence[_AxisPositions], name: str) -> No
 
 
 def _axis_positions(axis: Axis, old: Inputs, name: str) -> _AxisPositions:
-    """Find the positions that the values of an axis have in the old result.
-
-    Raises
-    ------
-    UsageError : its columns were several axes, or its points had other labels or another order
-    """
+    """Find the positions that the values of an axis have in the old result."""
     axes = {axis_number for column in axis.columns for axis_number in old.axes_of(column)}
     if len(axes) > 1:
-        shown = safe_text(", ".join(map(str, axis.columns)))
+        shown = ", ".join(map(str, axis.columns))
         raise UsageError(f"{name}: {shown} vary together now and did not before; sweep the new config")
     numbered = {old.axes[axis_number].numbered for axis_number in axes}
     if numbered - {axis.numbered}:
-        raise UsageError(f"{name}: the points of {safe_text(axis.name)} had other labels; sweep the new config")
+        raise UsageError(f"{name}: the points of {axis.name} had other labels; sweep the new config")
     columns = [np.atleast_1d(old.values(column)).tolist() for column in axis.columns]
     size = max(map(len, columns))
     before = [*zip(*(values * size if len(values) == 1 else values for values in columns), strict=True)]
@@ -306,7 +301,7 @@ def _axis_positions(axis: Axis, old: Inputs, name: str) -> _AxisPositions:
         changed = [number for number, row in enumerate(before) if rows[number : number + 1] != [row]]
         if changed:
             raise UsageError(
-                f"{name}: --set changes {safe_text(axis.name)} {changed[0]}, expected the cases that the result "
+                f"{name}: --set changes {axis.name} {changed[0]}, expected the cases that the result "
                 "has, in their order, and more after them"
             )
         positions = [number if number < size else -1 for number in range(axis.size)]
@@ -403,15 +398,15 @@ class _OldPositions:
         rows = old_map.rows(tuple(index)) if index else np.zeros(cells.shape, np.intp)
         return np.where(self._is_old(trajectory_map, cells), rows, -1)
 
-    def filler(self, before: xr.Dataset) -> Callable[[int, tuple[slice, ...], SlabValues], None]:
+    def filler(self, before: xr.Dataset) -> FillSlab:
         """Build the function that copies the values of the old result into the values of a slab."""
         names = [axis.name for axis in self.old.config.axes]
 
-        def fill(model: int, region: tuple[slice, ...], values: SlabValues) -> None:
-            old_model = self.model(model)
+        def fill(slab: ExpandedSlab) -> None:
+            old_model = self.model(slab.model)
             if old_model is None:
                 return
-            old_positions = [axis.positions[part] for axis, part in zip(self.axes, region, strict=True)]
+            old_positions = [axis.positions[part] for axis, part in zip(self.axes, slab.region, strict=True)]
             inside = np.ix_(*(np.flatnonzero(positions >= 0) for positions in old_positions))
             if any(positions.size == 0 for positions in inside):
                 return
@@ -422,14 +417,14 @@ class _OldPositions:
             }
             # the order of the axes of the old result among those of this slab
             order = [names[axis.axis] for axis in self.axes if axis.axis is not None]
-            for name, array in values.items():
+            for name, array in slab.values.items():
                 if "model" not in before[name].dims:
                     continue
                 old_values = before[name].isel(model=old_model, **chosen).transpose(*order).values
                 shape = tuple(positions.size for positions in inside)
                 if not array.flags.writeable:
                     # a view of computed values that was not copied
-                    values[name] = array = array.copy()
+                    slab.values[name] = array = array.copy()
                 array[inside or ...] = old_values.reshape(shape) if array.shape else old_values
 
         return fill

@@ -22,7 +22,7 @@ from .._version import __version__
 from ..array_types import Array
 from ..config.grid import Axis
 from ..config.input_names import is_input
-from ..contact.formula import Formula
+from ..contact.formula_calls import Formula
 from ..contact.materials import Material
 from ..contact.model import Law, Parameter
 from ..contact.simulate import TABLE_COLUMNS, CollisionResult
@@ -35,7 +35,7 @@ from ..errors import ResultError, UsageError
 from ..formatting import number
 from ..text import safe_text
 from .attributes import LawRecord, SummaryRecord, read_attribute
-from .netcdf import Region
+from .netcdf import RegionValues
 from .schema import attributes_of, count_points, derived_names, scale_of
 from .trajectory_table import MAX_STIFFNESS_VALUES, TrajectoryRows, TrajectoryTable, expand, whole_stiffness
 
@@ -147,9 +147,7 @@ def factored_template(
     return template.assign_attrs(coordinates=" ".join(others))
 
 
-def table_values(
-    table: TrajectoryTable, variables: Sequence[Variable]
-) -> Iterator[tuple[str, Region, NDArray[Any]]]:
+def table_values(table: TrajectoryTable, variables: Sequence[Variable]) -> Iterator[RegionValues]:
     """Yield the values of a factored file, a few at a time: name of the variable, region and values."""
     start = 0
     for model, trajectory_map in enumerate(table.maps):

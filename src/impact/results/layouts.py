@@ -2,20 +2,59 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Protocol
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, NamedTuple, Protocol
 
+import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
-from .factored import check_witnesses, stored_table, witness_variables
-from .trajectory_table import lazy_dataset
+from ..engine.plan import Plan
+from .factored import (
+    check_witnesses,
+    factored_template,
+    stored_stiffness,
+    stored_table,
+    table_values,
+    witness_variables,
+)
+from .netcdf import RegionValues
+from .schema import stored_variables
+from .summary import Summary, add_slab, summarize_table, summary_record
+from .trajectory_table import ExpandedSlab, TrajectoryTable, expanded_slabs, lazy_dataset
 from .validation import FACTORED_ATTRIBUTES, TABLE_VARIABLES, is_quantity
+
+# a factored result of more points has their summary in its file: a reader would take long to compute it
+NO_SUMMARY_POINTS = 2**20
+
+# replaces some values of a slab
+FillSlab = Callable[[ExpandedSlab], None]
+# called with the numbers of stored and of failed points
+OnSlab = Callable[[int, int], None]
+
+
+class Contents(NamedTuple):
+    """A result and what its file holds; the summary of a full one is complete when its values are written."""
+
+    result: xr.Dataset
+    template: xr.Dataset
+    values: Iterator[RegionValues]
+    summary: Summary
 
 
 class Layout(Protocol):
     """How a file holds a result."""
 
-    name: str
+    def check(self, plan: Plan) -> None:
+        """Raise a UsageError for a plan whose result cannot be stored, before integration."""
+
+    def template(self, result: xr.Dataset, plan: Plan, table: TrajectoryTable) -> xr.Dataset:
+        """Build the dataset of the file, with placeholder values, from that of the result."""
+
+    def contents(
+        self, result: xr.Dataset, plan: Plan, table: TrajectoryTable, on_slab: OnSlab, fill: FillSlab | None
+    ) -> Contents:
+        """Compute what the file holds, from the trajectory table and the values that `fill` replaces."""
 
     def read(self, variables: Mapping[str, xr.Variable], attributes: Mapping[str, object]) -> xr.Dataset:
         """Make a dataset of the variables and attributes of a file; its values are read or computed when indexed.
@@ -29,10 +68,31 @@ class Layout(Protocol):
 class FullLayout:
     """All values of all points."""
 
-    name = "full"
+    def check(self, plan: Plan) -> None:
+        pass
+
+    def template(self, result: xr.Dataset, plan: Plan, table: TrajectoryTable) -> xr.Dataset:
+        return result
+
+    def contents(
+        self, result: xr.Dataset, plan: Plan, table: TrajectoryTable, on_slab: OnSlab, fill: FillSlab | None
+    ) -> Contents:
+        summary, chunks = Summary(), plan.config.output.chunks
+        lengths = [chunks.get(axis.name, axis.size) for axis in plan.config.axes] if chunks else []
+
+        def values() -> Iterator[RegionValues]:
+            for slab in expanded_slabs(table, stored_variables(plan), lengths):
+                if fill:
+                    fill(slab)
+                for name, array in slab.values.items():
+                    yield name, (slab.model, *slab.region) if "model" in result[name].dims else slab.region, array
+                add_slab(summary, table, slab)
+                on_slab(summary.points, summary.failed)
+
+        return Contents(result, result, values(), summary)
 
     def read(self, variables: Mapping[str, xr.Variable], attributes: Mapping[str, object]) -> xr.Dataset:
-        coordinates = _coordinates(variables)
+        coordinates = _load_coordinates(variables)
         values = {name: variable for name, variable in variables.items() if name not in coordinates}
         return xr.Dataset(values, coordinates, attributes)
 
@@ -40,14 +100,44 @@ class FullLayout:
 class FactoredLayout:
     """A trajectory table, and some points in full by which it is checked."""
 
-    name = "factored"
+    def check(self, plan: Plan) -> None:
+        for law in plan.models:
+            stored_stiffness(plan.inputs, law)
+
+    def template(self, result: xr.Dataset, plan: Plan, table: TrajectoryTable) -> xr.Dataset:
+        return factored_template(result, table, stored_variables(plan))
+
+    def contents(
+        self, result: xr.Dataset, plan: Plan, table: TrajectoryTable, on_slab: OnSlab, fill: FillSlab | None
+    ) -> Contents:
+        variables, summary = stored_variables(plan), Summary()
+        template = self.template(result, plan, table)
+        result = lazy_dataset(result, table, variables)
+        if plan.stored_points > NO_SUMMARY_POINTS:
+            summary, extremes = summarize_table(result, table)
+            record = summary_record(summary, extremes, result)
+            template = template.assign_attrs(summary=record.model_dump_json())
+        else:
+            for slab in expanded_slabs(table, variables):
+                add_slab(summary, table, slab)
+
+        def values() -> Iterator[RegionValues]:
+            for stored in table_values(table, variables):
+                yield stored
+                on_slab(0, summary.failed)
+
+        return Contents(result, template, values(), summary)
 
     def read(self, variables: Mapping[str, xr.Variable], attributes: Mapping[str, object]) -> xr.Dataset:
         stored = {name: variable for name, variable in variables.items() if name in TABLE_VARIABLES}
         witnesses = {name: variable.load() for name, variable in stored.items() if name.startswith("witness_")}
-        dataset = xr.Dataset(witnesses, _coordinates(variables), attributes)
+        dataset = xr.Dataset(witnesses, _load_coordinates(variables), attributes)
         sizes = {name: variable.size for name, variable in stored.items() if name not in witnesses}
-        table = stored_table(dataset, sizes, lambda name, part: variables[name][part].values)
+
+        def read(name: str, positions: slice | NDArray[np.intp]) -> NDArray[Any]:
+            return variables[name][positions].values
+
+        table = stored_table(dataset, sizes, read)
         quantities = witness_variables(dataset)
         check_witnesses(table, quantities, dataset)
         template = dataset.drop_vars(witnesses).drop_attrs(deep=False)
@@ -55,7 +145,7 @@ class FactoredLayout:
         return lazy_dataset(template.assign_attrs(described), table, quantities)
 
 
-def _coordinates(variables: Mapping[str, xr.Variable]) -> dict[str, xr.Variable]:
+def _load_coordinates(variables: Mapping[str, xr.Variable]) -> dict[str, xr.Variable]:
     """Load the coordinates of a file."""
     return {
         name: variable.load()
@@ -64,9 +154,4 @@ def _coordinates(variables: Mapping[str, xr.Variable]) -> dict[str, xr.Variable]
     }
 
 
-FULL, FACTORED = FullLayout(), FactoredLayout()
-
-
-def layout_of_file(attributes: Mapping[str, object]) -> Layout:
-    """Choose the layout of a file by its attributes."""
-    return FACTORED if "laws" in attributes else FULL
+LAYOUTS: Mapping[str, Layout] = {"full": FullLayout(), "factored": FactoredLayout()}

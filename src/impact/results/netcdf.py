@@ -33,6 +33,8 @@ from .trajectory_table import check_memory
 from .validation import TABLE_VARIABLES, is_name
 
 Region = tuple[int | slice, ...]
+# the name of a variable, a region of it and its values there
+RegionValues = tuple[str, Region, NDArray[Any]]
 WriteRegion = Callable[[str, Region, NDArray[Any]], None]
 # values per chunk of a compressed variable, if the config does not set chunks
 CHUNK_VALUES = 2**16

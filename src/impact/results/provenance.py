@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
+from ..config.draft import Draft, Setting, open_text
 from ..config.grid import MAX_POINTS
-from ..config.load import Config, Purpose, parse_config
+from ..config.load import Config, Purpose, build
 from ..engine.plugins import Plugins
 from ..errors import ResultError, UsageError
 from ..text import safe_text
@@ -27,38 +28,28 @@ def stored_config(
     allow_changed_plugins: bool = False,
     purpose: Purpose = "sweep",
 ) -> Config:
-    """The config of the sweep or the calibration that a result came from.
-
-    Parameters
-    ----------
-    attributes : of the result
-    overrides : changes to its config, applied after the stored ones
-    plugins : models that are not built in, including those of the result
-    name : of the result, for messages
-    max_points : refuse a sweep of more points
-    allow_changed_plugins : accept another version of a plug-in; see `changed_plugins`
-    purpose : "calibrate" for the result of a calibration, whose config has measurements
-
-    Raises
-    ------
-    UsageError : it is a time history, or one of its plug-ins is missing or has changed
-    ResultError, ConfigError : the stored config cannot be read, or is invalid in this version
-    """
-    text = attributes.get("config")
-    if text is None:
-        raise UsageError(f"{safe_text(name)}: contains no config, it is a time history")
-    if not isinstance(text, str):
-        raise ResultError(f"{safe_text(name)}: its attribute config is not text")
-    check_plugins(attributes, plugins, name)
+    """Read the config of the sweep or the calibration that a result with these attributes came from."""
+    draft = stored_draft(attributes, plugins, name)
     if not allow_changed_plugins:
         for reason in (*changed_plugins(attributes, plugins, name), *unknown_plugins(attributes, plugins, name)):
             raise UsageError(reason)
+    return build(draft.with_settings(map(Setting.parse, overrides)), max_points, purpose)
+
+
+def stored_draft(attributes: Mapping[str, object], plugins: Plugins, name: str) -> Draft:
+    """Open the config that a result came from."""
+    text = attributes.get("config")
+    if text is None:
+        raise UsageError(f"{name}: contains no config, it is a time history")
+    if not isinstance(text, str):
+        raise ResultError(f"{name}: its attribute config is not text")
+    check_plugins(attributes, plugins, name)
     stored = read_attribute(attributes, "config_set", name, required=True)
-    return parse_config(text, [*stored, *overrides], plugins.models, name, max_points, purpose)
+    return open_text(text, name, plugins.models).with_settings(map(Setting.parse, stored))
 
 
 def config_of_part(config: Config, dataset: xr.Dataset) -> Config:
-    """The part of a config that a result holds: its axes, reduced to the values that are labels of the result.
+    """Reduce the axes of a config to the values that are labels of a result.
 
     An axis without a common value keeps its first value, so that a comparison shows the difference.
     """
@@ -83,17 +74,6 @@ def check_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str)
 
     Nothing is imported because a result names it: the names are only compared and reported.
 
-    Parameters
-    ----------
-    attributes : of the result
-    plugins : the current plug-ins, which may be more than those of the result
-    name : of the result, for messages
-
-    Raises
-    ------
-    UsageError : one is missing
-    ResultError : the attribute cannot be read
-
     >>> check_plugins({"plugins": '{"mine": {"file": "my.py", "sha256": "12ab"}}'}, Plugins(), "results.h5")
     Traceback (most recent call last):
     impact.errors.UsageError: results.h5: made with mine of my.py; give it again with --plugin FILE
@@ -112,18 +92,11 @@ def check_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str)
         )
         ways = " and ".join(sorted({_how_to_supply(record) for record in missing.values()}))
         again = "it" if len(missing) == 1 else "them"
-        raise UsageError(f"{safe_text(name)}: made with {safe_text(named)}; give {again} again with {ways}")
+        raise UsageError(f"{name}: made with {safe_text(named)}; give {again} again with {ways}")
 
 
 def changed_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str) -> tuple[str, ...]:
-    """A sentence for each plug-in whose current version differs from that of a result.
-
-    Parameters
-    ----------
-    attributes : of the result
-    plugins : the current plug-ins, including those of the result
-    name : of the result, for messages
-    """
+    """List, in a sentence each, the plug-ins whose current version differs from that of a result."""
     current = _current_plugins(plugins)
     return tuple(
         f"{safe_text(name)}: was made with another version of "
@@ -135,10 +108,7 @@ def changed_plugins(attributes: Mapping[str, object], plugins: Plugins, name: st
 
 
 def unknown_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str) -> tuple[str, ...]:
-    """A sentence for each plug-in without a hash, which cannot be compared with that of a result.
-
-    Parameters are those of `changed_plugins`.
-    """
+    """List, in a sentence each, the plug-ins without a hash, which cannot be compared with that of a result."""
     current = _current_plugins(plugins)
     return tuple(
         f"{safe_text(name)}: the model {safe_text(key)} is a Python value that no file defines, so that it cannot "
@@ -158,12 +128,12 @@ def _current_plugins(plugins: Plugins) -> dict[str, PluginRecord]:
 
 
 def _plugin_origin(record: PluginRecord) -> str | None:
-    """The file or the package of a model."""
+    """Name the file or the package of a model."""
     return record.package or record.file
 
 
 def _how_to_supply(record: PluginRecord) -> str:
-    """How a user supplies a plug-in."""
+    """State how a user supplies a plug-in."""
     if record.package:
         return "the package installed"
     return "plugins=[...]" if record.file is None else "--plugin FILE"

@@ -17,7 +17,7 @@ InputValue = TypeVar("InputValue")
 
 
 def command_start(path: str, dataset: xr.Dataset) -> tuple[str, ...]:
-    """The first words of a command that runs a point of a result again; empty for a dataset without a file.
+    """Start the command that runs a point of a result again; empty for a dataset without a file.
 
     Also empty if a model is a Python value, which no command line can name.
 
@@ -31,7 +31,7 @@ def command_start(path: str, dataset: xr.Dataset) -> tuple[str, ...]:
 
 
 def inputs_of_model(at: Mapping[str, InputValue]) -> dict[str, InputValue]:
-    """The inputs of a point without the parameters of other models.
+    """Leave out the parameters of other models.
 
     >>> inputs_of_model({"model": "mine", "e": 0.5, "mine.c": 2.0, "other.c": 3.0, "materials.steel.E": 2e11})
     {'model': 'mine', 'e': 0.5, 'mine.c': 2.0, 'materials.steel.E': 200000000000.0}
@@ -41,7 +41,7 @@ def inputs_of_model(at: Mapping[str, InputValue]) -> dict[str, InputValue]:
 
 
 def describe_point(at: Mapping[str, float | str]) -> str:
-    """The inputs of a point for a message, rounded to 12 digits.
+    """List the inputs of a point for a message, rounded to 12 digits.
 
     >>> describe_point({"model": "hertz", "e": 0.1 + 0.2})
     'model=hertz, e=0.3'
@@ -50,7 +50,7 @@ def describe_point(at: Mapping[str, float | str]) -> str:
 
 
 def replay_command(start: Sequence[str], at: Mapping[str, object]) -> str:
-    """The whole command: its first words, then the model and the inputs of the point.
+    """Complete the command by the model and the inputs of the point.
 
     >>> replay_command(("impact", "run", "new.h5"), {"model": "hertz", "case": 3})
     'impact run new.h5 --model hertz --at case=3'

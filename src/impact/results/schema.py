@@ -8,6 +8,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from importlib.metadata import version
 from typing import Any
 
@@ -25,7 +26,7 @@ from ..contact.materials import effective_mass
 from ..contact.timestep import EXACT
 from ..contact.variables import AXES, BY_DEFAULT, HISTORY, OUTPUTS, Variable, by_name
 from ..engine.build_impacts import mass_at, restitution_at
-from ..engine.plan import Index, Inputs, Plan
+from ..engine.plan import Index, Plan
 from ..formatting import number
 from .kinds import Kind
 
@@ -50,116 +51,85 @@ _CURVES = ("model", "output_name", "grid")
 CALIBRATION = by_name(
     Variable(
         "estimate",
+        "best value of the parameter; NaN where the law does not have it",
         _PARAMETERS,
         "SI",
         "itself + interval",
-        "best value of the parameter; NaN where the law does not have it",
     ),
     Variable(
-        "lower", _PARAMETERS, "SI", "itself + interval", "lower end of the interval of 95 % by profile likelihood"
+        "lower", "lower end of the interval of 95 % by profile likelihood", _PARAMETERS, "SI", "itself + interval"
     ),
     Variable(
-        "upper", _PARAMETERS, "SI", "itself + interval", "upper end of the interval of 95 % by profile likelihood"
+        "upper", "upper end of the interval of 95 % by profile likelihood", _PARAMETERS, "SI", "itself + interval"
     ),
     Variable(
         "covariance",
+        "covariance in the linear approximation",
         (*_PARAMETERS, "other_parameter"),
         "SI",
         "deviations",
-        "covariance in the linear approximation",
     ),
     Variable(
         "identifiable",
+        "1 if the data determine the parameter, -1 if it is not the law's",
         _PARAMETERS,
         "1",
         "exact",
-        "1 if the data determine the parameter, -1 if it is not the law's",
         dtype="i1",
     ),
     Variable(
         "fit_status",
+        "outcome of the fit",
         _LAWS,
         "1",
         "exact",
-        "outcome of the fit",
         dtype="i1",
         flags={name: number for number, name in enumerate(FIT_STATUSES)},
     ),
-    Variable("chi2_reduced", _LAWS, "1", "max(1, itself)", "squared residuals in variances per degree of freedom"),
+    Variable("chi2_reduced", "squared residuals in variances per degree of freedom", _LAWS, "1", "max(1, itself)"),
     Variable(
-        "p_value", _LAWS, "1", "max(1, itself)", "probability of a larger chi2 by the noise alone", is_new=True
+        "p_value", "probability of a larger chi2 by the noise alone", _LAWS, "1", "max(1, itself)", is_new=True
     ),
     Variable(
-        "excess", _LAWS, "SI", "itself", "standard deviation between specimens, besides that of the measurements"
+        "excess", "standard deviation between specimens, besides that of the measurements", _LAWS, "SI", "itself"
     ),
-    Variable("aicc", _LAWS, "1", "max(1, itself)", "corrected information criterion of Akaike"),
-    Variable("weight", _LAWS, "1", "max(1, itself)", "Akaike weight among the laws"),
+    Variable("aicc", "corrected information criterion of Akaike", _LAWS, "1", "max(1, itself)"),
+    Variable("weight", "Akaike weight among the laws", _LAWS, "1", "max(1, itself)"),
     Variable(
         "loo",
+        "root mean square of leave-one-out residuals in given standard deviations; in SI units without one",
         _LAWS,
         "1",
         "max(1, itself)",
-        "root mean square of leave-one-out residuals in given standard deviations; in SI units without one",
     ),
-    Variable("predicted", _MEASURED, "SI", "measured", "output of the law at the point"),
-    Variable("residual", _MEASURED, "SI", "measured", "measured minus predicted"),
+    Variable("predicted", "output of the law at the point", _MEASURED, "SI", "measured"),
+    Variable("residual", "measured minus predicted", _MEASURED, "SI", "measured"),
     Variable(
         "loo_residual",
+        "residual of the point in the fit without it, in its own standard deviations",
         _MEASURED,
         "1",
         "max(1, itself)",
-        "residual of the point in the fit without it, in its own standard deviations",
         is_new=True,
     ),
-    Variable("curve", _CURVES, "SI", "measured", "output of the law over the varied input"),
-    Variable("curve_lower", _CURVES, "SI", "measured", "lower end of the band of 95 % of the curve"),
-    Variable("curve_upper", _CURVES, "SI", "measured", "upper end of the band of 95 % of the curve"),
+    Variable("curve", "output of the law over the varied input", _CURVES, "SI", "measured"),
+    Variable("curve_lower", "lower end of the band of 95 % of the curve", _CURVES, "SI", "measured"),
+    Variable("curve_upper", "upper end of the band of 95 % of the curve", _CURVES, "SI", "measured"),
 )
 _STUDIES, _INPUTS = ("model", AXES), ("model", AXES, "input")
 SENSITIVITY = by_name(
-    Variable(
-        "first", _INPUTS, "1", "reported", "first-order index: share of the variance that the input explains alone"
-    ),
-    Variable(
-        "first_lower",
-        _INPUTS,
-        "1",
-        "reported",
-        "lower end of the bootstrap interval of 95 % of the first-order index",
-    ),
-    Variable(
-        "first_upper",
-        _INPUTS,
-        "1",
-        "reported",
-        "upper end of the bootstrap interval of 95 % of the first-order index",
-    ),
-    Variable("first_half", _INPUTS, "1", "reported", "first-order index from the first half of the samples"),
-    Variable(
-        "total",
-        _INPUTS,
-        "1",
-        "reported",
-        "total index: share of the variance that is left if only the input is unknown",
-    ),
-    Variable(
-        "total_lower", _INPUTS, "1", "reported", "lower end of the bootstrap interval of 95 % of the total index"
-    ),
-    Variable(
-        "total_upper", _INPUTS, "1", "reported", "upper end of the bootstrap interval of 95 % of the total index"
-    ),
-    Variable("total_half", _INPUTS, "1", "reported", "total index from the first half of the samples"),
-    Variable("mean", _STUDIES, "output", "reported", "mean of the output"),
-    Variable("sd", _STUDIES, "output", "reported", "standard deviation of the output"),
-    Variable("quantiles", (*_STUDIES, "quantile"), "output", "reported", "quantiles of the output"),
-    Variable(
-        "failed",
-        _STUDIES,
-        "1",
-        "reported",
-        "points without a result; with any there is no mean and no index",
-        dtype="i8",
-    ),
+    Variable("first", "first-order index: share of the variance that the input explains alone", _INPUTS),
+    Variable("first_lower", "lower end of the bootstrap interval of 95 % of the first-order index", _INPUTS),
+    Variable("first_upper", "upper end of the bootstrap interval of 95 % of the first-order index", _INPUTS),
+    Variable("first_half", "first-order index from the first half of the samples", _INPUTS),
+    Variable("total", "total index: share of the variance that is left if only the input is unknown", _INPUTS),
+    Variable("total_lower", "lower end of the bootstrap interval of 95 % of the total index", _INPUTS),
+    Variable("total_upper", "upper end of the bootstrap interval of 95 % of the total index", _INPUTS),
+    Variable("total_half", "total index from the first half of the samples", _INPUTS),
+    Variable("mean", "mean of the output", _STUDIES, "output"),
+    Variable("sd", "standard deviation of the output", _STUDIES, "output"),
+    Variable("quantiles", "quantiles of the output", (*_STUDIES, "quantile"), "output"),
+    Variable("failed", "points without a result; with any there is no mean and no index", dtype="i8"),
 )
 # the variables of each kind of dataset, by name
 SCHEMA: Mapping[Kind, Mapping[str, Variable]] = {
@@ -171,17 +141,9 @@ SCHEMA: Mapping[Kind, Mapping[str, Variable]] = {
 # coordinates of studies besides those of models and inputs, with their dimensions; the first is the study's axis
 STUDY_COORDINATES: Mapping[Kind, Mapping[str, str]] = {
     "calibration": {
-        "parameter": "parameter",
-        "other_parameter": "other_parameter",
-        "point": "point",
-        "line": "point",
-        "output": "point",
-        "measured": "point",
-        "sigma": "point",
-        "specimen": "point",
+        **{name: name for name in ("parameter", "other_parameter", "point", "grid", "output_name")},
+        **dict.fromkeys(("line", "output", "measured", "sigma", "specimen"), "point"),
         "determined": "model",
-        "grid": "grid",
-        "output_name": "output_name",
     },
     "sensitivity study": {"input": "input", "quantile": "quantile"},
 }
@@ -236,7 +198,7 @@ def template(variables: Iterable[Variable], sizes: Mapping[Hashable, int], axes:
 
 
 def stored_variables(plan: Plan) -> tuple[Variable, ...]:
-    """The variables of the result of a plan; always with the status, which explains NaNs."""
+    """Choose the variables of the result of a plan; always with the status, which explains NaNs."""
     chosen = {"status", *(plan.config.output.variables or BY_DEFAULT)}
     return tuple(
         replace(variable, dtype=plan.config.output.dtype if variable.dtype == "f8" else variable.dtype)
@@ -246,7 +208,7 @@ def stored_variables(plan: Plan) -> tuple[Variable, ...]:
 
 
 def dataset_template(plan: Plan) -> xr.Dataset:
-    """The dataset of a plan with placeholder values.
+    """Build the dataset of a plan with placeholder values.
 
     It has no index: storing it needs none, and building one takes longer than everything else.
     """
@@ -257,13 +219,8 @@ def dataset_template(plan: Plan) -> xr.Dataset:
     return dataset.assign(template(stored_variables(plan), dataset.sizes, axes))
 
 
-def plan_coordinates(plan: Plan) -> xr.Coordinates:
-    """The coordinates of the dataset of a plan, without an index."""
-    return xr.Coordinates(_coordinates_by_name(plan), indexes={})
-
-
 def attributes_of(variable: Variable) -> dict[str, object]:
-    """The attributes of a stored variable."""
+    """Describe a variable by the attributes that are stored with it."""
     attributes: dict[str, object] = {"units": udunits(variable.unit), "long_name": variable.meaning}
     if variable.equation:
         attributes["equation"] = variable.equation
@@ -273,39 +230,43 @@ def attributes_of(variable: Variable) -> dict[str, object]:
     return attributes
 
 
-def _coordinates_by_name(plan: Plan) -> dict[str, object]:
+def plan_coordinates(plan: Plan) -> xr.Coordinates:
+    """Build the coordinates of the dataset of a plan, without an index."""
     models = plan.models
-
-    def texts(field: str) -> tuple[str, list[str], dict[str, str]]:
-        return "model", [str(getattr(model, field)) for model in models], {"long_name": f"{field} of the model"}
-
     coordinates: dict[str, object] = {
         "model": ("model", [model.key for model in models], {"long_name": "contact force model"}),
-        **{field: texts(field) for field in ("title", "equation", "reference", "doi")},
+        **{
+            key: ("model", [str(getattr(model, key)) for model in models], {"long_name": f"{key} of the model"})
+            for key in ("title", "equation", "reference", "doi")
+        },
         "year": ("model", [model.year for model in models], {"long_name": "year of the model"}),
     }
     for axis in plan.config.axes:
         if axis.numbered:
-            coordinates[axis.name] = (
-                axis.name,
-                list(axis.labels),
-                {"long_name": f"number of the {axis.name.partition('_')[0]}"},
-            )
+            meaning = f"number of the {axis.name.partition('_')[0]}"
+            coordinates[axis.name] = (axis.name, list(axis.labels), {"long_name": meaning})
         for name, values in axis.columns.items():
             coordinates[name] = (axis.name, list(values), coordinate_attributes(plan, name))
     for name, value in plan.config.scalars.items():
         coordinates[name] = ((), value, coordinate_attributes(plan, name))
-    coordinates["exponent"] = _exponent_coordinate(plan)
+    coordinates["exponent"] = (*_exponents(plan), {"units": "1", "long_name": "compliance exponent n"})
     if "alpha" in plan.inputs.names():
-        coordinates["e"] = _restitution_coordinate(plan)
+        equation = "e = 1 - alpha (v1 - v2)  (24)"
+        attributes = {"units": "1", "long_name": "requested restitution", "equation": equation}
+        restitutions = _derived_values(plan, ("alpha", "v1", "v2"), partial(restitution_at, plan.inputs))
+        coordinates["e"] = (*restitutions, attributes)
     for ball in "12":
         if f"m{ball}" not in plan.inputs.names():
-            coordinates[f"m{ball}"] = _mass_coordinate(plan, ball)
-    return coordinates
+            densities = [f"materials.{name}.rho" for name in plan.inputs.materials_of(ball)]
+            names = (f"R{ball}", "material", f"material{ball}", *densities)
+            attributes = coordinate_attributes(plan, f"m{ball}") | {"equation": "m = (4/3) pi R^3 rho"}
+            masses = _derived_values(plan, names, partial(mass_at, plan.inputs, ball))
+            coordinates[f"m{ball}"] = (*masses, attributes)
+    return xr.Coordinates(coordinates, indexes={})
 
 
 def coordinate_attributes(plan: Plan, name: str) -> dict[str, str]:
-    """Units and meaning of a coordinate, as attributes."""
+    """Describe a coordinate by its unit and meaning."""
     parsed = InputName.parse(name)
     quantity = parsed.quantity({model.key: model for model in plan.models})
     if quantity is None:
@@ -315,7 +276,7 @@ def coordinate_attributes(plan: Plan, name: str) -> dict[str, str]:
 
 
 def udunits(unit: str) -> str:
-    """A unit of the config in the spelling of netCDF.
+    """Convert a unit of the config to the spelling of netCDF.
 
     >>> udunits("m/s"), udunits("N/m^n"), udunits("kg/m^3"), udunits("1")
     ('m s-1', 'N m-n', 'kg m-3', '1')
@@ -324,7 +285,7 @@ def udunits(unit: str) -> str:
 
 
 def plain_unit(unit: str) -> str:
-    """The inverse of `udunits`: a unit in the spelling of the config.
+    """Convert a unit to the spelling of the config, the inverse of `udunits`.
 
     >>> plain_unit("m s-1"), plain_unit("N m-1.5"), plain_unit("kg")
     ('m/s', 'N/m^1.5', 'kg')
@@ -333,7 +294,7 @@ def plain_unit(unit: str) -> str:
 
 
 def exponent_text(by_model: Mapping[str, float]) -> str:
-    """The exponent n of some models as text, with the models whose own exponent differs.
+    """Write the exponent n of some models, with the models whose own exponent differs.
 
     >>> exponent_text({"hertz": 1.5, "bilinear": 1.0, "lankarani-nikravesh-1990": 1.5})
     '1.5 (1 for bilinear)'
@@ -347,7 +308,7 @@ def exponent_text(by_model: Mapping[str, float]) -> str:
 
 
 def exponents_of(dataset: xr.Dataset) -> str | None:
-    """The exponent n of the models of a result as text; None if it varies along an axis or is unknown."""
+    """Write the exponent n of the models of a result; None if it varies along an axis or is unknown."""
     exponent = dataset.coords.get("exponent")
     if exponent is None or not set(exponent.dims) <= {"model"}:
         return None
@@ -365,74 +326,59 @@ def is_case(name: str) -> bool:
 
 
 def derived_names(coords: Mapping[Any, xr.DataArray]) -> frozenset[str]:
-    """The coordinates with names of inputs that were computed: e from alpha, masses from R and rho."""
+    """Name the coordinates of inputs that were computed: e from alpha, masses from R and rho."""
     masses = {name for name in ("m1", "m2") if name in coords and "equation" in coords[name].attrs}
     return frozenset(masses | ({"e"} if "alpha" in coords else set()))
 
 
 def columns_along(dataset: xr.Dataset, dim: Hashable) -> list[str]:
-    """The inputs that vary along a dimension only: the columns of its axis."""
+    """List the inputs that vary along a dimension only: the columns of its axis."""
     derived = derived_names(dataset.coords)
     along = [str(name) for name, coordinate in dataset.coords.variables.items() if coordinate.dims == (dim,)]
     return [name for name in along if is_input(name) and name not in derived]
 
 
 def foreign_dims(dataset: xr.Dataset, key: str) -> list[Hashable]:
-    """The dimensions along which only parameters of other models vary, so that nothing of this model does."""
+    """List the dimensions along which only parameters of other models vary, so that this model does not."""
     return [dim for dim in dataset.dims if is_foreign(columns_along(dataset, dim), key)]
 
 
 def parts_of_models(dataset: xr.Dataset) -> Iterator[xr.Dataset]:
-    """The part of each model of a result, at the first position along the parameters of other models."""
+    """Select each model of a result, at the first position along the parameters of other models."""
     for model, key in enumerate(dataset["model"].values):
         first = dict.fromkeys(foreign_dims(dataset, str(key)), slice(0, 1))
         yield dataset.isel({"model": model, **first})
 
 
 def count_points(dataset: xr.Dataset) -> int:
-    """The number of points of a result, without repetitions along parameters of other models."""
+    """Count the points of a result, without repetitions along parameters of other models."""
     if "model" not in dataset.dims:
         return math.prod(dataset.sizes.values())
     return sum(math.prod(part.sizes.values()) for part in parts_of_models(dataset))
 
 
-def _exponent_coordinate(plan: Plan) -> tuple[tuple[str, ...], object, dict[str, str]]:
+def _exponents(plan: Plan) -> tuple[tuple[str, ...], Array]:
     """The compliance exponent of each model: its own, else that of the sweep, which may be an axis."""
-    about = {"units": "1", "long_name": "compliance exponent n"}
-    law_exponents = np.array([np.nan if model.exponent is None else model.exponent for model in plan.models])
-    axes = plan.inputs.axes_of("n")
-    if not axes:
-        return ("model",), np.where(np.isnan(law_exponents), plan.config.scalars["n"], law_exponents), about
+    own = np.array([np.nan if model.exponent is None else model.exponent for model in plan.models])
+    if not (axes := plan.inputs.axes_of("n")):
+        return ("model",), np.where(np.isnan(own), plan.config.scalars["n"], own)
     axis = plan.config.axes[axes[0]]
     values = np.asarray(axis.columns["n"], float)
-    return ("model", axis.name), np.where(np.isnan(law_exponents)[:, None], values, law_exponents[:, None]), about
-
-
-def _restitution_coordinate(plan: Plan) -> tuple[tuple[str, ...], object, dict[str, str]]:
-    about = {"units": "1", "long_name": "requested restitution", "equation": "e = 1 - alpha (v1 - v2)  (24)"}
-    return *_derived_values(plan, ("alpha", "v1", "v2"), restitution_at), about
-
-
-def _mass_coordinate(plan: Plan, ball: str) -> tuple[tuple[str, ...], object, dict[str, str]]:
-    of_materials = [f"materials.{name}.rho" for name in plan.inputs.materials_of(ball)]
-    names = (f"R{ball}", "material", f"material{ball}", *of_materials)
-    about = {**coordinate_attributes(plan, f"m{ball}"), "equation": "m = (4/3) pi R^3 rho"}
-    return *_derived_values(plan, names, lambda inputs, index: mass_at(inputs, ball, index)), about
+    return ("model", axis.name), np.where(np.isnan(own)[:, None], values, own[:, None])
 
 
 def _derived_values(
-    plan: Plan, names: Sequence[str], formula: Callable[[Inputs, Index], Array]
+    plan: Plan, names: Sequence[str], formula: Callable[[Index], Array]
 ) -> tuple[tuple[str, ...], Array]:
-    """Values that are computed from inputs, and their dimensions: the axes of those inputs."""
+    """Compute values from inputs, along the axes of those inputs."""
     axes = sorted({axis for name in names for axis in plan.inputs.axes_of(name)})
-    where = [slice(None) if axis in axes else slice(1) for axis in range(len(plan.shape))]
-    shape = [plan.shape[axis] for axis in axes]
-    values = formula(plan.inputs, plan.inputs.index(where))
-    return tuple(plan.config.axes[axis].name for axis in axes), values.reshape(shape)
+    region = [slice(None) if axis in axes else slice(1) for axis in range(len(plan.shape))]
+    values = formula(plan.inputs.index(region))
+    return tuple(plan.config.axes[axis].name for axis in axes), values.reshape([plan.shape[axis] for axis in axes])
 
 
 def design_record(config: Config) -> dict[str, object]:
-    """The method, number and seed of the samples of a config, and the distributions by config name."""
+    """Record the method, number and seed of the samples of a config, and the distributions by config name."""
     assert config.design is not None
     return config.design.model_dump() | {
         "distributions": {
@@ -443,7 +389,7 @@ def design_record(config: Config) -> dict[str, object]:
 
 
 def provenance_attributes(plan: Plan) -> dict[str, object]:
-    """The attributes from which a result can be repeated."""
+    """List the attributes from which a result can be repeated."""
     config = plan.config
     return {
         "title": config.title,

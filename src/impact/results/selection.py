@@ -39,7 +39,7 @@ def model_positions(models: Sequence[str], dataset: xr.Dataset) -> list[int]:
     keys = [str(key) for key in dataset["model"].values]
     for key in models:
         if key not in keys:
-            raise UsageError(f'no model "{safe_text(key)}" in this result; {did_you_mean(key, keys)}')
+            raise UsageError(f'no model "{key}" in this result; {did_you_mean(key, keys)}')
     return [keys.index(key) for key in dict.fromkeys(models)]
 
 
@@ -59,7 +59,7 @@ def select(dataset: xr.Dataset, sel: Mapping[str, float | str]) -> xr.Dataset:
     masks: dict[Hashable, Mask] = {}
     for name, value in sel.items():
         if name not in dataset.coords or len(dataset[name].dims) != 1 or dataset[name].dims == ("model",):
-            raise UsageError(f'no axis "{safe_text(name)}" in this result; {did_you_mean(name, axes)}')
+            raise UsageError(f'no axis "{name}" in this result; {did_you_mean(name, axes)}')
         (dim,) = dataset[name].dims
         values = dataset[name].values
         same = _matches_value(values, value)
@@ -67,7 +67,7 @@ def select(dataset: xr.Dataset, sel: Mapping[str, float | str]) -> xr.Dataset:
             same &= masks[dim]
         if not same.any():
             shown = safe_text(_nearest_values(name, values, value))
-            raise UsageError(f"no {safe_text(f'{name} = {value}')} in this result; {shown}")
+            raise UsageError(f"no {name} = {value} in this result; {shown}")
         masks[dim] = same
     return dataset.isel({dim: _matching_positions(dataset[dim], same) for dim, same in masks.items()})
 

@@ -29,7 +29,6 @@ from ..engine.plugins import read_plugins
 from ..engine.run import ProgressCallback, ProgressCounter, Run, ignore, never, report_kept_ranges
 from ..engine.trajectories import TrajectoryRange, trajectory_maps, trajectory_ranges
 from ..errors import ResultError, StoreError, UnfinishedError, UsageError
-from ..text import safe_text
 from .outcome import SweepOutcome
 from .provenance import stored_config
 from .schema import dataset_template
@@ -59,7 +58,7 @@ class Shard:
         match = re.fullmatch(r"([0-9]{1,9})/([0-9]{1,9})", text)
         shard = cls(*map(int, match.groups())) if match else cls(0, 0)
         if not 1 <= shard.number <= shard.of:
-            raise UsageError(f"--shard {safe_text(text)}: expected K/N with K from 1 to N, such as 3/16")
+            raise UsageError(f"--shard {text}: expected K/N with K from 1 to N, such as 3/16")
         return shard
 
     def has(self, trajectory_range: TrajectoryRange) -> bool:
@@ -152,7 +151,7 @@ def sweep_shard(
     command += [word for path in plugins if isinstance(path, str | Path) for word in ("--plugin", str(path))]
     with run.connected() as connected:
         progress = _complete_shard(Path(output), plan, chosen, command, connected)
-    run.check_stop(f"{safe_text(str(progress.folder))} is complete")
+    run.check_stop(f"{progress.folder} is complete")
     return progress
 
 
@@ -245,7 +244,7 @@ def merge(
             # a difference in the trajectories is reported first, by its name
             with lock_work_folder(folder, plan):
                 raise UsageError(
-                    f"{safe_text(str(folder))}: its title or output differs from that of {safe_text(str(first))}; "
+                    f"{folder}: its title or output differs from that of {first}; "
                     "expected the folders of one sweep"
                 )
     # folders are locked one after the other: there may be more of them than the limit of open files
@@ -262,7 +261,7 @@ def merge(
         raise type(error)(
             "; ".join(filter(None, [str(error), "the work folders keep all finished trajectories"]))
         ) from error
-    run.check_stop(f"{safe_text(str(output))} is complete")
+    run.check_stop(f"{output} is complete")
     return replace(outcome, repeated_blocks=repeated)
 
 
@@ -286,8 +285,7 @@ def _read_record(folder: Path) -> _ShardRecord:
         if not is_valid:
             raise ValueError
     except (OSError, ValueError, TypeError, AttributeError, KeyError, RecursionError):
-        shown = safe_text(str(folder))
-        raise UsageError(f"{shown}: is not a shard; expected a work folder of impact sweep --shard K/N") from None
+        raise UsageError(f"{folder}: is not a shard; expected a work folder of impact sweep --shard K/N") from None
     return _ShardRecord(Shard(number, of), tuple(command), core, attributes)
 
 
@@ -313,8 +311,8 @@ def _locate_ranges(
                 other = vars(reload_range(folder_of[number], trajectory_range))
                 if any(values.tobytes() != other[name].tobytes() for name, values in vars(collisions).items()):
                     raise ResultError(
-                        f"{safe_text(str(work_folder.path(number)))}: differs from "
-                        f"{safe_text(str(folder_of[number].path(number)))}; expected both to be computed on the "
+                        f"{work_folder.path(number)}: differs from "
+                        f"{folder_of[number].path(number)}; expected both to be computed on the "
                         "same type of processor"
                     )
     return folder_of, len(repeated)
@@ -331,12 +329,12 @@ def _missing_shards(
     lines = []
     for number in sorted(counts)[:MAX_LISTED_SHARDS]:
         shard = Shard(number, n_shards)
-        again = safe_text(shlex.join([*first_record.command, "--shard", str(shard)]), 500)
+        again = shlex.join([*first_record.command, "--shard", str(shard)])
         lacks = f"lacks {counts[number]:,} block{'' if counts[number] == 1 else 's'}"
         if shard in folders:
-            lines.append(f"{safe_text(str(folders[shard]))}: shard {shard} {lacks}; {again} finishes it")
+            lines.append(f"{folders[shard]}: shard {shard} {lacks}; {again} finishes it")
         else:
-            lines.append(f"{safe_text(str(output))}: shard {shard} is missing; {again} computes it")
+            lines.append(f"{output}: shard {shard} is missing; {again} computes it")
     if len(counts) > MAX_LISTED_SHARDS:
         lines.append(f"and {len(counts) - MAX_LISTED_SHARDS:,} more shards")
     return lines

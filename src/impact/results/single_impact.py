@@ -5,23 +5,25 @@ from __future__ import annotations
 import json
 import math
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
-from importlib.resources import files
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import xarray as xr
 
 from .._version import __version__
-from ..config.draft import Setting, open_config
-from ..config.files import override_text
+from ..config.design import distribution_paths
+from ..config.draft import Draft, Setting, listed_names, open_config, open_text
+from ..config.files import as_table
 from ..config.grid import Axis
-from ..config.input_names import InputName, is_input
-from ..config.load import Config, parse_config, read_config
-from ..config.tables import MATERIAL_QUANTITIES, SWEEP_QUANTITIES, expand_models
-from ..contact.force_expressions import returning, stiffer
-from ..contact.history import History, follow
+from ..config.input_names import SWEEP_INPUTS, InputName, input_values
+from ..config.load import Config, build, inline_files
+from ..config.rules import has_other_stiffness
+from ..config.starter import STARTER_CONFIG
+from ..config.tables import MATERIAL_QUANTITIES, SWEEP_DEFAULTS, expand_models, model_quantities
+from ..contact.force_expressions import unload_to_residual, unload_with_stiffness
+from ..contact.history import History, integrate_history
 from ..contact.impacts import Impacts
 from ..contact.materials import Material
 from ..contact.model import ForceModel
@@ -34,21 +36,19 @@ from ..contact.variables import HISTORY, OUTPUTS
 from ..display import Block, Displayed, Table
 from ..engine.build_impacts import build_impacts, fixed_steps_at
 from ..engine.plan import Plan
-from ..engine.plugins import Plugins
-from ..errors import ConfigError, UsageError, did_you_mean
+from ..engine.plugins import Plugins, read_plugins
+from ..errors import UsageError, did_you_mean
 from ..formatting import number, quantity
 from ..text import safe_text
 from .kinds import require_sweep
-from .provenance import changed_plugins, check_plugins, stored_config, unknown_plugins
+from .provenance import changed_plugins, stored_draft, unknown_plugins
 from .schema import SCHEMA_VERSION, attributes_of, is_case, plain_unit
 from .seal import is_result
 from .xarray_backend import open_result
 
-STARTER_CONFIG = files("impact") / "config" / "starter.toml"
+STARTER_E = Setting(("sweep", "e"), 0.5, "--set sweep.e=0.5")
 
 ConfigSource = str | Path | Mapping[str, object] | xr.Dataset | None
-# returns the config with some overrides
-ReadConfig = Callable[[Sequence[str]], Config]
 # name, unit and meaning of the quantities that are derived from the inputs and the history of one impact
 DERIVED_QUANTITIES = (
     ("m1", "kg", "mass of ball 1"),
@@ -183,6 +183,44 @@ class Impact(Displayed):
         return with_numbers(unit, {**values, "n": self.exponent})
 
 
+def run(
+    source: str | Path | Mapping[str, object] | None = None,
+    *,
+    model: str | None = None,
+    at: Mapping[str, float | str] | None = None,
+    overrides: Sequence[str] = (),
+    plugins: Sequence[ForceModel | str | Path] = (),
+    times: int | None = None,
+) -> Impact:
+    """Run one impact and record its time history.
+
+    Parameters
+    ----------
+    source : a TOML file, a mapping, or a result; by default the two balls of Table 1 of the paper, at e = 0.5
+    model : key of the model; by default the first one of the source
+    at : values by config name, such as `{"e": 0.05}`; the default of an axis is its first value
+    overrides : changes to the config, such as `"sweep.m2=2"`
+    plugins : plug-in models, and paths of Python files with such models; a result that was computed with them
+        needs them again, and a changed one gives a warning with both hashes
+    times : number of points of the history, uniform from first contact to release; by default the steps of the
+        integrator
+
+    Raises
+    ------
+    ConfigError, UsageError, ModelError, ResultError : the source, a plug-in, a name or a value is invalid
+
+    >>> import impact
+    >>> shot = impact.run(model="gharib-hurmuzlu-2012", at={"e": 0.5})
+    >>> round(shot.values["e_out"], 6), round(shot.e_energetic, 6)
+    (0.41072, 0.41072)
+    """
+    if times is not None and times < 2:
+        raise UsageError(f"times: got {times}, expected a whole number >= 2")
+    plugin_set = read_plugins(plugins)
+    config, first = single_point(open_source(source, overrides, plugin_set), model, at)
+    return run_single_impact(Plan(config, plugin_set.of(config.models)), first, times)
+
+
 def no_motion(integrator: str) -> str:
     """The reason why a scheme with a fixed step has no time history."""
     return f'integrator = "{safe_text(integrator, 40)}" has no history, expected solver.integrator = "{EXACT}"'
@@ -195,7 +233,7 @@ def run_single_impact(plan: Plan, first: tuple[str, ...], times: int | None = No
     ----------
     plan : without axes
     first : names of axes of the source that are at their first value
-    times : number of points in time of the history, see `impact.contact.history.follow`
+    times : number of points in time of the history, see `impact.contact.history.integrate_history`
     """
     config = plan.config
     law = config.models[0]
@@ -216,7 +254,11 @@ def run_single_impact(plan: Plan, first: tuple[str, ...], times: int | None = No
         warnings.warn(error, stacklevel=2)
     # a history is that of the continuous law
     going = values["status"] == Status.OK and solver.integrator == EXACT
-    history = follow(law, impacts, rtol=solver.rtol, max_steps=solver.max_steps, times=times) if going else None
+    history = (
+        integrate_history(law, impacts, rtol=solver.rtol, max_steps=solver.max_steps, times=times)
+        if going
+        else None
+    )
     v0 = impacts.v0[0].item()
     # a law may have its own n, which replaces that of the config
     point = {**config.scalars, "n": impacts.n[0].item()}
@@ -245,7 +287,10 @@ def _derived_quantities(
 ) -> dict[str, float]:
     """The values of DERIVED_QUANTITIES."""
     quantities = {name: getattr(impacts, name)[0].item() for name in ("m1", "m2", "R1", "R2", "m")}
-    if law.unloading in (returning, stiffer) and values["status"] in (Status.OK, Status.LIMIT):
+    if law.unloading in (unload_to_residual, unload_with_stiffness) and values["status"] in (
+        Status.OK,
+        Status.LIMIT,
+    ):
         recovered = values["peak_indentation"] - values["permanent_indentation"]
         quantities["K_r"] = values["peak_force"] / recovered ** impacts.n[0].item() if recovered else math.inf
     if history is not None:
@@ -315,7 +360,7 @@ def histories(
     integrator = str(dataset.attrs.get("integrator", EXACT))
     if integrator != EXACT:
         raise UsageError(f"no motion to draw in this result: {no_motion(integrator)}")
-    check_plugins(dataset.attrs, plugins, "the result")
+    source = open_source(dataset, (), plugins)
     for changed in changed_plugins(dataset.attrs, plugins, "the result"):
         # a changed law has another motion than the result
         raise UsageError(changed)
@@ -324,8 +369,8 @@ def histories(
     first: dict[str, float | str] = {}
     for key in dict.fromkeys(models or keys):
         others = {str(name) for name in dataset.coords if not InputName.parse(name).applies_to(key)}
-        of_model = {name: value for name, value in at.items() if name not in others}
-        config, names = single_point(dataset, (), plugins, key, of_model)
+        model_inputs = {name: value for name, value in at.items() if name not in others}
+        config, names = single_point(source, key, model_inputs)
         impact = run_single_impact(Plan(config, plugins.of(config.models)), names)
         first |= {name: impact.point[name] for name in names}
         if impact.history is None:
@@ -339,15 +384,39 @@ def histories(
     return followed
 
 
-def single_point(
-    source: ConfigSource,
-    overrides: Sequence[str],
-    plugins: Plugins,
-    model: str | None = None,
-    at: Mapping[str, float | str] | None = None,
-    over: Mapping[str, object] | None = None,
-) -> tuple[Config, tuple[str, ...]]:
-    """The config of a single impact, or of impacts over one input.
+@dataclass(frozen=True)
+class PointSource:
+    """A config of which single impacts are taken.
+
+    Parameters
+    ----------
+    draft : the config with the settings of the user
+    plugins : models that are not built in
+    labels : the values at which a part of a result was selected, by coordinate
+    has_selection : whether it selects models, unlike the starter config
+    """
+
+    draft: Draft
+    plugins: Plugins
+    labels: Mapping[str, float | str] = field(default_factory=dict)
+    has_selection: bool = True
+
+    @property
+    def models(self) -> tuple[str, ...]:
+        """The keys of the selected models, or none; other values of the config need not be valid yet.
+
+        Raises
+        ------
+        ConfigError : the selection is invalid
+        """
+        if not self.has_selection or "models" not in self.draft.data:
+            return ()
+        _, problems = expand_models(self.draft.data["models"], self.draft.known_models)
+        return tuple(model.key for model in (build(self.draft).models if problems else self.draft.models))
+
+
+def open_source(source: ConfigSource, overrides: Sequence[str], plugins: Plugins) -> PointSource:
+    """Open the config of a source, with overrides.
 
     Parameters
     ----------
@@ -355,9 +424,48 @@ def single_point(
         starter config at e = 0.5; a part of a result fixes the values at which it was selected
     overrides : changes to its config
     plugins : models that are not built in; a warning is issued for one that has changed since the result was made
+
+    Raises
+    ------
+    ConfigError : it cannot be read
+    ResultError, UsageError : the config of a result cannot be read
+    """
+    if isinstance(source, str | Path) and is_result(Path(source)):
+        with open_result(source) as stored:
+            return _open_stored(stored, overrides, plugins, str(source))
+    if isinstance(source, xr.Dataset):
+        return _open_stored(source, overrides, plugins, "the result")
+    if source is None:
+        draft = open_text(STARTER_CONFIG.read_text(encoding="utf-8"), "starter", plugins.models)
+        draft = draft.with_settings([STARTER_E, *map(Setting.parse, overrides)])
+        return PointSource(draft, plugins, has_selection=("models",) in draft.origins)
+    draft = open_config(Path(source) if isinstance(source, str) else source, plugins.models)
+    return PointSource(draft.with_settings(map(Setting.parse, overrides)), plugins)
+
+
+def _open_stored(dataset: xr.Dataset, overrides: Sequence[str], plugins: Plugins, name: str) -> PointSource:
+    require_sweep(dataset, name)
+    draft = stored_draft(dataset.attrs, plugins, name).with_settings(map(Setting.parse, overrides))
+    for note in (*changed_plugins(dataset.attrs, plugins, name), *unknown_plugins(dataset.attrs, plugins, name)):
+        warnings.warn(note, stacklevel=4)
+    labels = {str(key): label.values.item() for key, label in dataset.coords.items() if label.ndim == 0}
+    return PointSource(draft, plugins, {key: value for key, value in labels.items() if key != "model"})
+
+
+def single_point(
+    source: PointSource,
+    model: str | None = None,
+    at: Mapping[str, float | str] | None = None,
+    over: Mapping[str, object] | None = None,
+) -> tuple[Config, tuple[str, ...]]:
+    """Reduce a config to one impact, or to impacts over one input.
+
+    Parameters
+    ----------
+    source : the config
     model : key of the model; by default the config's first
-    at : values by config name, which need not be on the grid, except for inputs that vary together, in a zip group
-        or in numbered cases; a case is chosen by the name of its dimension and its number
+    at : values by config name, which need not be on the grid. Inputs that vary together, in a zip group or in a
+        table of cases, are an exception: their values, or the number of a case, select one of its points
     over : values of an input, as in a config, that stay an axis
 
     Returns
@@ -367,148 +475,91 @@ def single_point(
 
     Raises
     ------
-    ConfigError, UsageError : a name is not an input of the config, or a value is not allowed
-    ResultError : the config of a result cannot be read
+    ConfigError, UsageError, ModelError : there is no such model or input, or a value is not allowed
     """
-    read, parted = _config_reader(source, overrides, plugins)
-    # each override, and the option that messages name instead
-    option_names = {} if model is None else {override_text(("models",), [model]): f"--model {model}"}
-    for name, values in (over or {}).items():
-        option_names[override_text(InputName.parse(name).path, values)] = f"--over {name}"
-    values = dict(at or {})
-
-    def with_values() -> dict[str, str]:
-        """The overrides, and those of all values of `at`."""
-        by_override = {override_text(InputName.parse(k).path, v): f"--at {k}={v}" for k, v in values.items()}
-        return {**option_names, **by_override}
-
-    fixed_exponent = model is not None and find(model, plugins.models).exponent is not None
-    if "K" in values and fixed_exponent and not _is_valid(read, with_values()):
-        # K in [sweep] belongs to another exponent
-        values[f"{model}.K"] = values.pop("K")
-    try:
-        config = _read_with_option_names(read, option_names)
-    except ConfigError:
-        for name in values:
-            if not is_input(name) and not is_case(name):
-                raise UsageError(
-                    f'no input "{safe_text(name)}" here; {did_you_mean(name, list(SWEEP_QUANTITIES))}'
-                ) from None
-        # an input that the config lacks may be among the values of `at`
-        option_names = with_values()
-        config = _read_with_option_names(read, option_names)
-    columns = [_selectable_columns(axis) for axis in config.axes]
-    varied = {name for names in columns for name in names}
-    if {"e", "alpha"} <= values.keys():
+    draft, fixed = source.draft, {str(InputName.parse(name)): value for name, value in (at or {}).items()}
+    if {"e", "alpha"} <= fixed.keys():
         raise UsageError("--at alpha: got alpha and e, expected one of the two")
-    at = {**{name: value for name, value in parted.items() if name in varied}, **values}
-    together = {name for names in columns if len(names) > 1 for name in names}
-    inputs = [*(name for names in columns for name in names), *config.scalars]
-    for name, value in at.items():
-        if name not in inputs and name not in SWEEP_QUANTITIES and name != f"{config.models[0].key}.K":
-            raise UsageError(f'no input "{safe_text(name)}" here; {did_you_mean(name, inputs)}')
-        if name not in together:
-            option_names[override_text(InputName.parse(name).path, value)] = f"--at {name}={value}"
-    config = _read_with_option_names(read, option_names)
+    law = None if model is None else find(model, source.plugins.models)
+    settings = [] if law is None else [Setting(("models",), [law.key], f"--model {law.key}")]
+    settings += [Setting(InputName.parse(k).path, values, f"--over {k}") for k, values in (over or {}).items()]
+    draft = inline_files(draft.with_settings(settings))
+    joint = _joint_inputs(draft)
+    varying = {str(name) for name, value in input_values(draft.data) if isinstance(value, list | dict)}
+    labels = {name: value for name, value in source.labels.items() if name in varying | joint or is_case(name)}
+    # the exponent n decides whose stiffness K is
+    for name, value in sorted({**labels, **fixed}.items(), key=lambda item: item[0] == "K"):
+        if name not in joint and not is_case(name):
+            draft = draft.with_settings([_setting_at(draft, name, value, law)])
+    config = build(draft)
+    for name in fixed:
+        if is_case(name) and name not in {axis.numbered for axis in config.axes}:
+            raise _unknown_input(draft, name)
+    return _without_axes(config, {**labels, **fixed}, over or {})
 
+
+def _joint_inputs(draft: Draft) -> set[str]:
+    """Name the inputs that vary together: in zip groups, in a table of cases, and as samples."""
+    sweep = draft.table("sweep")
+    groups = sweep.get("zip")
+    zipped = [name for group in groups for name in listed_names(group)] if isinstance(groups, list) else []
+    names = {str(InputName.parse(name)) for name in (*zipped, *as_table(sweep.get("cases")))}
+    return names | {str(InputName.of_path(path)) for path in distribution_paths(draft.data)}
+
+
+def _setting_at(draft: Draft, name: str, value: float | str, law: ForceModel | None) -> Setting:
+    """Fix an input at a value; K of a model with another exponent than [sweep] is that of its own table."""
+    if not _has_input(draft, InputName.parse(name)):
+        raise _unknown_input(draft, name)
+    path = InputName.parse(name).path
+    if name == "K" and law is not None and has_other_stiffness(draft, law):
+        path = ("model", law.key, "K")
+    return Setting(path, value, f"--at {name}={value}")
+
+
+def _has_input(draft: Draft, name: InputName) -> bool:
+    """Whether an input may have a value: any of [sweep], a parameter of a selected model, a varying property."""
+    if name.material:
+        value = as_table(draft.table("materials").get(name.material)).get(name.key)
+        return isinstance(value, list | dict)
+    if name.model:
+        return any(model.key == name.model and name.key in model_quantities(model) for model in draft.models)
+    return name.key in SWEEP_INPUTS
+
+
+def _unknown_input(draft: Draft, name: str) -> UsageError:
+    parameters = [f"{model.key}.{parameter.name}" for model in draft.models for parameter in model.parameters]
+    names = {*draft.input_names, *SWEEP_DEFAULTS, *parameters}
+    choices = [choice for choice in names if _has_input(draft, InputName.parse(choice))]
+    return UsageError(f'no input "{name}" here; {did_you_mean(name, [*choices, *_joint_inputs(draft)])}')
+
+
+def _without_axes(
+    config: Config, at: Mapping[str, float | str], over: Mapping[str, object]
+) -> tuple[Config, tuple[str, ...]]:
+    """Reduce axes that are not in `over` to one value, and name the inputs that took the first one of theirs."""
     scalars = dict(config.scalars)
     first: list[str] = []
-    kept = tuple(axis for axis in config.axes if over and not over.keys().isdisjoint(axis.columns))
+    kept = [axis for axis in config.axes if not over.keys().isdisjoint(axis.columns)]
     for axis in (axis for axis in config.axes if axis not in kept):
-        scalars |= {name: values[_position_on_axis(axis, at)] for name, values in axis.columns.items()}
-        if axis.size > 1 and not any(name in at for name in _selectable_columns(axis)):
+        position = _position_on_axis(axis, at)
+        scalars |= {name: values[position] for name, values in axis.columns.items()}
+        if axis.size > 1 and at.keys().isdisjoint(_selectable_columns(axis)):
             first += axis.columns
-    return replace(config, axes=kept, scalars=scalars, models=config.models[:1]), tuple(first)
-
-
-def models_of_source(source: ConfigSource, overrides: Sequence[str], plugins: Plugins) -> tuple[str, ...]:
-    """The keys of the models that a source of `single_point` selects; none where it selects no models.
-
-    Its other values may not be valid yet: a parameter may be missing that is given or solved for later.
-
-    Raises
-    ------
-    ConfigError : it cannot be read, or selects what is no model
-    """
-    read, _ = _config_reader(source, overrides, plugins)
-    if (isinstance(source, str | Path) and is_result(Path(source))) or isinstance(source, xr.Dataset):
-        return tuple(model.key for model in read(()).models)
-    # the models of the starter config are no selection
-    draft = open_config(Path(source) if isinstance(source, str) else source or {}, plugins.models)
-    draft = draft.with_settings(map(Setting.parse, overrides))
-    if "models" not in draft.data:
-        return ()
-    _, problems = expand_models(draft.data["models"], draft.known_models)
-    return tuple(model.key for model in (read(()).models if problems else draft.models))
-
-
-def _config_reader(
-    source: ConfigSource, overrides: Sequence[str], plugins: Plugins
-) -> tuple[ReadConfig, dict[str, float | str]]:
-    """A function that reads the config of a source, and the scalar coordinates of a part of a result."""
-    if source is None:
-        text = STARTER_CONFIG.read_text(encoding="utf-8")
-        first = ["sweep.e=0.5", *overrides]
-        return lambda more: parse_config(text, [*first, *more], plugins.models, name="starter"), {}
-    if isinstance(source, str | Path) and is_result(Path(source)):
-        with open_result(source) as stored:
-            return _stored_config_reader(stored, overrides, plugins, str(source))
-    if isinstance(source, xr.Dataset):
-        return _stored_config_reader(source, overrides, plugins, "the result")
-    path_or_table = Path(source) if isinstance(source, str) else source
-    return lambda more: read_config(path_or_table, [*overrides, *more], plugins.models), {}
-
-
-def _stored_config_reader(
-    dataset: xr.Dataset, overrides: Sequence[str], plugins: Plugins, name: str
-) -> tuple[ReadConfig, dict[str, float | str]]:
-    require_sweep(dataset, name)
-    attributes = dict(dataset.attrs)
-    single = {str(key): label.values.item() for key, label in dataset.coords.items() if label.ndim == 0}
-    if "config" in attributes:
-        check_plugins(attributes, plugins, name)
-        for note in (*changed_plugins(attributes, plugins, name), *unknown_plugins(attributes, plugins, name)):
-            warnings.warn(note, stacklevel=4)
-
-    def read(more: Sequence[str]) -> Config:
-        return stored_config(attributes, [*overrides, *more], plugins, name, allow_changed_plugins=True)
-
-    return read, {key: value for key, value in single.items() if key != "model"}
+    return replace(config, axes=tuple(kept), scalars=scalars, models=config.models[:1]), tuple(first)
 
 
 def _selectable_columns(axis: Axis) -> dict[str, Sequence[float | str]]:
-    """The values that can select a point of an axis: its columns, and the number of a case."""
+    """List the values that can select a point of an axis: its columns, and the number of a case."""
     return {**({axis.numbered: axis.labels} if axis.numbered else {}), **axis.columns}
 
 
 def _position_on_axis(axis: Axis, at: Mapping[str, float | str]) -> int:
-    """The position on an axis at which its columns have the values of `at`."""
+    """Find the first position on an axis at which its columns have the values of `at`."""
     columns = _selectable_columns(axis)
+    selected = {name: value for name, value in at.items() if name in columns}
     for position in range(axis.size):
-        if all(columns[name][position] == value for name, value in at.items() if name in columns):
+        if all(columns[name][position] == value for name, value in selected.items()):
             return position
-    requested = ", ".join(f"{name} = {value}" for name, value in at.items() if name in columns)
-    raise UsageError(f"{safe_text(requested)}: not on the zipped axis {axis.name}; these values vary together")
-
-
-def _is_valid(read: ReadConfig, option_names: Mapping[str, str]) -> bool:
-    """Whether a config can be read with some overrides."""
-    try:
-        read(list(option_names))
-    except ConfigError:
-        return False
-    return True
-
-
-def _read_with_option_names(read: ReadConfig, option_names: Mapping[str, str]) -> Config:
-    """Read a config; messages about its overrides name the options of the user instead."""
-    try:
-        return read(list(option_names))
-    except ConfigError as error:
-        names = {f"--set {override}:": f"{name}:" for override, name in option_names.items()}
-        raise ConfigError(*(_with_option_name(line, names) for line in error.problems)) from None
-
-
-def _with_option_name(line: str, names: Mapping[str, str]) -> str:
-    """A line of a message with the override at its start replaced by the option."""
-    return next((safe_text(new) + line[len(old) :] for old, new in names.items() if line.startswith(old)), line)
+    requested = ", ".join(f"{name} = {value}" for name, value in selected.items())
+    raise UsageError(f"{requested}: not on the zipped axis {axis.name}; these values vary together")

@@ -24,7 +24,7 @@ Slab = dict[Hashable, slice]
 
 
 def slabs(sizes: Mapping[Hashable, int], points: int = SLAB_POINTS) -> Iterator[Slab]:
-    """All points in C order, in slabs of at most `points` points.
+    """Divide all points, in C order, into slabs of at most `points` points.
 
     >>> list(slabs({"e": 2, "v1": 3}, 2))[:2]
     [{'e': slice(0, 1, None), 'v1': slice(0, 2, None)}, {'e': slice(0, 1, None), 'v1': slice(2, 3, None)}]
@@ -42,7 +42,7 @@ def slabs(sizes: Mapping[Hashable, int], points: int = SLAB_POINTS) -> Iterator[
 def aligned_slabs(
     sizes: Mapping[Hashable, int], lengths: Sequence[int], points: int = SLAB_POINTS
 ) -> Iterator[Slab]:
-    """All points, in slabs of whole chunks with the given lengths along the axes, of about `points` points.
+    """Divide all points into slabs of about `points` points, of whole chunks with the given lengths.
 
     >>> [where["v1"] for where in aligned_slabs({"e": 2, "v1": 4}, (2, 2), 4)]
     [slice(0, 2, None), slice(2, 4, None)]
@@ -79,10 +79,7 @@ def is_large(variable: xr.Variable) -> bool:
 
 
 def varying_dims(dataset: xr.Dataset, name: str) -> tuple[Hashable, ...]:
-    """The dimensions along which a variable varies, as far as known; all dimensions of one in memory.
-
-    They depend on the model: call it for one model at a time, `dataset.isel(model=number)`.
-    """
+    """Name the dimensions along which a variable of one model varies, as far as known; all of one in memory."""
     variable = dataset.variables[name]
     if not is_computed(variable) or "model" not in dataset.coords:
         return variable.dims
@@ -96,12 +93,7 @@ def varying_dims(dataset: xr.Dataset, name: str) -> tuple[Hashable, ...]:
 
 
 def distinct_points(dataset: xr.Dataset, name: str) -> tuple[xr.Variable, int]:
-    """A variable, reduced to the first position along each dimension on which it does not vary.
-
-    Returns
-    -------
-    (xarray.Variable, int) : with all dimensions of the variable, and the weight of each of its points
-    """
+    """Reduce a variable to the points at which it differs; the second result is the weight of each of them."""
     varying, variable = varying_dims(dataset, name), dataset.variables[name]
     fixed = [dim for dim in variable.dims if dim not in varying]
     weight = math.prod(variable.sizes[dim] for dim in fixed)
@@ -109,16 +101,7 @@ def distinct_points(dataset: xr.Dataset, name: str) -> tuple[xr.Variable, int]:
 
 
 def over_varying_dims(dataset: xr.Dataset, names: Sequence[str], *more: Hashable) -> tuple[xr.Dataset, int]:
-    """Some variables over the dimensions along which any of them varies, and the weight of each point.
-
-    The other dimensions are at their first position.
-
-    Parameters
-    ----------
-    dataset : a result
-    names : of the variables
-    more : dimensions that are never reduced
-    """
+    """Reduce variables to the dimensions along which any varies, and `more`; with the weight of each point."""
     varying = {*more, *(dim for name in names for dim in varying_dims(dataset, name))}
     dims = dict.fromkeys(dim for name in names for dim in dataset.variables[name].dims)
     fixed = [dim for dim in dims if dim not in varying]

@@ -15,7 +15,7 @@ from ..contact.status import FIRST_FAILURE, Status
 from .attributes import SummaryRecord
 from .schema import parts_of_models
 from .slabs import MAX_SUMMARY_POINTS, distinct_points, is_computed, slabs
-from .trajectory_table import TrajectoryTable, computed_array, expand
+from .trajectory_table import ExpandedSlab, TrajectoryTable, computed_array, expand
 
 # variables of which the largest absolute value is reported
 ERROR_VARIABLES = ("e_error", "v1_error", "v2_error", "closed_form_error", "energy_residual")
@@ -103,6 +103,17 @@ class Summary:
         largest = float(np.fmax.reduce(np.abs(values), axis=None, initial=np.nan))
         by_model = self.worst.setdefault(name, {})
         by_model[model] = float(np.fmax(by_model.get(model, np.nan), largest))
+
+
+def add_slab(summary: Summary, table: TrajectoryTable, slab: ExpandedSlab) -> None:
+    """Add the points of a slab; points that differ only by parameters of other models count once."""
+    axes = table.inputs.axes_of_model(table.laws[slab.model].key)
+    if any(part.start > 0 for axis, part in enumerate(slab.region) if axis not in axes):
+        return
+    first = tuple(slice(None) if axis in axes else slice(1) for axis in range(len(slab.region)))
+    counted = {name: array[first or ...] for name, array in slab.values.items()}
+    radius = np.fmin(slab.impacts.R1, slab.impacts.R2)
+    summary.add(counted, slab.model, [part.start for part in slab.region], radius)
 
 
 def summarize(

@@ -5,25 +5,21 @@ from __future__ import annotations
 import errno
 import os
 import shutil
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from ..atomic import atomic_write, check_output, check_outputs
 from ..config.grid import MAX_POINTS
 from ..config.input_names import InputName
 from ..config.load import read_config
-from ..contact.impacts import Impacts
 from ..contact.model import ForceModel
 from ..contact.simulate import TABLE_COLUMNS, CollisionResult
-from ..contact.variables import Variable
 from ..engine import checkpoint
 from ..engine.execute import FindReused, integrate_ranges, reuse_nothing, with_core
 from ..engine.executors import SERIAL, ExecutorSpec, choose_executor
@@ -40,14 +36,13 @@ from ..engine.trajectories import (
     trajectory_ranges,
 )
 from ..errors import ResultError, StoreError, UnfinishedError, UsageError
-from ..text import safe_text
-from .factored import factored_template, stored_stiffness, table_values
+from .layouts import LAYOUTS, FillSlab
 from .netcdf import MAX_LABEL_BYTES, encode_text, is_text
 from .outcome import SweepOutcome
 from .plausibility import material_notes
 from .schema import dataset_template, plan_coordinates, stored_variables
-from .summary import Summary, summarize, summarize_table, summary_record
-from .trajectory_table import TrajectoryTable, expanded_slabs, in_memory, lazy_dataset, table_of
+from .summary import summarize
+from .trajectory_table import TrajectoryTable, in_memory, lazy_dataset, table_of
 from .validation import is_name
 from .xarray_backend import MAX_LOADED_BYTES, check_readable, load, open_result, write_sealed
 
@@ -55,8 +50,6 @@ from .xarray_backend import MAX_LOADED_BYTES, check_readable, load, open_result,
 OVERHEAD_BYTES = 2**16
 # smaller sweeps of one range have no checkpoint: they are repeated faster than read
 NO_CHECKPOINT_POINTS = 2**20
-
-SlabValues = dict[str, NDArray[Any]]
 
 
 @dataclass(frozen=True)
@@ -68,7 +61,7 @@ class Extension:
     seal : of the old result
     note : JSON text for the attribute `extended` of the new result
     find_reused : returns the trajectories of a range that are not integrated again
-    fill : copies old values into a slab: `fill(model, region, values)`; None if all values are computed from
+    fill : copies old values into a slab; None if all values are computed from
         trajectories
     replaces : whether the new result replaces the old one
     """
@@ -76,7 +69,7 @@ class Extension:
     seal: str = ""
     note: str = ""
     find_reused: FindReused = reuse_nothing
-    fill: Callable[[int, tuple[slice, ...], SlabValues], None] | None = None
+    fill: FillSlab | None = None
     replaces: bool = False
 
 
@@ -216,16 +209,15 @@ def sweep_to_file(
     run = Run(backend or SERIAL, resume, overwrite, max_points, on_progress, on_note, should_stop)
     plan = prepare(source, overrides, plugins, run)
     output = Path(output)
-    shown = safe_text(str(output))
     outcome = None if overwrite else find_finished(output, plan)
     if outcome is not None:
         checkpoint.remove_stale_work_folder(output, plan)
-        run.check_stop(f"{shown} already contains this sweep")
+        run.check_stop(f"{output} already contains this sweep")
         return outcome
     check_outputs([output], [source, *plugins, *plan.config.files], overwrite=overwrite)
     with run.connected() as connected:
         outcome = sweep_into(output, plan, connected)
-    run.check_stop(f"{shown} is complete")
+    run.check_stop(f"{output} is complete")
     return outcome
 
 
@@ -235,13 +227,7 @@ def prepare(
     plugins: Sequence[ForceModel | str | Path] = (),
     run: Run = DEFAULT_RUN,
 ) -> Plan:
-    """Read a config and its plug-ins, and report values that are implausible.
-
-    Raises
-    ------
-    ConfigError : with all problems of the config
-    UsageError : more than `run.max_points` trajectories would be integrated
-    """
+    """Read a config and its plug-ins, and report values that are implausible."""
     source = Path(source) if isinstance(source, str) else source
     plugin_set = read_plugins(plugins)
     config = read_config(source, overrides, plugin_set.models, run.max_points)
@@ -254,12 +240,7 @@ def prepare(
 
 
 def sweep_in_memory(plan: Plan, run: Run = DEFAULT_RUN) -> xr.Dataset:
-    """Run a plan; a small result is in memory, a large one is computed when it is indexed.
-
-    Raises
-    ------
-    UnfinishedError : the sweep was stopped; nothing is kept
-    """
+    """Run a plan; a small result is in memory, a large one is computed when it is indexed."""
     check_labels(plan)
     maps = trajectory_maps(plan)
     plan = with_core(plan, maps)
@@ -331,12 +312,7 @@ def complete_ranges(
     run: Run,
     find_reused: FindReused = reuse_nothing,
 ) -> None:
-    """Integrate the ranges that a work folder does not have yet.
-
-    Raises
-    ------
-    StoreError, UsageError, UnfinishedError : see `sweep_to_file`
-    """
+    """Integrate the ranges that a work folder does not have yet."""
     todo: list[TrajectoryRange] = []
     for trajectory_range in ranges:
         stored = None if run.should_stop() else work_folder.load(trajectory_range)
@@ -369,16 +345,14 @@ def reload_range(work_folder: checkpoint.WorkFolder, trajectory_range: Trajector
     """Load a finished range, or raise a `StoreError` if it is damaged."""
     collisions = work_folder.load(trajectory_range)
     if collisions is None:
-        raise StoreError(f"{safe_text(str(work_folder.path(trajectory_range.number)))}: can no longer be read")
+        raise StoreError(f"{work_folder.path(trajectory_range.number)}: can no longer be read")
     return collisions
 
 
 def check_storable(plan: Plan) -> None:
     """Refuse a plan whose labels are too long or whose laws cannot be factored, before integration."""
     check_labels(plan)
-    if plan.layout == "factored":
-        for law in plan.models:
-            stored_stiffness(plan.inputs, law)
+    LAYOUTS[plan.layout].check(plan)
 
 
 def check_labels(plan: Plan) -> None:
@@ -386,9 +360,7 @@ def check_labels(plan: Plan) -> None:
     columns = [name for axis in plan.config.axes for name in axis.columns]
     odd = [name for name in columns if InputName.parse(name).material and not is_name(name)]
     if odd:
-        raise UsageError(
-            f"{safe_text(odd[0])}: expected a material name without spaces and slashes, to be an axis"
-        )
+        raise UsageError(f"{odd[0]}: expected a material name without spaces and slashes, to be an axis")
     coordinates = plan_coordinates(plan).values()
     size = sum(encode_text(coordinate).size for coordinate in coordinates if is_text(coordinate))
     if size > MAX_LABEL_BYTES:
@@ -439,71 +411,17 @@ def store_result(
     part: Path | None = None,
 ) -> SweepOutcome:
     """Write the result of a trajectory table in the layout of its plan; `part` is the temporary name."""
-    progress, variables, summary = counter.progress, stored_variables(plan), Summary()
-    whole = dataset_template(plan)
+    progress, result = counter.progress, dataset_template(plan)
     if extension.note:
-        whole = whole.assign_attrs(extended=extension.note)
+        result = result.assign_attrs(extended=extension.note)
 
-    def check(points: int) -> None:
-        run.on_progress(replace(progress, points=points, failed=max(summary.failed, progress.failed)))
+    def on_slab(points: int, failed: int) -> None:
+        run.on_progress(replace(progress, points=points, failed=max(failed, progress.failed)))
         run.check_stop()
 
-    def full() -> Iterator[tuple[str, tuple[int | slice, ...], NDArray[Any]]]:
-        chunks = plan.config.output.chunks
-        lengths = [chunks.get(axis.name, axis.size) for axis in plan.config.axes] if chunks else []
-        for model, region, impacts, values in expanded_slabs(table, variables, lengths):
-            if extension.fill:
-                extension.fill(model, region, values)
-            for name, array in values.items():
-                yield name, (model, *region) if "model" in whole[name].dims else region, array
-            axes = plan.inputs.axes_of_model(table.laws[model].key)
-            _add_slab(summary, axes, model, region, impacts, values)
-            check(summary.points)
-
-    def factored() -> Iterator[tuple[str, tuple[int | slice, ...], NDArray[Any]]]:
-        for stored in table_values(table, variables):
-            yield stored
-            check(0)
-
-    is_full = plan.layout == "full"
-    template = whole if is_full else factored_template(whole, table, variables)
-    if not is_full:
-        whole = lazy_dataset(whole, table, variables)
-        if plan.stored_points <= NO_CHECKPOINT_POINTS:
-            summary = _summarize_points(table, variables)
-        else:
-            # stored, since a reader would take long to compute it
-            summary, extremes = summarize_table(whole, table)
-            record = summary_record(summary, extremes, whole)
-            template = template.assign_attrs(summary=record.model_dump_json())
+    contents = LAYOUTS[plan.layout].contents(result, plan, table, on_slab, extension.fill)
     with atomic_write(output, overwrite=run.overwrite or extension.replaces, part=part) as sink:
-        seal = write_sealed(sink, template, full() if is_full else factored(), plan.config.output)
+        seal = write_sealed(sink, contents.template, contents.values, plan.config.output)
         check_readable(sink, output)
-    whole.encoding = {"source": str(output), "seal": seal, "layout": plan.layout}
-    return SweepOutcome(whole, summary, progress.of_trajectories, output=output)
-
-
-def _summarize_points(table: TrajectoryTable, variables: Sequence[Variable]) -> Summary:
-    """Summarize a trajectory table point by point; unlike `summarize` this has the radii."""
-    summary = Summary()
-    for model, region, impacts, values in expanded_slabs(table, variables):
-        axes = table.inputs.axes_of_model(table.laws[model].key)
-        _add_slab(summary, axes, model, region, impacts, values)
-    return summary
-
-
-def _add_slab(
-    summary: Summary,
-    axes: Collection[int],
-    model: int,
-    region: tuple[slice, ...],
-    impacts: Impacts,
-    values: SlabValues,
-) -> None:
-    """Add the points of a slab; points that differ only by parameters of other models count once."""
-    if any(part.start > 0 for axis, part in enumerate(region) if axis not in axes):
-        return
-    first = tuple(slice(None) if axis in axes else slice(1) for axis in range(len(region)))
-    counted = {name: array[first or ...] for name, array in values.items()}
-    radius = np.fmin(impacts.R1, impacts.R2)
-    summary.add(counted, model, [part.start for part in region], radius)
+    contents.result.encoding = {"source": str(output), "seal": seal, "layout": plan.layout}
+    return SweepOutcome(contents.result, contents.summary, progress.of_trajectories, output=output)

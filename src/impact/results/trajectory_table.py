@@ -11,7 +11,7 @@ import os
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -377,32 +377,36 @@ def lazy_dataset(template: xr.Dataset, table: TrajectoryTable, variables: Sequen
     return dataset
 
 
+class ExpandedSlab(NamedTuple):
+    """All values of a model in a region of the grid, by name, and the impacts that they are of."""
+
+    model: int
+    region: tuple[slice, ...]
+    impacts: Impacts
+    values: dict[str, NDArray[Any]]
+
+
 def expanded_slabs(
-    table: TrajectoryTable, variables: Sequence[Variable], lengths: Sequence[int] = ()
-) -> Iterator[tuple[int, tuple[slice, ...], Impacts, dict[str, NDArray[Any]]]]:
-    """All values of a result, slab by slab: number of the model, region, impacts, and values by name.
+    table: TrajectoryTable, variables: Sequence[Variable], chunks: Sequence[int] = ()
+) -> Iterator[ExpandedSlab]:
+    """Compute all values of a result, slab by slab; of whole chunks, if their lengths along the axes are given.
 
-    Variables that do not depend on the model are yielded once, with the first model.
-
-    Parameters
-    ----------
-    table, variables : see `lazy_dataset`
-    lengths : lengths of chunks along the axes; every slab then holds whole chunks
+    Variables that do not depend on the model are in the slabs of the first model only.
     """
     sizes: dict[Hashable, int] = dict(enumerate(table.inputs.shape))
     for model in range(len(table.laws)):
-        for slab in aligned_slabs(sizes, lengths) if lengths else slabs(sizes):
-            where = tuple(slab.values())
-            slab_variables = [variable for variable in variables if variable.per_model or model == 0]
-            index = table.inputs.index(where)
-            impacts, arrays = _expand(table, model, index, [variable.name for variable in slab_variables])
-            shape = tuple(part.stop - part.start for part in where)
+        chosen = [variable for variable in variables if variable.per_model or model == 0]
+        for slab in aligned_slabs(sizes, chunks) if chunks else slabs(sizes):
+            region = tuple(slab.values())
+            index = table.inputs.index(region)
+            impacts, arrays = _expand(table, model, index, [variable.name for variable in chosen])
+            shape = tuple(part.stop - part.start for part in region)
             values = {}
-            for variable in slab_variables:
-                array = np.broadcast_to(_without_dummy_axis(arrays.pop(variable.name), where), shape)
+            for variable in chosen:
+                array = np.broadcast_to(_without_dummy_axis(arrays.pop(variable.name), region), shape)
                 # copied only if it is a broadcast view or has another dtype
                 values[variable.name] = np.asarray(array, variable.dtype, order="C")
-            yield model, where, impacts, values
+            yield ExpandedSlab(model, region, impacts, values)
 
 
 def in_memory(dataset: xr.Dataset) -> xr.Dataset:
@@ -411,9 +415,9 @@ def in_memory(dataset: xr.Dataset) -> xr.Dataset:
     expanded = [array for array in computed.values() if array is not None]
     values = {array.variable.name: np.empty(array.shape, array.dtype) for array in expanded}
     # all variables of a slab together: they share most of the computation
-    for model, where, _, parts in expanded_slabs(expanded[0].table, [array.variable for array in expanded]):
-        for name, part in parts.items():
-            region: tuple[Any, ...] = (model, *where) if "model" in dataset[name].dims else where
+    for slab in expanded_slabs(expanded[0].table, [array.variable for array in expanded]):
+        for name, part in slab.values.items():
+            region: tuple[Any, ...] = (slab.model, *slab.region) if "model" in dataset[name].dims else slab.region
             values[name][region or ...] = part
     return dataset.assign(
         {name: (dataset[name].dims, array, dataset[name].attrs) for name, array in values.items()}

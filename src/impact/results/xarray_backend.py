@@ -12,7 +12,6 @@ from typing import Any
 import h5py
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from xarray.backends import BackendEntrypoint
 
 from ..atomic import Sink, atomic_write, check_output, check_outputs
@@ -23,8 +22,8 @@ from ..errors import ResultError, UnfinishedError, UsageError
 from ..text import safe_text
 from .hdf5_structure import byte_reader, check_root
 from .kinds import require_sweep
-from .layouts import layout_of_file
-from .netcdf import open_for_writing, read_variables
+from .layouts import LAYOUTS
+from .netcdf import RegionValues, open_for_writing, read_variables
 from .seal import check_seal, write_seal
 from .selection import model_positions, select
 from .slabs import slabs
@@ -41,7 +40,7 @@ COPY_BUFFER_BYTES = 2**22
 def write_sealed(
     sink: Sink,
     template: xr.Dataset,
-    values: Iterable[tuple[str, tuple[int | slice, ...], NDArray[Any]]],
+    values: Iterable[RegionValues],
     output: Output = DEFAULT_OUTPUT,
 ) -> str:
     """Write and seal a dataset.
@@ -98,15 +97,13 @@ def save(
     """
     path = Path(path)
     if "schema_version" not in dataset.attrs:
-        raise UsageError(
-            f"{safe_text(str(path))}: this dataset is not a result of impact: it has no schema_version"
-        )
+        raise UsageError(f"{path}: this dataset is not a result of impact: it has no schema_version")
     violation = schema_violation(dataset)
     if violation:
-        raise UsageError(f"{safe_text(str(path))}: {violation}; dataset.to_netcdf(path) stores any dataset")
+        raise UsageError(f"{path}: {violation}; dataset.to_netcdf(path) stores any dataset")
     check_output(path, overwrite=overwrite)
 
-    def parts() -> Iterator[tuple[str, tuple[slice, ...], NDArray[Any]]]:
+    def parts() -> Iterator[RegionValues]:
         for name, variable in dataset.data_vars.items():
             for where in slabs(variable.sizes):
                 if should_stop():
@@ -147,7 +144,7 @@ def check_readable(sink: Sink, path: Path) -> None:
         with h5py.File(sink, "r") as file:
             read_variables(file, read)
     except ResultError as error:
-        raise UsageError(f"{safe_text(str(path))}: could not be read again: {error}") from None
+        raise UsageError(f"{path}: could not be read again: {error}") from None
 
 
 def open_result(path: str | Path) -> xr.Dataset:
@@ -182,8 +179,8 @@ def open_result(path: str | Path) -> xr.Dataset:
             raise ResultError(f"{shown}: is not a readable result ({safe_text(str(error), 80)})") from error
         try:
             variables, attributes, unknown = read_variables(file, read)
-            layout = layout_of_file(attributes)
-            dataset = layout.read(variables, attributes)
+            layout = "factored" if "laws" in attributes else "full"
+            dataset = LAYOUTS[layout].read(variables, attributes)
             violation = schema_violation(dataset)
             if violation:
                 raise ResultError(f"is not a readable result ({violation})")
@@ -200,7 +197,7 @@ def open_result(path: str | Path) -> xr.Dataset:
     if unknown:
         names = safe_text(", ".join(unknown))
         warnings.warn(f"{shown}: ignored variables that are not part of a result: {names}", stacklevel=2)
-    dataset.encoding = {"source": str(path), "seal": seal, "layout": layout.name}
+    dataset.encoding = {"source": str(path), "seal": seal, "layout": layout}
     dataset.set_close(file.close)
     return dataset
 

@@ -26,7 +26,6 @@ from ..errors import ConfigError, UsageError, did_you_mean
 from ..results.sensitivity import HALF, QUANTILES, sensitivity_template
 from ..results.sweep import prepare, sweep_in_memory
 from ..results.xarray_backend import save
-from ..text import safe_text
 from .indices import indices_of, mixed_rows
 
 # an output whose standard deviation is a smaller multiple of rtol and of its largest value is constant
@@ -141,7 +140,7 @@ def check_output_name(of: str) -> None:
     """Raise a UsageError, which names the nearest output, if there is no such output."""
     if of not in OUTPUTS or of in ("status", "in_domain"):
         outputs = [name for name in OUTPUTS if name not in ("status", "in_domain")]
-        raise UsageError(f'--of: no output "{safe_text(of)}"; {did_you_mean(of, outputs)}')
+        raise UsageError(f'--of: no output "{of}"; {did_you_mean(of, outputs)}')
 
 
 def sensitivity_plan(plan: Plan, of: Sequence[str], max_points: int, name: str) -> Plan:

@@ -9,7 +9,6 @@ from pkgutil import iter_modules
 from types import MappingProxyType
 
 from ...errors import ModelError, did_you_mean
-from ...text import safe_text
 from ..model import ForceModel
 
 # families in the order of the paper; other families follow
@@ -71,5 +70,5 @@ def find(key: str, plugins: Sequence[ForceModel] = ()) -> ForceModel:
     """
     models = catalogue(plugins)
     if key not in models:
-        raise ModelError(f'no model "{safe_text(key)}"; {did_you_mean(key, list(models))}')
+        raise ModelError(f'no model "{key}"; {did_you_mean(key, list(models))}')
     return models[key]

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 from ..evidence import Evidence
 from ..model import ForceModel
+from .cited_sources import OPENSEES_HERTZDAMP, RIGID_BODY_DYNAMICS
 from .dashpot import KELVIN_VOIGT
 from .hysteresis import EXACT_HYSTERESIS, FLORES_2011, HUNT_CROSSLEY_1975, LANKARANI_NIKRAVESH_1990
-from .sources import OPENSEES_HERTZDAMP, RIGID_BODY_DYNAMICS
 
 
 def same_law(

@@ -10,11 +10,11 @@ import numpy as np
 from ..closed_forms.dashpot import approach_damping, approach_restitution
 from ..closed_forms.hysteresis import approach_damped_restitution
 from ..evidence import Evidence
-from ..force_expressions import damped, spring, stiffer
-from ..formula import Formula
+from ..force_expressions import damped, spring, unload_with_stiffness
+from ..formula_calls import Formula
 from ..model import About, ForceModel
+from .cited_sources import DYS, OPENSEES_JANKOWSKI, RAILWAY
 from .dashpot import dashpot
-from .sources import DYS, OPENSEES_JANKOWSKI, RAILWAY
 
 
 def approach_dashpot(key: str, *, zeta: Formula, **about: Unpack[About]) -> ForceModel:
@@ -102,7 +102,7 @@ KELVIN_VOIGT_HYSTERETIC = ForceModel(
     evidence=Evidence("seen", DYS, doi="two public bibliographies (2026)", note="the paper may have e²"),
     force=spring,
     coefficients={"Kr": lambda K, e: e * K},
-    unloading=stiffer,
+    unloading=unload_with_stiffness,
     oracle=lambda e: np.sqrt(e),
     exponent=1.0,
     family="asymmetric",

@@ -15,10 +15,10 @@ from ...array_types import Array
 from ..closed_forms.dashpot import force_damping, force_restitution, gap_damping, gap_restitution
 from ..evidence import Evidence
 from ..force_expressions import dragged
-from ..formula import Formula
+from ..formula_calls import Formula
 from ..model import About, ForceModel, Parameter
 from ..powers import power
-from .sources import CHRONO, DEMLAB_VISCOELASTIC, LIGGGHTS, MAPLESIM_HELP, YADE_2025, YADE_BIBLIOGRAPHY
+from .cited_sources import CHRONO, DEMLAB_VISCOELASTIC, LIGGGHTS, MAPLESIM_HELP, YADE_2025, YADE_BIBLIOGRAPHY
 
 # closed forms of the restitution, by where the contact ends
 DELIVERED_RESTITUTION: dict[str, Formula] = {

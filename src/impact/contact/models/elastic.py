@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..evidence import Evidence
 from ..force_expressions import spring
 from ..model import ForceModel
-from .sources import DEMLAB_VISCOELASTIC, GHARIB_HURMUZLU
+from .cited_sources import DEMLAB_VISCOELASTIC, GHARIB_HURMUZLU
 
 HERTZ = ForceModel(
     key="hertz",

@@ -11,11 +11,11 @@ import numpy as np
 from ...array_types import Array
 from ..closed_forms.plastic import luding_restitution, thornton_restitution
 from ..evidence import Evidence
-from ..force_expressions import returning, spring
-from ..formula import Formula
+from ..force_expressions import spring, unload_to_residual
+from ..formula_calls import Formula
 from ..model import ForceModel, Parameter
 from ..powers import power
-from .sources import DEMLAB_PLASTIC, YADE_BIBLIOGRAPHY
+from .cited_sources import DEMLAB_PLASTIC, YADE_BIBLIOGRAPHY
 
 # formula of E* for the laws that use it
 E_OF_K: Formula = lambda K, R_eff: 0.75 * K / np.sqrt(R_eff)  # noqa: E731
@@ -43,7 +43,7 @@ WALTON_BRAUN_VARIABLE = ForceModel(
     ),
     parameters=(Parameter("S", "1/m", "growth of the unloading stiffness with the force", least=0.0),),
     force=spring,
-    unloading=returning,
+    unloading=unload_to_residual,
     residual=lambda peak, force_at_peak, K, S: peak * (S * force_at_peak / (K + S * force_at_peak)),
     # with ω₀ = √(K/m): e² = K/K₂, and Fₘ = K v₀/ω₀
     oracle=lambda K, m, v0, S: np.sqrt(1 / (1 + S * v0 / np.sqrt(K / m))),
@@ -120,7 +120,7 @@ THORNTON_1997 = ForceModel(
     },
     breakpoints=(lambda dy: dy,),
     force=lambda elastic, x, R_eff, py, dy, Fy: np.where(x < dy, elastic, Fy + np.pi * py * R_eff * (x - dy)),
-    unloading=returning,
+    unloading=unload_to_residual,
     residual=lambda peak, force_at_peak, R_eff, E, py, dy, Fy: np.where(
         peak <= dy,
         0.0,
@@ -158,7 +158,7 @@ JOHNSON_1985 = ForceModel(
         ),
     },
     force=lambda elastic, x, R_eff, pd, yields: np.where(yields > 0, 2 * np.pi * R_eff * pd * x, elastic),
-    unloading=returning,
+    unloading=unload_to_residual,
     # a slow impact is not fully plastic: it would recover more than the peak indentation
     residual=lambda peak, force_at_peak, R_eff, E, yields: (
         yields * (peak - np.minimum(0.75 * force_at_peak / (np.sqrt(2 * R_eff * peak) * E), peak))

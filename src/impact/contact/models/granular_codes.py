@@ -10,6 +10,7 @@ from ..evidence import Evidence
 from ..model import ForceModel, Parameter
 from ..powers import power
 from .aliases import same_law
+from .cited_sources import CHRONO, DEMLAB_VISCOELASTIC, LIGGGHTS, YADE_2025
 from .dashpot import (
     ANAGNOSTOPOULOS_1988,
     HERTZIAN_DASHPOT,
@@ -27,7 +28,6 @@ from .dashpot import (
 )
 from .multibody_codes import of_code
 from .rate_dependent import KUWABARA_KONO_AT_SPEED
-from .sources import CHRONO, DEMLAB_VISCOELASTIC, LIGGGHTS, YADE_2025
 
 TANGENT_DASHPOT = "F = K δ^(3/2) + 2 β √(m S) δ̇,  S = (3/2) K δ^(1/2)"
 # at this closing speed the linear spring absorbs as much energy as Hertz's

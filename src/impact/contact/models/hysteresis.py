@@ -9,10 +9,10 @@ import numpy as np
 from ..closed_forms.hysteresis import delivered_restitution, exact_damping_ratio
 from ..evidence import Evidence
 from ..force_expressions import damped
-from ..formula import Formula
+from ..formula_calls import Formula
 from ..model import About, ForceModel
 from ..powers import power
-from .sources import DYS, GHARIB_HURMUZLU, MBDYN, MBDYN_BIBLIOGRAPHY, OPENSEES_HERTZDAMP, RAILWAY
+from .cited_sources import DYS, GHARIB_HURMUZLU, MBDYN, MBDYN_BIBLIOGRAPHY, OPENSEES_HERTZDAMP, RAILWAY
 
 
 def hysteresis(key: str, *, chi: Formula, **about: Unpack[About]) -> ForceModel:

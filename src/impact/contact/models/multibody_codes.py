@@ -12,13 +12,13 @@ import numpy as np
 from ...array_types import Array
 from ..closed_forms.dashpot import force_restitution, limited_restitution
 from ..evidence import Evidence
-from ..formula import Formula
+from ..formula_calls import Formula
 from ..model import ForceModel, Parameter
 from ..powers import power, powers
 from .aliases import same_law
+from .cited_sources import CHRONO_MULTICORE, DRAKE, MAPLESIM_HELP, MBDYN, MODIA3D, MUJOCO, SIMBODY
 from .dashpot import KELVIN_VOIGT_NO_TENSION
 from .hysteresis import FLORES_2011, HUNT_CROSSLEY_1975, LANKARANI_NIKRAVESH_1990, hysteresis
-from .sources import CHRONO_MULTICORE, DRAKE, MAPLESIM_HELP, MBDYN, MODIA3D, MUJOCO, SIMBODY
 
 LINEAR_DAMPING = "F = K δⁿ (1 + χ δ̇/v₀)"
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from ..evidence import Evidence
-from ..force_expressions import returning, spring, stiffer
+from ..force_expressions import spring, unload_to_residual, unload_with_stiffness
 from ..model import ForceModel, Parameter
 from ..powers import power
-from .sources import DEMLAB_PLASTIC, GHARIB_HURMUZLU
+from .cited_sources import DEMLAB_PLASTIC, GHARIB_HURMUZLU
 
 LANKARANI_NIKRAVESH_1994 = ForceModel(
     key="lankarani-nikravesh-1994",
@@ -24,7 +24,7 @@ LANKARANI_NIKRAVESH_1994 = ForceModel(
         doi="modelica/ModelicaStandardLibrary, ElastoGap.mo @b756f9deed (2026)",
     ),
     force=spring,
-    unloading=returning,
+    unloading=unload_to_residual,
     # equation (32) is δₘ (1 − e²) by (31) and fₘ = K δₘⁿ, for the integrated peak
     recovered=lambda e, peak: peak * (e * e),
     oracle=lambda e: e,
@@ -47,7 +47,7 @@ GHARIB_HURMUZLU_2012_ENERGETIC = ForceModel(
     ),
     force=spring,
     coefficients={"Kr": lambda K, n, e: K / power(e * e, n)},
-    unloading=stiffer,
+    unloading=unload_with_stiffness,
     recovered=lambda e, peak: peak * (e * e),
     oracle=lambda e: e,
     family="permanent",
@@ -69,7 +69,7 @@ BILINEAR = ForceModel(
     exponent=1.0,
     force=spring,
     coefficients={"Kr": lambda K, e: K / (e * e)},
-    unloading=stiffer,
+    unloading=unload_with_stiffness,
     recovered=lambda K, Kr, peak: peak * (K / Kr),
     oracle=lambda e: e,
     family="permanent",
@@ -87,7 +87,7 @@ ISMAIL_STRONGE_2008 = ForceModel(
     exponent=1.0,
     force=spring,
     coefficients={"Kr": lambda K, gamma: gamma * gamma * K},
-    unloading=stiffer,
+    unloading=unload_with_stiffness,
     recovered=lambda K, Kr, peak: peak * (K / Kr),
     oracle=lambda gamma: np.divide(1.0, gamma),
     family="permanent",

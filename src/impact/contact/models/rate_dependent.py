@@ -7,10 +7,10 @@ from typing import Literal, Unpack
 from ..closed_forms.viscoelastic import pade_damping
 from ..evidence import Evidence
 from ..force_expressions import dragged
-from ..formula import Formula
+from ..formula_calls import Formula
 from ..model import About, ForceModel, Parameter
 from ..powers import power, powers
-from .sources import DEMLAB_VISCOELASTIC
+from .cited_sources import DEMLAB_VISCOELASTIC
 
 
 def drag(

@@ -5,10 +5,10 @@ from __future__ import annotations
 from ..evidence import Evidence
 from .aliases import same_law
 from .asymmetric import JANKOWSKI_2006
-from .contact_fits import MUTHUKUMAR_2003
+from .cited_sources import IMPACT_MATERIAL, OPENSEES_HERTZDAMP, OPENSEES_JANKOWSKI
+from .finite_element_fits import MUTHUKUMAR_2003
 from .hysteresis import FLORES_2011
 from .multibody_codes import of_code
-from .sources import IMPACT_MATERIAL, OPENSEES_HERTZDAMP, OPENSEES_JANKOWSKI
 
 OPENSEES_HERTZDAMP_MATERIAL = of_code(
     same_law(

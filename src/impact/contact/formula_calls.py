@@ -50,7 +50,7 @@ def call_by_name(formula: Formula, values: Mapping[str, Array | float]) -> Array
         raise ModelError(f"a formula raised {type(error).__name__}: {error}") from error
 
 
-def explained(key: str, error: ModelError) -> tuple[str, str]:
+def describe_error(key: str, error: ModelError) -> tuple[str, str]:
     """A key that identifies an error of a law, and a line that describes it: location, type, text and a hint.
 
     Parameters

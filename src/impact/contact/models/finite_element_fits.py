@@ -7,11 +7,11 @@ import numpy as np
 from ...array_types import Array
 from ..closed_forms.plastic import muthukumar_restitution
 from ..evidence import Evidence
-from ..force_expressions import returning
+from ..force_expressions import unload_to_residual
 from ..model import ForceModel, Parameter
 from ..powers import power
+from .cited_sources import IMPACT_MATERIAL
 from .elastoplastic import E_OF_K
-from .sources import IMPACT_MATERIAL
 
 
 def softer_poisson_ratio(nu1: Array, nu2: Array, Y1: Array, Y2: Array) -> Array:
@@ -51,7 +51,7 @@ JACKSON_GREEN_2010 = ForceModel(
     force=lambda elastic, x, R_eff, C, dc, Fc, B: np.where(
         x < 1.9 * dc, elastic, Fc * jackson_green(np.maximum(x / dc, 1.9), x / R_eff, C, B)
     ),
-    unloading=returning,
+    unloading=unload_to_residual,
     residual=lambda peak, dc: np.where(
         peak > 1.9 * dc, 1.02 * peak * (1 - np.power((np.maximum(peak / dc, 1.9) + 5.9) / 6.9, -0.54)), 0
     ),

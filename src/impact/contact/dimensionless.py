@@ -8,7 +8,7 @@ import numpy as np
 
 from ..array_types import Array
 from ..errors import ModelError
-from .formula import argument_names, call_by_name
+from .formula_calls import argument_names, call_by_name
 from .impacts import Impacts
 from .model import QUANTITIES, ForceModel
 from .units import names_in

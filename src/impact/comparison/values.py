@@ -1,4 +1,8 @@
-"""Compare one variable of two aligned results: the difference in tolerances, slab by slab, and the worst point."""
+"""Compare the values of one variable of two aligned results: differences in tolerances, and the worst point.
+
+A difference is divided by the tolerance times the scale of the point: values agree up to a ratio of 1. Results of
+any size are read in slabs; where the axes along which a variable varies are known, only representative points are.
+"""
 
 from __future__ import annotations
 
@@ -14,22 +18,14 @@ from numpy.typing import NDArray
 from ..contact.status import Status
 from ..contact.variables import Variable
 from ..errors import UsageError
+from ..results import slabs
 from ..results.replay_command import inputs_of_model
 from ..results.schema import columns_along, is_case, scale_of
-from ..results.slabs import (
-    MAX_SUMMARY_POINTS,
-    SLAB_POINTS,
-    VARIES_ALONG,
-    aligned_slabs,
-    is_lazy,
-    slabs,
-    varying_dims,
-)
-from .align import Aligned, Side
-from .verdict import Judged
+from .align import AlignedResult, Alignment
+from .verdict import VariableComparison
 
-# a part of the common points, by axis; along axes that are not in it, the first point represents all
-SlicesByDim = Mapping[str, slice]
+# slices of the common points, by axis; along axes that are not in it, the first point represents all
+Region = Mapping[str, slice]
 
 # at most this many points of a variable are compared, which takes an hour
 MAX_COMPARED_POINTS = 10**10
@@ -41,29 +37,31 @@ DIMENSIONLESS_SCALES = ("v0", "the peak", "itself", "m v0^2/2")
 SCALE_INPUTS = {"v0": ("v1", "v2"), "m v0^2/2": ("v1", "v2", "m1", "m2")}
 
 
-def representative_regions(variables: Sequence[Variable], aligned: Aligned) -> dict[str, list[SlicesByDim]]:
-    """By variable, the parts of the common points that represent all of them; see `compare` for the rule.
+def representative_regions(variables: Sequence[Variable], aligned: Alignment) -> dict[str, list[Region]]:
+    """By variable, the regions whose points represent all common points; see `compare` for the rule.
 
     Raises
     ------
     UsageError : a variable has more than `MAX_COMPARED_POINTS` representative points
     """
-    regions: dict[str, list[SlicesByDim]] = {}
+    results = (aligned.new, aligned.baseline)
+    regions: dict[str, list[Region]] = {}
+    reduced = []
     for variable in variables:
-        if any(_declares_dims(side, variable.name) for side in (aligned.new, aligned.baseline)):
+        if any(_declares_dims(result, variable.name) for result in results):
+            reduced.append(variable)
             regions[variable.name] = []
         else:
             regions[variable.name] = [_region(aligned.dims[variable.name], aligned.sizes, slice(None))]
-    reduced = [variable for variable in variables if not regions[variable.name]]
     for model in range(aligned.sizes.get("model", 0)) if reduced else ():
-        sides = [_dataset_of_model(side, model) for side in (aligned.new, aligned.baseline)]
+        datasets = [_dataset_of_model(result, model) for result in results]
         for variable in reduced:
             if "model" in aligned.dims[variable.name]:
-                dims = _representative_dims(variable, aligned, sides)
+                dims = _representative_dims(variable, aligned, datasets)
                 regions[variable.name].append(_region(dims, aligned.sizes, slice(model, model + 1)))
     for variable in reduced:
         if "model" not in aligned.dims[variable.name]:
-            dims = _representative_dims(variable, aligned, [aligned.new.dataset, aligned.baseline.dataset])
+            dims = _representative_dims(variable, aligned, [result.dataset for result in results])
             regions[variable.name].append(_region(dims, aligned.sizes, slice(None)))
     for name, parts in regions.items():
         points = sum(math.prod(part.stop - part.start for part in region.values()) for region in parts)
@@ -73,56 +71,56 @@ def representative_regions(variables: Sequence[Variable], aligned: Aligned) -> d
     return regions
 
 
-def _declares_dims(side: Side, name: str) -> bool:
-    variable = side.dataset.variables[name]
-    return is_lazy(variable) and VARIES_ALONG in variable.encoding
+def _declares_dims(result: AlignedResult, name: str) -> bool:
+    """Whether the axes along which a variable varies are known."""
+    variable = result.dataset.variables[name]
+    return slabs.is_lazy(variable) and slabs.VARIES_ALONG in variable.encoding
 
 
-def _dataset_of_model(side: Side, model: int) -> xr.Dataset:
-    """One side's dataset of the model at a common position."""
-    position = int(side.positions["model"][model])
-    return side.dataset.isel(model=slice(position, position + 1)) if "model" in side.dataset.dims else side.dataset
+def _dataset_of_model(result: AlignedResult, model: int) -> xr.Dataset:
+    """Select the model at a common position."""
+    if "model" not in result.dataset.dims:
+        return result.dataset
+    position = int(result.positions["model"][model])
+    return result.dataset.isel(model=slice(position, position + 1))
 
 
-def _region(dims: Iterable[str], sizes: Mapping[str, int], models: slice) -> SlicesByDim:
+def _region(dims: Iterable[str], sizes: Mapping[str, int], models: slice) -> Region:
+    """Take some models and all points along the other dimensions."""
     return {dim: slice(*(models if dim == "model" else slice(None)).indices(sizes[dim])[:2]) for dim in dims}
 
 
-def _representative_dims(variable: Variable, aligned: Aligned, sides: Sequence[xr.Dataset]) -> tuple[str, ...]:
-    """The axes of a variable whose points represent all others.
-
-    Parameters
-    ----------
-    variable : in both results
-    aligned : the results
-    sides : the datasets of one model
-    """
+def _representative_dims(
+    variable: Variable, aligned: Alignment, datasets: Sequence[xr.Dataset]
+) -> tuple[str, ...]:
+    """Choose the axes of a variable whose points represent all others, from the datasets of one model."""
 
     def varying(*names: str) -> set[Hashable]:
-        return {dim for side in sides for name in names if name in side for dim in varying_dims(side, name)}
+        present = [(dataset, name) for dataset in datasets for name in names if name in dataset]
+        return {dim for dataset, name in present for dim in slabs.varying_dims(dataset, name)}
 
     scale: set[Hashable] = set()
     for name in SCALE_INPUTS.get(variable.scale, ()):
         scale |= set(aligned.baseline.coords.variables[name].dims)
-    if variable.scale == "the peak" and "peak_indentation" in sides[1]:
-        scale |= set(varying_dims(sides[1], "peak_indentation"))
+    if variable.scale == "the peak" and "peak_indentation" in datasets[1]:
+        scale |= set(slabs.varying_dims(datasets[1], "peak_indentation"))
     full = varying(variable.name) | scale
     candidates = [full]
     if variable.per_model and variable.has_tolerance:
         # the status decides whether a NaN is an answer
         candidates.insert(0, full | varying("status"))
-    if variable.scale in DIMENSIONLESS_SCALES and all("e_out" in side for side in sides):
+    if variable.scale in DIMENSIONLESS_SCALES and all("e_out" in dataset for dataset in datasets):
         candidates.append(varying("e_out"))
     chosen = []
     for dims in candidates:
         chosen.append(tuple(dim for dim in aligned.dims[variable.name] if dim in dims or dim == "model"))
-        if _points(chosen[-1], aligned.sizes) <= MAX_SUMMARY_POINTS:
+        if _points(chosen[-1], aligned.sizes) <= slabs.MAX_SUMMARY_POINTS:
             return chosen[-1]
     return min(chosen, key=lambda dims: _points(dims, aligned.sizes))
 
 
 def _points(dims: Iterable[str], sizes: Mapping[str, int]) -> int:
-    """The number of points of one model."""
+    """Count the points of one model."""
     return math.prod(sizes[dim] for dim in dims if dim != "model")
 
 
@@ -130,7 +128,7 @@ def _points(dims: Iterable[str], sizes: Mapping[str, int]) -> int:
 class Worst:
     """A point that differs: ratio to the tolerance, size that decides between equal ratios, index and values."""
 
-    times: float
+    ratio: float
     size: float
     index: tuple[int, ...]
     difference: float
@@ -138,10 +136,10 @@ class Worst:
     baseline: float
 
 
-def judge(
-    variable: Variable, aligned: Aligned, tol: float, regions: Iterable[SlicesByDim]
-) -> tuple[Judged, dict[str, NDArray[Any]]]:
-    """Compare one variable at all common points: |new - baseline| over tolerance, inf if no difference is allowed.
+def compare_values(
+    variable: Variable, aligned: Alignment, tol: float, regions: Iterable[Region]
+) -> tuple[VariableComparison, dict[str, NDArray[Any]]]:
+    """Compare one variable at all common points.
 
     Parameters
     ----------
@@ -152,7 +150,7 @@ def judge(
 
     Returns
     -------
-    Judged : the numbers
+    VariableComparison : the numbers
     dict : by axis, the largest ratio at each of its points, or of groups of neighbours if there are more than
         `MAX_RATIO_GROUPS` points; constant along an axis of which the first point represents all
     """
@@ -163,30 +161,31 @@ def judge(
     for region in regions:
         weight = math.prod(aligned.sizes[dim] for dim in dims if dim not in region)
         for slab in _slabs(variable.name, aligned, region):
-            where = {dim: slab.get(dim, slice(0, 1)) for dim in dims}
-            a, b = aligned.new.read(variable.name, where), aligned.baseline.read(variable.name, where)
+            part = {dim: slab.get(dim, slice(0, 1)) for dim in dims}
+            a, b = aligned.new.read(variable.name, part), aligned.baseline.read(variable.name, part)
             if np.array_equal(a, b):
                 continue
-            ratio, difference = _ratio(variable, aligned, where, a, b, tol)
+            ratio, difference = _ratio(variable, aligned, part, a, b, tol)
             different += int(np.count_nonzero(ratio > 1.0)) * weight
             if not ratio.max():
                 continue
-            worst = _worse(worst, _worst_of_slab(variable, where, ratio, difference, a, b), shape)
+            worst = _worse(worst, _worst_of_slab(variable, part, ratio, difference, a, b))
             for axis, dim in enumerate(dims):
                 maxima = ratio.max(axis=tuple(other for other in range(len(dims)) if other != axis))
-                size, part = aligned.sizes[dim], slab.get(dim)
-                if part is None:
-                    np.maximum(largest[dim], maxima, out=largest[dim])
+                if dim in slab:
+                    groups = np.arange(slab[dim].start, slab[dim].stop) // group_size(aligned.sizes[dim])
+                    np.maximum.at(largest[dim], groups, maxima)
                 else:
-                    np.maximum.at(largest[dim], np.arange(part.start, part.stop) // group_size(size), maxima)
-    return Judged(
+                    np.maximum(largest[dim], maxima, out=largest[dim])
+    undetermined = np.isnan(aligned.scales[variable.name]).sum() if aligned.scales else 0
+    return VariableComparison(
         name=variable.name,
         judged=variable.judged,
         tolerance=tol if variable.has_tolerance else math.nan,
-        points=math.prod(shape),
+        points=math.prod(shape) - int(undetermined),
         different=different,
         worst=worst.difference if worst else 0.0,
-        times=worst.times if worst else 0.0,
+        ratio=worst.ratio if worst else 0.0,
         at=_inputs_of_point(aligned.new.coords, dict(zip(dims, worst.index, strict=True))) if worst else {},
         new=worst.new if worst else math.nan,
         baseline=worst.baseline if worst else math.nan,
@@ -202,15 +201,15 @@ def group_size(size: int) -> int:
     return -(-size // MAX_RATIO_GROUPS)
 
 
-def _slabs(name: str, aligned: Aligned, region: SlicesByDim) -> Iterator[dict[str, slice]]:
-    """A box in slabs; of a file with chunks, in slabs of whole chunks, so that each is read once."""
+def _slabs(name: str, aligned: Alignment, region: Region) -> Iterator[dict[str, slice]]:
+    """Split a region into slabs; of a file with chunks, into slabs of whole chunks, so that each is read once."""
     sizes: dict[Hashable, int] = {dim: part.stop - part.start for dim, part in region.items()}
     variable = aligned.baseline.dataset.variables[name]
     chunks = dict(zip(variable.dims, variable.encoding.get("chunksizes") or (), strict=False))
-    if is_lazy(variable) and chunks and math.prod(chunks.values()) <= SLAB_POINTS:
-        parts = aligned_slabs(sizes, [chunks.get(dim, 1) for dim in sizes])
+    if slabs.is_lazy(variable) and chunks and math.prod(chunks.values()) <= slabs.SLAB_POINTS:
+        parts = slabs.aligned_slabs(sizes, [chunks.get(dim, 1) for dim in sizes])
     else:
-        parts = slabs(sizes)
+        parts = slabs.slabs(sizes)
     for slab in parts:
         yield {
             dim: slice(part.start + slab[dim].start, part.start + slab[dim].stop) for dim, part in region.items()
@@ -219,18 +218,20 @@ def _slabs(name: str, aligned: Aligned, region: SlicesByDim) -> Iterator[dict[st
 
 def _ratio(
     variable: Variable,
-    aligned: Aligned,
-    where: Mapping[str, slice],
+    aligned: Alignment,
+    region: Region,
     a: NDArray[Any],
     b: NDArray[Any],
     tol: float,
 ) -> tuple[NDArray[Any], NDArray[Any]]:
-    """The difference of the values of a slab, relative to the tolerance and in the variable's unit."""
+    """The differences of a region: over the tolerance, and in the variable's unit.
+
+    The ratio is inf if no difference is allowed, or if a NaN is not explained.
+    """
+    missing = np.isnan(a.astype(float)), np.isnan(b.astype(float))
     with np.errstate(all="ignore"):
         difference = np.where(a == b, 0.0, np.abs(a.astype(float) - b.astype(float)))
-        has_peak = "peak_indentation" in aligned.baseline.dataset
-        scale = scale_of(variable, lambda name: aligned.baseline.read(name, where), has_peak=has_peak)
-        scale = np.broadcast_to(scale, b.shape)
+        scale = _scale(variable, aligned, region, b.shape)
         # allow for the rounding of values that were stored in single precision
         lost = sum(float(np.finfo(values.dtype).eps) for values in (a, b) if values.dtype == np.float32)
         allowed = tol * scale + (lost * np.maximum(np.abs(a), np.abs(b)) if lost else 0.0)
@@ -245,30 +246,42 @@ def _ratio(
             # with an infinite scale every difference would be accepted
             has_measure = (allowed > 0.0) & np.isfinite(scale) & np.isfinite(counted)
             ratio = np.where(counted == 0.0, 0.0, np.where(has_measure, counted / allowed, np.inf))
-    missing = np.isnan(a.astype(float)), np.isnan(b.astype(float))
     ratio = np.where(missing[0] | missing[1], np.inf, ratio)
     if (missing[0] & missing[1]).any():
-        ratio = np.where(missing[0] & missing[1] & _may_be_missing(variable, aligned, where), 0.0, ratio)
+        ratio = np.where(missing[0] & missing[1] & _may_be_missing(variable, aligned, region), 0.0, ratio)
+    if aligned.scales:
+        # values of a calibration that the data do not determine are arbitrary
+        ratio = np.where(np.isnan(scale), 0.0, ratio)
     return ratio, difference
 
 
-def _may_be_missing(variable: Variable, aligned: Aligned, where: Mapping[str, slice]) -> NDArray[Any] | bool:
+def _scale(variable: Variable, aligned: Alignment, region: Region, shape: tuple[int, ...]) -> NDArray[Any]:
+    """The scale of each point of a region in the variable's unit."""
+    if aligned.scales:
+        return aligned.scales[variable.name][tuple(region.values())]
+    has_peak = "peak_indentation" in aligned.baseline.dataset
+    scale = scale_of(variable, lambda name: aligned.baseline.read(name, region), has_peak=has_peak)
+    return np.broadcast_to(scale, shape)
+
+
+def _may_be_missing(variable: Variable, aligned: Alignment, region: Region) -> NDArray[Any] | bool:
     """Where NaNs in both are equal: the statuses are equal, and the status or the law explains the NaN."""
-    if not variable.per_model or not all("status" in side.dataset for side in (aligned.new, aligned.baseline)):
+    results = (aligned.new, aligned.baseline)
+    if not variable.per_model or not all("status" in result.dataset for result in results):
         return True
-    new, baseline = (side.read("status", where) for side in (aligned.new, aligned.baseline))
-    return np.asarray((new == baseline) & ((baseline != Status.OK) | (variable.may_be_nan)))
+    new, baseline = (result.read("status", region) for result in results)
+    return np.asarray((new == baseline) & ((baseline != Status.OK) | variable.may_be_nan))
 
 
 def _worst_of_slab(
     variable: Variable,
-    where: Mapping[str, slice],
+    slab: Region,
     ratio: NDArray[Any],
     difference: NDArray[Any],
     a: NDArray[Any],
     b: NDArray[Any],
 ) -> Worst:
-    """The point of a slab with the largest ratio, among equals the first with the largest difference.
+    """Find the point with the largest ratio, among equals the first with the largest difference.
 
     Among flags, which differ or do not, the first point.
     """
@@ -277,28 +290,28 @@ def _worst_of_slab(
     return Worst(
         float(ratio[index]),
         float(sizes[index]),
-        tuple(part.start + int(offset) for part, offset in zip(where.values(), index, strict=True)),
+        tuple(part.start + int(offset) for part, offset in zip(slab.values(), index, strict=True)),
         float(difference[index]),
         float(a[index]),
         float(b[index]),
     )
 
 
-def _worse(first: Worst | None, second: Worst, shape: Sequence[int]) -> Worst:
-    """The worse of two points, among equals the first in the order of the baseline."""
+def _worse(first: Worst | None, second: Worst) -> Worst:
+    """Choose the worse of two points, among equals the first in the order of the baseline."""
     if first is None:
         return second
-    return max(first, second, key=lambda point: (point.times, point.size, [-index for index in point.index]))
+    return max(first, second, key=lambda point: (point.ratio, point.size, [-index for index in point.index]))
 
 
 def _inputs_of_point(coords: xr.Dataset, index: Mapping[str, int]) -> dict[str, float | str]:
     """The inputs of a point of the new result, with which its config gives the same point again."""
-    at = {
+    inputs = {
         name: coords.variables[name].values[position].item()
         for dim, position in index.items()
         for name in dict.fromkeys([dim, *columns_along(coords, dim)])
     }
     return {
         name: value if is_case(name) else float(value) if isinstance(value, int | float) else str(value)
-        for name, value in inputs_of_model(at).items()
+        for name, value in inputs_of_model(inputs).items()
     }
