@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -38,6 +38,11 @@ class Difference:
     kind: DifferenceKind
     name: str
     text: str
+
+
+def by_kind(faults: Iterable[Difference]) -> list[Difference]:
+    """Sort differences by their kinds, those that explain others first."""
+    return sorted(faults, key=lambda fault: DIFFERENCE_KINDS.index(fault.kind))
 
 
 @dataclass(frozen=True)
@@ -185,8 +190,7 @@ class Verdict(Displayed):
     @property
     def lines(self) -> tuple[str, ...]:
         """The differences, a line each; after a variable the command that runs its worst point again."""
-        faults = sorted(self.faults, key=lambda fault: DIFFERENCE_KINDS.index(fault.kind))
-        lines = [f"{fault.kind}: {fault.text}" for fault in faults]
+        lines = [f"{fault.kind}: {fault.text}" for fault in by_kind(self.faults)]
         for variable in self.differing:
             command = f"  {self.replay(variable)}"
             # several variables are often worst at one point
@@ -210,9 +214,9 @@ class Verdict(Displayed):
 
     def as_dict(self) -> dict[str, Any]:
         """The verdict as plain data."""
-        from .formats import as_data, report_of
+        from .formats import as_data
 
-        return as_data(report_of(self))
+        return as_data(self)
 
     def records(self) -> Sequence[Mapping[str, Any]]:
         """The compared variables, those that differ first."""

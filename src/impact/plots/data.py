@@ -35,12 +35,7 @@ MEASURED = "Measured"
 
 
 def check_table(path: Path, form: str) -> None:
-    """Check the suffix and the form of a table.
-
-    Raises
-    ------
-    UsageError : one of them is unknown
-    """
+    """Check the suffix and the form of a table."""
     if path.suffix.lower() not in TABLE_SUFFIXES:
         *most, last = TABLE_SUFFIXES
         raise UsageError(f"--data {path}: expected a name that ends in {', '.join(most)} or {last}")
@@ -49,18 +44,7 @@ def check_table(path: Path, form: str) -> None:
 
 
 def encode_table(plot_data: PlotData, suffix: str, form: str = "wide") -> bytes:
-    """The data of a picture as the bytes of a table; all digits are written, except to .tex.
-
-    Parameters
-    ----------
-    plot_data : the data
-    suffix : one of TABLE_SUFFIXES
-    form : "wide", one column per curve, whose names are ASCII and have the unit; or "long", one row per point
-
-    Raises
-    ------
-    UsageError : the table needs a package that is not installed
-    """
+    """Write the data of a picture with all digits, except in .tex: a column per curve, or a row per point."""
     import pandas as pd
 
     if form == "long":
@@ -82,10 +66,7 @@ def encode_table(plot_data: PlotData, suffix: str, form: str = "wide") -> bytes:
 
 
 def encode_history(history: xr.Dataset) -> bytes:
-    """A time history as the bytes of a CSV table: columns with their units, and all digits.
-
-    `read_points` reads it again.
-    """
+    """Write a time history as a CSV table with units and all digits, which `read_points` reads again."""
     frame = history.drop_vars("model").to_dataframe().reset_index()
     units = {name: plain_unit(str(history[name].attrs["units"])) for name in frame.columns}
     return _csv_bytes(frame.rename(columns={name: heading(name, unit=unit) for name, unit in units.items()}))
@@ -103,12 +84,7 @@ class Points:
     columns: Mapping[str, np.ndarray]
 
     def draw(self, axes: Axes, panel: Panel) -> dict[str, Artist]:
-        """Draw the points over the curves of a panel, with error bars where there is a sigma.
-
-        Raises
-        ------
-        UsageError : the points lack what the panel shows
-        """
+        """Draw the points over the curves of a panel, with error bars if there is a sigma."""
         variables = list(dict.fromkeys(curve.variable for curve in panel.curves if curve.model))
         shown = [name for name in variables if name in self.columns]
         if panel.x_name not in self.columns or not shown:
@@ -137,15 +113,11 @@ class Points:
 
 
 def read_points(points: str | Path | pd.DataFrame | xr.Dataset) -> Points:
-    """Measured points, of a CSV file or of a table of pandas or xarray.
+    """Read measured points of a CSV file or of a table of pandas or xarray.
 
     The names of the columns are those of inputs and variables, with their units in brackets: "v1 [mm/s]". Without
     a unit a column is in SI. `sigma` is the standard deviation of the variable in the
     column before it, by default in its unit.
-
-    Raises
-    ------
-    ConfigError : the file cannot be read, or a name, a unit or a number is invalid
     """
     quantities = _column_quantities()
     is_file = isinstance(points, str | Path)
@@ -164,7 +136,7 @@ def read_points(points: str | Path | pd.DataFrame | xr.Dataset) -> Points:
 
 
 def _column_quantities() -> dict[str, Quantity]:
-    """Names of columns, with their units."""
+    """Define the columns that points may have."""
     outputs = {
         name: Quantity(variable.unit, variable.meaning)
         for name, variable in (OUTPUTS | HISTORY).items()

@@ -171,7 +171,7 @@ def _values_text(dataset: xr.Dataset, name: str) -> str:
 
 
 def _count_points(dataset: xr.Dataset) -> int:
-    """The points of a sweep, the measured values of a calibration, or the studies of a sensitivity study."""
+    """Count the points of a sweep, the measured values of a calibration, or the studies of a sensitivity study."""
     if is_calibration(dataset):
         return dataset.sizes["point"]
     return int(dataset["mean"].size) if is_sensitivity(dataset) else count_points(dataset)
