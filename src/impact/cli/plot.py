@@ -19,7 +19,7 @@ from .completion import complete_axis, complete_kind, complete_output
 from .options import JsonOption, ModelOption, OverwriteOption, PluginOption, SelectOption
 
 if TYPE_CHECKING:
-    from ..plots.kinds import PlotData
+    from ..plots.data import PlotData
 
 
 def plot(
