@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from itertools import islice
 from pathlib import Path
 from typing import NoReturn
 
@@ -312,9 +311,9 @@ def test_a_picture_reads_only_what_it_draws(small: xr.Dataset, big: tuple[xr.Dat
     numbers = get_plot_data(dataset, kind, choice, [BROKEN])
     expected = 0 if "e" in sel else 3 * 10 * (1_000 if plane else 1)
     assert max(reads.total.values(), default=0) == expected
-    assert list(islice(numbers.rows(), 3))
+    assert len(numbers.long_table())
     if not plane:
-        assert list(numbers.rows()) == list(get_plot_data(small, kind, choice, [BROKEN]).rows())
+        assert numbers.long_table().equals(get_plot_data(small, kind, choice, [BROKEN]).long_table())
         return
     error = small["e_error"].sel(model="lankarani-nikravesh-1990", v2=0.0).values
     assert numbers.panels[1].values[7] == tuple(error.tolist())

@@ -89,16 +89,10 @@ NOT_OF_A_PLUGIN = (KeyboardInterrupt, MemoryError, Interruption)
 
 
 def did_you_mean(word: str, choices: Sequence[str], synonyms: Mapping[str, str] = MappingProxyType({})) -> str:
-    """End a message about an unknown name: with the most similar choice in any case, otherwise with all choices.
-
-    Parameters
-    ----------
-    synonyms : other words for some of the choices
+    """End a message about an unknown name: with the most similar choice, also by a synonym, or all choices.
 
     >>> did_you_mean("Hetrz", ["hertz", "bilinear"]), did_you_mean("masss1", ["m1", "v1"], {"mass1": "m1"})
     ('did you mean "hertz"?', 'did you mean "m1"?')
-    >>> did_you_mean("x", ["hertz", "bilinear"])
-    'known: bilinear, hertz'
     """
     if not choices:
         return "none are defined"

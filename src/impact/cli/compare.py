@@ -20,7 +20,7 @@ from .options import MaxPointsOption, PluginOption, QuietOption, ResultArgument,
 if TYPE_CHECKING:
     import xarray as xr
 
-    from ..comparison.formats import Report
+    from ..comparison.formats import NoVerdict
     from ..comparison.verdict import Verdict
     from ..engine.plan import Plan
 
@@ -66,7 +66,7 @@ def compare(
     try:
         verdict = impact.compare(new, baseline, tol=dict(tol or ()) or None, subset=subset)
     except ImpactError as error:
-        _print_report(formats.report_of_error(str(new), str(baseline), str(error)), format)
+        _print_outcome(formats.NoVerdict(str(new), str(baseline), str(error)), format)
         raise
     _report_verdict(verdict, format, plot)
 
@@ -131,7 +131,7 @@ def rerun(
                 execute=run_plan,
             )
         except ImpactError as error:
-            _print_report(formats.report_of_error("the rerun", str(result), str(error)), format)
+            _print_outcome(formats.NoVerdict("the rerun", str(result), str(error)), format)
             raise
     _report_verdict(verdict, format, plot)
 
@@ -148,13 +148,12 @@ def _check_plot(plot: Path | None, *sources: Path) -> None:
 
 def _report_verdict(verdict: Verdict, format: Format, plot: Path | None) -> None:
     """Print a verdict, draw it, and exit with its code."""
-    from ..comparison import formats
 
     with exits.ignore_broken_pipe():
         if format is Format.table:
             print_verdict(verdict)
         else:
-            _print_report(formats.report_of(verdict), format)
+            _print_outcome(verdict, format)
     if plot is not None and not verdict.worst_along:
         # a missing picture does not change the verdict
         exits.print_line("nothing to draw: no variable was compared along an axis")
@@ -167,19 +166,19 @@ def _report_verdict(verdict: Verdict, format: Format, plot: Path | None) -> None
         raise typer.Exit(exits.EXIT_NOT_EQUAL)
 
 
-def _print_report(printed: Report, format: Format) -> None:
-    """Print a report on stdout; an error has no table, its message is on stderr."""
+def _print_outcome(outcome: Verdict | NoVerdict, format: Format) -> None:
+    """Print a verdict or an error on stdout; an error has no table, its message is on stderr."""
     from ..comparison import formats
 
     match format:
         case Format.json:
-            print(dump(formats.as_data(printed)))
+            print(dump(formats.as_data(outcome)))
         case Format.junit:
-            print(formats.as_junit(printed))
+            print(formats.as_junit(outcome))
         case Format.markdown:
-            print(formats.as_markdown(printed), end="")
+            print(formats.as_markdown(outcome), end="")
         case Format.github:
-            print(formats.as_github(printed))
+            print(formats.as_github(outcome))
 
 
 def print_verdict(verdict: Verdict) -> None:

@@ -19,7 +19,7 @@ from .console import dump
 from .options import JsonOption, ModelOption, OverwriteOption, PluginOption, SelectOption
 
 if TYPE_CHECKING:
-    from ..plots.kinds import PlotData
+    from ..plots.data import PlotData
 
 
 def plot(

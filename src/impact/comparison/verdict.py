@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -35,6 +35,11 @@ class Difference:
     kind: DifferenceKind
     name: str
     text: str
+
+
+def by_kind(faults: Iterable[Difference]) -> list[Difference]:
+    """Sort differences by their kinds, those that explain others first."""
+    return sorted(faults, key=lambda fault: DIFFERENCE_KINDS.index(fault.kind))
 
 
 @dataclass(frozen=True)
@@ -182,8 +187,7 @@ class Verdict:
     @property
     def lines(self) -> tuple[str, ...]:
         """The differences, a line each; after a variable the command that runs its worst point again."""
-        faults = sorted(self.faults, key=lambda fault: DIFFERENCE_KINDS.index(fault.kind))
-        lines = [f"{fault.kind}: {fault.text}" for fault in faults]
+        lines = [f"{fault.kind}: {fault.text}" for fault in by_kind(self.faults)]
         for variable in self.differing:
             command = f"  {self.replay(variable)}"
             # several variables are often worst at one point

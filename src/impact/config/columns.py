@@ -25,7 +25,7 @@ from ..errors import ConfigError, did_you_mean
 from ..text import safe_text
 from .files import as_table, read_text, set_value
 from .input_names import InputName, input_values
-from .quantities import MAX_PROBLEMS, ConfigProblem, KeyPath, Quantity, as_text, mismatch_error
+from .quantities import MAX_PROBLEMS, ConfigProblem, KeyPath, Quantity, UnitError, as_text, mismatch_error
 
 MAX_CSV_BYTES = 2_000_000  # size of a CSV file, whose values a result stores
 COLUMN_HEADER = re.compile(r"\s*(.*?)\s*(?:\[\s*(.*?)\s*\])?\s*", re.DOTALL)
@@ -39,25 +39,17 @@ Cells = tuple[list[float | str], list[tuple[int, str]]]
 
 @dataclass(frozen=True)
 class Columns:
-    """Columns of values, by name.
+    """Columns of values, by name."""
 
-    Parameters
-    ----------
-    source : name of the file or the table
-    header : line of the names; 0 for a table
-    lines : of each row; for a table its number, from 1
-    units : unit of each column; empty for SI
-    cells : the values of each column; the cells of a file are text
-    is_known : whether a column has the name of an input or an output. Otherwise it may be any file, such as one
-        with passwords, that a config of unknown origin names: messages contain nothing of it
-    """
-
-    source: str
-    header: int
-    lines: Sequence[int]
-    units: Mapping[str, str]
-    cells: Mapping[str, Sequence[object]]
+    source: str  # name of the file or the table
+    header: int  # line of the names; 0 for a table
+    lines: Sequence[int]  # of each row; for a table its number, from 1
+    units: Mapping[str, str]  # of each column; empty for SI
+    cells: Mapping[str, Sequence[object]]  # of each column
+    # a column has the name of an input or an output. Otherwise it may be any file, such as one with passwords,
+    # that a config of unknown origin names: messages contain nothing of it
     is_known: bool = True
+    is_text: bool = True  # text without a unit may be a number
 
     def problem(self, message: str, column: str = "", row: int | None = None) -> str:
         """Say where a problem is."""
@@ -66,17 +58,7 @@ class Columns:
         return ": ".join(part for part in (place, safe_text(column, 60), message) if part)
 
     def values(self, column: str, quantity: Quantity | None, n: float | None, unit: str = "") -> list[Any]:
-        """Convert a column to SI units, or to names of materials.
-
-        Parameters
-        ----------
-        n : the exponent that the unit may contain; None where it varies
-        unit : of a column without one
-
-        Raises
-        ------
-        ConfigError : the unit has another dimension, or the quantity does not allow the values of some cells
-        """
+        """Convert a column to SI units, or to names of materials; `unit` is that of a column without one."""
         unit = self.units[column] or unit
         if self.is_known:
             expected = unit_expected(quantity, unit, n)
@@ -84,7 +66,7 @@ class Columns:
                 raise ConfigError(self.problem(f"got [{safe_text(unit)}], expected {expected}", column))
         elif quantity is None:
             raise ConfigError(self.problem("got no known column, expected such as material1 or v1 [m/s]"))
-        values, problems = read_cells(self.cells[column], quantity, n, unit, is_text=True)
+        values, problems = read_cells(self.cells[column], quantity, n, unit, is_text=self.is_text)
         if problems and quantity is not None and not self.is_known:
             raise ConfigError(self.problem(f"expected {quantity.expected}", row=problems[0][0]))
         if problems:
@@ -128,22 +110,16 @@ def _read_cell(
 
 def unit_expected(quantity: Quantity | None, unit: str, n: float | None = math.nan) -> str:
     """Describe the units that a quantity may have; empty if `unit` is one of them."""
-    if quantity is not None and unit:
-        try:
-            Quantity(quantity.unit, "").read(f"1 {unit}", n)
-        except PydanticCustomError as error:
-            return error.message().partition(", expected ")[2]
+    try:
+        if quantity is not None and unit:
+            quantity.factor(unit, n)
+    except UnitError as error:
+        return str(error)
     return ""
 
 
 def read_csv(path: Path, quantity_of: QuantityOf, *, with_any_names: bool = False) -> Columns:
-    """Read the columns of a CSV file, whose first line names them, with their units in brackets.
-
-    Raises
-    ------
-    ConfigError : the file cannot be read, is too large, has no rows, has rows of another length than the header,
-        or has no known names (unless `with_any_names`)
-    """
+    """Read the columns of a CSV file, whose first line has their names, some of them known, and their units."""
     reader = csv.reader(io.StringIO(read_text(path, "CSV", MAX_CSV_BYTES), newline=""), strict=True)
     try:
         numbered = [(reader.line_num, row) for row in reader if row]
@@ -185,11 +161,7 @@ def read_csv(path: Path, quantity_of: QuantityOf, *, with_any_names: bool = Fals
 
 
 def split_header(text: str) -> tuple[str, str]:
-    """Split the header of a column into its name and its unit.
-
-    >>> split_header("v1 [mm/s]"), split_header("e")
-    (('v1', 'mm/s'), ('e', ''))
-    """
+    """Split the header of a column, such as "v1 [mm/s]", into its name and its unit."""
     match = COLUMN_HEADER.fullmatch(text)
     assert match is not None, "any text matches"
     return match[1], match[2] or ""
@@ -254,22 +226,11 @@ def column_quantity(models: Mapping[str, ForceModel]) -> QuantityOf:
 def read_files(
     data: Mapping[str, Any], folder: Path | None, models: Mapping[str, ForceModel], n: float | None
 ) -> tuple[dict[KeyPath, object], list[str]]:
-    """Read the CSV files of cases and of single columns.
-
-    Parameters
-    ----------
-    data : plain data of a config
-    folder : of the files; None if no file may be read, as for a config stored in a result
-    models : all models by key
-    n : the exponent that units may contain
-
-    Returns
-    -------
-    The values that replace the names of files, by path, and problems. A file that cannot be read has no values.
-    """
+    """Read the CSV files of cases and of single columns: the values that replace their names, and problems."""
 
     @cache
     def open_csv(file: str, *, with_any_names: bool = False) -> Columns:
+        # a config stored in a result has no folder
         if folder is None:
             raise ConfigError(f"{file}: not read; a stored config contains values, not file names")
         return read_csv(folder / file, column_quantity(models), with_any_names=with_any_names)
@@ -345,17 +306,10 @@ def named_files(data: Mapping[str, Any]) -> list[str]:
 
 
 class Cases(NamedTuple):
-    """The data of a config with each column of its cases at the path of its input.
-
-    Parameters
-    ----------
-    data : plain data
-    paths : where the values of an input are in the table of cases, by the path of the input
-    problems : names that are unknown or have another value, and columns of another length than the first
-    """
+    """The data of a config with each column of its cases at the path of its input."""
 
     data: dict[str, Any]
-    paths: dict[KeyPath, KeyPath]
+    paths: dict[KeyPath, KeyPath]  # of the values in the table of cases, by the path of the input
     problems: list[ConfigProblem]
 
 

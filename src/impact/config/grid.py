@@ -34,22 +34,17 @@ AxisValues = tuple[float, ...] | tuple[str, ...]
 class Axis:
     """One dimension of the grid: the columns of a zip group or of a table of cases, or one column.
 
-    Parameters
-    ----------
-    columns : values by config name, all of one length
-    numbered : name of a dimension whose points are numbered from 0, because no column labels them: that of a table
-        of cases, of samples, or of a group with repeated values; empty where the first column labels the points
-    numbers : the numbers of its points, where it is a part of such a dimension; empty for a whole dimension
-
     >>> Axis({"m1": (1.0, 2.0), "m2": (2.0, 4.0)}).name
     'm1'
     >>> Axis({"v1": (1.0, 1.0)}, numbered="case").labels
     (0, 1)
     """
 
-    columns: Mapping[str, AxisValues]
+    columns: Mapping[str, AxisValues]  # by config name, all of one length
+    # the name of a dimension whose points are numbered from 0 since no column labels them: that of a table of
+    # cases, of samples, or of a group with repeated values; empty where the first column labels the points
     numbered: str = ""
-    numbers: tuple[int, ...] = ()
+    numbers: tuple[int, ...] = ()  # of its points, for a part of such a dimension
 
     @property
     def name(self) -> str:
@@ -62,7 +57,7 @@ class Axis:
 
     @property
     def labels(self) -> tuple[float, ...] | tuple[str, ...]:
-        """The labels of its points: the values of the first column, or numbers."""
+        """Labels of its points: the values of the first column, or numbers."""
         return (self.numbers or tuple(range(self.size))) if self.numbered else self.columns[self.name]
 
 
@@ -87,19 +82,13 @@ def build_grid(
     *,
     in_full: bool = True,
 ) -> Grid:
-    """The grid that the values of a config span.
+    """Build the grid that the valid values of a config span; they, and all other names, are by config name.
 
     Parameters
     ----------
-    values : the valid values by config name, in config order
-    quantities : the quantity of each numeric value, by config name
-    groups : config names that vary together
-    cases : config names of the columns of a table of cases
-    samples : config names of the inputs with drawn values
+    groups, cases, samples : names that vary together: of zip groups, columns of cases, and uncertain inputs
     config_names : all names in the config, also those with invalid values
-    n_models : number of models
-    max_points : limit of the number of points
-    in_full : whether every point is stored; otherwise the number of trajectories is limited later
+    in_full : every point is stored; otherwise the number of trajectories is limited later
     """
     axis_sizes = {name: _axis_size(value) for name, value in values.items()}
     scalars = {name: value for name, value in values.items() if isinstance(value, float | str)}
@@ -140,7 +129,7 @@ def build_grid(
 
 
 def _axis_size(value: Numbers | Names) -> int | None:
-    """The number of values of an axis; None for a scalar."""
+    """Count the values of an axis; None for a scalar."""
     match value:
         case tuple():
             return len(value)
@@ -155,12 +144,9 @@ def _build_axes(
     cases: Sequence[str],
     samples: Sequence[str],
 ) -> tuple[Axis, ...]:
-    """The axes of groups of columns; the first column without repeated values names the axis.
-
-    The points of cases, and of a group without such a column, are numbered: "case", then "case_2" and so on; the
-    points of uncertain inputs are numbered "sample".
-    """
+    """Build the axes of groups of columns; the first column without repeated values names the axis."""
     axes: list[Axis] = []
+    # the points of cases, and of a group without such a column, are numbered: "case", then "case_2" and so on
     numbered = 1 if cases else 0
     for group in groups:
         naming = [name for name in group if len(set(columns[name])) == len(columns[name])]
@@ -180,14 +166,7 @@ def _build_axes(
 def chunk_problems(
     chunks: Mapping[str, int], axes: Sequence[Axis], n_models: int, n_variables: int
 ) -> list[ConfigProblem]:
-    """Problems of the chunks in which a result is to be stored: unknown axes, too many or too large chunks.
-
-    Parameters
-    ----------
-    chunks : lengths of a chunk along axes, by name; along other axes a chunk covers all points
-    axes : of the grid
-    n_models, n_variables : numbers of models and of stored variables
-    """
+    """Check the lengths of chunks along axes: for unknown axes, and for too many or too large chunks."""
     sizes, path = {axis.name: axis.size for axis in axes}, ("output", "chunks")
     unknown = [name for name in chunks if name not in sizes]
     if unknown or not chunks:
@@ -207,15 +186,7 @@ def _zip_groups(
     together: Mapping[str, str],
     config_names: Sequence[str],
 ) -> tuple[dict[str, Sequence[str]], list[ConfigProblem]]:
-    """The group of each zipped name, and problems: names that are no axis, are repeated, or differ in length.
-
-    Parameters
-    ----------
-    groups : config names that vary together
-    sizes : number of values of each valid key, by config name; None for a scalar
-    together : what the names are that vary together without a group, by config name
-    config_names : all names in the config, also those with invalid values
-    """
+    """Find the group of each zipped name; `sizes` has None for scalars, `together` what other names vary with."""
     member_of: dict[str, Sequence[str]] = {}
     problems: list[ConfigProblem] = []
     for group_index, group in enumerate(groups[:MAX_PROBLEMS]):
@@ -245,7 +216,7 @@ def _zip_groups(
 
 
 def _repetition_problems(name: str, values: AxisValues) -> list[ConfigProblem]:
-    """A problem for the first value of a list that occurs twice."""
+    """Report the first value of a list that occurs twice."""
     seen: set[object] = set()
     for index, value in enumerate(values):
         if value in seen:

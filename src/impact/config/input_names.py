@@ -20,18 +20,12 @@ SWEEP_INPUTS = (*SWEEP_QUANTITIES, *MATERIAL_KEYS)
 class InputName:
     """The name of an input, which is also the name of its coordinate in a result.
 
-    Parameters
-    ----------
-    table : "sweep", "materials" or "model"
-    owner : the material, or the key of the model; empty in [sweep]
-    key : in that table
-
     >>> InputName.parse("v1"), InputName.parse("materials.steel.E").owner, InputName.parse("model.bilinear.K").path
     (InputName(table='sweep', owner='', key='v1'), 'steel', ('model', 'bilinear', 'K'))
     """
 
-    table: str
-    owner: str
+    table: str  # "sweep", "materials" or "model"
+    owner: str  # the material, or the key of the model; empty in [sweep]
     key: str
 
     @classmethod
@@ -74,16 +68,11 @@ class InputName:
         return self.owner if self.table == "model" else ""
 
     def applies_to(self, model: str) -> bool:
-        """Whether a model may depend on it: it is not a parameter of another model."""
+        """Check whether a model may depend on it: it is not a parameter of another model."""
         return self.model in ("", model)
 
     def quantity(self, models: Mapping[str, ForceModel]) -> Quantity | None:
-        """Find its quantity; None for the name of a material.
-
-        Raises
-        ------
-        KeyError : there is no such input
-        """
+        """Find its quantity, or None for the name of a material; KeyError for an unknown input."""
         if self.table == "model":
             return model_quantities(models[self.owner])[self.key]
         if self.table == "materials":
@@ -103,17 +92,13 @@ class InputName:
 
 
 def is_foreign(names: Iterable[str], model: str) -> bool:
-    """Whether inputs that vary together are parameters of other models only.
-
-    >>> is_foreign(["bilinear.K"], "hertz"), is_foreign(["bilinear.K", "m1"], "hertz")
-    (True, False)
-    """
+    """Check whether inputs that vary together are parameters of other models only."""
     applies = [InputName.parse(name).applies_to(model) for name in names]
     return bool(applies) and not any(applies)
 
 
 def is_input(name: object) -> bool:
-    """Whether a coordinate of a result is an input, unlike metadata of models and numbers of cases."""
+    """Check whether a coordinate of a result is an input, unlike metadata of models and numbers of cases."""
     return name in SWEEP_INPUTS or "." in str(name)
 
 

@@ -40,46 +40,28 @@ MEASURED_OUTPUTS = {
 
 @dataclass(frozen=True)
 class Measurements:
-    """Measured points, in SI.
+    """Measured points, in SI."""
 
-    Parameters
-    ----------
-    file : name of the CSV file as in the config; empty for values in the config
-    lines : the line of each point in the file; its number, from 1, for values in the config
-    inputs : values of the inputs that vary from point to point, by config name
-    outputs : measured values, by the name of the output
-    sigma : their standard deviations, by the name of the output; without the outputs that have none
-    noise : "given", the standard deviations as they are; "scale", times a common factor, which also stands for
-        the standard deviation of an output without one; or "excess", with a variance between specimens added
-    specimens : the specimen of each point, for the noise "excess"; empty where each point has its own
-    loss : how a residual counts
-    """
-
-    file: str
-    lines: tuple[int, ...]
-    inputs: Mapping[str, tuple[float, ...]]
+    file: str  # name of the CSV file as in the config; empty for values in the config
+    lines: tuple[int, ...]  # of each point in the file; its number, from 1, for values in the config
+    inputs: Mapping[str, tuple[float, ...]]  # those that vary from point to point, by config name
     outputs: Mapping[str, tuple[float, ...]]
-    sigma: Mapping[str, tuple[float, ...]]
+    sigma: Mapping[str, tuple[float, ...]]  # standard deviations of the outputs that have some
+    # "given": sigma as it is; "scale": times a common factor, which also stands for a sigma that is missing; or
+    # "excess": with a variance between specimens added
     noise: Noise
-    specimens: tuple[str, ...] = ()
+    specimens: tuple[str, ...] = ()  # of each point, for the noise "excess"; empty if each point has its own
     loss: Loss = "linear"
 
 
 @dataclass(frozen=True)
 class _Column:
-    """What a column of [data] holds.
-
-    Parameters
-    ----------
-    name : of the input, of the output, or of the output whose standard deviations they are
-    quantity : of its values
-    values : in SI units, or names of specimens
-    """
+    """What a column of [data] holds."""
 
     kind: Literal["input", "output", "sigma", "specimen"]
-    name: str
+    name: str  # of the input, of the output, or of the output whose standard deviations they are
     quantity: Quantity
-    values: tuple[Any, ...] = ()
+    values: tuple[Any, ...] = ()  # in SI units, or names of specimens
 
 
 # the header of a column, or "" for all together; the index of a cell, or None for the whole column; and a message
@@ -87,14 +69,14 @@ _Problem = tuple[str, int | None, str]
 
 
 def fit_paths(data: Mapping[str, Any]) -> Iterator[KeyPath]:
-    """The path of every `{ fit = ... }`."""
+    """Yield the path of every `{ fit = ... }`."""
     for name, value in input_values(data):
         if isinstance(value, dict) and "fit" in value:
             yield name.path
 
 
 def purpose_problems(data: Mapping[str, Any]) -> list[ConfigProblem]:
-    """The problem of a sweep with measurements or with parameters to fit, which only a calibration takes."""
+    """Refuse measurements and parameters to fit in a sweep."""
     takes = "use impact calibrate, which takes [data] and { fit = [least, most] }"
     if "data" in data:
         return [(("data",), f"got measurements, expected a sweep; {takes}")]
@@ -102,7 +84,7 @@ def purpose_problems(data: Mapping[str, Any]) -> list[ConfigProblem]:
 
 
 def _read_columns(
-    columns: Columns, data: Mapping[str, Any], models: Mapping[str, ForceModel], n: float | None, *, is_text: bool
+    columns: Columns, data: Mapping[str, Any], models: Mapping[str, ForceModel], n: float | None
 ) -> tuple[list[_Column], list[_Problem]]:
     """Read columns of a file, which are text and have units, or lists of a config, and report all problems."""
     kinds: dict[str, _Column] = {}
@@ -127,16 +109,17 @@ def _read_columns(
     for header, column in kinds.items():
         # a standard deviation has the unit of its output
         unit = columns.units.get(header) or (columns.units.get(column.name, "") if column.kind == "sigma" else "")
-        values, column_problems = _read_column(columns.cells[header], column, header, unit, n, is_text=is_text)
+        values, column_problems = _read_column(columns, column, header, unit, n)
         problems += [(header, index, message) for index, message in column_problems]
         result.append(replace(column, values=tuple(values)))
     return result, problems
 
 
 def _read_column(
-    cells: Sequence[object], column: _Column, header: str, unit: str, n: float | None, *, is_text: bool
+    columns: Columns, column: _Column, header: str, unit: str, n: float | None
 ) -> tuple[Sequence[object], Sequence[tuple[int | None, str]]]:
     """Read a column; problems have the index of a cell, or None for the header."""
+    cells = columns.cells[header]
     if column.kind == SPECIMEN:
         specimens = [cell if isinstance(cell, str) else number(cell) for cell in cells]
         return specimens, [(index, SPECIMEN_EXPECTED) for index, name in enumerate(specimens) if not name]
@@ -144,13 +127,13 @@ def _read_column(
     if unit.lower() in ("%", "percent", "pct", "per cent"):
         expected = f'a fraction: divide the column by 100 and write "{safe_text(header, 60)}"'
         return (), [(None, f"got [{safe_text(unit)}], expected {expected}")]
-    if is_text and not unit and si_unit != "1":
+    if columns.is_text and not unit and si_unit != "1":
         expected = f'one in brackets, such as "{safe_text(header, 60)} [{si_unit}]"'
         return (), [(None, f"got no unit, expected {expected}")]
     wrong_unit = unit_expected(column.quantity, unit, n)
     if wrong_unit:
         return (), [(None, f"got [{safe_text(unit)}], expected {wrong_unit}")]
-    return _read_measured(cells, column.quantity, n, unit, is_text=is_text)
+    return _read_measured(cells, column.quantity, n, unit, is_text=columns.is_text)
 
 
 def _read_measured(
@@ -201,7 +184,7 @@ def _deviation(output: str) -> Quantity:
 def read_data_file(
     data: Mapping[str, Any], folder: Path | None, models: Mapping[str, ForceModel], n: float | None
 ) -> tuple[dict[KeyPath, object], list[str]]:
-    """Read the file of [data]; parameters and returned values are those of `columns.read_files`."""
+    """Read the file of [data], as `columns.read_files` reads others."""
     table = as_table(data.get("data"))
     file = table.get("file")
     if not isinstance(file, str) or "columns" in table:
@@ -212,7 +195,7 @@ def read_data_file(
         columns = read_csv(folder / file, column_quantity(models))
     except ConfigError as error:
         return {}, [*error.problems]
-    read, problems = _read_columns(columns, data, models, n, is_text=True)
+    read, problems = _read_columns(columns, data, models, n)
     if problems:
         return {}, [columns.problem(text, header, row) for header, row, text in problems[:MAX_PROBLEMS]]
     values = {header: list(column.values) for header, column in zip(columns.cells, read, strict=True)}
@@ -243,14 +226,7 @@ def _percent_message(text: str) -> str:
 def read_measurements(
     data: Mapping[str, Any], models: Mapping[str, ForceModel], n: float | None
 ) -> tuple[Measurements | None, list[ConfigProblem]]:
-    """Read the measurements of a config, in which the values of the file of [data] are, and report problems.
-
-    Parameters
-    ----------
-    data : plain data of a config
-    models : all models by key
-    n : the exponent that units may contain
-    """
+    """Read the measurements of a config in which their values replace the file, and report problems."""
     table = as_table(data.get("data"))
     if isinstance(data.get("data"), dict) and not {"file", "columns"} & table.keys():
         return None, [(("data",), 'got neither file nor columns, expected such as file = "drops.csv"')]
@@ -258,7 +234,7 @@ def read_measurements(
     if not isinstance(lists, dict) or not lists or not all(isinstance(v, list) and v for v in lists.values()):
         return None, []
     path: KeyPath = ("data", "columns")
-    columns, column_problems = _read_columns(Columns("", 0, (), {}, lists), data, models, n, is_text=False)
+    columns, column_problems = _read_columns(Columns("", 0, (), {}, lists, is_text=False), data, models, n)
     problems: list[ConfigProblem] = [
         ((*path, *([header] if header else []), *([] if index is None else [index])), message)
         for header, index, message in column_problems
@@ -325,7 +301,7 @@ def _read_sigma(value: object, output: str, n_points: int) -> tuple[tuple[Any, .
 def _noise_problems(
     noise: object, outputs: Sequence[str], with_sigma: Sequence[str], specimens: Sequence[str]
 ) -> list[ConfigProblem]:
-    """Problems of the noise with the outputs, with those that have standard deviations, and with the specimens."""
+    """Check the noise with the outputs, with those that have standard deviations, and with the specimens."""
     path: KeyPath = ("data", "noise")
     if noise == "excess" and len(outputs) > 1:
         return [(path, f'got "excess" with {len(outputs)} outputs, expected one, whose unit the deviation has')]
@@ -344,13 +320,7 @@ def _noise_problems(
 
 
 def fitted_parameters(fits: Mapping[str, tuple[float, float]], model: ForceModel) -> tuple[str, ...]:
-    """The config names of the fitted parameters that a law has, in the order of the config.
-
-    Parameters
-    ----------
-    fits : bounds by config name
-    model : the law
-    """
+    """List the names of the fitted parameters that a law has."""
     used = with_base_quantities(model.quantities)
 
     def is_used(name: str) -> bool:
@@ -369,7 +339,7 @@ def fitted_parameters(fits: Mapping[str, tuple[float, float]], model: ForceModel
 def count_problems(
     measurements: Measurements, fits: Mapping[str, tuple[float, float]], models: Sequence[ForceModel]
 ) -> list[ConfigProblem]:
-    """The problem of fewer measured values than parameters of a law."""
+    """Check that there are as many measured values as parameters of a law."""
     n_values = len(measurements.lines) * len(measurements.outputs)
     counts = {model.key: len(fitted_parameters(fits, model)) for model in models}
     key = max(counts, key=lambda name: counts[name])

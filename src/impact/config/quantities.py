@@ -84,24 +84,16 @@ WIDE_BOUNDS_RATIO = 100.0
 
 @dataclass
 class ValidationContext:
-    """What the validation of a value depends on besides the value.
+    """What the validation of a value depends on besides the value."""
 
-    Parameters
-    ----------
-    n : the exponent of the sweep: None where it varies, NaN where it cannot be read
-    materials : names of the materials that a ball may have
-    models : all models by key
-    n_errors : number of invalid values so far
-    """
-
-    n: float | None
-    materials: tuple[str, ...]
-    models: Mapping[str, ForceModel]
-    n_errors: int = 0
+    n: float | None  # exponent of the sweep: None where it varies, NaN where it cannot be read
+    materials: tuple[str, ...]  # names of those that a ball may have
+    models: Mapping[str, ForceModel]  # all models by key
+    n_errors: int = 0  # invalid values so far
 
 
 def as_text(value: object) -> str:
-    """The value as text for a message: short, and without control characters.
+    """Describe a value in a message: briefly, and without control characters.
 
     >>> as_text(True), as_text(0.5), as_text("steel"), as_text([1, 2]), as_text(16**6000)
     ('true', '0.5', '"steel"', 'a list', 'an integer of 24001 bits')
@@ -127,17 +119,17 @@ def as_text(value: object) -> str:
 
 
 def mismatch_error(value: object, expected: str) -> PydanticCustomError:
-    """The error of a value that differs from what is expected."""
+    """Report a value that differs from what is expected."""
     return value_error(f"got {as_text(value)}, expected {expected}")
 
 
 def value_error(message: str) -> PydanticCustomError:
-    """An error with this message, which `validation_problems` passes on unchanged."""
+    """Report a message that `validation_problems` passes on unchanged."""
     return PydanticCustomError(PROBLEM_TYPE, "{message}", {"message": message})
 
 
 def located_errors(problems: Iterable[ConfigProblem]) -> ValidationError:
-    """An exception with several errors, each with its path inside the value."""
+    """Report several problems, each with its path inside the value."""
     errors = [InitErrorDetails(type=value_error(message), loc=path, input=None) for path, message in problems]
     return ValidationError.from_exception_data("config", errors)
 
@@ -153,14 +145,7 @@ def _raise_or_skip(info: ValidationInfo, error: PydanticCustomError, value: Any)
 
 
 def expected(text: str) -> WrapValidator:
-    """Replace the message of pydantic's own errors about a value; errors inside the value are not changed.
-
-    >>> from pydantic import TypeAdapter
-    >>> TypeAdapter(Annotated[str, expected("text")]).validate_python(3)
-    Traceback (most recent call last):
-    pydantic_core._pydantic_core.ValidationError: 1 validation error for function-wrap[wrap()]
-      got 3, expected text [type=config_problem, input_value=3, input_type=int]
-    """
+    """Replace the message of pydantic's own errors about a value; errors inside the value are not changed."""
 
     def wrap(value: object, handler: Callable[[object], object], info: ValidationInfo) -> object:
         try:
@@ -175,7 +160,7 @@ def expected(text: str) -> WrapValidator:
 
 
 def known_name(description: str, choices_of: Callable[[ValidationInfo], Sequence[str]]) -> BeforeValidator:
-    """A check that a text is one of some names; the message suggests the nearest."""
+    """Check that a text is one of some names; the message suggests the nearest."""
 
     def check(value: object, info: ValidationInfo) -> str:
         choices = choices_of(info)
@@ -213,7 +198,7 @@ class Table(BaseModel):
 
 @dataclass(frozen=True)
 class ReadAs:
-    """Annotation that has pydantic validate by a type built at run time; mypy sees the type of the value."""
+    """Validate by a type that is built at run time; mypy sees the type of the value."""
 
     type: Any
 
@@ -222,17 +207,15 @@ class ReadAs:
 
 
 def _float_to_int(value: object) -> object:
-    """An int for a float without a fraction, such as 1e6; other values unchanged."""
+    """Convert a float without a fraction, such as 1e6."""
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
 def bounded_int(least: int, most: int | None = None) -> ReadAs:
-    """The type of whole numbers in an interval."""
-    description = (
-        f"a whole number of at least {least:,}" if most is None else f"a whole number from {least:,} to {most:,}"
-    )
-    interval = Field(ge=least, le=most, strict=True)
-    return ReadAs(Annotated[int, interval, BeforeValidator(_float_to_int), expected(description)])
+    """Build the type of whole numbers in an interval."""
+    interval = f"of at least {least:,}" if most is None else f"from {least:,} to {most:,}"
+    bounds = Field(ge=least, le=most, strict=True)
+    return ReadAs(Annotated[int, bounds, BeforeValidator(_float_to_int), expected(f"a whole number {interval}")])
 
 
 class Column(Table):
@@ -312,16 +295,7 @@ class Range(_OneForm):
         return max(math.ceil(size), 0) if math.isfinite(size) else 2 * MAX_PRINTED_COUNT
 
     def values(self, quantity: Quantity) -> tuple[float, ...]:
-        """Write the range out; values between the ends are rounded to 15 significant digits, so that 0.3 is 0.3.
-
-        Raises
-        ------
-        ValidationError : a value is outside the interval of the quantity, the range overflows, or two neighbours
-            round to the same number
-
-        >>> Range(linspace=(0.0, 1.0, 11)).values(Quantity("1", "restitution", 0, 1))[3]
-        0.3
-        """
+        """List the values; those between the ends are rounded to 15 significant digits, so that 0.3 is 0.3."""
         first, last, step_or_count = self.numbers
         with np.errstate(all="ignore"):
             match self.kind:
@@ -362,11 +336,7 @@ class FitRange(Table):
 
     @property
     def middle(self) -> float:
-        """A value between the bounds: the geometric mean of positive bounds that are far apart, else the mean.
-
-        >>> FitRange(fit=(1e-6, 1e-2)).middle, FitRange(fit=(0.0, 1.0)).middle
-        (0.0001, 0.5)
-        """
+        """A value between the bounds: the geometric mean of positive bounds that are far apart, else the mean."""
         least, most = self.fit
         if least > 0.0 and most / least > WIDE_BOUNDS_RATIO:
             return min(max(math.sqrt(least) * math.sqrt(most), least), most)
@@ -406,7 +376,7 @@ Names: TypeAlias = str | tuple[str, ...] | Column
 
 
 def value_form(value: object) -> str:
-    """The tag of the form of a value: a number or text, a list, a range, a column, a fit or a distribution."""
+    """Tell the form of a value: a number or text, a list, a range, a column, a fit or a distribution."""
     match value:
         case list():
             return LIST
@@ -429,7 +399,7 @@ def _name_form(value: object) -> str:
 
 
 def _list_of(element: Any, description: str) -> Any:
-    """The type of a list of at least one element, which becomes a tuple."""
+    """Build the type of a list of at least one element, which becomes a tuple."""
 
     def check_not_empty(value: list[object]) -> list[object]:
         if not value:
@@ -440,7 +410,7 @@ def _list_of(element: Any, description: str) -> Any:
 
 
 def name_or_names(description: str, choices_of: Callable[[ValidationInfo], Sequence[str]]) -> ReadAs:
-    """The type of a name, or a list of names, that are among some choices."""
+    """Build the type of a name, or a list of names, that are among some choices."""
     choice = Annotated[str, known_name(description, choices_of)]
     return ReadAs(
         Annotated[
@@ -454,35 +424,19 @@ def name_or_names(description: str, choices_of: Callable[[ValidationInfo], Seque
 
 @dataclass(frozen=True)
 class Quantity:
-    """A number of the config: its unit, meaning and interval; used as the annotation of its type.
+    """A number of the config, with its unit; the annotation of a `float`, or of `Numbers` of any form."""
 
-    `Annotated[float, Quantity("1", "tolerance", 0, 1)]` is a number, bare or with its unit;
-    `Annotated[Numbers, Quantity("kg", "mass", 0)]` may also be a list, a range, a column of a file, a fit or a
-    distribution.
-
-    Parameters
-    ----------
-    unit : SI unit, whose exponents may contain n
-    meaning : what the number is, in words
-    least, most : ends of the interval of its values, which includes finite ends
-    above : whether the interval excludes `least`
-    infinite : whether inf is allowed
-    """
-
-    unit: str
+    unit: str  # in SI; exponents may contain n
     meaning: str
+    # ends of the interval of its values, which includes them if they are finite
     least: float = -math.inf
     most: float = math.inf
-    above: bool = False
-    infinite: bool = False
+    above: bool = False  # the interval excludes `least`
+    infinite: bool = False  # inf is allowed
 
     @property
     def expected(self) -> str:
-        """The allowed values, in words.
-
-        >>> Quantity("kg", "mass", least=0, above=True, infinite=True).expected
-        'a number > 0 kg, or inf'
-        """
+        """The allowed values in words, such as "a number > 0 kg, or inf"."""
         unit = "" if self.unit == "1" else f" {self.unit}"
         low, high = f"{'>' if self.above else '>='} {self.least:g}", f"<= {self.most:g}"
         match math.isfinite(self.least), math.isfinite(self.most):
@@ -501,7 +455,7 @@ class Quantity:
         return f"{self.meaning} [{'-' if self.unit == '1' else self.unit}]"
 
     def allows(self, value: float) -> bool:
-        """Whether a number is allowed."""
+        """Check whether a number is allowed."""
         if math.isinf(value) and not self.infinite:
             return False
         return (self.least < value if self.above else self.least <= value) and value <= self.most
@@ -526,16 +480,7 @@ class Quantity:
             return float(_raise_or_skip(info, error, math.nan))
 
     def read(self, value: object, n: float | None = math.nan) -> float:
-        """The SI value of a number or a string with a unit.
-
-        Parameters
-        ----------
-        value : from the config
-        n : the exponent that the unit may contain; None where it varies, NaN where it is unknown
-
-        Raises
-        ------
-        PydanticCustomError : the value is neither, is not allowed, or its unit has another dimension
+        """Convert a number, or a text with a unit, whose exponent n is None if it varies and NaN if unknown.
 
         >>> Quantity("Pa", "Young's modulus", least=0, above=True).read("56 GPa")
         56000000000.0
@@ -557,41 +502,49 @@ class Quantity:
         if len(text) > MAX_UNIT_LENGTH:
             raise mismatch_error(text, f"at most {MAX_UNIT_LENGTH} characters")
         parts = NUMBER_SYNTAX.fullmatch(text)
-        example = "" if self.exponents else f', such as "1 {self.unit}"'
         if parts is None or not parts[2]:
-            with_unit = "" if self.unit == "1" else f", bare or with a unit{example}"
+            with_unit = "" if self.unit == "1" else f", bare or with a unit{self._example}"
             raise mismatch_error(text, f"{self.expected}{with_unit}")
-        factor = self._factor(text, parts[2], n, example)
+        try:
+            factor = self.factor(parts[2], n)
+        except UnitError as error:
+            raise mismatch_error(text, str(error)) from None
         number = float(parts[1])
         if number == 0.0 or not math.isfinite(number):
             return number
         # exact until it is converted to a float, so that "35 mm" equals 0.035 exactly
         return _float_or_inf(lambda: float(Fraction(parts[1]) * factor))
 
-    def _factor(self, text: str, unit: str, n: float | None, example: str) -> Fraction | float:
-        """The factor that converts a unit to SI, if it has the dimension of the quantity."""
-        others = sorted(self.exponents - {"n"})
-        if others:
-            raise mismatch_error(text, f"a bare number: its unit {self.unit} depends on {' and '.join(others)}")
-        if n is None and self.exponents:
-            raise mismatch_error(text, f"a bare number: its unit {self.unit} depends on n, which varies")
+    @property
+    def _example(self) -> str:
+        return "" if self.exponents else f', such as "1 {self.unit}"'
+
+    def factor(self, unit: str, n: float | None = math.nan) -> Fraction | float:
+        """Find the factor from a unit to SI; a `UnitError` describes the units that the quantity may have."""
+        varying = ["n, which varies"] if n is None and self.exponents else []
+        if unknown := sorted(self.exponents - {"n"}) or varying:
+            raise UnitError(f"a bare number: its unit {self.unit} depends on {' and '.join(unknown)}")
         of_n = f" with n = {n:g}" if self.exponents and n is not None else ""
-        wanted = "a bare number" if self.unit == "1" else f"a unit of {self.unit}{of_n}{example}"
+        expected_unit = "a bare number" if self.unit == "1" else f"a unit of {self.unit}{of_n}{self._example}"
         scale = _si_scale(unit)
         if scale is None:
-            raise mismatch_error(text, f'{wanted}; "{safe_text(unit)}" is not a known unit')
+            raise UnitError(f'{expected_unit}; "{safe_text(unit)}" is not a known unit')
         factor, powers = scale
         if self.exponents and n is not None and math.isnan(n):
             return factor
-        expected_powers = map(float, dimension(self.unit, {"n": 0.0 if n is None or math.isnan(n) else n}))
-        if powers is None or any(abs(a - b) > 1e-9 for a, b in zip(powers, expected_powers, strict=True)):
-            raise mismatch_error(text, wanted)
+        own_powers = map(float, dimension(self.unit, {} if n is None else {"n": n}))
+        if powers is None or any(abs(a - b) > 1e-9 for a, b in zip(powers, own_powers, strict=True)):
+            raise UnitError(expected_unit)
         return factor
+
+
+class UnitError(ValueError):
+    """A unit is unknown or has another dimension; the message is what is expected."""
 
 
 @dataclass(frozen=True)
 class _AnyForm:
-    """Annotation of a value of any form; a bare number does not need `numbers_type`, which takes long to build."""
+    """Validate a value of any form; a bare number does not need `numbers_type`, which takes long to build."""
 
     quantity: Quantity
 
@@ -609,7 +562,7 @@ class _AnyForm:
 
 @cache
 def number_type(quantity: Quantity) -> Any:
-    """The type of a number, bare or with a unit."""
+    """Build the type of a number, bare or with a unit."""
     bounds: dict[str, Any] = {}
     if math.isfinite(quantity.least):
         bounds["gt" if quantity.above else "ge"] = quantity.least
@@ -714,11 +667,8 @@ def _unit_registry() -> Any:
 
 @lru_cache(maxsize=256)
 def _si_scale(unit: str) -> tuple[Fraction | float, tuple[float, float, float] | None] | None:
-    """The factor to SI, and the powers of mass, length and time, or None if the unit has another dimension.
-
-    None for an unknown unit.
-    """
-    if UNIT_SYNTAX.fullmatch(unit) is None:
+    """Find the factor to SI and the powers of mass, length and time, or None for another dimension or unit."""
+    if len(unit) > MAX_UNIT_LENGTH or UNIT_SYNTAX.fullmatch(unit) is None:
         return None
     # kg/m3 and kg m-3 are common spellings that pint does not accept
     unit = re.sub(rf"(?<=[{_LETTERS}])(-?[0-9])", r"^\1", unit)
@@ -733,8 +683,5 @@ def _si_scale(unit: str) -> tuple[Fraction | float, tuple[float, float, float] |
         powers = {str(dimension_name): float(power) for dimension_name, power in parsed.dimensionality.items()}
     except Exception:
         return None
-    base_dimensions = ("[mass]", "[length]", "[time]")
-    if not powers.keys() <= set(base_dimensions):
-        return factor, None
-    mass, length, time = (powers.get(dimension_name, 0.0) for dimension_name in base_dimensions)
-    return factor, (mass, length, time)
+    mass, length, time = (powers.pop(name, 0.0) for name in ("[mass]", "[length]", "[time]"))
+    return factor, None if powers else (mass, length, time)

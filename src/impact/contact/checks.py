@@ -21,6 +21,8 @@ from .variables import OUTPUTS
 CONTRACT_RTOL, CONTRACT_MAX_STEPS = 1e-10, 10_000
 # largest error of an identity by rounding, relative to its largest term
 ROUNDING_ERROR = 1e-12
+# names without the number of the ball
+PROPERTIES_OF_A_BALL = ("m", "R", "E", "nu", "yield_strength")
 
 
 @dataclass(frozen=True)
@@ -83,11 +85,7 @@ def _parameter_values(model: ForceModel, parameter: Parameter, impacts: Impacts)
 
 
 def check_contract(model: ForceModel) -> Iterator[ClauseResult]:
-    """Check every clause of the contract; yields a result for each.
-
-    Parameters
-    ----------
-    model : the law; it is checked with the forty impacts of `sample` at rtol 1e-10
+    """Check every clause of the contract with the impacts of `sample` at rtol 1e-10; yields a result for each.
 
     Warns
     -----
@@ -143,16 +141,8 @@ def check_contract(model: ForceModel) -> Iterator[ClauseResult]:
         impacts,
         v1=-impacts.v2,
         v2=-impacts.v1,
-        m1=impacts.m2,
-        m2=impacts.m1,
-        R1=impacts.R2,
-        R2=impacts.R1,
-        E1=impacts.E2,
-        E2=impacts.E1,
-        nu1=impacts.nu2,
-        nu2=impacts.nu1,
-        yield_strength1=impacts.yield_strength2,
-        yield_strength2=impacts.yield_strength1,
+        **{f"{name}1": getattr(impacts, f"{name}2") for name in PROPERTIES_OF_A_BALL},
+        **{f"{name}2": getattr(impacts, f"{name}1") for name in PROPERTIES_OF_A_BALL},
     )
     other = collided(swapped)
     yield ClauseResult(

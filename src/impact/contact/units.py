@@ -43,21 +43,12 @@ FACTOR_PATTERN = re.compile(rf"\s*([*/]?)\s*(1|[A-Za-z]+)(?:{EXPONENT_PATTERN})?
 
 
 def dimension(unit: str, values: Mapping[str, Array | float]) -> Dimension:
-    """The dimension of an SI unit.
-
-    Parameters
-    ----------
-    unit : SI unit such as "N/m^n", whose exponents may contain names
-    values : the values of these names: the compliance exponent n, and dimensionless parameters of a law
+    """Compute the dimension of an SI unit such as "N/m^n", with the values of the names in its exponents.
 
     >>> dimension("N/m^n", {"n": 1.5})
     Dimension(mass=1.0, length=-0.5, time=-2.0)
     >>> dimension("N s^p/m^(n+p)", {"n": 1.5, "p": 2.0})
     Dimension(mass=1.0, length=-2.5, time=0.0)
-
-    Raises
-    ------
-    ModelError : the unit is not a product of powers of kg, m, s, N, Pa, J, Hz, 1, or an exponent has no value
     """
     total: list[Array | float] = [0.0, 0.0, 0.0]
     position = 0
@@ -74,7 +65,7 @@ def dimension(unit: str, values: Mapping[str, Array | float]) -> Dimension:
 
 
 def with_numbers(unit: str, values: Mapping[str, float]) -> str:
-    """The unit with numbers for the names in its exponents.
+    """Put numbers for the names in the exponents of a unit.
 
     >>> with_numbers("N s^p/m^(n+p)", {"n": 1.5, "p": 2.0})
     'N s^2/m^3.5'
@@ -89,40 +80,30 @@ def with_numbers(unit: str, values: Mapping[str, float]) -> str:
 
 @cache
 def names_in(unit: str) -> frozenset[str]:
-    """The names in the exponents of a unit.
-
-    >>> sorted(names_in("N s^p/m^(n+p)"))
-    ['n', 'p']
-    """
+    """Find the names in the exponents of a unit: n and p in "N s^p/m^(n+p)"."""
     exponents = (factor[3] for factor in FACTOR_PATTERN.finditer(unit))
     return frozenset(name for exponent in exponents for name in re.findall(r"[A-Za-z]\w*", exponent or ""))
 
 
 def _exponent_value(text: str, values: Mapping[str, Array | float], unit: str) -> Array | float:
-    """The value of an exponent such as `2`, `n` or `(n+1)/2`."""
+    """Evaluate an exponent such as `2`, `n` or `(n+1)/2`."""
+
+    def evaluate(node: ast.expr) -> Array | float:
+        match node:
+            case ast.Constant(value=int() | float() as number):
+                return float(number)
+            case ast.Name(id=name):
+                return values[name]
+            case ast.UnaryOp(op=ast.USub(), operand=inner):
+                return -evaluate(inner)
+            case ast.BinOp(left=left, op=op, right=right):
+                return OPERATORS[type(op)](evaluate(left), evaluate(right))
+        raise KeyError(ast.unparse(node))
+
     try:
-        return _evaluate(ast.parse(text, mode="eval").body, values)
+        return evaluate(ast.parse(text, mode="eval").body)
     except SyntaxError:
         raise ModelError(f'unit "{unit}": the exponent "{text}" cannot be parsed') from None
     except KeyError:
         names = ", ".join(values)
         raise ModelError(f'unit "{unit}": the exponent "{text}" expected numbers, {names} and + - * /') from None
-
-
-def _evaluate(node: ast.expr, values: Mapping[str, Array | float]) -> Array | float:
-    """The value of an expression.
-
-    Raises
-    ------
-    KeyError : a part of it is neither a number, a name of `values` nor + - * /
-    """
-    match node:
-        case ast.Constant(value=int() | float() as number):
-            return float(number)
-        case ast.Name(id=name):
-            return values[name]
-        case ast.UnaryOp(op=ast.USub(), operand=inner):
-            return -_evaluate(inner, values)
-        case ast.BinOp(left=left, op=op, right=right):
-            return OPERATORS[type(op)](_evaluate(left, values), _evaluate(right, values))
-    raise KeyError(ast.unparse(node))

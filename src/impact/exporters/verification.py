@@ -67,12 +67,7 @@ class Verification:
 
 
 def run_script(code: Code, program: str, script: str) -> float:
-    """Run a script in an empty folder, and return the restitution that it prints.
-
-    Raises
-    ------
-    UsageError : it fails, or prints no restitution last
-    """
+    """Run a script in an empty folder, and return the restitution that it prints."""
     with tempfile.TemporaryDirectory(prefix="impact-export-") as folder:
         file = f"two_balls{code.suffix}"
         Path(folder, file).write_text(script, encoding="utf-8")
@@ -104,10 +99,6 @@ def verify_scripts(problem: ExportProblem, program: str, dt: float) -> Verificat
     zero, and compared with the continuous law. The uncertainty is then the difference of the extrapolations from
     dt and dt/2, and from dt/2 and dt/4, and half the spread over the phases at dt/4. Where a script measures no
     number, nothing is extrapolated.
-
-    Raises
-    ------
-    UsageError : a script fails
     """
     code = problem.code
     phases = (np.arange(PHASES) + 0.5) / PHASES

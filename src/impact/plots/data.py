@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import Field, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
-
-import numpy as np
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 from ..config.columns import columns_of_table, read_csv
 from ..config.quantities import Quantity, as_text
@@ -23,9 +21,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
-
-    from .curves import Panel
-    from .kinds import PlotData
+    from matplotlib.figure import Figure
 
 # suffixes of a table, and its forms
 TABLE_SUFFIXES = (".csv", ".tex", ".parquet")
@@ -34,13 +30,47 @@ SIGMA = "sigma"
 MEASURED = "Measured"
 
 
-def check_table(path: Path, form: str) -> None:
-    """Check the suffix and the form of a table.
+class PlotData(Protocol):
+    """The data of a picture: a frozen dataclass that makes its tables and draws itself."""
 
-    Raises
-    ------
-    UsageError : one of them is unknown
-    """
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
+    # whether measured points can be drawn over it
+    takes_points: ClassVar[bool]
+
+    @property
+    def title(self) -> str: ...
+
+    @property
+    def conditions(self) -> str: ...
+
+    @property
+    def not_drawn(self) -> tuple[str, ...]:
+        """What is left out, and why."""
+
+    @property
+    def panel_count(self) -> int: ...
+
+    @property
+    def names(self) -> set[str]:
+        """The names whose text a user can replace: axes, variables and models."""
+
+    def long_table(self) -> pd.DataFrame:
+        """Make a tidy table: a row for each point."""
+
+    def wide_table(self) -> pd.DataFrame:
+        """Make a table with a column for each curve, whose names are ASCII and have the unit."""
+
+    def place_panels(self, figure: Figure, width: float) -> tuple[list[Axes], float]:
+        """Add the axes of all panels to a figure; also returns the height of all panels [in]."""
+
+    def draw(
+        self, all_axes: Sequence[Axes], labels: Mapping[str, str], points: Points | None
+    ) -> list[tuple[Artist, str]]:
+        """Draw the panels, with labels that replace those of names; returns handles and names of the legend."""
+
+
+def check_table(path: Path, form: str) -> None:
+    """Check the suffix and the form of a table."""
     if path.suffix.lower() not in TABLE_SUFFIXES:
         *most, last = TABLE_SUFFIXES
         raise UsageError(f"--data {path}: expected a name that ends in {', '.join(most)} or {last}")
@@ -49,24 +79,8 @@ def check_table(path: Path, form: str) -> None:
 
 
 def encode_table(plot_data: PlotData, suffix: str, form: str = "wide") -> bytes:
-    """The data of a picture as the bytes of a table; all digits are written, except to .tex.
-
-    Parameters
-    ----------
-    plot_data : the data
-    suffix : one of TABLE_SUFFIXES
-    form : "wide", one column per curve, whose names are ASCII and have the unit; or "long", one row per point
-
-    Raises
-    ------
-    UsageError : the table needs a package that is not installed
-    """
-    import pandas as pd
-
-    if form == "long":
-        frame = pd.DataFrame(plot_data.rows(), columns=list(plot_data.columns))
-    else:
-        frame = pd.DataFrame({name: pd.Series(values) for name, values in plot_data.table().items()})
+    """Encode the data of a picture as a table, with all digits except in .tex."""
+    frame = plot_data.long_table() if form == "long" else plot_data.wide_table()
     if suffix == ".tex":
         text: str = frame.to_latex(index=False, escape=True, na_rep="", float_format=number)
         return text.encode()
@@ -82,10 +96,7 @@ def encode_table(plot_data: PlotData, suffix: str, form: str = "wide") -> bytes:
 
 
 def encode_history(history: xr.Dataset) -> bytes:
-    """A time history as the bytes of a CSV table: columns with their units, and all digits.
-
-    `read_points` reads it again.
-    """
+    """Write a time history as a CSV table with units and all digits, which `read_points` reads again."""
     frame = history.drop_vars("model").to_dataframe().reset_index()
     units = {name: plain_unit(str(history[name].attrs["units"])) for name in frame.columns}
     return _csv_bytes(frame.rename(columns={name: heading(name, unit=unit) for name, unit in units.items()}))
@@ -100,57 +111,20 @@ class Points:
     """Measured points: columns in SI, by the names of inputs, variables and sigma, and where they come from."""
 
     source: str
-    columns: Mapping[str, np.ndarray]
-
-    def draw(self, axes: Axes, panel: Panel) -> dict[str, Artist]:
-        """Draw the points over the curves of a panel, with error bars where there is a sigma.
-
-        Raises
-        ------
-        UsageError : the points lack what the panel shows
-        """
-        variables = list(dict.fromkeys(curve.variable for curve in panel.curves if curve.model))
-        shown = [name for name in variables if name in self.columns]
-        if panel.x_name not in self.columns or not shown:
-            needs = f"{panel.x_name} and {' or '.join(variables)}"
-            has = ", ".join(self.columns)
-            raise UsageError(f"{self.source}: the picture shows {needs}, and the points have {has}")
-        if SIGMA in self.columns and len(shown) > 1:
-            raise UsageError(f"{self.source}: {SIGMA} of which, {' or '.join(shown)}? expected one of them")
-        artists: dict[str, Artist] = {}
-        for index, name in enumerate(shown):
-            bars = axes.errorbar(
-                self.columns[panel.x_name],
-                self.columns[name],
-                self.columns.get(SIGMA),
-                color="black",
-                zorder=3,
-                marker="o",
-                markersize=4.0,
-                linestyle="none",
-                elinewidth=0.9,
-                capsize=2.0,
-                markerfacecolor="black" if index == 0 else "white",
-            )
-            artists[MEASURED if len(shown) == 1 else f"{MEASURED} {name}"] = bars[0]
-        return artists
+    columns: Mapping[str, tuple[float, ...]]
 
 
 def read_points(points: str | Path | pd.DataFrame | xr.Dataset) -> Points:
-    """Measured points, of a CSV file or of a table of pandas or xarray.
+    """Read measured points of a CSV file or of a table of pandas or xarray.
 
     The names of the columns are those of inputs and variables, with their units in brackets: "v1 [mm/s]". Without
     a unit a column is in SI. `sigma` is the standard deviation of the variable in the
     column before it, by default in its unit.
-
-    Raises
-    ------
-    ConfigError : the file cannot be read, or a name, a unit or a number is invalid
     """
     quantities = _column_quantities()
     is_file = isinstance(points, str | Path)
     columns = read_csv(Path(points), quantities.__getitem__) if is_file else columns_of_table(points, "points")
-    values: dict[str, np.ndarray] = {}
+    values: dict[str, tuple[float, ...]] = {}
     variable = ""
     for name in columns.units:
         if name not in quantities:
@@ -158,13 +132,13 @@ def read_points(points: str | Path | pd.DataFrame | xr.Dataset) -> Points:
         quantity, unit = quantities[name], ""
         if name == SIGMA and variable:
             quantity, unit = replace(quantity, unit=quantities[variable].unit), columns.units[variable]
-        values[name] = np.array(columns.values(name, quantity, None, unit), float)
+        values[name] = tuple(map(float, columns.values(name, quantity, None, unit)))
         variable = name
     return Points(columns.source, values)
 
 
 def _column_quantities() -> dict[str, Quantity]:
-    """Names of columns, with their units."""
+    """Define the columns that points may have."""
     outputs = {
         name: Quantity(variable.unit, variable.meaning)
         for name, variable in (OUTPUTS | HISTORY).items()

@@ -67,12 +67,7 @@ class StoredLaw:
 def stored_stiffness(
     inputs: Inputs, law: Law, rule: Stiffness | None = None
 ) -> tuple[tuple[int, ...], Array] | None:
-    """Evaluate K [N/m^n] by a law's own rule, over the axes that it depends on; None for a law without a rule.
-
-    Raises
-    ------
-    UsageError : it takes too many values to be stored
-    """
+    """Evaluate K [N/m^n] by a law's own rule, or return None; raise a UsageError for too many values."""
     if rule is None and not has_stiffness_rule(inputs, law):
         return None
     axes, K = whole_stiffness(inputs, law, rule)
@@ -94,12 +89,7 @@ def _stiffness_of_laws(table: TrajectoryTable) -> list[tuple[tuple[int, ...], Ar
 def factored_template(
     result_template: xr.Dataset, table: TrajectoryTable, variables: Sequence[Variable]
 ) -> xr.Dataset:
-    """Build the dataset of a factored file, with placeholder values, from the coordinates of the result.
-
-    Raises
-    ------
-    UsageError : a law's rule of K takes too many values to be stored
-    """
+    """Build the dataset of a factored file, with placeholder values, from the coordinates of the result."""
     names = [axis.name for axis in table.inputs.axes]
     laws = {}
     stiffness = _stiffness_of_laws(table)
@@ -218,18 +208,7 @@ def _unravel_cells(inputs: Inputs, cells: NDArray[np.int64]) -> Index:
 
 
 def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: ReadVariable) -> TrajectoryTable:
-    """Read the trajectory table of a factored file, without its rows, which are read when they are needed.
-
-    Parameters
-    ----------
-    dataset : coordinates and attributes of the file
-    sizes : lengths of the variables of the table, without the witnesses
-    read : returns values of a variable of the table, in a slice or at increasing positions
-
-    Raises
-    ------
-    ResultError : the attribute `laws` does not fit the variables
-    """
+    """Read the trajectory table of a factored file; its rows are read when they are needed."""
     laws: dict[str, LawRecord] = read_attribute(dataset.attrs, "laws", required=True)
     if list(laws) != [str(key) for key in dataset["model"].values]:
         raise ResultError("is not a readable result (laws: not those of its models)")

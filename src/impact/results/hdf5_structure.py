@@ -46,7 +46,7 @@ B_TREE_1 = struct.Struct("<4sBBH16x")
 
 
 def byte_reader(file: Any) -> ReadBytes:
-    """A function that reads bytes of a file behind its user block."""
+    """Return a function that reads bytes of a file behind its user block."""
 
     def read(address: int, size: int) -> bytes:
         file.seek(USER_BLOCK_BYTES + address)
@@ -59,12 +59,7 @@ def byte_reader(file: Any) -> ReadBytes:
 
 
 def check_root(read: ReadBytes) -> None:
-    """Refuse a file whose superblock or root group is not as this program writes them.
-
-    Raises
-    ------
-    ResultError : for that reason
-    """
+    """Raise a ResultError unless the superblock and the root group are as this program writes them."""
     try:
         magic, version, *sizes, base, driver, root, cached = SUPERBLOCK.unpack(read(0, SUPERBLOCK.size))
         expected = (HDF5_MAGIC, 0, [8, 8], USER_BLOCK_BYTES, UNDEFINED, 0)
@@ -76,22 +71,7 @@ def check_root(read: ReadBytes) -> None:
 
 
 def check_object(read: ReadBytes, address: int, name: str = "") -> int | None:
-    """Refuse an object with a structure that this program does not write, or that could contain a cycle.
-
-    Parameters
-    ----------
-    read : reads the file
-    address : of the header of the object
-    name : of the object, for the message
-
-    Returns
-    -------
-    int or None : the number of stored chunks of a dataset in chunks
-
-    Raises
-    ------
-    ResultError : for that reason
-    """
+    """Count the stored chunks of an object; raise a ResultError for another structure than this program's."""
     chunks = None
     try:
         for kind, flags, body in _messages(read, address):
@@ -110,7 +90,7 @@ def check_object(read: ReadBytes, address: int, name: str = "") -> int | None:
 
 
 def _messages(read: ReadBytes, address: int) -> Iterator[tuple[int, int, bytes]]:
-    """The messages of the header of an object: type, flags, content."""
+    """Yield the messages of the header of an object: type, flags, content."""
     head = read(address, 16)
     is_second_version = head[:4] == b"OHDR"
     if is_second_version:
@@ -192,7 +172,7 @@ def _check_dense_storage(read: ReadBytes, body: bytes, kind: int) -> None:
 
 
 def _records(read: ReadBytes, address: int) -> list[bytes]:
-    """The records of a B-tree of version 2, which must be a tree with as many records as it declares."""
+    """Read the records of a B-tree of version 2, which must be a tree with as many records as it declares."""
     signature, node_bytes, record_bytes, depth, root, n_root, total = B_TREE_2.unpack(read(address, B_TREE_2.size))
     if signature != b"BTHD" or depth > MAX_B_TREE_2_DEPTH or node_bytes > MAX_NODE_BYTES:
         raise ValueError
@@ -231,12 +211,12 @@ def _records(read: ReadBytes, address: int) -> list[bytes]:
 
 
 def _width(number: int) -> int:
-    """The bytes that a number needs."""
+    """Count the bytes that a number needs."""
     return (number.bit_length() + 7) // 8
 
 
 def _count_stored_chunks(read: ReadBytes, layout: bytes) -> int | None:
-    """The number of chunks in the B-tree of a dataset, which must be a tree; None without chunks."""
+    """Count the chunks in the B-tree of a dataset, which must be a tree; None without chunks."""
     version, kind = layout[:2]
     if version != 3:
         raise ValueError

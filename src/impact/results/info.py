@@ -63,7 +63,7 @@ def info(result: xr.Dataset | str | Path) -> dict[str, Any]:
 
 
 def _count_points(dataset: xr.Dataset) -> int:
-    """The points of a sweep, the measured values of a calibration, or the studies of a sensitivity study."""
+    """Count the points of a sweep, the measured values of a calibration, or the studies of a sensitivity study."""
     if is_calibration(dataset):
         return dataset.sizes["point"]
     return int(dataset["mean"].size) if is_sensitivity(dataset) else count_points(dataset)

@@ -66,18 +66,7 @@ SKIPPED_ATTRIBUTES = frozenset({"NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_NC
 
 @contextmanager
 def open_for_writing(sink: Sink, template: xr.Dataset, output: Output) -> Iterator[WriteRegion]:
-    """Write a dataset: coordinates and attributes first, then regions of its variables in any order.
-
-    Parameters
-    ----------
-    sink : the file
-    template : coordinates, attributes and variables of the dataset; the values of its variables are ignored
-    output : compression and chunks
-
-    Yields
-    ------
-    write_region : writes values into a region of a variable
-    """
+    """Write coordinates and attributes of a template; yield a function that writes a region of a variable."""
     # track_order: variables stay in the order of their creation
     with (
         h5py.File(sink, "w", track_order=True, userblock_size=USER_BLOCK_BYTES) as plain,
@@ -134,7 +123,7 @@ def is_text(variable: xr.DataArray | xr.Variable) -> bool:
 
 
 def encode_text(variable: xr.DataArray) -> NDArray[np.bytes_]:
-    """Text as an array of single bytes with one more axis, the netCDF classic convention."""
+    """Encode text as an array of single bytes with one more axis, the netCDF classic convention."""
     encoded = [str(text).encode() for text in np.asarray(variable.values, object).reshape(-1)]
     width = max(1, *map(len, encoded)) if encoded else 1
     return np.array(encoded, f"S{width}").reshape(variable.shape)[..., np.newaxis].view("S1")
@@ -234,15 +223,7 @@ class StoredArray(BackendArray):
 def read_variables(
     file: h5py.File, read: ReadBytes
 ) -> tuple[dict[str, xr.Variable], dict[str, object], tuple[str, ...]]:
-    """Variables, attributes, and names that are not part of a result, of a file with a valid seal and root.
-
-    Numbers are read when they are indexed, as they are stored: attributes for scales, fill values and times are
-    ignored. `read` reads the same file, see `impact.results.hdf5_structure`.
-
-    Raises
-    ------
-    ResultError : its structure is not that of a result
-    """
+    """Read variables, whose numbers are read when indexed, attributes, and names that are not part of a result."""
     _check_schema_version(file)
     opened, stored_chunks = _open_datasets(file, read)
     datasets = {name: h5py.Dataset(dataset) for name, dataset in opened.items()}
@@ -291,10 +272,7 @@ def _check_schema_version(file: h5py.File) -> None:
 
 
 def _open_datasets(file: h5py.File, read: ReadBytes) -> tuple[dict[str, h5d.DatasetID], dict[str, int | None]]:
-    """The datasets of the file and the numbers of their stored chunks, by name.
-
-    Only hard links, each to another object, are followed, after a check of the object.
-    """
+    """Open the datasets, and count their stored chunks; follow only checked hard links to different objects."""
     root = file.id
     if root.get_num_objs() > MAX_DATASETS:
         raise _unreadable(f"more than {MAX_DATASETS:,} datasets")
@@ -319,7 +297,7 @@ def _open_datasets(file: h5py.File, read: ReadBytes) -> tuple[dict[str, h5d.Data
 def _check_sizes(
     file: h5py.File, datasets: Mapping[str, h5py.Dataset], stored_chunks: Mapping[str, int | None]
 ) -> dict[str, tuple[str, ...]]:
-    """The dimensions of each dataset, after a check that the file itself holds all data."""
+    """Check that the file itself holds all data; return the dimensions of each dataset."""
     size = file.id.get_filesize()
     chunks = compressed = plain = text = 0
     for name, dataset in datasets.items():
@@ -353,7 +331,7 @@ def _count_chunks(dataset: h5py.Dataset) -> int:
 
 
 def _is_number_type(kind: h5t.TypeID) -> bool:
-    """Whether it is an integer or floating-point type in a standard format."""
+    """Check for an integer or floating-point type in a standard format."""
     plain = isinstance(kind, h5t.TypeIntegerID | h5t.TypeFloatID) and kind.get_size() <= 8
     return plain and h5t.py_create(kind.dtype).equal(kind)
 
@@ -363,7 +341,7 @@ def _is_byte_type(kind: h5t.TypeID) -> bool:
 
 
 def _declared_bytes(name: str, dataset: h5d.DatasetID) -> int:
-    """The bytes of a dataset, which must be stored in the file itself, contiguous or in chunks."""
+    """Count the bytes of a dataset, which must be stored in the file itself, contiguous or in chunks."""
     kind, shape = dataset.get_type(), dataset.shape
     if not (_is_number_type(kind) or (_is_byte_type(kind) and shape)):
         raise _unreadable("expected numbers or labels", name)
@@ -385,7 +363,7 @@ def _declared_bytes(name: str, dataset: h5d.DatasetID) -> int:
 
 
 def _dims_by_dataset(datasets: Mapping[str, h5py.Dataset]) -> dict[str, tuple[str, ...]]:
-    """The dimensions of each dataset, from the dimension IDs of netCDF."""
+    """Find the dimensions of each dataset by the dimension IDs of netCDF."""
     numbers = {
         name: np.ravel(dataset.attrs.get("_Netcdf4Coordinates", ())).tolist() for name, dataset in datasets.items()
     }
@@ -408,12 +386,12 @@ def _dims_by_dataset(datasets: Mapping[str, h5py.Dataset]) -> dict[str, tuple[st
 
 
 def _is_dimension_without_values(dataset: h5py.Dataset, name: str, dims: Mapping[str, tuple[str, ...]]) -> bool:
-    """Whether it is a dimension without coordinates."""
+    """Check for a dimension without coordinates."""
     return dims[name] == (name,) and not dataset.id.get_storage_size()
 
 
 def _attribute_text_bytes(name: str, holder: h5py.File | h5py.Dataset) -> int:
-    """The bytes of text of the attributes that are read, after a check of their types and sizes."""
+    """Count the bytes of text of the attributes that are read, and check their types and sizes."""
     total = 0
     for key in (key for key in holder.attrs if key not in SKIPPED_ATTRIBUTES):
         attribute = holder.attrs.get_id(key)
@@ -426,7 +404,7 @@ def _attribute_text_bytes(name: str, holder: h5py.File | h5py.Dataset) -> int:
 
 
 def _read_attributes(holder: h5py.File | h5py.Dataset) -> dict[str, object]:
-    """The attributes that were set by `_set_attributes`."""
+    """Read the attributes that `_set_attributes` sets."""
     attributes: dict[str, object] = {}
     for name in holder.attrs:
         if name not in NETCDF_ATTRIBUTES:

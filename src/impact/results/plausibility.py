@@ -48,7 +48,7 @@ def material_notes(
 
 
 def result_notes(summary: Summary) -> Iterator[str]:
-    """A sentence for each implausible property of a sweep's outcome."""
+    """Yield a sentence for each implausible property of a sweep's outcome."""
     if summary.points and not summary.not_counted and summary.counts.keys() == {Status.NO_IMPACT}:
         yield f"none of {summary.points:,} points is an impact: v1 <= v2, the balls do not approach"
     if summary.deep:

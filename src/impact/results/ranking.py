@@ -33,8 +33,6 @@ DEFAULT_TOL = 0.01
 RANKED_VARIABLES = ("e_error", "status")
 # ranges of e that a table lists
 MAX_RANGES = 8
-# bits of a double, and of the upper of the two parts in which it is summed
-MANTISSA_BITS, UPPER_BITS = 53, 27
 
 
 @dataclass(frozen=True)
@@ -242,7 +240,7 @@ def _check_rankable(dataset: xr.Dataset) -> None:
     missing = [name for name in RANKED_VARIABLES if name not in dataset]
     if missing:
         raise UsageError(f"this result has no {', '.join(missing)}; sweep without [output] variables, or add them")
-    if "e" not in dataset.coords or not _asks_for_e(dataset):
+    if "e" not in dataset.coords or not _uses_e(dataset):
         raise UsageError("this sweep has no requested e, which the ranking needs; add e or alpha")
     dims = set(dataset["e_error"].dims)
     if "model" not in dims or dims != set(dataset["status"].dims) or not dims.issuperset(dataset["e"].dims):
@@ -255,23 +253,25 @@ def _rank_key(ranked: Ranked) -> tuple[float, ...]:
     return (-ranked.share, *(math.inf if math.isnan(error) else error for error in errors))
 
 
-def _asks_for_e(dataset: xr.Dataset) -> bool:
-    """Whether any point has a target e."""
+def _uses_e(dataset: xr.Dataset) -> bool:
+    """Check whether any point has a target e."""
     e, _ = distinct_points(dataset, "e")
-    return any(not np.isnan(e.isel(where).values).all() for where in slabs(e.sizes))
+    return any(not np.isnan(e.isel(slab).values).all() for slab in slabs(e.sizes))
 
 
 def _select_model(dataset: xr.Dataset, position: int) -> xr.Dataset:
-    """One model of a result, without the axes of other models' parameters."""
+    """Select one model of a result, without the axes of other models' parameters."""
     first = dict.fromkeys(foreign_dims(dataset, str(dataset["model"].values[position])), 0)
     return dataset.isel({"model": position, **first})
 
 
-def _reduce_dims(of_model: xr.Dataset) -> tuple[xr.Dataset, int]:
-    """The ranked variables of a model, over the axes along which they or e vary, and the weight of each point."""
-    along_one = of_model.variables["e"].ndim == 1
+def _reduce_dims(model_data: xr.Dataset) -> tuple[xr.Dataset, int]:
+    """Keep the axes along which the ranked variables or e vary; return also the weight of each point."""
+    along_one = model_data.variables["e"].ndim == 1
     return over_varying_dims(
-        of_model, RANKED_VARIABLES, *(of_model.variables["e"].dims if along_one else varying_dims(of_model, "e"))
+        model_data,
+        RANKED_VARIABLES,
+        *(model_data.variables["e"].dims if along_one else varying_dims(model_data, "e")),
     )
 
 
@@ -279,7 +279,7 @@ def _reduce_dims(of_model: xr.Dataset) -> tuple[xr.Dataset, int]:
 class _JudgedSlab:
     """Points of a slab: target e, its error, and which points count, failed, have an error and are within tol."""
 
-    asked: NDArray[Any]
+    e: NDArray[Any]
     error: NDArray[Any]
     distance: NDArray[np.float64]
     judged: Mask
@@ -288,155 +288,130 @@ class _JudgedSlab:
     within: Mask
 
 
-def _judge_slab(evaluated: xr.Dataset, where: Slab, sizes: Mapping[Hashable, int], tol: float) -> _JudgedSlab:
-    error, status, asked = (
-        _read_slab(evaluated.variables[name], where, sizes) for name in (*RANKED_VARIABLES, "e")
-    )
+def _judge_slab(evaluated: xr.Dataset, slab: Slab, sizes: Mapping[Hashable, int], tol: float) -> _JudgedSlab:
+    error, status, e = (_read_slab(evaluated.variables[name], slab, sizes) for name in (*RANKED_VARIABLES, "e"))
     distance = np.abs(np.asarray(error, float))
-    judged = ~np.isnan(asked) & (status != Status.NO_IMPACT)
+    judged = ~np.isnan(e) & (status != Status.NO_IMPACT)
     failed = judged & (status >= FIRST_FAILURE)
     evaluable = judged & ~failed & ~np.isnan(distance)
-    return _JudgedSlab(asked, error, distance, judged, failed, evaluable, evaluable & (distance <= tol))
+    return _JudgedSlab(e, error, distance, judged, failed, evaluable, evaluable & (distance <= tol))
 
 
-def _best_parameters(of_model: xr.Dataset, parameter_dims: Sequence[Hashable], tol: float) -> dict[Hashable, int]:
-    """The index on each axis of a model's own parameters at which it ranks best over all other axes."""
-    evaluated, _ = over_varying_dims(of_model, RANKED_VARIABLES, *parameter_dims, *varying_dims(of_model, "e"))
+def _best_parameters(
+    model_data: xr.Dataset, parameter_dims: Sequence[Hashable], tol: float
+) -> dict[Hashable, int]:
+    """Find the index on each axis of a model's own parameters at which it ranks best over all other axes."""
+    evaluated, _ = over_varying_dims(model_data, RANKED_VARIABLES, *parameter_dims, *varying_dims(model_data, "e"))
     shape = tuple(evaluated.sizes[dim] for dim in parameter_dims)
     if math.prod(shape) > MAX_PARAMETER_COMBINATIONS:
         raise UsageError(
-            f"got {math.prod(shape):,} combinations of parameters of {of_model['model'].item()}, expected at most "
-            f"{MAX_PARAMETER_COMBINATIONS:,}; select values of them"
+            f"got {math.prod(shape):,} combinations of parameters of {model_data['model'].item()}, expected at "
+            f"most {MAX_PARAMETER_COMBINATIONS:,}; select values of them"
         )
     dims = evaluated.variables["e_error"].dims
     other_dims = (dim for dim in dims if dim not in parameter_dims)
     sizes = {dim: evaluated.sizes[dim] for dim in (*parameter_dims, *other_dims)}
     points, within, errors = np.zeros(shape, int), np.zeros(shape, int), np.full(shape, np.nan)
     others = tuple(range(len(parameter_dims), len(sizes)))
-    for where in slabs(sizes):
-        part = _judge_slab(evaluated, where, sizes, tol)
-        parameter_slab = tuple(where[dim] for dim in parameter_dims)
+    for slab in slabs(sizes):
+        part = _judge_slab(evaluated, slab, sizes, tol)
+        parameter_slab = tuple(slab[dim] for dim in parameter_dims)
         points[parameter_slab] += part.judged.sum(axis=others)
         within[parameter_slab] += part.within.sum(axis=others)
         largest = np.fmax.reduce(np.where(part.evaluable, part.distance, np.nan), axis=others, initial=np.nan)
         errors[parameter_slab] = np.fmax(errors[parameter_slab], largest)
     share = within / np.maximum(points, 1)
     best = np.lexsort((np.where(np.isnan(errors), np.inf, errors).reshape(-1), -share.reshape(-1)))[0]
-    return dict(zip(parameter_dims, (int(at) for at in np.unravel_index(best, shape)), strict=True))
+    return dict(zip(parameter_dims, map(int, np.unravel_index(best, shape)), strict=True))
 
 
-def _varies_parameters(of_model: xr.Dataset, dim: Hashable) -> bool:
-    """Whether only parameters of the model, and perhaps of others, vary along a dimension."""
-    models = {InputName.parse(name).model for name in columns_along(of_model, dim)}
-    return str(of_model["model"].item()) in models and "" not in models
+def _varies_parameters(model_data: xr.Dataset, dim: Hashable) -> bool:
+    """Check whether only parameters of the model, and perhaps of others, vary along a dimension."""
+    models = {InputName.parse(name).model for name in columns_along(model_data, dim)}
+    return str(model_data["model"].item()) in models and "" not in models
 
 
-def _rank_model(of_model: xr.Dataset, tol: float) -> Ranked:
-    """The rank of a model, from its e_error and status and from the target e."""
-    key = str(of_model["model"].item())
-    parameter_dims = [dim for dim in of_model.variables["e_error"].dims if _varies_parameters(of_model, dim)]
-    best = _best_parameters(of_model, parameter_dims, tol) if parameter_dims else {}
-    chosen = _swept_inputs(of_model, best)
-    of_model = of_model.isel(best)
-    axes = of_model.variables["e_error"].dims
-    evaluated, weight = _reduce_dims(of_model)
+def _rank_model(model_data: xr.Dataset, tol: float) -> Ranked:
+    """Rank a model by its e_error, its status and the target e."""
+    key = str(model_data["model"].item())
+    parameter_dims = [dim for dim in model_data.variables["e_error"].dims if _varies_parameters(model_data, dim)]
+    best = _best_parameters(model_data, parameter_dims, tol) if parameter_dims else {}
+    chosen = _swept_inputs(model_data, best)
+    model_data = model_data.isel(best)
+    axes = model_data.variables["e_error"].dims
+    evaluated, weight = _reduce_dims(model_data)
     sizes = {dim: evaluated.sizes[dim] for dim in evaluated.variables["e_error"].dims}
-    e, along_one = evaluated.variables["e"], of_model.variables["e"].ndim == 1
+    e, along_one = evaluated.variables["e"], model_data.variables["e"].ndim == 1
     # if e varies along one axis, for each e: whether any point counts, and whether any is not within tol
-    asked_at, missed_at = np.zeros(e.shape, bool), np.zeros(e.shape, bool)
+    requested, missed = np.zeros(e.shape, bool), np.zeros(e.shape, bool)
     points = evaluable_points = within_points = failed_points = 0
     total, max_error, e_out = Fraction(), math.nan, math.nan
     worst: dict[Hashable, int] | None = None
-    for where in slabs(sizes):
-        part = _judge_slab(evaluated, where, sizes, tol)
+    for slab in slabs(sizes):
+        part = _judge_slab(evaluated, slab, sizes, tol)
         distance, evaluable = part.distance, part.evaluable
         points += weight * int(part.judged.sum())
         evaluable_points += weight * int(evaluable.sum())
         within_points += weight * int(part.within.sum())
         failed_points += weight * int(part.failed.sum())
         if evaluable.any():
-            total += weight * _exact_sum(distance[evaluable & np.isfinite(distance)])
+            total += weight * _exact_sum(distance[evaluable & np.isfinite(distance)].tolist())
             index = np.unravel_index(int(np.argmax(np.where(evaluable, distance, -1.0))), distance.shape)
             if worst is None or distance[index] > max_error:
                 max_error = float(distance[index])
-                e_out = float(part.asked[index]) + float(part.error[index])
-                worst = {dim: where[dim].start + int(at) for dim, at in zip(sizes, index, strict=True)}
+                e_out = float(part.e[index]) + float(part.error[index])
+                worst = {dim: slab[dim].start + int(position) for dim, position in zip(sizes, index, strict=True)}
         if along_one:
             others = tuple(axis for axis, dim in enumerate(sizes) if dim not in e.dims)
-            along = where[e.dims[0]]
-            asked_at[along] |= np.logical_or.reduce(part.judged, axis=others)
-            missed_at[along] |= np.logical_or.reduce(part.judged & ~part.within, axis=others)
+            along = slab[e.dims[0]]
+            requested[along] |= np.logical_or.reduce(part.judged, axis=others)
+            missed[along] |= np.logical_or.reduce(part.judged & ~part.within, axis=others)
     at: dict[str, float | str] = {}
     mean_error = math.nan
     if worst is not None:
         # an infinite error comes from a file that was not written by a sweep
         mean_error = max_error if math.isinf(max_error) else float(total / evaluable_points)
-        asked_there = e.isel({dim: worst[dim] for dim in e.dims}).values.item()
-        at = {
-            **_swept_inputs(of_model, {dim: worst.get(dim, 0) for dim in axes}),
-            **chosen,
-            "e": float(asked_there),
-        }
+        requested_e = float(e.isel({dim: worst[dim] for dim in e.dims}).values.item())
+        at = _swept_inputs(model_data, {dim: worst.get(dim, 0) for dim in axes}) | chosen | {"e": requested_e}
     parameters = {name.config_key: chosen[str(name)] for name in map(InputName.parse, chosen) if name.model == key}
-    served = _served_ranges(e.values, asked_at, missed_at) if along_one else None
-    return Ranked(
-        key,
-        parameters,
-        points,
-        within_points,
-        failed_points,
-        mean_error,
-        max_error,
-        at,
-        e_out,
-        served,
-    )
+    served = _served_ranges(e.values, requested, missed) if along_one else None
+    return Ranked(key, parameters, points, within_points, failed_points, mean_error, max_error, at, e_out, served)
 
 
-def _read_slab(variable: xr.Variable, where: Slab, sizes: Mapping[Hashable, int]) -> NDArray[Any]:
-    """The values of a slab, with all dimensions in the order of `sizes`."""
-    part = variable.isel({dim: where[dim] for dim in variable.dims})
-    shape = {dim: where[dim].stop - where[dim].start for dim in sizes}
+def _read_slab(variable: xr.Variable, slab: Slab, sizes: Mapping[Hashable, int]) -> NDArray[Any]:
+    """Read the values of a slab, with all dimensions in the order of `sizes`."""
+    part = variable.isel({dim: slab[dim] for dim in variable.dims})
+    shape = {dim: slab[dim].stop - slab[dim].start for dim in sizes}
     return np.asarray(xr.Variable(part.dims, part.values).set_dims(shape).values)  # type: ignore[no-untyped-call]
 
 
-def _exact_sum(values: NDArray[np.float64]) -> Fraction:
-    """The exact sum of at most 2**26 finite, non-negative numbers.
+def _exact_sum(values: Sequence[float]) -> Fraction:
+    """Sum finite numbers exactly, so that the sum of all slabs does not depend on the slabs.
 
-    >>> _exact_sum(np.array([1e16, 1.0, 1e-16])) == Fraction(1e16) + 1 + Fraction(1e-16)
+    >>> _exact_sum([1e16, 1.0, 1e-16]) == Fraction(1e16) + 1 + Fraction(1e-16)
     True
     """
-    if not values.size:
-        return Fraction()
-    mantissas, exponents = np.frexp(values)
-    # integers in two parts, whose sums are exact in double precision
-    scaled = np.ldexp(mantissas, UPPER_BITS)
-    upper = np.floor(scaled)
-    lower = np.ldexp(scaled - upper, MANTISSA_BITS - UPPER_BITS)
-    least = int(exponents.min())
-    sums = (np.bincount(exponents - least, part).tolist() for part in (upper, lower))
-    total = sum(
-        ((int(up) << (MANTISSA_BITS - UPPER_BITS)) + int(low)) << power
-        for power, (up, low) in enumerate(zip(*sums, strict=True))
-    )
-    return total * Fraction(2) ** (least - MANTISSA_BITS)
+    parts: list[float] = []
+    while remainder := math.fsum([*values, *(-part for part in parts)]):
+        parts.append(remainder)
+    return sum(map(Fraction, parts), Fraction())
 
 
-def _swept_inputs(of_model: xr.Dataset, positions: Mapping[Hashable, int]) -> dict[str, float | str]:
-    """The swept inputs at a position along each axis, without the parameters of other models."""
-    variables, key = of_model.variables, str(of_model["model"].item())
+def _swept_inputs(model_data: xr.Dataset, positions: Mapping[Hashable, int]) -> dict[str, float | str]:
+    """List the swept inputs at a position along each axis, without the parameters of other models."""
+    variables, key = model_data.variables, str(model_data["model"].item())
     return {
         name: variables[name].values[position].item()
         for dim, position in positions.items()
-        for name in dict.fromkeys([str(dim), *columns_along(of_model, dim)])
+        for name in dict.fromkeys([str(dim), *columns_along(model_data, dim)])
         if InputName.parse(name).applies_to(key)
     }
 
 
-def _served_ranges(e: NDArray[Any], asked: Mask, missed: Mask) -> tuple[tuple[float, float], ...]:
-    """The ranges of neighbouring values of e at which every point that counts is within the tolerance."""
+def _served_ranges(e: NDArray[Any], requested: Mask, missed: Mask) -> tuple[tuple[float, float], ...]:
+    """Find the ranges of neighbouring values of e at which every point that counts is within the tolerance."""
     # sorted, each value once: several combinations of alpha and speeds may give the same e
-    values, value_index = np.unique(e[asked], return_inverse=True)
-    served = np.bincount(value_index, missed[asked], values.size) == 0
+    values, value_index = np.unique(e[requested], return_inverse=True)
+    served = np.bincount(value_index, missed[requested], values.size) == 0
     edges = np.diff(np.concatenate(([0], served, [0])))
     return tuple(zip(values[edges[:-1] == 1].tolist(), values[edges[1:] == -1].tolist(), strict=True))

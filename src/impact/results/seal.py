@@ -42,12 +42,7 @@ def write_seal(file: Any) -> str:
 
 
 def check_seal(path: Path) -> str:
-    """The seal of a file, after a check that it is valid.
-
-    Raises
-    ------
-    ResultError : the file does not exist, is not a sealed result, has another schema version, or is damaged
-    """
+    """Return the seal of a file; raise a ResultError for one that is damaged or not a result of this schema."""
     with open_regular_file(path) as file:
         header = file.read(USER_BLOCK_BYTES)
         if header.startswith(HDF5_MAGIC):
@@ -69,7 +64,7 @@ def check_seal(path: Path) -> str:
 
 
 def is_result(path: Path) -> bool:
-    """Whether a file begins like a result of this schema version or of version 1."""
+    """Check whether a file begins like a result of this schema version or of version 1."""
     if not path.is_file() or not path.stat().st_size:
         return False
     with path.open("rb") as file:
@@ -78,7 +73,7 @@ def is_result(path: Path) -> bool:
 
 @contextmanager
 def open_regular_file(path: Path) -> Iterator[BinaryIO]:
-    """A regular file, opened for reading."""
+    """Open a regular file for reading."""
     if not path.is_file():
         raise ResultError("is not a regular file" if path.exists() else "does not exist")
     # also a file of the system such as /proc/kmsg, of which reading might never end

@@ -30,12 +30,7 @@ IndexArray = NDArray[np.intp]
 
 
 def model_positions(models: Sequence[str], dataset: xr.Dataset) -> list[int]:
-    """The positions of models along `model`, in the order of the keys; repeated keys count once.
-
-    Raises
-    ------
-    UsageError : a model is not in the result
-    """
+    """Find the positions of models along `model`, in the order of the keys; repeated keys count once."""
     keys = [str(key) for key in dataset["model"].values]
     for key in models:
         if key not in keys:
@@ -44,17 +39,7 @@ def model_positions(models: Sequence[str], dataset: xr.Dataset) -> list[int]:
 
 
 def select(dataset: xr.Dataset, sel: Mapping[str, float | str]) -> xr.Dataset:
-    """Select a result at values of axes, or of coordinates along an axis; several along one axis have to agree.
-
-    Parameters
-    ----------
-    dataset : a result
-    sel : the values, by name; the axis is dropped, unless several numbered points have the value: these stay
-
-    Raises
-    ------
-    UsageError : an axis or a value is not in the result
-    """
+    """Select at values of coordinates; an axis is dropped, unless several numbered points have the value."""
     axes = [str(dim) for dim in dataset.sizes if dim != "model"]
     masks: dict[Hashable, Mask] = {}
     for name, value in sel.items():
@@ -73,13 +58,13 @@ def select(dataset: xr.Dataset, sel: Mapping[str, float | str]) -> xr.Dataset:
 
 
 def _matching_positions(labels: xr.DataArray, same: Mask) -> int | IndexArray:
-    """The selected position; on an axis with numbered points all positions that match."""
+    """Find the selected position; on an axis with numbered points all positions that match."""
     is_numbered = labels.dtype.kind in "iu" and np.count_nonzero(same) > 1
     return np.flatnonzero(same) if is_numbered else int(np.argmax(same))
 
 
 def _matches_value(values: np.ndarray, value: float | str) -> Mask:
-    """A mask of the values that equal a value."""
+    """Mark the values that equal a value."""
     if values.dtype.kind not in NUMBER_DTYPE_KINDS:
         return np.asarray(values.astype(str) == str(value))
     number = _as_number(value)
@@ -87,7 +72,7 @@ def _matches_value(values: np.ndarray, value: float | str) -> Mask:
 
 
 def _nearest_values(name: str, values: np.ndarray, value: float | str) -> str:
-    """A clause with the values of an axis if they are few, the next ones to a number, or the first."""
+    """List the values of an axis if they are few, the next ones to a number, or the first."""
     number = _as_number(value) if values.dtype.kind in NUMBER_DTYPE_KINDS else None
     if number is None or np.isnan(number) or values.size <= MAX_LISTED_VALUES:
         shown = ", ".join(map(label, values[:MAX_LISTED_VALUES].tolist()))
@@ -106,7 +91,7 @@ def _as_number(value: float | str) -> float | None:
 
 
 def match_labels(new: Sequence[Labels], baseline: Sequence[Labels]) -> tuple[IndexArray, IndexArray]:
-    """The positions of equal labels of an axis in two results, in the order of the baseline."""
+    """Find the positions of equal labels of an axis in two results, in the order of the baseline."""
     pairs = list(zip(new, baseline, strict=True))
     if all(np.array_equal(a, b) for a, b in pairs) and any(_is_increasing(a) for a, _ in pairs):
         # the usual case; sorting a long axis takes ten times its memory
@@ -131,7 +116,7 @@ def _is_increasing(values: Labels) -> bool:
 
 
 def _number_labels(new: Labels, baseline: Labels, rounding: float) -> IndexArray:
-    """A number for each label of both results; equal labels have equal numbers."""
+    """Number the labels of both results; equal labels have equal numbers."""
     numbers = new.dtype.kind in NUMBER_DTYPE_KINDS and baseline.dtype.kind in NUMBER_DTYPE_KINDS
     new, baseline = (labels.astype(float if numbers else str) for labels in (new, baseline))
     values, number = np.unique(np.concatenate([new, baseline]), return_inverse=True)

@@ -179,10 +179,7 @@ class Extremes(NamedTuple):
 
 
 def extremes_of(dataset: xr.Dataset, name: str) -> Extremes | None:
-    """The extremes of a variable of a result of any size, over the axes along which it varies.
-
-    None for a computed variable that varies over more than `MAX_SUMMARY_POINTS` points of all models together.
-    """
+    """Find the extremes of a variable; None for a computed one that varies over too many points."""
     record = _stored_record(dataset.variables[name])
     if record is not None and name in record.extremes:
         stored = record.extremes[name]
@@ -198,7 +195,7 @@ def extremes_of(dataset: xr.Dataset, name: str) -> Extremes | None:
 
 
 def _distinct_parts(dataset: xr.Dataset, name: str) -> list[tuple[xr.Variable, int]] | None:
-    """The distinct points of a variable of each model, and their weights; None if they are too many."""
+    """List the distinct points of a variable of each model, and their weights; None if they are too many."""
     of_models = parts_of_models(dataset) if "model" in dataset.variables[name].dims else (dataset,)
     parts = [distinct_points(part, name) for part in of_models]
     evaluations = sum(variable.size for variable, _ in parts)
@@ -206,15 +203,7 @@ def _distinct_parts(dataset: xr.Dataset, name: str) -> list[tuple[xr.Variable, i
 
 
 def summarize_table(dataset: xr.Dataset, table: TrajectoryTable) -> tuple[Summary, dict[str, Extremes | None]]:
-    """The results of `summarize` and of `extremes_of` for all variables of a table that is not in a file yet.
-
-    Variables that vary along the same axes are evaluated together: they share most of the computation.
-
-    Parameters
-    ----------
-    dataset : see `impact.results.trajectory_table.lazy_dataset`
-    table : of the sweep
-    """
+    """Summarize a lazy result and find its extremes; variables along the same axes are evaluated together."""
     summary, extremes = Summary(), dict[str, Extremes | None]()
     axes = [axis.name for axis in table.inputs.axes]
     # by model and by the sizes of the axes along which they vary: the weight of a point, and names of variables
@@ -251,7 +240,7 @@ def summarize_table(dataset: xr.Dataset, table: TrajectoryTable) -> tuple[Summar
 def summary_record(
     summary: Summary, extremes: Mapping[str, Extremes | None], dataset: xr.Dataset
 ) -> SummaryRecord:
-    """The summary of a result as it is stored."""
+    """Convert the summary of a result to the form in which it is stored."""
     keys = dataset["model"].values.tolist()
     return SummaryRecord(
         status=counts_by_name(summary.counts),
@@ -275,7 +264,7 @@ def _stored_record(variable: xr.Variable) -> SummaryRecord | None:
 
 
 def _common_record(dataset: xr.Dataset, names: Sequence[str]) -> SummaryRecord | None:
-    """The summary in the file of some variables, if it has one and none of them is a selection."""
+    """Find the summary in the file of some variables, if it has one and none of them is a selection."""
     records = [_stored_record(dataset.variables[name]) for name in names]
     return records[0] if records and all(record is records[0] for record in records) else None
 
@@ -283,7 +272,7 @@ def _common_record(dataset: xr.Dataset, names: Sequence[str]) -> SummaryRecord |
 def _stored_summary(
     record: SummaryRecord, dataset: xr.Dataset, names: Sequence[str], max_failed_at: int
 ) -> Summary:
-    """The summary of some variables, as stored in the file of a dataset."""
+    """Restore the summary of some variables from the record in the file of a dataset."""
     keys = dataset["model"].values.tolist()
     counts = {Status[name.upper()]: count for name, count in record.status.items()}
     has_status = "status" in names
@@ -338,7 +327,7 @@ class SweepOutcome:
 
 
 def worst_by_model(summary: Summary, dataset: xr.Dataset) -> dict[str, dict[str, float]]:
-    """The largest absolute errors by variable and key of the model."""
+    """List the largest absolute errors by variable and key of the model."""
     keys = dataset["model"].values.tolist() if summary.worst else []
     return {
         name: {keys[model]: largest for model, largest in by_model.items()}

@@ -75,7 +75,7 @@ class TrajectoryRows:
     _whole: dict[int, CollisionResult] = field(default_factory=dict)
 
     def take(self, model: int, rows: NDArray[np.intp]) -> CollisionResult:
-        """Trajectories of a model by their row numbers; arrays of the shape of `rows`."""
+        """Read trajectories of a model by their row numbers; arrays of the shape of `rows`."""
         trajectory_map = self.maps[model]
         if self.pick is not None and model not in self._whole and rows.size < trajectory_map.count // FEW_ROWS:
             distinct, position = np.unique(rows, return_inverse=True)
@@ -125,7 +125,7 @@ class TrajectoryTable:
 
     @cached_property
     def checks(self) -> tuple[frozenset[str], ...]:
-        """By model, the checks that are necessary at each point; see `impact.contact.impacts.check_inputs`."""
+        """Find, by model, the checks of `impact.contact.impacts.check_inputs` that are necessary at each point."""
         return tuple(
             checks_that_may_fail(self.inputs, law, stiffness)
             for law, stiffness in zip(self.laws, self.stiffness, strict=True)
@@ -163,7 +163,7 @@ def expand(table: TrajectoryTable, model: int, index: Index, names: Sequence[str
 
 
 def _expand(table: TrajectoryTable, model: int, index: Index, names: Sequence[str]) -> tuple[Impacts, Outputs]:
-    """The inputs and outputs of a model at some cells of the grid; see `expand`."""
+    """Compute the inputs and outputs of a model at some cells of the grid; see `expand`."""
     law = table.laws[model]
     impacts = build_impacts(table.inputs, law, index, table.stiffness[model])
     with np.errstate(all="ignore"):
@@ -173,7 +173,7 @@ def _expand(table: TrajectoryTable, model: int, index: Index, names: Sequence[st
 
 
 def varies_along(table: TrajectoryTable, model: int, names: Sequence[str]) -> dict[str, tuple[int, ...]]:
-    """The axes of the grid along which outputs of a model vary, at most."""
+    """Find the axes of the grid along which outputs of a model vary, at most."""
     law, inputs = table.laws[model], table.inputs
     # K may depend on the value of n: Hertz's K is for n = 3/2
     index = probe_index(inputs, {"n"})
@@ -197,7 +197,7 @@ def varies_along(table: TrajectoryTable, model: int, names: Sequence[str]) -> di
 
 
 def _alternating_statuses(shape: tuple[int, ...], *statuses: Status) -> NDArray[np.int8]:
-    """An array in which OK and each of some statuses alternate; OK only if it has one element."""
+    """Build an array in which OK and each of some statuses alternate; OK only if it has one element."""
     status_array = np.full(shape, Status.OK, np.int8)
     if status_array.size > 1:
         for offset, status in enumerate(statuses):
@@ -250,7 +250,7 @@ def checks_that_may_fail(inputs: Inputs, law: Law, stiffness: Stiffness | None =
 
 
 def _closing_speeds(inputs: Inputs) -> tuple[float, float, float]:
-    """The least and the greatest closing speed v1 - v2 [m/s], and a lower bound of the positive ones."""
+    """Find the least and the greatest closing speed v1 - v2 [m/s], and a lower bound of the positive ones."""
     v1, v2 = (np.asarray(inputs.values(name), float) for name in ("v1", "v2"))
     slowest, fastest = float(v1.min() - v2.max()), float(v1.max() - v2.min())
     magnitudes = np.abs(np.concatenate([v1.reshape(-1), v2.reshape(-1)]))
@@ -262,13 +262,7 @@ def _closing_speeds(inputs: Inputs) -> tuple[float, float, float]:
 def whole_stiffness(
     inputs: Inputs, law: Law, stiffness: Stiffness | None = None
 ) -> tuple[tuple[int, ...], Array | None]:
-    """K [N/m^n] by a law's own rule, over the axes that it depends on; None if the values are too many.
-
-    Returns
-    -------
-    axes : the axes that K depends on
-    K : of the shape of the grid, with length one along the other axes
-    """
+    """Evaluate K [N/m^n] by a law's own rule, and name the axes it depends on; no K if the values are too many."""
     probed = build_impacts(inputs, law, probe_index(inputs, {"n"}), stiffness).K
     axes = tuple(sorted(axes_of_arrays([probed])))
     if math.prod(inputs.shape[axis] for axis in axes) > MAX_STIFFNESS_VALUES:
@@ -278,13 +272,7 @@ def whole_stiffness(
 
 
 class ExpandedArray(BackendArray):
-    """A variable of a result that is computed when it is indexed.
-
-    Parameters
-    ----------
-    table : of the sweep
-    variable : the variable to compute
-    """
+    """A variable of a result that is computed from a trajectory table when it is indexed."""
 
     def __init__(self, table: TrajectoryTable, variable: Variable) -> None:
         self.table, self.variable = table, variable
@@ -331,17 +319,12 @@ def table_of_result(dataset: xr.Dataset) -> TrajectoryTable | None:
 
 
 def _without_dummy_axis(values: NDArray[Any], where: tuple[slice, ...]) -> NDArray[Any]:
-    """Values of a slab; a plan without axes has a dummy axis of length one, which is dropped."""
+    """Drop the axis of length one that a slab of a plan without axes has."""
     return values if where else values.reshape(())
 
 
 def check_memory(name: str, shape: Sequence[int], dtype: np.dtype[Any]) -> None:
-    """Refuse to compute or read an array that is too large for memory.
-
-    Raises
-    ------
-    MemoryError : it takes more than `max_indexed_bytes()`
-    """
+    """Raise a MemoryError for an array of more than `max_indexed_bytes()`."""
     size, limit = math.prod(shape) * dtype.itemsize, max_indexed_bytes()
     if size > limit:
         raise MemoryError(
@@ -360,14 +343,7 @@ def max_indexed_bytes() -> int:
 
 
 def lazy_dataset(template: xr.Dataset, table: TrajectoryTable, variables: Sequence[Variable]) -> xr.Dataset:
-    """A result whose variables are computed when they are read.
-
-    Parameters
-    ----------
-    template : coordinates and attributes of the result
-    table : of the sweep
-    variables : of the result
-    """
+    """Build a result, from its coordinates and attributes, whose variables are computed when they are read."""
     axes = [axis.name for axis in table.inputs.axes]
     names = [variable.name for variable in variables]
     along = [varies_along(table, model, names) for model in range(len(table.laws))]

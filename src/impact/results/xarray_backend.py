@@ -43,19 +43,7 @@ def write_sealed(
     values: Iterable[RegionValues],
     output: Output = DEFAULT_OUTPUT,
 ) -> str:
-    """Write and seal a dataset.
-
-    Parameters
-    ----------
-    sink : the file
-    template : coordinates, attributes and variables of the dataset; the values of its variables are ignored
-    values : the values of the variables: name, region and array
-    output : dtype, compression and chunks
-
-    Returns
-    -------
-    str : the seal
-    """
+    """Write and seal a dataset of the coordinates and attributes of a template; return the seal."""
     with open_for_writing(sink, template, output) as write_region:
         for name, region, array in values:
             write_region(name, region, array)
@@ -116,12 +104,7 @@ def save(
 
 
 def save_with_attributes(source: Path, path: Path, attributes: Mapping[str, str]) -> None:
-    """Copy a result file and set some attributes; its layout stays, an existing file is replaced.
-
-    Raises
-    ------
-    StoreError : the disk is full or failed
-    """
+    """Copy a result file and set some attributes; its layout stays, an existing file is replaced."""
     with atomic_write(path, overwrite=True) as sink, source.open("rb") as file:
         while content := file.read(COPY_BUFFER_BYTES):
             sink.write(content)
@@ -203,7 +186,7 @@ def open_result(path: str | Path) -> xr.Dataset:
 
 
 def _with_file_name(shown: str, error: ResultError) -> ResultError:
-    """The error with a message that begins with the name of the file."""
+    """Begin the message of an error with the name of the file."""
     return error if str(error).startswith(f"{shown}: ") else ResultError(f"{shown}: {error}")
 
 
