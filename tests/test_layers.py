@@ -24,15 +24,15 @@ LAYERS = (
     {"exporters"},
     {"plots"},
     {"reporting"},
-    # the package itself, "", hands out the functions of api
-    {"api", ""},
+    # the package itself, "", hands out the public functions
+    {""},
     {"cli", "pytest_plugin"},
     {"__main__"},
 )
 HEIGHT = {part: height for height, parts in enumerate(LAYERS) for part in parts}
 # where each library may be imported
 LIBRARIES = {
-    "typer": {"cli"}, "rich": {"cli", "display", "progress_display"}, "matplotlib": {"plots"},
+    "typer": {"cli"}, "rich": {"display", "progress_display"}, "matplotlib": {"plots"},
     "pandas": {"display", "plots"}, "ipywidgets": {"plots"}, "jinja2": {"reporting"}, "markupsafe": {"reporting"},
     "xarray": {"results", "comparison", "inverse", "uncertainty", "pytest_plugin"},
     "h5py": {"results"}, "h5netcdf": {"results"}, "tomllib": {"config"}, "pydantic": {"config", "results"},

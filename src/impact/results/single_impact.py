@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 import math
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import xarray as xr
 
@@ -32,12 +33,13 @@ from ..contact.status import Status
 from ..contact.timestep import EXACT
 from ..contact.units import with_numbers
 from ..contact.variables import HISTORY, OUTPUTS
+from ..display import Block, Displayed, Table
 from ..engine.build_impacts import build_impacts, fixed_steps_at
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..errors import UsageError, did_you_mean
 from ..formatting import number, quantity
-from ..text import html_table, safe_text
+from ..text import safe_text
 from .kinds import require_sweep
 from .provenance import changed_plugins, stored_draft, unknown_plugins
 from .schema import SCHEMA_VERSION, attributes_of, is_case, plain_unit
@@ -64,7 +66,7 @@ DERIVED_QUANTITIES = (
 
 
 @dataclass(frozen=True)
-class Impact:
+class Impact(Displayed):
     """One impact by one model.
 
     Parameters
@@ -138,8 +140,32 @@ class Impact:
             rows["integrator"] = self.integrator
         return rows
 
-    def _repr_html_(self) -> str:
-        return html_table((), self.rows().items())
+    def as_dict(self) -> dict[str, Any]:
+        """The impact as plain data."""
+        return {
+            "model": self.model.key,
+            "inputs": dict(self.point),
+            "first_value_of": list(self.first),
+            "integrator": self.integrator,
+            "exponent": self.exponent,
+            "closing_speed": self.closing_speed,
+            "outputs": {**self.values, "status": self.status.name.lower()},
+            "materials": {name: asdict(material) for name, material in self.materials.items()},
+            "derived": dict(self.derived),
+            "damping": self.damping,
+            "e_kinematic": self.e_kinematic,
+            "e_kinetic": self.e_kinetic,
+            "e_energetic": self.e_energetic,
+        }
+
+    def records(self) -> Sequence[Mapping[str, Any]]:
+        """One row: the model, the inputs and the outputs."""
+        data = self.as_dict()
+        return [{"model": data["model"], **data["inputs"], **data["outputs"]}]
+
+    def sections(self, width: int) -> Iterable[Block]:
+        """The inputs, outputs, the three restitutions and estimated errors, one per line."""
+        return [Table(list(self.rows().items()))]
 
     def _unit_of(self, name: str) -> str:
         """The unit of an input, which may be a parameter of the model, or a property of a material."""
@@ -457,7 +483,10 @@ def single_point(
     law = None if model is None else find(model, source.plugins.models)
     settings = [] if law is None else [Setting(("models",), [law.key], f"--model {law.key}")]
     settings += [Setting(InputName.parse(k).path, values, f"--over {k}") for k, values in (over or {}).items()]
-    draft = inline_files(draft.with_settings(settings))
+    draft = draft.with_settings(settings)
+    if isinstance(draft.table("sweep").get("cases"), str):
+        # the inputs that vary together are the columns of the file
+        draft = inline_files(draft)
     joint = _joint_inputs(draft)
     varying = {str(name) for name, value in input_values(draft.data) if isinstance(value, list | dict)}
     labels = {name: value for name, value in source.labels.items() if name in varying | joint or is_case(name)}
@@ -478,7 +507,9 @@ def _joint_inputs(draft: Draft) -> set[str]:
     groups = sweep.get("zip")
     zipped = [name for group in groups for name in listed_names(group)] if isinstance(groups, list) else []
     names = {str(InputName.parse(name)) for name in (*zipped, *as_table(sweep.get("cases")))}
-    return names | {str(InputName.of_path(path)) for path in distribution_paths(draft.data)}
+    if "design" in draft.data:
+        names |= {str(InputName.of_path(path)) for path in distribution_paths(draft.data)}
+    return names
 
 
 def _setting_at(draft: Draft, name: str, value: float | str, law: ForceModel | None) -> Setting:
@@ -504,8 +535,8 @@ def _has_input(draft: Draft, name: InputName) -> bool:
 def _unknown_input(draft: Draft, name: str) -> UsageError:
     parameters = [f"{model.key}.{parameter.name}" for model in draft.models for parameter in model.parameters]
     names = {*draft.input_names, *SWEEP_DEFAULTS, *parameters}
-    choices = [choice for choice in names if _has_input(draft, InputName.parse(choice))]
-    return UsageError(f'no input "{name}" here; {did_you_mean(name, [*choices, *_joint_inputs(draft)])}')
+    choices = {choice for choice in names if _has_input(draft, InputName.parse(choice))} | _joint_inputs(draft)
+    return UsageError(f'no input "{name}" here; {did_you_mean(name, sorted(choices))}')
 
 
 def _without_axes(
