@@ -12,7 +12,6 @@ import xarray as xr
 from hypothesis import given, settings, strategies as st
 
 import impact
-from impact.cli.summary import summary_json
 from impact.config.load import Axis
 from impact.contact.variables import OUTPUTS
 from impact.engine.plan import MAX_FULL_REPEATED, Plan
@@ -274,7 +273,7 @@ def test_files_summaries_and_commands_count_the_same_points(tmp_path: Path, cli:
     assert plan.layout == "full"
     for layout in LAYOUTS:
         outcome = sweep_into(tmp_path / f"{layout}.h5", in_layout(plan, layout))
-        counts = summary_json(outcome, tmp_path / f"{layout}.h5")
+        counts = outcome.as_dict()
         assert counts["points"] == sum(counts["status"].values()) == plan.points == 24
         stored = impact.load(tmp_path / f"{layout}.h5")
         assert summarize(stored).counts == outcome.summary.counts
@@ -285,7 +284,7 @@ def test_a_failed_point_is_named_without_parameters_of_other_models(tmp_path: Pa
     plan = axes_of_parameters(["kelvin-voigt", "johnson-1985"])
     solver = replace(plan.config.solver, max_steps=3)
     plan = replace(plan, config=replace(plan.config, solver=solver))
-    counts = summary_json(sweep_into(tmp_path / "r.h5", plan), tmp_path / "r.h5")
+    counts = sweep_into(tmp_path / "r.h5", plan).as_dict()
     assert counts["first_failed"]
     for failure in counts["first_failed"]:
         key = failure["at"]["model"]

@@ -12,9 +12,9 @@ import typer
 import impact
 
 from ..atomic import check_output
+from ..display import dump, show
 from ..errors import ImpactError, UsageError
 from . import exits
-from .console import dump
 from .options import MaxPointsOption, PluginOption, QuietOption, ResultArgument, ToleranceOption
 
 if TYPE_CHECKING:
@@ -23,10 +23,6 @@ if TYPE_CHECKING:
     from ..comparison.formats import NoVerdict
     from ..comparison.verdict import Verdict
     from ..engine.plan import Plan
-
-
-# a narrower terminal shows no table
-MIN_TABLE_WIDTH = 76
 
 
 class Format(StrEnum):
@@ -82,13 +78,13 @@ def bless(
 ) -> None:
     """Show how a result differs from its baseline, then replace the baseline by it."""
 
-    def show(verdict: Verdict) -> None:
-        print_verdict(verdict)
+    def show_verdict(verdict: Verdict) -> None:
+        show(verdict)
         sys.stdout.flush()
 
     try:
         verdict = impact.bless(
-            new, baseline, reason=reason, tol=dict(tol or ()) or None, allow_failed=allow_failed, show=show
+            new, baseline, reason=reason, tol=dict(tol or ()) or None, allow_failed=allow_failed, show=show_verdict
         )
     except (BrokenPipeError, SystemExit):
         raise UsageError(
@@ -151,7 +147,7 @@ def _report_verdict(verdict: Verdict, format: Format, plot: Path | None) -> None
 
     with exits.ignore_broken_pipe():
         if format is Format.table:
-            print_verdict(verdict)
+            show(verdict)
         else:
             _print_outcome(verdict, format)
     if plot is not None and not verdict.worst_along:
@@ -179,22 +175,3 @@ def _print_outcome(outcome: Verdict | NoVerdict, format: Format) -> None:
             print(formats.as_markdown(outcome), end="")
         case Format.github:
             print(formats.as_github(outcome))
-
-
-def print_verdict(verdict: Verdict) -> None:
-    """Print the headline, the differences with the commands that repeat them, and a table of changed variables."""
-    from ..comparison.verdict import VERDICT_HEADINGS
-    from .console import cell, console, table
-
-    out = console(sys.stdout)
-    for line in (verdict.headline, *verdict.lines, *(f"note: {note}" for note in verdict.notes)):
-        # no wrapping, so that commands can be copied
-        out.print(line, soft_wrap=True)
-    changed = verdict.rows()
-    if changed and out.width >= MIN_TABLE_WIDTH:
-        rows = table(*VERDICT_HEADINGS)
-        rows.columns[1].justify = "left"
-        for row in changed:
-            rows.add_row(*map(cell, row))
-        out.print()
-        out.print(rows)

@@ -45,10 +45,11 @@ class Columns:
     header: int  # line of the names; 0 for a table
     lines: Sequence[int]  # of each row; for a table its number, from 1
     units: Mapping[str, str]  # of each column; empty for SI
-    cells: Mapping[str, Sequence[object]]  # of each column; those of a file are text
+    cells: Mapping[str, Sequence[object]]  # of each column
     # a column has the name of an input or an output. Otherwise it may be any file, such as one with passwords,
     # that a config of unknown origin names: messages contain nothing of it
     is_known: bool = True
+    is_text: bool = True  # text without a unit may be a number
 
     def problem(self, message: str, column: str = "", row: int | None = None) -> str:
         """Say where a problem is."""
@@ -65,7 +66,7 @@ class Columns:
                 raise ConfigError(self.problem(f"got [{safe_text(unit)}], expected {expected}", column))
         elif quantity is None:
             raise ConfigError(self.problem("got no known column, expected such as material1 or v1 [m/s]"))
-        values, problems = read_cells(self.cells[column], quantity, n, unit, is_text=True)
+        values, problems = read_cells(self.cells[column], quantity, n, unit, is_text=self.is_text)
         if problems and quantity is not None and not self.is_known:
             raise ConfigError(self.problem(f"expected {quantity.expected}", row=problems[0][0]))
         if problems:

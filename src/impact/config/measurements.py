@@ -84,7 +84,7 @@ def purpose_problems(data: Mapping[str, Any]) -> list[ConfigProblem]:
 
 
 def _read_columns(
-    columns: Columns, data: Mapping[str, Any], models: Mapping[str, ForceModel], n: float | None, *, is_text: bool
+    columns: Columns, data: Mapping[str, Any], models: Mapping[str, ForceModel], n: float | None
 ) -> tuple[list[_Column], list[_Problem]]:
     """Read columns of a file, which are text and have units, or lists of a config, and report all problems."""
     kinds: dict[str, _Column] = {}
@@ -109,16 +109,17 @@ def _read_columns(
     for header, column in kinds.items():
         # a standard deviation has the unit of its output
         unit = columns.units.get(header) or (columns.units.get(column.name, "") if column.kind == "sigma" else "")
-        values, column_problems = _read_column(columns.cells[header], column, header, unit, n, is_text=is_text)
+        values, column_problems = _read_column(columns, column, header, unit, n)
         problems += [(header, index, message) for index, message in column_problems]
         result.append(replace(column, values=tuple(values)))
     return result, problems
 
 
 def _read_column(
-    cells: Sequence[object], column: _Column, header: str, unit: str, n: float | None, *, is_text: bool
+    columns: Columns, column: _Column, header: str, unit: str, n: float | None
 ) -> tuple[Sequence[object], Sequence[tuple[int | None, str]]]:
     """Read a column; problems have the index of a cell, or None for the header."""
+    cells = columns.cells[header]
     if column.kind == SPECIMEN:
         specimens = [cell if isinstance(cell, str) else number(cell) for cell in cells]
         return specimens, [(index, SPECIMEN_EXPECTED) for index, name in enumerate(specimens) if not name]
@@ -126,13 +127,13 @@ def _read_column(
     if unit.lower() in ("%", "percent", "pct", "per cent"):
         expected = f'a fraction: divide the column by 100 and write "{safe_text(header, 60)}"'
         return (), [(None, f"got [{safe_text(unit)}], expected {expected}")]
-    if is_text and not unit and si_unit != "1":
+    if columns.is_text and not unit and si_unit != "1":
         expected = f'one in brackets, such as "{safe_text(header, 60)} [{si_unit}]"'
         return (), [(None, f"got no unit, expected {expected}")]
     wrong_unit = unit_expected(column.quantity, unit, n)
     if wrong_unit:
         return (), [(None, f"got [{safe_text(unit)}], expected {wrong_unit}")]
-    return _read_measured(cells, column.quantity, n, unit, is_text=is_text)
+    return _read_measured(cells, column.quantity, n, unit, is_text=columns.is_text)
 
 
 def _read_measured(
@@ -194,7 +195,7 @@ def read_data_file(
         columns = read_csv(folder / file, column_quantity(models))
     except ConfigError as error:
         return {}, [*error.problems]
-    read, problems = _read_columns(columns, data, models, n, is_text=True)
+    read, problems = _read_columns(columns, data, models, n)
     if problems:
         return {}, [columns.problem(text, header, row) for header, row, text in problems[:MAX_PROBLEMS]]
     values = {header: list(column.values) for header, column in zip(columns.cells, read, strict=True)}
@@ -233,7 +234,7 @@ def read_measurements(
     if not isinstance(lists, dict) or not lists or not all(isinstance(v, list) and v for v in lists.values()):
         return None, []
     path: KeyPath = ("data", "columns")
-    columns, column_problems = _read_columns(Columns("", 0, (), {}, lists), data, models, n, is_text=False)
+    columns, column_problems = _read_columns(Columns("", 0, (), {}, lists, is_text=False), data, models, n)
     problems: list[ConfigProblem] = [
         ((*path, *([header] if header else []), *([] if index is None else [index])), message)
         for header, index, message in column_problems

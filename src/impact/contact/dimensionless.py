@@ -1,4 +1,8 @@
-"""Values of the quantities, parameters and coefficients of a law, in the contact's own units."""
+"""Values of the quantities, parameters and coefficients of a law, in the contact's own units.
+
+The units are the effective mass m, the closing speed v₀ and the length δ* = (m v₀²/K)^(1/(n+1)), in which
+K = m = v₀ = 1; a law needs only what is left: e, n, and its parameters converted by their units.
+"""
 
 from __future__ import annotations
 

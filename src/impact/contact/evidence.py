@@ -1,4 +1,4 @@
-"""Evidence for a law, as data: seen at a source, derived, disputed, or not verified."""
+"""How well the formula and the DOI of a law are verified: seen at a source, derived, disputed, or not verified."""
 
 from __future__ import annotations
 

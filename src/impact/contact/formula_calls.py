@@ -34,12 +34,7 @@ def argument_names(formula: Formula | None) -> tuple[str, ...]:
 
 
 def call_by_name(formula: Formula, values: Mapping[str, Array | float]) -> Array:
-    """The value of a formula, called with values by name; arrays are passed as read-only views.
-
-    Raises
-    ------
-    ModelError : the formula raised any error, or returned something other than real numbers
-    """
+    """The value of a formula, called with values by name; arrays are passed as read-only views."""
     arguments = [_read_only(values[name]) for name in argument_names(formula)]
     try:
         return _real(formula(*arguments))
@@ -51,13 +46,7 @@ def call_by_name(formula: Formula, values: Mapping[str, Array | float]) -> Array
 
 
 def describe_error(key: str, error: ModelError) -> tuple[str, str]:
-    """A key that identifies an error of a law, and a line that describes it: location, type, text and a hint.
-
-    Parameters
-    ----------
-    key : key of the model
-    error : raised by `call_by_name`, or because a formula returned a wrong shape
-    """
+    """A key that identifies an error of a law, and a line that describes it: location, type, text and a hint."""
     cause = error.__cause__
     if cause is None:
         return key, safe_text(f"model {key}: {str(error).removeprefix(f'{key}: ')}", 1000)

@@ -1,4 +1,8 @@
-"""The time history of an impact, and three restitutions computed from it independently."""
+"""The time history of an impact, and three restitutions computed from it independently.
+
+The history samples the interpolant of the integrator. Force and power are integrated over each step by Gauss
+points, independently of the quadratures of the integrator, and give the restitutions of equations (2) and (3).
+"""
 
 from __future__ import annotations
 
@@ -52,18 +56,10 @@ class History:
 def integrate_history(
     model: ForceModel, impacts: Impacts, *, rtol: float, max_steps: int, times: int | None = None
 ) -> History | None:
-    """The time history of a single impact.
+    """Integrate one impact (a batch of length one); None if the balls miss, or the result is a limit.
 
-    Parameters
-    ----------
-    model : the law
-    impacts : the impact, a batch of length one
-    rtol, max_steps : see `impact.contact.outputs.collide`
-    times : number of points in time, uniform from first contact to release; by default SAMPLES_PER_STEP per step
-
-    Returns
-    -------
-    History or None : None without a motion to follow, because the balls miss or the result is a limit
+    `times` is the number of points in time, uniform from first contact to release; by default SAMPLES_PER_STEP
+    per step.
     """
     n = float(impacts.n[0])
     with np.errstate(all="ignore"):

@@ -141,11 +141,6 @@ def dimensionless_exponents(
 ) -> dict[str, Array | float]:
     """The exponents of m, length and v0 in the contact's own unit of a quantity or parameter.
 
-    Parameters
-    ----------
-    model, name : the law, and the name of the quantity or parameter
-    exponent_values : values of the names in the exponents of its unit: n, and parameters of the law
-
     >>> from impact.contact.models import find
     >>> dimensionless_exponents(find("hertz"), "E1", {"n": 1.5})
     {'m': 1.0, 'length': -3.0, 'v0': 2.0}
@@ -176,8 +171,6 @@ def check_inputs(model: Law, impacts: Impacts, checks: frozenset[str] = CHECKS) 
 
     Parameters
     ----------
-    model : the law
-    impacts : the impacts
     checks : which of these to check: the restitution "e", the closing speed "v0", and the derived quantities
         m, K, length, energy and time, "length"
     """

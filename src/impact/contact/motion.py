@@ -154,7 +154,6 @@ def breakpoints(
 
     Parameters
     ----------
-    law : the law
     params : params of the phase, each of shape (n,)
     start : components at the start of the phase, shape (2, n)
     residual : permanent indentation, shape (n,), for the restitution phase; None on approach

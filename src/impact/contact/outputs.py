@@ -35,8 +35,6 @@ def outputs(
 
     Parameters
     ----------
-    law : the law
-    impacts : the inputs
     result : the collisions, in the contact's own units, of shapes that broadcast to those of the impacts
     names : in `OUTPUTS`, see docs/schema.md
     checked : the status by `check_inputs`, if it is already computed
@@ -74,12 +72,10 @@ def collide(
     errors: dict[str, str] | None = None,
     names: Iterable[str] = OUTPUTS,
 ) -> Outputs:
-    """Simulate the impacts with a model.
+    """Simulate impacts by a law: their `outputs`; one that fails has NaN and a status, and affects no other.
 
     Parameters
     ----------
-    model : the law
-    impacts : the inputs, n of them
     rtol : local error of a step of the integrator, relative
     max_steps : attempted steps per phase after which an impact fails
     collapse : integrate impacts that are equal in the contact's own units once; changes no bit of the results
@@ -90,10 +86,6 @@ def collide(
         (n,)
     errors : receives a line for each distinct error of the law, see `impact.contact.formula_calls.describe_error`
     names : names of the outputs
-
-    Returns
-    -------
-    dict : see `outputs`; an impact that fails has NaN and a status, and does not affect any other
     """
     with np.errstate(all="ignore"):
         values, checked = dimensionless_values(model, impacts), check_inputs(model, impacts)

@@ -37,10 +37,6 @@ def in_parts(
     breakpoints : functions that change their sign where the formula of the force changes
     start : components at the start, shape (2, n)
     params : params of the law, each of shape (n,)
-
-    Returns
-    -------
-    Solution : as of an integration without parts
     """
     if not breakpoints:
         return run(problem, start, params)

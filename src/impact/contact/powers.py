@@ -1,4 +1,4 @@
-"""Powers whose bits do not depend on the processor."""
+"""x**p with the same bits on every processor, where p is a multiple of a quarter: by products and square roots."""
 
 from __future__ import annotations
 

@@ -1,4 +1,10 @@
-"""Simulate collisions: dimensionless impacts through both phases, each distinct one integrated once."""
+"""Simulate collisions: dimensionless impacts through both phases, each distinct one integrated once.
+
+In units of m, v₀ and δ* = (m v₀²/K)^(1/(n+1)) the motion of every law is x'' = −f(x, x'; groups), x(0) = 0,
+x'(0) = 1, where the groups are a few pure numbers, such as χ. Impacts with the same groups are one trajectory. It
+ends its approach at zero velocity, where a law with an unloading branch changes to it, and its restitution at zero
+indentation or zero force, as the law declares. For the coordinates see `impact.contact.motion`.
+"""
 
 from __future__ import annotations
 
@@ -147,20 +153,15 @@ def simulate(
     integrator: str = EXACT,
     errors: dict[str, str] | None = None,
 ) -> CollisionResult:
-    """Integrate impacts by the law of a model.
+    """Integrate impacts by a law; one that fails has a status, and affects no other.
 
     Parameters
     ----------
-    model : the law
     n : compliance exponents, shape (k,)
     values : `dimensionless_values` of the impacts, by name, each of shape (k,); for a scheme also `PHASE`, and one
         of `STEPS_PER_CONTACT` and `STEP`
     status : status by `check_inputs`, shape (k,); impacts that are not OK are not integrated
     rtol, max_steps, collapse, core, integrator, errors : see `impact.contact.outputs.collide`
-
-    Returns
-    -------
-    CollisionResult : arrays of shape (k,); an impact that fails has a status, and does not affect any other
     """
     parts: list[tuple[Positions, CollisionResult]] = []
     integrate_both = partial(integrate_phases, rtol=rtol, max_steps=max_steps, core=core)
@@ -384,7 +385,6 @@ def integrate_phases(
 
     Parameters
     ----------
-    law : the law at one exponent and in one coordinate of the velocity
     params : its values per impact, each of shape (n,)
     rtol, max_steps, record : see `impact.ode.rk45.integrate`
     never_separates : which are known to stay together, where they do not part

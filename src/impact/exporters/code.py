@@ -53,12 +53,7 @@ class Collision:
 
     @property
     def effective_radius(self) -> float:
-        """R* [m], of the radii that are taken where the law needs none.
-
-        Raises
-        ------
-        UsageError : two planes
-        """
+        """R* [m], of the radii that are taken where the law needs none."""
         curvature = 1.0 / self["R1"] + 1.0 / self["R2"]
         if curvature == 0.0:
             raise UsageError("R1 and R2: got inf, expected one finite radius")
@@ -73,10 +68,6 @@ class Collision:
         dt, steps, gap : as in the collision
         reach : distance from the first point of contact that no part of a ball leaves
         skin : distance within which neighbours are searched for
-
-        Raises
-        ------
-        UsageError : a wall, a plane, or an input that is not known
         """
         for name in ("m1", "m2", "R1", "R2"):
             if not math.isfinite(self[name]):

@@ -100,10 +100,6 @@ def law_for_version(key: str, version: str) -> str:
 
     >>> law_for_version("lammps-tsuji", "20250722"), law_for_version("lammps-tsuji-without-root-limit", "20260901")
     ('lammps-tsuji-without-root', 'lammps-tsuji-limit')
-
-    Raises
-    ------
-    UsageError : an option of the law is of a later release
     """
     _, damping, limit = OPTIONS[key]
     for name, since in (("coeff_restitution", COEFF_RESTITUTION_SINCE), ("limit_damping", LIMIT_SINCE)):

@@ -67,10 +67,6 @@ def run_program(command: Sequence[str], folder: str, timeout_s: float) -> subpro
     """Run a command in a folder, without input, and return the end of what it prints.
 
     Its output goes through files, whose size is watched, so that it takes no memory.
-
-    Raises
-    ------
-    OSError, subprocess.SubprocessError : it cannot be started, takes longer, or prints more than MAX_OUTPUT_BYTES
     """
     deadline = time.monotonic() + timeout_s
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:

@@ -113,7 +113,7 @@ class SolveResult(Displayed):
         """The conditions of a range of inputs; without one the roots."""
         return self.over if self.over is not None else [asdict(root) for root in self.roots]
 
-    def blocks(self, width: int) -> Iterator[Block]:
+    def sections(self, width: int) -> Iterator[Block]:
         """A line for each root, or the range that can be attained."""
         ((variable, value),) = self.target.items()
         target = f"{variable} = {number(value)}"

@@ -8,15 +8,17 @@ import pickle
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from datetime import timedelta
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from ..config.grid import MAX_POINTS
 from ..contact.model import ForceModel
 from ..contact.simulate import TABLE_COLUMNS
+from ..display import Block, Displayed, Table, Wrapped
 from ..engine.checkpoint import write_range
 from ..engine.execute import context_of, integrate_columns, with_core
 from ..engine.plan import Plan
@@ -32,6 +34,12 @@ WORKER_COUNTS = (1, 2, 8, 32, 128, 512)
 # the time of the driver for a range on a remote worker over the time that is measured by `estimate`: the rest is
 # spent in dask, see scripts/bench_scaling.py
 DASK_OVERHEAD = 2.0
+
+# why equal points are not searched for in the whole grid
+NOT_IN_PLAN = {
+    "block": "too many cells to compare all, equal points are searched for within a block",
+    "not": "every point is integrated (solver.collapse = false)",
+}
 
 
 @dataclass(frozen=True)
@@ -55,9 +63,16 @@ class ModelCounts:
     axes: tuple[str, ...]
     within: Literal["plan", "block", "not"]
 
+    @property
+    def row(self) -> tuple[str, ...]:
+        """The model in a table, and why equal points are not searched for in the whole grid."""
+        axes = f"depends on {', '.join(self.axes)}" if self.axes else "depends on no axis"
+        scope = f"{axes}; {NOT_IN_PLAN[self.within]}" if self.within in NOT_IN_PLAN else axes
+        return (self.model, f"{self.points:,}", f"{self.cells:,}", f"{self.trajectories:,}", scope)
+
 
 @dataclass(frozen=True)
-class Estimate:
+class Estimate(Displayed):
     """The size and the duration of a sweep.
 
     Parameters
@@ -82,6 +97,40 @@ class Estimate:
     core: str
     wire: int
     by_workers: dict[int, float]
+
+    def as_dict(self) -> dict[str, Any]:
+        """The estimate as plain data."""
+        return asdict(self)
+
+    def records(self) -> Sequence[Mapping[str, Any]]:
+        """The numbers of each model."""
+        return [asdict(counts) for counts in self.models]
+
+    def sections(self, width: int) -> Iterator[Block]:
+        """The points and trajectories of each model, and the size and the time of all together."""
+        headings = ("model", "points", "cells", "trajectories", "how the points collapse")
+        yield Table([counts.row for counts in self.models], headings, text=(0, -1))
+        yield Wrapped(
+            f"{self.points:,} points from {self.trajectories:,} trajectories, {self.bytes:,} bytes (and "
+            f"{self.kept:,} while it runs), {_duration(self.seconds)} by {self.core} and what the disk takes; "
+            "nothing was written"
+        )
+
+    @property
+    def workers_line(self) -> str:
+        """The time by the number of remote workers."""
+        *few, most = (f"{_duration(seconds)} by {count:,}" for count, seconds in self.by_workers.items())
+        times = "; ".join([*few, f"{most} workers, the most that can be kept busy"])
+        return f"dask workers: {times}; {self.wire:,} bytes are sent to them and back"
+
+
+def _duration(seconds: float) -> str:
+    """Write a time in words.
+
+    >>> _duration(0.2), _duration(7), _duration(7500)
+    ('under a second', 'about 0:00:07', 'about 2:05:00')
+    """
+    return "under a second" if seconds < 1.0 else f"about {timedelta(seconds=round(seconds))}"
 
 
 def estimate(

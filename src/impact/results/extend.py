@@ -33,9 +33,9 @@ from ..text import safe_text
 from .attributes import read_attribute
 from .kinds import require_sweep
 from .layouts import FillSlab
+from .outcome import SweepOutcome
 from .provenance import stored_config
 from .selection import IndexArray, match_labels
-from .summary import SweepOutcome
 from .sweep import Extension, sweep_into
 from .trajectory_table import ExpandedSlab, TrajectoryTable, table_of_result
 from .xarray_backend import load, open_result

@@ -10,7 +10,7 @@ import json
 import re
 import shlex
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,6 +20,7 @@ from ..atomic import atomic_write, check_outputs
 from ..config.grid import MAX_POINTS
 from ..config.tables import CORES
 from ..contact.model import ForceModel
+from ..display import Block, Displayed
 from ..engine.checkpoint import WorkFolder, lock_work_folder, open_work_folder
 from ..engine.execute import with_core
 from ..engine.executors import SERIAL, ExecutorSpec
@@ -28,9 +29,9 @@ from ..engine.plugins import read_plugins
 from ..engine.run import ProgressCallback, ProgressCounter, Run, ignore, never, report_kept_ranges
 from ..engine.trajectories import TrajectoryRange, trajectory_maps, trajectory_ranges
 from ..errors import ResultError, StoreError, UnfinishedError, UsageError
+from .outcome import SweepOutcome
 from .provenance import stored_config
 from .schema import dataset_template
-from .summary import SweepOutcome
 from .sweep import check_storable, complete_ranges, prepare, range_reader, reload_range, store_result
 from .trajectory_table import table_of
 
@@ -63,16 +64,21 @@ class Shard:
     def has(self, trajectory_range: TrajectoryRange) -> bool:
         return trajectory_range.number % self.of == self.number - 1
 
+    @property
+    def suffix(self) -> str:
+        """The end of the name of its work folder, after that of the result."""
+        return f".{self.number}-of-{self.of}.work"
+
     def folder(self, output: Path) -> Path:
         """Name its work folder."""
-        return output.with_name(f"{output.name}.{self.number}-of-{self.of}.work")
+        return output.with_name(output.name + self.suffix)
 
     def __str__(self) -> str:
         return f"{self.number}/{self.of}"
 
 
 @dataclass(frozen=True)
-class ShardProgress:
+class ShardProgress(Displayed):
     """The finished part of a shard."""
 
     folder: Path
@@ -81,6 +87,22 @@ class ShardProgress:
     trajectories: int
     failed: int
     shard: Shard
+
+    def as_dict(self) -> dict[str, Any]:
+        """The counts as plain data."""
+        return {**vars(self), "folder": str(self.folder), "shard": str(self.shard)}
+
+    def sections(self, width: int) -> Iterator[Block]:
+        """What is finished, and the command that joins all shards."""
+        failed = f", {self.failed:,} failed" if self.failed else ""
+        name = self.folder.name.removesuffix(self.shard.suffix)
+        output = self.folder.with_name(name)
+        folders = self.folder.with_name(f"{shlex.quote(name)}.*-of-{self.shard.of}.work")
+        yield (
+            f"{self.folder}: {self.blocks:,} of {self.of_blocks:,} blocks, {self.trajectories:,} "
+            f"trajectories{failed}; with all {self.shard.of:,} shards: impact merge {folders} "
+            f"-o {shlex.quote(str(output))}"
+        )
 
 
 def sweep_shard(

@@ -38,9 +38,10 @@ from ..engine.trajectories import (
 from ..errors import ResultError, StoreError, UnfinishedError, UsageError
 from .layouts import LAYOUTS, FillSlab
 from .netcdf import MAX_LABEL_BYTES, encode_text, is_text
+from .outcome import SweepOutcome
 from .plausibility import material_notes
 from .schema import dataset_template, plan_coordinates, stored_variables
-from .summary import SweepOutcome, summarize
+from .summary import summarize
 from .trajectory_table import TrajectoryTable, in_memory, lazy_dataset, table_of
 from .validation import is_name
 from .xarray_backend import MAX_LOADED_BYTES, check_readable, load, open_result, write_sealed
@@ -385,7 +386,7 @@ def find_finished(path: Path, plan: Plan) -> SweepOutcome | None:
         dataset.close()
         return None
     trajectories = sum(trajectory_map.count for trajectory_map in trajectory_maps(plan))
-    return SweepOutcome(dataset, summarize(dataset), trajectories, is_new=False)
+    return SweepOutcome(dataset, summarize(dataset), trajectories, is_new=False, output=path)
 
 
 def _missing_space(error: Exception, output: Path, plan: Plan, counter: ProgressCounter) -> list[str]:
@@ -423,4 +424,4 @@ def store_result(
         seal = write_sealed(sink, contents.template, contents.values, plan.config.output)
         check_readable(sink, output)
     contents.result.encoding = {"source": str(output), "seal": seal, "layout": plan.layout}
-    return SweepOutcome(contents.result, contents.summary, progress.of_trajectories)
+    return SweepOutcome(contents.result, contents.summary, progress.of_trajectories, output=output)

@@ -46,10 +46,6 @@ def built_in() -> frozenset[str]:
 def catalogue(plugins: Sequence[ForceModel] = ()) -> Mapping[str, ForceModel]:
     """All models by key: the built-in ones, then the plug-ins.
 
-    Raises
-    ------
-    ModelError : two models have the same key
-
     >>> list(catalogue())[:3]
     ['hertz', 'hunt-crossley-1975', 'herbert-mcwhannell-1977']
     """
@@ -62,12 +58,7 @@ def catalogue(plugins: Sequence[ForceModel] = ()) -> Mapping[str, ForceModel]:
 
 
 def find(key: str, plugins: Sequence[ForceModel] = ()) -> ForceModel:
-    """The model of a key.
-
-    Raises
-    ------
-    ModelError : no model has this key; the message names the nearest one
-    """
+    """The model of a key."""
     models = catalogue(plugins)
     if key not in models:
         raise ModelError(f'no model "{key}"; {did_you_mean(key, list(models))}')
