@@ -14,7 +14,7 @@ from ..contact.units import with_numbers
 from ..contact.variables import OUTPUTS
 from ..engine.plan import Plan
 from ..formatting import decimals, number
-from ..text import safe_text
+from ..text import NO_BREAK, safe_text
 from .attributes import read_attribute
 from .schema import SENSITIVITY, plan_coordinates, provenance_attributes, template
 
@@ -22,7 +22,6 @@ from .schema import SENSITIVITY, plan_coordinates, provenance_attributes, templa
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 # with fewer samples the intervals are too short: at 16 independent ones 87 % of them hold the index
 MIN_SAMPLES = 64
-NO_BREAK = "\N{NO-BREAK SPACE}"
 # indices from the first half of the samples
 HALF = ("first_half", "total_half")
 
