@@ -15,7 +15,6 @@ import impact
 from impact.config.load import Axis
 from impact.contact.variables import OUTPUTS
 from impact.engine.plan import MAX_FULL_REPEATED, Plan
-from impact.engine.trajectories import trajectory_maps
 from impact.errors import UsageError
 from impact.results.provenance import config_of_part
 from impact.results.ranking import recommend
@@ -187,7 +186,7 @@ def test_cases_are_appended_and_keep_their_numbers(tmp_path: Path, layout: str) 
 def test_equal_cases_are_integrated_once(cases: dict[str, list[Any]]) -> None:
     plan = plan_of(cases, models=["gharib-hurmuzlu-2012"], m2=1.0)
     # the model depends on e only
-    assert trajectory_maps(plan)[0].count == 2
+    assert plan.maps[0].count == 2
 
 
 # a parameter of each model, which is an axis
@@ -240,8 +239,8 @@ def test_ten_models_with_their_parameters_as_axes_cost_as_much_as_each_alone(ten
     # the number of stored points is bounded
     assert plan.stored_points > MAX_FULL_REPEATED
     assert plan.layout == "factored"
-    for trajectories, key in zip(trajectory_maps(plan), PARAMETER_OF, strict=True):
-        (alone,) = trajectory_maps(axes_of_parameters([key]))
+    for trajectories, key in zip(plan.maps, PARAMETER_OF, strict=True):
+        (alone,) = axes_of_parameters([key]).maps
         assert trajectories.count == alone.count <= len(VALUES) * len(SPEEDS)
 
 
@@ -265,7 +264,7 @@ def test_a_model_without_collapse_is_integrated_along_its_own_axes_only() -> Non
     plan = axes_of_parameters(["kelvin-voigt", "ismail-stronge-2008"])
     solver = replace(plan.config.solver, collapse=False)
     plan = replace(plan, config=replace(plan.config, solver=solver))
-    assert [trajectories.count for trajectories in trajectory_maps(plan)] == [len(VALUES) * len(SPEEDS)] * 2
+    assert [trajectories.count for trajectories in plan.maps] == [len(VALUES) * len(SPEEDS)] * 2
 
 
 def test_files_summaries_and_commands_count_the_same_points(tmp_path: Path, cli: Any) -> None:
