@@ -63,7 +63,7 @@ class Columns:
         if self.is_known:
             expected = unit_expected(quantity, unit, n)
             if expected:
-                raise ConfigError(self.problem(f"got [{safe_text(unit)}], expected {expected}", column))
+                raise ConfigError(self.problem(f"got [{unit}], expected {expected}", column))
         elif quantity is None:
             raise ConfigError(self.problem("got no known column, expected such as material1 or v1 [m/s]"))
         values, problems = read_cells(self.cells[column], quantity, n, unit, is_text=self.is_text)
