@@ -132,10 +132,13 @@ def encode_text(variable: xr.DataArray) -> NDArray[np.bytes_]:
 def _set_attributes(holder: Any, attributes: Mapping[Any, Any]) -> None:
     """Set attributes; text has a fixed length in bytes, which a reader can check before it reads."""
     for name, value in attributes.items():
-        if isinstance(value, str):
-            encoded = value.encode()
-            value = np.array(encoded, h5py.string_dtype("utf-8", max(len(encoded), 1)))
-        holder.attrs[str(name)] = value
+        holder.attrs[str(name)] = encode_attribute(value) if isinstance(value, str) else value
+
+
+def encode_attribute(text: str) -> NDArray[Any]:
+    """Encode text as a string of a fixed number of bytes."""
+    encoded = text.encode()
+    return np.array(encoded, h5py.string_dtype("utf-8", max(len(encoded), 1)))
 
 
 def _storage_options(variable: xr.DataArray, output: Output) -> dict[str, Any]:
@@ -171,13 +174,7 @@ class StoredArray(BackendArray):
         return indexing.explicit_indexing_adapter(key, self.shape, support, self.read)
 
     def read(self, key: tuple[Any, ...]) -> NDArray[Any]:
-        """Read values; `key` has an integer, a slice or an integer array for each axis.
-
-        Raises
-        ------
-        ResultError : they cannot be read
-        MemoryError : they take more memory than `check_memory` allows
-        """
+        """Read values; `key` has an integer, a slice or an integer array for each axis."""
         # an array of all positions would take longer than to read a few values
         positions = [
             range(size)[part] if isinstance(part, slice) else np.atleast_1d(part)
@@ -203,10 +200,7 @@ class StoredArray(BackendArray):
         return values
 
     def _check_chunks(self, positions: Sequence[range | NDArray[np.intp]]) -> None:
-        """Check that the chunks of some values decompress to exactly their declared size.
-
-        HDF5 decompresses a chunk to any size, and reads beyond the end of a chunk that is too short.
-        """
+        """Check the sizes of chunks: HDF5 decompresses to any size, and reads beyond a short chunk."""
         if not self.dataset.compression:
             return
         chunks = self.dataset.chunks
