@@ -22,7 +22,7 @@ from ..text import safe_text
 from .hdf5_structure import byte_reader, check_root
 from .kinds import require_sweep
 from .layouts import LAYOUTS
-from .netcdf import RegionValues, encode_attribute, open_for_writing, read_variables
+from .netcdf import RegionValues, encode_attribute, read_variables, write_dataset
 from .seal import check_seal, write_seal
 from .selection import model_positions, select
 from .slabs import slabs
@@ -40,9 +40,7 @@ def write_sealed(
     sink: Sink, template: xr.Dataset, values: Iterable[RegionValues], output: Output = DEFAULT_OUTPUT
 ) -> str:
     """Write and seal a dataset of the coordinates and attributes of a template; return the seal."""
-    with open_for_writing(sink, template, output) as write_region:
-        for name, region, array in values:
-            write_region(name, region, array)
+    write_dataset(sink, template, values, output)
     seal = write_seal(sink)
     sink.check()
     return seal
