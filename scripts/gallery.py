@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from impact.plots.kinds import KINDS
+from impact.plots.kinds import KINDS, find_kind
 
 ROOT = Path(__file__).parent.parent
 PAGE = """\
@@ -65,67 +65,68 @@ class Entry:
         return ["impact", "plot", f"{self.result}.h5", *options, "-o", f"{self.kind}.svg"]
 
 
-ENTRIES = (
-    Entry(
-        "final-velocities",
+# result, options and caption of the kinds that need others than those of `entry_of`
+EXAMPLES = {
+    "final-velocities": (
         "figure6",
         "",
         "Figure 6 of Gharib and Hurmuzlu (2012). The model with permanent indentation agrees with the "
         "impulse-momentum solution; each of the two damped models agrees near one end of the range only.",
     ),
-    Entry("restitution", "figure6", "", "Delivered restitution of each model over the requested restitution."),
-    Entry("error", "figure6", "", "Delivered minus requested restitution, with bands at 0.01 and 0.05."),
-    Entry(
-        "timestep",
+    "restitution": ("figure6", "", "Delivered restitution of each model over the requested restitution."),
+    "error": ("figure6", "", "Delivered minus requested restitution, with bands at 0.01 and 0.05."),
+    "timestep": (
         "timestep",
         "",
         "What an explicit code delivers at a fixed step, over the steps in the contact time: the mean and the "
         "range over the phase, the part of a step in which the contact begins; [timestep.md](timestep.md).",
     ),
-    Entry(
-        "map",
+    "map": (
         "speeds",
         "",
         "Error of the restitution over restitution and speed. Models driven by e do not depend on the speed. In "
         "Thornton's elastic-plastic model the restitution depends on the speed only. Modia3D uses e = 0 up to "
         "0.1 m/s here.",
     ),
-    Entry("validity", "speeds", "", "The closest model at each point, and its error."),
-    Entry(
-        "loop",
+    "validity": ("speeds", "", "The closest model at each point, and its error."),
+    "loop": (
         "figure6",
         "--sel e=0.5",
         "Force over indentation, as in Figures 3 and 5. The enclosed area is the energy loss.",
     ),
-    Entry("history", "figure6", "--sel e=0.5", "Indentation, its rate and the force over time, same impact."),
-    Entry(
-        "impulse",
+    "history": ("figure6", "--sel e=0.5", "Indentation, its rate and the force over time, same impact."),
+    "impulse": (
         "figure6",
         "--sel e=0.5 --model lankarani-nikravesh-1990 --model gharib-hurmuzlu-2012",
         "The impulse-velocity diagram, Figure 2. All models follow the same lines and differ in the end point.",
     ),
-    Entry(
-        "calibration",
+    "calibration": (
         "drops",
         "",
         "Twelve measured restitutions and the laws that were fitted to them, the best one first, with their "
         "residuals; [calibrate.md](calibrate.md).",
     ),
-    Entry(
-        "uncertainty",
+    "uncertainty": (
         "samples",
         "--variable peak_force --model gonthier-2004 --model tsuji-1992",
         "The peak force where the stiffness is known to 20 % and the speed to 5 %: the median and the band of "
         "90 % of 4,096 samples; [uncertainty.md](uncertainty.md).",
     ),
-    Entry(
-        "sensitivity",
+    "sensitivity": (
         "study",
         "",
         "Which of the two uncertain inputs matters for the peak force at e = 0.6; see "
         "[uncertainty.md](uncertainty.md).",
     ),
-)
+}
+
+
+def entry_of(kind: str) -> Entry:
+    """Find the entry of a kind: by default drawn from Figure 6, with the caption of a report."""
+    return Entry(kind, *EXAMPLES.get(kind, ("figure6", "", find_kind(kind).caption)))
+
+
+ENTRIES = tuple(entry_of(kind) for kind in KINDS)
 
 
 def gallery_page() -> str:
@@ -147,7 +148,7 @@ def _sections() -> Iterator[str]:
 {shlex.join(entry.command)}
 ```
 
-![{entry.kind}: {KINDS[entry.kind]}](gallery/{entry.kind}.svg)"""
+![{find_kind(entry.kind).caption}](gallery/{entry.kind}.svg)"""
 
 
 def write_results(folder: Path) -> None:

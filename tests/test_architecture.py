@@ -26,7 +26,7 @@ def test_a_name_of_the_page_exists(name: str) -> None:
 
 def test_outputs_and_pictures_are_defined_where_the_page_says() -> None:
     start = PAGE.partition("## Where to start")[2]
-    for name in ("outputs.FORMULAS", "variables.OUTPUTS", "kinds.KINDS", "figures.FIGURES"):
+    for name in ("outputs.FORMULAS", "variables.OUTPUTS", "kinds.KINDS"):
         assert f".{name}`" in start
 
 

@@ -12,11 +12,9 @@ import xarray as xr
 from hypothesis import given, settings, strategies as st
 
 import impact
-from impact.cli.summary import summary_json
 from impact.config.load import Axis
 from impact.contact.variables import OUTPUTS
 from impact.engine.plan import MAX_FULL_REPEATED, Plan
-from impact.engine.trajectories import trajectory_maps
 from impact.errors import UsageError
 from impact.results.provenance import config_of_part
 from impact.results.ranking import recommend
@@ -188,7 +186,7 @@ def test_cases_are_appended_and_keep_their_numbers(tmp_path: Path, layout: str) 
 def test_equal_cases_are_integrated_once(cases: dict[str, list[Any]]) -> None:
     plan = plan_of(cases, models=["gharib-hurmuzlu-2012"], m2=1.0)
     # the model depends on e only
-    assert trajectory_maps(plan)[0].count == 2
+    assert plan.maps[0].count == 2
 
 
 # a parameter of each model, which is an axis
@@ -241,8 +239,8 @@ def test_ten_models_with_their_parameters_as_axes_cost_as_much_as_each_alone(ten
     # the number of stored points is bounded
     assert plan.stored_points > MAX_FULL_REPEATED
     assert plan.layout == "factored"
-    for trajectories, key in zip(trajectory_maps(plan), PARAMETER_OF, strict=True):
-        (alone,) = trajectory_maps(axes_of_parameters([key]))
+    for trajectories, key in zip(plan.maps, PARAMETER_OF, strict=True):
+        (alone,) = axes_of_parameters([key]).maps
         assert trajectories.count == alone.count <= len(VALUES) * len(SPEEDS)
 
 
@@ -266,7 +264,7 @@ def test_a_model_without_collapse_is_integrated_along_its_own_axes_only() -> Non
     plan = axes_of_parameters(["kelvin-voigt", "ismail-stronge-2008"])
     solver = replace(plan.config.solver, collapse=False)
     plan = replace(plan, config=replace(plan.config, solver=solver))
-    assert [trajectories.count for trajectories in trajectory_maps(plan)] == [len(VALUES) * len(SPEEDS)] * 2
+    assert [trajectories.count for trajectories in plan.maps] == [len(VALUES) * len(SPEEDS)] * 2
 
 
 def test_files_summaries_and_commands_count_the_same_points(tmp_path: Path, cli: Any) -> None:
@@ -274,7 +272,7 @@ def test_files_summaries_and_commands_count_the_same_points(tmp_path: Path, cli:
     assert plan.layout == "full"
     for layout in LAYOUTS:
         outcome = sweep_into(tmp_path / f"{layout}.h5", in_layout(plan, layout))
-        counts = summary_json(outcome, tmp_path / f"{layout}.h5")
+        counts = outcome.as_dict()
         assert counts["points"] == sum(counts["status"].values()) == plan.points == 24
         stored = impact.load(tmp_path / f"{layout}.h5")
         assert summarize(stored).counts == outcome.summary.counts
@@ -285,7 +283,7 @@ def test_a_failed_point_is_named_without_parameters_of_other_models(tmp_path: Pa
     plan = axes_of_parameters(["kelvin-voigt", "johnson-1985"])
     solver = replace(plan.config.solver, max_steps=3)
     plan = replace(plan, config=replace(plan.config, solver=solver))
-    counts = summary_json(sweep_into(tmp_path / "r.h5", plan), tmp_path / "r.h5")
+    counts = sweep_into(tmp_path / "r.h5", plan).as_dict()
     assert counts["first_failed"]
     for failure in counts["first_failed"]:
         key = failure["at"]["model"]

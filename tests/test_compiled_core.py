@@ -19,8 +19,7 @@ from impact.contact.numba.dispatch import is_installed, serves
 from impact.contact.outputs import Outputs, collide
 from impact.contact.status import FIRST_FAILURE
 from impact.contact.variables import OUTPUTS
-from impact.engine.execute import NUMBA_MIN_TRAJECTORIES, with_core
-from impact.engine.trajectories import trajectory_maps
+from impact.engine.plan import NUMBA_MIN_TRAJECTORIES
 from impact.errors import ConfigError, UsageError
 from impact.results.sweep import prepare
 
@@ -180,7 +179,7 @@ def test_auto_chooses_numba_if_installed_and_above_a_number_of_trajectories() ->
                 "model": {key: {"A": 1e-6}} if key == "kuwabara-kono-1987" else {},
             }
         )
-        return with_core(plan, trajectory_maps(plan)).config.solver.core
+        return plan.solver.core
 
     assert core(NUMBA_MIN_TRAJECTORIES - 1, "kuwabara-kono-1987") == "numpy"
     assert core(NUMBA_MIN_TRAJECTORIES, "kuwabara-kono-1987") == ("numba" if is_installed() else "numpy")

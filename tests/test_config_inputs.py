@@ -7,9 +7,11 @@ import math
 import re
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 import impact
+from impact.config.input_names import InputName
 from impact.config.load import Config, parse_config, read_config
 from impact.contact.materials import Material
 from impact.errors import ConfigError
@@ -228,6 +230,24 @@ def test_no_message_contains_a_file_without_a_known_column(
     with pytest.raises(ConfigError, match=r"^env:") as error:
         read_points("env")
     assert "SECRET" not in str(error.value)
+
+
+@pytest.mark.parametrize("text", ["v1", "bilinear.K", "materials.steel.E", "materials.steel.2.E"])
+def test_the_name_of_an_input_is_parsed_without_loss(text: str) -> None:
+    name = InputName.parse(text)
+    assert str(name) == text
+    assert InputName.of_path(name.path) == InputName.parse(name.config_key.removeprefix("sweep.")) == name
+
+
+def test_a_column_means_the_same_in_a_file_and_in_a_table(tmp_path: Path) -> None:
+    (tmp_path / "points.csv").write_text("v1 [mm/s],e_out\n500,0.5\n 35,0.25\n", encoding="utf-8")
+    frame = pd.DataFrame({"v1": ["500 mm/s", "35 mm/s"], "e_out [%]": [50.0, 25.0]})
+    for points in (tmp_path / "points.csv", frame):
+        columns = read_points(points).columns
+        assert {name: list(column) for name, column in columns.items()} == {
+            "v1": [0.5, 0.035],
+            "e_out": [0.5, 0.25],
+        }
 
 
 @pytest.mark.skipif(not Path("/proc/kmsg").exists(), reason="needs Linux")

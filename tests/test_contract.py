@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from impact.contact.checks import check_contract
+from impact.contact.checks import check_model
 from impact.contact.closed_forms.hysteresis import delivered_restitution
 from impact.contact.model import ForceModel
 from impact.contact.models import catalogue
@@ -30,7 +30,7 @@ CLAUSES = (
 
 @pytest.mark.parametrize("key", EACH_LAW)
 def test_every_law_meets_every_clause(key):
-    findings = list(check_contract(catalogue()[key]))
+    findings = check_model(catalogue()[key])
     assert [finding.clause for finding in findings if not finding.holds] == [], findings
     # a law without a closed form has no clause about it
     absent = {"agrees with its closed form"} if catalogue()[key].oracle is None else set()
@@ -120,4 +120,4 @@ WRONG_LAWS = {
 @pytest.mark.parametrize(("model", "clause"), WRONG_LAWS.values(), ids=WRONG_LAWS)
 def test_a_law_that_violates_a_clause_is_reported(model, clause):
     # the clauses after this one are not checked
-    assert any(finding.clause == clause and not finding.holds for finding in check_contract(model))
+    assert any(finding.clause == clause and not finding.holds for finding in check_model(model))

@@ -17,7 +17,6 @@ from impact.engine import trajectories as trajectories_module
 from impact.engine.build_impacts import build_impacts
 from impact.engine.plan import Plan
 from impact.engine.run import Run
-from impact.engine.trajectories import trajectory_maps
 from impact.results.estimate import estimate
 from impact.results.sweep import prepare
 
@@ -142,7 +141,7 @@ def test_the_impacts_of_a_grid_are_those_of_its_points(config: dict[str, object]
 def trajectory_counts(sweep: dict[str, object], *models: str, **more: object) -> list[int]:
     """The trajectories of each model."""
     config = {"models": list(models), "sweep": sweep, "materials": MATERIALS, **more}
-    return [model_map.count for model_map in trajectory_maps(prepare(config, plugins=[DASHPOT, SPEED]))]
+    return [model_map.count for model_map in prepare(config, plugins=[DASHPOT, SPEED]).maps]
 
 
 GRID = {"e": [0.1, 0.5, 0.9], "v1": [1.0, 2.0], "m1": [1.0, 4.0], "m2": [1.0, 4.0], "material": ["soft", "hard"]}
@@ -202,7 +201,7 @@ def test_a_unit_whose_exponent_is_zero_at_the_first_values_hides_no_axis(
         },
         "model": {"powers": {"c": 0.3, "p": p}},
     }
-    (model_map,) = trajectory_maps(prepare(config, plugins=[power_law]))
+    (model_map,) = prepare(config, plugins=[power_law]).maps
     assert model_map.axes == axes
     deduplicated, separate = (
         impact.sweep(config, overrides=[f"solver.collapse={word}"], plugins=[power_law])
@@ -217,7 +216,7 @@ def test_the_trajectories_of_a_plan_of_any_size_are_counted() -> None:
     config = {"models": ["gharib-hurmuzlu-2012", "speed"], "sweep": sweep, "materials": MATERIALS}
     plan = prepare(config, plugins=[SPEED], run=Run(max_points=10**15))
     assert plan.points == 4 * 10**14
-    assert [model_map.count for model_map in trajectory_maps(plan)] == [100, 10_000]
+    assert [model_map.count for model_map in plan.maps] == [100, 10_000]
     estimated = estimate(config, plugins=[SPEED], max_points=10**15)
     assert (estimated.points, estimated.trajectories) == (plan.points, 10_100)
     # a row of the table for each trajectory, and an index of the same length

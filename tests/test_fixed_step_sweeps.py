@@ -434,8 +434,7 @@ def test_the_numbers_of_the_picture_have_the_range(coarse: xr.Dataset, tmp_path:
     head, first, *_ = (tmp_path / "wide.csv").read_text(encoding="utf-8").splitlines()
     assert head.split(",")[3:6] == [f"e_out{part} {LINEAR} e=0.5" for part in ("", "_least", "_largest")]
     assert float(first.split(",")[4]) == coarse["e_out"].sel(model=LINEAR, e=0.5, steps_per_contact=5).min()
-    rows = list(get_plot_data(coarse, "timestep", Choice()).rows())
-    assert len(rows) == 4 * (2 + 3 * 3)
+    assert len(get_plot_data(coarse, "timestep", Choice()).long_table()) == 4 * (2 + 3 * 3)
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,6 @@ from impact.contact.materials import Material
 from impact.contact.variables import OUTPUTS
 from impact.engine.plan import Plan
 from impact.engine.run import Run
-from impact.engine.trajectories import trajectory_maps
 from impact.errors import ModelError, UsageError
 from impact.results.sweep import prepare, sweep_in_memory, sweep_into
 
@@ -215,7 +214,7 @@ def test_a_model_without_material_is_not_integrated_for_each_property() -> None:
         "model": {"bilinear": {"K": 1e6}},
     }
     plan = with_axes(prepare(document), Axis({"materials.steel.yield_strength": (0.1e9, 0.2e9, 0.3e9)}))
-    assert [trajectories.count for trajectories in trajectory_maps(plan)] == [2, 3]
+    assert [trajectories.count for trajectories in plan.maps] == [2, 3]
 
 
 @pytest.mark.parametrize("layout", ["full", pytest.param("factored", marks=pytest.mark.slow)])

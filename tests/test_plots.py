@@ -25,7 +25,7 @@ import impact
 from impact.errors import UsageError
 from impact.plots.curves import CurveData, Panel
 from impact.plots.draw import draw, get_plot_data
-from impact.plots.kinds import KINDS, MOTION_KINDS, WIDTHS, Choice, Look
+from impact.plots.kinds import KINDS, WIDTHS, Choice, Look, find_kind
 from impact.plots.style import save_figure
 from impact.results.single_impact import Impact
 
@@ -33,6 +33,7 @@ from .conftest import ROOT, Run
 from .fork_server import ForkServer
 
 OTHER_RESULTS = ("timestep", "calibration", "uncertainty", "sensitivity")
+MOTION_KINDS = [kind for kind in KINDS if find_kind(kind).source == "history"]
 # those of the result of an ordinary sweep
 CURVES = [kind for kind in KINDS if kind not in ("map", "validity", *OTHER_RESULTS)]
 
@@ -810,6 +811,23 @@ def test_the_command_draws_what_python_draws(cli: Run, coarse_file: Path, tmp_pa
     save_figure(figure, tmp_path / "b.svg", style=style)
     digests = {hashlib.sha256((tmp_path / f"{name}.svg").read_bytes()).hexdigest() for name in "ab"}
     assert len(digests) == 1
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_a_kind_is_a_constant_of_its_module(name: str) -> None:
+    kind = find_kind(name)
+    assert kind.name == name
+    assert kind.caption.endswith(".")
+
+
+def test_the_help_of_plot_names_every_kind_and_loads_no_matplotlib() -> None:
+    code = (
+        "import sys\nfrom impact.cli.main import app\ntry:\n    app(['plot', '--help'])\nfinally:\n"
+        "    assert not {'matplotlib', 'pandas'} & sys.modules.keys()\n"
+    )
+    shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    words = "".join(letter if letter.isalpha() or letter == "-" else " " for letter in shown).split()
+    assert set(KINDS) <= set(words)
 
 
 def test_the_scripts_that_draw_the_docs_compile() -> None:

@@ -24,7 +24,7 @@ import xarray as xr
 import impact
 from impact.contact.models import catalogue
 from impact.errors import UsageError
-from impact.reporting.figures import FIGURES
+from impact.plots.kinds import KINDS, find_kind
 from impact.results.ranking import recommend
 from impact.results.replay_command import describe_point
 
@@ -46,6 +46,7 @@ POINT = {"e": 0.5, "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6e9}
 OF_A_SWEEP = ("final-velocities", "restitution", "error", "map", "validity", "loop")
 FAIR = ["lankarani-nikravesh-1990", "gharib-hurmuzlu-2012"]
 SCRIPT = "<script>alert(1)</script>"
+CAPTIONS = {kind: find_kind(kind).caption for kind in KINDS}
 
 
 class ParsedPage(HTMLParser):
@@ -217,7 +218,7 @@ def test_of_many_models_the_figures_show_the_best(pages: dict[str, str], many: x
     best = [model.model for model in recommend(many).models[:8]]
     assert f"The figures show 8 of the {many.sizes['model']} models: {', '.join(best)}." in pages["many"]
     assert "The figures show" not in pages["wide"] + pages["figure 6"]
-    assert figures(pages["many"]) == [FIGURES[kind] for kind in OF_A_SWEEP]
+    assert figures(pages["many"]) == [CAPTIONS[kind] for kind in OF_A_SWEEP]
 
 
 def test_a_page_of_many_models_is_small_and_reproducible(pages: dict[str, str], many: xr.Dataset) -> None:
@@ -229,19 +230,19 @@ def test_a_page_of_many_models_is_small_and_reproducible(pages: dict[str, str], 
 
 
 def test_the_figures_depend_on_the_axes(pages: dict[str, str], wide: xr.Dataset) -> None:
-    lines = [FIGURES[kind] for kind in ("final-velocities", "restitution", "error")]
-    assert figures(pages["figure 6"]) == [*lines, FIGURES["loop"]]
-    assert figures(pages["wide"]) == [FIGURES[kind] for kind in OF_A_SWEEP]
+    lines = [CAPTIONS[kind] for kind in ("final-velocities", "restitution", "error")]
+    assert figures(pages["figure 6"]) == [*lines, CAPTIONS["loop"]]
+    assert figures(pages["wide"]) == [CAPTIONS[kind] for kind in OF_A_SWEEP]
     # the middle of e, without the parameter of one of the models
-    (caption,) = re.findall(f"{FIGURES['loop']}(.*?)</figcaption>", pages["wide"])
+    (caption,) = re.findall(f"{CAPTIONS['loop']}(.*?)</figcaption>", pages["wide"])
     assert "e\xa0=\xa00.6" in caption
     text = build(wide.isel(e=[1], v1=[0], m1=[0]))
-    assert figures(text) == [*lines, FIGURES["loop"]]
+    assert figures(text) == [*lines, CAPTIONS["loop"]]
 
 
 def test_the_figures_are_at_a_speed_at_which_the_balls_meet() -> None:
     text = build(swept(FAIR, e=[0.2, 0.9], v1=[-1.0, 0.0, 2.0]))
-    assert figures(text) == [FIGURES[kind] for kind in OF_A_SWEEP]
+    assert figures(text) == [CAPTIONS[kind] for kind in OF_A_SWEEP]
     captions = re.findall("<figcaption>(.*?)</figcaption>", text)
     assert [("v1\xa0=\xa02\xa0m/s" in caption) for caption in captions] == [True, True, True, False, False, True]
 
@@ -260,7 +261,7 @@ def test_a_page_of_a_sweep_without_e_explains_what_is_missing() -> None:
         "The figure error is left out: this result has no error of the restitution, which needs a requested e"
         in text
     )
-    assert figures(text) == [FIGURES[kind] for kind in ("final-velocities", "restitution", "loop")]
+    assert figures(text) == [CAPTIONS[kind] for kind in ("final-velocities", "restitution", "loop")]
     assert "kelvin-voigt.C\xa0=\xa020" in text
 
 
@@ -342,14 +343,14 @@ def test_only_the_loop_needs_the_file_of_a_plug_in(tmp_path: Path) -> None:
     text = build(result)
     assert dict(table(text, "How it was computed"))["plug-in mine"].startswith("file my.py, sha256 ")
     assert "The figure loop is left out: the result: made with mine of my.py" in text
-    assert FIGURES["loop"] not in text
-    assert FIGURES["loop"] in build(result, [tmp_path / "my.py"])
+    assert CAPTIONS["loop"] not in text
+    assert CAPTIONS["loop"] in build(result, [tmp_path / "my.py"])
 
 
 def test_a_figure_without_stored_values_is_left_out() -> None:
     config = {"models": FAIR, "sweep": {**POINT, "e": [0.1, 0.5]}, "output": {"variables": ["e_out"]}}
     text = build(impact.sweep(config))
-    assert figures(text) == [FIGURES["restitution"], FIGURES["loop"]]
+    assert figures(text) == [CAPTIONS["restitution"], CAPTIONS["loop"]]
     assert "The figure final-velocities is left out: this result has no v1_post" in text
 
 

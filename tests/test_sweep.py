@@ -26,7 +26,7 @@ import impact
 from impact.engine.execute import context_of, integrate_ranges, integrate_remotely
 from impact.engine.executors import SERIAL, ExecutorSpec, choose_executor
 from impact.engine.run import Progress, Run as SweepRun
-from impact.engine.trajectories import columns_of, trajectory_maps, trajectory_ranges
+from impact.engine.trajectories import trajectory_ranges
 from impact.errors import ConfigError, StoreError, UsageError
 from impact.progress_display import line, new_bar, update
 from impact.results.summary import summarize
@@ -101,12 +101,11 @@ def test_a_dry_run_estimates_transferred_bytes_and_the_useful_number_of_workers(
     assert "workers" not in cli(*words, *larger, cwd=blocks.parent).stdout
     estimate = json.loads(cli(*words, "--json", cwd=blocks.parent).stdout)
     plan = prepare(blocks, overrides)
-    maps = trajectory_maps(plan)
-    ranges = list(trajectory_ranges(maps))
+    ranges = plan.ranges
     assert [part.size for part in ranges] == [17_000] * 4
     transferred = 0
     for part in ranges:
-        columns, context = columns_of(plan, maps, part), context_of(plan)
+        columns, context = plan.columns_of(part), context_of(plan)
         transferred += len(pickle.dumps((columns, context)))
         transferred += len(pickle.dumps(integrate_remotely(plan.models[part.model].key, columns, context)))
     # the estimate measures one range only
@@ -299,11 +298,10 @@ def test_an_executor_gets_no_more_blocks_than_its_capacity(blocks: Path) -> None
             return future
 
     plan = prepare(blocks, ["models=['bilinear']", "sweep.m1=1.0", "sweep.e.linspace=[0,1,1001]"])
-    maps = trajectory_maps(plan)
-    todo = list(trajectory_ranges(maps, 10))
+    todo = list(trajectory_ranges(plan.maps, 10))
     with CountingExecutor(2) as executor:
         spec = ExecutorSpec(lambda: nullcontext(executor), lambda: 5, shares_memory=True)
-        for _ in integrate_ranges(plan, maps, todo, SweepRun(spec)):
+        for _ in integrate_ranges(plan, todo, SweepRun(spec)):
             unfinished -= {future for future in unfinished if future.done()}
     assert len(todo) > 100
     assert largest == 5

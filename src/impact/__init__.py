@@ -8,10 +8,6 @@ from typing import TYPE_CHECKING, Any
 from ._version import __version__ as __version__
 
 if TYPE_CHECKING:
-    from .api import (
-        check_model as check_model,
-        models as models,
-    )
     from .comparison.bless import bless as bless
     from .comparison.compare import compare as compare
     from .comparison.rerun import rerun as rerun
@@ -19,10 +15,12 @@ if TYPE_CHECKING:
     from .config.library import materials as materials
     from .config.starter import init as init
     from .config.tables import schema as schema
+    from .contact.checks import check_model as check_model
     from .contact.evidence import Evidence as Evidence
     from .contact.model import ForceModel as ForceModel, Parameter as Parameter
     from .contact.models.hysteresis import hysteresis as hysteresis
     from .contact.powers import power as power
+    from .engine.catalogue import models as models
     from .errors import ImpactError as ImpactError
     from .exporters.export import export as export, export_codes as export_codes
     from .inverse.calibrate import calibrate as calibrate
@@ -53,7 +51,7 @@ _MODULES = {
     "Verdict": "comparison.verdict",
     "bless": "comparison.bless",
     "calibrate": "inverse.calibrate",
-    "check_model": "api",
+    "check_model": "contact.checks",
     "compare": "comparison.compare",
     "describe": "results.describe",
     "estimate": "results.estimate",
@@ -69,7 +67,7 @@ _MODULES = {
     "load": "results.xarray_backend",
     "materials": "config.library",
     "merge": "results.shards",
-    "models": "api",
+    "models": "engine.catalogue",
     "plot": "plots.draw",
     "plot_to_files": "plots.files",
     "power": "contact.powers",

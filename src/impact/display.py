@@ -1,6 +1,6 @@
 """Results as text, HTML, JSON and data frames; rich and pandas are imported when they are needed.
 
-A result defines once what is shown of it, `blocks`: lines of text and tables. All text is escaped here.
+A result defines once what is shown of it, `sections`: lines of text and tables. All text is escaped here.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 # width of a table that is not printed on a terminal
 PIPE_WIDTH = 160
 # characters of a cell, and of a line, which may be a command that is copied
-MAX_CELL, MAX_LINE = 200, 2000
+MAX_CELL, MAX_LINE = 200, 4000
 
 
 class Styled(NamedTuple):
@@ -109,7 +109,7 @@ class Displayed:
         """The JSON object of the command."""
 
     @abstractmethod
-    def blocks(self, width: int) -> Iterable[Block]:
+    def sections(self, width: int) -> Iterable[Block]:
         """The lines and tables of the text of the command, `width` characters wide."""
 
     def records(self) -> Sequence[Mapping[str, Any]]:
@@ -123,14 +123,12 @@ class Displayed:
         return pd.DataFrame.from_records(list(self.records()))
 
     def __str__(self) -> str:
-        return text_of(self)
+        stream, width = io.StringIO(), _width(sys.stdout)
+        print_blocks(self.sections(width), stream, width)
+        return stream.getvalue().removesuffix("\n")
 
     def _repr_html_(self) -> str:
-        blocks = (block for block in self.blocks(PIPE_WIDTH) if block)
-        return "".join(
-            f"<p>{escape(safe_text(block, MAX_LINE))}</p>" if isinstance(block, str) else block.html()
-            for block in blocks
-        )
+        return html_of(self.sections(PIPE_WIDTH))
 
 
 def show(value: Displayed, *, as_json: bool = False, stream: TextIO | None = None) -> None:
@@ -138,20 +136,25 @@ def show(value: Displayed, *, as_json: bool = False, stream: TextIO | None = Non
     if as_json:
         print(dump(value), file=stream)
     else:
-        print_blocks(value, stream or sys.stdout)
+        stream = stream or sys.stdout
+        width = _width(stream)
+        print_blocks(value.sections(width), stream, width)
 
 
-def text_of(value: Displayed) -> str:
-    """The text of a result, as wide as the terminal."""
-    stream = io.StringIO()
-    print_blocks(value, stream, _width(sys.stdout))
-    return stream.getvalue().removesuffix("\n")
+def html_of(blocks: Iterable[Block]) -> str:
+    """Write lines and tables in HTML."""
+    return "".join(
+        block.html() if isinstance(block, Table) else f"<p>{escape(safe_text(block, MAX_LINE))}</p>"
+        for block in blocks
+        if block
+    )
 
 
-def print_blocks(value: Displayed, stream: TextIO, width: int | None = None) -> None:
-    """Print the lines and tables of a result."""
+def print_blocks(blocks: Iterable[Block], stream: TextIO | None = None, width: int | None = None) -> None:
+    """Print lines and tables on stdout or another stream."""
+    stream = stream or sys.stdout
     width = width or _width(stream)
-    for block in value.blocks(width):
+    for block in blocks:
         if isinstance(block, Table):
             block.print_to(_console(stream, width))
         elif isinstance(block, Wrapped):

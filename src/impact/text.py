@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from html import escape
 from unicodedata import category
 
 # control, format (bidi marks, zero-width), lone surrogate, private, unassigned, line and paragraph separator
@@ -11,7 +9,7 @@ UNSAFE = frozenset({"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"})
 
 
 def with_year(title: str, year: int | str) -> str:
-    """The title of a model with its year, unless the title ends with versions in brackets.
+    """Add the year to the title of a model, unless the title ends with versions in brackets.
 
     >>> with_year("Hertz", 1882), with_year("Modia3D (v0.4.0 to v0.5.2, 2019 to 2021)", 2019)
     ('Hertz (1882)', 'Modia3D (v0.4.0 to v0.5.2, 2019 to 2021)')
@@ -20,7 +18,7 @@ def with_year(title: str, year: int | str) -> str:
 
 
 def safe_text(text: str, limit: int = 200) -> str:
-    r"""The text with control and invisible characters escaped, cut to at most `limit` characters.
+    r"""Escape control and invisible characters of a text, and cut it to at most `limit` characters.
 
     >>> safe_text("steel\x1b[31m")
     'steel\\x1b[31m'
@@ -46,20 +44,3 @@ def _escaped(letter: str) -> str:
     if code < 0x100:
         return f"\\x{code:02x}"
     return f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"
-
-
-def html_table(headings: Sequence[str], rows: Iterable[Sequence[object]], above: str = "") -> str:
-    """A table in HTML for a notebook, below a line of text; all texts are escaped, and texts are left-aligned.
-
-    >>> html_table([], [["<b>"]], "x & y")
-    '<p>x &amp; y</p><table><tbody><tr><td style="text-align:left">&lt;b&gt;</td></tr></tbody></table>'
-    """
-
-    def cells(tag: str, texts: Sequence[object]) -> str:
-        shown = (escape(safe_text(str(text), 1000)) for text in texts)
-        return "".join(f'<{tag} style="text-align:left">{text}</{tag}>' for text in shown)
-
-    head = f"<thead><tr>{cells('th', headings)}</tr></thead>" if headings else ""
-    body = "".join(f"<tr>{cells('td', row)}</tr>" for row in rows)
-    line = f"<p>{escape(safe_text(above, 1000))}</p>" if above else ""
-    return f"{line}<table>{head}<tbody>{body}</tbody></table>"

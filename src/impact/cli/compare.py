@@ -12,21 +12,17 @@ import typer
 import impact
 
 from ..atomic import check_output
+from ..display import dump, show
 from ..errors import ImpactError, UsageError
 from . import exits
-from .console import dump
 from .options import MaxPointsOption, PluginOption, QuietOption, ResultArgument, ToleranceOption
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from ..comparison.formats import Report
+    from ..comparison.formats import NoVerdict
     from ..comparison.verdict import Verdict
     from ..engine.plan import Plan
-
-
-# a narrower terminal shows no table
-MIN_TABLE_WIDTH = 76
 
 
 class Format(StrEnum):
@@ -66,7 +62,7 @@ def compare(
     try:
         verdict = impact.compare(new, baseline, tol=dict(tol or ()) or None, subset=subset)
     except ImpactError as error:
-        _print_report(formats.report_of_error(str(new), str(baseline), str(error)), format)
+        _print_outcome(formats.NoVerdict(str(new), str(baseline), str(error)), format)
         raise
     _report_verdict(verdict, format, plot)
 
@@ -82,13 +78,13 @@ def bless(
 ) -> None:
     """Show how a result differs from its baseline, then replace the baseline by it."""
 
-    def show(verdict: Verdict) -> None:
-        print_verdict(verdict)
+    def show_verdict(verdict: Verdict) -> None:
+        show(verdict)
         sys.stdout.flush()
 
     try:
         verdict = impact.bless(
-            new, baseline, reason=reason, tol=dict(tol or ()) or None, allow_failed=allow_failed, show=show
+            new, baseline, reason=reason, tol=dict(tol or ()) or None, allow_failed=allow_failed, show=show_verdict
         )
     except (BrokenPipeError, SystemExit):
         raise UsageError(
@@ -131,7 +127,7 @@ def rerun(
                 execute=run_plan,
             )
         except ImpactError as error:
-            _print_report(formats.report_of_error("the rerun", str(result), str(error)), format)
+            _print_outcome(formats.NoVerdict("the rerun", str(result), str(error)), format)
             raise
     _report_verdict(verdict, format, plot)
 
@@ -148,13 +144,12 @@ def _check_plot(plot: Path | None, *sources: Path) -> None:
 
 def _report_verdict(verdict: Verdict, format: Format, plot: Path | None) -> None:
     """Print a verdict, draw it, and exit with its code."""
-    from ..comparison import formats
 
     with exits.ignore_broken_pipe():
         if format is Format.table:
-            print_verdict(verdict)
+            show(verdict)
         else:
-            _print_report(formats.report_of(verdict), format)
+            _print_outcome(verdict, format)
     if plot is not None and not verdict.worst_along:
         # a missing picture does not change the verdict
         exits.print_line("nothing to draw: no variable was compared along an axis")
@@ -167,35 +162,16 @@ def _report_verdict(verdict: Verdict, format: Format, plot: Path | None) -> None
         raise typer.Exit(exits.EXIT_NOT_EQUAL)
 
 
-def _print_report(printed: Report, format: Format) -> None:
-    """Print a report on stdout; an error has no table, its message is on stderr."""
+def _print_outcome(outcome: Verdict | NoVerdict, format: Format) -> None:
+    """Print a verdict or an error on stdout; an error has no table, its message is on stderr."""
     from ..comparison import formats
 
     match format:
         case Format.json:
-            print(dump(formats.as_data(printed)))
+            print(dump(formats.as_data(outcome)))
         case Format.junit:
-            print(formats.as_junit(printed))
+            print(formats.as_junit(outcome))
         case Format.markdown:
-            print(formats.as_markdown(printed), end="")
+            print(formats.as_markdown(outcome), end="")
         case Format.github:
-            print(formats.as_github(printed))
-
-
-def print_verdict(verdict: Verdict) -> None:
-    """Print the headline, the differences with the commands that repeat them, and a table of changed variables."""
-    from ..comparison.verdict import VERDICT_HEADINGS
-    from .console import cell, console, table
-
-    out = console(sys.stdout)
-    for line in (verdict.headline, *verdict.lines, *(f"note: {note}" for note in verdict.notes)):
-        # no wrapping, so that commands can be copied
-        out.print(line, soft_wrap=True)
-    changed = verdict.rows()
-    if changed and out.width >= MIN_TABLE_WIDTH:
-        rows = table(*VERDICT_HEADINGS)
-        rows.columns[1].justify = "left"
-        for row in changed:
-            rows.add_row(*map(cell, row))
-        out.print()
-        out.print(rows)
+            print(formats.as_github(outcome))

@@ -96,4 +96,4 @@ def extend(
         reason = "; layout full holds none of them" if outcome.extended_layout == "full" else ""
         count = f"{outcome.integrated:,} of {outcome.trajectories:,} trajectories were integrated for it"
         exits.print_line(count + reason)
-    summary.conclude(outcome, output or result, quiet=quiet, as_json=as_json, allow_failed=allow_failed)
+    summary.print_summary_and_exit(outcome, quiet=quiet, as_json=as_json, allow_failed=allow_failed)

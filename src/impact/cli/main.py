@@ -11,6 +11,8 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand, TyperGroup, TyperOption
 
+import impact
+
 from .._version import __version__
 from . import exits
 
@@ -61,7 +63,8 @@ class Command(TyperCommand):
 
     def invoke(self, ctx: Any) -> Any:
         if self.name != "help":
-            import_module("..api", __package__)
+            # imports the module of the public function
+            getattr(impact, str(self.name))
         # what was imported so far is kept to the end
         gc.freeze()
         gc.enable()

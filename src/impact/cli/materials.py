@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import sys
+from collections.abc import Mapping
+from functools import partial
 from typing import Annotated
 
 import typer
 
 import impact
 
+from ..display import Table, dump, print_blocks
 from ..errors import UsageError, did_you_mean
-from .console import dump
 from .options import JsonOption
 
 DISPLAY_UNITS = {"E": "GPa", "nu": "-", "rho": "kg/m3", "yield_strength": "MPa"}
@@ -30,15 +31,14 @@ def materials(
     if as_json:
         print(dump(shown))
         return
-    from .console import cell, console, table
+    rows = [
+        (key, *map(partial(_display_value, record), DISPLAY_UNITS), record["about"], record["source"])
+        for key, record in shown.items()
+    ]
+    headings = ("material", *(f"{key} [{unit}]" for key, unit in DISPLAY_UNITS.items()), "what", "source")
+    print_blocks([Table(rows, headings, text=(0, -2, -1))])
 
-    rows = table("material", *(f"{key} [{unit}]" for key, unit in DISPLAY_UNITS.items()), "what", "source")
-    for column in rows.columns[-2:]:
-        column.justify = "left"
-    for key, record in shown.items():
-        numbers = [
-            cell(float(record[field]) / SI_PER_UNIT.get(unit, 1.0)) if field in record else cell("–")
-            for field, unit in DISPLAY_UNITS.items()
-        ]
-        rows.add_row(key, *numbers, cell(record["about"]), cell(record["source"]))
-    console(sys.stdout).print(rows)
+
+def _display_value(record: Mapping[str, float | str], name: str) -> float | str:
+    """Convert a property to its unit in the table."""
+    return float(record[name]) / SI_PER_UNIT.get(DISPLAY_UNITS[name], 1.0) if name in record else "–"

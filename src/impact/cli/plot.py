@@ -10,16 +10,16 @@ import typer
 
 import impact
 
+from ..display import dump
 from ..errors import UsageError
 from ..plots.kinds import KINDS, WIDTHS
 from ..text import safe_text
 from . import exits
 from .completion import complete_axis, complete_kind, complete_output
-from .console import dump
 from .options import JsonOption, ModelOption, OverwriteOption, PluginOption, SelectOption
 
 if TYPE_CHECKING:
-    from ..plots.kinds import PlotData
+    from ..plots.data import PlotData
 
 
 def plot(

@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-import sys
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
 import impact
 
-from .console import dump
+from ..display import show
 from .options import JsonOption, ModelOption, ResultArgument, SelectOption
 from .params import parse_number
-
-if TYPE_CHECKING:
-    from ..results.ranking import Ranking
-
-# rows of the table; the rest is only counted
-MAX_ROWS = 30
 
 
 def recommend(
@@ -35,35 +28,4 @@ def recommend(
     """Rank the models of a result by the error of their restitution over the swept range."""
 
     ranking = impact.recommend(impact.load(result), tol=tol, sel=dict(sel or ()), models=model)
-    if as_json:
-        print(dump(ranking_json(ranking)))
-    else:
-        _print_ranking(ranking)
-
-
-def ranking_json(ranking: Ranking) -> dict[str, Any]:
-    """A ranking as plain data."""
-    return {
-        "headline": ranking.headline,
-        "tol": ranking.tol,
-        "best": [row.model for row in ranking.best],
-        "models": [{**vars(row), "share": row.share} for row in ranking.models],
-    }
-
-
-def _print_ranking(ranking: Ranking) -> None:
-    """Print a summary sentence and a table of the models, the best first."""
-    from .console import cell, console, table
-
-    out = console(sys.stdout)
-    out.print(ranking.headline, soft_wrap=True)
-    rows = table(*ranking.headings)
-    for column in rows.columns[5:]:
-        column.justify = "left"
-    for row in ranking.models[:MAX_ROWS]:
-        rows.add_row(*map(cell, row.row))
-    out.print()
-    out.print(rows)
-    more = len(ranking.models) - MAX_ROWS
-    if more > 0:
-        out.print(f"and {more:,} more (--json has all)")
+    show(ranking, as_json=as_json)

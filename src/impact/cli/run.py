@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
 import impact
 
 from ..atomic import check_output, write_file
+from ..display import show
 from ..errors import UsageError
 from . import exits
 from .completion import complete_model
-from .console import dump, print_rows
 from .options import AtOption, JsonOption, OverwriteOption, PluginOption, SetOption, SourceArgument
 from .params import parse_whole_number
-
-if TYPE_CHECKING:
-    from ..results.single_impact import Impact
 
 # files of a time history: netCDF-4, which is HDF5, and a table
 HISTORY_SUFFIXES = (".h5", ".hdf5", ".nc", ".csv")
@@ -71,10 +67,7 @@ def run(
     result = impact.run(
         source, model=model, at=dict(at or ()), overrides=sets or (), plugins=plugins or (), times=times
     )
-    if as_json:
-        print(dump(run_json(result)))
-    else:
-        print_rows(result.rows())
+    show(result, as_json=as_json)
     if result.status >= FIRST_FAILURE:
         raise typer.Exit(exits.EXIT_POINTS_FAILED)
     if history is not None:
@@ -85,22 +78,3 @@ def run(
         else:
             impact.save(result.history, history, overwrite=overwrite)
         exits.print_line(f"{history}: {result.history.sizes['t']} points in time")
-
-
-def run_json(result: Impact) -> dict[str, Any]:
-    """One impact as plain data."""
-    return {
-        "model": result.model.key,
-        "inputs": dict(result.point),
-        "first_value_of": list(result.first),
-        "integrator": result.integrator,
-        "exponent": result.exponent,
-        "closing_speed": result.closing_speed,
-        "outputs": {**result.values, "status": result.status.name.lower()},
-        "materials": {name: asdict(material) for name, material in result.materials.items()},
-        "derived": dict(result.derived),
-        "damping": result.damping,
-        "e_kinematic": result.e_kinematic,
-        "e_kinetic": result.e_kinetic,
-        "e_energetic": result.e_energetic,
-    }

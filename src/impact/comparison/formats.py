@@ -10,10 +10,10 @@ from xml.etree import ElementTree
 
 from ..formatting import number
 from ..text import safe_text
-from .verdict import DIFFERENCE_KINDS, VariableComparison, Verdict
+from .verdict import Difference, VariableComparison, Verdict, by_kind
 
 PROGRAM = "impact compare"
-# what a test of JUnit claims: that there is no fault of a kind
+# what a test of JUnit claims: that there is no difference of a kind
 CLAIMS: Mapping[str, str] = {
     "nothing in common": "both have a variable in common",
     "physics config": "both have the same inputs",
@@ -26,130 +26,102 @@ MAX_ANNOTATED = 3
 
 
 @dataclass(frozen=True)
-class ReportCase:
-    """One test of a report: a variable or a kind of fault; `texts` describe its failures."""
-
-    name: str
-    texts: tuple[str, ...] = ()
-    replay: str = ""
-
-
-@dataclass(frozen=True)
-class Report:
-    """The data of all formats: a verdict, or the error that prevented one (`equal` is None)."""
+class NoVerdict:
+    """The error that prevented a comparison, with the attributes of a verdict that are printed."""
 
     new: str
     baseline: str
-    equal: bool | None
-    headline: str
-    cases: tuple[ReportCase, ...] = ()
+    error: str
+    equal: None = None
+    faults: tuple[Difference, ...] = ()
+    ranked: tuple[VariableComparison, ...] = ()
     notes: tuple[str, ...] = ()
-    variables: tuple[VariableComparison, ...] = ()
+
+    @property
+    def headline(self) -> str:
+        """The error in one line."""
+        return "; ".join(self.error.splitlines())
+
+    def replay(self, variable: VariableComparison) -> str:
+        """There is no point to run again."""
+        return ""
 
 
-def report_of(verdict: Verdict) -> Report:
-    """The report of a verdict: a case for each kind of fault, and for each variable, the worst first."""
-    faults = (
-        ReportCase(kind, tuple(fault.text for fault in verdict.faults if fault.kind == kind))
-        for kind in DIFFERENCE_KINDS
-        if kind != "values"
-    )
-    values = (
-        ReportCase(variable.name)
-        if variable.is_equal
-        else ReportCase(variable.name, (variable.text,), verdict.replay(variable))
-        for variable in verdict.ranked
-    )
-    return Report(
-        safe_text(verdict.new),
-        safe_text(verdict.baseline),
-        verdict.equal,
-        verdict.headline,
-        (*faults, *values),
-        verdict.notes,
-        verdict.ranked,
-    )
-
-
-def report_of_error(new: str, baseline: str, error: str) -> Report:
-    """The report of an error that prevented the comparison."""
-    return Report(safe_text(new), safe_text(baseline), None, "; ".join(error.splitlines()))
-
-
-def as_data(report: Report) -> dict[str, Any]:
-    """The report as a dict for JSON; `equal` is null if there is no verdict."""
+def as_data(outcome: Verdict | NoVerdict) -> dict[str, Any]:
+    """Plain data for JSON; `equal` is null if there is no verdict."""
     return {
-        "equal": report.equal,
-        "headline": report.headline,
-        "new": report.new,
-        "baseline": report.baseline,
-        "faults": [
-            {"kind": case.name, "text": text}
-            for case in report.cases
-            if case.name in DIFFERENCE_KINDS
-            for text in case.texts
-        ],
+        "equal": outcome.equal,
+        "headline": outcome.headline,
+        "new": safe_text(outcome.new),
+        "baseline": safe_text(outcome.baseline),
+        "faults": [{"kind": fault.kind, "text": fault.text} for fault in by_kind(outcome.faults)],
         "variables": [
             {
                 **{"times" if name == "ratio" else name: value for name, value in vars(variable).items()},
                 "at": _safe_inputs(variable.at),
                 "equal": variable.is_equal,
                 "text": variable.text,
-                "replay": next((case.replay for case in report.cases if case.name == variable.name), ""),
+                "replay": "" if variable.is_equal else outcome.replay(variable),
             }
-            for variable in report.variables
+            for variable in outcome.ranked
         ],
-        "notes": list(report.notes),
+        "notes": list(outcome.notes),
     }
 
 
 def _safe_inputs(at: Mapping[str, float | str]) -> dict[str, float | str]:
+    """Escape the names and labels of a point."""
     return {safe_text(name): safe_text(v, 2000) if isinstance(v, str) else v for name, v in at.items()}
 
 
-def as_junit(report: Report) -> str:
-    """JUnit XML: a suite with a test for each kind of fault and each variable, named by what it claims."""
-    failed = [case for case in report.cases if case.texts]
-    cases = report.cases or (ReportCase("both are readable"),)
-    numbers = {"tests": len(cases), "failures": len(failed), "errors": int(report.equal is None), "skipped": 0}
+def _failures(outcome: Verdict | NoVerdict) -> list[tuple[str, str]]:
+    """List what differs, each with the command that runs its worst point again."""
+    differing = (variable for variable in outcome.ranked if not variable.is_equal)
+    faults = [(fault.text, "") for fault in by_kind(outcome.faults)]
+    return [*faults, *((variable.text, outcome.replay(variable)) for variable in differing)]
+
+
+def as_junit(outcome: Verdict | NoVerdict) -> str:
+    """JUnit XML: a suite with a test for each kind of difference and each variable, named by what it claims."""
+    tests = {
+        claim: [fault.text for fault in outcome.faults if fault.kind == kind] for kind, claim in CLAIMS.items()
+    }
+    for variable in outcome.ranked:
+        lines = [] if variable.is_equal else [variable.text, outcome.replay(variable)]
+        tests[f"{variable.name} is equal within its tolerance"] = [line for line in lines if line]
+    if outcome.equal is None:
+        tests = {"both are readable": []}
+    numbers = {
+        "tests": len(tests),
+        "failures": sum(map(bool, tests.values())),
+        "errors": int(outcome.equal is None),
+        "skipped": 0,
+    }
     counts = {name: str(number) for name, number in numbers.items()}
     root = ElementTree.Element("testsuites", counts)
-    suite = ElementTree.SubElement(
-        root, "testsuite", {"name": f"{PROGRAM} {report.new} {report.baseline}", **counts}
-    )
-    for case in cases:
-        test = ElementTree.SubElement(suite, "testcase", {"classname": "impact.compare", "name": _claim(case)})
-        if report.equal is None:
-            ElementTree.SubElement(test, "error", {"message": report.headline})
-        elif case.texts:
-            body = "\n".join([*case.texts, *([case.replay] if case.replay else [])])
-            ElementTree.SubElement(test, "failure", {"message": case.texts[0]}).text = body
+    title = f"{PROGRAM} {safe_text(outcome.new)} {safe_text(outcome.baseline)}"
+    suite = ElementTree.SubElement(root, "testsuite", {"name": title, **counts})
+    for claim, lines in tests.items():
+        test = ElementTree.SubElement(suite, "testcase", {"classname": "impact.compare", "name": claim})
+        if outcome.equal is None:
+            ElementTree.SubElement(test, "error", {"message": outcome.headline})
+        elif lines:
+            ElementTree.SubElement(test, "failure", {"message": lines[0]}).text = "\n".join(lines)
     output = ElementTree.SubElement(suite, "system-out")
-    output.text = "\n".join([report.headline, *(f"note: {note}" for note in report.notes)])
+    output.text = "\n".join([outcome.headline, *(f"note: {note}" for note in outcome.notes)])
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode", xml_declaration=True)
 
 
-def _claim(case: ReportCase) -> str:
-    """What a test claims, in words."""
-    if case.name == "both are readable":
-        return case.name
-    return CLAIMS.get(case.name, f"{case.name} is equal within its tolerance")
-
-
-def as_markdown(report: Report) -> str:
+def as_markdown(outcome: Verdict | NoVerdict) -> str:
     """Markdown for a pull request or a job summary."""
-    sign = {True: "✅", False: "❌", None: "⚠️"}[report.equal]
-    lines = [f"### {sign} {PROGRAM}: {_escape_markdown(report.headline)}", ""]
-    lines += [f"`{_escape_code(report.new)}` against the baseline `{_escape_code(report.baseline)}`", ""]
-    fault_lines = [
-        f"- {_escape_markdown(text)}"
-        for case in report.cases
-        if case.name in DIFFERENCE_KINDS
-        for text in case.texts
-    ]
-    lines += [*fault_lines, ""] if fault_lines else []
-    differing = [variable for variable in report.variables if not variable.is_equal]
+    sign = {True: "✅", False: "❌", None: "⚠️"}[outcome.equal]
+    new, baseline = (_escape_code(safe_text(name)) for name in (outcome.new, outcome.baseline))
+    lines = [f"### {sign} {PROGRAM}: {_escape_markdown(outcome.headline)}", ""]
+    lines += [f"`{new}` against the baseline `{baseline}`", ""]
+    if outcome.faults:
+        lines += [*(f"- {_escape_markdown(fault.text)}" for fault in by_kind(outcome.faults)), ""]
+    differing = [variable for variable in outcome.ranked if not variable.is_equal]
     if differing:
         lines += [
             "| variable | differ | worst | × tolerance | at | new | baseline |",
@@ -160,40 +132,37 @@ def as_markdown(report: Report) -> str:
             values = f"{number(variable.new, 12)} | {number(variable.baseline, 12)}"
             counts, point = f"{variable.different} of {variable.points}", _escape_markdown(variable.location)
             lines.append(f"| `{variable.name}` | {counts} | {numbers} | {point} | {values} |")
-        repeats = dict.fromkeys(case.replay for case in report.cases if case.replay)
+        commands = dict.fromkeys(filter(None, map(outcome.replay, differing)))
         # a fence of four backticks, since a name may contain three
-        lines += ["", "````sh", *repeats, "````", ""] if repeats else [""]
-    lines += [f"- note: {_escape_markdown(note)}" for note in report.notes]
+        lines += ["", "````sh", *commands, "````", ""] if commands else [""]
+    lines += [f"- note: {_escape_markdown(note)}" for note in outcome.notes]
     return "\n".join(lines).rstrip() + "\n"
 
 
-def as_github(report: Report) -> str:
+def as_github(outcome: Verdict | NoVerdict) -> str:
     """A workflow command of GitHub Actions: one annotation on the baseline, with the worst of what differs."""
-    differing = [case for case in report.cases if case.texts]
-    worst = [(text, case.replay) for case in differing for text in case.texts]
-    lines = [report.headline]
-    for text, replay in worst[:MAX_ANNOTATED]:
-        lines += [text, replay] if replay and replay not in lines else [text]
-    lines += [f"and {len(worst) - MAX_ANNOTATED} more"] if len(worst) > MAX_ANNOTATED else []
-    lines += [f"note: {note}" for note in report.notes]
-    return _annotation("notice" if report.equal else "error", report.baseline, "\n".join(lines))
+    failures = _failures(outcome)
+    lines = [outcome.headline]
+    for text, command in failures[:MAX_ANNOTATED]:
+        lines += [text, command] if command and command not in lines else [text]
+    lines += [f"and {len(failures) - MAX_ANNOTATED} more"] if len(failures) > MAX_ANNOTATED else []
+    lines += [f"note: {note}" for note in outcome.notes]
+    level = "notice" if outcome.equal else "error"
+    file = _escape_command(safe_text(outcome.baseline), ":,")
+    text = _escape_command("\n".join(lines))
+    return f"::{level} file={file},title={PROGRAM}::{text}"
 
 
-def _annotation(level: str, file: str, text: str) -> str:
-    where = "".join(GITHUB_ESCAPES.get(letter, letter) for letter in file)
-    message = "".join(letter if letter in ":," else GITHUB_ESCAPES.get(letter, letter) for letter in text)
-    return f"::{level} file={where},title={PROGRAM}::{message}"
-
-
-# characters that a workflow command must escape; the last two in its properties only
-GITHUB_ESCAPES: Mapping[str, str] = {"%": "%25", "\r": "%0D", "\n": "%0A", ":": "%3A", ",": "%2C"}
+def _escape_command(text: str, letters: str = "") -> str:
+    """Escape what ends a workflow command, and more letters in its properties."""
+    return re.sub(rf"[%\r\n{letters}]", lambda match: f"%{ord(match[0]):02X}", text)
 
 
 def _escape_markdown(text: str) -> str:
-    """Text that Markdown shows literally."""
+    """Escape text so that Markdown shows it literally."""
     return re.sub(r"([\\`*_{}\[\]<>|~#!&$@])", r"\\\1", text)
 
 
 def _escape_code(text: str) -> str:
-    """Text for code spans, which have no escapes."""
+    """Replace the letters that end a code span or a cell, which have no escapes."""
     return text.replace("`", "'").replace("|", "¦")

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -124,13 +123,16 @@ def _points(dims: Iterable[str], sizes: Mapping[str, int]) -> int:
     return math.prod(sizes[dim] for dim in dims if dim != "model")
 
 
-@dataclass(frozen=True)
-class Worst:
-    """A point that differs: ratio to the tolerance, size that decides between equal ratios, index and values."""
+class Worst(NamedTuple):
+    """A point that differs; the worst is the largest.
+
+    Its ratio to the tolerance counts first, then its size, then its place: the index, negative so that the first
+    in the order of the baseline is the largest.
+    """
 
     ratio: float
     size: float
-    index: tuple[int, ...]
+    place: tuple[int, ...]
     difference: float
     new: float
     baseline: float
@@ -157,7 +159,8 @@ def compare_values(
     dims = aligned.dims[variable.name]
     shape = tuple(aligned.sizes[dim] for dim in dims)
     largest = {dim: np.zeros(-(-size // group_size(size))) for dim, size in zip(dims, shape, strict=True)}
-    different, worst = 0, None
+    different = 0
+    worst: Worst | None = None
     for region in regions:
         weight = math.prod(aligned.sizes[dim] for dim in dims if dim not in region)
         for slab in _slabs(variable.name, aligned, region):
@@ -169,7 +172,8 @@ def compare_values(
             different += int(np.count_nonzero(ratio > 1.0)) * weight
             if not ratio.max():
                 continue
-            worst = _worse(worst, _worst_of_slab(variable, part, ratio, difference, a, b))
+            worst_here = _worst_of_slab(variable, part, ratio, difference, a, b)
+            worst = worst_here if worst is None else max(worst, worst_here)
             for axis, dim in enumerate(dims):
                 maxima = ratio.max(axis=tuple(other for other in range(len(dims)) if other != axis))
                 if dim in slab:
@@ -186,7 +190,7 @@ def compare_values(
         different=different,
         worst=worst.difference if worst else 0.0,
         ratio=worst.ratio if worst else 0.0,
-        at=_inputs_of_point(aligned.new.coords, dict(zip(dims, worst.index, strict=True))) if worst else {},
+        at=_inputs_of_point(aligned.new.coords, dims, worst.place) if worst else {},
         new=worst.new if worst else math.nan,
         baseline=worst.baseline if worst else math.nan,
     ), largest
@@ -290,25 +294,18 @@ def _worst_of_slab(
     return Worst(
         float(ratio[index]),
         float(sizes[index]),
-        tuple(part.start + int(offset) for part, offset in zip(slab.values(), index, strict=True)),
+        tuple(-part.start - int(offset) for part, offset in zip(slab.values(), index, strict=True)),
         float(difference[index]),
         float(a[index]),
         float(b[index]),
     )
 
 
-def _worse(first: Worst | None, second: Worst) -> Worst:
-    """Choose the worse of two points, among equals the first in the order of the baseline."""
-    if first is None:
-        return second
-    return max(first, second, key=lambda point: (point.ratio, point.size, [-index for index in point.index]))
-
-
-def _inputs_of_point(coords: xr.Dataset, index: Mapping[str, int]) -> dict[str, float | str]:
+def _inputs_of_point(coords: xr.Dataset, dims: Sequence[str], place: Sequence[int]) -> dict[str, float | str]:
     """The inputs of a point of the new result, with which its config gives the same point again."""
     inputs = {
-        name: coords.variables[name].values[position].item()
-        for dim, position in index.items()
+        name: coords.variables[name].values[-position].item()
+        for dim, position in zip(dims, place, strict=True)
         for name in dict.fromkeys([dim, *columns_along(coords, dim)])
     }
     return {

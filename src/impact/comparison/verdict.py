@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import xarray as xr
 
 from ..contact.status import Status
+from ..display import Block, Displayed, Table
 from ..formatting import number
 from ..results.replay_command import describe_point, replay_command
-from ..text import html_table, safe_text
+from ..text import safe_text
 
 DifferenceKind = Literal["nothing in common", "physics config", "labels", "units", "missing variable", "values"]
 # in the order of a verdict: kinds that explain others first
@@ -26,6 +27,8 @@ DIFFERENCE_KINDS: tuple[DifferenceKind, ...] = (
 )
 VERDICT_HEADINGS = ("variable", "judged", "tolerance", "differ", "worst", "x tolerance")
 MAX_NAMES = 4  # names per kind in the first line
+# a narrower terminal shows no table
+MIN_TABLE_WIDTH = 76
 
 
 @dataclass(frozen=True)
@@ -35,6 +38,11 @@ class Difference:
     kind: DifferenceKind
     name: str
     text: str
+
+
+def by_kind(faults: Iterable[Difference]) -> list[Difference]:
+    """Sort differences by their kinds, those that explain others first."""
+    return sorted(faults, key=lambda fault: DIFFERENCE_KINDS.index(fault.kind))
 
 
 @dataclass(frozen=True)
@@ -106,7 +114,7 @@ def _format_outcome(name: str, value: float) -> str:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Verdict(Displayed):
     """Whether a result is equal to its baseline, and the differences.
 
     `str(verdict)` is the report, so that `assert verdict.equal, str(verdict)` is a test.
@@ -182,8 +190,7 @@ class Verdict:
     @property
     def lines(self) -> tuple[str, ...]:
         """The differences, a line each; after a variable the command that runs its worst point again."""
-        faults = sorted(self.faults, key=lambda fault: DIFFERENCE_KINDS.index(fault.kind))
-        lines = [f"{fault.kind}: {fault.text}" for fault in faults]
+        lines = [f"{fault.kind}: {fault.text}" for fault in by_kind(self.faults)]
         for variable in self.differing:
             command = f"  {self.replay(variable)}"
             # several variables are often worst at one point
@@ -205,9 +212,23 @@ class Verdict:
             if variable.ratio
         ]
 
-    def _repr_html_(self) -> str:
-        above = " · ".join((self.headline, *self.lines, *(f"note: {note}" for note in self.notes)))
-        return html_table(VERDICT_HEADINGS, self.rows(), above) if self.rows() else html_table((), [[above]])
+    def as_dict(self) -> dict[str, Any]:
+        """The verdict as plain data."""
+        from .formats import as_data
+
+        return as_data(self)
+
+    def records(self) -> Sequence[Mapping[str, Any]]:
+        """The compared variables, those that differ first."""
+        return [vars(variable) for variable in self.ranked]
+
+    def sections(self, width: int) -> Iterator[Block]:
+        """The headline, the differences with the commands that repeat them, and a table of changed variables."""
+        yield from str(self).split("\n")
+        rows = self.rows()
+        if rows and width >= MIN_TABLE_WIDTH:
+            yield ""
+            yield Table(rows, VERDICT_HEADINGS, text=(0, 1))
 
     def replay(self, variable: VariableComparison) -> str:
         """The command that runs the worst point of a variable again; empty if there is none."""

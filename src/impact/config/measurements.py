@@ -14,14 +14,11 @@ from ..contact.variables import OUTPUTS
 from ..errors import ConfigError, did_you_mean
 from ..formatting import number
 from ..text import safe_text
-from .columns import Cells, Columns, column_quantity, contains_path, read_cells, read_csv, unit_expected
+from .columns import Cells, Columns, column_quantity, contains_path, read_cells, read_csv
 from .files import as_table
 from .input_names import InputName, input_values
 from .quantities import MAX_PROBLEMS, ConfigProblem, KeyPath, Quantity, as_text, value_error
-from .tables import LOSSES, MAX_MEASURED, MIN_SIGMA, NOISES, SWEEP_QUANTITIES
-
-Noise = Literal["given", "scale", "excess"]
-Loss = Literal["linear", "huber", "cauchy"]
+from .tables import LOSSES, MAX_MEASURED, MIN_SIGMA, NOISES, SWEEP_QUANTITIES, Loss, Noise
 
 SIGMA, SPECIMEN = "sigma", "specimen"
 SPECIMEN_EXPECTED = "got nothing, expected the name of a specimen"
@@ -84,7 +81,7 @@ def purpose_problems(data: Mapping[str, Any]) -> list[ConfigProblem]:
 
 
 def _read_columns(
-    columns: Columns, data: Mapping[str, Any], models: Mapping[str, ForceModel], n: float | None, *, is_text: bool
+    columns: Columns, data: Mapping[str, Any], models: Mapping[str, ForceModel], n: float | None
 ) -> tuple[list[_Column], list[_Problem]]:
     """Read columns of a file, which are text and have units, or lists of a config, and report all problems."""
     kinds: dict[str, _Column] = {}
@@ -109,16 +106,17 @@ def _read_columns(
     for header, column in kinds.items():
         # a standard deviation has the unit of its output
         unit = columns.units.get(header) or (columns.units.get(column.name, "") if column.kind == "sigma" else "")
-        values, column_problems = _read_column(columns.cells[header], column, header, unit, n, is_text=is_text)
+        values, column_problems = _read_column(columns, column, header, unit, n)
         problems += [(header, index, message) for index, message in column_problems]
         result.append(replace(column, values=tuple(values)))
     return result, problems
 
 
 def _read_column(
-    cells: Sequence[object], column: _Column, header: str, unit: str, n: float | None, *, is_text: bool
+    columns: Columns, column: _Column, header: str, unit: str, n: float | None
 ) -> tuple[Sequence[object], Sequence[tuple[int | None, str]]]:
     """Read a column; problems have the index of a cell, or None for the header."""
+    cells = columns.cells[header]
     if column.kind == SPECIMEN:
         specimens = [cell if isinstance(cell, str) else number(cell) for cell in cells]
         return specimens, [(index, SPECIMEN_EXPECTED) for index, name in enumerate(specimens) if not name]
@@ -126,24 +124,18 @@ def _read_column(
     if unit.lower() in ("%", "percent", "pct", "per cent"):
         expected = f'a fraction: divide the column by 100 and write "{safe_text(header, 60)}"'
         return (), [(None, f"got [{safe_text(unit)}], expected {expected}")]
-    if is_text and not unit and si_unit != "1":
+    if columns.is_text and not unit and si_unit != "1":
         expected = f'one in brackets, such as "{safe_text(header, 60)} [{si_unit}]"'
         return (), [(None, f"got no unit, expected {expected}")]
-    wrong_unit = unit_expected(column.quantity, unit, n)
-    if wrong_unit:
-        return (), [(None, f"got [{safe_text(unit)}], expected {wrong_unit}")]
-    return _read_measured(cells, column.quantity, n, unit, is_text=is_text)
+    return _percent_problem(cells, column.quantity) or columns.read(header, column.quantity, n, unit)
 
 
-def _read_measured(
-    cells: Sequence[object], quantity: Quantity, n: float | None, unit: str = "", *, is_text: bool = False
-) -> Cells:
-    """Read measured values, of which none is in percent."""
+def _percent_problem(cells: Sequence[object], quantity: Quantity) -> Cells | None:
+    """Refuse values in percent; the first stands for the whole column."""
     for index, cell in enumerate(cells):
         if _is_in_percent(cell, quantity):
-            # the first stands for the whole column
             return [], [(index, _percent_message(str(cell)))]
-    return read_cells(cells, quantity, n, unit, is_text=is_text)
+    return None
 
 
 def _column_of(header: str, outputs: Sequence[str], models: Mapping[str, ForceModel]) -> _Column:
@@ -194,7 +186,7 @@ def read_data_file(
         columns = read_csv(folder / file, column_quantity(models))
     except ConfigError as error:
         return {}, [*error.problems]
-    read, problems = _read_columns(columns, data, models, n, is_text=True)
+    read, problems = _read_columns(columns, data, models, n)
     if problems:
         return {}, [columns.problem(text, header, row) for header, row, text in problems[:MAX_PROBLEMS]]
     values = {header: list(column.values) for header, column in zip(columns.cells, read, strict=True)}
@@ -233,7 +225,7 @@ def read_measurements(
     if not isinstance(lists, dict) or not lists or not all(isinstance(v, list) and v for v in lists.values()):
         return None, []
     path: KeyPath = ("data", "columns")
-    columns, column_problems = _read_columns(Columns("", 0, (), {}, lists), data, models, n, is_text=False)
+    columns, column_problems = _read_columns(Columns("", 0, (), {}, lists, is_text=False), data, models, n)
     problems: list[ConfigProblem] = [
         ((*path, *([header] if header else []), *([] if index is None else [index])), message)
         for header, index, message in column_problems
@@ -288,13 +280,14 @@ def read_measurements(
 def _read_sigma(value: object, output: str, n_points: int) -> tuple[tuple[Any, ...], list[ConfigProblem]]:
     """Read the key `sigma`, one number or one for each point; the validation of [data] reports invalid numbers."""
     path: KeyPath = ("data", "sigma")
-    if not isinstance(value, list):
-        values, problems = _read_measured([value], _deviation(output), None)
-        return tuple(values) * n_points, [(path, message) for _, message in problems if isinstance(value, str)]
-    if len(value) != n_points:
-        return (), [(path, f"got {len(value)} values, expected {n_points}, one for each point")]
-    values, problems = _read_measured(value, _deviation(output), None)
-    return tuple(values), [((*path, index), text) for index, text in problems if isinstance(value[index], str)]
+    cells = value if isinstance(value, list) else [value]
+    if cells is value and len(cells) != n_points:
+        return (), [(path, f"got {len(cells)} values, expected {n_points}, one for each point")]
+    values, problems = _percent_problem(cells, _deviation(output)) or read_cells(cells, _deviation(output), None)
+    texts = [(index, message) for index, message in problems if isinstance(cells[index], str)]
+    if cells is not value:
+        return tuple(values) * n_points, [(path, message) for _, message in texts]
+    return tuple(values), [((*path, index), message) for index, message in texts]
 
 
 def _noise_problems(

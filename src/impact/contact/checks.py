@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
 from ..array_types import Array
+from ..display import Block, Displayed, Styled, Table
+from ..formatting import number
 from .impacts import Impacts, stiffness
 from .materials import effective_mass, hertz_stiffness, sphere_radius
 from .model import QUANTITIES, ForceModel, Parameter
@@ -21,6 +24,9 @@ from .variables import OUTPUTS
 CONTRACT_RTOL, CONTRACT_MAX_STEPS = 1e-10, 10_000
 # largest error of an identity by rounding, relative to its largest term
 ROUNDING_ERROR = 1e-12
+CLOSED_FORM = "agrees with its closed form"
+# names without the number of the ball
+PROPERTIES_OF_A_BALL = ("m", "R", "E", "nu", "yield_strength")
 
 
 @dataclass(frozen=True)
@@ -37,7 +43,7 @@ class ClauseResult:
 
 
 def sample(model: ForceModel) -> Impacts:
-    """Forty dissimilar impacts: a wall, heavy and light balls, slow and fast, soft and hard, e from 0.05 to 1."""
+    """Make forty dissimilar impacts: walls, heavy and light, slow and fast, soft and hard, e from 0.05 to 1."""
     count = 40
     index = np.arange(float(count))
     e = np.linspace(0.05, 1.0, count)
@@ -73,7 +79,7 @@ def sample(model: ForceModel) -> Impacts:
 
 
 def _parameter_values(model: ForceModel, parameter: Parameter, impacts: Impacts) -> Array:
-    """Values of a parameter for the impacts: its default, or values from its least one upwards, shape (n,)."""
+    """Choose values of a parameter for the impacts: its default, or from its least one upwards, shape (n,)."""
     if parameter.default is not None:
         return np.full(len(impacts), parameter.default)
     # the size of the parameter that is 1 in the contact's own units
@@ -82,21 +88,75 @@ def _parameter_values(model: ForceModel, parameter: Parameter, impacts: Impacts)
     return np.clip(least + np.linspace(0.0, 4.0, len(impacts)) * size, parameter.least, parameter.most)
 
 
-def check_contract(model: ForceModel) -> Iterator[ClauseResult]:
-    """Check every clause of the contract; yields a result for each.
+class ContractResult(list[ClauseResult], Displayed):
+    """The result of each clause of the contract for one model."""
 
-    Parameters
-    ----------
-    model : the law; it is checked with the forty impacts of `sample` at rtol 1e-10
+    HEADINGS = ("model", "clause", "", "worst", "bound")
+
+    def __init__(self, model: ForceModel, results: Iterable[ClauseResult]) -> None:
+        super().__init__(results)
+        self.model = model
+
+    @property
+    def holds(self) -> bool:
+        return all(result.holds for result in self)
+
+    def as_dict(self) -> dict[str, Any]:
+        """The clauses as plain data."""
+        return {"model": self.model.key, "holds": self.holds, "clauses": self.records()}
+
+    def records(self) -> Sequence[Mapping[str, Any]]:
+        """The clauses."""
+        return [
+            {"clause": result.clause, "holds": result.holds, "worst": result.worst, "bound": result.bound}
+            for result in self
+        ]
+
+    def rows(self) -> list[tuple[str | Styled, ...]]:
+        """Write a row for each clause, under HEADINGS; the model is named once."""
+        return [
+            (
+                "" if index else self.model.key,
+                result.clause,
+                Styled("holds", "green") if result.holds else Styled("broken", "red"),
+                number(result.worst, 2),
+                number(result.bound, 2),
+            )
+            for index, result in enumerate(self)
+        ]
+
+    def sections(self, width: int) -> Iterator[Block]:
+        """A row for each clause, and what was not checked."""
+        yield Table(self.rows(), self.HEADINGS, text=(0, 1))
+        yield from self.notes()
+
+    def notes(self) -> list[str]:
+        """Say what was not checked."""
+        if any(result.clause == CLOSED_FORM for result in self):
+            return []
+        return [f"{self.model.key}: has no oracle, so that its restitution was compared with no closed form"]
+
+
+def check_model(model: ForceModel) -> ContractResult:
+    """Check a model, such as a plug-in, against every clause of the contract, with forty dissimilar impacts.
+
+    Returns
+    -------
+    list of ClauseResult : the clause, the largest deviation, its bound, and whether the clause holds
 
     Warns
     -----
-    UserWarning : a formula of the law raised an error; once for each distinct error
+    UserWarning : a formula raised an error, with its file, line and text
 
-    >>> from impact.contact.models import find
-    >>> all(finding.holds for finding in check_contract(find("bilinear")))
+    >>> import impact
+    >>> all(result.holds for result in impact.check_model(impact.models()["bilinear"]))
     True
     """
+    return ContractResult(model, _check_clauses(model))
+
+
+def _check_clauses(model: ForceModel) -> Iterator[ClauseResult]:
+    """Check every clause of the contract with the forty impacts of `sample`."""
     reported: set[str] = set()
 
     def collided(impacts: Impacts, rtol: float = CONTRACT_RTOL) -> Outputs:
@@ -133,7 +193,7 @@ def check_contract(model: ForceModel) -> Iterator[ClauseResult]:
     )
     yield ClauseResult("work balances energy", worst(base["energy_residual"]), 10 * CONTRACT_RTOL)
     if model.oracle is not None:
-        yield ClauseResult("agrees with its closed form", worst(base["closed_form_error"]), 10 * CONTRACT_RTOL)
+        yield ClauseResult(CLOSED_FORM, worst(base["closed_form_error"]), 10 * CONTRACT_RTOL)
 
     other = collided(in_other_units(model, impacts))
     yield ClauseResult(
@@ -143,16 +203,8 @@ def check_contract(model: ForceModel) -> Iterator[ClauseResult]:
         impacts,
         v1=-impacts.v2,
         v2=-impacts.v1,
-        m1=impacts.m2,
-        m2=impacts.m1,
-        R1=impacts.R2,
-        R2=impacts.R1,
-        E1=impacts.E2,
-        E2=impacts.E1,
-        nu1=impacts.nu2,
-        nu2=impacts.nu1,
-        yield_strength1=impacts.yield_strength2,
-        yield_strength2=impacts.yield_strength1,
+        **{f"{name}1": getattr(impacts, f"{name}2") for name in PROPERTIES_OF_A_BALL},
+        **{f"{name}2": getattr(impacts, f"{name}1") for name in PROPERTIES_OF_A_BALL},
     )
     other = collided(swapped)
     yield ClauseResult(
@@ -172,7 +224,7 @@ def check_contract(model: ForceModel) -> Iterator[ClauseResult]:
 
 
 def in_other_units(model: ForceModel, impacts: Impacts) -> Impacts:
-    """The same impacts with grams, feet and minutes as units."""
+    """Convert the impacts to grams, feet and minutes."""
     units = {parameter.name: parameter.unit for parameter in model.parameters} | QUANTITIES
     units |= {"v1": "m/s", "v2": "m/s", "m1": "kg", "m2": "kg"}
     exponents = {"n": impacts.n, **impacts.parameters}
@@ -186,7 +238,7 @@ def in_other_units(model: ForceModel, impacts: Impacts) -> Impacts:
 
 
 def _alone_differs(collided: Callable[[Impacts], Outputs], impacts: Impacts, base: Outputs) -> int:
-    """How many impacts have other bits when they are integrated alone."""
+    """Count the impacts that have other bits when they are integrated alone."""
     differ = 0
     for index in range(0, len(impacts), 7):
         alone = collided(impacts[np.array([index])])

@@ -1,4 +1,4 @@
-"""Evidence for a law, as data: seen at a source, derived, disputed, or not verified."""
+"""How well the formula and the DOI of a law are verified: seen at a source, derived, disputed, or not verified."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Evidence:
 
 
 def count_states(evidence: Iterable[Evidence]) -> str:
-    """The number of laws in each state, as text.
+    """Count the laws in each state, as text.
 
     >>> count_states([Evidence("derived", "here"), Evidence("seen", "there"), Evidence("seen", "there")])
     '2 seen, 1 derived'

@@ -1,4 +1,4 @@
-"""Expressions of forces that many laws share, and both back ends."""
+"""Expressions of forces that many laws share, in NumPy and compiled."""
 
 from __future__ import annotations
 

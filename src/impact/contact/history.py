@@ -1,4 +1,8 @@
-"""The time history of an impact, and three restitutions computed from it independently."""
+"""The time history of an impact, and three restitutions computed from it independently.
+
+The history samples the interpolant of the integrator. Force and power are integrated over each step by Gauss
+points, independently of the quadratures of the integrator, and give the restitutions of equations (2) and (3).
+"""
 
 from __future__ import annotations
 
@@ -52,18 +56,10 @@ class History:
 def integrate_history(
     model: ForceModel, impacts: Impacts, *, rtol: float, max_steps: int, times: int | None = None
 ) -> History | None:
-    """The time history of a single impact.
+    """Integrate one impact (a batch of length one); None if the balls miss, or the result is a limit.
 
-    Parameters
-    ----------
-    model : the law
-    impacts : the impact, a batch of length one
-    rtol, max_steps : see `impact.contact.outputs.collide`
-    times : number of points in time, uniform from first contact to release; by default SAMPLES_PER_STEP per step
-
-    Returns
-    -------
-    History or None : None without a motion to follow, because the balls miss or the result is a limit
+    `times` is the number of points in time, uniform from first contact to release; by default SAMPLES_PER_STEP
+    per step.
     """
     n = float(impacts.n[0])
     with np.errstate(all="ignore"):
@@ -162,13 +158,13 @@ def _phase(
 
 
 def _fractions(steps: tuple[Step, ...]) -> list[Array]:
-    """Uniform fractions of each step, and the end of the last step."""
+    """Make uniform fractions of each step, and the end of the last step."""
     inner = np.arange(SAMPLES_PER_STEP) / SAMPLES_PER_STEP
     return [step.end * (inner if step is not steps[-1] else np.append(inner, 1.0)) for step in steps]
 
 
 def _fractions_at(steps: tuple[Step, ...], times: Array) -> list[Array]:
-    """The fractions of each step at which the interpolated time equals one of the increasing times."""
+    """Compute the fractions of each step at which the interpolated time equals one of the increasing times."""
     ends = np.array([step.at(step.end)[2, 0] for step in steps])
     step_of_time = np.minimum(np.searchsorted(ends, times), len(steps) - 1)
     fractions = []

@@ -35,8 +35,6 @@ def outputs(
 
     Parameters
     ----------
-    law : the law
-    impacts : the inputs
     result : the collisions, in the contact's own units, of shapes that broadcast to those of the impacts
     names : in `OUTPUTS`, see docs/schema.md
     checked : the status by `check_inputs`, if it is already computed
@@ -54,7 +52,7 @@ def outputs(
 
 
 def _compute(name: str, computed: dict[str, Any]) -> Any:
-    """An output or intermediate value by name; it and what it needs are added to `computed`."""
+    """Compute an output or intermediate value by name, and add it and what it needs to `computed`."""
     if name not in computed:
         formula = FORMULAS[name]
         computed[name] = formula(*(_compute(needed, computed) for needed in argument_names(formula)))
@@ -74,12 +72,10 @@ def collide(
     errors: dict[str, str] | None = None,
     names: Iterable[str] = OUTPUTS,
 ) -> Outputs:
-    """Simulate the impacts with a model.
+    """Simulate impacts by a law: their `outputs`; one that fails has NaN and a status, and affects no other.
 
     Parameters
     ----------
-    model : the law
-    impacts : the inputs, n of them
     rtol : local error of a step of the integrator, relative
     max_steps : attempted steps per phase after which an impact fails
     collapse : integrate impacts that are equal in the contact's own units once; changes no bit of the results
@@ -90,10 +86,6 @@ def collide(
         (n,)
     errors : receives a line for each distinct error of the law, see `impact.contact.formula_calls.describe_error`
     names : names of the outputs
-
-    Returns
-    -------
-    dict : see `outputs`; an impact that fails has NaN and a status, and does not affect any other
     """
     with np.errstate(all="ignore"):
         values, checked = dimensionless_values(model, impacts), check_inputs(model, impacts)
@@ -114,14 +106,14 @@ def collide(
 
 
 def _mask_if_any(mask: Mask) -> Mask | None:
-    """The mask, or None if it is False everywhere, which saves work."""
+    """Return the mask, or None if it is False everywhere, which saves work."""
     return mask if mask.any() else None
 
 
 def _replace_where(
     value: NDArray[Any], where: Mask | None, otherwise: float | np.int32 | NDArray[Any]
 ) -> NDArray[Any]:
-    """The value, replaced by another one where the mask is True."""
+    """Replace the value by another one where the mask is True."""
     return value if where is None else np.where(where, otherwise, value)
 
 
@@ -140,7 +132,7 @@ def _undefined(failed: Mask | None, missed: Mask | None, status: NDArray[np.int8
 
 
 def _asked_e(impacts: Impacts) -> Array:
-    """The required restitution, NaN where it is not within [0, 1]."""
+    """Return the required restitution, NaN where it is not within [0, 1]."""
     e = impacts.e
     return e if all_within(e, 0.0, 1.0) else np.where((e >= 0.0) & (e <= 1.0), e, np.nan)
 

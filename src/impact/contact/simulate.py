@@ -1,4 +1,10 @@
-"""Simulate collisions: dimensionless impacts through both phases, each distinct one integrated once."""
+"""Simulate collisions: dimensionless impacts through both phases, each distinct one integrated once.
+
+In units of m, v₀ and δ* = (m v₀²/K)^(1/(n+1)) the motion of every law is x'' = −f(x, x'; groups), x(0) = 0,
+x'(0) = 1, where the groups are a few pure numbers, such as χ. Impacts with the same groups are one trajectory. It
+ends its approach at zero velocity, where a law with an unloading branch changes to it, and its restitution at zero
+indentation or zero force, as the law declares. For the coordinates see `impact.contact.motion`.
+"""
 
 from __future__ import annotations
 
@@ -46,7 +52,7 @@ ValueArrays = Mapping[str, Array]
 
 
 def positions(mask: NDArray[np.bool_]) -> Positions:
-    """The positions at which the mask is True."""
+    """Find the positions at which the mask is True."""
     return slice(None) if mask.all() else np.flatnonzero(mask)
 
 
@@ -107,7 +113,7 @@ class CollisionResult:
         return result
 
     def take(self, where: Positions) -> CollisionResult:
-        """The impacts at some positions."""
+        """Select the impacts at some positions."""
         return CollisionResult(**{field.name: getattr(self, field.name)[where] for field in fields(self)})
 
 
@@ -147,20 +153,15 @@ def simulate(
     integrator: str = EXACT,
     errors: dict[str, str] | None = None,
 ) -> CollisionResult:
-    """Integrate impacts by the law of a model.
+    """Integrate impacts by a law; one that fails has a status, and affects no other.
 
     Parameters
     ----------
-    model : the law
     n : compliance exponents, shape (k,)
     values : `dimensionless_values` of the impacts, by name, each of shape (k,); for a scheme also `PHASE`, and one
         of `STEPS_PER_CONTACT` and `STEP`
     status : status by `check_inputs`, shape (k,); impacts that are not OK are not integrated
     rtol, max_steps, collapse, core, integrator, errors : see `impact.contact.outputs.collide`
-
-    Returns
-    -------
-    CollisionResult : arrays of shape (k,); an impact that fails has a status, and does not affect any other
     """
     parts: list[tuple[Positions, CollisionResult]] = []
     integrate_both = partial(integrate_phases, rtol=rtol, max_steps=max_steps, core=core)
@@ -290,7 +291,7 @@ def _collide_at_fixed_steps(
     of_law = {name: array for name, array in values.items() if name not in (STEPS_PER_CONTACT, STEP, PHASE)}
 
     def contact_times(where: Positions, size: int) -> tuple[Array, NDArray[np.int8]]:
-        """The contact times of the continuous law, and statuses that are OK where there is one."""
+        """Compute the contact times of the continuous law, and statuses that are OK where there is one."""
         continuous = _simulate_distinct(
             model, n, _values_at(of_law, where), size, integrate_both=integrate_both, collapse=collapse
         )
@@ -354,7 +355,7 @@ def _put_fixed_steps(
 def _check_coefficients(
     model: ForceModel, law_values: LawValues, values: ValueArrays, count: int
 ) -> NDArray[np.int8]:
-    """The status of impacts by the coefficients of their law, before they are integrated; shape (count,)."""
+    """Compute the status of impacts by the coefficients of their law, before integration; shape (count,)."""
     status = np.full(count, Status.OK, np.int8)
     coefficients = {name: np.asarray(law_values[name]) for name in model.coefficients}
     if all(np.isfinite(coefficient).all() for coefficient in coefficients.values()):
@@ -384,7 +385,6 @@ def integrate_phases(
 
     Parameters
     ----------
-    law : the law at one exponent and in one coordinate of the velocity
     params : its values per impact, each of shape (n,)
     rtol, max_steps, record : see `impact.ode.rk45.integrate`
     never_separates : which are known to stay together, where they do not part

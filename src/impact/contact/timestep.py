@@ -1,4 +1,9 @@
-"""Collisions as codes with a fixed time step integrate them, with one evaluation of the force per step."""
+"""Collisions as codes with a fixed time step integrate them, with one evaluation of the force per step.
+
+A step first changes the velocity, then the position with the new velocity, see `SCHEMES`: "kick-drift" takes the
+force at the start of the step, Drake's schemes the force at its end, whose root is known in closed form for the
+laws that they take. The restitution depends on the phase, the part of a step at which the contact begins.
+"""
 
 from __future__ import annotations
 
@@ -50,19 +55,13 @@ COMPACTION_SHARE = 0.25
 
 
 def default_scheme(model: ForceModel) -> str:
-    """The scheme of the codes that a law is of: "drake-tamsi" for Drake's, else "kick-drift"."""
+    """Find the scheme of the codes that a law is of: "drake-tamsi" for Drake's, else "kick-drift"."""
     is_of_drake = model.family == "codes" and model.key.startswith("drake-")
     return DRAKE_TAMSI if is_of_drake else KICK_DRIFT
 
 
 def has_scheme(model: ForceModel, n: float, scheme: str) -> bool:
-    """Whether a scheme takes a law with an exponent n.
-
-    Parameters
-    ----------
-    model : the law
-    n : compliance exponent
-    scheme : one of `SCHEMES`
+    """Return whether a scheme takes a law with an exponent n.
 
     >>> from impact.contact.models import find
     >>> [has_scheme(find(key), 1.0, "drake-sap") for key in ("kelvin-voigt-no-tension", "kelvin-voigt")]
@@ -80,7 +79,7 @@ def has_scheme(model: ForceModel, n: float, scheme: str) -> bool:
 
 
 def law_problem(model: ForceModel, scheme: str) -> str:
-    """What to tell a user who asks for a scheme that does not take the law."""
+    """Write the message to a user who asks for a scheme that does not take the law."""
     return f'scheme "{scheme}" does not take {model.key}, expected a law {LAWS_OF_SCHEME[scheme]}'
 
 
@@ -131,22 +130,11 @@ def collide_at_fixed_step(
 
     Parameters
     ----------
-    model : the law
-    n : compliance exponent
     values : `impact.contact.dimensionless.dimensionless_values`, each of shape (k,)
     step : time step, in the contact's own unit of time, shape (k,)
     phase : where in its step the contact begins, 0 < phase <= 1, shape (k,)
     max_steps : steps that a collision may take, for all or of shape (k,); one that takes more never separates
     scheme : one of `SCHEMES`
-
-    Returns
-    -------
-    FixedStepResult : arrays of shape (k,)
-
-    Raises
-    ------
-    ModelError : a formula of the law fails, or returns an array of another shape
-    UsageError : there is no such scheme, or it does not take the law
     """
     check_scheme(model, n, scheme)
     count = step.size
@@ -205,7 +193,7 @@ class _Contacts:
         return np.maximum(force, 0.0) if is_clamped else force
 
     def force_at(self, x: Array) -> Array:
-        """The force at other positions, zero where the law has no finite one."""
+        """Compute the force at other positions, zero where the law has no finite one."""
         other = copy(self)
         other.x = x
         force = other.force()
@@ -233,7 +221,7 @@ class _Contacts:
         return np.broadcast_to(value, self.x.shape)
 
     def advance(self) -> None:
-        """One step of all collisions."""
+        """Advance all collisions by a step."""
         force = self.force()
         self.u = self.next_velocity(force)
         displacement = self.step * self.u
@@ -246,7 +234,7 @@ class _Contacts:
                 self._turn(turned)
 
     def next_velocity(self, force: Array) -> Array:
-        """The velocity at the end of the step; `force` is that before it.
+        """Compute the velocity at the end of the step; `force` is that before it.
 
         The schemes of Drake take the force at the end of the step. Both forces grow with u', so that the force is
         zero at the end if and only if it is zero with u' = u. Where it is not, u' is for TAMSI the larger root of
@@ -287,29 +275,11 @@ class _Contacts:
 
     def keep(self, active: NDArray[np.bool_]) -> None:
         """Remove the collisions that have ended."""
-        for name in KEPT_ARRAYS:
-            setattr(self, name, getattr(self, name)[active])
+        for name, value in list(vars(self).items()):
+            if isinstance(value, np.ndarray):
+                setattr(self, name, value[active])
         self.params = tuple(column[active] for column in self.params)
         self.branch = tuple(column[active] for column in self.branch)
-
-
-# the arrays of `_Contacts` besides the params
-KEPT_ARRAYS = (
-    "step",
-    "x",
-    "u",
-    "limit",
-    "peak",
-    "residual",
-    "largest_force",
-    "last_force",
-    "displacement",
-    "approach_displacement",
-    "work",
-    "approach_work",
-    "rows",
-    "unloads",
-)
 
 
 def _run(contacts: _Contacts) -> FixedStepResult:

@@ -53,19 +53,14 @@ class Collision:
 
     @property
     def effective_radius(self) -> float:
-        """R* [m], of the radii that are taken where the law needs none.
-
-        Raises
-        ------
-        UsageError : two planes
-        """
+        """R* [m], of the radii that are taken where the law needs none."""
         curvature = 1.0 / self["R1"] + 1.0 / self["R2"]
         if curvature == 0.0:
             raise UsageError("R1 and R2: got inf, expected one finite radius")
         return 1.0 / curvature
 
     def script_values(self) -> dict[str, str]:
-        """The values of a script, as text with all digits; ball 1 is on the left.
+        """Write the values of a script as text with all digits; ball 1 is on the left.
 
         x1, x2 : positions of the centres, so that the surfaces meet at the origin
         R1, R2, d1, d2 : radii and diameters
@@ -73,10 +68,6 @@ class Collision:
         dt, steps, gap : as in the collision
         reach : distance from the first point of contact that no part of a ball leaves
         skin : distance within which neighbours are searched for
-
-        Raises
-        ------
-        UsageError : a wall, a plane, or an input that is not known
         """
         for name in ("m1", "m2", "R1", "R2"):
             if not math.isfinite(self[name]):
@@ -159,7 +150,7 @@ class Code:
     command: Callable[[str, str], Sequence[str]] = lambda program, file: (program, file)
 
     def script(self, collision: Collision, parameters: Parameters) -> str:
-        """The template with its lines, its parameters, the values of `Collision.script_values`, and material2.
+        """Fill the template with the lines, the parameters, `Collision.script_values`, and material2.
 
         material2 is the name of the material of ball 2 in the lines: "material1" where they make only that one.
         """

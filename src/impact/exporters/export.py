@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ from typing import Any
 from .._version import __version__
 from ..atomic import check_outputs, write_file
 from ..contact.status import Status
+from ..display import Block, Displayed
 from ..errors import UsageError
 from ..formatting import decimals, number, quantity
 from ..inverse.timestep import TimestepRow, needed_steps, time_steps, timestep_rows
@@ -29,12 +30,14 @@ STEPS_PER_CONTACT = 50.0
 ADVISED_TOL = 0.01
 # a continuous law that delivers another e than it is asked for, by more than this, is warned about
 ASKED_TOL = 0.005
+# fields of an export that its plain data begin with
+EXPORT_FIELDS = ("code", "version", "model", "scheme", "e", "e_continuous", "contact_time")
 # the longest line of a comment
 MAX_COMMENT = 1000
 
 
 @dataclass(frozen=True)
-class Export:
+class Export(Displayed):
     """A law as a code takes it.
 
     Parameters
@@ -77,6 +80,38 @@ class Export:
         if self.script is not None:
             return self.script
         return "\n".join([*comment_lines(self.header, *self.comment), *self.lines]) + "\n"
+
+    def as_dict(self) -> dict[str, Any]:
+        """The result as plain data; numbers that do not apply are NaN."""
+        row = self.at_dt
+        data: dict[str, Any] = {
+            **{name: getattr(self, name) for name in EXPORT_FIELDS},
+            "e_at_dt": {"dt": row.dt, "mean": row.e_mean, "least": row.e_least, "largest": row.e_largest},
+            "e_to_ask": row.e_to_ask,
+            "parameters": dict(self.parameters),
+            "lines": list(self.lines),
+            "header": list(self.header),
+            "warnings": list(self.warnings),
+        }
+        if self.script is not None:
+            data["script"] = self.script
+        if self.verification is not None:
+            data["verification"] = self.verification.as_dict()
+        return data
+
+    def records(self) -> Sequence[Mapping[str, Any]]:
+        """The parameters of the code."""
+        return [{"parameter": name, "value": value} for name, value in self.parameters.items()]
+
+    def sections(self, width: int) -> Iterator[Block]:
+        """What the code delivers and what was predicted; the text where no script was run."""
+        if self.verification is None:
+            yield from self.text.splitlines()
+            return
+        steps = number(self.at_dt.steps_per_contact)
+        yield f"{self.code} {self.version}, {self.model}, {steps} steps per contact"
+        yield ""
+        yield from self.verification.sections(width)
 
 
 def comment_lines(lines: Iterable[str], begin: str = "# ", end: str = "") -> list[str]:

@@ -62,7 +62,7 @@ class ExportProblem:
         return self.law.e if self.law.has_e else self.e_continuous
 
     def collision(self, dt: float, phase: float) -> Collision:
-        """The collision whose contact begins at a phase of a step dt [s]."""
+        """Make the collision whose contact begins at a phase of a step dt [s]."""
         values = input_values(self.law.impact)
         for name in ("R1", "R2"):
             if math.isnan(values[name]):
@@ -98,13 +98,7 @@ def prepare_export(
     at: Mapping[str, float | str],
     overrides: Sequence[str],
 ) -> ExportProblem:
-    """Choose the law, and reduce the source to one impact; the damping of a law without e is solved for.
-
-    Raises
-    ------
-    UsageError : the code has no such law, or no damping gives the e
-    ConfigError : an input is not allowed
-    """
+    """Choose the law, and reduce the source to one impact; the damping of a law without e is solved for."""
     plugins, missing = Plugins(()), ""
     point_source = open_source(source, overrides, plugins)
     if model is not None:

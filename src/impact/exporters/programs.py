@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -48,6 +49,16 @@ def output_of(command: Sequence[str]) -> str:
             return ""
 
 
+def printed_version(option: str, pattern: str) -> Callable[[str], str | None]:
+    """Make a function that searches the version of a program, the first group of a pattern, in what it prints."""
+
+    def version_of(program: str) -> str | None:
+        match = re.search(pattern, output_of([program, option]))
+        return match[1] if match else None
+
+    return version_of
+
+
 def python_package_version(package: str) -> Callable[[str], str | None]:
     """Make a function that asks a Python interpreter for the version of a package."""
 
@@ -67,10 +78,6 @@ def run_program(command: Sequence[str], folder: str, timeout_s: float) -> subpro
     """Run a command in a folder, without input, and return the end of what it prints.
 
     Its output goes through files, whose size is watched, so that it takes no memory.
-
-    Raises
-    ------
-    OSError, subprocess.SubprocessError : it cannot be started, takes longer, or prints more than MAX_OUTPUT_BYTES
     """
     deadline = time.monotonic() + timeout_s
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:

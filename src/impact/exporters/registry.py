@@ -42,12 +42,7 @@ CODES: dict[str, Code] = {
 
 
 def find_code(name: str) -> Code:
-    """Find a code by its name.
-
-    Raises
-    ------
-    UsageError : there is none of this name
-    """
+    """Find a code by its name."""
     if name not in CODES:
         raise UsageError(f'--to: no code "{name}"; {did_you_mean(name, list(CODES))}')
     return CODES[name]

@@ -16,17 +16,7 @@ RELEASE = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+() -]{0,49}")
 
 
 def read_release(code: Code, text: str, origin: str) -> str:
-    """Read a version into the form in which versions are compared, and that is safe in a comment of any code.
-
-    Parameters
-    ----------
-    text : as the user or the program writes it
-    origin : what the message about a wrong text begins with
-
-    Raises
-    ------
-    UsageError : it is not a release
-    """
+    """Read a version into the form in which versions are compared, and that is safe in a comment of any code."""
     try:
         if RELEASE.fullmatch(text) is None:
             raise UsageError(f'got "{text}", expected a release, such as {code.newest}')
@@ -52,17 +42,7 @@ def _version_of(code: Code, program: str) -> str | None:
 def choose_version(
     code: Code, program: str | None, version: str | None, *, verify: bool
 ) -> tuple[str | None, str]:
-    """Choose the program that runs scripts, None if there is none, and the version that lines are written for.
-
-    Parameters
-    ----------
-    program, version : as the user gives them
-    verify : whether scripts are to be run
-
-    Raises
-    ------
-    UsageError : scripts are to be run, and the code is not installed or has another version
-    """
+    """Choose the program that runs scripts, None if there is none, and the version that lines are written for."""
     if version is not None:
         version = read_release(code, version, "--code-version")
         if not verify:
@@ -83,14 +63,6 @@ def choose_version(
 def law_of_code(code: Code, model: str, version: str) -> str:
     """Find the key of a code's law for a key of the catalogue, in a version of the code.
 
-    Parameters
-    ----------
-    model : a law of the code, or one of the catalogue that it has under a name of its own
-
-    Raises
-    ------
-    UsageError : the code, or this version of it, has no such law
-
     >>> from impact.exporters.registry import find_code
     >>> law_of_code(find_code("lammps"), "tsuji-1992", "20250722")
     'lammps-coeff-restitution-hertz'
@@ -105,10 +77,6 @@ def law_of_code(code: Code, model: str, version: str) -> str:
 
 def first_law(code: Code, models: Sequence[str], version: str) -> str:
     """Find the law of a code for the first of some models that a version of it has.
-
-    Raises
-    ------
-    UsageError : the code, or this version of it, has none of them
 
     >>> from impact.exporters.registry import find_code
     >>> lammps = find_code("lammps")

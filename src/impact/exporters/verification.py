@@ -6,14 +6,17 @@ import math
 import re
 import subprocess
 import tempfile
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..array_types import Array
+from ..display import Block, Displayed, Table
 from ..errors import UsageError
-from ..formatting import number, quantity
+from ..formatting import decimals, number, quantity
 from .code import Code
 from .problem import ExportProblem
 from .programs import run_program
@@ -26,7 +29,7 @@ FLOOR = 1e-7
 
 
 @dataclass(frozen=True)
-class Verification:
+class Verification(Displayed):
     """What a code delivers, next to what is predicted.
 
     Parameters
@@ -44,6 +47,38 @@ class Verification:
     measured: tuple[float, ...]
     predicted: tuple[float, ...]
     uncertainty: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """The comparison as plain data."""
+        return {
+            "program": self.program,
+            "agrees": self.agrees,
+            "uncertainty": self.uncertainty,
+            "rows": self.records(),
+        }
+
+    def records(self) -> Sequence[Mapping[str, Any]]:
+        """A row for each time step and phase."""
+        columns = zip(self.dt, self.phases, self.measured, self.predicted, strict=True)
+        return [dict(zip(("dt", "phase", "measured", "predicted"), row, strict=True)) for row in columns]
+
+    def sections(self, width: int) -> Iterator[Block]:
+        """A row for each time step and phase, and whether the code agrees."""
+        rows = [
+            (
+                number(row["dt"]),
+                number(row["phase"]),
+                decimals(row["measured"], 12),
+                decimals(row["predicted"], 12),
+                number(row["measured"] - row["predicted"], 2),
+            )
+            for row in self.records()
+        ]
+        yield Table(rows, ("dt [s]", "phase", "measured", "predicted", "difference"), text=(0,))
+        yield ""
+        word = "agrees" if self.agrees else "DIFFERS"
+        largest = self.not_numbers or f"largest difference {number(self.difference, 2)}"
+        yield f"{word}: {largest}, uncertainty {number(self.uncertainty, 2)}"
 
     @property
     def difference(self) -> float:
@@ -67,12 +102,7 @@ class Verification:
 
 
 def run_script(code: Code, program: str, script: str) -> float:
-    """Run a script in an empty folder, and return the restitution that it prints.
-
-    Raises
-    ------
-    UsageError : it fails, or prints no restitution last
-    """
+    """Run a script in an empty folder, and return the restitution that it prints."""
     with tempfile.TemporaryDirectory(prefix="impact-export-") as folder:
         file = f"two_balls{code.suffix}"
         Path(folder, file).write_text(script, encoding="utf-8")
@@ -104,10 +134,6 @@ def verify_scripts(problem: ExportProblem, program: str, dt: float) -> Verificat
     zero, and compared with the continuous law. The uncertainty is then the difference of the extrapolations from
     dt and dt/2, and from dt/2 and dt/4, and half the spread over the phases at dt/4. Where a script measures no
     number, nothing is extrapolated.
-
-    Raises
-    ------
-    UsageError : a script fails
     """
     code = problem.code
     phases = (np.arange(PHASES) + 0.5) / PHASES

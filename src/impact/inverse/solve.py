@@ -31,7 +31,8 @@ from ..contact.units import with_numbers
 from ..contact.variables import OUTPUTS
 from ..display import Block, Displayed
 from ..engine.build_impacts import build_impacts
-from ..engine.plan import Inputs, Plan
+from ..engine.inputs import Inputs
+from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..errors import UsageError, did_you_mean
 from ..formatting import number, quantity
@@ -113,7 +114,7 @@ class SolveResult(Displayed):
         """The conditions of a range of inputs; without one the roots."""
         return self.over if self.over is not None else [asdict(root) for root in self.roots]
 
-    def blocks(self, width: int) -> Iterator[Block]:
+    def sections(self, width: int) -> Iterator[Block]:
         """A line for each root, or the range that can be attained."""
         ((variable, value),) = self.target.items()
         target = f"{variable} = {number(value)}"

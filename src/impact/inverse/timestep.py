@@ -135,7 +135,7 @@ class TimestepResult(Displayed):
         """The rows, one for each step."""
         return [asdict(row) for row in self.rows]
 
-    def blocks(self, width: int) -> Iterator[Block]:
+    def sections(self, width: int) -> Iterator[Block]:
         """The continuous law, a row for each step, the steps that fail, and the number of steps needed."""
         e = f"e = {number(self.e)}, " if self.e == self.e else ""
         contact_time = quantity(self.contact_time, "s")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,18 +13,16 @@ from ..errors import UsageError, did_you_mean
 from ..formatting import decimals
 from ..results.calibration import calibration_title, fit_status
 from ..results.kinds import is_calibration
-from ..results.schema import plain_unit
 from ..text import safe_text
-from .curves import Curve, CurveData, Panel, model_label
+from .curves import Curve, CurveData, Panel, x_axis_fields
 from .data import SIGMA, Points
-from .labels import words_of
+from .kinds import Choice, Kind
+from .labels import model_label
 from .slices import conditions_of
 from .style import is_geometric
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from .kinds import Choice
 
 # laws that are drawn unless the user names them
 MAX_LAWS = 5
@@ -35,7 +34,7 @@ RESIDUAL_HEIGHT = 0.55
 
 
 def calibration_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
-    """Measured values over the varied input, the best laws, and their residuals in standard deviations.
+    """Read measured values over the varied input, the best laws, and their residuals in standard deviations.
 
     Without an input that varies alone, the values are over their number.
 
@@ -54,16 +53,15 @@ def calibration_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
             raise UsageError(f'no model "{key}" in this calibration; {did_you_mean(key, keys)}')
     shown = [key for key in keys if key in choice.models] if choice.models else keys[:MAX_LAWS]
     not_drawn = tuple(f"{key}, rank {keys.index(key) + 1}" for key in keys if key not in shown)
-    data = dataset.load().sel(model=shown)
-    best = float(dataset["aicc"][0])
+    # a difference between the best law and others; a law alone has none
+    data = dataset.load().assign(difference=dataset["aicc"] - float(dataset["aicc"][0])).sel(model=shown)
     varied = str(dataset.attrs.get("varied", ""))
     panels: list[Panel] = []
     points: list[Points] = []
     for name in dict.fromkeys(map(str, data["output"].values)):
-        of_output = data.isel(point=np.flatnonzero(data["output"].values == name))
-        for panel, measured in _panels(of_output, name, varied, choice, best):
-            panels.append(panel)
-            points.append(measured)
+        output_data = data.isel(point=np.flatnonzero(data["output"].values == name))
+        panels += _panels(output_data, name, varied, choice)
+        points += [_measured_points(output_data, name, varied or "point"), Points("", {})]
     title = safe_text(calibration_title(dataset), 140)
     conditions = conditions_of(data.drop_vars(["grid", varied], errors="ignore").isel(point=0), "grid")
     return CurveData(
@@ -71,74 +69,81 @@ def calibration_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     )
 
 
-def _panels(data: xr.Dataset, name: str, varied: str, choice: Choice, best: float) -> list[tuple[Panel, Points]]:
-    """The panel of an output and that of its residuals, with the measured points of each.
-
-    Parameters
-    ----------
-    data : the laws that are drawn, at the points of the output
-    name : of the output
-    varied : the input of the curves; "" for none
-    choice : see `calibration_curves`
-    best : AICc of the best law
-    """
-    x_name = varied or "point"
-    x, measured = (np.asarray(data[key].values, float) for key in (x_name, "measured"))
-    sigma = np.asarray(data[SIGMA].values, float)
+def _panels(data: xr.Dataset, name: str, varied: str, choice: Choice) -> tuple[Panel, Panel]:
+    """Draw an output of some laws over the varied input, "" for none, and the residuals."""
+    x = np.asarray(data[varied or "point"].values, float)
     grid = np.asarray(data["grid"].values, float) if varied else x
-    output = OUTPUTS[name]
     curves, residuals = [], []
     for index, key in enumerate(map(str, data["model"].values)):
         law = data.isel(model=index)
-        status = fit_status(law)
-        # a difference between the best law and others; a law alone has none
-        difference = float(law["aicc"]) - best
-        remark = status.replace("_", " ")
-        if status in ("ok", "at_limit"):
-            remark = f"ΔAICc = {decimals(difference, 1)}" if np.isfinite(difference) else ""
-        label = ", ".join(filter(None, (model_label(law, numbered=choice.equations), remark)))
+        label = ", ".join(filter(None, (model_label(law, numbered=choice.equations), _remark(law))))
         if varied:
-            of_law = law.sel(output_name=name)
-            y, least, largest = (of_law[key].values.tolist() for key in ("curve", "curve_lower", "curve_upper"))
+            ends = law.sel(output_name=name)
+            y, least, largest = (ends[key].values.tolist() for key in ("curve", "curve_lower", "curve_upper"))
         else:
             y, least, largest = law["predicted"].values.tolist(), [], []
-        has_band = bool(np.isfinite(least).all()) and bool(least)
-        curves.append(
-            Curve(
-                label, key, tuple(grid.tolist()), tuple(y), variable=name,
-                least=tuple(least) if has_band else (), largest=tuple(largest) if has_band else (),
-            )
-        )  # fmt: skip
-        deviation = _deviation(law, sigma)
-        scaled = (law["residual"].values / deviation).tolist()
-        residuals.append(Curve(label, key, tuple(x.tolist()), tuple(scaled), variable=f"{name}_residual"))
-    axis: dict[str, Any] = {
-        "x_name": x_name,
-        "x_label": words_of(data[x_name].attrs, x_name),
-        "x_unit": safe_text(plain_unit(str(data[x_name].attrs.get("units", "1")))),
-        "x_log": is_geometric(grid) if varied and not choice.log else "x" in choice.log and bool((x > 0.0).all()),
-    }
+        curve = Curve(label, key, tuple(grid.tolist()), tuple(y), variable=name)
+        if np.isfinite(least).all():
+            curve = replace(curve, least=tuple(least), largest=tuple(largest))
+        curves.append(curve)
+        scaled = law["residual"].values / _deviation(law)
+        residuals.append(Curve(label, key, tuple(x.tolist()), tuple(scaled.tolist()), variable=f"{name}_residual"))
+    axis = x_axis_fields(data[varied or "point"], choice)
+    axis["x_log"] = (
+        is_geometric(grid) if varied and not choice.log else "x" in choice.log and bool((x > 0.0).all())
+    )
     values = Panel(
-        y_label="Delivered restitution" if name == "e_out" else output.meaning.capitalize(),
+        y_label="Delivered restitution" if name == "e_out" else OUTPUTS[name].meaning.capitalize(),
         curves=tuple(curves),
-        y_unit=output.unit,
+        y_unit=OUTPUTS[name].unit,
         y_name=name,
         y_log="y" in choice.log,
         band_name=BAND_NAME,
         **axis,
     )
-    rest = Panel(
-        y_label="Residual in σ", curves=tuple(residuals), bands=(SHADED_RESIDUAL,),
-        y_name="residual", joined=False, height=RESIDUAL_HEIGHT, **axis,
-    )  # fmt: skip
-    # the error bars are those of the best law: with some noise they depend on the fit
-    columns = {x_name: x, name: measured, SIGMA: _deviation(data.isel(model=0), sigma)}
-    return [(values, Points("measured", columns)), (rest, Points("", {}))]
+    return values, Panel(
+        y_label="Residual in σ",
+        curves=tuple(residuals),
+        bands=(SHADED_RESIDUAL,),
+        y_name="residual",
+        joined=False,
+        height=RESIDUAL_HEIGHT,
+        **axis,
+    )
 
 
-def _deviation(law: xr.Dataset, sigma: Array) -> Array:
-    """The standard deviation of each point, as the noise of the calibration has it."""
+def _remark(law: xr.Dataset) -> str:
+    """Write how well a law fits, or why it does not."""
+    status, difference = fit_status(law), float(law["difference"])
+    if status not in ("ok", "at_limit"):
+        return status.replace("_", " ")
+    return f"ΔAICc = {decimals(difference, 1)}" if np.isfinite(difference) else ""
+
+
+def _measured_points(data: xr.Dataset, name: str, x_name: str) -> Points:
+    """Read the measured values; error bars that depend on the fit are those of the best law."""
+    columns: dict[str, Any] = {
+        x_name: data[x_name].values,
+        name: data["measured"].values,
+        SIGMA: _deviation(data.isel(model=0)),
+    }
+    return Points("measured", {key: tuple(np.asarray(values, float).tolist()) for key, values in columns.items()})
+
+
+def _deviation(law: xr.Dataset) -> Array:
+    """Compute the standard deviation of each point, from the noise of the calibration."""
+    sigma = np.asarray(law[SIGMA].values, float)
     known = np.where(np.isfinite(sigma), sigma, 1.0)
     scale = np.sqrt(float(law["chi2_reduced"])) if law.attrs.get("noise") == "scale" else 1.0
     deviation: Array = np.hypot(known, float(law["excess"])) * scale
     return deviation
+
+
+CALIBRATION = Kind(
+    "calibration",
+    "Measured values, the laws that fit them with their bands of 95 %, and residuals.",
+    calibration_curves,
+    lambda dataset, keys: Choice(),
+    along=(),
+    source="calibration",
+)

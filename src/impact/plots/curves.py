@@ -1,50 +1,37 @@
-"""Curves over one axis of a result: velocities, restitution and its error; their data and their drawing."""
+"""Curves over one axis: the data of a picture, their tables and their drawing."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import zip_longest
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
+import pandas as pd
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from numpy.typing import NDArray
 
 from ..errors import UsageError
-from ..formatting import heading, label as number_label
-from ..results.schema import plain_unit
-from ..text import safe_text
-from .data import MEASURED
-from .labels import REFERENCE, label_axis, law_text, pretty_conditions, symbol, words_of
-from .slices import NO_BREAK, conditions_of, is_ordered, parameter_text, read, scalars_of, take_line
+from ..formatting import heading
+from .data import MEASURED, SIGMA, Points
+from .kinds import Choice
+from .labels import label_axis, pretty_conditions, symbol, words_of
+from .slices import NO_BREAK, unit_of
 from .style import is_geometric, model_styles
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from .data import Points
-    from .kinds import Choice
-
-BAND_NAME = "Least to largest over the phase"
-FIGURE_6 = "Final velocities comparison"
-# distances from zero that are shaded, the widest first, and their colours
-BANDS = (0.05, 0.01)
+# colours of the distances from zero that are shaded, the widest first
 BAND_COLOURS = ("#ebf3f8", "#cde2ef")
-# the smallest |e_error| on a logarithmic axis: smaller ones are errors of the solver
-MIN_DRAWN_ERROR = 1e-9
 # height of a panel over the width of the picture: of a single panel, and of several below each other
 PANEL_ASPECT, STACKED_PANEL_ASPECT = 0.56, 0.36
-# the axes of a picture of fixed steps, and the message about a result without one
-STEP_AXES = ("steps_per_contact", "dt")
-NEEDS_STEPS = 'timestep needs an axis steps_per_contact or dt, with solver.integrator = "kick-drift"'
-# values of e of a picture of fixed steps
-MAX_RESTITUTIONS = 8
 # the part of a model's colour in a band, on white; and the least distance of labels, as a part of the axis
 BAND_SHADE, LABEL_DISTANCE = 0.22, 0.055
 # from this number of laws on the legend shows keys instead of titles
@@ -77,6 +64,13 @@ class Curve:
     least: tuple[float, ...] = ()
     largest: tuple[float, ...] = ()
     is_guide: bool = False
+
+    def rows_of_values(self) -> Iterator[tuple[str, tuple[float, ...]]]:
+        """Iterate over its values and the ends of its band, with a name for each end."""
+        yield "", self.y
+        if self.least:
+            yield "least", self.least
+            yield "largest", self.largest
 
 
 @dataclass(frozen=True)
@@ -125,10 +119,9 @@ class Panel:
 
 @dataclass(frozen=True)
 class CurveData:
-    """The data of a picture of curves.
+    """The data of a picture of curves, in panels one below the other.
 
-    It has a title, conditions, panels one below the other, what is not drawn, and measured points of each panel,
-    if the result has them itself.
+    `measured` has the measured points of each panel, if the result has them itself.
     """
 
     title: str
@@ -137,54 +130,11 @@ class CurveData:
     not_drawn: tuple[str, ...] = ()
     measured: tuple[Points, ...] = ()
 
-    columns = ("x_axis", "y_axis", "curve", "model", "x", "y")
+    takes_points: ClassVar[bool] = True
 
-    def rows(self) -> Iterator[tuple[str | float, ...]]:
-        """The points of all curves and the measured ones, one per row, with the columns `columns`."""
-        for panel, points in zip_longest(self.panels, self.measured):
-            axes = (
-                heading(f"{panel.x_label},", panel.x_name, panel.x_unit),
-                heading(f"{panel.y_label},", panel.y_name, panel.y_unit),
-            )
-            for curve in panel.curves:
-                name = " ".join(part for part in (curve.label, curve.end) if part)
-                name = ", ".join(part for part in (name, curve.case) if part)
-                for suffix, values in (("", curve.y), (", least", curve.least), (", largest", curve.largest)):
-                    for x, y in zip(curve.x, values, strict=bool(values)):
-                        yield (*axes, name + suffix, curve.model or "", x, y)
-            if points is not None and points.columns:
-                x_values = points.columns[panel.x_name].tolist()
-                for column, measured in points.columns.items():
-                    if column != panel.x_name:
-                        name = MEASURED if column == panel.y_name else f"{MEASURED}, {column}"
-                        for x, y in zip(x_values, measured.tolist(), strict=True):
-                            yield (*axes, name, "", x, y)
-
-    def table(self) -> dict[str, tuple[float, ...]]:
-        """The points of all curves and the measured ones, one column per curve; curves with the same x share it.
-
-        The names of the columns are ASCII: variable, model, and the unit in brackets.
-        """
-        columns: dict[str, tuple[float, ...]] = {}
-        all_curves = [(panel, curve) for panel in self.panels for curve in panel.curves]
-        is_shared = all(curve.x == all_curves[0][1].x for _, curve in all_curves)
-        for panel, curve in all_curves:
-            owner = curve.model or "reference"
-            name = " ".join(part for part in (owner, curve.case.replace(" ", "")) if part)
-            x_column = heading(panel.x_name, "" if is_shared else owner, panel.x_unit)
-            # a law may have other points in another panel, such as its residuals
-            if columns.get(x_column, curve.x) != curve.x:
-                x_column = heading(panel.x_name, f"{curve.variable} {name}", panel.x_unit)
-            columns[x_column] = curve.x
-            for suffix, values in (("", curve.y), ("_least", curve.least), ("_largest", curve.largest)):
-                if values:
-                    columns[heading(f"{curve.variable}{suffix}", name, panel.y_unit)] = values
-        for panel, points in zip(self.panels, self.measured, strict=False):
-            for column, measured in points.columns.items():
-                of = "measured" if column == panel.y_name else f"{panel.y_name} measured"
-                unit = panel.x_unit if column == panel.x_name else panel.y_unit
-                columns[heading(column, of, unit)] = tuple(measured.tolist())
-        return columns
+    @property
+    def panel_count(self) -> int:
+        return len(self.panels)
 
     @property
     def names(self) -> set[str]:
@@ -196,235 +146,132 @@ class CurveData:
             *(curve.model or "reference" for curve in all_curves),
         }
 
+    def long_table(self) -> pd.DataFrame:
+        """Make a row for each point of a curve, and for each measured point."""
+        parts: list[dict[str, Any]] = []
+        for panel, points in zip_longest(self.panels, self.measured):
+            axes = {
+                "x_axis": heading(f"{panel.x_label},", panel.x_name, panel.x_unit),
+                "y_axis": heading(f"{panel.y_label},", panel.y_name, panel.y_unit),
+            }
+            for curve in panel.curves:
+                label = " ".join(filter(None, (curve.label, curve.end)))
+                for end, values in curve.rows_of_values():
+                    name = ", ".join(filter(None, (label, curve.case, end)))
+                    parts.append({**axes, "curve": name, "model": curve.model or "", "x": curve.x, "y": values})
+            for column, values in (points.columns if points else {}).items():
+                if column != panel.x_name:
+                    name = MEASURED if column == panel.y_name else f"{MEASURED}, {column}"
+                    x = points.columns[panel.x_name]
+                    parts.append({**axes, "curve": name, "model": "", "x": x, "y": values})
+        return pd.concat(map(pd.DataFrame, parts), ignore_index=True)
 
-def velocity_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
-    """Figure 6 of the paper: post-impact velocities of every model and of the impulse-momentum solution.
+    def wide_table(self) -> pd.DataFrame:
+        """Make a column for each curve and for measured points; curves with the same x share it."""
+        columns: dict[str, Sequence[float]] = {}
+        all_curves = [(panel, curve) for panel in self.panels for curve in panel.curves]
+        is_shared = all(curve.x == all_curves[0][1].x for _, curve in all_curves)
+        for panel, curve in all_curves:
+            owner = curve.model or "reference"
+            name = " ".join(filter(None, (owner, curve.case.replace(" ", ""))))
+            x_column = heading(panel.x_name, "" if is_shared else owner, panel.x_unit)
+            # a law may have other points in another panel, such as its residuals
+            if columns.get(x_column, curve.x) != curve.x:
+                x_column = heading(panel.x_name, f"{curve.variable} {name}", panel.x_unit)
+            columns[x_column] = curve.x
+            for end, values in curve.rows_of_values():
+                variable = "_".join(filter(None, (curve.variable, end)))
+                columns[heading(variable, name, panel.y_unit)] = values
+        for panel, points in zip(self.panels, self.measured, strict=False):
+            for column, values in points.columns.items():
+                owner = "measured" if column == panel.y_name else f"{panel.y_name} measured"
+                columns[heading(column, owner, panel.x_unit if column == panel.x_name else panel.y_unit)] = values
+        return pd.DataFrame({name: pd.Series(values) for name, values in columns.items()})
 
-    Parameters
-    ----------
-    dataset : a result
-    choice : which part of it; an x whose values are spaced evenly in their logarithm has a logarithmic axis
+    def place_panels(self, figure: Figure, width: float) -> tuple[list[Axes], float]:
+        """Place panels below each other."""
+        heights = [panel.height for panel in self.panels]
+        count = self.panel_count
+        all_axes = figure.subplots(count, sharex=count > 1, squeeze=False, height_ratios=heights)
+        aspect = PANEL_ASPECT if count == 1 else STACKED_PANEL_ASPECT
+        return list(all_axes.ravel()), sum(heights) * width * aspect + 0.3
 
-    Raises
-    ------
-    UsageError : the result does not contain what `choice` selects
-    """
-    line = _take_line(dataset, choice, "v1_post", "v2_post", "v1_reference", "v2_reference")
-    reference = f"{REFERENCE} (6), (7)" if choice.equations else REFERENCE
-    references = [
-        _curve(reference, None, line, line.data[f"v{ball}_reference"], f"v{ball}_post", end)
-        for ball, end in ((1, "v₁⁺"), (2, "v₂⁺"))
-    ]
-    curves = [
-        _curve(label, key, line, of_model[f"v{ball}_post"], f"v{ball}_post", end)
-        for label, key, of_model in _split_by_model(line, choice)
-        for ball, end in ((1, "v₁⁺"), (2, "v₂⁺"))
-    ]
-    all_curves = (*_without_empty(references), *curves)
-    panel = Panel("", "Velocity after the impact", all_curves, y_unit="m/s", y_name="v_post")
-    return _curve_data(dataset, line, FIGURE_6, [panel], choice)
-
-
-def restitution_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
-    """The delivered restitution of every model beside the requested one; see `velocity_curves`."""
-    line = _take_line(dataset, choice, "e_out")
-    requested = [_curve("Requested", None, line, line.data["e"], "e")] if "e" in line.data.coords else []
-    curves = [
-        _curve(label, key, line, of_model["e_out"], "e_out")
-        for label, key, of_model in _split_by_model(line, choice)
-    ]
-    panel = Panel("", "Delivered restitution", (*_without_empty(requested), *curves), y_name="e_out")
-    return _curve_data(dataset, line, "Delivered restitution", [panel], choice)
-
-
-def error_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
-    """The error of every model's restitution, signed and absolute; see `velocity_curves`."""
-    line = _take_line(dataset, choice, "e_error")
-    errors = [(label, key, of_model["e_error"].values) for label, key, of_model in _split_by_model(line, choice)]
-    if not any(np.isfinite(values).any() for _, _, values in errors):
-        raise UsageError("this result has no error of the restitution, which needs a requested e; sweep e")
-    signed = [_curve(label, key, line, values, "e_error") for label, key, values in errors]
-    absolute = [
-        _curve(label, key, line, np.maximum(np.abs(values), MIN_DRAWN_ERROR), "abs_e_error")
-        for label, key, values in errors
-    ]
-    panels = [
-        Panel("", "Error", tuple(signed), bands=BANDS, y_name="e_error"),
-        Panel("", "Absolute error", tuple(absolute), y_log=True, bands=BANDS, y_name="abs_e_error"),
-    ]
-    return _curve_data(dataset, line, "Error of the restitution", panels, choice)
-
-
-def timestep_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
-    """The restitution at fixed steps over the step: its mean over the phase, the least and the largest.
-
-    There is a curve for each model and each requested e. For the parameters and errors see `velocity_curves`; by
-    default x is the number of steps per contact, or the step.
-    """
-    if "phase" not in dataset.coords:
-        raise UsageError(f"this result is of the continuous law; {NEEDS_STEPS}")
-    along = [name for name in STEP_AXES if name in dataset.coords and dataset[name].ndim == 1]
-    if choice.x is None and not along:
-        raise UsageError(f"this result has a single step; {NEEDS_STEPS}")
-    line = _take_line(dataset, replace(choice, x=choice.x or along[0]), "e_out", keep=("phase", "e"))
-    (x_dim,) = line.data[line.x].dims
-    phase_dims = [dim for dim in line.data["phase"].dims if dim != x_dim]
-    e_dims = [dim for dim in (line.data["e"].dims if "e" in line.data.coords else ()) if dim not in phase_dims]
-    over_e = [dim for dim in e_dims if dim != x_dim]
-    count = line.data.sizes[over_e[0]] if over_e else 1
-    if count > MAX_RESTITUTIONS:
-        raise UsageError(
-            f"got {count} values of e, expected at most {MAX_RESTITUTIONS} to draw; use --sel e=VALUE"
-        )
-    references: list[Curve] = []
-    curves: list[Curve] = []
-    for label, key, of_model in _split_by_model(line, choice):
-        of_cases = [of_model.isel({over_e[0]: number}) for number in range(count)] if over_e else [of_model]
-        delivered = [of_case["e_out"].transpose(x_dim, *phase_dims).values for of_case in of_cases]
-        delivered = [np.asarray(values, float).reshape(len(values), -1) for values in delivered]
-        # a law that does not depend on e has one curve
-        differ = any(not np.array_equal(delivered[0], values, equal_nan=True) for values in delivered)
-        for of_case, values in zip(of_cases, delivered, strict=True):
-            case = f"e = {number_label(of_case['e'].item())}" if over_e else ""
-            curve = _curve(label, key, line, values.mean(axis=1), "e_out")
-            if values.shape[1] > 1:
-                least, largest = (tuple(edge.tolist()) for edge in (values.min(axis=1), values.max(axis=1)))
-                curve = replace(curve, least=least, largest=largest)
-            if differ or not curves or curves[-1].model != key:
-                curves.append(replace(curve, case=case if differ else ""))
-            if "e" in of_case.coords and len(references) < count:
-                at_end = f"e = {number_label(of_case['e'].item())}" if of_case["e"].ndim == 0 else ""
-                guide = _curve("Requested", None, line, of_case["e"], "e")
-                references.append(replace(guide, case=at_end, is_guide=True))
-    shown = (*_without_empty(references), *curves)
-    panel = Panel("", "Delivered restitution", shown, y_name="e_out", band_name=BAND_NAME)
-    title = f"Restitution at fixed steps, {safe_text(str(dataset.attrs.get('integrator', '')), 40)}"
-    plot_data = _curve_data(dataset, line, title, [panel], choice)
-    panels = (replace(panel, x_log=panel.x_log or line.x in STEP_AXES) for panel in plot_data.panels)
-    return replace(plot_data, panels=tuple(panels))
+    def draw(
+        self, all_axes: Sequence[Axes], labels: Mapping[str, str], points: Points | None
+    ) -> list[tuple[Artist, str]]:
+        """Draw curves, and measured points over them."""
+        models = dict.fromkeys(curve.model for panel in self.panels for curve in panel.curves if curve.model)
+        styles = model_styles([model for model in models if model])
+        entries: dict[str, Artist] = {}
+        band: dict[str, Artist] = {}
+        stored = {panel: own for panel, own in zip(self.panels, self.measured, strict=False) if own.columns}
+        for axes, panel in zip(all_axes, self.panels, strict=True):
+            _draw_bands(axes, panel)
+            axes.set(xscale="log" if panel.x_log else "linear", yscale="log" if panel.y_log else "linear")
+            for curve in panel.curves:
+                chosen_name = labels.get(curve.model or "reference")
+                default_name = curve.model if curve.model and len(styles) >= MANY_LAWS else curve.label
+                name = chosen_name or pretty_conditions(default_name)
+                (line,) = axes.plot(curve.x, curve.y, label=f"_{name}", **_line_style(curve, panel, styles))
+                entries.setdefault(name, line)
+                if curve.least:
+                    band[panel.band_name] = _draw_band(axes, curve, line)
+            entries |= _draw_points(axes, panel, points) if points else {}
+            entries |= _draw_points(axes, panel, stored[panel]) if panel in stored else {}
+            # the names of marks need room at the ends of the axes
+            axes.margins(x=0.06 if panel.marks else 0.02, y=0.12 if panel.marks else None)
+            axes.autoscale_view()
+            _label_bands(axes, panel)
+            _label_axes(axes, panel, labels, last=axes is all_axes[-1] or len(all_axes) == 1)
+            for mark in panel.marks:
+                _draw_mark(axes, mark)
+            _label_curve_ends(axes, panel.curves, labels)
+            _label_guides(axes, [curve for curve in panel.curves if curve.is_guide and curve.case])
+        return [(artist, name) for name, artist in (entries | band).items()]
 
 
-@dataclass(frozen=True)
-class _Line:
-    """A line through a result: its variables in memory, the coordinate `x`, and values that are not drawn."""
-
-    data: xr.Dataset
-    x: str
-    not_drawn: tuple[str, ...]
-
-
-def _take_line(dataset: xr.Dataset, choice: Choice, *names: str, keep: Sequence[str] = ()) -> _Line:
-    """The line of a result that is drawn, with some variables in memory; `keep` as in `take_line`."""
-    line, x, not_drawn = take_line(dataset, choice.x, choice.sel, choice.models, keep)
-    missing = [name for name in names if name not in dataset]
-    if missing:
-        raise UsageError(f"this result has no {', '.join(missing)}; sweep without [output] variables, or add them")
-    return _Line(read(line, names), x, not_drawn)
-
-
-def _split_by_model(line: _Line, choice: Choice) -> Iterator[tuple[str, str, xr.Dataset]]:
-    """Label, key and part of each model of a line."""
-    for index in range(line.data.sizes["model"]):
-        of_model = line.data.isel(model=index)
-        yield model_label(of_model, numbered=choice.equations), str(of_model["model"].item()), of_model
-
-
-def model_label(of_model: xr.Dataset, *, numbered: bool = False) -> str:
-    """The title of a model of a result, with the values of its parameters."""
-    title, year, equation = (of_model[name].item() for name in ("title", "year", "equation"))
-    parameters = parameter_text(str(of_model["model"].item()), scalars_of(of_model))
-    return law_text(str(title), int(year), str(equation), parameters, numbered=numbered)
-
-
-def _curve(
-    label: str,
-    model: str | None,
-    line: _Line,
-    values: xr.DataArray | NDArray[np.float64],
-    variable: str,
-    end: str = "",
-) -> Curve:
-    x = np.asarray(line.data[line.x].values, float)
-    y = np.broadcast_to(np.asarray(values, float), x.shape)
-    return Curve(label, model, tuple(x.tolist()), tuple(y.tolist()), end, variable)
-
-
-def _without_empty(curves: list[Curve]) -> list[Curve]:
-    """The curves that have a finite value: without a requested restitution a reference has none."""
-    return [curve for curve in curves if np.isfinite(curve.y).any()]
-
-
-def _curve_data(
-    dataset: xr.Dataset, line: _Line, title: str, panels: Sequence[Panel], choice: Choice
-) -> CurveData:
-    """The data of a picture: panels with the x axis of their line, the title and the conditions."""
-    data, x = line.data, line.x
-    heading = safe_text(str(dataset.attrs.get("title", "")), 140)
-    conditions = conditions_of(data, x)
-    if heading and title != FIGURE_6:
-        heading, conditions = title, ": ".join(filter(None, (heading, conditions)))
-    values = data[x].values
-    x_axis: dict[str, Any] = {
-        "x_name": x,
-        "x_label": words_of(data[x].attrs, x),
-        "x_unit": safe_text(plain_unit(str(data[x].attrs.get("units", "1")))),
+def x_axis_fields(coordinate: xr.DataArray, choice: Choice) -> dict[str, Any]:
+    """Describe the horizontal axis of a panel along a coordinate."""
+    values = coordinate.values
+    return {
+        "x_name": str(coordinate.name),
+        "x_label": words_of(coordinate.attrs, str(coordinate.name)),
+        "x_unit": unit_of(coordinate),
         "x_log": is_geometric(values) or ("x" in choice.log and bool(np.all(values > 0.0))),
-        "joined": is_ordered(dataset, x),
     }
-    panels = [replace(panel, y_log=panel.y_log or "y" in choice.log, **x_axis) for panel in panels]
-    empty = {c.model: None for panel in panels for c in panel.curves if c.model and not np.isfinite(c.y).any()}
-    without_value = tuple(f"{key}, which has no point here" for key in empty)
-    return CurveData(heading or title, conditions, tuple(panels), (*line.not_drawn, *without_value))
 
 
-def draw_curves(
-    plot_data: CurveData, all_axes: Sequence[Axes], labels: Mapping[str, str], points: Points | None
-) -> list[tuple[Artist, str]]:
-    """Draw curves, and measured points over them.
-
-    Parameters
-    ----------
-    plot_data : the curves
-    all_axes : axes of each panel
-    labels : texts that replace those of axes, variables and laws, by name
-    points : measured points
-
-    Returns
-    -------
-    handles and names of the legend
-    """
-    models = dict.fromkeys(curve.model for panel in plot_data.panels for curve in panel.curves if curve.model)
-    styles = model_styles([model for model in models if model])
-    entries: dict[str, Artist] = {}
-    band: dict[str, Artist] = {}
-    stored = {panel: own for panel, own in zip(plot_data.panels, plot_data.measured, strict=False) if own.columns}
-    for axes, panel in zip(all_axes, plot_data.panels, strict=True):
-        _draw_bands(axes, panel)
-        axes.set(xscale="log" if panel.x_log else "linear", yscale="log" if panel.y_log else "linear")
-        for curve in panel.curves:
-            chosen_name = labels.get(curve.model or "reference")
-            default_name = curve.model if curve.model and len(styles) >= MANY_LAWS else curve.label
-            name = chosen_name or pretty_conditions(default_name)
-            (line,) = axes.plot(curve.x, curve.y, label=f"_{name}", **_line_style(curve, panel, styles))
-            entries.setdefault(name, line)
-            if curve.least:
-                band[panel.band_name] = _draw_band(axes, curve, line)
-        entries |= points.draw(axes, panel) if points else {}
-        entries |= stored[panel].draw(axes, panel) if panel in stored else {}
-        # the names of marks need room at the ends of the axes
-        axes.margins(x=0.06 if panel.marks else 0.02, y=0.12 if panel.marks else None)
-        axes.autoscale_view()
-        _label_bands(axes, panel)
-        _label_axes(axes, panel, labels, last=axes is all_axes[-1] or len(all_axes) == 1)
-        for mark in panel.marks:
-            _draw_mark(axes, mark)
-        _label_curve_ends(axes, panel.curves, labels)
-        _label_guides(axes, [curve for curve in panel.curves if curve.is_guide and curve.case])
-    return [(artist, name) for name, artist in (entries | band).items()]
+def _draw_points(axes: Axes, panel: Panel, points: Points) -> dict[str, Artist]:
+    """Draw measured points over the curves of a panel, with error bars where there is a sigma."""
+    variables = list(dict.fromkeys(curve.variable for curve in panel.curves if curve.model))
+    shown = [name for name in variables if name in points.columns]
+    if panel.x_name not in points.columns or not shown:
+        needs = f"{panel.x_name} and {' or '.join(variables)}"
+        has = ", ".join(points.columns)
+        raise UsageError(f"{points.source}: the picture shows {needs}, and the points have {has}")
+    if SIGMA in points.columns and len(shown) > 1:
+        raise UsageError(f"{points.source}: {SIGMA} of which, {' or '.join(shown)}? expected one of them")
+    artists: dict[str, Artist] = {}
+    for index, name in enumerate(shown):
+        bars = axes.errorbar(
+            points.columns[panel.x_name],
+            points.columns[name],
+            points.columns.get(SIGMA),
+            color="black",
+            zorder=3,
+            marker="o",
+            markersize=4.0,
+            linestyle="none",
+            elinewidth=0.9,
+            capsize=2.0,
+            markerfacecolor="black" if index == 0 else "white",
+        )
+        artists[MEASURED if len(shown) == 1 else f"{MEASURED} {name}"] = bars[0]
+    return artists
 
 
 def _line_style(curve: Curve, panel: Panel, styles: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """The line style of a curve: a reference is a plain line, points without an order have no line."""
+    """Choose the line style of a curve: a reference is a plain line, points without an order have no line."""
     points = len(curve.x)
     scattered: dict[str, Any] = {} if panel.joined else {"linestyle": "none"}
     if curve.is_guide:
@@ -471,6 +318,7 @@ def _label_guides(axes: Axes, guides: Sequence[Curve]) -> None:
 
 
 def _draw_bands(axes: Axes, panel: Panel) -> None:
+    """Shade the distances from zero, or draw lines at them on a logarithmic axis."""
     for band, colour in zip(panel.bands, BAND_COLOURS, strict=False):
         if panel.y_log:
             # above the line of the grid, which may be at the same value

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import Field, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
-
-import numpy as np
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 from ..config.columns import columns_of_table, read_csv
 from ..config.quantities import Quantity, as_text
@@ -23,15 +21,52 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
-
-    from .curves import Panel
-    from .kinds import PlotData
+    from matplotlib.figure import Figure
 
 # suffixes of a table, and its forms
 TABLE_SUFFIXES = (".csv", ".tex", ".parquet")
 TABLE_FORMS = ("wide", "long")
 SIGMA = "sigma"
 MEASURED = "Measured"
+
+
+class PlotData(Protocol):
+    """The data of a picture: a frozen dataclass that makes its tables and draws itself."""
+
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
+    # whether measured points can be drawn over it
+    takes_points: ClassVar[bool]
+
+    @property
+    def title(self) -> str: ...
+
+    @property
+    def conditions(self) -> str: ...
+
+    @property
+    def not_drawn(self) -> tuple[str, ...]:
+        """What is left out, and why."""
+
+    @property
+    def panel_count(self) -> int: ...
+
+    @property
+    def names(self) -> set[str]:
+        """The names whose text a user can replace: axes, variables and models."""
+
+    def long_table(self) -> pd.DataFrame:
+        """Make a tidy table: a row for each point."""
+
+    def wide_table(self) -> pd.DataFrame:
+        """Make a table with a column for each curve, whose names are ASCII and have the unit."""
+
+    def place_panels(self, figure: Figure, width: float) -> tuple[list[Axes], float]:
+        """Add the axes of all panels to a figure; also returns the height of all panels [in]."""
+
+    def draw(
+        self, all_axes: Sequence[Axes], labels: Mapping[str, str], points: Points | None
+    ) -> list[tuple[Artist, str]]:
+        """Draw the panels, with labels that replace those of names; returns handles and names of the legend."""
 
 
 def check_table(path: Path, form: str) -> None:
@@ -44,13 +79,8 @@ def check_table(path: Path, form: str) -> None:
 
 
 def encode_table(plot_data: PlotData, suffix: str, form: str = "wide") -> bytes:
-    """Write the data of a picture with all digits, except in .tex: a column per curve, or a row per point."""
-    import pandas as pd
-
-    if form == "long":
-        frame = pd.DataFrame(plot_data.rows(), columns=list(plot_data.columns))
-    else:
-        frame = pd.DataFrame({name: pd.Series(values) for name, values in plot_data.table().items()})
+    """Encode the data of a picture as a table, with all digits except in .tex."""
+    frame = plot_data.long_table() if form == "long" else plot_data.wide_table()
     if suffix == ".tex":
         text: str = frame.to_latex(index=False, escape=True, na_rep="", float_format=number)
         return text.encode()
@@ -81,35 +111,7 @@ class Points:
     """Measured points: columns in SI, by the names of inputs, variables and sigma, and where they come from."""
 
     source: str
-    columns: Mapping[str, np.ndarray]
-
-    def draw(self, axes: Axes, panel: Panel) -> dict[str, Artist]:
-        """Draw the points over the curves of a panel, with error bars if there is a sigma."""
-        variables = list(dict.fromkeys(curve.variable for curve in panel.curves if curve.model))
-        shown = [name for name in variables if name in self.columns]
-        if panel.x_name not in self.columns or not shown:
-            needs = f"{panel.x_name} and {' or '.join(variables)}"
-            has = ", ".join(self.columns)
-            raise UsageError(f"{self.source}: the picture shows {needs}, and the points have {has}")
-        if SIGMA in self.columns and len(shown) > 1:
-            raise UsageError(f"{self.source}: {SIGMA} of which, {' or '.join(shown)}? expected one of them")
-        artists: dict[str, Artist] = {}
-        for index, name in enumerate(shown):
-            bars = axes.errorbar(
-                self.columns[panel.x_name],
-                self.columns[name],
-                self.columns.get(SIGMA),
-                color="black",
-                zorder=3,
-                marker="o",
-                markersize=4.0,
-                linestyle="none",
-                elinewidth=0.9,
-                capsize=2.0,
-                markerfacecolor="black" if index == 0 else "white",
-            )
-            artists[MEASURED if len(shown) == 1 else f"{MEASURED} {name}"] = bars[0]
-        return artists
+    columns: Mapping[str, tuple[float, ...]]
 
 
 def read_points(points: str | Path | pd.DataFrame | xr.Dataset) -> Points:
@@ -122,7 +124,7 @@ def read_points(points: str | Path | pd.DataFrame | xr.Dataset) -> Points:
     quantities = _column_quantities()
     is_file = isinstance(points, str | Path)
     columns = read_csv(Path(points), quantities.__getitem__) if is_file else columns_of_table(points, "points")
-    values: dict[str, np.ndarray] = {}
+    values: dict[str, tuple[float, ...]] = {}
     variable = ""
     for name in columns.units:
         if name not in quantities:
@@ -130,7 +132,7 @@ def read_points(points: str | Path | pd.DataFrame | xr.Dataset) -> Points:
         quantity, unit = quantities[name], ""
         if name == SIGMA and variable:
             quantity, unit = replace(quantity, unit=quantities[variable].unit), columns.units[variable]
-        values[name] = np.array(columns.values(name, quantity, None, unit), float)
+        values[name] = tuple(map(float, columns.values(name, quantity, None, unit)))
         variable = name
     return Points(columns.source, values)
 

@@ -15,10 +15,10 @@ from matplotlib.lines import Line2D
 from ..comparison.verdict import VariableComparison, Verdict
 from ..errors import UsageError
 from ..formatting import number
-from ..results.schema import plain_unit
 from ..text import safe_text
 from .labels import axis_text, escape_mathtext, words_of
 from .layout import Picture
+from .slices import unit_of
 from .style import COLOURS, MARKERS, default_size, is_geometric, styled
 
 # height of a row of panels [in]
@@ -79,10 +79,9 @@ def difference_data(verdict: Verdict) -> DifferenceData:
         order = np.argsort(coordinate.values, kind="stable") if is_numeric else np.arange(coordinate.size)
         values = coordinate.values[order]
         names = () if is_numeric else tuple(safe_text(number(value), MAX_NAME_LENGTH) for value in values.tolist())
-        unit = safe_text(plain_unit(str(coordinate.attrs.get("units", "1"))))
         panels.append(
             DifferencePanel(
-                label=axis_text(words_of(coordinate.attrs, axis), axis, unit, {}),
+                label=axis_text(words_of(coordinate.attrs, axis), axis, unit_of(coordinate), {}),
                 values=tuple(values.tolist()) if is_numeric else tuple(range(len(values))),
                 names=names,
                 ratios={n: tuple(along[axis][n].values[order].tolist()) for n in shown if n in along[axis]},

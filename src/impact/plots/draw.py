@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,9 +14,8 @@ from ..contact.model import ForceModel
 from ..engine.plugins import read_plugins
 from ..errors import UsageError
 from ..results.single_impact import Impact, histories
-from . import curves, maps, uncertainty
-from .data import Points, read_points
-from .kinds import Choice, Look, default_kind, plot_data_of
+from .data import PlotData, Points, read_points
+from .kinds import STUDIES, Choice, Look, default_kind, find_kind
 from .labels import check_labels, escape_mathtext, pretty_conditions
 from .layout import Picture
 from .style import default_size, styled
@@ -24,8 +23,6 @@ from .style import default_size, styled
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
-
-    from .kinds import PlotData
 
 DEFAULT_LOOK = Look()
 
@@ -96,17 +93,20 @@ def plot(
         dataset = dataset.history
     choice = Choice(x, y, variable, sel, models, log, equations)
     look = Look(width, height, style, title, labels)
-    return draw(get_plot_data(dataset, kind or default_kind(dataset), choice, plugins), look, points, ax)
+    return draw(get_plot_data(dataset, kind or default_kind(dataset).name, choice, plugins), look, points, ax)
 
 
 def get_plot_data(
     dataset: xr.Dataset, kind: str, choice: Choice, plugins: Sequence[ForceModel | str | Path] = ()
 ) -> PlotData:
     """Get the data of a picture; see `plot`."""
-    plugin_set = read_plugins(plugins)
-    return plot_data_of(
-        kind, dataset, choice, lambda: histories(dataset, choice.models, choice.sel or {}, plugin_set)
-    )
+    plugin_set, found = read_plugins(plugins), find_kind(kind)
+    default = default_kind(dataset)
+    if default.source in STUDIES and found != default:
+        raise UsageError(f"this result has the kind {default.name}, not {kind}")
+    if found.source == "history":
+        return found.data(histories(dataset, choice.models, choice.sel or {}, plugin_set), choice)
+    return found.data(dataset, choice)
 
 
 def label_keys(plot_data: PlotData, look: Look) -> set[str]:
@@ -129,13 +129,12 @@ def draw(
     labels = look.labels or {}
     check_labels(labels, label_keys(plot_data, look))
     measured = points if points is None or isinstance(points, Points) else read_points(points)
-    if measured is not None and not isinstance(plot_data, curves.CurveData):
+    if measured is not None and not plot_data.takes_points:
         raise UsageError(f"{measured.source}: measured points are drawn over curves only")
     heading = labels.get("title", escape_mathtext(plot_data.title))
-    count = 2 if isinstance(plot_data, maps.MapData) and plot_data.closest else len(plot_data.panels)
     if ax is not None:
-        all_axes = _check_axes(ax, count)
-        entries = _draw_panels(plot_data, all_axes, labels, measured)
+        all_axes = _check_axes(ax, plot_data.panel_count)
+        entries = plot_data.draw(all_axes, labels, measured)
         if look.title:
             all_axes[0].set_title(heading)
         if entries:
@@ -148,30 +147,9 @@ def draw(
         width, height = width or default_width, height or default_height
         texts = (heading, pretty_conditions(plot_data.conditions)) if look.title else ()
         picture = Picture(width, *texts)
-        if isinstance(plot_data, curves.CurveData):
-            heights = [panel.height for panel in plot_data.panels]
-            all_axes = list(
-                picture.subplots(count, sharex=count > 1, squeeze=False, height_ratios=heights).ravel()
-            )
-            aspect = curves.PANEL_ASPECT if count == 1 else curves.STACKED_PANEL_ASPECT
-            body = sum(heights) * width * aspect + 0.3
-        elif isinstance(plot_data, uncertainty.BarData):
-            all_axes = list(picture.subplots(count, sharex=True, squeeze=False).ravel())
-            body = uncertainty.bars_height(plot_data)
-        else:
-            all_axes, body = maps.place_panels(picture, plot_data, width, count)
-        picture.add_legend(body, height, _draw_panels(plot_data, all_axes, labels, measured))
+        all_axes, panels_height = plot_data.place_panels(picture, width)
+        picture.add_legend(panels_height, height, plot_data.draw(all_axes, labels, measured))
     return picture
-
-
-def _draw_panels(
-    plot_data: PlotData, all_axes: Sequence[Axes], labels: Mapping[str, str], measured: Points | None
-) -> Any:
-    if isinstance(plot_data, curves.CurveData):
-        return curves.draw_curves(plot_data, all_axes, labels, measured)
-    if isinstance(plot_data, uncertainty.BarData):
-        return uncertainty.draw_bars(plot_data, all_axes, labels)
-    return maps.draw_maps(plot_data, all_axes, labels)
 
 
 def _check_axes(ax: Axes | Sequence[Axes], count: int) -> list[Axes]:

@@ -12,12 +12,10 @@ from ..config.grid import SAMPLE
 from ..contact.model import ForceModel
 from ..errors import UsageError
 from ..formatting import quantity
-from ..results.schema import plain_unit
 from ..text import safe_text
-from .curves import STEP_AXES
 from .draw import plot
-from .kinds import KINDS, MAP_KINDS, MOTION_KINDS, STUDY_KINDS, default_kind
-from .slices import x_axis
+from .kinds import STUDIES, default_kind, find_kind, kinds_of, source_of
+from .slices import unit_of, x_axis
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -52,9 +50,11 @@ def explore(dataset: xr.Dataset, *, plugins: Sequence[ForceModel | str | Path] =
     if "model" not in dataset.dims:
         raise UsageError("expected the result of a sweep, with models; impact.plot draws a time history")
 
-    kinds, axes = kinds_of(dataset), axes_of(dataset)
+    axes = axes_of(dataset)
     keys = [str(key) for key in dataset["model"].values]
-    kind = ipywidgets.Dropdown(options=kinds, value=default_kind(dataset), description="kind")
+    kind = ipywidgets.Dropdown(
+        options=kinds_to_offer(dataset), value=default_kind(dataset).name, description="kind"
+    )
     models = ipywidgets.SelectMultiple(options=keys, value=keys, description="models", rows=min(len(keys), 8))
     first = x_axis(dataset, None) if axes else None
     first = first if first in axes else next(iter(axes), None)
@@ -72,18 +72,18 @@ def explore(dataset: xr.Dataset, *, plugins: Sequence[ForceModel | str | Path] =
     message = ipywidgets.HTML()
 
     def update(change: object = None) -> None:
-        drawn = drawn_axes(kind.value, x.value, y.value)
-        x.disabled, y.disabled = x.value not in drawn, y.value not in drawn or kind.value not in MAP_KINDS
+        found = find_kind(kind.value)
+        drawn = found.inputs_along(x.value, y.value)
+        x.disabled, y.disabled = "x" not in found.along, "y" not in found.along
         for name, slider in sliders.items():
             slider.disabled = name in drawn
         sel = {name: slider.value for name, slider in sliders.items() if name not in drawn}
-        along_x, along_y, *_ = (None, None) if kind.value == "timestep" else (*drawn, None, None)
         try:
             figure = plot(
                 dataset,
                 kind=kind.value,
-                x=along_x,
-                y=along_y,
+                x=None if x.disabled else x.value,
+                y=None if y.disabled else y.value,
                 sel=sel,
                 models=list(models.value),
                 plugins=plugins,
@@ -102,50 +102,30 @@ def explore(dataset: xr.Dataset, *, plugins: Sequence[ForceModel | str | Path] =
     return ipywidgets.VBox([ipywidgets.HBox([ipywidgets.VBox(controls), picture]), message])
 
 
-def kinds_of(dataset: xr.Dataset) -> list[str]:
-    """The kinds of pictures of a result.
+def kinds_to_offer(dataset: xr.Dataset) -> list[str]:
+    """List the kinds of picture that apply to a result.
 
     >>> import impact
-    >>> kinds_of(impact.sweep("configs/figure6.toml"))[:3]
-    ['final-velocities', 'restitution', 'error']
+    >>> kinds_to_offer(impact.sweep("configs/figure6.toml"))
+    ['final-velocities', 'restitution', 'error', 'loop', 'history', 'impulse']
     """
-    default = default_kind(dataset)
-    if default in STUDY_KINDS:
-        return [default]
-    left_out = {*STUDY_KINDS}
-    if SAMPLE not in dataset.dims:
-        left_out.add("uncertainty")
-    if "phase" not in dataset.coords:
-        left_out.add("timestep")
-    return [kind for kind in KINDS if kind not in left_out]
+    # a kind may apply to one model alone, such as a map over one of its parameters
+    one_key = [str(key) for key in dataset["model"].values[:1]]
+    return [kind.name for kind in kinds_of(dataset) if kind.default(dataset, one_key) is not None]
 
 
 def axes_of(dataset: xr.Dataset) -> list[str]:
-    """The axes with values to select: not the samples, and none of a calibration or a sensitivity study.
+    """List the axes with values to select: not the samples, and none of a calibration or a sensitivity study.
 
     >>> import impact
     >>> axes_of(impact.sweep("configs/figure6.toml"))
     ['e']
     """
-    if default_kind(dataset) in STUDY_KINDS:
+    if source_of(dataset) in STUDIES:
         return []
     return [str(dim) for dim in dataset.dims if dim not in ("model", SAMPLE) and dim in dataset.coords]
 
 
-def drawn_axes(kind: str, x: str | None, y: str | None) -> tuple[str, ...]:
-    """The axes along which a kind of picture draws; the others have a value.
-
-    >>> drawn_axes("loop", "e", "m2"), drawn_axes("error", "e", "m2"), drawn_axes("map", "e", "m2")
-    ((), ('e',), ('e', 'm2'))
-    """
-    if kind in MOTION_KINDS or x is None:
-        return ()
-    if kind == "timestep":
-        return (*STEP_AXES, "phase", "e")
-    return (x, y) if kind in MAP_KINDS and y is not None else (x,)
-
-
 def _shown_values(coordinate: xr.DataArray) -> list[tuple[str, Any]]:
-    """Texts and values of the positions of an axis."""
-    unit = plain_unit(str(coordinate.attrs.get("units", "1")))
-    return [(safe_text(quantity(value, unit)), value) for value in coordinate.values.tolist()]
+    """List the texts and values of the positions of an axis."""
+    return [(safe_text(quantity(value, unit_of(coordinate))), value) for value in coordinate.values.tolist()]

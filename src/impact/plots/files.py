@@ -12,16 +12,14 @@ from ..atomic import check_outputs, write_file
 from ..contact.model import ForceModel
 from ..errors import UsageError
 from ..results.xarray_backend import load
-from .data import check_table, encode_table, read_points
+from .data import PlotData, check_table, encode_table, read_points
 from .draw import draw, get_plot_data, label_keys
-from .kinds import MOTION_KINDS, Choice, Look, check_kind, default_kind
+from .kinds import Choice, Look, check_kind, default_kind, find_kind
 from .labels import check_labels
 from .style import check_picture, save_figure
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from .kinds import PlotData
 
 Plugins = Sequence[ForceModel | str | Path]
 
@@ -105,7 +103,7 @@ def plot_to_files(
     check_outputs(targets, [result, points], overwrite=overwrite)
     measured = None if points is None else read_points(points)
     dataset = load(result)
-    kinds = kinds or [default_kind(dataset)]
+    kinds = kinds or [default_kind(dataset).name]
     plot_data, left_out = _read_kinds(kinds, dataset, choice, plugins)
     if plot_data:
         check_labels(look.labels or {}, set().union(*(label_keys(shown, look) for shown in plot_data.values())))
@@ -149,7 +147,10 @@ def _read_kinds(
         except UsageError as error:
             reasons[kind] = str(error)
     if plot_data and choice.sel:
-        for kind in reasons.keys() - {*MOTION_KINDS}:
+        for kind in reasons:
+            # a motion is at the selected point
+            if find_kind(kind).source == "history":
+                continue
             with suppress(UsageError):
                 plot_data[kind] = _over_selected_axes(kind, dataset, choice, plugins)
     return (

@@ -1,6 +1,7 @@
-"""The kinds of picture: what each shows, its data, and its drawing.
+"""The kinds of picture: their names, what a user may choose of one, and the record that describes it.
 
-The command line reads the names of the kinds at every start, so this module imports matplotlib only to draw.
+The command line reads the names at every start, so the module of a kind, which loads matplotlib, is imported when
+the kind is needed.
 """
 
 from __future__ import annotations
@@ -8,40 +9,34 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 from ..errors import UsageError, did_you_mean
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from .curves import CurveData
-    from .maps import MapData
-    from .uncertainty import BarData
+    from .data import PlotData
 
-    PlotData: TypeAlias = CurveData | MapData | BarData
-
+# the module of each kind
 KINDS = {
-    "final-velocities": "velocities after the impact and the impulse-momentum solution, Figure 6 of the paper",
-    "restitution": "delivered over requested restitution",
-    "error": "error of the restitution, signed and absolute",
-    "timestep": "restitution at fixed steps: mean, least and largest over the phase",
-    "map": "a variable over two axes, a panel for each model",
-    "validity": "model with the smallest error over two axes, and that error",
-    "loop": "force over indentation",
-    "history": "indentation, its rate and the force over time",
-    "impulse": "velocities over the impulse",
-    "calibration": "measured values, the laws that fit them with their bands, and residuals",
-    "uncertainty": "an output of uncertain inputs over an axis: median, and 5 to 95 % of the samples",
-    "sensitivity": "which uncertain input matters: first-order and total Sobol indices",
+    "final-velocities": "restitution",
+    "restitution": "restitution",
+    "error": "restitution",
+    "timestep": "restitution",
+    "map": "maps",
+    "validity": "maps",
+    "loop": "motions",
+    "history": "motions",
+    "impulse": "motions",
+    "calibration": "calibrations",
+    "uncertainty": "uncertainty",
+    "sensitivity": "sensitivity",
 }
-# kinds that show the motion at one point, which --sel selects
-MOTION_KINDS = ("loop", "history", "impulse")
-# kinds over two axes
-MAP_KINDS = ("map", "validity")
-# results of these kinds have no other picture
-STUDY_KINDS = ("calibration", "sensitivity")
+# sources, see `source_of`, that have a picture of their own and no other
+STUDIES = ("calibration", "sensitivity study")
 # width of one and of two columns of a journal [in]
 WIDTHS = {"single": 3.5, "double": 7.1}
 LOG_AXES = ("x", "y", "xy")
@@ -97,6 +92,39 @@ class Look:
         return length(self.width, "--width"), length(self.height, "--height")
 
 
+@dataclass(frozen=True)
+class Kind:
+    """A kind of picture. It is a constant of its module, with its name in capitals.
+
+    Parameters
+    ----------
+    caption : what the picture shows, as a sentence
+    data : computes the data of the picture from a result, or, for the source "history", from the time histories of
+        one impact
+    default : chooses what a report shows of a result, for some keys of models; None if the kind does not apply
+    along : the inputs that it draws along; "x" and "y" are those of the choice
+    source : what it shows, see `source_of`; the first kind in KINDS of a source is the default of that source
+    in_report : whether a report has a figure of it
+    """
+
+    name: str
+    caption: str
+    data: Callable[[Any, Choice], PlotData]
+    default: Callable[[xr.Dataset, Sequence[str]], Choice | None]
+    along: tuple[str, ...] = ("x",)
+    source: str = "sweep"
+    in_report: bool = True
+
+    def inputs_along(self, x: str | None, y: str | None) -> tuple[str, ...]:
+        """List the inputs that it draws along; others have a value.
+
+        >>> [find_kind(name).inputs_along("e", "m2") for name in ("loop", "error", "map")]
+        [(), ('e',), ('e', 'm2')]
+        """
+        inputs = ({"x": x, "y": y}.get(name, name) for name in self.along)
+        return tuple(name for name in inputs if name is not None)
+
+
 def length(size: str | float | None, option: str) -> float | None:
     """A size of a picture in inches: a number of them, a length with its unit, or the name of a journal's width.
 
@@ -118,60 +146,36 @@ def length(size: str | float | None, option: str) -> float | None:
     return float(inches)
 
 
-def check_kind(kind: str) -> None:
-    """Raise a UsageError, which names the nearest kind, if there is no such kind of picture."""
-    if kind not in KINDS:
-        raise UsageError(f'--kind: no kind "{kind}"; {did_you_mean(kind, list(KINDS))}')
+def check_kind(name: str) -> None:
+    """Raise a UsageError that suggests the nearest kind, if there is no such kind of picture."""
+    if name not in KINDS:
+        raise UsageError(f'--kind: no kind "{name}"; {did_you_mean(name, list(KINDS))}')
 
 
-def default_kind(dataset: xr.Dataset) -> str:
-    """The kind of picture that shows what a dataset is for."""
+def find_kind(name: str) -> Kind:
+    """Find a kind of picture by its name."""
+    check_kind(name)
+    module = import_module(f".{KINDS[name]}", __package__)
+    kind: Kind = getattr(module, name.upper().replace("-", "_"))
+    return kind
+
+
+def source_of(dataset: xr.Dataset) -> str:
+    """Tell what a dataset holds: its kind, see `impact.results.kinds`, or "samples" of uncertain inputs."""
     from ..config.grid import SAMPLE
-    from ..results.kinds import is_calibration, is_sensitivity
+    from ..results.kinds import kind_of
 
-    if "t" in dataset.dims:
-        return "loop"
-    if is_calibration(dataset):
-        return "calibration"
-    if is_sensitivity(dataset):
-        return "sensitivity"
-    return "uncertainty" if SAMPLE in dataset.dims else "final-velocities"
+    source = kind_of(dataset)
+    return "samples" if source == "sweep" and SAMPLE in dataset.dims else source
 
 
-def plot_data_of(
-    kind: str, dataset: xr.Dataset, choice: Choice, histories: Callable[[], Sequence[xr.Dataset]]
-) -> PlotData:
-    """The data of a picture.
+def default_kind(dataset: xr.Dataset) -> Kind:
+    """Find the kind of picture that shows what a dataset is for."""
+    return next(kind for kind in map(find_kind, KINDS) if kind.source == source_of(dataset))
 
-    Parameters
-    ----------
-    kind : one of KINDS
-    dataset : a result, or a time history
-    choice : which part of it
-    histories : integrates the chosen point again with each model, and returns the time histories
 
-    Raises
-    ------
-    UsageError : there is no such kind, or the result does not contain what it needs
-    """
-    check_kind(kind)
-    from . import calibrations, curves, maps, uncertainty
-    from .motions import MOTIONS
-
-    default = default_kind(dataset)
-    if default in STUDY_KINDS and kind != default:
-        raise UsageError(f"this result has the kind {default}, not {kind}")
-    if kind in MOTIONS:
-        return MOTIONS[kind](histories(), equations=choice.equations)
-    functions: dict[str, Callable[[xr.Dataset, Choice], PlotData]] = {
-        "final-velocities": curves.velocity_curves,
-        "restitution": curves.restitution_curves,
-        "error": curves.error_curves,
-        "timestep": curves.timestep_curves,
-        "map": maps.field_map,
-        "validity": maps.validity_map,
-        "calibration": calibrations.calibration_curves,
-        "uncertainty": uncertainty.uncertainty_curves,
-        "sensitivity": uncertainty.sensitivity_bars,
-    }
-    return functions[kind](dataset, choice)
+def kinds_of(dataset: xr.Dataset) -> list[Kind]:
+    """List the kinds of picture that may show a dataset."""
+    source = source_of(dataset)
+    sources = (source,) if source in STUDIES else ("sweep", "history", source)
+    return [kind for kind in map(find_kind, KINDS) if kind.source in sources]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Mapping
 from functools import cache
+from typing import TYPE_CHECKING
 
 from matplotlib.axis import Axis
 from matplotlib.mathtext import MathTextParser
@@ -15,7 +16,10 @@ from ..contact.variables import HISTORY, OUTPUTS
 from ..errors import UsageError
 from ..formatting import scaled_unit, typographic
 from ..text import safe_text, with_year
-from .slices import NO_BREAK
+from .slices import NO_BREAK, parameter_text, scalars_of
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 GREEK = frozenset(
     [
@@ -58,7 +62,7 @@ REFERENCE = "Impulse-momentum"
 
 @cache
 def symbol(name: str) -> str:
-    r"""A variable as mathtext; empty where its name is not a letter.
+    r"""Write a variable as mathtext; empty if its name is not a letter.
 
     >>> symbol("v1"), symbol("e_out"), symbol("tau_c"), symbol("contact_time"), symbol("maw.gamma")
     ('$v_1$', '$e_\\mathrm{out}$', '$\\tau_c$', '', '$\\gamma$')
@@ -74,23 +78,12 @@ def symbol(name: str) -> str:
 
 
 def escape_mathtext(text: str) -> str:
-    """Text of a file or a user, escaped so that matplotlib shows it unchanged."""
+    """Escape text of a file or a user so that matplotlib shows it unchanged."""
     return text.replace("$", r"\$")
 
 
 def check_labels(labels: Mapping[str, str], shown: Collection[str]) -> None:
-    """Check the labels that a user chose for names of a picture.
-
-    Parameters
-    ----------
-    labels : texts, which may have mathtext, by the name of an axis or a variable, the key of a law, "reference" or
-        "title"
-    shown : the names in the picture, or in one of several
-
-    Raises
-    ------
-    UsageError : there is no such name, or a text is not valid mathtext
-    """
+    """Raise a UsageError if a label is for a name that is not shown, or is not valid mathtext."""
     for key, text in labels.items():
         if key not in shown:
             known = ", ".join(sorted(shown))
@@ -103,7 +96,7 @@ def check_labels(labels: Mapping[str, str], shown: Collection[str]) -> None:
 
 
 def axis_text(meaning: str, name: str, unit: str, labels: Mapping[str, str]) -> str:
-    """The label of an axis: words, symbol and unit, of which the last two stay together."""
+    """Write the label of an axis: words, symbol and unit, of which the last two stay together."""
     if name in labels:
         meaning, letter = labels[name], ""
     else:
@@ -113,12 +106,12 @@ def axis_text(meaning: str, name: str, unit: str, labels: Mapping[str, str]) -> 
 
 
 def words_of(attributes: Mapping[object, object], name: str) -> str:
-    """The meaning of a variable in words, up to a semicolon."""
+    """Read the meaning of a variable in words, up to a semicolon."""
     return safe_text(str(attributes.get("long_name") or name).partition(";")[0])
 
 
 def pretty(text: str) -> str:
-    r"""Units and numbers in print notation.
+    r"""Write units and numbers in print notation.
 
     >>> pretty("6e+09 N/m^1.5")
     '6·10⁹ N/m$^{1.5}$'
@@ -130,7 +123,7 @@ def pretty(text: str) -> str:
 
 
 def pretty_conditions(text: str) -> str:
-    """Conditions with their symbols in italics; a property is that of its material."""
+    """Write conditions with their symbols in italics; a property is that of its material."""
 
     def shown(name: re.Match[str]) -> str:
         material = re.fullmatch(r"materials\.(.+)\.\w+", name[1])
@@ -140,10 +133,17 @@ def pretty_conditions(text: str) -> str:
 
 
 def law_text(title: str, year: int, equation: str, parameters: str, *, numbered: bool) -> str:
-    """The name of a law: title, year, its parameters, and where `numbered` its equation in the paper."""
+    """Write the name of a law: title, year, its parameters, and if `numbered` its equation in the paper."""
     number = re.search(r"\(\d+\)(?:-\(\d+\))?$", equation) if numbered else None
     name = safe_text(with_year(title, year), 80)
     return ", ".join(filter(None, (name, number[0] if number else "", parameters)))
+
+
+def model_label(model_data: xr.Dataset, *, numbered: bool = False) -> str:
+    """Write the title of a model of a result, with the values of its parameters."""
+    title, year, equation = (model_data[name].item() for name in ("title", "year", "equation"))
+    parameters = parameter_text(str(model_data["model"].item()), scalars_of(model_data))
+    return law_text(str(title), int(year), str(equation), parameters, numbered=numbered)
 
 
 def label_axis(

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
+import pandas as pd
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import QuadMesh
 from matplotlib.colors import LogNorm, Normalize
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
@@ -20,18 +22,16 @@ from numpy.typing import NDArray
 
 from ..errors import UsageError, did_you_mean
 from ..formatting import heading, percentage
-from ..results.schema import plain_unit
 from ..text import safe_text
-from .curves import model_label
-from .labels import REFERENCE, label_axis, number_axis, pretty_conditions, symbol, words_of
+from .data import Points
+from .kinds import Choice, Kind
+from .labels import REFERENCE, label_axis, model_label, number_axis, pretty_conditions, symbol, words_of
 from .layout import Picture
-from .slices import NO_SWEEP, conditions_of, read, take_plane
+from .slices import NO_SWEEP, choose_plane, conditions_of, read, take_plane, unit_of
 from .style import is_geometric, model_styles
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from .kinds import Choice
 
 FloatArray = NDArray[np.float64]
 # a value at each y and x
@@ -101,10 +101,11 @@ class MapData:
     closest: tuple[tuple[str | None, ...], ...] = ()
     distance: Plane = ()
 
+    takes_points: ClassVar[bool] = False
+
     @property
-    def columns(self) -> tuple[str, ...]:
-        """The names of the columns of `rows`."""
-        return ("model", self.x, self.y, self.variable, *(("closest", "abs_e_error") if self.closest else ()))
+    def panel_count(self) -> int:
+        return 2 if self.closest else len(self.panels)
 
     @property
     def shares(self) -> dict[str | None, float]:
@@ -119,37 +120,86 @@ class MapData:
         variable = () if self.closest else (self.variable,)
         return {self.x, self.y, *variable, *(panel.model or "reference" for panel in self.panels)}
 
-    def table(self) -> dict[str, Sequence[object]]:
-        """The values by name of a column, one column per model; x varies slowest."""
-        x_unit, y_unit, unit = self.units
-        columns: dict[str, Sequence[object]] = {
-            heading(self.x, unit=x_unit): np.repeat(self.x_values, len(self.y_values)).tolist(),
-            heading(self.y, unit=y_unit): np.tile(self.y_values, len(self.x_values)).tolist(),
+    def long_table(self) -> pd.DataFrame:
+        """Make a row for each point of each model; x varies more slowly than y."""
+        points: dict[str, Any] = {
+            self.x: np.repeat(self.x_values, len(self.y_values)),
+            self.y: np.tile(self.y_values, len(self.x_values)),
         }
-        for panel in self.panels:
-            columns[heading(self.variable, panel.model or "", unit)] = np.transpose(panel.values).ravel().tolist()
+        closest: dict[str, Any] = {}
         if self.closest:
-            columns["closest"] = [key or "" for key in np.transpose(np.array(self.closest, object)).ravel()]
-            columns["abs_e_error"] = np.transpose(self.distance).ravel().tolist()
-        return columns
+            closest["closest"] = [key or "" for key in np.transpose(np.array(self.closest, object)).ravel()]
+            closest["abs_e_error"] = np.transpose(self.distance).ravel()
+        parts = [
+            {"model": panel.model or "", **points, self.variable: np.transpose(panel.values).ravel(), **closest}
+            for panel in self.panels
+        ]
+        return pd.concat(map(pd.DataFrame, parts), ignore_index=True)
 
-    def rows(self) -> Iterator[tuple[str | float, ...]]:
-        """The values, one point per row; for the names of the columns see `columns`."""
-        for panel in self.panels:
-            for i, x in enumerate(self.x_values):
-                for j, y in enumerate(self.y_values):
-                    best = (self.closest[j][i] or "", self.distance[j][i]) if self.closest else ()
-                    yield (panel.model or "", x, y, panel.values[j][i], *best)
+    def wide_table(self) -> pd.DataFrame:
+        """Make a row for each point, with a column for each model."""
+        x_unit, y_unit, unit = self.units
+        table = self.long_table()
+        keys = table["model"].unique()
+        wide = table.pivot(index=[self.x, self.y], columns="model", values=self.variable)[keys]
+        wide.columns = pd.Index([heading(self.variable, key, unit) for key in keys])
+        wide.index.names = [heading(self.x, unit=x_unit), heading(self.y, unit=y_unit)]
+        closest = table.loc[table["model"] == keys[0], table.columns[4:]]
+        return pd.concat([wide.reset_index(), closest.reset_index(drop=True)], axis=1)
+
+    def place_panels(self, figure: Figure, width: float) -> tuple[list[Axes], float]:
+        """Place panels in rows; only the left and lower axes have tick labels."""
+        count, columns = self.panel_count, panels_per_row(self, width)
+        rows = -(-count // columns)
+        grid = figure.subplots(rows, columns, squeeze=False)
+        for index, axes in enumerate(grid.ravel()):
+            axes.tick_params(labelleft=index % columns == 0, labelbottom=index + columns >= count)
+            if index >= count:
+                axes.remove()
+        height = min(max(0.9 * (width - MARGIN_WIDTH) / columns, MIN_ROW_HEIGHT), MAX_ROW_HEIGHT)
+        return list(grid.ravel()[:count]), rows * (height + 0.25) + 0.3
+
+    def draw(
+        self, all_axes: Sequence[Axes], labels: Mapping[str, str], points: Points | None
+    ) -> list[tuple[Artist, str]]:
+        """Draw the panels with a colour bar."""
+        x, y = edges_of(self.x_values, self.x_log), edges_of(self.y_values, self.y_log)
+        draw_panels = _draw_closest if self.closest else _draw_fields
+        mesh, entries = draw_panels(self, all_axes, x, y, labels)
+        names = [labels.get(panel.model or "reference", pretty_conditions(panel.label)) for panel in self.panels]
+        titles = ["Closest model", "Its absolute error"] if self.closest else names
+        for axes, title in zip(all_axes, titles, strict=True):
+            axes.set_title(title)
+            axes.grid(False)
+            axes.set(xscale="log" if self.x_log else "linear", yscale="log" if self.y_log else "linear")
+            axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
+            for axis, index, name, values, log in (
+                (axes.xaxis, 0, self.x, self.x_values, self.x_log),
+                (axes.yaxis, 1, self.y, self.y_values, self.y_log),
+            ):
+                largest = max(map(abs, values))
+                label_axis(axis, self.labels[index], name, self.units[index], largest, labels, log=log)
+        if len(all_axes) > 1 and isinstance(figure := all_axes[0].figure, Picture):
+            figure.share_labels(all_axes[0].get_xlabel(), all_axes[0].get_ylabel())
+            for axes in all_axes:
+                axes.set(xlabel="", ylabel="")
+        bar_axes = all_axes[-1:] if self.closest else list(all_axes)
+        grid = all_axes[0].get_gridspec()
+        rows = grid.nrows if grid is not None and not self.closest else 1
+        more = "min" if self.closest and np.nanmin(self.distance) < MIN_DRAWN_DISTANCE else "neither"
+        bar = all_axes[0].figure.colorbar(mesh, ax=bar_axes, extend=more, pad=0.02, aspect=25 * rows)
+        if self.closest:
+            number_axis(bar.ax.yaxis, log=True)
+        else:
+            largest = max(map(abs, mesh.get_clim()))
+            label_axis(bar.ax.yaxis, self.labels[2], self.variable, self.units[2], largest, labels, log=False)
+        return entries
 
 
 def field_map(dataset: xr.Dataset, choice: Choice) -> MapData:
-    """The data of a map: a variable over two axes, for each model.
+    """Read a variable over two axes, for at most MAX_PANELS models.
 
-    Parameters
-    ----------
-    dataset : a result
-    choice : its variable, axes and models, of which at most MAX_PANELS are drawn; an axis whose values are spaced
-        evenly in their logarithm is logarithmic
+    An axis whose values are spaced evenly in their logarithm is logarithmic.
 
     Raises
     ------
@@ -163,7 +213,7 @@ def field_map(dataset: xr.Dataset, choice: Choice) -> MapData:
 
 
 def validity_map(dataset: xr.Dataset, choice: Choice) -> MapData:
-    """The model with the smallest |e_error| over two axes, and that error; see `field_map`.
+    """Find the model with the smallest |e_error| over two axes, and that error; see `field_map`.
 
     Of models whose errors are equal within TIE_TOLERANCE it is the first in the result.
     """
@@ -186,13 +236,13 @@ def _nested_tuples(values: NDArray[Any]) -> tuple[Any, ...]:
 def _map_data(
     kind: str, dataset: xr.Dataset, variable: str, choice: Choice, max_panels: int | None = None
 ) -> MapData:
-    """The panels of a kind of map; of more than `max_panels` models the rest is not read."""
+    """Read the panels of a kind of map; of more than `max_panels` models the rest is not read."""
     if "model" not in dataset.dims:
         raise UsageError(NO_SWEEP)
     if variable not in dataset.data_vars:
         hint = did_you_mean(variable, [str(name) for name in dataset.data_vars])
         raise UsageError(f'no variable "{variable}" in this result; {hint}')
-    data, x, y, not_drawn = take_plane(dataset, kind, choice.x, choice.y, choice.sel, choice.models)
+    data, x, y, not_drawn = take_plane(dataset, kind, choice)
     field, plane = data[variable], (*data[y].dims, *data[x].dims)
     left_out: tuple[str, ...] = ()
     if "model" in field.dims:
@@ -218,9 +268,7 @@ def _map_data(
 
     heading_text = safe_text(str(dataset.attrs.get("title", "")), 140)
     x_label, y_label, label = (words_of(data[name].attrs, name) for name in (x, y, variable))
-    x_unit, y_unit, unit = (
-        safe_text(plain_unit(str(data[name].attrs.get("units", "1")))) for name in (x, y, variable)
-    )
+    x_unit, y_unit, unit = (unit_of(data[name]) for name in (x, y, variable))
     label = "Error" if variable == "e_error" else label[:1].upper() + label[1:]
     title = safe_text(f"{label if kind == 'map' else 'Closest model'} over {x} and {y}")
     return MapData(
@@ -244,77 +292,21 @@ def _map_data(
 
 
 def edges_of(values: Sequence[float], log: bool) -> FloatArray:
-    """The edges of cells, half way between their values, of shape (values + 1,).
+    """Compute the edges of cells, half way between their values, of shape (values + 1,).
 
     >>> edges_of([0.0, 1.0, 3.0], log=False).tolist(), edges_of([1.0, 100.0], log=True).round(9).tolist()
     ([-0.5, 0.5, 2.0, 4.0], [0.1, 10.0, 1000.0])
     """
-    at = np.log(values) if log else np.asarray(values, float)
-    middle = (at[1:] + at[:-1]) / 2.0
-    edges = np.concatenate(([2.0 * at[0] - middle[0]], middle, [2.0 * at[-1] - middle[-1]]))
+    centres = np.log(values) if log else np.asarray(values, float)
+    middle = (centres[1:] + centres[:-1]) / 2.0
+    edges = np.concatenate(([2.0 * centres[0] - middle[0]], middle, [2.0 * centres[-1] - middle[-1]]))
     return np.asarray(np.exp(edges) if log else edges)
 
 
 def panels_per_row(plot_data: MapData, width: float) -> int:
-    """The number of panels in each row of a figure of a width [in]; the rows have nearly equal numbers."""
-    count = 2 if plot_data.closest else len(plot_data.panels)
+    """Count the panels in each row of a figure of a width [in]; the rows have nearly equal numbers."""
     fit = max(1, int(width / (MIN_CLOSEST_PANEL_WIDTH if plot_data.closest else MIN_PANEL_WIDTH)))
-    return -(-count // -(-count // fit))
-
-
-def row_height(plot_data: MapData, width: float) -> float:
-    """The height [in] of a row of panels in a figure of a width [in]."""
-    return float(
-        min(max(0.9 * (width - MARGIN_WIDTH) / panels_per_row(plot_data, width), MIN_ROW_HEIGHT), MAX_ROW_HEIGHT)
-    )
-
-
-def draw_maps(plot_data: MapData, all_axes: Sequence[Axes], labels: Mapping[str, str]) -> list[tuple[Artist, str]]:
-    """Draw panels over two axes.
-
-    Parameters
-    ----------
-    plot_data : the panels
-    all_axes : axes of each panel
-    labels : texts that replace those of axes and laws, by name
-
-    Returns
-    -------
-    handles and names of the legend
-    """
-    x, y = edges_of(plot_data.x_values, plot_data.x_log), edges_of(plot_data.y_values, plot_data.y_log)
-    draw = _draw_closest if plot_data.closest else _draw_fields
-    mesh, entries = draw(plot_data, all_axes, x, y, labels)
-    names = [labels.get(panel.model or "reference", pretty_conditions(panel.label)) for panel in plot_data.panels]
-    titles = ["Closest model", "Its absolute error"] if plot_data.closest else names
-    for axes, title in zip(all_axes, titles, strict=True):
-        axes.set_title(title)
-        axes.grid(False)
-        axes.set(xscale="log" if plot_data.x_log else "linear", yscale="log" if plot_data.y_log else "linear")
-        axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
-        for axis, index, name, values, log in (
-            (axes.xaxis, 0, plot_data.x, plot_data.x_values, plot_data.x_log),
-            (axes.yaxis, 1, plot_data.y, plot_data.y_values, plot_data.y_log),
-        ):
-            largest = max(map(abs, values))
-            label_axis(axis, plot_data.labels[index], name, plot_data.units[index], largest, labels, log=log)
-    if len(all_axes) > 1 and isinstance(figure := all_axes[0].figure, Picture):
-        figure.share_labels(all_axes[0].get_xlabel(), all_axes[0].get_ylabel())
-        for axes in all_axes:
-            axes.set(xlabel="", ylabel="")
-    bar_axes = all_axes[-1:] if plot_data.closest else list(all_axes)
-    grid = all_axes[0].get_gridspec()
-    rows = grid.nrows if grid is not None and not plot_data.closest else 1
-    more = "min" if plot_data.closest and np.nanmin(plot_data.distance) < MIN_DRAWN_DISTANCE else "neither"
-    bar = all_axes[0].figure.colorbar(mesh, ax=bar_axes, extend=more, pad=0.02, aspect=25 * rows)
-    if plot_data.closest:
-        number_axis(bar.ax.yaxis, log=True)
-    else:
-        largest = max(map(abs, mesh.get_clim()))
-        label_axis(
-            bar.ax.yaxis, plot_data.labels[2], plot_data.variable, plot_data.units[2], largest, labels, log=False
-        )
-    return entries
+    return -(-plot_data.panel_count // -(-plot_data.panel_count // fit))
 
 
 def _draw_fields(
@@ -403,7 +395,7 @@ def _draw_values(
 
 
 def _merged_cells(x: FloatArray, y: FloatArray, mask: NDArray[np.bool_], style: dict[str, Any]) -> PathPatch:
-    """The cells where a mask, of shape (y, x), is true, as one patch; neighbours in a row are one rectangle."""
+    """Join the cells in a mask, of shape (y, x), into a patch; neighbours in a row are one rectangle."""
     rectangles = []
     for row, line in enumerate(mask):
         ends = x[np.flatnonzero(np.diff(np.concatenate(([False], line, [False]))))]
@@ -414,13 +406,13 @@ def _merged_cells(x: FloatArray, y: FloatArray, mask: NDArray[np.bool_], style: 
     return PathPatch(path, antialiased=False, rasterized=mask.size > MAX_VECTOR_CELLS, **style)
 
 
-def place_panels(picture: Picture, plot_data: MapData, width: float, count: int) -> tuple[list[Axes], float]:
-    """Axes for all panels, and the height of all rows [in]; only the left and lower axes have tick labels."""
-    columns = panels_per_row(plot_data, width)
-    rows = -(-count // columns)
-    grid = picture.subplots(rows, columns, squeeze=False)
-    for index, axes in enumerate(grid.ravel()):
-        axes.tick_params(labelleft=index % columns == 0, labelbottom=index + columns >= count)
-        if index >= count:
-            axes.remove()
-    return list(grid.ravel()[:count]), rows * (row_height(plot_data, width) + 0.25) + 0.3
+MAP = Kind(
+    "map",
+    "Error of the restitution over two axes, a panel for each model.",
+    field_map,
+    choose_plane,
+    along=("x", "y"),
+)
+VALIDITY = Kind(
+    "validity", "Model with the smallest error, and that error.", validity_map, choose_plane, along=("x", "y")
+)

@@ -12,11 +12,13 @@ from ..config.tables import SWEEP_QUANTITIES
 from ..contact.models import catalogue
 from ..errors import UsageError
 from ..results.attributes import read_attribute
-from ..results.schema import exponent_text, plain_unit
+from ..results.kinds import has_fixed_steps
+from ..results.schema import exponent_text
 from ..text import safe_text
 from .curves import Curve, CurveData, Mark, Panel
+from .kinds import Choice, Kind
 from .labels import REFERENCE, law_text, words_of
-from .slices import described_inputs, parameter_text
+from .slices import choose_line, described_inputs, parameter_text, unit_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,15 +29,14 @@ MIN_MARKED_INDENTATION = 0.02
 FORCE_RTOL = 1e-6
 
 
-def loop(histories: Sequence[xr.Dataset], *, equations: bool = False) -> CurveData:
-    """Force over indentation, Figures 3 and 5 of the paper: the area of a loop is the energy loss.
+def loop_curves(histories: Sequence[xr.Dataset], choice: Choice) -> CurveData:
+    """Draw force over indentation, Figures 3 and 5 of the paper: the area of a loop is the energy loss.
 
     Parameters
     ----------
     histories : time histories of one impact by several models, as `impact.run(...).history` is
-    equations : name the laws with the numbers of their equations in the paper
     """
-    lines = _curves_over("Force over indentation", histories, [("delta", "F", "")], equations)
+    lines = _curves_over("Force over indentation", histories, [("delta", "F", "")], choice)
     if len(histories) > 1:
         return lines
     (panel,) = lines.panels
@@ -43,7 +44,7 @@ def loop(histories: Sequence[xr.Dataset], *, equations: bool = False) -> CurveDa
 
 
 def _loop_marks(curve: Curve) -> tuple[Mark, ...]:
-    """Marks at the largest indentation, at its force if it is the largest, and at the permanent indentation."""
+    """Mark the largest indentation, its force if it is the largest, and the permanent indentation."""
     peak = int(np.argmax(curve.x))
     deepest, force, left = curve.x[peak], curve.y[peak], curve.x[-1]
     marks = [Mark("delta_m", deepest, force, "x")]
@@ -54,19 +55,19 @@ def _loop_marks(curve: Curve) -> tuple[Mark, ...]:
     return tuple(marks)
 
 
-def history(histories: Sequence[xr.Dataset], *, equations: bool = False) -> CurveData:
-    """Indentation, its rate and the force over time; see `loop`."""
-    return _curves_over("Time history", histories, [("t", name, "") for name in ("delta", "v", "F")], equations)
+def history_curves(histories: Sequence[xr.Dataset], choice: Choice) -> CurveData:
+    """Draw indentation, its rate and the force over time; see `loop_curves`."""
+    return _curves_over("Time history", histories, [("t", name, "") for name in ("delta", "v", "F")], choice)
 
 
-def impulse(histories: Sequence[xr.Dataset], *, equations: bool = False) -> CurveData:
-    """Velocities over the impulse, Figure 2 of the paper; see `loop`.
+def impulse_curves(histories: Sequence[xr.Dataset], choice: Choice) -> CurveData:
+    """Draw velocities over the impulse, Figure 2 of the paper; see `loop_curves`.
 
     All laws follow the same straight lines, (8) and (9), and differ in where they end.
     """
     pairs = [("tau", "v1", "v₁"), ("tau", "v2", "v₂")]
-    lines = _curves_over("Velocities over the impulse", histories, pairs, equations)
-    reference = f"{REFERENCE} (8), (9)" if equations else REFERENCE
+    lines = _curves_over("Velocities over the impulse", histories, pairs, choice)
+    reference = f"{REFERENCE} (8), (9)" if choice.equations else REFERENCE
     curves = tuple(
         curve
         for panel, name in zip(lines.panels, ("v1", "v2"), strict=True)
@@ -79,7 +80,7 @@ def impulse(histories: Sequence[xr.Dataset], *, equations: bool = False) -> Curv
 
 
 def _impulse_marks(histories: Sequence[xr.Dataset]) -> tuple[Mark, ...]:
-    """Marks at the impulse of the approach, where the lines of the balls meet, and at that of the whole impact."""
+    """Mark the impulse of the approach, where the lines of the balls meet, and that of the whole impact."""
     first = histories[0]
     tau = np.asarray(_series(first, "tau"))
     if not np.isfinite(tau).all():
@@ -92,21 +93,22 @@ def _impulse_marks(histories: Sequence[xr.Dataset]) -> tuple[Mark, ...]:
     return tuple(marks)
 
 
-def _reference_curve(of_model: xr.Dataset, name: str, label: str) -> list[Curve]:
-    """The line of the impulse-momentum solution, from contact to the impulse τ_c (1 + e); none without an e."""
-    inputs = _impact_inputs(of_model)
+def _reference_curve(history: xr.Dataset, name: str, label: str) -> list[Curve]:
+    """Draw the impulse-momentum solution, from contact to the impulse τ_c (1 + e); nothing without an e."""
+    inputs = _impact_inputs(history)
     e, mass = inputs.get("e"), _effective_mass(inputs)
     if not isinstance(e, float | int) or not np.isfinite(mass):
         return []
-    start = float(of_model[name][0])
-    total = (1.0 + float(e)) * mass * float(of_model["v"][0])
+    start = float(history[name][0])
+    total = (1.0 + float(e)) * mass * float(history["v"][0])
     end = start + (-1.0 if name == "v1" else 1.0) * total / float(inputs[f"m{name[1]}"])
     return [Curve(label, None, (0.0, total), (start, end), {"v1": "v₁", "v2": "v₂"}[name], name)]
 
 
 def _curves_over(
-    title: str, histories: Sequence[xr.Dataset], pairs: Sequence[tuple[str, str, str]], equations: bool
+    title: str, histories: Sequence[xr.Dataset], pairs: Sequence[tuple[str, str, str]], choice: Choice
 ) -> CurveData:
+    """Draw a panel for each pair of names, whose third text is written at the end of its curves."""
     if not histories:
         raise UsageError("no motion to draw: no model has an impact at this point")
     first = histories[0]
@@ -114,53 +116,54 @@ def _curves_over(
     for x, y, end in pairs:
         curves = [
             Curve(
-                _model_label(of_model, equations),
-                str(of_model["model"].item()),
-                _series(of_model, x),
-                _series(of_model, y),
+                _model_label(history, numbered=choice.equations),
+                str(history["model"].item()),
+                _series(history, x),
+                _series(history, y),
                 end,
                 y,
             )
-            for of_model in histories
+            for history in histories
         ]
         (x_label, x_unit), (y_label, y_unit) = _axis_label_and_unit(first, x), _axis_label_and_unit(first, y)
         panels.append(Panel(x_label, y_label, tuple(curves), x_unit, y_unit, x_name=x, y_name=y))
     return CurveData(title, _conditions_text(histories), tuple(panels))
 
 
-def _series(of_model: xr.Dataset, name: str) -> tuple[float, ...]:
+def _series(history: xr.Dataset, name: str) -> tuple[float, ...]:
+    """Read a variable of a history, or compute the impulse "tau"."""
     if name == "tau":
         # the impulse that reduced the closing speed to v
         return tuple(
-            (_effective_mass(_impact_inputs(of_model)) * (float(of_model["v"][0]) - of_model["v"].values)).tolist()
+            (_effective_mass(_impact_inputs(history)) * (float(history["v"][0]) - history["v"].values)).tolist()
         )
-    return tuple(np.asarray(of_model[name].values, float).tolist())
+    return tuple(np.asarray(history[name].values, float).tolist())
 
 
-def _axis_label_and_unit(of_model: xr.Dataset, name: str) -> tuple[str, str]:
-    """The label and the unit of an axis."""
+def _axis_label_and_unit(history: xr.Dataset, name: str) -> tuple[str, str]:
+    """Read the label and the unit of an axis."""
     if name == "tau":
         return "Impulse", "N s"
-    attributes = of_model[name].attrs
-    return words_of(attributes, name), safe_text(plain_unit(str(attributes.get("units", "1"))))
+    return words_of(history[name].attrs, name), unit_of(history[name])
 
 
-def _model_label(of_model: xr.Dataset, equations: bool) -> str:
-    key = str(of_model["model"].item())
-    model, parameters = catalogue().get(key), parameter_text(key, _impact_inputs(of_model))
+def _model_label(history: xr.Dataset, *, numbered: bool) -> str:
+    """Write the name of a law, which may be a plug-in that is not installed."""
+    key = str(history["model"].item())
+    model, parameters = catalogue().get(key), parameter_text(key, _impact_inputs(history))
     if model is None:
         return ", ".join(filter(None, (safe_text(key, 80), parameters)))
-    return law_text(model.title, model.year, model.equation, parameters, numbered=equations)
+    return law_text(model.title, model.year, model.equation, parameters, numbered=numbered)
 
 
-def _impact_inputs(of_model: xr.Dataset) -> Mapping[str, float | str]:
-    """The inputs of the impact, stored in its time history."""
-    inputs: Mapping[str, float | str] = read_attribute(of_model.attrs, "inputs")
+def _impact_inputs(history: xr.Dataset) -> Mapping[str, float | str]:
+    """Read the inputs of the impact, stored in its time history."""
+    inputs: Mapping[str, float | str] = read_attribute(history.attrs, "inputs")
     return inputs
 
 
 def _effective_mass(inputs: Mapping[str, float | str]) -> float:
-    """The effective mass [kg]; NaN where it is unknown."""
+    """Compute the effective mass [kg]; NaN where it is unknown."""
     try:
         return 1.0 / (1.0 / float(inputs["m1"]) + 1.0 / float(inputs["m2"]))
     except (KeyError, ValueError, TypeError, ZeroDivisionError):
@@ -168,13 +171,43 @@ def _effective_mass(inputs: Mapping[str, float | str]) -> float:
 
 
 def _conditions_text(histories: Sequence[xr.Dataset]) -> str:
-    """The inputs as text."""
+    """Write the inputs of the impact."""
     inputs = _impact_inputs(histories[0])
-    by_model = {str(of_model["model"].item()): _impact_inputs(of_model).get("n") for of_model in histories}
+    by_model = {str(history["model"].item()): _impact_inputs(history).get("n") for history in histories}
     exponents = {key: n for key, n in by_model.items() if isinstance(n, float)}
     text = exponent_text(exponents) if len(exponents) == len(by_model) else None
     units = {name: SWEEP_QUANTITIES[name].unit if name in SWEEP_QUANTITIES else "1" for name in inputs}
     return described_inputs(inputs, units, text)
 
 
-MOTIONS = {"loop": loop, "history": history, "impulse": impulse}
+def choose_point(dataset: xr.Dataset, keys: Sequence[str]) -> Choice | None:
+    """Choose the axis at whose middle a motion is drawn; None for results at fixed steps, which have no motion."""
+    return None if has_fixed_steps(dataset) else choose_line(dataset, keys)
+
+
+LOOP = Kind(
+    "loop",
+    "Force over indentation at one point: the area of a loop is the energy loss.",
+    loop_curves,
+    choose_point,
+    along=(),
+    source="history",
+)
+HISTORY = Kind(
+    "history",
+    "Indentation, its rate and the force over time at one point.",
+    history_curves,
+    choose_point,
+    along=(),
+    source="history",
+    in_report=False,
+)
+IMPULSE = Kind(
+    "impulse",
+    "Velocities over the impulse at one point, and the impulse-momentum solution.",
+    impulse_curves,
+    choose_point,
+    along=(),
+    source="history",
+    in_report=False,
+)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..config.grid import SAMPLE
 from ..config.input_names import InputName, is_input
 from ..contact.units import with_numbers
 from ..errors import UsageError, did_you_mean
@@ -14,6 +15,7 @@ from ..formatting import quantity
 from ..results.schema import exponents_of, plain_unit
 from ..results.selection import model_positions, select
 from ..text import safe_text
+from .kinds import Choice
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,57 +26,88 @@ MAX_DRAWN = 2**24
 NO_BREAK = "\N{NO-BREAK SPACE}"
 NO_SWEEP = "this is a time history, not the result of a sweep; draw it with --kind loop, or history"
 
-Selection = Mapping[str, float | str] | None
+
+class Line(NamedTuple):
+    """A line through a result: the sorted data, the coordinate to draw over, and values without a position."""
+
+    data: xr.Dataset
+    x: str
+    not_drawn: tuple[str, ...]
 
 
-def take_line(
-    dataset: xr.Dataset,
-    x: str | None = None,
-    sel: Selection = None,
-    models: Sequence[str] | None = None,
-    keep: Sequence[str] = (),
-) -> tuple[xr.Dataset, str, tuple[str, ...]]:
-    """Cut a line through a result.
+class Plane(NamedTuple):
+    """A plane through a result: the sorted data, two coordinates to draw over, and values without a position."""
+
+    data: xr.Dataset
+    x: str
+    y: str
+    not_drawn: tuple[str, ...]
+
+
+def varying_inputs(dataset: xr.Dataset) -> list[str]:
+    """List the inputs that vary: each axis with the inputs along it, then those that vary along several axes."""
+    dims_of = {
+        str(name): coordinate.dims
+        for name, coordinate in dataset.coords.items()
+        if coordinate.ndim and "model" not in coordinate.dims and is_input(name)
+    }
+    along = [name for dim in dataset.dims for name in (str(dim), *dims_of) if dims_of.get(name) == (dim,)]
+    return list(dict.fromkeys([*along, *dims_of]))
+
+
+def numeric_axes(dataset: xr.Dataset) -> dict[str, xr.DataArray]:
+    """Find the inputs that have several numbers along one axis."""
+    along = {name: dataset[name] for name in varying_inputs(dataset) if dataset[name].ndim == 1}
+    return {
+        name: coordinate
+        for name, coordinate in along.items()
+        if coordinate.dtype.kind == "f" and np.unique(coordinate.values[np.isfinite(coordinate.values)]).size > 1
+    }
+
+
+def choose_line(dataset: xr.Dataset, keys: Sequence[str]) -> Choice:
+    """Choose to draw models over e, else over the first axis of several numbers."""
+    axes = numeric_axes(dataset)
+    return Choice("e" if "e" in axes else next(iter(axes), None), models=keys)
+
+
+def choose_plane(dataset: xr.Dataset, keys: Sequence[str]) -> Choice | None:
+    """Choose a second axis as well; None without one."""
+    axes, x = numeric_axes(dataset), choose_line(dataset, keys).x
+    for name, coordinate in axes.items():
+        # neither a parameter of one model of several nor an uncertain input is an axis of a map
+        is_common = len(keys) == 1 or not InputName.parse(name).model
+        if x and is_common and coordinate.dims not in ((SAMPLE,), axes[x].dims):
+            return Choice(x, name, models=keys)
+    return None
+
+
+def take_line(dataset: xr.Dataset, choice: Choice, keep: Sequence[str] = ()) -> Line:
+    """Cut a line through a result; its data are not read yet.
 
     Parameters
     ----------
     dataset : a result
-    x : the coordinate to draw over; by default e, else the first numeric axis
-    sel : values of other axes, by name; an axis that is not named shows its first value
-    models : keys of the models to show; by default all
+    choice : its x is by default e, else the first numeric axis; an axis without a selected value shows its first
     keep : names of coordinates whose axes, where they vary along a single one, are kept
-
-    Returns
-    -------
-    the dataset along the line, sorted and not read yet; the coordinate to draw over; values without a position
 
     Raises
     ------
     UsageError : an axis, a value or a model is not in the result
     """
-    dataset = _select(dataset, sel, models)
-    x = x_axis(dataset, x)
+    dataset = _select(dataset, choice)
+    x = x_axis(dataset, choice.x)
     kept = [dataset[name].dims[0] for name in keep if name in dataset.coords and dataset[name].ndim == 1]
     line, not_drawn = _sorted_along(_drop_other_axes(dataset, [dataset[x].dims[0], *kept]), x)
     if not line[x].size:
         raise UsageError(f"{x} has no finite value to draw over")
-    return line, x, not_drawn
+    return Line(line, x, not_drawn)
 
 
-def take_plane(
-    dataset: xr.Dataset,
-    kind: str,
-    x: str | None = None,
-    y: str | None = None,
-    sel: Selection = None,
-    models: Sequence[str] | None = None,
-) -> tuple[xr.Dataset, str, str, tuple[str, ...]]:
-    """Cut a plane through a result: the dataset over two sorted axes, their names, and values without a position.
-
-    For the parameters and errors see `take_line`; `kind` is the kind of picture, for messages.
-    """
-    dataset = _select(dataset, sel, models)
-    along = [x_axis(dataset, name) for name in (x, y) if name is not None]
+def take_plane(dataset: xr.Dataset, kind: str, choice: Choice) -> Plane:
+    """Cut a plane through a result for a kind of picture; see `take_line`."""
+    dataset = _select(dataset, choice)
+    along = [x_axis(dataset, name) for name in (choice.x, choice.y) if name is not None]
     dims = [dataset[name].dims[0] for name in along]
     # the default is no axis of a single value, and no coordinate that varies along several axes
     plain = dataset.drop_vars([name for name, coordinate in dataset.coords.items() if coordinate.ndim > 1])
@@ -99,26 +132,26 @@ def take_plane(
             raise UsageError(f"{kind} needs different values along each axis; {name} {has}")
         plane, left_out = _sorted_along(plane, name)
         not_drawn += left_out
-    first, second = along if x is not None or y is None else along[::-1]
-    return plane, first, second, not_drawn
+    first, second = along if choice.x is not None or choice.y is None else along[::-1]
+    return Plane(plane, first, second, not_drawn)
 
 
-def _select(dataset: xr.Dataset, sel: Selection, models: Sequence[str] | None) -> xr.Dataset:
-    """The selected part of a result."""
+def _select(dataset: xr.Dataset, choice: Choice) -> xr.Dataset:
+    """Select the chosen models and values of a result."""
     if "model" not in dataset.dims:
         raise UsageError(NO_SWEEP)
-    if models:
-        dataset = dataset.isel(model=model_positions(models, dataset))
-    return select(dataset, sel or {})
+    if choice.models:
+        dataset = dataset.isel(model=model_positions(choice.models, dataset))
+    return select(dataset, choice.sel or {})
 
 
 def _drop_other_axes(dataset: xr.Dataset, dims: Sequence[object]) -> xr.Dataset:
-    """The result at the first value of every axis that is not drawn."""
+    """Reduce a result to the first value of every axis that is not drawn."""
     return dataset.isel({dim: 0 for dim in dataset.sizes if dim != "model" and dim not in dims})
 
 
 def _sorted_along(dataset: xr.Dataset, name: str) -> tuple[xr.Dataset, tuple[str, ...]]:
-    """The part of a result at the finite values of a coordinate along one axis, in order, and the other values.
+    """Sort a result along a coordinate of one axis; also returns its values that are not finite, which it drops.
 
     The infinite mass of a wall, or the infinite radius of a plane, has no position on an axis.
     """
@@ -150,7 +183,7 @@ def is_ordered(dataset: xr.Dataset, name: str) -> bool:
 
 
 def read(data: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
-    """Some variables of a slice or a plane, in memory, with the coordinates.
+    """Read some variables of a line or a plane into memory.
 
     Raises
     ------
@@ -165,7 +198,7 @@ def read(data: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
 
 
 def x_axis(dataset: xr.Dataset, x: str | None) -> str:
-    """The coordinate to draw over: `x`, else e, else the first axis of numbers."""
+    """Find the coordinate to draw over: `x`, else e, else the first axis of numbers."""
     lines = [
         str(name)
         for name, coord in dataset.coords.items()
@@ -193,18 +226,23 @@ def _is_float(dataset: xr.Dataset, name: str) -> bool:
     return dataset[name].dtype.kind == "f"
 
 
+def unit_of(coordinate: xr.DataArray) -> str:
+    """Read the unit of a coordinate; "1" if it has none."""
+    return safe_text(plain_unit(str(coordinate.attrs.get("units", "1"))))
+
+
 def conditions_of(dataset: xr.Dataset, *drawn: str) -> str:
-    """The values of all inputs that are not drawn, as text; no line break separates a name from its value.
+    """Write the values of all inputs that are not drawn; no line break separates a name from its value.
 
     The parameters of a law are part of its name, see `parameter_text`.
     """
     inputs = {name: value for name, value in scalars_of(dataset).items() if name not in drawn}
-    units = {name: plain_unit(str(dataset[name].attrs.get("units", "1"))) for name in inputs}
+    units = {name: unit_of(dataset[name]) for name in inputs}
     return described_inputs(inputs, units, exponents_of(dataset))
 
 
 def scalars_of(dataset: xr.Dataset) -> dict[str, object]:
-    """The coordinates of a slice that have one value."""
+    """Find the inputs that have one value."""
     return {
         str(name): coordinate.values.item()
         for name, coordinate in dataset.coords.items()
@@ -213,7 +251,7 @@ def scalars_of(dataset: xr.Dataset) -> dict[str, object]:
 
 
 def described_inputs(inputs: Mapping[str, object], units: Mapping[str, str], exponent: str | None = None) -> str:
-    """Inputs with their units as text; `exponent` is the text for n if the laws shown fix their exponent."""
+    """Write inputs with their units; `exponent` is the text for n if the laws shown fix their exponent."""
     parts = []
     for name, value in inputs.items():
         if not InputName.parse(name).model:
@@ -225,7 +263,7 @@ def described_inputs(inputs: Mapping[str, object], units: Mapping[str, str], exp
 
 
 def parameter_text(key: str, inputs: Mapping[str, object]) -> str:
-    """The parameters of a law among some inputs, as text beside its name.
+    """Write the parameters of a law among some inputs, for its name.
 
     >>> parameter_text("bilinear", {"bilinear.K": 1e9, "hertz.K": 2e9, "e": 0.5}).replace(NO_BREAK, " ")
     'K = 1e+09'

@@ -25,6 +25,7 @@ from ..contact.model import ForceModel
 from ..contact.models import catalogue
 from ..errors import UsageError
 from ..formatting import label, number
+from ..plots.slices import varying_inputs
 from ..results.attributes import read_attribute
 from ..results.calibration import (
     FIT_HEADINGS,
@@ -43,7 +44,7 @@ from ..results.slabs import MAX_SUMMARY_POINTS, is_large
 from ..results.summary import Summary, extremes_of, summarize
 from ..results.xarray_backend import load
 from ..text import safe_text, with_year
-from .figures import at_text, coordinate_text, figures_of, unit_of, varying
+from .figures import at_text, coordinate_text, figures_of, unit_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -119,7 +120,7 @@ def page(dataset: xr.Dataset, plugins: Sequence[ForceModel | str | Path] = ()) -
         design=describe_design(dataset),
         notes=[*material_notes(read_attribute(dataset.attrs, "materials"), moduli), *result_notes(summary)],
         outcomes=list(_outcomes(summary)),
-        axes=[(name, *_meaning_and_unit(dataset[name]), *_range(dataset[name])) for name in varying(dataset)],
+        axes=[_axis_row(dataset[name]) for name in varying_inputs(dataset)],
         single_values=list(_single_values(dataset)),
         ranking=ranked,
         headline=headline,
@@ -214,9 +215,10 @@ def _single_values(dataset: xr.Dataset) -> Iterator[tuple[str, str, str]]:
         yield name, ", ".join(values), "material"
 
 
-def _meaning_and_unit(coordinate: xr.DataArray) -> tuple[str, str]:
-    """Meaning and unit of a coordinate."""
-    return str(coordinate.attrs.get("long_name", "")), unit_of(coordinate) or "–"
+def _axis_row(coordinate: xr.DataArray) -> tuple[str, ...]:
+    """Describe a coordinate: name, meaning, unit, ends, number of values, and how they are spaced."""
+    meaning = str(coordinate.attrs.get("long_name", ""))
+    return str(coordinate.name), meaning, unit_of(coordinate) or "–", *_range(coordinate)
 
 
 def _range(coordinate: xr.DataArray) -> tuple[str, str, str, str]:
@@ -272,7 +274,7 @@ def _failures_section(dataset: xr.Dataset, summary: Summary) -> dict[str, Any]:
     for status, model, index in summary.failed_at:
         point = dataset.isel({"model": model, **dict(zip(axes, index, strict=True))})
         key = str(point["model"].item())
-        inputs = [name for name in varying(dataset) if InputName.parse(name).applies_to(key)]
+        inputs = [name for name in varying_inputs(dataset) if InputName.parse(name).applies_to(key)]
         points.append((key, at_text(point, inputs) or "–", status.meaning))
     more = summary.failed - len(points)
     return {"sentences": sentences, "points": points, "more": f"{more:,}" if more > 0 else ""}

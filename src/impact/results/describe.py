@@ -1,4 +1,4 @@
-"""What a calibration or a sensitivity study says: its text, its tables and its plain data."""
+"""What a calibration, a sensitivity study or a law says: its text, its tables and its plain data."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ from typing import Any
 
 import xarray as xr
 
+from ..contact.model import ForceModel
 from ..display import Block, Displayed, Table
+from ..engine.catalogue import ModelDescription
 from ..errors import UsageError
 from . import calibration, sensitivity
 from .attributes import read_attribute
@@ -61,7 +63,7 @@ class Fits(Displayed):
             for path, numbers in law["parameters"].items()
         ]
 
-    def blocks(self, width: int) -> Iterator[Block]:
+    def sections(self, width: int) -> Iterator[Block]:
         """A row for each law and parameter, and what to know besides."""
         yield calibration.describe_data(self.dataset)
         yield ""
@@ -107,7 +109,7 @@ class Studies(Displayed):
             for indices in study["indices"]
         ]
 
-    def blocks(self, width: int) -> Iterator[Block]:
+    def sections(self, width: int) -> Iterator[Block]:
         """The design, and the distribution and a table of indices of each study."""
         yield sensitivity.describe_design(self.dataset)
         for point, study in sensitivity.iterate_studies(self.dataset):
@@ -118,8 +120,8 @@ class Studies(Displayed):
                 yield Table(sensitivity.index_rows(study), sensitivity.INDEX_HEADINGS)
 
 
-def describe(dataset: xr.Dataset) -> Fits | Studies:
-    """Describe a calibration or a sensitivity study, as its command prints it and a notebook shows it.
+def describe(item: xr.Dataset | ForceModel) -> Fits | Studies | ModelDescription:
+    """Describe a calibration, a sensitivity study or a law, as its command prints it and a notebook shows it.
 
     Raises
     ------
@@ -134,8 +136,10 @@ def describe(dataset: xr.Dataset) -> Fits | Studies:
     >>> impact.describe(study).to_dataframe()[["input", "first", "total"]].round(2).values.tolist()
     [['sweep.v1', 0.56, 0.57], ['sweep.K', 0.43, 0.44]]
     """
-    if is_calibration(dataset):
-        return Fits(dataset)
-    if is_sensitivity(dataset):
-        return Studies(dataset)
+    if isinstance(item, ForceModel):
+        return ModelDescription(item)
+    if is_calibration(item):
+        return Fits(item)
+    if is_sensitivity(item):
+        return Studies(item)
     raise UsageError("expected the result of a calibration or of a sensitivity study")

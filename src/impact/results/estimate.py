@@ -8,20 +8,22 @@ import pickle
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from datetime import timedelta
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from ..config.grid import MAX_POINTS
 from ..contact.model import ForceModel
 from ..contact.simulate import TABLE_COLUMNS
+from ..display import Block, Displayed, Table, Wrapped
 from ..engine.checkpoint import write_range
-from ..engine.execute import context_of, integrate_columns, with_core
+from ..engine.execute import context_of, integrate_columns
 from ..engine.plan import Plan
 from ..engine.run import Run, ignore
-from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryMap, columns_of, trajectory_maps, trajectory_ranges
+from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryMap
 from .layouts import LAYOUTS
 from .schema import dataset_template, stored_variables
 from .sweep import prepare
@@ -32,6 +34,12 @@ WORKER_COUNTS = (1, 2, 8, 32, 128, 512)
 # the time of the driver for a range on a remote worker over the time that is measured by `estimate`: the rest is
 # spent in dask, see scripts/bench_scaling.py
 DASK_OVERHEAD = 2.0
+
+# why equal points are not searched for in the whole grid
+NOT_IN_PLAN = {
+    "block": "too many cells to compare all, equal points are searched for within a block",
+    "not": "every point is integrated (solver.collapse = false)",
+}
 
 
 @dataclass(frozen=True)
@@ -55,9 +63,16 @@ class ModelCounts:
     axes: tuple[str, ...]
     within: Literal["plan", "block", "not"]
 
+    @property
+    def row(self) -> tuple[str, ...]:
+        """The model in a table, and why equal points are not searched for in the whole grid."""
+        axes = f"depends on {', '.join(self.axes)}" if self.axes else "depends on no axis"
+        scope = f"{axes}; {NOT_IN_PLAN[self.within]}" if self.within in NOT_IN_PLAN else axes
+        return (self.model, f"{self.points:,}", f"{self.cells:,}", f"{self.trajectories:,}", scope)
+
 
 @dataclass(frozen=True)
-class Estimate:
+class Estimate(Displayed):
     """The size and the duration of a sweep.
 
     Parameters
@@ -82,6 +97,40 @@ class Estimate:
     core: str
     wire: int
     by_workers: dict[int, float]
+
+    def as_dict(self) -> dict[str, Any]:
+        """The estimate as plain data."""
+        return asdict(self)
+
+    def records(self) -> Sequence[Mapping[str, Any]]:
+        """The numbers of each model."""
+        return [asdict(counts) for counts in self.models]
+
+    def sections(self, width: int) -> Iterator[Block]:
+        """The points and trajectories of each model, and the size and the time of all together."""
+        headings = ("model", "points", "cells", "trajectories", "how the points collapse")
+        yield Table([counts.row for counts in self.models], headings, text=(0, -1))
+        yield Wrapped(
+            f"{self.points:,} points from {self.trajectories:,} trajectories, {self.bytes:,} bytes (and "
+            f"{self.kept:,} while it runs), {_duration(self.seconds)} by {self.core} and what the disk takes; "
+            "nothing was written"
+        )
+
+    @property
+    def workers_line(self) -> str:
+        """The time by the number of remote workers."""
+        *few, most = (f"{_duration(seconds)} by {count:,}" for count, seconds in self.by_workers.items())
+        times = "; ".join([*few, f"{most} workers, the most that can be kept busy"])
+        return f"dask workers: {times}; {self.wire:,} bytes are sent to them and back"
+
+
+def _duration(seconds: float) -> str:
+    """Write a time in words.
+
+    >>> _duration(0.2), _duration(7), _duration(7500)
+    ('under a second', 'about 0:00:07', 'about 2:05:00')
+    """
+    return "under a second" if seconds < 1.0 else f"about {timedelta(seconds=round(seconds))}"
 
 
 def estimate(
@@ -110,25 +159,21 @@ def estimate(
     303
     """
     plan = prepare(source, overrides, plugins, Run(max_points=max_points, on_note=on_note))
-    maps = trajectory_maps(plan)
-    plan = with_core(plan, maps)
-    total = sum(trajectory_map.count for trajectory_map in maps)
-    ranges = list(trajectory_ranges(maps))
     # a range in the middle, to avoid the extreme values at both ends
-    chosen = ranges[len(ranges) // 2]
+    chosen = plan.ranges[len(plan.ranges) // 2]
     model = plan.models[chosen.model]
     # the first run loads or compiles the core
     for _ in range(2):
         with _timed() as integrating:
-            collisions, _ = integrate_columns(model, columns_of(plan, maps, chosen), plan.config.solver)
+            collisions, _ = integrate_columns(model, plan.columns_of(chosen), plan.solver)
     with _timed() as driving:
-        sent = len(pickle.dumps((columns_of(plan, maps, chosen), context_of(plan)), pickle.HIGHEST_PROTOCOL))
+        sent = len(pickle.dumps((plan.columns_of(chosen), context_of(plan)), pickle.HIGHEST_PROTOCOL))
         back = pickle.dumps(collisions, pickle.HIGHEST_PROTOCOL)
         pickle.loads(back)
         write_range(io.BytesIO(), "", collisions)
     # the time of a slab does not depend on the values of its trajectories: repeat those of the range
     positions = np.arange(RANGE_TRAJECTORIES) % chosen.size
-    table = table_of(plan, maps, lambda _, start, stop: collisions.take(positions[: stop - start]))
+    table = table_of(plan, lambda _, start, stop: collisions.take(positions[: stop - start]))
     with _timed() as assembling:
         values = next(expanded_slabs(table, stored_variables(plan))).values
         for array in values.values():
@@ -136,19 +181,22 @@ def estimate(
     slab = values["status"].size
     each, seconds_per_trajectory_of_driver = integrating() / chosen.size, DASK_OVERHEAD * driving() / chosen.size
     writing_seconds = assembling() / slab * plan.stored_points if plan.layout == "full" else 0.0
-    busy = min(max(round(each / seconds_per_trajectory_of_driver), 1), len(ranges))
-    work_folder_bytes = total * sum(getattr(collisions, name).itemsize for name in TABLE_COLUMNS)
+    busy = min(max(round(each / seconds_per_trajectory_of_driver), 1), len(plan.ranges))
+    work_folder_bytes = plan.trajectories * sum(getattr(collisions, name).itemsize for name in TABLE_COLUMNS)
     counts = [*(count for count in WORKER_COUNTS if count < busy), busy]
     return Estimate(
         plan.points,
-        total,
-        tuple(_model_counts(plan, trajectory_map) for trajectory_map in maps),
+        plan.trajectories,
+        tuple(_model_counts(plan, trajectory_map) for trajectory_map in plan.maps),
         LAYOUTS[plan.layout].template(dataset_template(plan), plan, table).nbytes,
         work_folder_bytes,
-        each * total / jobs + writing_seconds,
-        plan.config.solver.core,
-        round((sent + len(back)) / chosen.size * total),
-        {count: max(each / count, seconds_per_trajectory_of_driver) * total + writing_seconds for count in counts},
+        each * plan.trajectories / jobs + writing_seconds,
+        plan.solver.core,
+        round((sent + len(back)) / chosen.size * plan.trajectories),
+        {
+            count: max(each / count, seconds_per_trajectory_of_driver) * plan.trajectories + writing_seconds
+            for count in counts
+        },
     )
 
 

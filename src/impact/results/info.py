@@ -1,20 +1,65 @@
-"""The contents of a result or a time history, as plain data."""
+"""The contents of a result or a time history, as plain data and as text."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from ..display import PIPE_WIDTH, Block, Displayed, Table
+from ..formatting import label, number
+from .attributes import read_attribute
+from .describe import describe
 from .kinds import is_calibration, is_sensitivity
-from .schema import count_points
+from .outcome import error_table
+from .schema import count_points, exponents_of, plain_unit
+from .slabs import is_large
 from .summary import Extremes, Summary, counts_by_name, extremes_of, summarize, worst_by_model
 from .xarray_backend import open_result
 
+# attributes that are shown if they are set
+SHOWN_ATTRIBUTES = (
+    "rtol",
+    "integrator",
+    "materials",
+    "impact_version",
+    "schema_version",
+    "fingerprint",
+    "plugins",
+    "tolerances",
+    "reason",
+    "design",
+)
+# coordinates of the laws, which are not shown
+HIDDEN_COORDINATES = ("title", "equation", "reference", "doi", "year")
+# longer lists of numbers are abbreviated
+MAX_LISTED_NUMBERS = 4
 
-def info(result: xr.Dataset | str | Path) -> dict[str, Any]:
+
+class Info(dict[str, Any], Displayed):
+    """The contents of a result, which a notebook shows as tables."""
+
+    def __init__(self, description: Mapping[str, Any], tables: Sequence[Block]) -> None:
+        super().__init__(description)
+        self.tables = tables
+
+    def as_dict(self) -> dict[str, Any]:
+        """The contents as plain data."""
+        return dict(self)
+
+    def records(self) -> Sequence[Mapping[str, Any]]:
+        """The variables."""
+        return [{"variable": name, **variable} for name, variable in self["variables"].items()]
+
+    def sections(self, width: int) -> Sequence[Block]:
+        """The axes and attributes, the variables, and the largest errors or what was calibrated or studied."""
+        return self.tables
+
+
+def info(result: xr.Dataset | str | Path) -> Info:
     """The contents of a result or a time history of any size, as plain data.
 
     Returns
@@ -35,17 +80,22 @@ def info(result: xr.Dataset | str | Path) -> dict[str, Any]:
     if isinstance(result, str | Path):
         # not loaded, so that a summary in the file is used
         with open_result(result) as opened:
-            return info(opened)
+            return _describe(opened, str(result))
+    return _describe(result)
+
+
+def _describe(result: xr.Dataset, name: str = "") -> Info:
+    """Describe a dataset, of the file of a name."""
     summary = summarize(result) if "model" in result.dims else Summary()
     variables: dict[str, Any] = {}
-    for name, variable in result.items():
-        extremes = extremes_of(result, str(name))
-        variables[str(name)] = {
+    for variable_name, variable in result.items():
+        extremes = extremes_of(result, str(variable_name))
+        variables[str(variable_name)] = {
             "units": variable.attrs.get("units"),
             "dims": list(variable.dims),
             **(extremes._asdict() if extremes else dict.fromkeys(Extremes._fields)),
         }
-    return {
+    description = {
         "points": _count_points(result),
         # of a result in memory neither is known
         **{name: result.encoding.get(name) for name in ("layout", "seal")},
@@ -60,6 +110,64 @@ def info(result: xr.Dataset | str | Path) -> dict[str, Any]:
             for name, value in result.attrs.items()
         },
     }
+    return Info(description, _tables(result, name, description))
+
+
+def _tables(result: xr.Dataset, name: str, description: Mapping[str, Any]) -> list[Block]:
+    """Tabulate the contents of a dataset; "–" where a summary would evaluate too many points."""
+    attributes = result.attrs
+    sizes = " × ".join(f"{dim} {size}" for dim, size in description["dimensions"].items())
+    rows: dict[str, Any] = {"file": name} if name else {}
+    rows |= {"title": attributes.get("title", ""), "dimensions": sizes, "points": f"{description['points']:,}"}
+    rows |= {key: description[key] for key in ("layout", "seal") if description[key] is not None}
+    for coordinate in result.coords.values():
+        if coordinate.name not in HIDDEN_COORDINATES:
+            rows[str(coordinate.name)] = _values_text(result, str(coordinate.name))
+    rows |= {key: attributes[key] for key in SHOWN_ATTRIBUTES if attributes.get(key, "{}") != "{}"}
+    if read_attribute(attributes, "config_set"):
+        rows["config_set"] = attributes["config_set"]
+    if description["status"]:
+        rows["status"] = ", ".join(f"{count:,} {status}" for status, count in description["status"].items())
+    if description["not_evaluated"]:
+        rows["not evaluated"] = f"the status of {description['not_evaluated']:,} points"
+    headings = ("variable", "unit", "dimensions", "smallest", "largest", "missing")
+    variables = [_variable_row(key, variable) for key, variable in description["variables"].items()]
+    tables: list[Block] = [Table(list(rows.items())), "", Table(variables, headings)]
+    if description["worst"]:
+        tables += ["", error_table(description["worst"])]
+    if is_calibration(result) or is_sensitivity(result):
+        tables += ["", *describe(result).sections(PIPE_WIDTH)]
+    return tables
+
+
+def _variable_row(name: str, variable: Mapping[str, Any]) -> tuple[object, ...]:
+    evaluated = variable["missing"] is not None
+    return (
+        name,
+        variable["units"] or "",
+        ", ".join(variable["dims"]),
+        *(variable[end] if evaluated else "–" for end in ("smallest", "largest")),
+        f"{variable['missing']:,}" if evaluated else "–",
+    )
+
+
+def _values_text(dataset: xr.Dataset, name: str) -> str:
+    """List the values of a coordinate with its unit; of many numbers the range and the number."""
+    coordinate = dataset[name]
+    values = coordinate.variable
+    unit = plain_unit(str(coordinate.attrs.get("units", "1")))
+    suffix = "" if unit == "1" else f" [{unit}]"
+    if name == "n" and coordinate.ndim == 0 and (exponents := exponents_of(dataset)):
+        return exponents + suffix
+    if is_large(values):
+        extremes = extremes_of(dataset, name)
+        ends = f"{number(extremes.smallest)} … {number(extremes.largest)}, " if extremes else ""
+        return f"{ends}{coordinate.size} values{suffix}"
+    array = coordinate.values.reshape(-1)
+    distinct = list(dict.fromkeys(array.tolist()))
+    if array.dtype.kind in "fi" and len(distinct) > MAX_LISTED_NUMBERS:
+        return f"{number(array.min())} … {number(array.max())}, {array.size} values{suffix}"
+    return ", ".join(map(label, distinct)) + suffix
 
 
 def _count_points(dataset: xr.Dataset) -> int:

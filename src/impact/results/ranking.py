@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from ..array_types import Mask
 from ..config.input_names import InputName
 from ..contact.status import FIRST_FAILURE, Status
+from ..display import Block, Displayed, Table, html_of
 from ..errors import UsageError
 from ..formatting import label, number, percentage
-from ..text import html_table, safe_text
+from ..text import safe_text
 from .kinds import require_sweep
 from .replay_command import describe_point
 from .schema import columns_along, foreign_dims
@@ -31,6 +32,8 @@ MAX_PARAMETER_COMBINATIONS = 2**24
 # accepted |e_out - e|
 DEFAULT_TOL = 0.01
 RANKED_VARIABLES = ("e_error", "status")
+# rows of the text; the rest is only counted
+MAX_ROWS = 30
 # ranges of e that a table lists
 MAX_RANGES = 8
 
@@ -107,7 +110,7 @@ class Ranked:
 
 
 @dataclass(frozen=True)
-class Ranking:
+class Ranking(Displayed):
     """The models of a result, ordered by their share of points within the tolerance, then by their errors."""
 
     tol: float
@@ -145,8 +148,33 @@ class Ranking:
             return f"no model gives e within {tol} everywhere; {key} is nearest: {first.percent} of {points}"
         return f"no model gives e within {tol} at {alone or f'any of {points}'}"
 
+    def as_dict(self) -> dict[str, Any]:
+        """The ranking as plain data."""
+        return {
+            "headline": self.headline,
+            "tol": self.tol,
+            "best": [row.model for row in self.best],
+            "models": self.records(),
+        }
+
+    def records(self) -> Sequence[Mapping[str, Any]]:
+        """The models, the best first."""
+        return [{**vars(row), "share": row.share} for row in self.models]
+
+    def sections(self, width: int) -> Iterator[Block]:
+        """The headline and a table of the first models."""
+        yield self.headline
+        yield ""
+        yield self._table(self.models[:MAX_ROWS])
+        more = len(self.models) - MAX_ROWS
+        if more > 0:
+            yield f"and {more:,} more (--json has all)"
+
+    def _table(self, models: Sequence[Ranked]) -> Table:
+        return Table([model.row for model in models], self.headings, text=(0, 5, 6))
+
     def _repr_html_(self) -> str:
-        return html_table(self.headings, (ranked.row for ranked in self.models), self.headline)
+        return html_of([self.headline, self._table(self.models)])
 
 
 def recommend(

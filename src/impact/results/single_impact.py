@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 import math
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import xarray as xr
 
@@ -32,12 +33,13 @@ from ..contact.status import Status
 from ..contact.timestep import EXACT
 from ..contact.units import with_numbers
 from ..contact.variables import HISTORY, OUTPUTS
+from ..display import Block, Displayed, Table
 from ..engine.build_impacts import build_impacts, fixed_steps_at
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..errors import UsageError, did_you_mean
 from ..formatting import number, quantity
-from ..text import html_table, safe_text
+from ..text import safe_text
 from .kinds import require_sweep
 from .provenance import changed_plugins, stored_draft, unknown_plugins
 from .schema import SCHEMA_VERSION, attributes_of, is_case, plain_unit
@@ -64,7 +66,7 @@ DERIVED_QUANTITIES = (
 
 
 @dataclass(frozen=True)
-class Impact:
+class Impact(Displayed):
     """One impact by one model.
 
     Parameters
@@ -138,8 +140,32 @@ class Impact:
             rows["integrator"] = self.integrator
         return rows
 
-    def _repr_html_(self) -> str:
-        return html_table((), self.rows().items())
+    def as_dict(self) -> dict[str, Any]:
+        """The impact as plain data."""
+        return {
+            "model": self.model.key,
+            "inputs": dict(self.point),
+            "first_value_of": list(self.first),
+            "integrator": self.integrator,
+            "exponent": self.exponent,
+            "closing_speed": self.closing_speed,
+            "outputs": {**self.values, "status": self.status.name.lower()},
+            "materials": {name: asdict(material) for name, material in self.materials.items()},
+            "derived": dict(self.derived),
+            "damping": self.damping,
+            "e_kinematic": self.e_kinematic,
+            "e_kinetic": self.e_kinetic,
+            "e_energetic": self.e_energetic,
+        }
+
+    def records(self) -> Sequence[Mapping[str, Any]]:
+        """One row: the model, the inputs and the outputs."""
+        data = self.as_dict()
+        return [{"model": data["model"], **data["inputs"], **data["outputs"]}]
+
+    def sections(self, width: int) -> Iterable[Block]:
+        """The inputs, outputs, the three restitutions and estimated errors, one per line."""
+        return [Table(list(self.rows().items()))]
 
     def _unit_of(self, name: str) -> str:
         """The unit of an input, which may be a parameter of the model, or a property of a material."""

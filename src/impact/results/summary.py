@@ -280,25 +280,6 @@ def _from_json(value: float | None) -> float:
     return math.nan if value is None else value
 
 
-@dataclass(frozen=True)
-class SweepOutcome:
-    """The result of a sweep, which may be larger than memory, and its summary.
-
-    dataset : its coordinates and attributes; the values of its variables may be placeholders
-    is_new : whether the file was written now; False if it held this sweep already
-    integrated : how many trajectories were integrated now; None if not counted
-    extended_layout : layout of the result that was extended; only "factored" stores trajectories to reuse
-    """
-
-    dataset: xr.Dataset
-    summary: Summary
-    trajectories: int | None = None
-    is_new: bool = True
-    integrated: int | None = None
-    repeated_blocks: int = 0
-    extended_layout: str | None = None
-
-
 def worst_by_model(summary: Summary, dataset: xr.Dataset) -> dict[str, dict[str, float]]:
     """List the largest absolute errors by variable and key of the model."""
     keys = dataset["model"].values.tolist() if summary.worst else []

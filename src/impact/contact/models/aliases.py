@@ -14,13 +14,7 @@ from .hysteresis import EXACT_HYSTERESIS, FLORES_2011, HUNT_CROSSLEY_1975, LANKA
 def same_law(
     law: ForceModel, key: str, *, title: str, year: int, reference: str, evidence: Evidence, doi: str = ""
 ) -> ForceModel:
-    """A law under another name.
-
-    Parameters
-    ----------
-    law : law of the catalogue
-    key, title, year, reference, evidence, doi : fields of the other publication, whose domain is not known
-    """
+    """Give a law another name."""
     return replace(
         law,
         key=key,

@@ -1,4 +1,4 @@
-"""Laws with different forces on approach and on restitution, without a permanent indentation."""
+"""Asymmetric laws: different forces on approach and on restitution, without a permanent indentation."""
 
 from __future__ import annotations
 
@@ -18,13 +18,7 @@ from .dashpot import dashpot
 
 
 def approach_dashpot(key: str, *, zeta: Formula, **about: Unpack[About]) -> ForceModel:
-    """A law of a spring and a dashpot that acts on approach only, from the formula of its damping ratio.
-
-    Parameters
-    ----------
-    key, about : see `ForceModel`
-    zeta : see `dashpot`
-    """
+    """Make a law of a spring and a dashpot that acts on approach only, from the formula of its damping ratio."""
     return replace(
         dashpot(key, zeta=zeta, release="gap", **about),
         unloading=spring,

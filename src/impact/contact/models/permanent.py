@@ -1,4 +1,4 @@
-"""Permanent indentation: one law on approach, a stiffer one on restitution; equations (29) to (43)."""
+"""Permanent indentation: a force on approach, a stiffer one on restitution; equations (29) to (43)."""
 
 from __future__ import annotations
 

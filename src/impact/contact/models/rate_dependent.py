@@ -22,15 +22,7 @@ def drag(
     coordinate_power: int = 2,
     **about: Unpack[About],
 ) -> ForceModel:
-    """A law of the form F = K δⁿ + c δ^q δ̇.
-
-    Parameters
-    ----------
-    key, coordinate_power, about : see `ForceModel`
-    c : formula of the damping coefficient, such as `lambda gamma, m: gamma * m`
-    q : exponent of the indentation in the damping
-    release : where the contact ends
-    """
+    """Make a law of the form F = K δⁿ + c δ^q δ̇."""
     return ForceModel(
         key,
         **about,

@@ -103,15 +103,7 @@ def integrate_compiled(
     rtol: float,
     max_steps: int,
 ) -> Solution:
-    """Integrate a phase as `impact.ode.rk45.integrate` does, without its record.
-
-    Parameters
-    ----------
-    form : form of the phase
-    law, problem, params : law, problem and params of the phase; params each of shape (n,)
-    start : components at the start, shape (2, n)
-    rtol, max_steps : see `impact.ode.rk45.integrate`
-    """
+    """Integrate a phase as `impact.ode.rk45.integrate` does, without its record."""
     from .kernel import kernel
 
     n = start.shape[1]

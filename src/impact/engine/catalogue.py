@@ -1,0 +1,257 @@
+"""The catalogue of laws, or a part of it, as a table; one law in full."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..contact.dimensionless import delivered
+from ..contact.evidence import count_states
+from ..contact.model import ForceModel, Parameter
+from ..contact.models import catalogue
+from ..contact.numba.dispatch import serves
+from ..display import Block, Displayed, Styled, Table, Wrapped, html_of
+from ..errors import ModelError, UsageError, did_you_mean
+from ..formatting import decimals, number
+from ..text import with_year
+from .plugins import read_plugins
+
+# requested e of which a table of the catalogue shows the delivered restitution
+E_VALUES = (0.1, 0.3, 0.5, 0.7, 0.9)
+# characters that a column of the catalogue takes, with the space before it
+E_WIDTH, EQUATION_WIDTH, DOMAIN_WIDTH, CORE_WIDTH = 8, 32, 26, 7
+# exponents for which the compiled core is reported
+COMPILED_AT = (1.0, 1.5, 2.0, 2.5, 3.0)
+# characters of a text about one model, which may be a plug-in
+MAX_TEXT = 2000
+
+
+@dataclass(frozen=True)
+class ModelDescription(Displayed):
+    """One law: its declaration, the restitution that it delivers, and what integrates it."""
+
+    model: ForceModel
+
+    def as_dict(self) -> dict[str, Any]:
+        """The declaration as plain data."""
+        model = self.model
+        names = ("key", "title", "year", "family", "equation", "reference", "doi", "same_as")
+        return {
+            **{name: getattr(model, name) for name in names},
+            "evidence": vars(model.evidence),
+            "domain": {name: list(ends) for name, ends in model.domain.items()},
+            "domain_source": model.domain_source,
+            "parameters": [vars(parameter) for parameter in model.parameters],
+            "exponent": model.exponent,
+            "release": model.release,
+            "delivered_restitution": self.delivered,
+            "integrated_by": self.cores,
+        }
+
+    @property
+    def delivered(self) -> dict[str, float]:
+        """The exact restitution by the requested e; empty if it is not known or depends on parameters."""
+        values = delivered(self.model, np.array(E_VALUES))
+        return {} if values is None else {number(e): out for e, out in zip(E_VALUES, values.tolist(), strict=True)}
+
+    @property
+    def cores(self) -> str:
+        """The core that integrates the law if numba is installed."""
+        exponent = self.model.exponent
+        exponents = COMPILED_AT if exponent is None else (exponent,)
+        approach, restitution = ([n for n in exponents if serves(self.model, n)[phase]] for phase in (0, 1))
+        phases = [name for name, served in (("approach", approach), ("restitution", restitution)) if served]
+        if not phases:
+            return "numpy"
+        condition = f", where n is {', '.join(map(number, approach))}" if exponent is None else ""
+        only = f" on {phases[0]}, numpy else" if len(phases) == 1 else ""
+        return f"numba{only}{condition}"
+
+    def sections(self, width: int) -> Iterator[Block]:
+        """The declaration, one property per line."""
+        model = self.model
+        gap = "the permanent indentation" if model.is_permanent else "zero indentation"
+        rows = {
+            "model": model.key,
+            "same law as": model.same_as,
+            "title": with_year(model.title, model.year),
+            "family": model.family,
+            "equation": model.equation,
+            "reference": model.reference,
+            "doi": model.doi,
+            "evidence": str(model.evidence),
+            "stated domain": model.domain_text or "not stated",
+            "exponent": "the sweep's n" if model.exponent is None else f"n = {number(model.exponent)}, its own",
+            "ends at": gap if model.release == "gap" else f"zero force, at {gap} at the latest",
+            "integrated by": self.cores,
+        }
+        for index, parameter in enumerate(model.parameters):
+            # the table is named once
+            rows[" " * index if index else f"[model.{model.key}]"] = _describe_parameter(parameter)
+        rows["delivers"] = ", ".join(f"{decimals(out)} for e = {e}" for e, out in self.delivered.items())
+        yield Table([row for row in rows.items() if row[1]], max_cell=MAX_TEXT)
+
+
+def _describe_parameter(parameter: Parameter) -> str:
+    default = "required" if parameter.default is None else f"default {number(parameter.default)}"
+    unit = "" if parameter.unit == "1" else f" [{parameter.unit}]"
+    limits = f"from {number(parameter.least)} to {number(parameter.most)}"
+    return f"{parameter.name}{unit}: {parameter.meaning}; {limits}, {default}"
+
+
+class Models(dict[str, ForceModel], Displayed):
+    """Models by key, which a notebook shows as a table."""
+
+    def __repr__(self) -> str:
+        return f"{len(self)} models: {', '.join(self)}"
+
+    def find(self, key: str) -> ForceModel:
+        """Look up a model.
+
+        Raises
+        ------
+        ModelError : no model has this key; the message names the nearest one
+        """
+        if key not in self:
+            raise ModelError(f'no model "{key}"; {did_you_mean(key, list(self))}')
+        return self[key]
+
+    def as_dict(self) -> dict[str, Any]:
+        """The declarations by key."""
+        return {key: ModelDescription(model).as_dict() for key, model in self.items()}
+
+    def records(self) -> Sequence[Mapping[str, Any]]:
+        """The declarations."""
+        return list(self.as_dict().values())
+
+    def sections(self, width: int) -> Iterator[Block]:
+        """One row for each model, by family, with the columns that fit the terminal, and what they mean."""
+        width_left = width - max(map(len, self))
+        e_values, others = _catalogue_columns(max(width_left, E_WIDTH))
+        rows: list[Sequence[object]] = []
+        for family, members in groupby(self.values(), lambda model: model.family):
+            rows.append([Styled(f"family:{family}", "dim")])
+            rows += [[model.key, *_catalogue_cells(model, e_values, others)] for model in members]
+        numbers = range(1, 1 + len(e_values))
+        yield Table(
+            rows,
+            ("model", *(f"e={number(e)}" for e in e_values), *others),
+            text=(0, *range(numbers.stop, numbers.stop + len(others))),
+            # on the narrowest terminal the keys are folded, so that one value stays
+            no_wrap=(*([0] if width_left >= E_WIDTH else []), *numbers),
+            max_cell=MAX_TEXT,
+        )
+        if e_values:
+            yield ""
+            yield Wrapped("The columns e=... show the delivered restitution for each requested e.")
+        if "core" in others:
+            yield Wrapped(
+                "The column core shows what integrates a law, or a phase of it, if numba is installed "
+                '(extra "fast").'
+            )
+        yield Wrapped(
+            "A model with [parameters] depends on them; `impact models KEY` describes one model in full."
+        )
+        counts = count_states(model.evidence for model in self.values())
+        entries = "this entry" if len(self) == 1 else f"these {len(self)} entries"
+        yield Wrapped(f"Evidence for the formulas of {entries}: {counts}.")
+
+    def _repr_html_(self) -> str:
+        rows = [
+            (key, model.family, model.equation, ", ".join(p.name for p in model.parameters), model.domain_text)
+            for key, model in self.items()
+        ]
+        return html_of([Table(rows, ("model", "family", "equation", "parameters", "stated domain"))])
+
+
+def _catalogue_columns(width_left: int) -> tuple[tuple[float, ...], tuple[str, ...]]:
+    """Choose the values of e, and the other columns, that a table of the catalogue shows next to the keys.
+
+    >>> _catalogue_columns(3), _catalogue_columns(20), _catalogue_columns(43)
+    (((), ()), ((0.1, 0.9), ()), ((0.1, 0.3, 0.5, 0.7, 0.9), ()))
+    """
+    count = min(len(E_VALUES), width_left // E_WIDTH)
+    few: dict[int, tuple[float, ...]] = {0: (), 1: (0.5,), 2: (0.1, 0.9), 3: (0.1, 0.5, 0.9)}
+    e_values = few.get(count, E_VALUES[: count - 1] + E_VALUES[-1:])
+    width_left -= E_WIDTH * len(e_values)
+    others = []
+    for name, width in (("equation", EQUATION_WIDTH), ("core", CORE_WIDTH), ("stated domain", DOMAIN_WIDTH)):
+        if width_left >= width:
+            others.append(name)
+            width_left -= width
+    return e_values, tuple(others)
+
+
+def _catalogue_cells(model: ForceModel, e_values: Sequence[float], others: Sequence[str]) -> Iterator[str]:
+    """Write the columns of a model in a table of the catalogue, after its key."""
+    description = ModelDescription(model)
+    restitution = description.delivered
+    for e in e_values:
+        yield decimals(restitution[number(e)]) if restitution else "–"
+    parameters = ", ".join(parameter.name for parameter in model.parameters)
+    texts = {
+        "equation": model.equation + (f"  [{parameters}]" if parameters else ""),
+        "core": description.cores.split()[0].rstrip(","),
+        "stated domain": model.domain_text or "–",
+    }
+    if model.same_as:
+        texts = {"equation": f"same law as {model.same_as}", "core": "", "stated domain": ""}
+    yield from (texts[name] for name in others)
+
+
+def models(
+    plugins: Sequence[ForceModel | str | Path] = (),
+    *,
+    pattern: str = "*",
+    family: str | None = None,
+    search: str | None = None,
+) -> Models:
+    """The catalogue of contact force models, by key, or a part of it.
+
+    Parameters
+    ----------
+    plugins : plug-in models, and paths of Python files with such models, which come last
+    pattern : pattern of the keys, such as "lammps-*", or a family as in a config, such as "family:hysteresis"
+    family : name of the family; by default all families
+    search : words that all have to occur in the key, title, year, equation, reference or DOI, in any case
+
+    Raises
+    ------
+    UsageError : no model matches the pattern or the words, or there is no such family
+    ModelError : a plug-in cannot be read or is invalid
+
+    >>> import impact
+    >>> impact.models()["gharib-hurmuzlu-2012"].equation
+    'F = K δⁿ (1 + χ δ̇/v₀),  χ = 1/e  (28)'
+    >>> list(impact.models(pattern="lankarani-*"))
+    ['lankarani-nikravesh-1990', 'lankarani-nikravesh-1994']
+    """
+    all_models = catalogue(read_plugins(plugins).models)
+    families = sorted({model.family for model in all_models.values()})
+    if pattern.startswith("family:"):
+        pattern, family = "*", pattern.removeprefix("family:")
+    if family is not None and family not in families:
+        raise UsageError(f'--family: no family "{family}"; {did_you_mean(family, families)}')
+    candidates = {key: model for key, model in all_models.items() if family in (None, model.family)}
+    matching = {key: model for key, model in candidates.items() if fnmatchcase(key, pattern)}
+    if not matching:
+        raise UsageError(f'no model matches "{pattern}"; {did_you_mean(pattern.strip("*?"), list(candidates))}')
+    if search is not None:
+        words = search.casefold().split()
+        matching = {key: model for key, model in matching.items() if _contains(model, words)}
+        if not matching:
+            raise UsageError(f'--search: no model has "{search[:60]}" in its title, equation or reference')
+    return Models(matching)
+
+
+def _contains(model: ForceModel, words: Sequence[str]) -> bool:
+    """Whether all words occur in the description of a model."""
+    texts = (model.key, model.family, model.title, str(model.year), model.equation, model.reference, model.doi)
+    text = " ".join(texts).casefold()
+    return all(word in text for word in words)

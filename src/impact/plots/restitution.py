@@ -1,0 +1,242 @@
+"""Pictures of a sweep over one axis: velocities, restitution and its error, restitution at fixed steps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import UsageError
+from ..formatting import label as number_label
+from ..text import safe_text
+from .curves import Curve, CurveData, Panel, x_axis_fields
+from .kinds import Choice, Kind
+from .labels import REFERENCE, model_label
+from .slices import Line, choose_line, conditions_of, is_ordered, numeric_axes, read, take_line
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+FIGURE_6 = "Final velocities comparison"
+# distances from zero that are shaded, the widest first
+BANDS = (0.05, 0.01)
+# the smallest |e_error| on a logarithmic axis: smaller ones are errors of the solver
+MIN_DRAWN_ERROR = 1e-9
+# the axes of a picture of fixed steps, and the message about a result without one
+STEP_AXES = ("steps_per_contact", "dt")
+NEEDS_STEPS = 'timestep needs an axis steps_per_contact or dt, with solver.integrator = "kick-drift"'
+# values of e of a picture of fixed steps
+MAX_RESTITUTIONS = 8
+
+
+def velocity_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
+    """Read the post-impact velocities of every model and of the impulse-momentum solution, Figure 6 of the paper.
+
+    An x whose values are spaced evenly in their logarithm has a logarithmic axis.
+
+    Raises
+    ------
+    UsageError : the result does not contain what `choice` selects
+    """
+    line = _read_line(dataset, choice, "v1_post", "v2_post", "v1_reference", "v2_reference")
+    reference = f"{REFERENCE} (6), (7)" if choice.equations else REFERENCE
+    balls = ((1, "v₁⁺"), (2, "v₂⁺"))
+    references = [
+        _curve(reference, None, line, line.data[f"v{ball}_reference"], f"v{ball}_post", end) for ball, end in balls
+    ]
+    curves = [
+        _curve(label, key, line, model_data[f"v{ball}_post"], f"v{ball}_post", end)
+        for label, key, model_data in _split_by_model(line, choice)
+        for ball, end in balls
+    ]
+    all_curves = (*_without_empty(references), *curves)
+    panel = Panel("", "Velocity after the impact", all_curves, y_unit="m/s", y_name="v_post")
+    return _curve_data(dataset, line, FIGURE_6, [panel], choice)
+
+
+def restitution_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
+    """Read the delivered restitution of every model and the requested one; see `velocity_curves`."""
+    line = _read_line(dataset, choice, "e_out")
+    requested = [_curve("Requested", None, line, line.data["e"], "e")] if "e" in line.data.coords else []
+    curves = [
+        _curve(label, key, line, model_data["e_out"], "e_out")
+        for label, key, model_data in _split_by_model(line, choice)
+    ]
+    panel = Panel("", "Delivered restitution", (*_without_empty(requested), *curves), y_name="e_out")
+    return _curve_data(dataset, line, "Delivered restitution", [panel], choice)
+
+
+def error_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
+    """Read the error of every model's restitution, signed and absolute; see `velocity_curves`."""
+    line = _read_line(dataset, choice, "e_error")
+    signed = [
+        _curve(label, key, line, model_data["e_error"], "e_error")
+        for label, key, model_data in _split_by_model(line, choice)
+    ]
+    if not _without_empty(signed):
+        raise UsageError("this result has no error of the restitution, which needs a requested e; sweep e")
+    absolute = [
+        replace(curve, y=tuple(np.maximum(np.abs(curve.y), MIN_DRAWN_ERROR).tolist()), variable="abs_e_error")
+        for curve in signed
+    ]
+    panels = [
+        Panel("", "Error", tuple(signed), bands=BANDS, y_name="e_error"),
+        Panel("", "Absolute error", tuple(absolute), y_log=True, bands=BANDS, y_name="abs_e_error"),
+    ]
+    return _curve_data(dataset, line, "Error of the restitution", panels, choice)
+
+
+def timestep_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
+    """Compute the mean, the least and the largest restitution over the phase, at fixed steps.
+
+    There is a curve for each model and each requested e, by default over the number of steps per contact or the
+    step. For errors see `velocity_curves`.
+    """
+    if "phase" not in dataset.coords:
+        raise UsageError(f"this result is of the continuous law; {NEEDS_STEPS}")
+    along = [name for name in STEP_AXES if name in dataset.coords and dataset[name].ndim == 1]
+    if choice.x is None and not along:
+        raise UsageError(f"this result has a single step; {NEEDS_STEPS}")
+    line = _read_line(dataset, replace(choice, x=choice.x or along[0]), "e_out", keep=("phase", "e"))
+    cases = _split_by_restitution(line)
+    guides = [
+        replace(_curve("Requested", None, line, case["e"], "e"), case=name, is_guide=True)
+        for name, case in cases
+        if "e" in case.coords
+    ]
+    curves: list[Curve] = []
+    for index, (label, key, _) in enumerate(_split_by_model(line, choice)):
+        by_case = [
+            (name, _curve_over_phase(label, key, line, case["e_out"].isel(model=index))) for name, case in cases
+        ]
+        first = by_case[0][1]
+        # a law that does not depend on e has one curve
+        if all(_have_equal_values(curve, first) for _, curve in by_case):
+            by_case = [("", first)]
+        curves += [replace(curve, case=name) for name, curve in by_case]
+    band_name = "Least to largest over the phase"
+    shown = (*_without_empty(guides), *curves)
+    panel = Panel("", "Delivered restitution", shown, y_name="e_out", band_name=band_name)
+    title = f"Restitution at fixed steps, {safe_text(str(dataset.attrs.get('integrator', '')), 40)}"
+    return _curve_data(dataset, line, title, [panel], choice, x_log=line.x in STEP_AXES)
+
+
+def _split_by_restitution(line: Line) -> list[tuple[str, xr.Dataset]]:
+    """Split a line at fixed steps at each value of e that is neither along x nor along the phase; names each."""
+    taken = {*line.data[line.x].dims, *line.data["phase"].dims}
+    dim = next((dim for dim in (line.data["e"].dims if "e" in line.data.coords else ()) if dim not in taken), None)
+    count = line.data.sizes[dim] if dim else 1
+    if count > MAX_RESTITUTIONS:
+        raise UsageError(
+            f"got {count} values of e, expected at most {MAX_RESTITUTIONS} to draw; use --sel e=VALUE"
+        )
+    cases = [line.data.isel({dim: index}) for index in range(count)] if dim else [line.data]
+    return [
+        (f"e = {number_label(case['e'].item())}" if "e" in case.coords and not case["e"].ndim else "", case)
+        for case in cases
+    ]
+
+
+def _curve_over_phase(label: str, key: str, line: Line, values: xr.DataArray) -> Curve:
+    """Compute the mean over the phase, and a band from the least to the largest value of several phases."""
+    (x_dim,) = line.data[line.x].dims
+    by_phase = np.asarray(values.transpose(x_dim, ...).values, float).reshape(values.sizes[x_dim], -1)
+    curve = _curve(label, key, line, by_phase.mean(axis=1), "e_out")
+    if by_phase.shape[1] == 1:
+        return curve
+    least, largest = by_phase.min(axis=1), by_phase.max(axis=1)
+    return replace(curve, least=tuple(least.tolist()), largest=tuple(largest.tolist()))
+
+
+def _have_equal_values(curve: Curve, other: Curve) -> bool:
+    return all(
+        np.array_equal(values, other_values, equal_nan=True)
+        for (_, values), (_, other_values) in zip(curve.rows_of_values(), other.rows_of_values(), strict=True)
+    )
+
+
+def _read_line(dataset: xr.Dataset, choice: Choice, *names: str, keep: Sequence[str] = ()) -> Line:
+    """Cut a line through a result and read some variables; `keep` as in `take_line`."""
+    line = take_line(dataset, choice, keep)
+    missing = [name for name in names if name not in dataset]
+    if missing:
+        raise UsageError(f"this result has no {', '.join(missing)}; sweep without [output] variables, or add them")
+    return line._replace(data=read(line.data, names))
+
+
+def _split_by_model(line: Line, choice: Choice) -> Iterator[tuple[str, str, xr.Dataset]]:
+    """Iterate over label, key and data of each model."""
+    for index in range(line.data.sizes["model"]):
+        model_data = line.data.isel(model=index)
+        yield model_label(model_data, numbered=choice.equations), str(model_data["model"].item()), model_data
+
+
+def _curve(
+    label: str,
+    model: str | None,
+    line: Line,
+    values: xr.DataArray | NDArray[np.float64],
+    variable: str,
+    end: str = "",
+) -> Curve:
+    """Make a curve of values along a line, or of one value everywhere."""
+    x = np.asarray(line.data[line.x].values, float)
+    y = np.broadcast_to(np.asarray(values, float), x.shape)
+    return Curve(label, model, tuple(x.tolist()), tuple(y.tolist()), end, variable)
+
+
+def _without_empty(curves: list[Curve]) -> list[Curve]:
+    """Drop the curves without a finite value, such as a reference without a requested restitution."""
+    return [curve for curve in curves if np.isfinite(curve.y).any()]
+
+
+def _curve_data(
+    dataset: xr.Dataset,
+    line: Line,
+    title: str,
+    panels: Sequence[Panel],
+    choice: Choice,
+    *,
+    x_log: bool = False,
+) -> CurveData:
+    """Complete panels with the x axis of their line, and add the title and the conditions."""
+    coordinate = line.data[line.x]
+    heading = safe_text(str(dataset.attrs.get("title", "")), 140)
+    conditions = conditions_of(line.data, line.x)
+    if heading and title != FIGURE_6:
+        heading, conditions = title, ": ".join(filter(None, (heading, conditions)))
+    x_axis = x_axis_fields(coordinate, choice)
+    x_axis |= {"x_log": x_axis["x_log"] or x_log, "joined": is_ordered(dataset, line.x)}
+    panels = [replace(panel, y_log=panel.y_log or "y" in choice.log, **x_axis) for panel in panels]
+    empty = {c.model: None for panel in panels for c in panel.curves if c.model and not np.isfinite(c.y).any()}
+    without_value = tuple(f"{key}, which has no point here" for key in empty)
+    return CurveData(heading or title, conditions, tuple(panels), (*line.not_drawn, *without_value))
+
+
+def choose_steps(dataset: xr.Dataset, keys: Sequence[str]) -> Choice | None:
+    """Choose to draw over the steps, at the first e if it has too many values; None without steps."""
+    axes = numeric_axes(dataset)
+    steps = next((name for name in STEP_AXES if name in axes), None)
+    has_many = "e" in axes and axes["e"].size > MAX_RESTITUTIONS
+    sel = {"e": float(axes["e"].values[0])} if has_many else {}
+    return Choice(steps, sel=sel, models=keys) if steps else None
+
+
+FINAL_VELOCITIES = Kind(
+    "final-velocities",
+    "Velocities after the impact, and the impulse-momentum solution.",
+    velocity_curves,
+    choose_line,
+)
+RESTITUTION = Kind("restitution", "Delivered over requested restitution.", restitution_curves, choose_line)
+ERROR = Kind("error", "Error of the restitution: signed above, absolute below.", error_curves, choose_line)
+TIMESTEP = Kind(
+    "timestep",
+    "Restitution at fixed steps: mean, least and largest over the phase.",
+    timestep_curves,
+    choose_steps,
+    along=(*STEP_AXES, "phase", "e"),
+)

@@ -1,0 +1,190 @@
+"""The picture of a sensitivity study: Sobol indices as bars."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+import pandas as pd
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..contact.variables import OUTPUTS
+from ..errors import UsageError
+from ..formatting import heading
+from ..results.kinds import is_sensitivity
+from ..results.selection import model_positions, select
+from ..results.sensitivity import distribution_texts
+from .data import Points
+from .kinds import Choice, Kind
+from .labels import axis_text, model_label, number_axis, pretty_conditions, symbol
+from .slices import conditions_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# bars of an input, and their colours
+BARS = {"first": "First-order index", "total": "Total index"}
+BAR_COLOURS = {"first": "#8cbfdc", "total": "#0072B2"}
+BAR_HEIGHT = 0.38
+# height of an input, and of what else a panel has [in]
+INPUT_INCHES, PANEL_INCHES = 0.34, 0.55
+MAX_PANELS = 8
+
+
+@dataclass(frozen=True)
+class BarPanel:
+    """The indices of one model: its name and key, and by index the values and the ends of their intervals."""
+
+    label: str
+    model: str
+    values: Mapping[str, tuple[float, ...]]
+    lower: Mapping[str, tuple[float, ...]]
+    upper: Mapping[str, tuple[float, ...]]
+
+
+@dataclass(frozen=True)
+class BarData:
+    """The data of a picture of Sobol indices: a panel for each model, with bars for each input."""
+
+    title: str
+    conditions: str
+    inputs: tuple[str, ...]
+    panels: tuple[BarPanel, ...]
+    not_drawn: tuple[str, ...] = ()
+
+    takes_points: ClassVar[bool] = False
+
+    @property
+    def panel_count(self) -> int:
+        return len(self.panels)
+
+    @property
+    def names(self) -> set[str]:
+        """The axis, inputs and models whose text a user can replace."""
+        return {"index", *self.inputs, *(panel.model for panel in self.panels)}
+
+    def long_table(self) -> pd.DataFrame:
+        """Make a row for each bar."""
+        parts = [
+            {
+                "model": panel.model,
+                "input": self.inputs,
+                "index": index,
+                "value": panel.values[index],
+                "lower": panel.lower[index],
+                "upper": panel.upper[index],
+            }
+            for panel in self.panels
+            for index in BARS
+        ]
+        return pd.concat(map(pd.DataFrame, parts), ignore_index=True)
+
+    def wide_table(self) -> pd.DataFrame:
+        """Make a row for each input, with columns for each index of each model and the ends of its interval."""
+        ends = {"value": "", "lower": "_lower", "upper": "_upper"}
+        table = self.long_table().pivot(index="input", columns=["model", "index"], values=[*ends])
+        columns = [(end, panel.model, index) for panel in self.panels for index in BARS for end in ends]
+        table = table.loc[list(self.inputs), columns]
+        table.columns = pd.Index([heading(f"{index}{ends[end]}", model, "1") for end, model, index in columns])
+        return table.reset_index()
+
+    def place_panels(self, figure: Figure, width: float) -> tuple[list[Axes], float]:
+        """Place panels below each other."""
+        all_axes = figure.subplots(self.panel_count, sharex=True, squeeze=False)
+        return list(all_axes.ravel()), self.panel_count * (PANEL_INCHES + INPUT_INCHES * len(self.inputs)) + 0.3
+
+    def draw(
+        self, all_axes: Sequence[Axes], labels: Mapping[str, str], points: Points | None
+    ) -> list[tuple[Artist, str]]:
+        """Draw the bars of each model."""
+        entries: dict[str, Artist] = {}
+        positions = np.arange(len(self.inputs))[::-1]
+        for axes, panel in zip(all_axes, self.panels, strict=True):
+            for offset, (index, name) in zip((0.5, -0.5), BARS.items(), strict=True):
+                values = np.asarray(panel.values[index])
+                # an estimate may be outside of its interval, which ends at 0 or 1
+                ends = np.maximum([values - panel.lower[index], panel.upper[index] - values], 0.0)
+                bars = axes.barh(
+                    positions + offset * BAR_HEIGHT,
+                    values,
+                    BAR_HEIGHT,
+                    xerr=ends,
+                    color=BAR_COLOURS[index],
+                    error_kw={"elinewidth": 0.9, "capsize": 2.5, "capthick": 0.9},
+                )
+                entries.setdefault(name, bars.patches[0])
+            axes.set_title(
+                labels.get(panel.model) or pretty_conditions(panel.label), loc="left", fontsize="medium"
+            )
+            inputs = [labels.get(name) or (symbol(name) if "." not in name else name) for name in self.inputs]
+            axes.set_yticks(positions, inputs)
+            axes.set_xlim(left=min(0.0, axes.get_xlim()[0]))
+            axes.axvline(0.0, color="black", linewidth=0.8)
+            axes.grid(visible=False, axis="y")
+            number_axis(axes.xaxis)
+        all_axes[-1].set_xlabel(axis_text("Sobol index", "index", "1", labels))
+        return [(artist, name) for name, artist in entries.items()]
+
+
+def sensitivity_bars(dataset: xr.Dataset, choice: Choice) -> BarData:
+    """Read the first-order and total indices of each uncertain input, with their intervals.
+
+    Raises
+    ------
+    UsageError : the dataset is no sensitivity study, or no model depends on the inputs
+    """
+    if not is_sensitivity(dataset):
+        raise UsageError("this result is no sensitivity study: impact sensitivity -o writes those")
+    for option, value in (("--x", choice.x), ("--y", choice.y), ("--log", choice.log)):
+        if value:
+            raise UsageError(f"{option}: does not apply to the picture of a sensitivity study")
+    if choice.models:
+        dataset = dataset.isel(model=model_positions(choice.models, dataset))
+    data = select(dataset, choice.sel or {}).load()
+    data = data.isel({dim: 0 for dim in data["mean"].dims if dim != "model"})
+    panels: list[BarPanel] = []
+    not_drawn: list[str] = []
+    for number in range(data.sizes["model"]):
+        law = data.isel(model=number)
+        key = str(law["model"].item())
+        if not np.isfinite(law["total"].values).any():
+            reason = "samples failed" if int(law["failed"]) else "which does not depend on the inputs"
+            not_drawn.append(f"{key}, {reason}")
+        elif len(panels) == MAX_PANELS:
+            not_drawn.append(f"{key}, beyond {MAX_PANELS} models")
+        else:
+            panels.append(_bar_panel(law, choice))
+    if not panels:
+        raise UsageError(f"nothing to draw: {'; '.join(not_drawn)}")
+    inputs = tuple(str(name).removeprefix("sweep.").removeprefix("model.") for name in data["input"].values)
+    meaning = OUTPUTS[data.attrs["of"]].meaning
+    conditions = [", ".join(distribution_texts(data)), conditions_of(data.drop_vars("quantile"))]
+    return BarData(
+        f"Which uncertain input matters: {meaning}",
+        ", ".join(filter(None, conditions)),
+        inputs,
+        tuple(panels),
+        tuple(not_drawn),
+    )
+
+
+def _bar_panel(law: xr.Dataset, choice: Choice) -> BarPanel:
+    """Read the indices of one model and the ends of their intervals."""
+    values, lower, upper = (
+        {name: tuple(law[f"{name}{end}"].values.tolist()) for name in BARS} for end in ("", "_lower", "_upper")
+    )
+    return BarPanel(model_label(law, numbered=choice.equations), str(law["model"].item()), values, lower, upper)
+
+
+SENSITIVITY = Kind(
+    "sensitivity",
+    "First-order and total Sobol indices of the uncertain inputs, with intervals of 95 %.",
+    sensitivity_bars,
+    lambda dataset, keys: Choice(models=keys),
+    along=(),
+    source="sensitivity study",
+)

@@ -1,0 +1,112 @@
+"""What a sweep, a merge or an extension wrote: counts by status, largest errors, first failed points."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from ..contact.status import FIRST_FAILURE, Status
+from ..display import Block, Displayed, Table, Wrapped
+from ..formatting import label, number
+from .plausibility import result_notes
+from .replay_command import command_start, inputs_of_model, replay_command
+from .summary import Summary, counts_by_name, worst_by_model
+
+# headings of the largest errors, in the order of a table
+ERROR_HEADINGS = {
+    "e_error": "max |e_out − e|",
+    "v1_error": "max |v1 error|",
+    "v2_error": "max |v2 error|",
+    "closed_form_error": "max |e_out − exact|",
+    "energy_residual": "max |residual|",
+}
+
+
+@dataclass(frozen=True)
+class SweepOutcome(Displayed):
+    """The result of a sweep, which may be larger than memory, and its summary.
+
+    Parameters
+    ----------
+    dataset : its coordinates and attributes; the values of its variables may be placeholders
+    summary : of its points
+    trajectories : number of different trajectories; None if unknown
+    is_new : whether the file was written now; False if it held this sweep already
+    integrated : how many trajectories were integrated now; None if not counted
+    repeated_blocks : number of blocks that several shards have
+    extended_layout : layout of the result that was extended; only "factored" stores trajectories to reuse
+    output : the file
+    """
+
+    dataset: xr.Dataset
+    summary: Summary
+    trajectories: int | None = None
+    is_new: bool = True
+    integrated: int | None = None
+    repeated_blocks: int = 0
+    extended_layout: str | None = None
+    output: Path | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Points, counts by status, and the first failed points with the command that repeats each."""
+        return {
+            "output": str(self.output),
+            "points": self.summary.points,
+            "models": self.dataset.sizes["model"],
+            "trajectories": self.trajectories,
+            "status": counts_by_name(self.summary.counts),
+            "failed": self.summary.failed,
+            "first_failed": self.records(),
+            "layout": self.dataset.encoding.get("layout"),
+            "seal": self.dataset.encoding.get("seal"),
+        }
+
+    def records(self) -> Sequence[Mapping[str, Any]]:
+        """The first failed points."""
+        command = command_start(str(self.output), self.dataset)
+        statuses = self.dataset["status"]
+        records = []
+        for status, model, index in self.summary.failed_at:
+            point = statuses.isel(dict(zip(statuses.dims, (model, *index), strict=True)))
+            at = inputs_of_model({str(dim): point[dim].values.item() for dim in statuses.dims})
+            replay = replay_command(command, at) if command else None
+            records.append({"status": status.name.lower(), "at": at, "replay": replay})
+        return records
+
+    def sections(self, width: int) -> Iterator[Block]:
+        """The largest errors, the counts, the first failed points and what is implausible."""
+        summary = self.summary
+        if summary.worst:
+            yield error_table(worst_by_model(summary, self.dataset))
+        counts = ", ".join(f"{count:,} {name}" for name, count in counts_by_name(summary.counts).items())
+        distinct = "" if self.trajectories is None else f" from {self.trajectories:,} trajectories"
+        yield Wrapped(f"{self.output}: {summary.points:,} points{distinct} ({counts})")
+        failures = self.records()
+        for failure in failures:
+            inputs = ", ".join(f"{name}={label(value)}" for name, value in failure["at"].items())
+            yield Wrapped(f"failed: {inputs}: {Status[failure['status'].upper()].meaning}")
+            if failure["replay"]:
+                yield f"  {failure['replay']}"
+        more = summary.failed - len(failures)
+        if more > 0:
+            yield f"and {more:,} more"
+        yield from (f"note: {note}" for note in result_notes(summary))
+
+    @property
+    def failed_line(self) -> str:
+        """The number of failed points by status."""
+        counts, failed = self.summary.counts, self.summary.failed
+        reasons = (f"{counts[s]:,} {s.name.lower()}" for s in sorted(counts) if s >= FIRST_FAILURE)
+        return f"{self.output}: {failed:,} of {self.summary.points:,} points failed ({', '.join(reasons)})"
+
+
+def error_table(worst: Mapping[str, Mapping[str, float]]) -> Table:
+    """Tabulate the largest errors by variable and model."""
+    names = [name for name in ERROR_HEADINGS if name in worst]
+    models = dict.fromkeys(model for name in names for model in worst[name])
+    rows = [[model, *(number(worst[name].get(model, float("nan")), 3) for name in names)] for model in models]
+    return Table(rows, ("model", *(ERROR_HEADINGS[name] for name in names)))
