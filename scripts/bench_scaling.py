@@ -32,16 +32,13 @@ from rich.console import Console
 from rich.table import Table
 
 from impact.engine.dask import cluster
-from impact.engine.execute import context_of, integrate_columns, integrate_remotely, with_core
+from impact.engine.execute import context_of, integrate_columns, integrate_remotely
 from impact.engine.executors import RANGES_IN_FLIGHT, ExecutorSpec, choose_executor
 from impact.engine.plan import Plan
 from impact.engine.run import Progress, Run
 from impact.engine.trajectories import (
     RANGE_TRAJECTORIES,
     Columns,
-    columns_of,
-    trajectory_maps,
-    trajectory_ranges,
 )
 from impact.results.sweep import prepare, sweep_into
 
@@ -57,8 +54,7 @@ def table1_plan(points: int, core: str) -> Plan:
         "solver": {"collapse": False, "core": core},
         "sweep": {"e": {"linspace": [0.05, 0.99, points // len(MODELS)]}, **sweep},
     }
-    plan = prepare(config)
-    return with_core(plan, trajectory_maps(plan))
+    return prepare(config)
 
 
 @contextmanager
@@ -150,7 +146,7 @@ def range_time(plan: Plan, key: str, columns: Columns) -> float:
     (model,) = (model for model in plan.models if model.key == key)
     for _ in range(2):
         start = time.process_time()
-        integrate_columns(model, columns, plan.config.solver)
+        integrate_columns(model, columns, plan.solver)
         seconds = time.process_time() - start
     return seconds
 
@@ -163,10 +159,9 @@ def main() -> None:
     if args.points <= RANGE_TRAJECTORIES:
         parser.error(f"--points: got {args.points:,}, expected more than {RANGE_TRAJECTORIES:,}")
     plan = table1_plan(args.points, args.core)
-    maps = trajectory_maps(plan)
-    ranges = list(trajectory_ranges(maps))
+    ranges = plan.ranges
     middle = ranges[len(ranges) // 2]
-    key, columns = plan.models[middle.model].key, columns_of(plan, maps, middle)
+    key, columns = plan.models[middle.model].key, plan.columns_of(middle)
     worker_time = range_time(plan, key, columns)
     print(f"{plan.points:,} points, {len(ranges)} ranges, {args.core}, {os.cpu_count()} cores")
     table = Table("", "trajectories/s", "ratio", "driver", "scheduler", "bytes", box=None)

@@ -15,13 +15,14 @@ import impact
 from impact.config.load import Axis
 from impact.contact.variables import OUTPUTS
 from impact.engine.plan import MAX_FULL_REPEATED, Plan
-from impact.engine.trajectories import trajectory_maps
 from impact.errors import UsageError
 from impact.results.provenance import config_of_part
 from impact.results.ranking import recommend
 from impact.results.selection import select
 from impact.results.summary import summarize
 from impact.results.sweep import prepare, sweep_in_memory, sweep_into
+
+from .conftest import assert_same_array
 
 LAYOUTS = ("full", "factored")
 EVERYTHING = [*OUTPUTS]
@@ -70,11 +71,6 @@ def in_layout(plan: Plan, layout: Any) -> Plan:
     return replace(plan, config=replace(plan.config, output=replace(plan.config.output, layout=layout)))
 
 
-def assert_same_bits(actual: xr.DataArray, expected: xr.DataArray) -> None:
-    assert (actual.dims, actual.dtype) == (expected.dims, expected.dtype)
-    assert actual.values.tobytes() == expected.values.tobytes(), actual.name
-
-
 @st.composite
 def tables(draw: st.DrawFn) -> dict[str, list[Any]]:
     """Tables of cases, of which some may be equal."""
@@ -93,7 +89,7 @@ def test_a_case_equals_a_sweep_with_its_values(columns: dict[str, list[Any]]) ->
         row = {name: values[case] for name, values in columns.items()}
         single = sweep_in_memory(one_row(plan, row))
         for name in EVERYTHING:
-            assert_same_bits(result[name].isel(case=case), single[name])
+            assert_same_array(result[name].isel(case=case), single[name])
 
 
 def one_row(plan: Plan, row: dict[str, Any]) -> Plan:
@@ -181,13 +177,13 @@ def test_cases_are_appended_and_keep_their_numbers(tmp_path: Path, layout: str) 
     extended = impact.extend(tmp_path / "r.h5", ["sweep.cases={v1=[1.0, 0.5, 1.0, 2.0]}"])
     assert extended["case"].values.tolist() == [0, 1, 2, 3]
     for name in whole.data_vars:
-        assert_same_bits(extended[name], whole[name])
+        assert_same_array(extended[name], whole[name])
 
 
 def test_equal_cases_are_integrated_once(cases: dict[str, list[Any]]) -> None:
     plan = plan_of(cases, models=["gharib-hurmuzlu-2012"], m2=1.0)
     # the model depends on e only
-    assert trajectory_maps(plan)[0].count == 2
+    assert plan.maps[0].count == 2
 
 
 # a parameter of each model, which is an axis
@@ -240,8 +236,8 @@ def test_ten_models_with_their_parameters_as_axes_cost_as_much_as_each_alone(ten
     # the number of stored points is bounded
     assert plan.stored_points > MAX_FULL_REPEATED
     assert plan.layout == "factored"
-    for trajectories, key in zip(trajectory_maps(plan), PARAMETER_OF, strict=True):
-        (alone,) = trajectory_maps(axes_of_parameters([key]))
+    for trajectories, key in zip(plan.maps, PARAMETER_OF, strict=True):
+        (alone,) = axes_of_parameters([key]).maps
         assert trajectories.count == alone.count <= len(VALUES) * len(SPEEDS)
 
 
@@ -258,14 +254,14 @@ def test_a_model_does_not_depend_on_parameters_of_other_models(
             dims = {dim: at for dim, at in others.items() if dim in result[name].dims}
             part = result[name].isel(dims)
             whole = part.isel(model=[position]) if "model" in part.dims else part
-            assert_same_bits(whole.transpose(*alone[name].dims), alone[name])
+            assert_same_array(whole.transpose(*alone[name].dims), alone[name])
 
 
 def test_a_model_without_collapse_is_integrated_along_its_own_axes_only() -> None:
     plan = axes_of_parameters(["kelvin-voigt", "ismail-stronge-2008"])
     solver = replace(plan.config.solver, collapse=False)
     plan = replace(plan, config=replace(plan.config, solver=solver))
-    assert [trajectories.count for trajectories in trajectory_maps(plan)] == [len(VALUES) * len(SPEEDS)] * 2
+    assert [trajectories.count for trajectories in plan.maps] == [len(VALUES) * len(SPEEDS)] * 2
 
 
 def test_files_summaries_and_commands_count_the_same_points(tmp_path: Path, cli: Any) -> None:

@@ -13,8 +13,7 @@ from pathlib import Path
 import pytest
 
 import impact
-from impact.engine.execute import context_of, integrate_remotely, with_core
-from impact.engine.trajectories import columns_of, trajectory_maps, trajectory_ranges
+from impact.engine.execute import context_of, integrate_remotely
 from impact.results.sweep import prepare
 
 from .clusters import (
@@ -206,10 +205,8 @@ def test_a_block_integrated_twice_gives_the_same_bits(
 
     (tmp_path / "c.toml").write_text(CONFIG)
     plan = prepare(tmp_path / "c.toml")
-    maps = trajectory_maps(plan)
-    plan = with_core(plan, maps)
-    part = next(trajectory_ranges(maps))
-    block = (plan.models[part.model].key, columns_of(plan, maps, part), context_of(plan))
+    part = plan.ranges[0]
+    block = (plan.models[part.model].key, plan.columns_of(part), context_of(plan))
     with Client(cluster.address, set_as_default=False) as client:
         returned = [
             client.submit(integrate_remotely, *block, workers=[name], pure=False).result() for name in "ab"

@@ -19,12 +19,11 @@ from impact.contact.numba.dispatch import is_installed, serves
 from impact.contact.outputs import Outputs, collide
 from impact.contact.status import FIRST_FAILURE
 from impact.contact.variables import OUTPUTS
-from impact.engine.execute import NUMBA_MIN_TRAJECTORIES, with_core
-from impact.engine.trajectories import trajectory_maps
+from impact.engine.plan import NUMBA_MIN_TRAJECTORIES
 from impact.errors import ConfigError, UsageError
 from impact.results.sweep import prepare
 
-from .conftest import ROOT, Run
+from .conftest import ROOT, Run, assert_same_bits
 from .problems import table1_impacts, with_parameters
 
 RTOL, CORE_TOLERANCE = 1e-10, 1e-12
@@ -142,8 +141,7 @@ def test_results_agree_across_cores_threads_and_collapse() -> None:
     threads = impact.sweep(SWEEP, overrides=['solver.core="numba"'], threads=3)
     separate = impact.sweep(SWEEP, overrides=['solver.core="numba"', "solver.collapse=false"], threads=2)
     for other in (threads, separate):
-        for name in numba.data_vars:
-            assert other[name].values.tobytes() == numba[name].values.tobytes(), name
+        assert_same_bits(other, numba)
     assert impact.compare(separate, numpy).equal
 
 
@@ -180,7 +178,7 @@ def test_auto_chooses_numba_if_installed_and_above_a_number_of_trajectories() ->
                 "model": {key: {"A": 1e-6}} if key == "kuwabara-kono-1987" else {},
             }
         )
-        return with_core(plan, trajectory_maps(plan)).config.solver.core
+        return plan.solver.core
 
     assert core(NUMBA_MIN_TRAJECTORIES - 1, "kuwabara-kono-1987") == "numpy"
     assert core(NUMBA_MIN_TRAJECTORIES, "kuwabara-kono-1987") == ("numba" if is_installed() else "numpy")

@@ -12,16 +12,14 @@ from hypothesis import given, settings, strategies as st
 import impact
 from impact.config.load import read_config
 from impact.contact.impacts import Impacts
-from impact.contact.variables import BY_DEFAULT
 from impact.engine import trajectories as trajectories_module
 from impact.engine.build_impacts import build_impacts
 from impact.engine.plan import Plan
 from impact.engine.run import Run
-from impact.engine.trajectories import trajectory_maps
 from impact.results.estimate import estimate
 from impact.results.sweep import prepare
 
-from .conftest import ROOT
+from .conftest import ROOT, assert_same_bits
 
 DASHPOT = impact.ForceModel(
     "dashpot",
@@ -103,11 +101,6 @@ def sweep_with_plugins(config: dict[str, object], *overrides: str) -> xr.Dataset
     return impact.sweep(config, overrides=overrides, plugins=[DASHPOT, SPEED])
 
 
-def assert_same_bits(first: xr.Dataset, second: xr.Dataset) -> None:
-    for name in BY_DEFAULT:
-        assert first[name].values.tobytes() == second[name].values.tobytes(), name
-
-
 @settings(max_examples=15)
 @given(configs())
 def test_deduplication_changes_no_bit_of_a_result(config: dict[str, object]) -> None:
@@ -142,7 +135,7 @@ def test_the_impacts_of_a_grid_are_those_of_its_points(config: dict[str, object]
 def trajectory_counts(sweep: dict[str, object], *models: str, **more: object) -> list[int]:
     """The trajectories of each model."""
     config = {"models": list(models), "sweep": sweep, "materials": MATERIALS, **more}
-    return [model_map.count for model_map in trajectory_maps(prepare(config, plugins=[DASHPOT, SPEED]))]
+    return [model_map.count for model_map in prepare(config, plugins=[DASHPOT, SPEED]).maps]
 
 
 GRID = {"e": [0.1, 0.5, 0.9], "v1": [1.0, 2.0], "m1": [1.0, 4.0], "m2": [1.0, 4.0], "material": ["soft", "hard"]}
@@ -202,7 +195,7 @@ def test_a_unit_whose_exponent_is_zero_at_the_first_values_hides_no_axis(
         },
         "model": {"powers": {"c": 0.3, "p": p}},
     }
-    (model_map,) = trajectory_maps(prepare(config, plugins=[power_law]))
+    (model_map,) = prepare(config, plugins=[power_law]).maps
     assert model_map.axes == axes
     deduplicated, separate = (
         impact.sweep(config, overrides=[f"solver.collapse={word}"], plugins=[power_law])
@@ -217,7 +210,7 @@ def test_the_trajectories_of_a_plan_of_any_size_are_counted() -> None:
     config = {"models": ["gharib-hurmuzlu-2012", "speed"], "sweep": sweep, "materials": MATERIALS}
     plan = prepare(config, plugins=[SPEED], run=Run(max_points=10**15))
     assert plan.points == 4 * 10**14
-    assert [model_map.count for model_map in trajectory_maps(plan)] == [100, 10_000]
+    assert [model_map.count for model_map in plan.maps] == [100, 10_000]
     estimated = estimate(config, plugins=[SPEED], max_points=10**15)
     assert (estimated.points, estimated.trajectories) == (plan.points, 10_100)
     # a row of the table for each trajectory, and an index of the same length

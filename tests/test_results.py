@@ -14,10 +14,10 @@ from impact.config.load import parse_config
 from impact.contact.outputs import FORMULAS
 from impact.contact.status import Status
 from impact.contact.variables import BY_DEFAULT, OUTPUTS
-from impact.engine.execute import integrate_ranges, with_core
+from impact.engine.execute import integrate_ranges
 from impact.engine.plan import Plan
 from impact.engine.run import DEFAULT_RUN
-from impact.engine.trajectories import trajectory_maps, trajectory_ranges
+from impact.engine.trajectories import trajectory_ranges
 from impact.results.schema import dataset_template, stored_variables, udunits
 from impact.results.trajectory_table import TrajectoryRows, TrajectoryTable, in_memory, lazy_dataset
 
@@ -183,14 +183,10 @@ def test_an_axis_of_exponents() -> None:
 def test_the_size_and_order_of_ranges_change_no_bit(wide: xr.Dataset, size: int, collapse: str) -> None:
     # ranges of this size, shuffled
     plan = Plan(parse_config(WIDE, [f"solver.collapse={collapse}"]))
-    maps = trajectory_maps(plan)
-    plan = with_core(plan, maps)
-    ranges = sorted(trajectory_ranges(maps, size), key=lambda part: hash((part.number, "shuffled")))
-    finished = {
-        (part.model, part.start): columns for part, columns in integrate_ranges(plan, maps, ranges, DEFAULT_RUN)
-    }
-    rows = TrajectoryRows(maps, lambda model, start, stop: finished[model, start], size)
-    table = TrajectoryTable(plan.inputs, plan.models, maps, rows, (None,) * len(plan.models))
+    ranges = sorted(trajectory_ranges(plan.maps, size), key=lambda part: hash((part.number, "shuffled")))
+    finished = {(part.model, part.start): columns for part, columns in integrate_ranges(plan, ranges, DEFAULT_RUN)}
+    rows = TrajectoryRows(plan.maps, lambda model, start, stop: finished[model, start], size)
+    table = TrajectoryTable(plan.inputs, plan.models, plan.maps, rows, (None,) * len(plan.models))
     # the overrides of the config are an attribute
     template = dataset_template(plan).assign_attrs(config_set=wide.attrs["config_set"])
     dataset = lazy_dataset(template, table, stored_variables(plan))

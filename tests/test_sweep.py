@@ -26,13 +26,13 @@ import impact
 from impact.engine.execute import context_of, integrate_ranges, integrate_remotely
 from impact.engine.executors import SERIAL, ExecutorSpec, choose_executor
 from impact.engine.run import Progress, Run as SweepRun
-from impact.engine.trajectories import columns_of, trajectory_maps, trajectory_ranges
+from impact.engine.trajectories import trajectory_ranges
 from impact.errors import ConfigError, StoreError, UsageError
 from impact.progress_display import line, new_bar, update
 from impact.results.summary import summarize
 from impact.results.sweep import prepare, sweep_in_memory, sweep_into
 
-from .conftest import ROOT, WIDE, Run
+from .conftest import PLUGIN, ROOT, WIDE, Run
 from .fork_server import ForkServer, printed_on_terminal
 
 # several blocks, integrated in less than a second
@@ -56,9 +56,6 @@ rtol = 1e-4
 THREE_MODELS = 'models=["bilinear", "gharib-hurmuzlu-2012", "lankarani-nikravesh-1990"]'
 # progress is shown from the start, not after a second
 SHOW_PROGRESS_AT_ONCE = "from impact import progress_display\nprogress_display.FIRST_S = 0.0"
-PLUGIN = """import impact
-MODEL = impact.hysteresis("mine", title="", year=2026, equation="", reference="", chi=lambda e: 1 - e)
-"""
 
 
 @pytest.fixture
@@ -101,12 +98,11 @@ def test_a_dry_run_estimates_transferred_bytes_and_the_useful_number_of_workers(
     assert "workers" not in cli(*words, *larger, cwd=blocks.parent).stdout
     estimate = json.loads(cli(*words, "--json", cwd=blocks.parent).stdout)
     plan = prepare(blocks, overrides)
-    maps = trajectory_maps(plan)
-    ranges = list(trajectory_ranges(maps))
+    ranges = plan.ranges
     assert [part.size for part in ranges] == [17_000] * 4
     transferred = 0
     for part in ranges:
-        columns, context = columns_of(plan, maps, part), context_of(plan)
+        columns, context = plan.columns_of(part), context_of(plan)
         transferred += len(pickle.dumps((columns, context)))
         transferred += len(pickle.dumps(integrate_remotely(plan.models[part.model].key, columns, context)))
     # the estimate measures one range only
@@ -245,8 +241,8 @@ def test_only_the_undamaged_result_of_the_same_sweep_is_recognized_as_finished(b
 @pytest.mark.slow
 def test_two_processes_with_a_plug_in_write_the_same_bytes_as_one(blocks: Path) -> None:
     plugin = blocks.parent / "plugin.py"
-    plugin.write_text(PLUGIN, encoding="utf-8")
-    overrides = ["models=['mine', 'bilinear']", "output.variables=['e_out', 'contact_time', 'status']"]
+    plugin.write_text(PLUGIN.format(chi="1 - e"), encoding="utf-8")
+    overrides = ["models=['mine-2026', 'bilinear']", "output.variables=['e_out', 'contact_time', 'status']"]
     plan = prepare(blocks, overrides, [plugin])
     # every process uses the source that was read at the start
     plugin.write_text("raise SystemExit", encoding="utf-8")
@@ -260,8 +256,8 @@ def test_two_processes_with_a_plug_in_write_the_same_bytes_as_one(blocks: Path) 
 @pytest.mark.slow
 def test_jobs_on_the_command_line_and_in_python_change_no_value(blocks: Path, cli: Run) -> None:
     plugin = blocks.parent / "plugin.py"
-    plugin.write_text(PLUGIN, encoding="utf-8")
-    words = ["sweep", blocks, "--plugin", plugin, "--set", "models=['mine']", "--quiet"]
+    plugin.write_text(PLUGIN.format(chi="1 - e"), encoding="utf-8")
+    words = ["sweep", blocks, "--plugin", plugin, "--set", "models=['mine-2026']", "--quiet"]
     assert cli(*words, "--jobs", 2, "-o", "parallel.h5", cwd=blocks.parent).returncode == 0
     assert cli(*words, "-o", "serial.h5", cwd=blocks.parent).returncode == 0
     serial, parallel = (impact.load(blocks.parent / f"{name}.h5") for name in ("serial", "parallel"))
@@ -299,11 +295,10 @@ def test_an_executor_gets_no_more_blocks_than_its_capacity(blocks: Path) -> None
             return future
 
     plan = prepare(blocks, ["models=['bilinear']", "sweep.m1=1.0", "sweep.e.linspace=[0,1,1001]"])
-    maps = trajectory_maps(plan)
-    todo = list(trajectory_ranges(maps, 10))
+    todo = list(trajectory_ranges(plan.maps, 10))
     with CountingExecutor(2) as executor:
         spec = ExecutorSpec(lambda: nullcontext(executor), lambda: 5, shares_memory=True)
-        for _ in integrate_ranges(plan, maps, todo, SweepRun(spec)):
+        for _ in integrate_ranges(plan, todo, SweepRun(spec)):
             unfinished -= {future for future in unfinished if future.done()}
     assert len(todo) > 100
     assert largest == 5

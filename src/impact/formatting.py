@@ -12,7 +12,7 @@ PREFIXED = re.compile(r"(m|s|N|J|Pa|W|Hz)(?![\^A-Za-z])")
 
 
 def number(value: object, digits: int = 6) -> str:
-    """A float with `digits` significant digits; NaN is a dash, and other types use `str`.
+    """Format a float with `digits` significant digits; NaN is a dash, and other types use `str`.
 
     >>> number(1 / 3), number(0.5), number(6e9), number(float("nan")), number(12)
     ('0.333333', '0.5', '6e+09', '–', '12')
@@ -23,7 +23,7 @@ def number(value: object, digits: int = 6) -> str:
 
 
 def decimals(value: float, places: int = 4) -> str:
-    """A number with `places` decimals, for columns whose numbers are compared; NaN is a dash.
+    """Format a number with `places` decimals, for columns whose numbers are compared; NaN is a dash.
 
     >>> decimals(0.5), decimals(float("nan"))
     ('0.5000', '–')
@@ -32,7 +32,7 @@ def decimals(value: float, places: int = 4) -> str:
 
 
 def percentage(share: float) -> str:
-    """A share from 0 to 1 in percent; "0%" and "100%" mean exactly none and all.
+    """Format a share from 0 to 1 in percent; "0%" and "100%" mean exactly none and all.
 
     >>> [percentage(n / 3000) for n in (0, 1, 2000, 2999, 3000)]
     ['0%', '<0.1%', '66.7%', '>99.9%', '100%']
@@ -45,7 +45,7 @@ def percentage(share: float) -> str:
 
 
 def label(value: object) -> str:
-    """The label of an axis value: enough digits to identify it, without rounding errors or trailing zeros.
+    """Write the label of an axis value: enough digits to identify it, without rounding errors or trailing zeros.
 
     >>> label(0.1 + 0.2), label(6e9), label(1234567.0), label("steel")
     ('0.3', '6e+09', '1234567', 'steel')
@@ -55,7 +55,7 @@ def label(value: object) -> str:
 
 
 def quantity(value: object, unit: str = "1", digits: int = 6) -> str:
-    """A value with its unit, if it has one.
+    """Format a value with its unit, if it has one.
 
     >>> quantity(0.5, "m/s"), quantity(1.5), quantity(float("nan"), "N")
     ('0.5 m/s', '1.5', '–')
@@ -65,7 +65,7 @@ def quantity(value: object, unit: str = "1", digits: int = 6) -> str:
 
 
 def heading(name: str, of: str = "", unit: str = "1") -> str:
-    """The heading of a column: a name, the model or ball it belongs to, and its unit in brackets.
+    """Write the heading of a column: a name, the model or ball it belongs to, and its unit in brackets.
 
     >>> heading("v1_post", "hertz", "m/s"), heading("e")
     ('v1_post hertz [m/s]', 'e')
@@ -74,7 +74,7 @@ def heading(name: str, of: str = "", unit: str = "1") -> str:
 
 
 def typographic(value: float, *, powers: bool = False) -> str:
-    """A number with a minus sign and powers of ten as in print; with `powers`, also 1e-4 is a power of ten.
+    """Format a number with a minus sign and powers of ten as in print; with `powers`, also 1e-4 is a power of ten.
 
     >>> [typographic(value) for value in (0.25, -3.0, -1e-9, 2.5e10, 1e-4)], typographic(1e-4, powers=True)
     (['0.25', '−3', '−10⁻⁹', '2.5·10¹⁰', '0.0001'], '10⁻⁴')
@@ -89,7 +89,7 @@ def typographic(value: float, *, powers: bool = False) -> str:
 
 
 def scaled_unit(unit: str, largest: float) -> tuple[float, str]:
-    """The unit with the prefix that suits a number: its size in the given unit, and its name.
+    """Choose the prefix of a unit that suits a number: the size in the given unit, and the name.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def scaled_unit(unit: str, largest: float) -> tuple[float, str]:
 
 
 def _prefixed(largest: float) -> tuple[int, str]:
-    """The power of ten of a prefix, and the prefix; 0 and "" for numbers that need none."""
+    """Choose the power of ten of a prefix, and the prefix; 0 and "" for numbers that need none."""
     if not 0.0 < largest < float("inf") or 0.1 <= largest < 1000.0:
         return 0, ""
     exponent = int(f"{largest:.6e}".partition("e")[2])

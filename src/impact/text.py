@@ -9,7 +9,7 @@ UNSAFE = frozenset({"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"})
 
 
 def with_year(title: str, year: int | str) -> str:
-    """The title of a model with its year, unless the title ends with versions in brackets.
+    """Add the year to the title of a model, unless the title ends with versions in brackets.
 
     >>> with_year("Hertz", 1882), with_year("Modia3D (v0.4.0 to v0.5.2, 2019 to 2021)", 2019)
     ('Hertz (1882)', 'Modia3D (v0.4.0 to v0.5.2, 2019 to 2021)')
@@ -18,7 +18,7 @@ def with_year(title: str, year: int | str) -> str:
 
 
 def safe_text(text: str, limit: int = 200) -> str:
-    r"""The text with control and invisible characters escaped, cut to at most `limit` characters.
+    r"""Escape control and invisible characters of a text, and cut it to at most `limit` characters.
 
     >>> safe_text("steel\x1b[31m")
     'steel\\x1b[31m'

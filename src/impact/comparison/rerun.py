@@ -13,7 +13,6 @@ from ..config.grid import MAX_POINTS
 from ..contact.model import ForceModel
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
-from ..engine.trajectories import check_count
 from ..results.kinds import is_calibration, require_sweep
 from ..results.provenance import config_of_part, stored_config
 from ..results.replay_command import command_start
@@ -71,7 +70,7 @@ def rerun(
     config = stored_config(stored.attrs, changes, plugin_set, str(result), max_points, allow_changed_plugins=True)
     whole = Plan(config, plugin_set.of(config.models))
     plan = replace(whole, config=config_of_part(config, stored))
-    check_count(plan, max_points, str(result))
+    plan.check_count(max_points, str(result))
     verdict = compare(execute(plan), stored, tol=tol, subset=subset)
     if plan.points < whole.points:
         part = f"repeated {plan.points:,} of {whole.points:,} points of the config: the file holds no others"

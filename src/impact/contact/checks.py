@@ -43,7 +43,7 @@ class ClauseResult:
 
 
 def sample(model: ForceModel) -> Impacts:
-    """Forty dissimilar impacts: a wall, heavy and light balls, slow and fast, soft and hard, e from 0.05 to 1."""
+    """Make forty dissimilar impacts: walls, heavy and light, slow and fast, soft and hard, e from 0.05 to 1."""
     count = 40
     index = np.arange(float(count))
     e = np.linspace(0.05, 1.0, count)
@@ -79,7 +79,7 @@ def sample(model: ForceModel) -> Impacts:
 
 
 def _parameter_values(model: ForceModel, parameter: Parameter, impacts: Impacts) -> Array:
-    """Values of a parameter for the impacts: its default, or values from its least one upwards, shape (n,)."""
+    """Choose values of a parameter for the impacts: its default, or from its least one upwards, shape (n,)."""
     if parameter.default is not None:
         return np.full(len(impacts), parameter.default)
     # the size of the parameter that is 1 in the contact's own units
@@ -224,7 +224,7 @@ def _check_clauses(model: ForceModel) -> Iterator[ClauseResult]:
 
 
 def in_other_units(model: ForceModel, impacts: Impacts) -> Impacts:
-    """The same impacts with grams, feet and minutes as units."""
+    """Convert the impacts to grams, feet and minutes."""
     units = {parameter.name: parameter.unit for parameter in model.parameters} | QUANTITIES
     units |= {"v1": "m/s", "v2": "m/s", "m1": "kg", "m2": "kg"}
     exponents = {"n": impacts.n, **impacts.parameters}
@@ -238,7 +238,7 @@ def in_other_units(model: ForceModel, impacts: Impacts) -> Impacts:
 
 
 def _alone_differs(collided: Callable[[Impacts], Outputs], impacts: Impacts, base: Outputs) -> int:
-    """How many impacts have other bits when they are integrated alone."""
+    """Count the impacts that have other bits when they are integrated alone."""
     differ = 0
     for index in range(0, len(impacts), 7):
         alone = collided(impacts[np.array([index])])

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 def deduplicate(
     columns: Sequence[NDArray[Any]], shape: tuple[int, ...]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """The distinct rows of a table that is given by its columns.
+    """Find the distinct rows of a table that is given by its columns.
 
     Parameters
     ----------
@@ -38,5 +38,5 @@ def deduplicate(
 
 
 def _ranks(values: NDArray[Any]) -> NDArray[np.intp]:
-    """The rank of each value among the distinct ones; equal values have equal ranks."""
+    """Compute the rank of each value among the distinct ones; equal values have equal ranks."""
     return np.unique(values, return_inverse=True)[1].reshape(values.shape)

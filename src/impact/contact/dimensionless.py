@@ -22,7 +22,7 @@ LawValues = dict[str, Array | float]
 
 
 def required_quantities(model: ForceModel) -> list[str]:
-    """The names of the quantities and parameters that a law, its closed form or its units need, without n."""
+    """Find the names of the quantities and parameters that a law, its closed form or its units need, without n."""
     parameters = {parameter.name for parameter in model.parameters}
     closed_form_names = {name for name in argument_names(model.oracle) if name in QUANTITIES or name in parameters}
     names = {*model.quantities, *closed_form_names}
@@ -31,7 +31,7 @@ def required_quantities(model: ForceModel) -> list[str]:
 
 
 def exponent_names(model: ForceModel) -> frozenset[str]:
-    """The names in the exponents of the units of a law's values, such as n of N/m^n.
+    """Find the names in the exponents of the units of a law's values, such as n of N/m^n.
 
     >>> from impact.contact.models import find
     >>> sorted(exponent_names(find("hertz")))
@@ -41,17 +41,17 @@ def exponent_names(model: ForceModel) -> frozenset[str]:
 
 
 def dimensionless_values(model: ForceModel, impacts: Impacts) -> dict[str, Array]:
-    """The quantities that a law needs of impacts, by name, in the contact's own units; of the impacts' shapes."""
+    """Compute the quantities that a law needs, by name, in the contact's own units; of the impacts' shapes."""
     return {name: impacts.dimensionless(model, name) for name in required_quantities(model)}
 
 
 def with_units(values: Mapping[str, Array], n: float) -> LawValues:
-    """The values of impacts with the same n, extended by K, m and v0, which are 1, and by n."""
+    """Extend the values of impacts with the same n by K, m and v0, which are 1, and by n."""
     return {**values, "K": 1.0, "m": 1.0, "v0": 1.0, "n": n}
 
 
 def with_coefficients(model: ForceModel, values: Mapping[str, Array | float], count: int) -> LawValues:
-    """The values, extended by the coefficients of the law, each of shape (count,)."""
+    """Extend the values by the coefficients of the law, each of shape (count,)."""
     extended = dict(values)
     for name, formula in model.coefficients.items():
         # adding zero turns -0.0 into 0.0, which is the same physics
@@ -60,7 +60,7 @@ def with_coefficients(model: ForceModel, values: Mapping[str, Array | float], co
 
 
 def exact_restitution(model: ForceModel, values: LawValues, count: int) -> Array:
-    """The delivered restitution by the law's closed form, NaN where it has none; shape (count,)."""
+    """Compute the delivered restitution by the law's closed form, NaN where it has none; shape (count,)."""
     exact = np.full(count, np.nan)
     if model.oracle is not None:
         exact[:] = _checked_shape(call_by_name(model.oracle, values), count)
@@ -68,19 +68,19 @@ def exact_restitution(model: ForceModel, values: LawValues, count: int) -> Array
 
 
 def _checked_shape(value: Array, count: int) -> Array:
-    """The value, if it is a number for all impacts or has one for each."""
+    """Return the value, if it is a number for all impacts or has one for each."""
     if value.shape not in ((), (count,)):
         raise ModelError(f"a formula returned shape {value.shape}, expected ({count},)")
     return value
 
 
 def chi_of(values: LawValues, count: int) -> Array:
-    """The damping ratio χ of a law that has one, else NaN; shape (count,)."""
+    """Return the damping ratio χ of a law that has one, else NaN; shape (count,)."""
     return np.array(np.broadcast_to(values.get("chi", np.nan), count))
 
 
 def delivered(model: ForceModel, e: Array) -> Array | None:
-    """The exact delivered restitution for e, shape (n,); None where there is no closed form in e and n alone."""
+    """Compute the exact delivered restitution for e, shape (n,); None without a closed form in e and n alone."""
     formulas = (model.oracle, *model.coefficients.values())
     names = {"e", "K", "m", "v0", "n", *model.coefficients}
     if model.oracle is None or any(name not in names for formula in formulas for name in argument_names(formula)):

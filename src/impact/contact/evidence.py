@@ -50,7 +50,7 @@ class Evidence:
 
 
 def count_states(evidence: Iterable[Evidence]) -> str:
-    """The number of laws in each state, as text.
+    """Count the laws in each state, as text.
 
     >>> count_states([Evidence("derived", "here"), Evidence("seen", "there"), Evidence("seen", "there")])
     '2 seen, 1 derived'

@@ -22,7 +22,7 @@ Formula = Callable[..., object]
 
 @cache
 def argument_names(formula: Formula | None) -> tuple[str, ...]:
-    """The names of a formula's arguments, without those that have a default.
+    """Find the names of a formula's arguments, without those that have a default.
 
     >>> argument_names(lambda elastic, v, chi: elastic * (1 + chi * v))
     ('elastic', 'v', 'chi')
@@ -34,7 +34,7 @@ def argument_names(formula: Formula | None) -> tuple[str, ...]:
 
 
 def call_by_name(formula: Formula, values: Mapping[str, Array | float]) -> Array:
-    """The value of a formula, called with values by name; arrays are passed as read-only views."""
+    """Call a formula with values by name; arrays are passed as read-only views."""
     arguments = [_read_only(values[name]) for name in argument_names(formula)]
     try:
         return _real(formula(*arguments))
@@ -46,7 +46,7 @@ def call_by_name(formula: Formula, values: Mapping[str, Array | float]) -> Array
 
 
 def describe_error(key: str, error: ModelError) -> tuple[str, str]:
-    """A key that identifies an error of a law, and a line that describes it: location, type, text and a hint."""
+    """Identify an error of a law by a key, and describe it in a line: location, type, text and a hint."""
     cause = error.__cause__
     if cause is None:
         return key, safe_text(f"model {key}: {str(error).removeprefix(f'{key}: ')}", 1000)
@@ -64,7 +64,7 @@ def describe_error(key: str, error: ModelError) -> tuple[str, str]:
 
 
 def _read_only(value: Array | float) -> Array | float:
-    """The value; an array as a view that cannot be written to."""
+    """Return the value; an array as a view that cannot be written to."""
     if not isinstance(value, np.ndarray):
         return value
     view = value.view()
@@ -73,7 +73,7 @@ def _read_only(value: Array | float) -> Array | float:
 
 
 def _real(value: object) -> Array:
-    """The value as an array of float64; text, dates and complex numbers are refused."""
+    """Convert the value to an array of float64; text, dates and complex numbers are refused."""
     array = np.asarray(value)
     if array.dtype == float:
         return array

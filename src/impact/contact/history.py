@@ -158,13 +158,13 @@ def _phase(
 
 
 def _fractions(steps: tuple[Step, ...]) -> list[Array]:
-    """Uniform fractions of each step, and the end of the last step."""
+    """Make uniform fractions of each step, and the end of the last step."""
     inner = np.arange(SAMPLES_PER_STEP) / SAMPLES_PER_STEP
     return [step.end * (inner if step is not steps[-1] else np.append(inner, 1.0)) for step in steps]
 
 
 def _fractions_at(steps: tuple[Step, ...], times: Array) -> list[Array]:
-    """The fractions of each step at which the interpolated time equals one of the increasing times."""
+    """Compute the fractions of each step at which the interpolated time equals one of the increasing times."""
     ends = np.array([step.at(step.end)[2, 0] for step in steps])
     step_of_time = np.minimum(np.searchsorted(ends, times), len(steps) - 1)
     fractions = []

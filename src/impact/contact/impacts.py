@@ -65,7 +65,7 @@ class Impacts:
         return Impacts(**arrays, parameters={name: a[chosen] for name, a in self.parameters.items()})
 
     def broadcast(self) -> Impacts:
-        """The same impacts, with every field of the shape of all of them."""
+        """Give every field the shape of all of them."""
         arrays = {f.name: np.broadcast_to(getattr(self, f.name), self.shape) for f in fields(self)[:-1]}
         parameters = {name: np.broadcast_to(array, self.shape) for name, array in self.parameters.items()}
         return Impacts(**arrays, parameters=parameters)
@@ -122,11 +122,11 @@ class Impacts:
         return self.m * self.v0 * self.v0
 
     def quantity(self, name: str) -> Array:
-        """A quantity of the contact or a parameter of the law, in SI."""
+        """Return a quantity of the contact or a parameter of the law, in SI."""
         return np.asarray(self.parameters[name] if name in self.parameters else getattr(self, name))
 
     def dimensionless(self, model: ForceModel, name: str) -> Array:
-        """A quantity or parameter in the contact's own units, in which K = m = v0 = 1."""
+        """Compute a quantity or parameter in the contact's own units, in which K = m = v0 = 1."""
         value = self.quantity(name)
         exponents = dimensionless_exponents(model, name, {"n": self.n, **self.parameters})
         for unit, exponent in exponents.items():
@@ -139,7 +139,7 @@ class Impacts:
 def dimensionless_exponents(
     model: ForceModel, name: str, exponent_values: Mapping[str, Array | float]
 ) -> dict[str, Array | float]:
-    """The exponents of m, length and v0 in the contact's own unit of a quantity or parameter.
+    """Compute the exponents of m, length and v0 in the contact's own unit of a quantity or parameter.
 
     >>> from impact.contact.models import find
     >>> dimensionless_exponents(find("hertz"), "E1", {"n": 1.5})
@@ -150,7 +150,7 @@ def dimensionless_exponents(
 
 
 def stiffness(n: Array, hertz: Array, m: Array, v0: Array) -> Array:
-    """The default stiffness K [N/m^n]: Hertz's for n = 3/2, else K = F_m/delta_m^n at the peak by Hertz.
+    """Compute the default stiffness K [N/m^n]: Hertz's for n = 3/2, else K = F_m/delta_m^n at the peak by Hertz.
 
     For n = 1 that is the secant stiffness. It depends on the closing speed and is NaN where that is not positive.
 
@@ -167,7 +167,7 @@ def stiffness(n: Array, hertz: Array, m: Array, v0: Array) -> Array:
 
 
 def check_inputs(model: Law, impacts: Impacts, checks: frozenset[str] = CHECKS) -> NDArray[np.int8]:
-    """The status of impacts before they are integrated; of a shape that broadcasts to theirs.
+    """Compute the status of impacts before they are integrated; of a shape that broadcasts to theirs.
 
     Parameters
     ----------
@@ -190,7 +190,7 @@ def check_inputs(model: Law, impacts: Impacts, checks: frozenset[str] = CHECKS) 
 def _unless(
     values: Array, least: float, most: float, status: NDArray[np.int8], otherwise: Status
 ) -> NDArray[np.int8]:
-    """The status, replaced by another one where a value is not within bounds."""
+    """Replace the status by another one where a value is not within bounds."""
     if all_within(values, least, most):
         return status
     return np.where((values >= least) & (values <= most), status, otherwise)

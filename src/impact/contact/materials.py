@@ -61,7 +61,7 @@ def effective_compliance(E1: Array, nu1: Array, E2: Array, nu2: Array) -> Array:
 
 
 def hertz_stiffness(E1: Array, nu1: Array, E2: Array, nu2: Array, R1: Array, R2: Array) -> Array:
-    """Stiffness K [N/m^1.5] of the contact of two spheres: Gharib and Hurmuzlu (2012), equations (12) and (13).
+    """Compute K [N/m^1.5] of the contact of two spheres: Gharib and Hurmuzlu (2012), equations (12), (13).
 
     K = (4/3)/(k1 + k2) sqrt(R), k_j = (1 - nu_j^2)/E_j, with R = 1/(1/R1 + 1/R2), so that an infinite
     radius is a plane. Two planes have an infinite K.

@@ -53,7 +53,7 @@ COORDINATE_COEFFICIENTS = {"v": (), "log": ("chi",), "force": ("c", "q")}
 
 
 def with_base_quantities(names: Iterable[str]) -> frozenset[str]:
-    """The names, extended by those of the quantities that they are computed from.
+    """Extend the names by those of the quantities that they are computed from.
 
     >>> sorted(with_base_quantities(["R_eff", "e"]))
     ['R1', 'R2', 'R_eff', 'e']
@@ -317,7 +317,7 @@ class ForceModel:
         return frozenset(name for formula in formulas for name in argument_names(formula) if name in names)
 
     def unit_of(self, name: str) -> str:
-        """The unit of a quantity or parameter."""
+        """Find the unit of a quantity or parameter."""
         return (
             next((parameter.unit for parameter in self.parameters if parameter.name == name), None)
             or QUANTITIES[name]

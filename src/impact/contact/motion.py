@@ -81,7 +81,7 @@ class MotionLaw:
         )
 
     def call(self, formula: Formula, params: Params, arguments: dict[str, Array]) -> Array:
-        """The value of a formula from the params and further arguments by name; K, m and v0 are 1."""
+        """Compute the value of a formula from the params and further arguments by name; K, m and v0 are 1."""
         values: dict[str, Array | float] = {"K": 1.0, "m": 1.0, "v0": 1.0, "n": self.n, **arguments}
         values.update(zip(self.names, params, strict=True))
         return call_by_name(formula, values)
@@ -91,12 +91,12 @@ class MotionLaw:
         return self.coordinate.velocity(y, self.strength(params))
 
     def strength(self, params: Params) -> Array:
-        """The coefficient that measures the damping for the coordinate of the law, shape (n,) or empty."""
+        """Compute the coefficient that measures the damping for the coordinate of the law, shape (n,) or empty."""
         return params[self.names.index(self.coordinate.strength)] if self.coordinate.strength else NO_COEFFICIENT
 
 
 def approach_problem(law: MotionLaw) -> Problem:
-    """The approach: from contact to the largest indentation, where v falls to zero."""
+    """Pose the approach: from contact to the largest indentation, where v falls to zero."""
     return Problem(
         rates=_rates(law, law.model.force, ()),
         event=lambda y, k, params: law.coordinate.stop(y, k),
@@ -108,7 +108,7 @@ def approach_problem(law: MotionLaw) -> Problem:
 
 
 def restitution_problem(law: MotionLaw) -> Problem:
-    """The restitution phase: from the largest indentation to the release, where s or the force falls to zero.
+    """Pose the restitution phase: from the largest indentation to the release, where s or the force falls to zero.
 
     Where the law has an unloading branch, its params (`UNLOADING_PARAMS`) follow those of the law.
     """
@@ -139,7 +139,7 @@ def restitution_problem(law: MotionLaw) -> Problem:
 
 
 def release_event(s: Array, rate: Array, force: Array, slope: Array) -> tuple[Array, Array]:
-    """The one of s and the force that falls to zero first, and its rate; for arrays and for numbers."""
+    """Choose the one of s and the force that falls to zero first, and its rate; for arrays and for numbers."""
     # without damping the force vanishes with the indentation, as a power of s, without a change of sign: the
     # end is then where s is zero. A force that vanishes earlier does so in a small part of the time to s = 0
     earlier = MAX_FORCE_EXPONENT * force * np.abs(rate) < s * np.abs(slope)
@@ -150,7 +150,7 @@ def release_event(s: Array, rate: Array, force: Array, slope: Array) -> tuple[Ar
 def breakpoints(
     law: MotionLaw, params: Params, start: Array, residual: Array | None = None
 ) -> tuple[Params, list[Breakpoint]]:
-    """The params of a phase, extended by those of its breakpoints, and the breakpoints of its force.
+    """Extend the params of a phase by those of its breakpoints; returns also the breakpoints.
 
     Parameters
     ----------
@@ -178,12 +178,12 @@ def breakpoints(
 
 
 def _breakpoint_at_column(column: int) -> Breakpoint:
-    """The breakpoint at the values of s that are a column of the params."""
+    """Make the breakpoint at the values of s that are a column of the params."""
     return lambda y, params: np.asarray(params[column] - y[0])
 
 
 def _breakpoint_of_motion(law: MotionLaw, formula: Formula, extra: tuple[str, ...]) -> Breakpoint:
-    """The breakpoint where a formula of the motion changes its sign."""
+    """Make the breakpoint where a formula of the motion changes its sign."""
 
     def breakpoint(y: Array, params: Params) -> Array:
         arguments = _formula_arguments(law, {*argument_names(formula)}, extra, y, params)
@@ -193,7 +193,7 @@ def _breakpoint_of_motion(law: MotionLaw, formula: Formula, extra: tuple[str, ..
 
 
 def restitution_law(law: MotionLaw) -> MotionLaw:
-    """The law of the restitution phase, in v where it has an unloading branch: coordinates are for `force`."""
+    """Make the law of the restitution phase, in v with an unloading branch: coordinates are for `force`."""
     return law if law.model.unloading is None else replace(law, coordinate=VelocityCoordinate())
 
 
@@ -208,7 +208,7 @@ def start_of_restitution(law: MotionLaw, params: Params, recovered: Array) -> Ar
 
 
 def _components_at(law: MotionLaw, params: Params, s: Array, v: float, n: int) -> Array:
-    """The components, shape (2, n), at s of shape (n,) or (1,) and a velocity that all trajectories have."""
+    """Compute the components, shape (2, n), at s of shape (n,) or (1,) and a velocity that all have."""
     y = np.empty((2, n))
     y[0] = s
     y[1] = law.coordinate.of(s, v, law.strength(params))
@@ -216,19 +216,19 @@ def _components_at(law: MotionLaw, params: Params, s: Array, v: float, n: int) -
 
 
 def indentation(law: MotionLaw, s: Array) -> Array:
-    """The indentation above the residual one, from s; shape (n,)."""
+    """Compute the indentation above the residual one, from s; shape (n,)."""
     return integer_power(s, law.model.coordinate_power)
 
 
 def force_at_peak(law: MotionLaw, s: Array, params: Params) -> Array:
-    """The force at the end of the approach, at s of shape (n,) and v = 0."""
+    """Compute the force at the end of the approach, at s of shape (n,) and v = 0."""
     at_rest, formula = _components_at(law, params, s, 0.0, s.size), law.model.force
     force = law.call(formula, params, _formula_arguments(law, {*argument_names(formula)}, (), at_rest, params))
     return np.broadcast_to(force, s.shape)
 
 
 def unloading_state(law: MotionLaw, params: Params, peak: Array, at_peak: Array) -> tuple[Array, Array, Params]:
-    """The residual and the recovered indentation at each peak, and the params of the restitution phase."""
+    """Compute the residual and the recovered indentation at each peak, and the params of the restitution phase."""
     model, residual = law.model, np.zeros_like(peak)
     formula = model.residual or model.recovered
     if formula is not None:
@@ -246,7 +246,7 @@ def unloading_state(law: MotionLaw, params: Params, peak: Array, at_peak: Array)
 def _formula_arguments(
     law: MotionLaw, names: set[str], extra: tuple[str, ...], y: Array, params: Params
 ) -> dict[str, Array]:
-    """The arguments of a formula that change during the motion, by name: v, and what `names` has of x and K δⁿ."""
+    """Compute the arguments of a formula that change in the motion: v, and what `names` has of x and K δⁿ."""
     p, s = law.model.coordinate_power, y[0]
     arguments = {"v": law.velocity(y, params)}
     if extra:
@@ -294,12 +294,12 @@ def _rates(law: MotionLaw, formula: Formula, extra: tuple[str, ...]) -> Rates:
 
 
 def may_be_overdamped(model: ForceModel) -> bool:
-    """Whether the damping of a law, which pulls until the indentation is zero, may leave no rebound speed."""
+    """Return whether the damping of a law, pulling until zero indentation, may leave no rebound speed."""
     return model.velocity_coordinate == "force" and model.release == "gap" and model.unloading is None
 
 
 def is_overdamped(x: Array, speed: Array, c: Array, n: float, q: float) -> Mask:
-    """Which balls are certain to separate at zero speed, where F = xⁿ + c x^q v; shape (n,).
+    """Find which balls are certain to separate at zero speed, where F = xⁿ + c x^q v; shape (n,).
 
     Once speed ≤ b(x) = c x^(q+1)/(2(q + 1)) it stays so where x^(n−2q−1) ≤ c²/(4(q + 1)), for it changes at the
     rate xⁿ − c x^q speed. With n ≥ 2q + 1 that holds for ever, and x stays above zero. Otherwise it holds down to
@@ -323,7 +323,7 @@ def overdamped_speed(c: Array, n: float, q: float) -> Array:
 
 
 def never_separates(rates: Rates, params: Params, peak: Array, coordinate_power: int) -> Mask:
-    """Which balls at rest at their peak never separate, by any law whose contact ends at zero indentation.
+    """Find which balls at rest at their peak never separate, by any law whose contact ends at zero indentation.
 
     If F(x, -B x^k) <= -k B^2 x^(2k-1) for all x from 0 to the peak, with some B and some k >= 1, the speed w of
     the rebound cannot grow beyond B x^k: at w = B x^k it falls faster than that bound does. Then

@@ -52,7 +52,7 @@ def outputs(
 
 
 def _compute(name: str, computed: dict[str, Any]) -> Any:
-    """An output or intermediate value by name; it and what it needs are added to `computed`."""
+    """Compute an output or intermediate value by name, and add it and what it needs to `computed`."""
     if name not in computed:
         formula = FORMULAS[name]
         computed[name] = formula(*(_compute(needed, computed) for needed in argument_names(formula)))
@@ -106,14 +106,14 @@ def collide(
 
 
 def _mask_if_any(mask: Mask) -> Mask | None:
-    """The mask, or None if it is False everywhere, which saves work."""
+    """Return the mask, or None if it is False everywhere, which saves work."""
     return mask if mask.any() else None
 
 
 def _replace_where(
     value: NDArray[Any], where: Mask | None, otherwise: float | np.int32 | NDArray[Any]
 ) -> NDArray[Any]:
-    """The value, replaced by another one where the mask is True."""
+    """Replace the value by another one where the mask is True."""
     return value if where is None else np.where(where, otherwise, value)
 
 
@@ -132,7 +132,7 @@ def _undefined(failed: Mask | None, missed: Mask | None, status: NDArray[np.int8
 
 
 def _asked_e(impacts: Impacts) -> Array:
-    """The required restitution, NaN where it is not within [0, 1]."""
+    """Return the required restitution, NaN where it is not within [0, 1]."""
     e = impacts.e
     return e if all_within(e, 0.0, 1.0) else np.where((e >= 0.0) & (e <= 1.0), e, np.nan)
 

@@ -73,7 +73,7 @@ def in_parts(
 
 
 def _distances(breakpoints: Sequence[Breakpoint], y: Array, k: Array, params: Params) -> list[tuple[Array, Array]]:
-    """Each breakpoint, with the sign that makes it positive on the current side, and its rate; shapes (n,)."""
+    """Compute each breakpoint, positive on the current side by its sign, and its rate; shapes (n,)."""
     small = BREAKPOINT_RATE_STEP * np.where(y[0] > 0.0, np.minimum(y[0], 1.0), 1.0)
     ahead = y + small * k[:N_COMPONENTS]
     distances = []
@@ -84,7 +84,7 @@ def _distances(breakpoints: Sequence[Breakpoint], y: Array, k: Array, params: Pa
 
 
 def _first_event(problem: Problem, breakpoints: Sequence[Breakpoint]) -> Event:
-    """The event of the phase, or a breakpoint, whichever comes first."""
+    """Make the event that is that of the phase, or a breakpoint, whichever comes first."""
 
     def event(y: Array, k: Array, params: Params) -> tuple[Array, Array]:
         g, dg = problem.event(y, k, params)

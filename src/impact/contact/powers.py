@@ -41,7 +41,7 @@ def power(base: Array, exponent: float) -> Array:
 
 
 def is_reproducible(exponent: Array | float) -> NDArray[np.bool_]:
-    """Whether `power` computes an exponent from products and square roots; elementwise."""
+    """Return whether `power` computes an exponent from products and square roots; elementwise."""
     quarters = np.multiply(exponent, 4.0)
     return np.asarray((quarters == np.rint(quarters)) & (np.abs(quarters) <= 64.0))
 
@@ -66,7 +66,7 @@ def powers(base: Array, exponent: Array) -> Array:
 
 
 def distinct_values(values: Array) -> Array:
-    """The distinct values of an array, sorted.
+    """Find the distinct values of an array, sorted.
 
     >>> distinct_values(np.array([1.5, 1.0, 1.5]))
     array([1. , 1.5])
@@ -77,7 +77,7 @@ def distinct_values(values: Array) -> Array:
 
 
 def all_within(values: Array, least: float, most: float) -> bool:
-    """Whether all values are within bounds; False if any is NaN. Only the least and the largest are compared.
+    """Return whether all values are within bounds, by the least and the largest; False if any is NaN.
 
     >>> all_within(np.array([0.0, 0.5]), 0.0, 1.0), all_within(np.array([0.5, np.nan]), 0.0, 1.0)
     (True, False)

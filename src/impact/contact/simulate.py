@@ -52,7 +52,7 @@ ValueArrays = Mapping[str, Array]
 
 
 def positions(mask: NDArray[np.bool_]) -> Positions:
-    """The positions at which the mask is True."""
+    """Find the positions at which the mask is True."""
     return slice(None) if mask.all() else np.flatnonzero(mask)
 
 
@@ -113,7 +113,7 @@ class CollisionResult:
         return result
 
     def take(self, where: Positions) -> CollisionResult:
-        """The impacts at some positions."""
+        """Select the impacts at some positions."""
         return CollisionResult(**{field.name: getattr(self, field.name)[where] for field in fields(self)})
 
 
@@ -291,7 +291,7 @@ def _collide_at_fixed_steps(
     of_law = {name: array for name, array in values.items() if name not in (STEPS_PER_CONTACT, STEP, PHASE)}
 
     def contact_times(where: Positions, size: int) -> tuple[Array, NDArray[np.int8]]:
-        """The contact times of the continuous law, and statuses that are OK where there is one."""
+        """Compute the contact times of the continuous law, and statuses that are OK where there is one."""
         continuous = _simulate_distinct(
             model, n, _values_at(of_law, where), size, integrate_both=integrate_both, collapse=collapse
         )
@@ -355,7 +355,7 @@ def _put_fixed_steps(
 def _check_coefficients(
     model: ForceModel, law_values: LawValues, values: ValueArrays, count: int
 ) -> NDArray[np.int8]:
-    """The status of impacts by the coefficients of their law, before they are integrated; shape (count,)."""
+    """Compute the status of impacts by the coefficients of their law, before integration; shape (count,)."""
     status = np.full(count, Status.OK, np.int8)
     coefficients = {name: np.asarray(law_values[name]) for name in model.coefficients}
     if all(np.isfinite(coefficient).all() for coefficient in coefficients.values()):

@@ -55,13 +55,13 @@ COMPACTION_SHARE = 0.25
 
 
 def default_scheme(model: ForceModel) -> str:
-    """The scheme of the codes that a law is of: "drake-tamsi" for Drake's, else "kick-drift"."""
+    """Find the scheme of the codes that a law is of: "drake-tamsi" for Drake's, else "kick-drift"."""
     is_of_drake = model.family == "codes" and model.key.startswith("drake-")
     return DRAKE_TAMSI if is_of_drake else KICK_DRIFT
 
 
 def has_scheme(model: ForceModel, n: float, scheme: str) -> bool:
-    """Whether a scheme takes a law with an exponent n.
+    """Return whether a scheme takes a law with an exponent n.
 
     >>> from impact.contact.models import find
     >>> [has_scheme(find(key), 1.0, "drake-sap") for key in ("kelvin-voigt-no-tension", "kelvin-voigt")]
@@ -79,7 +79,7 @@ def has_scheme(model: ForceModel, n: float, scheme: str) -> bool:
 
 
 def law_problem(model: ForceModel, scheme: str) -> str:
-    """What to tell a user who asks for a scheme that does not take the law."""
+    """Write the message to a user who asks for a scheme that does not take the law."""
     return f'scheme "{scheme}" does not take {model.key}, expected a law {LAWS_OF_SCHEME[scheme]}'
 
 
@@ -193,7 +193,7 @@ class _Contacts:
         return np.maximum(force, 0.0) if is_clamped else force
 
     def force_at(self, x: Array) -> Array:
-        """The force at other positions, zero where the law has no finite one."""
+        """Compute the force at other positions, zero where the law has no finite one."""
         other = copy(self)
         other.x = x
         force = other.force()
@@ -221,7 +221,7 @@ class _Contacts:
         return np.broadcast_to(value, self.x.shape)
 
     def advance(self) -> None:
-        """One step of all collisions."""
+        """Advance all collisions by a step."""
         force = self.force()
         self.u = self.next_velocity(force)
         displacement = self.step * self.u
@@ -234,7 +234,7 @@ class _Contacts:
                 self._turn(turned)
 
     def next_velocity(self, force: Array) -> Array:
-        """The velocity at the end of the step; `force` is that before it.
+        """Compute the velocity at the end of the step; `force` is that before it.
 
         The schemes of Drake take the force at the end of the step. Both forces grow with u', so that the force is
         zero at the end if and only if it is zero with u' = u. Where it is not, u' is for TAMSI the larger root of

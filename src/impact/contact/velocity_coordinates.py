@@ -46,7 +46,7 @@ class VelocityCoordinate:
         return np.asarray(y[1])
 
     def stop(self, y: Array, k: Array) -> tuple[Array, Array]:
-        """The function that falls to zero with the velocity, and its rate, from components y and rates k."""
+        """Compute a function that falls to zero with the velocity, and its rate, from components y and rates k."""
         return y[1], k[1]
 
     def rates(self, out: Array, y: Array, weight: Array, elastic: Array, strength: Array) -> None:
@@ -111,7 +111,7 @@ class ForceCoordinate(VelocityCoordinate):
 
 
 def is_strong(model: ForceModel, values: Mapping[str, Array | float], count: int) -> NDArray[np.bool_]:
-    """Which impacts are integrated in the coordinate of their law, by their own damping alone; shape (count,)."""
+    """Find which impacts the coordinate of their law suits, by their own damping alone; shape (count,)."""
     if model.velocity_coordinate not in STRONG_DAMPING:
         return np.zeros(count, bool)
     return np.broadcast_to(
@@ -122,7 +122,7 @@ def is_strong(model: ForceModel, values: Mapping[str, Array | float], count: int
 
 
 def coordinate(model: ForceModel, n: float) -> VelocityCoordinate:
-    """The coordinate that a law declares for strong damping."""
+    """Find the coordinate that a law declares for strong damping."""
     if model.velocity_coordinate == "log":
         return LogCoordinate()
     if model.velocity_coordinate == "force":
@@ -131,7 +131,7 @@ def coordinate(model: ForceModel, n: float) -> VelocityCoordinate:
 
 
 def force_form(model: ForceModel, n: float) -> ForceCoordinate:
-    """The coordinate w of a law that declares the form K δⁿ + c δ^q δ̇."""
+    """Find the coordinate w of a law that declares the form K δⁿ + c δ^q δ̇."""
     q = float(call_by_name(model.coefficients["q"], {"n": n}))
     return ForceCoordinate(model.coordinate_power * q, model.coordinate_power * (n - q))
 

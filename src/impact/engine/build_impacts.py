@@ -15,7 +15,7 @@ from ..contact.materials import effective_mass, hertz_stiffness, sphere_mass, sp
 from ..contact.model import Law
 from ..contact.simulate import PHASE, STEP, STEPS_PER_CONTACT
 from ..errors import ModelError
-from .plan import Index, Inputs, dimensions
+from .inputs import Index, Inputs, dimensions
 
 # K of a law at cells of the grid [N/m^n]
 Stiffness = Callable[[Index], Array]

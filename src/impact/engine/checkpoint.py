@@ -23,10 +23,9 @@ from ..atomic import atomic_write, sync_folder
 from ..contact.simulate import TABLE_COLUMNS, CollisionResult
 from ..errors import ImpactError, InUseError, StoreError, UsageError
 from ..text import safe_text
-from .execute import with_core
 from .plan import Plan
 from .run import Run
-from .trajectories import RANGE_TRAJECTORIES, TrajectoryRange, trajectory_maps
+from .trajectories import RANGE_TRAJECTORIES, TrajectoryRange
 
 PLAN_FILE, LOCK_FILE = "plan.json", "lock"
 OTHER_SWEEP_HINT = "give the sweep that it is of, another output, or --overwrite to start again"
@@ -50,8 +49,8 @@ class WorkFolder:
     folder: Path
     key: str
 
-    def path(self, number: int) -> Path:
-        return self.folder / f"{number:08d}.npz"
+    def path(self, trajectory_range: TrajectoryRange) -> Path:
+        return self.folder / f"{trajectory_range.number:08d}.npz"
 
     def _header(self, trajectory_range: TrajectoryRange) -> str:
         """Identify the sweep and the range of a file by a line of text."""
@@ -60,13 +59,13 @@ class WorkFolder:
 
     def store(self, trajectory_range: TrajectoryRange, collisions: CollisionResult) -> None:
         """Store a finished range; raises a `StoreError` if the disk is full or failed."""
-        path = self.path(trajectory_range.number)
+        path = self.path(trajectory_range)
         with atomic_write(path, overwrite=True, part=self.folder / "block.part") as sink:
             write_range(sink, self._header(trajectory_range), collisions)
 
     def load(self, trajectory_range: TrajectoryRange) -> CollisionResult | None:
         """Load a finished range; None if it is missing or damaged."""
-        path = self.path(trajectory_range.number)
+        path = self.path(trajectory_range)
         # reading something other than a regular file might never end
         if not path.is_file():
             return None
@@ -100,7 +99,6 @@ def remove_stale_work_folder(output: Path, plan: Plan) -> None:
     with contextlib.suppress(ImpactError, Timeout, OSError):
         if folder.is_dir():
             _check_is_work_folder(folder)
-            plan = with_core(plan, trajectory_maps(plan))
             with FileLock(folder / LOCK_FILE, timeout=0):
                 has_plan = os.path.lexists(folder / PLAN_FILE)
                 if not has_plan or _can_resume(folder, _sweep_record(plan), resume=True):
@@ -167,7 +165,7 @@ def _prepare_folder(folder: Path, record: Mapping[str, Any], run: Run) -> None:
 
 def _sweep_record(plan: Plan, extends: str = "") -> dict[str, Any]:
     """Collect everything that the finished ranges of a sweep depend on."""
-    solver = plan.config.solver
+    solver = plan.solver
     return {
         "schema": TABLE_COLUMNS,
         "block": RANGE_TRAJECTORIES,

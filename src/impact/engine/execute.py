@@ -10,9 +10,9 @@ import socket
 import time
 import warnings
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache, partial
 
 import numpy as np
@@ -22,18 +22,15 @@ from .._version import __version__
 from ..config.tables import Solver
 from ..contact.model import ForceModel
 from ..contact.models import catalogue
-from ..contact.numba.dispatch import is_installed, serves
+from ..contact.numba.dispatch import is_installed
 from ..contact.simulate import TABLE_COLUMNS, CollisionResult, simulate
 from ..contact.status import STATUSES
 from ..errors import StoreError, UsageError
-from .build_impacts import exponents
 from .executors import ExecutorSpec
 from .plan import Plan
 from .run import Run
-from .trajectories import Columns, TrajectoryMap, TrajectoryRange, columns_of
+from .trajectories import Columns, TrajectoryRange
 
-# trajectories of compiled force laws above which numba is faster, including the time to load it
-NUMBA_MIN_TRAJECTORIES = 200_000
 # how often a range whose process was killed is submitted again
 MAX_RETRIES = 3
 # seconds between two checks of `should_stop` and of the capacity of the executor
@@ -66,7 +63,7 @@ class WorkerContext:
 
 
 def integrate_columns(model: ForceModel, columns: Columns, solver: Solver) -> Integrated:
-    """Integrate trajectories of a model; see `impact.engine.trajectories.columns_of`."""
+    """Integrate trajectories of a model; see `impact.engine.plan.Plan.columns_of`."""
     errors: dict[str, str] = {}
     values = {name: column for name, column in columns.items() if name not in ("n", "status")}
     collisions = simulate(
@@ -115,35 +112,8 @@ def other_version(location: str, location_version: str, this_version: str) -> st
     return f"{location}: has impact {location_version}, this is {this_version}; expected the same"
 
 
-def with_core(plan: Plan, maps: Sequence[TrajectoryMap]) -> Plan:
-    """Replace `core = "auto"` by "numba" or "numpy", depending on the number of trajectories.
-
-    >>> from impact.results.sweep import prepare
-    >>> from impact.engine.trajectories import trajectory_maps
-    >>> plan = prepare("configs/figure6.toml")
-    >>> with_core(plan, trajectory_maps(plan)).config.solver.core
-    'numpy'
-    """
-    solver = plan.config.solver
-    if solver.core != "auto":
-        return plan
-    count = sum(trajectory_map.count for trajectory_map in maps if _is_compiled(plan, trajectory_map))
-    core = "numba" if is_installed() and count >= NUMBA_MIN_TRAJECTORIES else "numpy"
-    return replace(plan, config=replace(plan.config, solver=replace(solver, core=core)))
-
-
-def _is_compiled(plan: Plan, trajectory_map: TrajectoryMap) -> bool:
-    """Whether the compiled core integrates a phase of a model, for all of its exponents."""
-    if "dt" in plan.inputs.names():
-        # at a given step the continuous law is only integrated where balls do not separate
-        return False
-    model = plan.models[trajectory_map.model]
-    return all(any(serves(model, n)) for n in exponents(plan.inputs, model))
-
-
 def integrate_ranges(
     plan: Plan,
-    maps: Sequence[TrajectoryMap],
     todo: Iterable[TrajectoryRange],
     run: Run,
     find_reused: FindReused = reuse_nothing,
@@ -156,7 +126,7 @@ def integrate_ranges(
     remaining, attempts = deque(todo), Counter[int]()
     reported: set[str] = set()
     with run.executor as spec:
-        submit = _build_submit(plan, maps, spec)
+        submit = _build_submit(plan, spec)
         while True:
             running: Running = {}
             try:
@@ -259,7 +229,7 @@ def _dtype_and_shape(array: object) -> str:
 
 
 def _build_submit(
-    plan: Plan, maps: Sequence[TrajectoryMap], spec: ExecutorSpec
+    plan: Plan, spec: ExecutorSpec
 ) -> Callable[[Executor, TrajectoryRange, ReusedPart], Future[Integrated]]:
     """Build the function that submits what is not reused of a range to an executor."""
     integrate: Callable[[str, Columns], Integrated]
@@ -267,7 +237,7 @@ def _build_submit(
         models = {model.key: model for model in plan.models}
 
         def integrate(key: str, columns: Columns) -> Integrated:
-            return integrate_columns(models[key], columns, plan.config.solver)
+            return integrate_columns(models[key], columns, plan.solver)
 
     else:
         values = [plugin.model.key for plugin in plan.plugins.items if plugin.is_value]
@@ -280,7 +250,7 @@ def _build_submit(
 
     def submit(executor: Executor, trajectory_range: TrajectoryRange, reused: ReusedPart) -> Future[Integrated]:
         # the arguments are built here, so that waiting ranges take no memory
-        columns = columns_of(plan, maps, trajectory_range)
+        columns = plan.columns_of(trajectory_range)
         if reused is not None:
             columns = {name: values[~reused[0]] for name, values in columns.items()}
         return executor.submit(integrate, plan.models[trajectory_range.model].key, columns)
@@ -293,7 +263,7 @@ def context_of(plan: Plan) -> WorkerContext:
     plugins = plan.plugins
     return WorkerContext(
         __version__,
-        plan.config.solver,
+        plan.solver,
         tuple((source.name, source.content) for source in plugins.sources),
         tuple(plugins.hashes.items()),
     )

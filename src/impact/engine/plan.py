@@ -1,109 +1,44 @@
-"""A plan: the impacts of a config, by index arithmetic on the axes of its grid."""
+"""A plan: a config with its plug-ins, and the trajectories to integrate for it."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import math
-from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .._version import __version__
-from ..config.input_names import InputName, is_foreign
-from ..config.load import Axis, Config
+from ..config.input_names import InputName
+from ..config.load import Config
+from ..config.tables import Solver
 from ..contact.materials import Material
 from ..contact.model import ForceModel
+from ..contact.numba.dispatch import is_installed, serves
 from ..contact.timestep import EXACT
+from ..errors import UsageError
+from .build_impacts import exponents
+from .inputs import Inputs
 from .plugins import Plugins
+from .trajectories import (
+    MAX_CELLS,
+    Columns,
+    TrajectoryMap,
+    TrajectoryRange,
+    build_map,
+    columns_at,
+    law_axes,
+    trajectory_ranges,
+)
 
 # values of a variable up to which layout "auto" stores a result in full; the smaller limit holds where values
 # repeat along the axes of other laws
 MAX_FULL_POINTS, MAX_FULL_REPEATED = 10**7, 10**6
-
-# the indices of cells along each axis of the grid, in arrays that broadcast against each other
-Index = tuple[NDArray[np.intp], ...]
-
-
-def dimensions(index: Index) -> int:
-    """Number of dimensions of the arrays of an index; one for a plan without axes."""
-    return index[0].ndim if index else 1
-
-
-@dataclass(frozen=True)
-class Inputs:
-    """The inputs of a sweep: scalars by config name, and the axes of its grid in config order."""
-
-    scalars: Mapping[str, float | str]
-    axes: tuple[Axis, ...]
-    materials: Mapping[str, Material]
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Sizes of the axes."""
-        return tuple(axis.size for axis in self.axes)
-
-    @property
-    def cells(self) -> int:
-        """Number of cells of the grid; cells that differ only in parameters of other models are one point."""
-        return math.prod(self.shape)
-
-    def axes_of_model(self, key: str) -> tuple[int, ...]:
-        """List the axes along which the points of a model lie: all but those of other models' parameters."""
-        return tuple(number for number, axis in enumerate(self.axes) if not is_foreign(axis.columns, key))
-
-    def points_of(self, key: str) -> int:
-        """Number of points of a model."""
-        return math.prod(self.shape[axis] for axis in self.axes_of_model(key))
-
-    def names(self) -> tuple[str, ...]:
-        """List all config names that have a value, those of axes first."""
-        return (*(name for axis in self.axes for name in axis.columns), *self.scalars)
-
-    def axes_of(self, name: str) -> tuple[int, ...]:
-        """List the axes along which a name varies: none for a scalar."""
-        return tuple(number for number, axis in enumerate(self.axes) if name in axis.columns)
-
-    def column(self, name: str, index: Index) -> NDArray[np.generic]:
-        """Look up the values of a name at cells; of length 1 along the axes on which it does not vary."""
-        if name in self.scalars:
-            return np.full((1,) * dimensions(index), self.scalars[name])
-        (number,) = self.axes_of(name)
-        return self._arrays[name][index[number]]
-
-    def values(self, name: str) -> NDArray[np.generic]:
-        """Look up all values of a name: those of its axis, or a single one, None for a name without a value."""
-        if name in self._arrays:
-            return self._arrays[name]
-        parsed = InputName.parse(name)
-        material = self.materials.get(parsed.material)
-        constant = getattr(material, parsed.key) if material is not None else None
-        return np.asarray(self.scalars.get(name, constant))
-
-    def materials_of(self, ball: str) -> frozenset[str]:
-        """List the materials that a ball, "1" or "2", has in any cell."""
-        return self._ball_materials[ball]
-
-    def index(self, slices: Sequence[slice] | None = None) -> Index:
-        """Index a part of the grid, one array along each axis; by default of the whole grid."""
-        slices = [slice(None)] * len(self.axes) if slices is None else slices
-        return np.ix_(*(np.arange(size)[cells] for size, cells in zip(self.shape, slices, strict=True)))
-
-    @cached_property
-    def _arrays(self) -> dict[str, NDArray[np.generic]]:
-        return {name: np.asarray(values) for axis in self.axes for name, values in axis.columns.items()}
-
-    @cached_property
-    def _ball_materials(self) -> dict[str, frozenset[str]]:
-        names = {ball: ({"material", f"material{ball}"} & {*self.names()}) for ball in "12"}
-        return {
-            ball: frozenset(str(value) for name in of_ball for value in np.unique(self.values(name)))
-            for ball, of_ball in names.items()
-        }
+# trajectories of compiled force laws above which numba is faster, including the time to load it
+NUMBA_MIN_TRAJECTORIES = 200_000
 
 
 @dataclass(frozen=True)
@@ -120,6 +55,70 @@ class Plan:
     @cached_property
     def inputs(self) -> Inputs:
         return Inputs(self.config.scalars, self.config.axes, self.config.materials)
+
+    @cached_property
+    def maps(self) -> tuple[TrajectoryMap, ...]:
+        """The distinct trajectories of each model."""
+        collapse = self.config.solver.collapse
+        return tuple(build_map(self.inputs, number, model, collapse) for number, model in enumerate(self.models))
+
+    @cached_property
+    def ranges(self) -> tuple[TrajectoryRange, ...]:
+        """The ranges in which the trajectories are integrated."""
+        return tuple(trajectory_ranges(self.maps))
+
+    @property
+    def trajectories(self) -> int:
+        """Number of distinct trajectories of all models."""
+        return sum(trajectory_map.count for trajectory_map in self.maps)
+
+    @cached_property
+    def solver(self) -> Solver:
+        """The settings of the solver, with "numba" or "numpy" for `core = "auto"`.
+
+        >>> from impact.results.sweep import prepare
+        >>> prepare("configs/figure6.toml").solver.core
+        'numpy'
+        """
+        solver = self.config.solver
+        if solver.core != "auto":
+            return solver
+        count = sum(trajectory_map.count for trajectory_map in self.maps if self._is_compiled(trajectory_map))
+        return replace(solver, core="numba" if is_installed() and count >= NUMBA_MIN_TRAJECTORIES else "numpy")
+
+    def _is_compiled(self, trajectory_map: TrajectoryMap) -> bool:
+        """Whether the compiled core integrates a phase of a model, for all of its exponents."""
+        if "dt" in self.inputs.names():
+            # at a given step the continuous law is only integrated where balls do not separate
+            return False
+        model = self.models[trajectory_map.model]
+        return all(any(serves(model, n)) for n in exponents(self.inputs, model))
+
+    def columns_of(self, trajectory_range: TrajectoryRange) -> Columns:
+        """Build the dimensionless problems of the trajectories of a range, arrays of its size."""
+        trajectory_map = self.maps[trajectory_range.model]
+        cells = np.arange(trajectory_range.start, trajectory_range.stop)
+        if trajectory_map.first is not None:
+            cells = trajectory_map.first[cells]
+        cell_index = np.unravel_index(cells, trajectory_map.shape) if trajectory_map.shape else ()
+        index_along = dict(zip(trajectory_map.axes, cell_index, strict=True))
+        # the other axes are at their first value
+        index = tuple(index_along.get(axis, np.zeros(1, np.intp)) for axis in range(len(self.shape)))
+        columns = columns_at(self.inputs, self.models[trajectory_range.model], trajectory_map.axes, index)
+        return {name: np.broadcast_to(values, cells.shape).copy() for name, values in columns.items()}
+
+    def check_count(self, most: int, name: str) -> None:
+        """Refuse too many trajectories before any array is allocated; `name` is that of the config."""
+        if self.points <= most:
+            return
+        axes = (law_axes(self.inputs, model, self.config.solver.collapse) for model in self.models)
+        # with fewer cells, equal ones are found, and the number of trajectories is not known yet
+        cells = [math.prod(self.shape[axis] for axis in of_law) for of_law in axes]
+        total = sum(count for count in cells if count > MAX_CELLS)
+        if total > most:
+            raise UsageError(
+                f"{name}: sweep: got {total:,} trajectories to integrate, expected at most {most:,} (--max-points)"
+            )
 
     @property
     def shape(self) -> tuple[int, ...]:

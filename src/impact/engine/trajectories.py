@@ -18,9 +18,8 @@ from ..contact.deduplicate import deduplicate
 from ..contact.dimensionless import dimensionless_values, exponent_names
 from ..contact.impacts import CHECKS, check_inputs
 from ..contact.model import ForceModel
-from ..errors import UsageError
 from .build_impacts import build_impacts, fixed_steps_at
-from .plan import Index, Inputs, Plan, dimensions
+from .inputs import Index, Inputs, dimensions
 
 # cells up to which equal values are found in the whole plan; with more, only within a range of trajectories
 MAX_CELLS = 2**22
@@ -86,37 +85,20 @@ class TrajectoryRange:
         return self.stop - self.start
 
 
-def trajectory_maps(plan: Plan) -> tuple[TrajectoryMap, ...]:
-    """Find the trajectories of every model of a plan, in the order of the models."""
-    return tuple(_build_map(plan, index, model) for index, model in enumerate(plan.models))
+def law_axes(inputs: Inputs, model: ForceModel, collapse: bool) -> tuple[int, ...]:
+    """Find the axes of the trajectories of a law: those on which it depends, or all without `collapse`."""
+    return axes_of_law(inputs, model) if collapse else inputs.axes_of_model(model.key)
 
 
-def check_count(plan: Plan, most: int, name: str) -> None:
-    """Refuse a plan of too many trajectories before any array is allocated; `name` is that of the config."""
-    if plan.points <= most:
-        return
-    total = 0
-    for model in plan.models:
-        collapse = plan.config.solver.collapse
-        axes = axes_of_law(plan.inputs, model) if collapse else plan.inputs.axes_of_model(model.key)
-        # with fewer cells, equal ones are found, and the number of trajectories is not known yet
-        cells = math.prod(plan.shape[axis] for axis in axes)
-        total += cells if cells > MAX_CELLS else 0
-    if total > most:
-        raise UsageError(
-            f"{name}: sweep: got {total:,} trajectories to integrate, expected at most {most:,} (--max-points)"
-        )
-
-
-def _build_map(plan: Plan, model_index: int, model: ForceModel) -> TrajectoryMap:
-    collapse = plan.config.solver.collapse
-    axes = axes_of_law(plan.inputs, model) if collapse else plan.inputs.axes_of_model(model.key)
-    trajectory_map = TrajectoryMap(model_index, axes, tuple(plan.shape[axis] for axis in axes))
+def build_map(inputs: Inputs, number: int, model: ForceModel, collapse: bool) -> TrajectoryMap:
+    """Find the distinct trajectories of a model, which has this number in the plan."""
+    axes = law_axes(inputs, model, collapse)
+    trajectory_map = TrajectoryMap(number, axes, tuple(inputs.shape[axis] for axis in axes))
     if not collapse or trajectory_map.cells > MAX_CELLS:
         return trajectory_map
     # the other axes are at their first value
-    shape = tuple(size if axis in axes else 1 for axis, size in enumerate(plan.shape))
-    columns = columns_at(plan, model, axes, np.ix_(*map(np.arange, shape)))
+    shape = tuple(size if axis in axes else 1 for axis, size in enumerate(inputs.shape))
+    columns = columns_at(inputs, model, axes, np.ix_(*map(np.arange, shape)))
     first, of_cell = deduplicate(list(columns.values()), shape or (1,))
     return replace(trajectory_map, first=first, of_cell=of_cell.astype(np.int32))
 
@@ -140,32 +122,16 @@ def even_size(count: int, most: int) -> int:
     return -(-count // -(-count // most))
 
 
-def columns_of(plan: Plan, maps: Sequence[TrajectoryMap], trajectory_range: TrajectoryRange) -> Columns:
-    """Build the dimensionless problems of a range of trajectories, arrays of shape (trajectory_range.size,)."""
-    trajectory_map, model = maps[trajectory_range.model], plan.models[trajectory_range.model]
-    cells = np.arange(trajectory_range.start, trajectory_range.stop)
-    if trajectory_map.first is not None:
-        cells = trajectory_map.first[cells]
-    cell_index = np.unravel_index(cells, trajectory_map.shape) if trajectory_map.shape else ()
-    index_along = dict(zip(trajectory_map.axes, cell_index, strict=True))
-    # the other axes are at their first value
-    index = tuple(index_along.get(axis, np.zeros(1, np.intp)) for axis in range(len(plan.shape)))
-    columns = columns_at(plan, model, trajectory_map.axes, index)
-    return {name: np.broadcast_to(values, cells.shape).copy() for name, values in columns.items()}
-
-
-def columns_at(plan: Plan, model: ForceModel, axes: Sequence[int], index: Index) -> Columns:
+def columns_at(inputs: Inputs, model: ForceModel, axes: Sequence[int], index: Index) -> Columns:
     """Build the problems of a model at cells, arrays that broadcast; only inputs along `axes` are checked."""
-    impacts = build_impacts(plan.inputs, model, index)
+    impacts = build_impacts(inputs, model, index)
     with np.errstate(all="ignore"):
-        checks = frozenset(
-            check for check, varying in axes_of_checks(plan.inputs, model).items() if varying <= {*axes}
-        )
+        checks = frozenset(check for check, varying in axes_of_checks(inputs, model).items() if varying <= {*axes})
         return {
             "n": impacts.n,
             "status": check_inputs(model, impacts, checks),
             **dimensionless_values(model, impacts),
-            **fixed_steps_at(plan.inputs, impacts, index),
+            **fixed_steps_at(inputs, impacts, index),
         }
 
 

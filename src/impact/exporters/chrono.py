@@ -31,7 +31,7 @@ FIXED_MASS_RATIO = 1e9
 
 
 def version_numbers(version: str) -> tuple[int, ...]:
-    """The numbers of a release.
+    """Split a release into its numbers.
 
     >>> version_numbers("9.0.1")
     (9, 0, 1)
@@ -40,7 +40,7 @@ def version_numbers(version: str) -> tuple[int, ...]:
 
 
 def read_version(text: str) -> str:
-    """A release as Chrono writes it.
+    """Read a release as Chrono writes it.
 
     >>> read_version("v9.0.1")
     '9.0.1'
@@ -54,13 +54,13 @@ def read_version(text: str) -> str:
 
 
 def from_material(collision: Collision) -> bool:
-    """Whether the coefficients follow from Young's modulus; a linear spring of its own stiffness has none."""
+    """Return whether coefficients follow from Young's modulus; a linear spring of its own stiffness has none."""
     _, force, of_material = SETTINGS[collision.model.key]
     return of_material and not (force == "Hooke" and collision.has_user_stiffness)
 
 
 def parameters(collision: Collision) -> dict[str, float | str]:
-    """The properties of the material, or the coefficients kn and gn, and the settings of the system."""
+    """Write the properties of the material, or the coefficients kn and gn, and the settings of the system."""
     c = collision
     system, force, _ = SETTINGS[c.model.key]
     settings: dict[str, float | str] = {"ContactForceModel": force}
@@ -117,7 +117,7 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
 
 
 def settings(collision: Collision, parameters: Parameters) -> list[str]:
-    """The lines that choose the law in the system."""
+    """Write the lines that choose the law in the system."""
     system, force, _ = SETTINGS[collision.model.key]
     properties = str(from_material(collision)).lower()
     speed = parameters.get("CharacteristicImpactVelocity")

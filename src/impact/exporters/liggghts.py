@@ -7,7 +7,7 @@ import re
 from ..errors import UsageError
 from ..formatting import number
 from .code import Code, Collision, Parameters
-from .programs import output_of
+from .programs import printed_version
 
 # model of pair style gran, and its options, by key of the catalogue
 OPTIONS = {
@@ -44,11 +44,6 @@ print           "e_out = ${{e_out}}"
 """
 
 
-def version_of(program: str) -> str | None:
-    match = re.search(r"LIGGGHTS-PUBLIC ([\d.]+)", output_of([program, "-help"]))
-    return match[1] if match else None
-
-
 def read_version(text: str) -> str:
     if not re.fullmatch(r"\d+\.\d+\.\d+", text):
         raise UsageError(f'got "{text}", expected a release such as 3.8.0')
@@ -58,7 +53,7 @@ def read_version(text: str) -> str:
 
 
 def parameters(collision: Collision) -> dict[str, float | str]:
-    """The words after each property of fix property/global: its kind, and its values by type or pair of types."""
+    """Write the words after each property of fix property/global: its kind, and values by (pair of) types."""
     c = collision
     if not c.has_materials:
         raise UsageError("LIGGGHTS takes Young's modulus and Poisson's ratio: expected a material, not K")
@@ -144,6 +139,6 @@ CODE = Code(
     suffix=".in",
     program="liggghts",
     install="on Debian: apt-get install liggghts",
-    version_of=version_of,
+    version_of=printed_version("-help", r"LIGGGHTS-PUBLIC ([\d.]+)"),
     command=lambda program, file: (program, "-in", file, "-log", "none"),
 )

@@ -15,7 +15,7 @@ SPECIES = {
 
 
 def parameters(collision: Collision) -> dict[str, float | str]:
-    """The arguments of the setters; the mass is twice the effective one."""
+    """Write the arguments of the setters; the mass is twice the effective one."""
     c = collision
     if c.model.key == "mercurydpm-linear-viscoelastic":
         return {"stiffness": c["K"], "restitution": c["e"], "mass": 2.0 * c["m"]}

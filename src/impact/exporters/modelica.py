@@ -8,7 +8,7 @@ from .code import Code, Collision, Parameters
 
 
 def parameters(collision: Collision) -> dict[str, float | str]:
-    """The modifiers of the component."""
+    """Write the modifiers of the component."""
     return {"c": collision["K"], "d": collision["d"], "n": collision["n"], "s_rel0": 0.0}
 
 

@@ -33,7 +33,7 @@ print("e_out =", (v2 - v1) / {v0})
 
 
 def parameters(collision: Collision) -> dict[str, float | str]:
-    """The attributes of a geom; solref holds numbers per effective mass."""
+    """Write the attributes of a geom; solref holds numbers per effective mass."""
     c = collision
     if c.model.key == "mujoco-solref":
         if c["timeconst"] < 2.0 * c.dt:

@@ -62,7 +62,7 @@ class ExportProblem:
         return self.law.e if self.law.has_e else self.e_continuous
 
     def collision(self, dt: float, phase: float) -> Collision:
-        """The collision whose contact begins at a phase of a step dt [s]."""
+        """Make the collision whose contact begins at a phase of a step dt [s]."""
         values = input_values(self.law.impact)
         for name in ("R1", "R2"):
             if math.isnan(values[name]):

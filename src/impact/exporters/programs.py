@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -46,6 +47,16 @@ def output_of(command: Sequence[str]) -> str:
             return run_program(command, folder, VERSION_TIMEOUT_S).stdout
         except (OSError, subprocess.SubprocessError):
             return ""
+
+
+def printed_version(option: str, pattern: str) -> Callable[[str], str | None]:
+    """Make a function that searches the version of a program, the first group of a pattern, in what it prints."""
+
+    def version_of(program: str) -> str | None:
+        match = re.search(pattern, output_of([program, option]))
+        return match[1] if match else None
+
+    return version_of
 
 
 def python_package_version(package: str) -> Callable[[str], str | None]:

@@ -58,7 +58,7 @@ print("e_out =", (v2 - v1) / {v0})
 
 
 def parameters(collision: Collision) -> dict[str, float | str]:
-    """Stiffness and dissipation of each sphere; the stiffness is the modulus of plane strain."""
+    """Write stiffness and dissipation of each sphere; the stiffness is the modulus of plane strain."""
     c = collision
     if not c.has_materials:
         raise UsageError("Simbody takes the moduli of both spheres: expected a material, not K")

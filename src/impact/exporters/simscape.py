@@ -12,7 +12,7 @@ WIDE_TRANSITION = 0.1
 
 
 def parameters(collision: Collision) -> dict[str, float | str]:
-    """The parameters of the section Normal Force, in the block's default units."""
+    """Write the parameters of the section Normal Force, in the block's default units."""
     c = collision
     return {
         "NormalForceType": "SmoothSpringDamper",
@@ -28,7 +28,7 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
 
 
 def transition_share(collision: Collision) -> float:
-    """The width of the transition region over the peak indentation v₀ √(m/K) of the undamped spring [-]."""
+    """Compute the width of the transition region over the undamped peak indentation v₀ √(m/K) [-]."""
     c = collision
     return c["w"] / (c["v0"] * math.sqrt(c["m"] / c["K"]))
 

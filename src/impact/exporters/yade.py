@@ -7,7 +7,7 @@ import re
 
 from ..errors import UsageError
 from .code import Code, Collision, Parameters
-from .programs import output_of
+from .programs import printed_version
 
 LAWS = {
     "yade-en": "Law2_ScGeom_MindlinPhys_Mindlin, en",
@@ -40,11 +40,6 @@ print("e_out =", (v2 - v1) / {v0})
 """
 
 
-def version_of(program: str) -> str | None:
-    match = re.search(r"\d{4}\.\d{2}[a-z]?", output_of([program, "--version"]))
-    return match[0] if match else None
-
-
 def read_version(text: str) -> str:
     if not re.fullmatch(r"\d{4}\.\d{2}[a-z]?", text):
         raise UsageError(f'got "{text}", expected a release such as 2023.02a, or its year and month')
@@ -52,7 +47,7 @@ def read_version(text: str) -> str:
 
 
 def law_for_version(key: str, version: str) -> str:
-    """The law of an option in a version.
+    """Find the law of an option in a version.
 
     >>> law_for_version("yade-en", "2022.01a"), law_for_version("yade-betan", "2011.05")
     ('yade-en-clamped', 'yade-betan-pulling')
@@ -81,7 +76,7 @@ def parameters(collision: Collision) -> dict[str, float | str]:
 
 
 def linear_damping(e: float) -> float:
-    """The damping ratio of a linear spring and dashpot that ends at zero indentation, see `yade-betan`."""
+    """Compute the damping ratio of a linear spring and dashpot that ends at zero indentation, see `yade-betan`."""
     if e == 0.0:
         # the limit
         return 1.0
@@ -156,6 +151,6 @@ CODE = Code(
     template=TWO_BALLS,
     program="yade",
     install="on Debian: apt-get install yade",
-    version_of=version_of,
+    version_of=printed_version("--version", r"(\d{4}\.\d{2}[a-z]?)"),
     command=lambda program, file: (program, "-j1", "-n", "-x", file),
 )

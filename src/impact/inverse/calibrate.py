@@ -26,7 +26,8 @@ from ..contact.units import dimension
 from ..engine.build_impacts import build_impacts
 from ..engine.execute import WorkerContext, context_of, models_of_context
 from ..engine.executors import choose_executor
-from ..engine.plan import Inputs, Plan
+from ..engine.inputs import Inputs
+from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..results.calibration import calibration_template
 from ..results.schema import FIT_STATUSES

@@ -31,7 +31,8 @@ from ..contact.units import with_numbers
 from ..contact.variables import OUTPUTS
 from ..display import Block, Displayed
 from ..engine.build_impacts import build_impacts
-from ..engine.plan import Inputs, Plan
+from ..engine.inputs import Inputs
+from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..errors import UsageError, did_you_mean
 from ..formatting import number, quantity

@@ -20,10 +20,10 @@ from ..contact.model import ForceModel
 from ..contact.simulate import TABLE_COLUMNS
 from ..display import Block, Displayed, Table, Wrapped
 from ..engine.checkpoint import write_range
-from ..engine.execute import context_of, integrate_columns, with_core
+from ..engine.execute import context_of, integrate_columns
 from ..engine.plan import Plan
 from ..engine.run import Run, ignore
-from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryMap, columns_of, trajectory_maps, trajectory_ranges
+from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryMap
 from .layouts import LAYOUTS
 from .schema import dataset_template, stored_variables
 from .sweep import prepare
@@ -159,25 +159,21 @@ def estimate(
     303
     """
     plan = prepare(source, overrides, plugins, Run(max_points=max_points, on_note=on_note))
-    maps = trajectory_maps(plan)
-    plan = with_core(plan, maps)
-    total = sum(trajectory_map.count for trajectory_map in maps)
-    ranges = list(trajectory_ranges(maps))
     # a range in the middle, to avoid the extreme values at both ends
-    chosen = ranges[len(ranges) // 2]
+    chosen = plan.ranges[len(plan.ranges) // 2]
     model = plan.models[chosen.model]
     # the first run loads or compiles the core
     for _ in range(2):
         with _timed() as integrating:
-            collisions, _ = integrate_columns(model, columns_of(plan, maps, chosen), plan.config.solver)
+            collisions, _ = integrate_columns(model, plan.columns_of(chosen), plan.solver)
     with _timed() as driving:
-        sent = len(pickle.dumps((columns_of(plan, maps, chosen), context_of(plan)), pickle.HIGHEST_PROTOCOL))
+        sent = len(pickle.dumps((plan.columns_of(chosen), context_of(plan)), pickle.HIGHEST_PROTOCOL))
         back = pickle.dumps(collisions, pickle.HIGHEST_PROTOCOL)
         pickle.loads(back)
         write_range(io.BytesIO(), "", collisions)
     # the time of a slab does not depend on the values of its trajectories: repeat those of the range
     positions = np.arange(RANGE_TRAJECTORIES) % chosen.size
-    table = table_of(plan, maps, lambda _, start, stop: collisions.take(positions[: stop - start]))
+    table = table_of(plan, lambda _, start, stop: collisions.take(positions[: stop - start]))
     with _timed() as assembling:
         values = next(expanded_slabs(table, stored_variables(plan))).values
         for array in values.values():
@@ -185,19 +181,22 @@ def estimate(
     slab = values["status"].size
     each, seconds_per_trajectory_of_driver = integrating() / chosen.size, DASK_OVERHEAD * driving() / chosen.size
     writing_seconds = assembling() / slab * plan.stored_points if plan.layout == "full" else 0.0
-    busy = min(max(round(each / seconds_per_trajectory_of_driver), 1), len(ranges))
-    work_folder_bytes = total * sum(getattr(collisions, name).itemsize for name in TABLE_COLUMNS)
+    busy = min(max(round(each / seconds_per_trajectory_of_driver), 1), len(plan.ranges))
+    work_folder_bytes = plan.trajectories * sum(getattr(collisions, name).itemsize for name in TABLE_COLUMNS)
     counts = [*(count for count in WORKER_COUNTS if count < busy), busy]
     return Estimate(
         plan.points,
-        total,
-        tuple(_model_counts(plan, trajectory_map) for trajectory_map in maps),
+        plan.trajectories,
+        tuple(_model_counts(plan, trajectory_map) for trajectory_map in plan.maps),
         LAYOUTS[plan.layout].template(dataset_template(plan), plan, table).nbytes,
         work_folder_bytes,
-        each * total / jobs + writing_seconds,
-        plan.config.solver.core,
-        round((sent + len(back)) / chosen.size * total),
-        {count: max(each / count, seconds_per_trajectory_of_driver) * total + writing_seconds for count in counts},
+        each * plan.trajectories / jobs + writing_seconds,
+        plan.solver.core,
+        round((sent + len(back)) / chosen.size * plan.trajectories),
+        {
+            count: max(each / count, seconds_per_trajectory_of_driver) * plan.trajectories + writing_seconds
+            for count in counts
+        },
     )
 
 

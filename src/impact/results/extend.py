@@ -24,10 +24,11 @@ from ..contact.simulate import CollisionResult
 from ..contact.status import STATUS_OK, Status
 from ..engine.execute import ReusedPart
 from ..engine.executors import SERIAL, ExecutorSpec
-from ..engine.plan import Inputs, Plan
+from ..engine.inputs import Inputs
+from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..engine.run import ProgressCallback, Run, ignore, never
-from ..engine.trajectories import TrajectoryMap, TrajectoryRange, check_count, columns_of, trajectory_maps
+from ..engine.trajectories import TrajectoryMap, TrajectoryRange
 from ..errors import ResultError, UsageError
 from ..text import safe_text
 from .attributes import read_attribute
@@ -155,12 +156,12 @@ def _extend_into(output: Path, source: Path, overrides: Sequence[str], plugins: 
             solver = replace(new.config.solver, core=str(before.attrs["core"]))
             new = replace(new, config=replace(new.config, solver=solver))
         _check_changes(old, new, name)
-        check_count(new, run.max_points, str(source))
+        new.check_count(run.max_points, str(source))
         axes = tuple(_axis_positions(axis, old.inputs, name) for axis in new.config.axes)
         _check_none_lost(old, axes, name)
         seal = str(before.encoding["seal"])
         history = [*read_attribute(before.attrs, "extended", str(source)), {"seal": seal, "set": list(overrides)}]
-        old_positions = _OldPositions(old, new, trajectory_maps(new), axes)
+        old_positions = _OldPositions(old, new, axes)
         n_integrated: dict[int, int] = {}
 
         # a full result has no trajectories, only the values of its points
@@ -317,7 +318,6 @@ class _OldPositions:
 
     old: Plan
     new: Plan
-    maps: Sequence[TrajectoryMap]
     axes: tuple[_AxisPositions, ...]
     # by model, for each trajectory its row in the old table, or -1
     _rows: dict[int, IndexArray] = field(default_factory=dict)
@@ -337,7 +337,7 @@ class _OldPositions:
         is_known = old_rows >= 0
         stored = table.rows.take(model, np.maximum(old_rows, 0))
         # a status that was assigned before integration may differ between the two sweeps
-        status = columns_of(self.new, self.maps, trajectory_range)["status"]
+        status = self.new.columns_of(trajectory_range)["status"]
         is_known &= np.where(
             status == STATUS_OK, ~np.isin(stored.status, CHECKED_STATUSES), stored.status == status
         )
@@ -347,7 +347,7 @@ class _OldPositions:
 
     def not_needed(self, trajectory_range: TrajectoryRange) -> ReusedPart:
         """Mark the trajectories of a range that only points need which the old result holds in full."""
-        trajectory_map = self.maps[trajectory_range.model]
+        trajectory_map = self.new.maps[trajectory_range.model]
         others = [axis for axis in range(len(self.axes)) if axis not in trajectory_map.axes]
         if self.model(trajectory_range.model) is None or any(
             (self.axes[axis].positions < 0).any() for axis in others
@@ -369,7 +369,7 @@ class _OldPositions:
         return is_old
 
     def _old_rows(self, trajectory_range: TrajectoryRange, old_map: TrajectoryMap) -> IndexArray:
-        trajectory_map = self.maps[trajectory_range.model]
+        trajectory_map = self.new.maps[trajectory_range.model]
         if trajectory_map.of_cell is None:
             return self._rows_of_cells(
                 trajectory_map, old_map, np.arange(trajectory_range.start, trajectory_range.stop)

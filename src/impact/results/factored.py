@@ -29,7 +29,7 @@ from ..contact.simulate import TABLE_COLUMNS, CollisionResult
 from ..contact.status import STATUSES, Status
 from ..contact.variables import OUTPUTS, Variable
 from ..engine.build_impacts import Stiffness, has_stiffness_rule, mass_at, values_at
-from ..engine.plan import Index, Inputs
+from ..engine.inputs import Index, Inputs
 from ..engine.trajectories import TrajectoryMap
 from ..errors import ResultError, UsageError
 from ..formatting import number

@@ -26,7 +26,8 @@ from ..contact.materials import effective_mass
 from ..contact.timestep import EXACT
 from ..contact.variables import AXES, BY_DEFAULT, HISTORY, OUTPUTS, Variable, by_name
 from ..engine.build_impacts import mass_at, restitution_at
-from ..engine.plan import Index, Plan
+from ..engine.inputs import Index
+from ..engine.plan import Plan
 from ..formatting import number
 from .kinds import Kind
 
@@ -399,7 +400,7 @@ def provenance_attributes(plan: Plan) -> dict[str, object]:
         "fingerprint": plan.fingerprint,
         "rtol": config.solver.rtol,
         "max_steps": config.solver.max_steps,
-        "core": config.solver.core,
+        "core": plan.solver.core,
         # results of the continuous law have the attributes that they had before there were schemes
         **({} if config.solver.integrator == EXACT else {"integrator": config.solver.integrator}),
         "impact_version": __version__,

@@ -22,18 +22,17 @@ from ..config.tables import CORES
 from ..contact.model import ForceModel
 from ..display import Block, Displayed
 from ..engine.checkpoint import WorkFolder, lock_work_folder, open_work_folder
-from ..engine.execute import with_core
 from ..engine.executors import SERIAL, ExecutorSpec
 from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
 from ..engine.run import ProgressCallback, ProgressCounter, Run, ignore, never, report_kept_ranges
-from ..engine.trajectories import TrajectoryRange, trajectory_maps, trajectory_ranges
+from ..engine.trajectories import TrajectoryRange
 from ..errors import ResultError, StoreError, UnfinishedError, UsageError
 from .outcome import SweepOutcome
 from .provenance import stored_config
 from .schema import dataset_template
-from .sweep import check_storable, complete_ranges, prepare, range_reader, reload_range, store_result
-from .trajectory_table import table_of
+from .sweep import check_storable, complete_ranges, prepare, reload_range, store_result
+from .trajectory_table import table_of_ranges
 
 # describes the shard of a work folder, next to the plan
 SHARD_FILE_NAME = "shard.json"
@@ -158,10 +157,7 @@ def sweep_shard(
 def _complete_shard(output: Path, plan: Plan, shard: Shard, command: Sequence[str], run: Run) -> ShardProgress:
     """Integrate what the work folder of a shard does not have yet."""
     check_storable(plan)
-    maps = trajectory_maps(plan)
-    plan = with_core(plan, maps)
-    all_ranges = list(trajectory_ranges(maps))
-    ranges = [trajectory_range for trajectory_range in all_ranges if shard.has(trajectory_range)]
+    ranges = [trajectory_range for trajectory_range in plan.ranges if shard.has(trajectory_range)]
     counter = ProgressCounter.start(ranges, plan.points, run)
     folder = shard.folder(output)
     with open_work_folder(folder, plan, run) as work_folder:
@@ -169,15 +165,15 @@ def _complete_shard(output: Path, plan: Plan, shard: Shard, command: Sequence[st
         record = {
             "shard": [shard.number, shard.of],
             "command": list(command),
-            "core": plan.config.solver.core,
+            "core": plan.solver.core,
             "attributes": {name: attributes[name] for name in RECORDED_ATTRIBUTES},
         }
         with atomic_write(folder / SHARD_FILE_NAME, overwrite=True) as sink:
             sink.write(json.dumps(record).encode())
         with report_kept_ranges(folder, counter, "the same command", lambda error: []):
-            complete_ranges(work_folder, plan, maps, ranges, counter, run)
+            complete_ranges(work_folder, plan, ranges, counter, run)
     progress = counter.progress
-    return ShardProgress(folder, len(ranges), len(all_ranges), progress.trajectories, progress.failed, shard)
+    return ShardProgress(folder, len(ranges), len(plan.ranges), progress.trajectories, progress.failed, shard)
 
 
 @dataclass(frozen=True)
@@ -236,9 +232,7 @@ def merge(
     # the core that the shards were integrated by, which may not be the default of this machine
     config = replace(config, solver=replace(config.solver, core=first_record.core))
     plan = Plan(config, plugin_set.of(config.models))
-    maps = trajectory_maps(plan)
-    ranges = list(trajectory_ranges(maps))
-    counter = ProgressCounter.start(ranges, plan.points, run)
+    counter = ProgressCounter.start(plan.ranges, plan.points, run)
     for folder, record in records.items():
         if record.attributes["fingerprint"] != first_record.attributes["fingerprint"]:
             # a difference in the trajectories is reported first, by its name
@@ -248,13 +242,11 @@ def merge(
                     "expected the folders of one sweep"
                 )
     # folders are locked one after the other: there may be more of them than the limit of open files
-    folder_of, repeated = _locate_ranges([*records], plan, ranges, counter, run)
-    missing = [trajectory_range for trajectory_range in ranges if trajectory_range.number not in folder_of]
+    folder_of, repeated = _locate_ranges([*records], plan, counter, run)
+    missing = [trajectory_range for trajectory_range in plan.ranges if trajectory_range not in folder_of]
     if missing:
         raise UsageError(*_missing_shards(output, missing, records))
-    table = table_of(
-        plan, maps, range_reader(maps, lambda number: reload_range(folder_of[number], ranges[number]))
-    )
+    table = table_of_ranges(plan, lambda finished: reload_range(folder_of[finished], finished))
     try:
         outcome = store_result(output, plan, table, counter, run)
     except (StoreError, UnfinishedError) as error:
@@ -290,30 +282,30 @@ def _read_record(folder: Path) -> _ShardRecord:
 
 
 def _locate_ranges(
-    folders: Sequence[Path], plan: Plan, ranges: Sequence[TrajectoryRange], counter: ProgressCounter, run: Run
-) -> tuple[dict[int, WorkFolder], int]:
+    folders: Sequence[Path], plan: Plan, counter: ProgressCounter, run: Run
+) -> tuple[dict[TrajectoryRange, WorkFolder], int]:
     """Find the work folder of each range, and count the ranges that are in several folders."""
-    folder_of: dict[int, WorkFolder] = {}
-    repeated: set[int] = set()
+    folder_of: dict[TrajectoryRange, WorkFolder] = {}
+    repeated: set[TrajectoryRange] = set()
     for folder in folders:
         with lock_work_folder(folder, plan) as work_folder:
-            for trajectory_range in ranges:
+            for trajectory_range in plan.ranges:
                 run.check_stop("nothing was written")
-                collisions, number = work_folder.load(trajectory_range), trajectory_range.number
+                collisions = work_folder.load(trajectory_range)
                 if collisions is None:
                     continue
-                if number not in folder_of:
-                    folder_of[number] = work_folder
+                if trajectory_range not in folder_of:
+                    folder_of[trajectory_range] = work_folder
                     counter.count(trajectory_range, collisions)
                     counter.report()
                     continue
-                repeated.add(number)
-                other = vars(reload_range(folder_of[number], trajectory_range))
+                repeated.add(trajectory_range)
+                other = vars(reload_range(folder_of[trajectory_range], trajectory_range))
                 if any(values.tobytes() != other[name].tobytes() for name, values in vars(collisions).items()):
                     raise ResultError(
-                        f"{work_folder.path(number)}: differs from "
-                        f"{folder_of[number].path(number)}; expected both to be computed on the "
-                        "same type of processor"
+                        f"{work_folder.path(trajectory_range)}: differs from "
+                        f"{folder_of[trajectory_range].path(trajectory_range)}; expected both to be computed on "
+                        "the same type of processor"
                     )
     return folder_of, len(repeated)
 

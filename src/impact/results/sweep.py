@@ -9,9 +9,9 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
-import numpy as np
 import xarray as xr
 
 from ..atomic import atomic_write, check_output, check_outputs
@@ -21,20 +21,12 @@ from ..config.load import read_config
 from ..contact.model import ForceModel
 from ..contact.simulate import TABLE_COLUMNS, CollisionResult
 from ..engine import checkpoint
-from ..engine.execute import FindReused, integrate_ranges, reuse_nothing, with_core
+from ..engine.execute import FindReused, integrate_ranges, reuse_nothing
 from ..engine.executors import SERIAL, ExecutorSpec, choose_executor
 from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
 from ..engine.run import DEFAULT_RUN, ProgressCallback, ProgressCounter, Run, ignore, never, report_kept_ranges
-from ..engine.trajectories import (
-    RANGE_TRAJECTORIES,
-    TrajectoryMap,
-    TrajectoryRange,
-    check_count,
-    even_size,
-    trajectory_maps,
-    trajectory_ranges,
-)
+from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryRange
 from ..errors import ResultError, StoreError, UnfinishedError, UsageError
 from .layouts import LAYOUTS, FillSlab
 from .netcdf import MAX_LABEL_BYTES, encode_text, is_text
@@ -42,7 +34,7 @@ from .outcome import SweepOutcome
 from .plausibility import material_notes
 from .schema import dataset_template, plan_coordinates, stored_variables
 from .summary import summarize
-from .trajectory_table import TrajectoryTable, in_memory, lazy_dataset, table_of
+from .trajectory_table import TrajectoryTable, in_memory, lazy_dataset, table_of_ranges
 from .validation import is_name
 from .xarray_backend import MAX_LOADED_BYTES, check_readable, load, open_result, write_sealed
 
@@ -232,7 +224,7 @@ def prepare(
     plugin_set = read_plugins(plugins)
     config = read_config(source, overrides, plugin_set.models, run.max_points)
     plan = Plan(config, plugin_set.of(config.models))
-    check_count(plan, run.max_points, str(source) if isinstance(source, Path) else "config")
+    plan.check_count(run.max_points, str(source) if isinstance(source, Path) else "config")
     columns = {name: values for axis in config.axes for name, values in axis.columns.items()}
     for note in material_notes(plan.material_record, columns):
         run.on_note(note)
@@ -242,18 +234,15 @@ def prepare(
 def sweep_in_memory(plan: Plan, run: Run = DEFAULT_RUN) -> xr.Dataset:
     """Run a plan; a small result is in memory, a large one is computed when it is indexed."""
     check_labels(plan)
-    maps = trajectory_maps(plan)
-    plan = with_core(plan, maps)
-    ranges = list(trajectory_ranges(maps))
-    counter = ProgressCounter.start(ranges, plan.points, run)
-    finished: dict[int, CollisionResult] = {}
-    for trajectory_range, collisions in integrate_ranges(plan, maps, ranges, run):
-        finished[trajectory_range.number] = collisions
+    counter = ProgressCounter.start(plan.ranges, plan.points, run)
+    finished: dict[TrajectoryRange, CollisionResult] = {}
+    for trajectory_range, collisions in integrate_ranges(plan, plan.ranges, run):
+        finished[trajectory_range] = collisions
         counter.count(trajectory_range, collisions)
         counter.report()
     if not counter.is_full or run.should_stop():
         raise UnfinishedError("nothing was written")
-    table, variables = table_of(plan, maps, range_reader(maps, finished.__getitem__)), stored_variables(plan)
+    table, variables = table_of_ranges(plan, finished.__getitem__), stored_variables(plan)
     dataset = lazy_dataset(dataset_template(plan), table, variables)
     return in_memory(dataset) if dataset.nbytes <= MAX_LOADED_BYTES else dataset
 
@@ -265,20 +254,17 @@ def sweep_into(
     may_replace = run.overwrite or extension.replaces
     check_output(output, overwrite=may_replace)
     check_storable(plan)
-    maps = trajectory_maps(plan)
-    plan = with_core(plan, maps)
-    ranges = list(trajectory_ranges(maps))
-    counter = ProgressCounter.start(ranges, plan.points, run)
+    counter = ProgressCounter.start(plan.ranges, plan.points, run)
     few = plan.stored_points <= NO_CHECKPOINT_POINTS or plan.layout == "factored"
     folder = checkpoint.work_folder_of(output)
-    if counter.progress.of_trajectories <= RANGE_TRAJECTORIES and few and not os.path.lexists(folder):
+    if plan.trajectories <= RANGE_TRAJECTORIES and few and not os.path.lexists(folder):
         finished = {}
         for trajectory_range, collisions in integrate_ranges(
-            plan, maps, ranges, DEFAULT_RUN, extension.find_reused
+            plan, plan.ranges, DEFAULT_RUN, extension.find_reused
         ):
-            finished[trajectory_range.number] = collisions
+            finished[trajectory_range] = collisions
             counter.count(trajectory_range, collisions)
-        table = table_of(plan, maps, range_reader(maps, finished.__getitem__))
+        table = table_of_ranges(plan, finished.__getitem__)
         try:
             return store_result(output, plan, table, counter, run, extension)
         except UnfinishedError:
@@ -292,10 +278,8 @@ def sweep_into(
         with report_kept_ranges(
             folder, counter, again, lambda error: _missing_space(error, output, plan, counter)
         ):
-            complete_ranges(work_folder, plan, maps, ranges, counter, run, extension.find_reused)
-            table = table_of(
-                plan, maps, range_reader(maps, lambda number: reload_range(work_folder, ranges[number]))
-            )
+            complete_ranges(work_folder, plan, plan.ranges, counter, run, extension.find_reused)
+            table = table_of_ranges(plan, partial(reload_range, work_folder))
             outcome = store_result(
                 output, plan, table, counter, run, extension, checkpoint.partial_file_of(output)
             )
@@ -306,7 +290,6 @@ def sweep_into(
 def complete_ranges(
     work_folder: checkpoint.WorkFolder,
     plan: Plan,
-    maps: Sequence[TrajectoryMap],
     ranges: Sequence[TrajectoryRange],
     counter: ProgressCounter,
     run: Run,
@@ -321,7 +304,7 @@ def complete_ranges(
         else:
             counter.count(trajectory_range, stored)
     counter.report()
-    for trajectory_range, collisions in integrate_ranges(plan, maps, todo, run, find_reused):
+    for trajectory_range, collisions in integrate_ranges(plan, todo, run, find_reused):
         work_folder.store(trajectory_range, collisions)
         counter.count(trajectory_range, collisions)
         counter.report()
@@ -329,23 +312,11 @@ def complete_ranges(
         raise UnfinishedError
 
 
-def range_reader(
-    maps: Sequence[TrajectoryMap], load: Callable[[int], CollisionResult]
-) -> Callable[[int, int, int], CollisionResult]:
-    """Build the `read` function of `TrajectoryRows`; `load` returns a finished range by its number."""
-    first_range = np.cumsum([0, *(-(-trajectory_map.count // RANGE_TRAJECTORIES) for trajectory_map in maps)])
-
-    def read(model: int, start: int, stop: int) -> CollisionResult:
-        return load(int(first_range[model]) + start // even_size(maps[model].count, RANGE_TRAJECTORIES))
-
-    return read
-
-
 def reload_range(work_folder: checkpoint.WorkFolder, trajectory_range: TrajectoryRange) -> CollisionResult:
     """Load a finished range, or raise a `StoreError` if it is damaged."""
     collisions = work_folder.load(trajectory_range)
     if collisions is None:
-        raise StoreError(f"{work_folder.path(trajectory_range.number)}: can no longer be read")
+        raise StoreError(f"{work_folder.path(trajectory_range)}: can no longer be read")
     return collisions
 
 
@@ -385,8 +356,7 @@ def find_finished(path: Path, plan: Plan) -> SweepOutcome | None:
     if dict(dataset.sizes) != {"model": len(plan.models), **axes}:
         dataset.close()
         return None
-    trajectories = sum(trajectory_map.count for trajectory_map in trajectory_maps(plan))
-    return SweepOutcome(dataset, summarize(dataset), trajectories, is_new=False, output=path)
+    return SweepOutcome(dataset, summarize(dataset), plan.trajectories, is_new=False, output=path)
 
 
 def _missing_space(error: Exception, output: Path, plan: Plan, counter: ProgressCounter) -> list[str]:

@@ -30,8 +30,16 @@ from ..contact.simulate import CollisionResult
 from ..contact.status import Status
 from ..contact.variables import Variable
 from ..engine.build_impacts import Stiffness, build_impacts, has_stiffness_rule
-from ..engine.plan import Index, Inputs, Plan, dimensions
-from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryMap, axes_of_arrays, even_size, probe_index
+from ..engine.inputs import Index, Inputs, dimensions
+from ..engine.plan import Plan
+from ..engine.trajectories import (
+    RANGE_TRAJECTORIES,
+    TrajectoryMap,
+    TrajectoryRange,
+    axes_of_arrays,
+    even_size,
+    probe_index,
+)
 from .attributes import SummaryRecord
 from .schema import attributes_of
 from .slabs import ORIGINAL_DIMS, VARIES_ALONG, aligned_slabs, slabs
@@ -124,13 +132,16 @@ class TrajectoryTable:
         )
 
 
-def table_of(
-    plan: Plan, maps: Sequence[TrajectoryMap], read: Callable[[int, int, int], CollisionResult]
-) -> TrajectoryTable:
+def table_of(plan: Plan, read: Callable[[int, int, int], CollisionResult]) -> TrajectoryTable:
     """Build the trajectory table of a plan; for `read` see `TrajectoryRows`."""
-    return TrajectoryTable(
-        plan.inputs, plan.models, tuple(maps), TrajectoryRows(maps, read), (None,) * len(plan.models)
-    )
+    rows, no_rules = TrajectoryRows(plan.maps, read), (None,) * len(plan.models)
+    return TrajectoryTable(plan.inputs, plan.models, plan.maps, rows, no_rules)
+
+
+def table_of_ranges(plan: Plan, load: Callable[[TrajectoryRange], CollisionResult]) -> TrajectoryTable:
+    """Build the trajectory table of a plan from its finished ranges."""
+    range_at = {(finished.model, finished.start): finished for finished in plan.ranges}
+    return table_of(plan, lambda model, start, stop: load(range_at[model, start]))
 
 
 def expand(table: TrajectoryTable, model: int, index: Index, names: Sequence[str]) -> dict[str, NDArray[Any]]:

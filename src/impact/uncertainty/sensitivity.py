@@ -21,7 +21,6 @@ from ..contact.model import ForceModel
 from ..contact.variables import OUTPUTS
 from ..engine.plan import Plan
 from ..engine.run import Run
-from ..engine.trajectories import check_count
 from ..errors import ConfigError, UsageError, did_you_mean
 from ..results.sensitivity import HALF, QUANTILES, sensitivity_template
 from ..results.sweep import prepare, sweep_in_memory
@@ -186,7 +185,7 @@ def sensitivity_plan(plan: Plan, of: Sequence[str], max_points: int, name: str) 
     if whole.points > max_points:
         got = f"{whole.points:,} points, {len(names) + 2} for each sample"
         raise UsageError(f"{name}: got {got}, expected at most {max_points:,} (--max-points)")
-    check_count(whole, max_points, name)
+    whole.check_count(max_points, name)
     return whole
 
 

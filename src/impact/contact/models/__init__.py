@@ -39,12 +39,12 @@ def _built_in() -> tuple[ForceModel, ...]:
 
 
 def built_in() -> frozenset[str]:
-    """The keys of the models that are built in."""
+    """Find the keys of the models that are built in."""
     return frozenset(model.key for model in _built_in())
 
 
 def catalogue(plugins: Sequence[ForceModel] = ()) -> Mapping[str, ForceModel]:
-    """All models by key: the built-in ones, then the plug-ins.
+    """Collect all models by key: the built-in ones, then the plug-ins.
 
     >>> list(catalogue())[:3]
     ['hertz', 'hunt-crossley-1975', 'herbert-mcwhannell-1977']
@@ -58,7 +58,7 @@ def catalogue(plugins: Sequence[ForceModel] = ()) -> Mapping[str, ForceModel]:
 
 
 def find(key: str, plugins: Sequence[ForceModel] = ()) -> ForceModel:
-    """The model of a key."""
+    """Find the model of a key."""
     models = catalogue(plugins)
     if key not in models:
         raise ModelError(f'no model "{key}"; {did_you_mean(key, list(models))}')

@@ -46,7 +46,7 @@ JKR_1971 = ForceModel(
 
 
 def jkr_force(x: Array, E: Array, R_eff: Array, b: Array) -> Array:
-    """The force at an indentation x, negative where the neck pulls; any shape."""
+    """Compute the force at an indentation x, negative where the neck pulls; any shape."""
     y = jkr_root(x, R_eff, b)
     cube = integer_power(y, 3)
     return np.asarray(E * cube * (4 / 3 * cube / R_eff - 2 * b))
@@ -97,6 +97,6 @@ LIGGGHTS_EDINBURGH = ForceModel(
 def edinburgh_branches(
     x: Array, peak: Array, K: Array, n: float, k2: Array, gamma: Array, exponent: Array, R1: Array, R2: Array
 ) -> tuple[Array, Array]:
-    """The elastic and the adhesive branch of the unloading, whose larger value is the force; any shape."""
+    """Compute the elastic and the adhesive branch of the unloading, whose larger value is the force; any shape."""
     adhesion = edinburgh_adhesion(peak, K, n, k2, gamma, exponent, R1, R2)
     return K * k2 * (power(x, n) - (1 - 1 / k2) * power(peak, n)), -adhesion * np.power(x, exponent)

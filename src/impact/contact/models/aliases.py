@@ -14,7 +14,7 @@ from .hysteresis import EXACT_HYSTERESIS, FLORES_2011, HUNT_CROSSLEY_1975, LANKA
 def same_law(
     law: ForceModel, key: str, *, title: str, year: int, reference: str, evidence: Evidence, doi: str = ""
 ) -> ForceModel:
-    """A law under another name."""
+    """Give a law another name."""
     return replace(
         law,
         key=key,

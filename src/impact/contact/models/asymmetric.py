@@ -18,7 +18,7 @@ from .dashpot import dashpot
 
 
 def approach_dashpot(key: str, *, zeta: Formula, **about: Unpack[About]) -> ForceModel:
-    """A law of a spring and a dashpot that acts on approach only, from the formula of its damping ratio."""
+    """Make a law of a spring and a dashpot that acts on approach only, from the formula of its damping ratio."""
     return replace(
         dashpot(key, zeta=zeta, release="gap", **about),
         unloading=spring,

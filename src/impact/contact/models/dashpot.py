@@ -28,7 +28,7 @@ DELIVERED_RESTITUTION: dict[str, Formula] = {
 
 
 def dashpot(key: str, *, zeta: Formula, release: Literal["gap", "force"], **about: Unpack[About]) -> ForceModel:
-    """A law of a spring and a dashpot, from the formula of its damping ratio ζ = α/√(2(n+1)).
+    """Make a law of a spring and a dashpot, from the formula of its damping ratio ζ = α/√(2(n+1)).
 
     >>> law = dashpot("mine", title="Mine", year=2026, equation="ζ = 1 − e", reference="", zeta=lambda e: 1 - e,
     ...               release="force", exponent=1.0)
@@ -54,7 +54,7 @@ def dashpot(key: str, *, zeta: Formula, release: Literal["gap", "force"], **abou
 
 
 def with_release(law: ForceModel, release: Literal["gap", "force"], **changes: Any) -> ForceModel:
-    """A law made by `dashpot` with the same damping ratio, whose contact ends elsewhere."""
+    """Change where the contact of a law made by `dashpot` ends, with the same damping ratio."""
     ends = {"gap": "to δ = 0", "force": "to F = 0"}
     equation = law.equation.replace(ends[law.release], ends[release])
     return replace(law, release=release, equation=equation, oracle=DELIVERED_RESTITUTION[release], **changes)

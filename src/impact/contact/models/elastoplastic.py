@@ -94,7 +94,7 @@ LUDING_2008 = ForceModel(
 
 
 def unloading_ratio(peak: Array, k2: Array, shallow: Array) -> Array:
-    """The unloading stiffness of Luding's law over K, which grows with the peak up to k₂."""
+    """Compute the unloading stiffness of Luding's law over K, which grows with the peak up to k₂."""
     return 1 + (k2 - 1) * np.minimum(peak * shallow, 1)
 
 
@@ -133,7 +133,7 @@ THORNTON_1997 = ForceModel(
 
 
 def thornton_radius(force_at_peak: Array, E: Array, py: Array, Fy: Array) -> Array:
-    """The radius of curvature Rₚ after the plastic flow."""
+    """Compute the radius of curvature Rₚ after the plastic flow."""
     return 4 * E / (3 * force_at_peak) * power((2 * force_at_peak + Fy) / (2 * np.pi * py), 1.5)
 
 

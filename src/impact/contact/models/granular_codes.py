@@ -38,7 +38,7 @@ STIFFNESS_BY_SPEED = "K = (16/15) E* √R* (15 m v_c²/(16 E* √R*))^(1/5)"
 def in_code(
     law: ForceModel, key: str, title: str, year: int, reference: str, source: str, note: str = ""
 ) -> ForceModel:
-    """A law of the catalogue under the name that a code has for it, with the law's own rule for K."""
+    """Make a law of the catalogue under the name that a code has for it, with the law's own rule for K."""
     evidence = Evidence("seen", source, note=note)
     return of_code(
         same_law(law, key, title=title, year=year, reference=reference, evidence=evidence), law.stiffness
@@ -46,7 +46,7 @@ def in_code(
 
 
 def stiffness_by_speed(E_eff: Array, R_eff: Array, m: Array, vc: Array) -> Array:
-    """Stiffness K [N/m] of a linear spring from E* [Pa], R* [m], m [kg] and a characteristic speed [m/s]."""
+    """Compute K [N/m] of a linear spring from E* [Pa], R* [m], m [kg] and a characteristic speed [m/s]."""
     root = np.sqrt(R_eff) * E_eff
     return 16 / 15 * root * power(15 * m * vc * vc / (16 * root), 0.2)
 

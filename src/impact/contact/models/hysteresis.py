@@ -16,7 +16,7 @@ from .cited_sources import DYS, GHARIB_HURMUZLU, MBDYN, MBDYN_BIBLIOGRAPHY, OPEN
 
 
 def hysteresis(key: str, *, chi: Formula, **about: Unpack[About]) -> ForceModel:
-    """A law of the hysteresis family, from the formula of its damping ratio χ = λ v₀/K.
+    """Make a law of the hysteresis family, from the formula of its damping ratio χ = λ v₀/K.
 
     Parameters
     ----------

@@ -43,7 +43,7 @@ MakeLaw = Callable[..., ForceModel]
 
 
 def tsuji_polynomial(e: Array) -> Array:
-    """The polynomial p(e) by which LAMMPS computes α [-], without the factor √2; e of any shape."""
+    """Compute the polynomial p(e) by which LAMMPS computes α [-], without the factor √2; e of any shape."""
     total = np.zeros_like(e)
     for coefficient in reversed(TSUJI_POLYNOMIAL):
         total = total * e + coefficient
@@ -70,7 +70,7 @@ def with_and_without_limit(
     source: str = DAMPING_KERNEL_SOURCE,
     note: str = "",
 ) -> Iterator[ForceModel]:
-    """The laws of one option of LAMMPS: the default, and the one with limit_damping.
+    """Make the laws of one option of LAMMPS: the default, and the one with limit_damping.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def with_and_without_limit(
 
 
 def mass_velocity_hertz(key: str, *, release: str, **about: Any) -> ForceModel:
-    """The law F = K δ^(3/2) + γ m δ̇; with release "force" it is that of Lee and Herrmann."""
+    """Make the law F = K δ^(3/2) + γ m δ̇; with release "force" it is that of Lee and Herrmann."""
     if release == "force":
         return replace(LEE_HERRMANN_1993, key=key, doi="", same_as=LEE_HERRMANN_1993.key, **about)
     return drag(

@@ -24,17 +24,17 @@ LINEAR_DAMPING = "F = K δⁿ (1 + χ δ̇/v₀)"
 
 
 def of_code(law: ForceModel, stiffness: Formula | None = None) -> ForceModel:
-    """A law in the family "codes", with the code's rule for K."""
+    """Make a law in the family "codes", with the code's rule for K."""
     return replace(law, family="codes", stiffness=stiffness)
 
 
 def springs_in_series(a: Array, b: Array) -> Array:
-    """Stiffness of two springs in series."""
+    """Compute the stiffness of two springs in series."""
     return a * b / (a + b)
 
 
 def smooth_step(t: Array) -> Array:
-    """The cubic from 0 at t = 0 to 1 at t = 1, with zero slope at both; 1 beyond."""
+    """Compute the cubic from 0 at t = 0 to 1 at t = 1, with zero slope at both; 1 beyond."""
     t = np.minimum(t, 1.0)
     return t * t * (3.0 - 2.0 * t)
 
@@ -115,7 +115,7 @@ def simbody_stiffness(E1: Array, E2: Array, nu1: Array, nu2: Array, R_eff: Array
 
 
 def simbody_dissipation(c1: Array, c2: Array, E1: Array, E2: Array, nu1: Array, nu2: Array) -> Array:
-    """The dissipation of a pair: that of each body is weighted by the stiffness of the other."""
+    """Compute the dissipation of a pair: that of each body is weighted by the stiffness of the other."""
     k1, k2 = power(E1 / (1 - nu1 * nu1), 2 / 3), power(E2 / (1 - nu2 * nu2), 2 / 3)
     return (c1 * k2 + c2 * k1) / (k1 + k2)
 
@@ -311,7 +311,7 @@ MODIA3D_EXPONENTIAL = of_code(
 
 
 def modia3d_regularized_speed(v0: Array, vs: Array) -> Array:
-    """The speed [m/s] that Modia3D divides by, which is at least v_s/3."""
+    """Compute the speed [m/s] that Modia3D divides by, which is at least v_s/3."""
     return np.where(v0 >= vs, v0, v0 * (v0 / vs) * (1 - v0 / (3 * vs)) + vs / 3)
 
 
@@ -411,7 +411,7 @@ SIMSCAPE_CONTACT = ForceModel(
 
 
 def in_mbdyn(law: ForceModel, key: str, formulation: str) -> ForceModel:
-    """A law of the catalogue under its name in MBDyn."""
+    """Make a law of the catalogue under its name in MBDyn."""
     return of_code(
         same_law(
             law,

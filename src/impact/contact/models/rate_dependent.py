@@ -22,7 +22,7 @@ def drag(
     coordinate_power: int = 2,
     **about: Unpack[About],
 ) -> ForceModel:
-    """A law of the form F = K δⁿ + c δ^q δ̇."""
+    """Make a law of the form F = K δⁿ + c δ^q δ̇."""
     return ForceModel(
         key,
         **about,

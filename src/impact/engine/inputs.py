@@ -1,0 +1,95 @@
+"""The inputs of a sweep: scalars and axes, and their values at cells of the grid by index arithmetic."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..config.input_names import InputName, is_foreign
+from ..config.load import Axis
+from ..contact.materials import Material
+
+# the indices of cells along each axis of the grid, in arrays that broadcast against each other
+Index = tuple[NDArray[np.intp], ...]
+
+
+def dimensions(index: Index) -> int:
+    """Number of dimensions of the arrays of an index; one for a plan without axes."""
+    return index[0].ndim if index else 1
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """The inputs of a sweep: scalars by config name, and the axes of its grid in config order."""
+
+    scalars: Mapping[str, float | str]
+    axes: tuple[Axis, ...]
+    materials: Mapping[str, Material]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Sizes of the axes."""
+        return tuple(axis.size for axis in self.axes)
+
+    @property
+    def cells(self) -> int:
+        """Number of cells of the grid; cells that differ only in parameters of other models are one point."""
+        return math.prod(self.shape)
+
+    def axes_of_model(self, key: str) -> tuple[int, ...]:
+        """List the axes along which the points of a model lie: all but those of other models' parameters."""
+        return tuple(number for number, axis in enumerate(self.axes) if not is_foreign(axis.columns, key))
+
+    def points_of(self, key: str) -> int:
+        """Number of points of a model."""
+        return math.prod(self.shape[axis] for axis in self.axes_of_model(key))
+
+    def names(self) -> tuple[str, ...]:
+        """List all config names that have a value, those of axes first."""
+        return (*(name for axis in self.axes for name in axis.columns), *self.scalars)
+
+    def axes_of(self, name: str) -> tuple[int, ...]:
+        """List the axes along which a name varies: none for a scalar."""
+        return tuple(number for number, axis in enumerate(self.axes) if name in axis.columns)
+
+    def column(self, name: str, index: Index) -> NDArray[np.generic]:
+        """Look up the values of a name at cells; of length 1 along the axes on which it does not vary."""
+        if name in self.scalars:
+            return np.full((1,) * dimensions(index), self.scalars[name])
+        (number,) = self.axes_of(name)
+        return self._arrays[name][index[number]]
+
+    def values(self, name: str) -> NDArray[np.generic]:
+        """Look up all values of a name: those of its axis, or a single one, None for a name without a value."""
+        if name in self._arrays:
+            return self._arrays[name]
+        parsed = InputName.parse(name)
+        material = self.materials.get(parsed.material)
+        constant = getattr(material, parsed.key) if material is not None else None
+        return np.asarray(self.scalars.get(name, constant))
+
+    def materials_of(self, ball: str) -> frozenset[str]:
+        """List the materials that a ball, "1" or "2", has in any cell."""
+        return self._ball_materials[ball]
+
+    def index(self, slices: Sequence[slice] | None = None) -> Index:
+        """Index a part of the grid, one array along each axis; by default of the whole grid."""
+        slices = [slice(None)] * len(self.axes) if slices is None else slices
+        return np.ix_(*(np.arange(size)[cells] for size, cells in zip(self.shape, slices, strict=True)))
+
+    @cached_property
+    def _arrays(self) -> dict[str, NDArray[np.generic]]:
+        return {name: np.asarray(values) for axis in self.axes for name, values in axis.columns.items()}
+
+    @cached_property
+    def _ball_materials(self) -> dict[str, frozenset[str]]:
+        names = {ball: ({"material", f"material{ball}"} & {*self.names()}) for ball in "12"}
+        return {
+            ball: frozenset(str(value) for name in of_ball for value in np.unique(self.values(name)))
+            for ball, of_ball in names.items()
+        }
