@@ -244,7 +244,7 @@ def test_a_column_means_the_same_in_a_file_and_in_a_table(tmp_path: Path) -> Non
     frame = pd.DataFrame({"v1": ["500 mm/s", "35 mm/s"], "e_out [%]": [50.0, 25.0]})
     for points in (tmp_path / "points.csv", frame):
         columns = read_points(points).columns
-        assert {name: column.tolist() for name, column in columns.items()} == {
+        assert {name: list(column) for name, column in columns.items()} == {
             "v1": [0.5, 0.035],
             "e_out": [0.5, 0.25],
         }

@@ -57,21 +57,26 @@ class Columns:
         place = f"{self.source}:{line}" if line else self.source
         return ": ".join(part for part in (place, safe_text(column, 60), message) if part)
 
+    def read(
+        self, column: str, quantity: Quantity | None, n: float | None, unit: str = ""
+    ) -> tuple[Sequence[Any], Sequence[tuple[int | None, str]]]:
+        """Convert a column, whose header may lack `unit`, and list problems: of a cell, or None for the header."""
+        unit = self.units.get(column) or unit
+        expected = unit_expected(quantity, unit, n)
+        if expected:
+            return [], [(None, f"got [{safe_text(unit)}], expected {expected}")]
+        return read_cells(self.cells[column], quantity, n, unit, is_text=self.is_text)
+
     def values(self, column: str, quantity: Quantity | None, n: float | None, unit: str = "") -> list[Any]:
-        """Convert a column to SI units, or to names of materials; `unit` is that of a column without one."""
-        unit = self.units[column] or unit
-        if self.is_known:
-            expected = unit_expected(quantity, unit, n)
-            if expected:
-                raise ConfigError(self.problem(f"got [{unit}], expected {expected}", column))
-        elif quantity is None:
+        """Convert a column as `read` does; its problems are a `ConfigError`."""
+        if quantity is None and not self.is_known:
             raise ConfigError(self.problem("got no known column, expected such as material1 or v1 [m/s]"))
-        values, problems = read_cells(self.cells[column], quantity, n, unit, is_text=self.is_text)
+        values, problems = self.read(column, quantity, n, unit)
         if problems and quantity is not None and not self.is_known:
             raise ConfigError(self.problem(f"expected {quantity.expected}", row=problems[0][0]))
         if problems:
             raise ConfigError(*(self.problem(message, column, row) for row, message in problems))
-        return values
+        return list(values)
 
 
 def read_cells(

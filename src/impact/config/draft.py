@@ -136,7 +136,7 @@ class Draft:
         return [str(name) for name, _ in input_values(self.data) if name.path not in NO_INPUTS]
 
     def with_problems(self, problems: Iterable[ConfigProblem]) -> Draft:
-        return replace(self, problems=(*self.problems, *problems))
+        return replace(self, problems=tuple(dict.fromkeys((*self.problems, *problems))))
 
     def with_settings(self, settings: Iterable[Setting]) -> Draft:
         """Apply settings in order, after library materials of which one of them changes a property."""

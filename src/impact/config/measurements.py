@@ -14,14 +14,11 @@ from ..contact.variables import OUTPUTS
 from ..errors import ConfigError, did_you_mean
 from ..formatting import number
 from ..text import safe_text
-from .columns import Cells, Columns, column_quantity, contains_path, read_cells, read_csv, unit_expected
+from .columns import Cells, Columns, column_quantity, contains_path, read_cells, read_csv
 from .files import as_table
 from .input_names import InputName, input_values
 from .quantities import MAX_PROBLEMS, ConfigProblem, KeyPath, Quantity, as_text, value_error
-from .tables import LOSSES, MAX_MEASURED, MIN_SIGMA, NOISES, SWEEP_QUANTITIES
-
-Noise = Literal["given", "scale", "excess"]
-Loss = Literal["linear", "huber", "cauchy"]
+from .tables import LOSSES, MAX_MEASURED, MIN_SIGMA, NOISES, SWEEP_QUANTITIES, Loss, Noise
 
 SIGMA, SPECIMEN = "sigma", "specimen"
 SPECIMEN_EXPECTED = "got nothing, expected the name of a specimen"
@@ -130,21 +127,15 @@ def _read_column(
     if columns.is_text and not unit and si_unit != "1":
         expected = f'one in brackets, such as "{safe_text(header, 60)} [{si_unit}]"'
         return (), [(None, f"got no unit, expected {expected}")]
-    wrong_unit = unit_expected(column.quantity, unit, n)
-    if wrong_unit:
-        return (), [(None, f"got [{unit}], expected {wrong_unit}")]
-    return _read_measured(cells, column.quantity, n, unit, is_text=columns.is_text)
+    return _percent_problem(cells, column.quantity) or columns.read(header, column.quantity, n, unit)
 
 
-def _read_measured(
-    cells: Sequence[object], quantity: Quantity, n: float | None, unit: str = "", *, is_text: bool = False
-) -> Cells:
-    """Read measured values, of which none is in percent."""
+def _percent_problem(cells: Sequence[object], quantity: Quantity) -> Cells | None:
+    """Refuse values in percent; the first stands for the whole column."""
     for index, cell in enumerate(cells):
         if _is_in_percent(cell, quantity):
-            # the first stands for the whole column
             return [], [(index, _percent_message(str(cell)))]
-    return read_cells(cells, quantity, n, unit, is_text=is_text)
+    return None
 
 
 def _column_of(header: str, outputs: Sequence[str], models: Mapping[str, ForceModel]) -> _Column:
@@ -289,13 +280,14 @@ def read_measurements(
 def _read_sigma(value: object, output: str, n_points: int) -> tuple[tuple[Any, ...], list[ConfigProblem]]:
     """Read the key `sigma`, one number or one for each point; the validation of [data] reports invalid numbers."""
     path: KeyPath = ("data", "sigma")
-    if not isinstance(value, list):
-        values, problems = _read_measured([value], _deviation(output), None)
-        return tuple(values) * n_points, [(path, message) for _, message in problems if isinstance(value, str)]
-    if len(value) != n_points:
-        return (), [(path, f"got {len(value)} values, expected {n_points}, one for each point")]
-    values, problems = _read_measured(value, _deviation(output), None)
-    return tuple(values), [((*path, index), text) for index, text in problems if isinstance(value[index], str)]
+    cells = value if isinstance(value, list) else [value]
+    if cells is value and len(cells) != n_points:
+        return (), [(path, f"got {len(cells)} values, expected {n_points}, one for each point")]
+    values, problems = _percent_problem(cells, _deviation(output)) or read_cells(cells, _deviation(output), None)
+    texts = [(index, message) for index, message in problems if isinstance(cells[index], str)]
+    if cells is not value:
+        return tuple(values) * n_points, [(path, message) for _, message in texts]
+    return tuple(values), [((*path, index), message) for index, message in texts]
 
 
 def _noise_problems(

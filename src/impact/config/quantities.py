@@ -450,7 +450,7 @@ class Quantity:
         return f"a finite number{unit and ' of'}{unit}"
 
     @property
-    def about(self) -> str:
+    def description(self) -> str:
         """The meaning with the unit in brackets."""
         return f"{self.meaning} [{'-' if self.unit == '1' else self.unit}]"
 
@@ -469,7 +469,7 @@ class Quantity:
         # quantities with the same unit and interval share a type, whatever their meaning
         of_any_meaning = replace(self, meaning="")
         validated = number_type(of_any_meaning) if source is float else Annotated[Any, _AnyForm(of_any_meaning)]
-        return handler.generate_schema(Annotated[validated, Field(description=self.about)])
+        return handler.generate_schema(Annotated[validated, Field(description=self.description)])
 
     def validate(self, value: object, info: ValidationInfo) -> float:
         """Call `read` with the exponent of the validation context."""

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import field
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated, Any, Literal, cast, get_args
 
 from pydantic import (
     BeforeValidator,
@@ -57,8 +57,10 @@ DEFAULT_RTOL = 1e-10
 MAX_SOLVER_STEPS = 10**9
 CORES = ("auto", "numpy", "numba")
 INTEGRATORS = (EXACT, *SCHEMES)
-NOISES = ("given", "scale", "excess")
-LOSSES = ("linear", "huber", "cauchy")
+Noise = Literal["given", "scale", "excess"]
+# how a residual counts, see `scipy.optimize.least_squares`
+Loss = Literal["linear", "huber", "cauchy"]
+NOISES, LOSSES = get_args(Noise), get_args(Loss)
 DESIGN_METHODS = ("sobol", "lhs", "halton", "random")
 MAX_SAMPLES = 2**22
 MODELS_EXPECTED = 'a model, or a list of models; "all" are all'
@@ -275,13 +277,13 @@ class Data(Table):
     lines: Annotated[
         Any, ReadAs(list[Annotated[int, bounded_int(1)]]), expected("a list of the numbers of lines")
     ] = Field(None, description="the line of each point in the file, if the values are in columns")
-    noise: Annotated[Any, ReadAs(Literal[NOISES]), known_name("a kind of noise", lambda info: NOISES)] = Field(
+    noise: Annotated[Any, ReadAs(Noise), known_name("a kind of noise", lambda info: NOISES)] = Field(
         None,
         description="the standard deviations are given, have a common factor (scale), or an excess variance is "
         "added to theirs; excess by default with a column of specimens, given with standard deviations, "
         "otherwise scale",
     )
-    loss: Annotated[Any, ReadAs(Literal[LOSSES]), known_name("a loss", lambda info: LOSSES)] = Field(
+    loss: Annotated[Any, ReadAs(Loss), known_name("a loss", lambda info: LOSSES)] = Field(
         None, description="how a residual counts: squared (linear), or less beyond one standard deviation"
     )
     sigma: Annotated[

@@ -22,11 +22,9 @@ from scipy.optimize import brentq, least_squares
 from scipy.stats import chi2, qmc, t
 
 from ..array_types import Array, Mask
+from ..config.tables import Loss, Noise
 from .batch import Evaluate, VectorFunction, run_together
 
-Noise: TypeAlias = Literal["given", "scale", "excess"]
-# how a residual counts, see `scipy.optimize.least_squares`
-Loss: TypeAlias = Literal["linear", "huber", "cauchy"]
 FitStatus: TypeAlias = Literal["ok", "at_bound", "not_converged", "too_few_points", "no_prediction", "at_limit"]
 
 T = TypeVar("T")

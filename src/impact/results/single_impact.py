@@ -483,7 +483,10 @@ def single_point(
     law = None if model is None else find(model, source.plugins.models)
     settings = [] if law is None else [Setting(("models",), [law.key], f"--model {law.key}")]
     settings += [Setting(InputName.parse(k).path, values, f"--over {k}") for k, values in (over or {}).items()]
-    draft = inline_files(draft.with_settings(settings))
+    draft = draft.with_settings(settings)
+    if isinstance(draft.table("sweep").get("cases"), str):
+        # the inputs that vary together are the columns of the file
+        draft = inline_files(draft)
     joint = _joint_inputs(draft)
     varying = {str(name) for name, value in input_values(draft.data) if isinstance(value, list | dict)}
     labels = {name: value for name, value in source.labels.items() if name in varying | joint or is_case(name)}
@@ -504,7 +507,9 @@ def _joint_inputs(draft: Draft) -> set[str]:
     groups = sweep.get("zip")
     zipped = [name for group in groups for name in listed_names(group)] if isinstance(groups, list) else []
     names = {str(InputName.parse(name)) for name in (*zipped, *as_table(sweep.get("cases")))}
-    return names | {str(InputName.of_path(path)) for path in distribution_paths(draft.data)}
+    if "design" in draft.data:
+        names |= {str(InputName.of_path(path)) for path in distribution_paths(draft.data)}
+    return names
 
 
 def _setting_at(draft: Draft, name: str, value: float | str, law: ForceModel | None) -> Setting:
@@ -530,8 +535,8 @@ def _has_input(draft: Draft, name: InputName) -> bool:
 def _unknown_input(draft: Draft, name: str) -> UsageError:
     parameters = [f"{model.key}.{parameter.name}" for model in draft.models for parameter in model.parameters]
     names = {*draft.input_names, *SWEEP_DEFAULTS, *parameters}
-    choices = [choice for choice in names if _has_input(draft, InputName.parse(choice))]
-    return UsageError(f'no input "{name}" here; {did_you_mean(name, [*choices, *_joint_inputs(draft)])}')
+    choices = {choice for choice in names if _has_input(draft, InputName.parse(choice))} | _joint_inputs(draft)
+    return UsageError(f'no input "{name}" here; {did_you_mean(name, sorted(choices))}')
 
 
 def _without_axes(
