@@ -150,10 +150,7 @@ def _drop_other_axes(dataset: xr.Dataset, dims: Sequence[object]) -> xr.Dataset:
 
 
 def _sorted_along(dataset: xr.Dataset, name: str) -> tuple[xr.Dataset, tuple[str, ...]]:
-    """Sort a result along a coordinate of one axis; also returns its values that are not finite, which it drops.
-
-    The infinite mass of a wall, or the infinite radius of a plane, has no position on an axis.
-    """
+    """Sort along a coordinate; also returns its infinite values, which have no position on an axis."""
     values = dataset[name].values
     order = np.argsort(values, kind="stable")
     order = order[np.isfinite(values[order])]
@@ -182,12 +179,7 @@ def is_ordered(dataset: xr.Dataset, name: str) -> bool:
 
 
 def read(data: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
-    """Read some variables of a line or a plane into memory.
-
-    Raises
-    ------
-    UsageError : they have more than MAX_DRAWN values
-    """
+    """Read some variables of a line or a plane into memory, unless they are too many to draw."""
     numbers = sum(data[name].size for name in names)
     if numbers > MAX_DRAWN:
         raise UsageError(

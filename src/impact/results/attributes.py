@@ -25,10 +25,6 @@ class PluginRecord(BaseModel):
 class SummaryRecord(BaseModel):
     """The summary of all points that a large factored file contains; numbers that are NaN are null.
 
-    Parameters
-    ----------
-    status : number of points by name of the status
-    not_evaluated : number of points whose status was not evaluated
     worst : the largest absolute value of each error, by key of the model
     failed_at : the first points that failed: name of the status, key of the model, index along the axes
     extremes : the smallest and the largest value of each variable, and the number of points without a value; null
