@@ -121,7 +121,7 @@ def _read_column(
     si_unit, unit = column.quantity.unit, "" if unit in ("-", "1") else unit
     if unit.lower() in ("%", "percent", "pct", "per cent"):
         expected = f'a fraction: divide the column by 100 and write "{safe_text(header, 60)}"'
-        return (), [(None, f"got [{safe_text(unit)}], expected {expected}")]
+        return (), [(None, f"got [{unit}], expected {expected}")]
     if columns.is_text and not unit and si_unit != "1":
         expected = f'one in brackets, such as "{safe_text(header, 60)} [{si_unit}]"'
         return (), [(None, f"got no unit, expected {expected}")]
