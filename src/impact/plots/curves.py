@@ -19,10 +19,11 @@ from matplotlib.patches import Patch
 
 from ..errors import UsageError
 from ..formatting import heading
+from ..text import NO_BREAK
 from .data import MEASURED, SIGMA, Points
 from .kinds import Choice
 from .labels import label_axis, pretty_conditions, symbol, words_of
-from .slices import NO_BREAK, unit_of
+from .slices import unit_of
 from .style import is_geometric, model_styles
 
 if TYPE_CHECKING:

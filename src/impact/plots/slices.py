@@ -14,7 +14,7 @@ from ..errors import UsageError, did_you_mean
 from ..formatting import quantity
 from ..results.schema import exponents_of, plain_unit
 from ..results.selection import model_positions, select
-from ..text import safe_text
+from ..text import NO_BREAK, safe_text
 from .kinds import Choice
 
 if TYPE_CHECKING:
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 # values in a picture, which are held as Python objects
 MAX_DRAWN = 2**24
-NO_BREAK = "\N{NO-BREAK SPACE}"
 NO_SWEEP = "this is a time history, not the result of a sweep; draw it with --kind loop, or history"
 
 
