@@ -192,7 +192,7 @@ def witness_values(
     values_by_name = {variable.name: np.empty(indices.size, variable.dtype) for variable in variables}
     for model in np.unique(models).tolist():
         rows = np.flatnonzero(models == model)
-        values = expand(table, model, _unravel_cells(table.inputs, cells[rows]), list(values_by_name))
+        _, values = expand(table, model, _unravel_cells(table.inputs, cells[rows]), list(values_by_name))
         for name, array in values_by_name.items():
             array[rows] = np.broadcast_to(values[name], rows.shape)
     return values_by_name
