@@ -276,5 +276,5 @@ def worst_by_model(summary: Summary, dataset: xr.Dataset) -> dict[str, dict[str,
 
 
 def counts_by_name(counts: Mapping[Status, int]) -> dict[str, int]:
-    """Counts by the names of the statuses, in their order."""
+    """Count by the names of the statuses, in their order."""
     return {status.name.lower(): counts[status] for status in sorted(counts)}
