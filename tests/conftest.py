@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Hashable, Iterable, Iterator
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -51,6 +52,33 @@ rho = 7850
 [model.ismail-stronge-2008]
 gamma = [1.5, 4.0]
 """
+
+
+# the text of a plug-in with one law, for `format(chi=...)`
+PLUGIN = """\
+from impact import hysteresis
+
+MINE = hysteresis("mine-2026", title="Mine", year=2026, equation="", reference="", chi=lambda e: {chi})
+"""
+CHI = "(1 - e * e) / e"
+
+
+def code_blocks(page: str, language: str) -> list[str]:
+    """The code blocks of a page in a language."""
+    return re.findall(rf"```{re.escape(language)}\n(.*?)```", page, re.DOTALL)
+
+
+def assert_same_bits(actual: xr.Dataset, expected: xr.Dataset, names: Iterable[Hashable] = ()) -> None:
+    """The data variables of the expected dataset, or some of its variables, have the same axes, types and bits."""
+    for name in names or expected.data_vars:
+        assert_same_array(actual[name], expected[name])
+
+
+def assert_same_array(actual: xr.DataArray, expected: xr.DataArray) -> None:
+    assert (actual.dims, actual.shape, actual.dtype) == (expected.dims, expected.shape, expected.dtype), (
+        actual.name
+    )
+    assert actual.values.tobytes() == expected.values.tobytes(), actual.name
 
 
 def assert_same_output(printed: str, expected: str) -> None:

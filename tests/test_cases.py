@@ -22,6 +22,8 @@ from impact.results.selection import select
 from impact.results.summary import summarize
 from impact.results.sweep import prepare, sweep_in_memory, sweep_into
 
+from .conftest import assert_same_array
+
 LAYOUTS = ("full", "factored")
 EVERYTHING = [*OUTPUTS]
 MATERIALS = {
@@ -69,11 +71,6 @@ def in_layout(plan: Plan, layout: Any) -> Plan:
     return replace(plan, config=replace(plan.config, output=replace(plan.config.output, layout=layout)))
 
 
-def assert_same_bits(actual: xr.DataArray, expected: xr.DataArray) -> None:
-    assert (actual.dims, actual.dtype) == (expected.dims, expected.dtype)
-    assert actual.values.tobytes() == expected.values.tobytes(), actual.name
-
-
 @st.composite
 def tables(draw: st.DrawFn) -> dict[str, list[Any]]:
     """Tables of cases, of which some may be equal."""
@@ -92,7 +89,7 @@ def test_a_case_equals_a_sweep_with_its_values(columns: dict[str, list[Any]]) ->
         row = {name: values[case] for name, values in columns.items()}
         single = sweep_in_memory(one_row(plan, row))
         for name in EVERYTHING:
-            assert_same_bits(result[name].isel(case=case), single[name])
+            assert_same_array(result[name].isel(case=case), single[name])
 
 
 def one_row(plan: Plan, row: dict[str, Any]) -> Plan:
@@ -180,7 +177,7 @@ def test_cases_are_appended_and_keep_their_numbers(tmp_path: Path, layout: str) 
     extended = impact.extend(tmp_path / "r.h5", ["sweep.cases={v1=[1.0, 0.5, 1.0, 2.0]}"])
     assert extended["case"].values.tolist() == [0, 1, 2, 3]
     for name in whole.data_vars:
-        assert_same_bits(extended[name], whole[name])
+        assert_same_array(extended[name], whole[name])
 
 
 def test_equal_cases_are_integrated_once(cases: dict[str, list[Any]]) -> None:
@@ -257,7 +254,7 @@ def test_a_model_does_not_depend_on_parameters_of_other_models(
             dims = {dim: at for dim, at in others.items() if dim in result[name].dims}
             part = result[name].isel(dims)
             whole = part.isel(model=[position]) if "model" in part.dims else part
-            assert_same_bits(whole.transpose(*alone[name].dims), alone[name])
+            assert_same_array(whole.transpose(*alone[name].dims), alone[name])
 
 
 def test_a_model_without_collapse_is_integrated_along_its_own_axes_only() -> None:

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import yaml
 
-from .conftest import ROOT, Run
+from .conftest import ROOT, Run, code_blocks
 
 # these tests create environments and build the package
 pytestmark = pytest.mark.slow
@@ -34,7 +34,7 @@ Shell = dict[str, str]
 
 def block(language: str, position: int = 0) -> str:
     """The block of a language at a position of the page."""
-    return str(re.findall(rf"```{language}\n(.*?)```", PAGE, re.DOTALL)[position])
+    return code_blocks(PAGE, language)[position]
 
 
 @pytest.fixture(scope="module")

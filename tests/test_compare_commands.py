@@ -29,7 +29,7 @@ from impact.cli.main import app
 from impact.errors import ResultError, StoreError, UsageError
 from impact.results.xarray_backend import write_sealed
 
-from .conftest import ROOT, WIDE
+from .conftest import CHI, PLUGIN, ROOT, WIDE
 from .fork_server import CompletedCommand, ForkServer, abandoned_pipe, printed_on_terminal
 
 FORMATS = ("table", "json", "junit", "markdown", "github")
@@ -684,19 +684,12 @@ def test_the_memory_of_a_rerun_is_bounded_by_the_size_of_the_file(forked: ForkSe
         assert "note: repeated " in done.stdout
 
 
-PLUGIN = """\
-from impact import hysteresis
-
-MINE = hysteresis("mine-2026", title="Mine", year=2026, equation="", reference="", chi=lambda e: {chi})
-"""
-
-
 def test_a_rerun_needs_the_plug_in_of_the_result(forked: ForkServer, tmp_path: Path) -> None:
     config = 'models = ["hertz", "mine-2026"]\n[sweep]\ne = [0.2, 0.8]\nv1 = 1\nm1 = 1\nm2 = 1\nK = 6e9\n'
     config += "[solver]\nrtol = 1e-4\n"
     (tmp_path / "config.toml").write_text(config, encoding="utf-8")
     plugin = tmp_path / "mine.py"
-    plugin.write_text(PLUGIN.format(chi="(1 - e * e) / e"), encoding="utf-8")
+    plugin.write_text(PLUGIN.format(chi=CHI), encoding="utf-8")
     assert forked("sweep", "config.toml", "--plugin", "mine.py", cwd=tmp_path).returncode == 0
 
     done = forked("rerun", "results.h5", cwd=tmp_path)
@@ -716,7 +709,7 @@ def test_a_rerun_with_a_changed_plug_in_has_a_note(forked: ForkServer, tmp_path:
     config += "[solver]\nrtol = 1e-4\n"
     (tmp_path / "config.toml").write_text(config, encoding="utf-8")
     plugin = tmp_path / "mine.py"
-    plugin.write_text(PLUGIN.format(chi="(1 - e * e) / e"), encoding="utf-8")
+    plugin.write_text(PLUGIN.format(chi=CHI), encoding="utf-8")
     assert forked("sweep", "config.toml", "--plugin", "mine.py", cwd=tmp_path).returncode == 0
     original_hash = sha256(plugin.read_bytes()).hexdigest()
     same = plugin.read_text(encoding="utf-8") + "# the same numbers\n"

@@ -23,7 +23,7 @@ from impact.engine.plan import NUMBA_MIN_TRAJECTORIES
 from impact.errors import ConfigError, UsageError
 from impact.results.sweep import prepare
 
-from .conftest import ROOT, Run
+from .conftest import ROOT, Run, assert_same_bits
 from .problems import table1_impacts, with_parameters
 
 RTOL, CORE_TOLERANCE = 1e-10, 1e-12
@@ -141,8 +141,7 @@ def test_results_agree_across_cores_threads_and_collapse() -> None:
     threads = impact.sweep(SWEEP, overrides=['solver.core="numba"'], threads=3)
     separate = impact.sweep(SWEEP, overrides=['solver.core="numba"', "solver.collapse=false"], threads=2)
     for other in (threads, separate):
-        for name in numba.data_vars:
-            assert other[name].values.tobytes() == numba[name].values.tobytes(), name
+        assert_same_bits(other, numba)
     assert impact.compare(separate, numpy).equal
 
 

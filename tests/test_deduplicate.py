@@ -12,7 +12,6 @@ from hypothesis import given, settings, strategies as st
 import impact
 from impact.config.load import read_config
 from impact.contact.impacts import Impacts
-from impact.contact.variables import BY_DEFAULT
 from impact.engine import trajectories as trajectories_module
 from impact.engine.build_impacts import build_impacts
 from impact.engine.plan import Plan
@@ -20,7 +19,7 @@ from impact.engine.run import Run
 from impact.results.estimate import estimate
 from impact.results.sweep import prepare
 
-from .conftest import ROOT
+from .conftest import ROOT, assert_same_bits
 
 DASHPOT = impact.ForceModel(
     "dashpot",
@@ -100,11 +99,6 @@ def configs(draw: st.DrawFn) -> dict[str, object]:
 
 def sweep_with_plugins(config: dict[str, object], *overrides: str) -> xr.Dataset:
     return impact.sweep(config, overrides=overrides, plugins=[DASHPOT, SPEED])
-
-
-def assert_same_bits(first: xr.Dataset, second: xr.Dataset) -> None:
-    for name in BY_DEFAULT:
-        assert first[name].values.tobytes() == second[name].values.tobytes(), name
 
 
 @settings(max_examples=15)

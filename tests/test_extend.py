@@ -14,7 +14,7 @@ import xarray as xr
 import impact
 from impact.errors import ConfigError, ResultError, UsageError
 
-from .conftest import Run
+from .conftest import Run, assert_same_bits
 
 BASE = """
 title = "Base"
@@ -87,11 +87,7 @@ def single_sweep(config: str, overrides: list[str], folder: Path) -> xr.Dataset:
 def assert_same_values(extended: xr.Dataset, single: xr.Dataset) -> None:
     """All variables and coordinates have the same bits, and both are of the same sweep."""
     assert {*extended.variables} == {*single.variables}
-    for name in single.variables:
-        actual, expected = extended.variables[name], single.variables[name]
-        assert actual.dims == expected.dims, name
-        assert actual.dtype == expected.dtype, name
-        assert actual.values.tobytes() == expected.values.tobytes(), name
+    assert_same_bits(extended, single, single.variables)
     for name in ("fingerprint", "config", "materials"):
         assert extended.attrs[name] == single.attrs[name]
 

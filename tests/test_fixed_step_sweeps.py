@@ -23,7 +23,7 @@ from impact.plots.curves import Curve, CurveData
 from impact.plots.draw import get_plot_data
 from impact.plots.kinds import Choice
 
-from .conftest import ROOT, Run
+from .conftest import ROOT, Run, assert_same_bits
 from .test_plots import check_layout, names_of
 
 LINEAR = "anagnostopoulos-1988"
@@ -50,11 +50,6 @@ def swept(models: str | list[str] = LINEAR, /, integrator: str = "kick-drift", *
     tables = {key: sweep.pop(key) for key in ("model", "materials") if key in sweep}
     solver = {"integrator": integrator, **sweep.pop("solver", {})}
     return impact.sweep({"models": models, "solver": solver, "sweep": BALLS | sweep, **tables})
-
-
-def check_same_bits(result: xr.Dataset, other: xr.Dataset) -> None:
-    for name in result:
-        assert result[name].values.tobytes() == other[name].values.tobytes(), name
 
 
 def test_table_of_a_linear_contact() -> None:
@@ -133,7 +128,7 @@ def test_the_bits_are_the_same_with_processes_threads_and_without_collapse(
 ) -> None:
     sweep = BALLS | {"e": [0.3, 0.8], "phase": [0.2, 0.5, 1.0]} | step
     config = {"models": LAWS[:4], "solver": {"integrator": "kick-drift"}, "sweep": sweep}
-    check_same_bits(impact.sweep(config, **how), impact.sweep(config))
+    assert_same_bits(impact.sweep(config, **how), impact.sweep(config))
 
 
 def test_only_distinct_problems_are_integrated(tmp_path: Path, cli: Run) -> None:
@@ -165,7 +160,7 @@ def test_shards_extend_and_the_factored_layout_give_the_same_file(tmp_path: Path
         run("extend", f"part-{layout}.h5", "-o", f"extended-{layout}.h5", "--set", wanted)
         run("compare", f"extended-{layout}.h5", "whole.h5", "--tol", "1e-300")
     run("expand", "extended-factored.h5", "-o", "expanded.h5")
-    check_same_bits(impact.load(tmp_path / "expanded.h5"), impact.load(tmp_path / "whole.h5"))
+    assert_same_bits(impact.load(tmp_path / "expanded.h5"), impact.load(tmp_path / "whole.h5"))
     run("rerun", "whole.h5")
 
 

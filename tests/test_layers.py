@@ -1,4 +1,4 @@
-"""Imports only go down from layer to layer, and each library is imported in one layer."""
+"""Imports only go down from floor to floor and one way within a floor; each library has its packages."""
 
 from __future__ import annotations
 
@@ -11,25 +11,17 @@ from pathlib import Path
 import pytest
 
 SOURCE = Path(__file__).parent.parent / "src" / "impact"
-LAYERS = (
-    {"_version", "array_types", "atomic", "display", "errors", "formatting", "text"},
-    {"ode"},
-    {"contact"},
-    {"config"},
-    {"engine"},
-    {"progress_display"},
-    {"results"},
-    {"inverse", "uncertainty"},
-    {"comparison"},
-    {"exporters"},
-    {"plots"},
-    {"reporting"},
+# the floors of docs/architecture.md, from the lowest; a part imports from those before it, and from itself
+FLOORS = {
+    "foundations": ("_version", "array_types", "text", "errors", "formatting", "atomic", "display"),
+    "numerics": ("ode", "contact"),
+    "config": ("config",),
+    "sweeps": ("engine", "progress_display", "results"),
+    "acts": ("inverse", "uncertainty", "comparison", "exporters", "plots", "reporting"),
     # the package itself, "", hands out the public functions
-    {""},
-    {"cli", "pytest_plugin"},
-    {"__main__"},
-)
-HEIGHT = {part: height for height, parts in enumerate(LAYERS) for part in parts}
+    "interfaces": ("", "cli", "pytest_plugin", "__main__"),
+}
+ORDER = [part for parts in FLOORS.values() for part in parts]
 # where each library may be imported
 LIBRARIES = {
     "typer": {"cli"}, "rich": {"display", "progress_display"}, "matplotlib": {"plots"},
@@ -103,7 +95,7 @@ def test_imports_go_down(path: Path) -> None:
         library, _, rest = name.partition(".")
         if library == "impact":
             target = rest.partition(".")[0]
-            assert HEIGHT[target] <= HEIGHT[part], f"{path.name} imports {name}, which is above it"
+            assert ORDER.index(target) <= ORDER.index(part), f"{path.name} imports {name}, which comes after it"
         elif not typing_only and library in LIBRARIES:
             assert part in LIBRARIES[library], f"{path.name} imports {name}"
 
@@ -140,8 +132,8 @@ def test_modules_of_plots_need_no_circle_for_their_types() -> None:
     TopologicalSorter(graph).prepare()
 
 
-def test_every_module_has_a_layer_and_a_docstring() -> None:
+def test_every_module_has_a_floor_and_a_docstring() -> None:
     for path in MODULES:
-        assert part_of(path) in HEIGHT
+        assert part_of(path) in ORDER
         text = path.read_text(encoding="utf-8")
         assert not text or ast.get_docstring(ast.parse(text)), f"{path.name} does not say what it holds"

@@ -16,7 +16,7 @@ import impact
 from impact.engine.plugins import installed, read_plugins
 from impact.errors import ModelError
 
-from .conftest import ROOT, Run
+from .conftest import ROOT, Run, code_blocks
 from .fork_server import CompletedCommand, ForkServer
 
 PAGE = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
@@ -43,7 +43,7 @@ K = 6e9
 
 
 def blocks(language: str) -> list[str]:
-    return re.findall(rf"```{language}\n(.*?)```", PAGE, re.DOTALL)
+    return code_blocks(PAGE, language)
 
 
 @pytest.fixture

@@ -22,14 +22,9 @@ from impact.engine.plugins import Plugins, read_plugins
 from impact.errors import ConfigError, ModelError, ResultError, UsageError
 from impact.results.provenance import check_plugins
 
+from .conftest import CHI, PLUGIN
 from .fork_server import ForkServer
 
-CHI = "(1 - e * e) / e"
-PLUGIN = """\
-from impact import hysteresis
-
-MINE = hysteresis("mine-2026", title="Mine", year=2026, equation="", reference="", chi=lambda e: {chi})
-"""
 CONFIG = """models = ["hertz", "mine-2026"]
 [solver]
 rtol = 1e-4

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from .conftest import ROOT, Run
+from .conftest import ROOT, Run, code_blocks
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
 def blocks(language: str) -> list[str]:
-    return re.findall(rf"```{language}\n(.*?)```", README, re.DOTALL)
+    return code_blocks(README, language)
 
 
 def test_the_readme_opens_with_the_installation_the_picture_and_two_commands() -> None:
@@ -65,7 +65,7 @@ def test_the_numbers_and_the_config_of_the_page_on_sweeps_match_the_code() -> No
     for number in (NO_CHECKPOINT_POINTS, CHUNK_VALUES, MAX_AXIS_VALUES, RANGE_TRAJECTORIES, MAX_CELLS):
         assert f"{number:,}" in page
     assert MAX_POINTS == 10**9
-    (toml,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    (toml,) = code_blocks(page, "toml")
     output = parse_config((ROOT / "configs" / "figure6.toml").read_text(encoding="utf-8") + toml).output
     assert (output.dtype, output.compression, output.layout) == ("float32", "gzip", "full")
     assert output.chunks == {"e": 50}

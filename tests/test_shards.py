@@ -21,7 +21,7 @@ from impact import ImpactError
 from impact.errors import UsageError
 
 from .clusters import content, start_sweep
-from .conftest import Run
+from .conftest import PLUGIN, Run
 from .fork_server import ForkServer
 
 # one block for each law
@@ -37,10 +37,6 @@ m2 = [1.0, 2.0]
 K = 1e9
 """
 BLOCKS = 5
-PLUGIN = """import impact
-
-MODEL = impact.hysteresis("mine", title="", year=2026, equation="", reference="", chi=lambda e: 1 - e)
-"""
 
 
 @pytest.fixture
@@ -241,12 +237,12 @@ def test_a_shard_that_another_process_writes_is_not_merged(cli: Run, folder: Pat
 
 @pytest.mark.slow
 def test_a_merge_needs_the_plug_in_of_the_shards(cli: Run, folder: Path) -> None:
-    (folder / "mine.py").write_text(PLUGIN)
-    (folder / "c.toml").write_text(CONFIG.replace('"hertz"', '"mine"'))
+    (folder / "mine.py").write_text(PLUGIN.format(chi="1 - e"))
+    (folder / "c.toml").write_text(CONFIG.replace('"hertz"', '"mine-2026"'))
     folders = run_shards(folder, "1/2", "2/2", plugins=["mine.py"])
     completed = cli("merge", *folders, cwd=folder)
     assert completed.returncode == 2
-    assert "made with mine of mine.py; give it again with --plugin FILE" in completed.stderr
+    assert "made with mine-2026 of mine.py; give it again with --plugin FILE" in completed.stderr
     assert cli("merge", *folders, "--plugin", "mine.py", cwd=folder).returncode == 0
 
 

@@ -9,9 +9,9 @@ import re
 import shlex
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
-from contextlib import nullcontext
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
@@ -32,7 +32,7 @@ from impact.progress_display import line, new_bar, update
 from impact.results.summary import summarize
 from impact.results.sweep import prepare, sweep_in_memory, sweep_into
 
-from .conftest import ROOT, WIDE, Run
+from .conftest import PLUGIN, ROOT, WIDE, Run
 from .fork_server import ForkServer, printed_on_terminal
 
 # several blocks, integrated in less than a second
@@ -56,9 +56,6 @@ rtol = 1e-4
 THREE_MODELS = 'models=["bilinear", "gharib-hurmuzlu-2012", "lankarani-nikravesh-1990"]'
 # progress is shown from the start, not after a second
 SHOW_PROGRESS_AT_ONCE = "from impact import progress_display\nprogress_display.FIRST_S = 0.0"
-PLUGIN = """import impact
-MODEL = impact.hysteresis("mine", title="", year=2026, equation="", reference="", chi=lambda e: 1 - e)
-"""
 
 
 @pytest.fixture
@@ -244,8 +241,8 @@ def test_only_the_undamaged_result_of_the_same_sweep_is_recognized_as_finished(b
 @pytest.mark.slow
 def test_two_processes_with_a_plug_in_write_the_same_bytes_as_one(blocks: Path) -> None:
     plugin = blocks.parent / "plugin.py"
-    plugin.write_text(PLUGIN, encoding="utf-8")
-    overrides = ["models=['mine', 'bilinear']", "output.variables=['e_out', 'contact_time', 'status']"]
+    plugin.write_text(PLUGIN.format(chi="1 - e"), encoding="utf-8")
+    overrides = ["models=['mine-2026', 'bilinear']", "output.variables=['e_out', 'contact_time', 'status']"]
     plan = prepare(blocks, overrides, [plugin])
     # every process uses the source that was read at the start
     plugin.write_text("raise SystemExit", encoding="utf-8")
@@ -259,8 +256,8 @@ def test_two_processes_with_a_plug_in_write_the_same_bytes_as_one(blocks: Path) 
 @pytest.mark.slow
 def test_jobs_on_the_command_line_and_in_python_change_no_value(blocks: Path, cli: Run) -> None:
     plugin = blocks.parent / "plugin.py"
-    plugin.write_text(PLUGIN, encoding="utf-8")
-    words = ["sweep", blocks, "--plugin", plugin, "--set", "models=['mine']", "--quiet"]
+    plugin.write_text(PLUGIN.format(chi="1 - e"), encoding="utf-8")
+    words = ["sweep", blocks, "--plugin", plugin, "--set", "models=['mine-2026']", "--quiet"]
     assert cli(*words, "--jobs", 2, "-o", "parallel.h5", cwd=blocks.parent).returncode == 0
     assert cli(*words, "-o", "serial.h5", cwd=blocks.parent).returncode == 0
     serial, parallel = (impact.load(blocks.parent / f"{name}.h5") for name in ("serial", "parallel"))
@@ -468,3 +465,18 @@ def test_a_file_with_a_high_compression_ratio_can_be_read(tmp_path: Path) -> Non
     assert (tmp_path / "flat.h5").stat().st_size < outcome.dataset.nbytes / 300
     with impact.load(tmp_path / "flat.h5") as loaded:
         assert loaded["e_out"].min() == loaded["e_out"].max() > 0.999
+
+
+def test_an_executor_is_entered_only_if_there_is_something_to_integrate(tmp_path: Path) -> None:
+    @contextmanager
+    def refuse() -> Iterator[ExecutorSpec]:
+        raise AssertionError("entered")
+        yield SERIAL
+
+    path, config = tmp_path / "r.h5", ROOT / "configs" / "figure6.toml"
+    with pytest.raises(ConfigError):
+        impact.sweep_to_file(config, path, overrides=["sweep.e=2.0"], backend=refuse())
+    impact.sweep(config, output=path)
+    assert not impact.sweep_to_file(config, path, backend=refuse()).is_new
+    with pytest.raises(AssertionError, match="entered"):
+        impact.sweep_to_file(config, path, overwrite=True, backend=refuse())

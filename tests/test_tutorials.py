@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from .conftest import ROOT, Run, assert_same_output
+from .conftest import ROOT, Run, assert_same_output, code_blocks
 
 DOCS = ROOT / "docs"
 EXAMPLES = [
@@ -37,9 +37,9 @@ def test_a_tutorial_prints_what_its_commands_print(
 @pytest.mark.slow
 def test_the_commands_of_a_figure_for_a_paper(cli: Run, tmp_path: Path) -> None:
     text = (DOCS / "tutorials" / "paper.md").read_text(encoding="utf-8")
-    (config,) = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
+    (config,) = code_blocks(text, "toml")
     (tmp_path / "contact.toml").write_text(config, encoding="utf-8")
-    for block in re.findall(r"```sh\n(.*?)```", text, re.DOTALL):
+    for block in code_blocks(text, "sh"):
         for line in block.splitlines():
             done = cli(*shlex.split(line)[1:], cwd=tmp_path)
             assert done.returncode == 0, (line, done.stderr)
@@ -48,9 +48,7 @@ def test_the_commands_of_a_figure_for_a_paper(cli: Run, tmp_path: Path) -> None:
 
 def test_the_index_of_the_site_has_every_page() -> None:
     index = (DOCS / "index.md").read_text(encoding="utf-8")
-    listed = {
-        line for block in re.findall(r"```\{toctree\}(.*?)```", index, re.DOTALL) for line in block.splitlines()
-    }
+    listed = {line for block in code_blocks(index, "{toctree}") for line in block.splitlines()}
     files = (*DOCS.rglob("*.md"), *DOCS.rglob("*.ipynb"))
     pages = {page.relative_to(DOCS).with_suffix("").as_posix() for page in files} - {"index"}
     generated = {page for page in pages if page.startswith("reference/")}

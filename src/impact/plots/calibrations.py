@@ -34,14 +34,7 @@ RESIDUAL_HEIGHT = 0.55
 
 
 def calibration_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
-    """Read measured values over the varied input, the best laws, and their residuals in standard deviations.
-
-    Without an input that varies alone, the values are over their number.
-
-    Raises
-    ------
-    UsageError : the dataset is no calibration, an option does not apply to one, or a law is not in it
-    """
+    """Read measured values over the varied input or their number, the best laws, and their residuals."""
     if not is_calibration(dataset):
         raise UsageError("this result is no calibration: impact calibrate writes those")
     for option, value in (("--sel", choice.sel), ("--x", choice.x), ("--y", choice.y)):

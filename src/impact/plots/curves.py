@@ -19,10 +19,11 @@ from matplotlib.patches import Patch
 
 from ..errors import UsageError
 from ..formatting import heading
+from ..text import NO_BREAK
 from .data import MEASURED, SIGMA, Points
 from .kinds import Choice
 from .labels import label_axis, pretty_conditions, symbol, words_of
-from .slices import NO_BREAK, unit_of
+from .slices import unit_of
 from .style import is_geometric, model_styles
 
 if TYPE_CHECKING:
@@ -40,30 +41,18 @@ MANY_LAWS = 16
 
 @dataclass(frozen=True)
 class Curve:
-    """One curve.
-
-    Parameters
-    ----------
-    label : its name in the legend
-    model : key of the model; None for a reference
-    x, y : its points, in SI
-    end : text beside the last point
-    variable : name of its y in a result or a time history
-    case : value of an input that distinguishes curves of one model, such as "e = 0.5"
-    least, largest : a band around the curve; empty for none
-    is_guide : whether it is a thin line, with its case beside its end
-    """
+    """One curve in SI; the model of a reference is None."""
 
     label: str
     model: str | None
     x: tuple[float, ...]
     y: tuple[float, ...]
-    end: str = ""
-    variable: str = ""
-    case: str = ""
-    least: tuple[float, ...] = ()
+    end: str = ""  # text at the last point
+    variable: str = ""  # name of y in a result or a time history
+    case: str = ""  # value of an input that distinguishes curves of one model, such as "e = 0.5"
+    least: tuple[float, ...] = ()  # a band around the curve
     largest: tuple[float, ...] = ()
-    is_guide: bool = False
+    is_guide: bool = False  # a thin line with its case at its end
 
     def rows_of_values(self) -> Iterator[tuple[str, tuple[float, ...]]]:
         """Iterate over its values and the ends of its band, with a name for each end."""
@@ -85,21 +74,7 @@ class Mark:
 
 @dataclass(frozen=True)
 class Panel:
-    """Curves over one pair of axes.
-
-    Parameters
-    ----------
-    x_label, y_label : meaning of each axis in words
-    curves : the curves
-    x_unit, y_unit : unit of each axis, in SI
-    x_log, y_log : whether the axis is logarithmic
-    bands : distances from zero that are shaded, the widest first
-    marks : named points
-    x_name, y_name : name of each axis in a result or a time history
-    joined : whether lines join the points
-    band_name : what the bands around curves are, for the legend
-    height : relative to other panels
-    """
+    """Curves over one pair of axes, with the words, the unit and the name of each."""
 
     x_label: str
     y_label: str
@@ -108,21 +83,18 @@ class Panel:
     y_unit: str = "1"
     x_log: bool = False
     y_log: bool = False
-    bands: tuple[float, ...] = ()
+    bands: tuple[float, ...] = ()  # distances from zero that are shaded, the widest first
     marks: tuple[Mark, ...] = ()
-    x_name: str = ""
+    x_name: str = ""  # in a result or a time history
     y_name: str = ""
-    joined: bool = True
-    band_name: str = ""
-    height: float = 1.0
+    joined: bool = True  # whether lines join the points
+    band_name: str = ""  # in the legend, of the bands around curves
+    height: float = 1.0  # relative to other panels
 
 
 @dataclass(frozen=True)
 class CurveData:
-    """The data of a picture of curves, in panels one below the other.
-
-    `measured` has the measured points of each panel, if the result has them itself.
-    """
+    """The data of a picture of curves: panels below each other, and measured points that the result has."""
 
     title: str
     conditions: str
@@ -329,12 +301,9 @@ def _draw_bands(axes: Axes, panel: Panel) -> None:
 
 
 def _label_bands(axes: Axes, panel: Panel) -> None:
-    """Write the values of bands at their lines on a logarithmic axis.
-
-    The label of the widest band is above its line. Labels of narrower bands are below theirs, where no label can
-    overlap them, except near the lower end of the axis, where only the space between the lines is left.
-    """
+    """Write the values of bands at their lines on a logarithmic axis."""
     low, high = axes.get_ylim()
+    # narrower bands have their label below the line, except near the lower end, where only the space above is left
     for band in panel.bands if panel.y_log else ():
         is_below = band != panel.bands[0] and band > (low * high) ** 0.5
         axes.annotate(

@@ -56,12 +56,7 @@ class DifferenceData:
 
 
 def difference_data(verdict: Verdict) -> DifferenceData:
-    """The data of the picture.
-
-    Raises
-    ------
-    UsageError : the two have no point in common
-    """
+    """Collect the largest differences along each axis from a verdict."""
     if not verdict.worst_along:
         raise UsageError("nothing to draw: no variable was compared along an axis")
     judged = [variable for variable in verdict.variables if variable.judged != "reported"]

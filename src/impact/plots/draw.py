@@ -120,12 +120,7 @@ def draw(
     points: str | Path | pd.DataFrame | xr.Dataset | Points | None = None,
     ax: Axes | Sequence[Axes] | None = None,
 ) -> Figure:
-    """Draw a picture, in a new figure or into the user's axes.
-
-    Raises
-    ------
-    UsageError : an option is invalid, or does not apply to the picture
-    """
+    """Draw a picture, in a new figure or into the user's axes."""
     labels = look.labels or {}
     check_labels(labels, label_keys(plot_data, look))
     measured = points if points is None or isinstance(points, Points) else read_points(points)

@@ -48,12 +48,7 @@ INCHES_PER_UNIT = {"mm": 1.0 / 25.4, "cm": 1.0 / 2.54, "in": 1.0}
 
 @dataclass(frozen=True)
 class Choice:
-    """Which part of a result is drawn; see `impact.plot`.
-
-    Raises
-    ------
-    UsageError : `log` names no axes
-    """
+    """Which part of a result is drawn; see `impact.plot`."""
 
     x: str | None = None
     y: str | None = None
@@ -70,12 +65,7 @@ class Choice:
 
 @dataclass(frozen=True)
 class Look:
-    """How a picture looks; see `impact.plot`.
-
-    Raises
-    ------
-    UsageError : a length is invalid
-    """
+    """How a picture looks; see `impact.plot`."""
 
     width: float | str | None = None
     height: float | str | None = None
@@ -94,25 +84,16 @@ class Look:
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of picture. It is a constant of its module, with its name in capitals.
-
-    Parameters
-    ----------
-    caption : what the picture shows, as a sentence
-    data : computes the data of the picture from a result, or, for the source "history", from the time histories of
-        one impact
-    default : chooses what a report shows of a result, for some keys of models; None if the kind does not apply
-    along : the inputs that it draws along; "x" and "y" are those of the choice
-    source : what it shows, see `source_of`; the first kind in KINDS of a source is the default of that source
-    in_report : whether a report has a figure of it
-    """
+    """A kind of picture: a constant of its module, with the name of the kind in capitals."""
 
     name: str
-    caption: str
+    caption: str  # a sentence for reports and the gallery
+    # from a result, or, of the source "history", from the time histories of one impact
     data: Callable[[Any, Choice], PlotData]
+    # what a report shows of a result, for some keys of models; None if the kind does not apply
     default: Callable[[xr.Dataset, Sequence[str]], Choice | None]
-    along: tuple[str, ...] = ("x",)
-    source: str = "sweep"
+    along: tuple[str, ...] = ("x",)  # inputs that it draws along; "x" and "y" are those of the choice
+    source: str = "sweep"  # what it shows, see `source_of`; the first kind in KINDS of a source is its default
     in_report: bool = True
 
     def inputs_along(self, x: str | None, y: str | None) -> tuple[str, ...]:

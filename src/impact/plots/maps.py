@@ -66,40 +66,25 @@ class Field:
 
 @dataclass(frozen=True)
 class MapData:
-    """The data of a picture: panels over the same two axes, and what is not drawn.
-
-    Parameters
-    ----------
-    title, conditions : texts above the panels
-    variable, x, y : names in the result
-    labels, units : of x, y and the variable
-    x_values, y_values : values of the axes, in SI
-    x_log, y_log : whether the axis is logarithmic
-    signed : whether the variable has values of both signs
-    panels : values of the variable
-    not_drawn : values of the axes without a position
-    left_out : keys of the models without a panel
-    closest : at each y and x, the key of the model with the smallest |e_error|; empty for a map
-    distance : at each y and x, that |e_error|; empty for a map
-    """
+    """The data of a map, or of the closest model, in SI: panels over the same two axes."""
 
     title: str
     conditions: str
     variable: str
     x: str
     y: str
-    labels: tuple[str, str, str]
+    labels: tuple[str, str, str]  # of x, y and the variable
     units: tuple[str, str, str]
     x_values: tuple[float, ...]
     y_values: tuple[float, ...]
     x_log: bool
     y_log: bool
-    signed: bool
+    signed: bool  # whether the variable has values of both signs
     panels: tuple[Field, ...]
     not_drawn: tuple[str, ...] = ()
-    left_out: tuple[str, ...] = ()
-    closest: tuple[tuple[str | None, ...], ...] = ()
-    distance: Plane = ()
+    left_out: tuple[str, ...] = ()  # keys of the models without a panel
+    closest: tuple[tuple[str | None, ...], ...] = ()  # keys of the models with the smallest |e_error|
+    distance: Plane = ()  # that |e_error|
 
     takes_points: ClassVar[bool] = False
 
@@ -197,14 +182,7 @@ class MapData:
 
 
 def field_map(dataset: xr.Dataset, choice: Choice) -> MapData:
-    """Read a variable over two axes, for at most MAX_PANELS models.
-
-    An axis whose values are spaced evenly in their logarithm is logarithmic.
-
-    Raises
-    ------
-    UsageError : the result does not contain what `choice` selects, or does not have two axes
-    """
+    """Read a variable over two axes, for at most MAX_PANELS models."""
     plot_data = _map_data("map", dataset, choice.variable or "e_error", choice, MAX_PANELS)
     if not plot_data.left_out:
         return plot_data

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,12 +31,7 @@ FORCE_RTOL = 1e-6
 
 
 def loop_curves(histories: Sequence[xr.Dataset], choice: Choice) -> CurveData:
-    """Draw force over indentation, Figures 3 and 5 of the paper: the area of a loop is the energy loss.
-
-    Parameters
-    ----------
-    histories : time histories of one impact by several models, as `impact.run(...).history` is
-    """
+    """Draw force over indentation, Figures 3 and 5 of the paper: the area of a loop is the energy loss."""
     lines = _curves_over("Force over indentation", histories, [("delta", "F", "")], choice)
     if len(histories) > 1:
         return lines
@@ -185,29 +181,7 @@ def choose_point(dataset: xr.Dataset, keys: Sequence[str]) -> Choice | None:
     return None if has_fixed_steps(dataset) else choose_line(dataset, keys)
 
 
-LOOP = Kind(
-    "loop",
-    "Force over indentation at one point: the area of a loop is the energy loss.",
-    loop_curves,
-    choose_point,
-    along=(),
-    source="history",
-)
-HISTORY = Kind(
-    "history",
-    "Indentation, its rate and the force over time at one point.",
-    history_curves,
-    choose_point,
-    along=(),
-    source="history",
-    in_report=False,
-)
-IMPULSE = Kind(
-    "impulse",
-    "Velocities over the impulse at one point, and the impulse-momentum solution.",
-    impulse_curves,
-    choose_point,
-    along=(),
-    source="history",
-    in_report=False,
-)
+_motion = partial(Kind, default=choose_point, along=(), source="history")
+LOOP = _motion("loop", "Force over indentation at one point: the area of a loop is the energy loss.", loop_curves)
+HISTORY = _motion("history", "Indentation, its rate and the force over time.", history_curves, in_report=False)
+IMPULSE = _motion("impulse", "Velocities over the impulse at one point.", impulse_curves, in_report=False)

@@ -33,14 +33,7 @@ MAX_RESTITUTIONS = 8
 
 
 def velocity_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
-    """Read the post-impact velocities of every model and of the impulse-momentum solution, Figure 6 of the paper.
-
-    An x whose values are spaced evenly in their logarithm has a logarithmic axis.
-
-    Raises
-    ------
-    UsageError : the result does not contain what `choice` selects
-    """
+    """Read the post-impact velocities of every model and of the impulse-momentum solution, Figure 6."""
     line = _read_line(dataset, choice, "v1_post", "v2_post", "v1_reference", "v2_reference")
     reference = f"{REFERENCE} (6), (7)" if choice.equations else REFERENCE
     balls = ((1, "v₁⁺"), (2, "v₂⁺"))
@@ -90,11 +83,7 @@ def error_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
 
 
 def timestep_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
-    """Compute the mean, the least and the largest restitution over the phase, at fixed steps.
-
-    There is a curve for each model and each requested e, by default over the number of steps per contact or the
-    step. For errors see `velocity_curves`.
-    """
+    """Compute the mean, the least and the largest restitution over the phase, at fixed steps."""
     if "phase" not in dataset.coords:
         raise UsageError(f"this result is of the continuous law; {NEEDS_STEPS}")
     along = [name for name in STEP_AXES if name in dataset.coords and dataset[name].ndim == 1]

@@ -131,12 +131,7 @@ class BarData:
 
 
 def sensitivity_bars(dataset: xr.Dataset, choice: Choice) -> BarData:
-    """Read the first-order and total indices of each uncertain input, with their intervals.
-
-    Raises
-    ------
-    UsageError : the dataset is no sensitivity study, or no model depends on the inputs
-    """
+    """Read the first-order and total indices of each uncertain input, with their intervals."""
     if not is_sensitivity(dataset):
         raise UsageError("this result is no sensitivity study: impact sensitivity -o writes those")
     for option, value in (("--x", choice.x), ("--y", choice.y), ("--log", choice.log)):

@@ -14,7 +14,7 @@ from ..errors import UsageError, did_you_mean
 from ..formatting import quantity
 from ..results.schema import exponents_of, plain_unit
 from ..results.selection import model_positions, select
-from ..text import safe_text
+from ..text import NO_BREAK, safe_text
 from .kinds import Choice
 
 if TYPE_CHECKING:
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 # values in a picture, which are held as Python objects
 MAX_DRAWN = 2**24
-NO_BREAK = "\N{NO-BREAK SPACE}"
 NO_SWEEP = "this is a time history, not the result of a sweep; draw it with --kind loop, or history"
 
 
@@ -151,10 +150,7 @@ def _drop_other_axes(dataset: xr.Dataset, dims: Sequence[object]) -> xr.Dataset:
 
 
 def _sorted_along(dataset: xr.Dataset, name: str) -> tuple[xr.Dataset, tuple[str, ...]]:
-    """Sort a result along a coordinate of one axis; also returns its values that are not finite, which it drops.
-
-    The infinite mass of a wall, or the infinite radius of a plane, has no position on an axis.
-    """
+    """Sort along a coordinate; also returns its infinite values, which have no position on an axis."""
     values = dataset[name].values
     order = np.argsort(values, kind="stable")
     order = order[np.isfinite(values[order])]
@@ -183,12 +179,7 @@ def is_ordered(dataset: xr.Dataset, name: str) -> bool:
 
 
 def read(data: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
-    """Read some variables of a line or a plane into memory.
-
-    Raises
-    ------
-    UsageError : they have more than MAX_DRAWN values
-    """
+    """Read some variables of a line or a plane into memory, unless they are too many to draw."""
     numbers = sum(data[name].size for name in names)
     if numbers > MAX_DRAWN:
         raise UsageError(

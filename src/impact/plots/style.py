@@ -41,16 +41,7 @@ METADATA: dict[str, dict[str, None]] = {
 
 @contextlib.contextmanager
 def styled(style: str | Path | None = None) -> Iterator[None]:
-    """Draw with the style sheet of this package; settings that the user changed from matplotlib's defaults stay.
-
-    Parameters
-    ----------
-    style : a file of matplotlib's rcParams, or the name of a style of matplotlib; it overrides all others
-
-    Raises
-    ------
-    UsageError : it cannot be read
-    """
+    """Draw with the style sheet of this package; settings that the user changed, and `style`, override it."""
     ours = rc_params_from_file(str(STYLE_SHEET), use_default_template=False)
     unchanged = {key: value for key, value in ours.items() if rcParams[key] == rcParamsDefault[key]}
     with matplotlib.rc_context({**unchanged, **_style_of(style)}):
@@ -105,7 +96,7 @@ def model_styles(models: Sequence[str]) -> dict[str, dict[str, Any]]:
 
 
 def _next_free(choices: Sequence[Any], start: int, used: Counter[Any], refused: Set[Any] = frozenset()) -> Any:
-    """The least used choice, the first from index `start` on; a refused one only if there is no other."""
+    """Choose the least used, the first from index `start` on; a refused one only if there is no other."""
     ordered = [choices[(start + step) % len(choices)] for step in range(len(choices))]
     return min(ordered, key=lambda choice: (choice in refused, used[choice]))
 
@@ -118,12 +109,7 @@ def is_geometric(values: np.ndarray) -> bool:
 
 
 def check_picture(path: Path) -> str:
-    """The format of a picture, from the ending of its name.
-
-    Raises
-    ------
-    UsageError : the ending is not one of METADATA, or the format needs a program that is not installed
-    """
+    """Find the format of a picture from the ending of its name, and check that it can be written."""
     kind = path.suffix.lower().removeprefix(".")
     if kind not in METADATA:
         *most, last = (f".{name}" for name in METADATA)
@@ -137,12 +123,7 @@ def check_picture(path: Path) -> str:
 
 
 def encoded(figure: Figure, kind: str, style: str | Path | None = None) -> bytes:
-    """A figure as the bytes of a file, in a format of METADATA; they are the same each time.
-
-    Raises
-    ------
-    UsageError : LaTeX cannot typeset its text
-    """
+    """Encode a figure in a format of METADATA; the bytes are the same each time."""
     buffer = io.BytesIO()
     # some formats have no metadata, and do not accept the argument
     options: dict[str, Any] = {"metadata": METADATA[kind]} if METADATA[kind] else {}
@@ -161,12 +142,6 @@ def encoded(figure: Figure, kind: str, style: str | Path | None = None) -> bytes
 def save_figure(
     figure: Figure, path: str | Path, *, overwrite: bool = True, style: str | Path | None = None
 ) -> None:
-    """Write a figure; the format follows the file's ending, and the bytes are the same each time.
-
-    Raises
-    ------
-    UsageError : see `check_picture`, or the file cannot be written there
-    StoreError : the disk is full or failed
-    """
+    """Write a figure in the format of the file's ending; the bytes are the same each time."""
     path = Path(path)
     write_file(path, encoded(figure, check_picture(path), style), overwrite=overwrite)

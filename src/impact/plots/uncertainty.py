@@ -30,14 +30,7 @@ NEEDS_SAMPLES = "this result has no samples; sweep a config with distributions a
 
 
 def uncertainty_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
-    """Compute the median of an output over an axis with the band of 90 % of the samples, for each model.
-
-    Without another axis it is the distribution function of the output, by default e_out.
-
-    Raises
-    ------
-    UsageError : the result has no samples, or does not contain what `choice` selects
-    """
+    """Compute an output's median and band over an axis, or, without one, its distribution function."""
     if SAMPLE not in dataset.dims:
         raise UsageError(NEEDS_SAMPLES)
     name = choice.variable or "e_out"

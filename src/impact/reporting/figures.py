@@ -34,14 +34,7 @@ MAX_SEARCHED = 2**18
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure of a report.
-
-    Parameters
-    ----------
-    label : what it shows
-    caption : the same, the point where it is drawn, and what is left out
-    source : the picture as a data URL
-    """
+    """A figure of a report: what it shows, a caption with its point, and the picture as a data URL."""
 
     label: str
     caption: str

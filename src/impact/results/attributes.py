@@ -25,10 +25,6 @@ class PluginRecord(BaseModel):
 class SummaryRecord(BaseModel):
     """The summary of all points that a large factored file contains; numbers that are NaN are null.
 
-    Parameters
-    ----------
-    status : number of points by name of the status
-    not_evaluated : number of points whose status was not evaluated
     worst : the largest absolute value of each error, by key of the model
     failed_at : the first points that failed: name of the status, key of the model, index along the axes
     extremes : the smallest and the largest value of each variable, and the number of points without a value; null
@@ -77,7 +73,7 @@ ATTRIBUTE_TYPES: Mapping[str, Any] = {
 
 
 def read_attribute(attributes: Mapping[Any, Any], name: str, source: str = "", *, required: bool = False) -> Any:
-    """The value of a JSON attribute.
+    """Read a JSON attribute.
 
     Parameters
     ----------
@@ -105,10 +101,11 @@ def read_attribute(attributes: Mapping[Any, Any], name: str, source: str = "", *
             return _adapter(name).validate_json(text, strict=True)
     except ValidationError:
         pass
-    what = "missing" if text is None else "not JSON of the expected type"
-    raise ResultError(f"{source}{': ' if source else ''}attribute {name}: {what}")
+    problem = "missing" if text is None else "not JSON of the expected type"
+    raise ResultError(f"{source}{': ' if source else ''}attribute {name}: {problem}")
 
 
 @cache
 def _adapter(name: str) -> TypeAdapter[Any]:
+    """Build the validator of an attribute once."""
     return TypeAdapter(ATTRIBUTE_TYPES[name])

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import product
 from typing import Any
 
@@ -35,7 +34,6 @@ from .validation import TABLE_VARIABLES, is_name
 Region = tuple[int | slice, ...]
 # the name of a variable, a region of it and its values there
 RegionValues = tuple[str, Region, NDArray[Any]]
-WriteRegion = Callable[[str, Region, NDArray[Any]], None]
 # values per chunk of a compressed variable, if the config does not set chunks
 CHUNK_VALUES = 2**16
 # limits that are far above every result
@@ -48,33 +46,18 @@ MAX_CHUNKS_OF_FILE = 200_000  # of all datasets together
 # uncompressed bytes per byte of the file, about the most that deflate can reach, and bytes that are always allowed
 MAX_COMPRESSION_RATIO, ALWAYS_ALLOWED_BYTES = 1_100, 2**26
 # attributes that netCDF itself writes
-NETCDF_ATTRIBUTES = frozenset(
-    {
-        "NAME",
-        "DIMENSION_LIST",
-        "REFERENCE_LIST",
-        "_NCProperties",
-        "coordinates",
-        "CLASS",
-        "_Netcdf4Dimid",
-        "_Netcdf4Coordinates",
-        "_Encoding",
-    }
-)
 SKIPPED_ATTRIBUTES = frozenset({"NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_NCProperties", "coordinates"})
+NETCDF_ATTRIBUTES = SKIPPED_ATTRIBUTES | {"CLASS", "_Netcdf4Dimid", "_Netcdf4Coordinates", "_Encoding"}
 
 
-@contextmanager
-def open_for_writing(sink: Sink, template: xr.Dataset, output: Output) -> Iterator[WriteRegion]:
-    """Write coordinates and attributes of a template; yield a function that writes a region of a variable."""
+def write_dataset(sink: Sink, template: xr.Dataset, values: Iterable[RegionValues], output: Output) -> None:
+    """Write the coordinates and attributes of a template, and values in regions of its variables."""
     # track_order: variables stay in the order of their creation
     with (
         h5py.File(sink, "w", track_order=True, userblock_size=USER_BLOCK_BYTES) as plain,
         h5netcdf.File(plain, "w") as file,
     ):
-        texts = {
-            str(name): encode_text(variable) for name, variable in template.coords.items() if is_text(variable)
-        }
+        texts = {name: encode_text(variable) for name, variable in template.coords.items() if is_text(variable)}
         widths = dict.fromkeys(sorted(values.shape[-1] for values in texts.values()))
         file.dimensions = {
             **{str(name): size for name, size in template.sizes.items()},
@@ -87,9 +70,10 @@ def open_for_writing(sink: Sink, template: xr.Dataset, output: Output) -> Iterat
         }
         for name, variable in template.coords.items():
             if name in texts:
-                values = texts[str(name)]
-                dims = (*variable.dims, f"string{values.shape[-1]}")
-                added = file.create_variable(str(name), dims, values.dtype, data=values)
+                text = texts[name]
+                added = file.create_variable(
+                    str(name), (*variable.dims, f"string{text.shape[-1]}"), text.dtype, data=text
+                )
                 _set_attributes(added, {**variable.attrs, "_Encoding": "utf-8"})
             else:
                 added = file.create_variable(str(name), variable.dims, variable.dtype, data=variable.values)
@@ -97,24 +81,17 @@ def open_for_writing(sink: Sink, template: xr.Dataset, output: Output) -> Iterat
         for name, variable in template.data_vars.items():
             storage = _storage_options(variable, output)
             added = file.create_variable(str(name), variable.dims, variable.dtype, **storage)
-            related = [other for other, dims in coordinates.items() if dims <= {*variable.dims}]
-            _set_attributes(
-                added,
-                variable.attrs
-                if name in TABLE_VARIABLES
-                else {**variable.attrs, "coordinates": " ".join(related)},
-            )
+            related = " ".join(other for other, dims in coordinates.items() if dims <= {*variable.dims})
+            named = {} if name in TABLE_VARIABLES else {"coordinates": related}
+            _set_attributes(added, {**variable.attrs, **named})
         _set_attributes(file, dict(template.attrs))
         sink.check()
 
         # written by h5py directly, which has less overhead per call
         datasets = {str(name): plain[str(name)] for name in template.data_vars}
-
-        def write_region(name: str, region: Region, values: NDArray[Any]) -> None:
-            datasets[name][region or ...] = values
+        for name, region, array in values:
+            datasets[name][region or ...] = array
             sink.check()
-
-        yield write_region
     sink.check()
 
 
@@ -132,10 +109,13 @@ def encode_text(variable: xr.DataArray) -> NDArray[np.bytes_]:
 def _set_attributes(holder: Any, attributes: Mapping[Any, Any]) -> None:
     """Set attributes; text has a fixed length in bytes, which a reader can check before it reads."""
     for name, value in attributes.items():
-        if isinstance(value, str):
-            encoded = value.encode()
-            value = np.array(encoded, h5py.string_dtype("utf-8", max(len(encoded), 1)))
-        holder.attrs[str(name)] = value
+        holder.attrs[str(name)] = encode_attribute(value) if isinstance(value, str) else value
+
+
+def encode_attribute(text: str) -> NDArray[Any]:
+    """Encode text as a string of a fixed number of bytes."""
+    encoded = text.encode()
+    return np.array(encoded, h5py.string_dtype("utf-8", max(len(encoded), 1)))
 
 
 def _storage_options(variable: xr.DataArray, output: Output) -> dict[str, Any]:
@@ -171,13 +151,7 @@ class StoredArray(BackendArray):
         return indexing.explicit_indexing_adapter(key, self.shape, support, self.read)
 
     def read(self, key: tuple[Any, ...]) -> NDArray[Any]:
-        """Read values; `key` has an integer, a slice or an integer array for each axis.
-
-        Raises
-        ------
-        ResultError : they cannot be read
-        MemoryError : they take more memory than `check_memory` allows
-        """
+        """Read values; `key` has an integer, a slice or an integer array for each axis."""
         # an array of all positions would take longer than to read a few values
         positions = [
             range(size)[part] if isinstance(part, slice) else np.atleast_1d(part)
@@ -203,10 +177,7 @@ class StoredArray(BackendArray):
         return values
 
     def _check_chunks(self, positions: Sequence[range | NDArray[np.intp]]) -> None:
-        """Check that the chunks of some values decompress to exactly their declared size.
-
-        HDF5 decompresses a chunk to any size, and reads beyond the end of a chunk that is too short.
-        """
+        """Check the sizes of chunks: HDF5 decompresses to any size, and reads beyond a short chunk."""
         if not self.dataset.compression:
             return
         chunks = self.dataset.chunks
@@ -355,8 +326,8 @@ def _declared_bytes(name: str, dataset: h5d.DatasetID) -> int:
         stored = fits and filters in ([], [h5z.FILTER_DEFLATE], [h5z.FILTER_SHUFFLE, h5z.FILTER_DEFLATE])
     else:
         # the dataset of a dimension without values is never written
-        held = dataset.get_storage_size() in (0, declared)
-        stored = plist.get_layout() == h5d.CONTIGUOUS and not plist.get_external_count() and held
+        size_matches = dataset.get_storage_size() in (0, declared)
+        stored = plist.get_layout() == h5d.CONTIGUOUS and not plist.get_external_count() and size_matches
     if not stored or not declared:
         raise _unreadable("not stored in this file, in one piece or in chunks of one size", name)
     return declared if dataset.get_storage_size() else 0

@@ -61,10 +61,7 @@ def result_notes(summary: Summary) -> Iterator[str]:
 
 
 def depth_summary(dataset: xr.Dataset) -> Summary:
-    """The numbers `deep` and `deepest` of a result, which a sweep counts and a file does not hold.
-
-    The radii follow from the coordinates. A model of more than `MAX_SUMMARY_POINTS` computed points is left out.
-    """
+    """Find `deep` and `deepest` from the radii, without models of more computed points than a summary has."""
     summary = Summary()
     axes = [str(dim) for dim in dataset.sizes if dim != "model"]
     try:

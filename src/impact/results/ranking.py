@@ -42,20 +42,14 @@ MAX_RANGES = 8
 class Ranked:
     """How well one model delivers the target restitution, with the best values of its own parameters.
 
-    Parameters
-    ----------
-    model : its key
     parameters : the best values by path in the config, such as "model.bilinear.K"; empty if none is an axis
     points : number of points with a target e and an impact
-    within : number of those points with |e_out - e| within the tolerance
-    failed : number of those points that failed; they are not within the tolerance
-    mean_error, max_error : of |e_out - e| over the points that did not fail; NaN if all failed
-    at : the point with the largest error: its swept inputs by config name, and e; empty if all failed
-    e_out : the delivered restitution at that point
-    served : the ranges of e, as (least, greatest), in which all points are within the tolerance; None unless e
-        varies along one axis
-
-    A mean error is the exact mean, rounded once: it depends neither on the order of the points nor on slabs.
+    within, failed : number of those with |e_out - e| within the tolerance, and of those that failed
+    mean_error, max_error : of |e_out - e| over the points that did not fail; NaN if all failed. The mean is exact,
+        rounded once: it depends neither on the order of the points nor on slabs
+    at, e_out : the swept inputs by config name and e at the point with the largest error, empty if all failed, and
+        the restitution there
+    served : the ranges of e in which all points are within the tolerance; None unless e varies along one axis
     """
 
     model: str
@@ -117,13 +111,7 @@ class Ranked:
 
 @dataclass(frozen=True)
 class Ranking(Displayed):
-    """The models of a result, the best first: by their share of points within the tolerance, then by their errors.
-
-    Parameters
-    ----------
-    tol : the tolerance of |e_out - e|
-    models : the ranked models, the best first; equal ones in the order of the result
-    """
+    """The models of a result, ordered by their share of points within the tolerance, then by their errors."""
 
     tol: float
     models: tuple[Ranked, ...]

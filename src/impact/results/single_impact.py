@@ -360,7 +360,7 @@ def histories(
     keys = [str(key) for key in dataset["model"].values.ravel()]
     for key in models or ():
         if key not in keys:
-            raise UsageError(f'no model "{safe_text(key)}" in this result; {did_you_mean(key, keys)}')
+            raise UsageError(f'no model "{key}" in this result; {did_you_mean(key, keys)}')
     integrator = str(dataset.attrs.get("integrator", EXACT))
     if integrator != EXACT:
         raise UsageError(f"no motion to draw in this result: {no_motion(integrator)}")
@@ -384,7 +384,7 @@ def histories(
     if not followed:
         where = ", ".join(f"{name} = {value}" for name, value in {**first, **at}.items())
         reason = next(iter(ends.values()))
-        raise UsageError(f"no motion to draw at {safe_text(where)}: {reason}; choose a point, such as --sel e=0.5")
+        raise UsageError(f"no motion to draw at {where}: {reason}; choose a point, such as --sel e=0.5")
     return followed
 
 

@@ -28,15 +28,9 @@ MAX_SMALL_INDENTATION = 0.1
 class Summary:
     """Counts and extremes of the points of a result.
 
-    Parameters
-    ----------
-    points : number of points
-    counts : number of points by status
     worst : the largest absolute value by error variable and number of the model; NaN if all are NaN, missing if
         not evaluated
     failed_at : the first points that failed: status, number of the model, and index along the axes
-    max_failed_at : how many of these are recorded
-    not_counted : number of points whose status was not evaluated
     deep, deepest : number of points with a peak indentation above `MAX_SMALL_INDENTATION`, and the largest one, as
         fractions of the smaller radius; only of points with known radii
     """
@@ -63,16 +57,7 @@ class Summary:
         radius: NDArray[Any] | None = None,
         weight: int = 1,
     ) -> Summary:
-        """Add some points of one model.
-
-        Parameters
-        ----------
-        values : by variable, all of one shape; without a status only the errors are evaluated
-        model : number of the model
-        start : index of the first point along each axis
-        radius : of the smaller ball [m], NaN if unknown; its shape broadcasts to that of the values
-        weight : number of points of the result that each of these represents
-        """
+        """Add points of a model from an index on, each `weight` times; the radius [m] is of the smaller ball."""
         if "status" in values:
             self._count(values["status"], model, start, weight)
         for name in ERROR_VARIABLES:
@@ -122,16 +107,9 @@ def summarize(
     """Summarize a result of any size.
 
     Each variable is evaluated over the axes along which it varies, one model after another, and each of its points
-    counts as often as it occurs. A computed variable that varies over more than `max_points` points is not
-    evaluated: the error is then missing from `worst`, or the points are `not_counted`. Variables that are stored
-    in a file are always read.
-
-    Parameters
-    ----------
-    dataset : a result
-    max_failed_at : how many failed points are recorded: the first distinct ones in C order, at the first position
-        along each axis on which the status does not vary
-    max_points : limit for a computed variable of one model
+    counts as often as it occurs. A computed variable that varies over more than `max_points` points of a model is
+    not evaluated: the error is then missing from `worst`, or the points are `not_counted`. The first distinct
+    failed points in C order are recorded, at the first position along each axis on which the status is constant.
     """
     names = [name for name in ("status", *ERROR_VARIABLES) if name in dataset]
     record = _common_record(dataset, names)
@@ -166,7 +144,7 @@ class Extremes(NamedTuple):
     missing: int = 0
 
     def add(self, values: NDArray[Any], weight: int) -> Extremes:
-        """The extremes of more values, each of which counts as often as `weight`."""
+        """Add more values, each of which counts as often as `weight`."""
         smallest, largest = values.min(), values.max()
         missing = 0
         if not (np.isfinite(smallest) and np.isfinite(largest)):

@@ -58,13 +58,8 @@ MAX_INDEXED_BYTES = 16 * 2**30
 class TrajectoryRows:
     """The integrated trajectories of each model, read in segments when they are needed.
 
-    Parameters
-    ----------
-    maps : by model, the trajectory of each cell
     read : returns the trajectories of a model from a start to a stop: `read(model, start, stop)`
-    segment : how many trajectories are read at a time, at most
-    pick : returns a few trajectories of a model by their increasing row numbers; None if trajectories are read in
-        segments only
+    pick : returns a few trajectories of a model by their increasing row numbers; None if there are only segments
     """
 
     maps: Sequence[TrajectoryMap]
@@ -106,12 +101,7 @@ class TrajectoryRows:
 class TrajectoryTable:
     """The trajectories of a sweep, with everything else that the outputs depend on.
 
-    Parameters
-    ----------
-    inputs : of the sweep
     laws : the models; those of a file have no formulas
-    maps : by model, the trajectory of each cell
-    rows : the trajectories
     stiffness : K of each law that has a rule for it but no formula (a law of a file); None otherwise
     summary : of all points, if the file contains one
     """

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import h5py
-import numpy as np
 import xarray as xr
 from xarray.backends import BackendEntrypoint
 
@@ -23,7 +22,7 @@ from ..text import safe_text
 from .hdf5_structure import byte_reader, check_root
 from .kinds import require_sweep
 from .layouts import LAYOUTS
-from .netcdf import RegionValues, open_for_writing, read_variables
+from .netcdf import RegionValues, encode_attribute, read_variables, write_dataset
 from .seal import check_seal, write_seal
 from .selection import model_positions, select
 from .slabs import slabs
@@ -38,15 +37,10 @@ COPY_BUFFER_BYTES = 2**22
 
 
 def write_sealed(
-    sink: Sink,
-    template: xr.Dataset,
-    values: Iterable[RegionValues],
-    output: Output = DEFAULT_OUTPUT,
+    sink: Sink, template: xr.Dataset, values: Iterable[RegionValues], output: Output = DEFAULT_OUTPUT
 ) -> str:
     """Write and seal a dataset of the coordinates and attributes of a template; return the seal."""
-    with open_for_writing(sink, template, output) as write_region:
-        for name, region, array in values:
-            write_region(name, region, array)
+    write_dataset(sink, template, values, output)
     seal = write_seal(sink)
     sink.check()
     return seal
@@ -86,17 +80,16 @@ def save(
     path = Path(path)
     if "schema_version" not in dataset.attrs:
         raise UsageError(f"{path}: this dataset is not a result of impact: it has no schema_version")
-    violation = schema_violation(dataset)
-    if violation:
+    if violation := schema_violation(dataset):
         raise UsageError(f"{path}: {violation}; dataset.to_netcdf(path) stores any dataset")
     check_output(path, overwrite=overwrite)
 
     def parts() -> Iterator[RegionValues]:
         for name, variable in dataset.data_vars.items():
-            for where in slabs(variable.sizes):
+            for slab in slabs(variable.sizes):
                 if should_stop():
                     raise UnfinishedError("nothing was written")
-                yield str(name), tuple(where.values()), variable.isel(where).values
+                yield str(name), tuple(slab.values()), variable.isel(slab).values
 
     with atomic_write(path, overwrite=overwrite) as sink:
         write_sealed(sink, dataset, parts(), output)
@@ -112,9 +105,7 @@ def save_with_attributes(source: Path, path: Path, attributes: Mapping[str, str]
         # the bytes of a modified attribute depend on its former value: create it again
         with h5py.File(sink, "r+") as stored:
             for name, text in attributes.items():
-                encoded = text.encode()
-                kind = h5py.string_dtype("utf-8", max(len(encoded), 1))
-                stored.attrs.create(name, np.array(encoded, kind))
+                stored.attrs.create(name, encode_attribute(text))
         write_seal(sink)
         check_readable(sink, path)
 
@@ -148,46 +139,40 @@ def open_result(path: str | Path) -> xr.Dataset:
     UserWarning : it holds variables that are not part of a result; they are ignored
     """
     path = Path(path)
-    shown = safe_text(str(path))
-    with contextlib.ExitStack() as opened:
-        try:
-            seal = check_seal(path)
-            read = byte_reader(opened.enter_context(path.open("rb")))
+    with _named_errors(path), contextlib.ExitStack() as on_error:
+        seal = check_seal(path)
+        with path.open("rb") as content:
+            read = byte_reader(content)
             check_root(read)
             # opened by its path: a signal that arrives while h5py calls a Python stream is lost
-            file = h5py.File(path, "r", driver="sec2")
-        except ResultError as error:
-            raise ResultError(f"{shown}: {error}") from None
-        except OSError as error:
-            raise ResultError(f"{shown}: is not a readable result ({safe_text(str(error), 80)})") from error
-        try:
+            file = on_error.enter_context(h5py.File(path, "r", driver="sec2"))
             variables, attributes, unknown = read_variables(file, read)
-            layout = "factored" if "laws" in attributes else "full"
-            dataset = LAYOUTS[layout].read(variables, attributes)
-            violation = schema_violation(dataset)
-            if violation:
-                raise ResultError(f"is not a readable result ({violation})")
-        except ResultError as error:
-            file.close()
-            raise _with_file_name(shown, error) from None
-        except MemoryError:
-            file.close()
-            raise
-        except Exception as error:
-            file.close()
-            # h5py and xarray raise almost any exception on a malformed file
-            raise ResultError(f"{shown}: is not a readable result ({safe_text(str(error), 80)})") from error
+        layout = "factored" if "laws" in attributes else "full"
+        dataset = LAYOUTS[layout].read(variables, attributes)
+        if violation := schema_violation(dataset):
+            raise ResultError(f"is not a readable result ({violation})")
+        on_error.pop_all()
     if unknown:
-        names = safe_text(", ".join(unknown))
+        shown, names = safe_text(str(path)), safe_text(", ".join(unknown))
         warnings.warn(f"{shown}: ignored variables that are not part of a result: {names}", stacklevel=2)
     dataset.encoding = {"source": str(path), "seal": seal, "layout": layout}
     dataset.set_close(file.close)
     return dataset
 
 
-def _with_file_name(shown: str, error: ResultError) -> ResultError:
-    """Begin the message of an error with the name of the file."""
-    return error if str(error).startswith(f"{shown}: ") else ResultError(f"{shown}: {error}")
+@contextlib.contextmanager
+def _named_errors(path: str | Path) -> Iterator[None]:
+    """Name the file in errors; h5py and xarray raise almost any exception on a malformed one."""
+    try:
+        yield
+    except MemoryError:
+        raise
+    except ResultError as error:
+        if str(error).startswith(f"{safe_text(str(path))}: "):
+            raise
+        raise ResultError(f"{path}: {error}") from None
+    except Exception as error:
+        raise ResultError(f"{path}: is not a readable result ({safe_text(str(error), 80)})") from error
 
 
 def load(path: str | Path) -> xr.Dataset:
@@ -204,16 +189,8 @@ def load(path: str | Path) -> xr.Dataset:
     dataset = open_result(path)
     if dataset.nbytes > MAX_LOADED_BYTES:
         return dataset
-    with dataset:
-        shown = safe_text(str(path))
-        try:
-            return dataset.load() if table_of_result(dataset) is None else in_memory(dataset)
-        except MemoryError:
-            raise
-        except ResultError as error:
-            raise _with_file_name(shown, error) from None
-        except Exception as error:
-            raise ResultError(f"{shown}: is not a readable result ({safe_text(str(error), 80)})") from error
+    with dataset, _named_errors(path):
+        return dataset.load() if table_of_result(dataset) is None else in_memory(dataset)
 
 
 def expand(
