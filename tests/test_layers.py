@@ -104,7 +104,7 @@ def test_imports_go_down(path: Path) -> None:
 def test_a_command_imports_public_names(path: Path) -> None:
     for name, typing_only in imports(path):
         library, _, rest = name.partition(".")
-        if library != "impact" or typing_only or rest.partition(".")[0] in {"", "cli", *LAYERS[0]}:
+        if library != "impact" or typing_only or rest.partition(".")[0] in {"", "cli", *FLOORS["foundations"]}:
             continue
         allowed = CLI_IMPORTS.get(path.stem, set())
         assert any(f"{rest}.".startswith(f"{part}.") for part in allowed), f"{path.name} imports {name}"
