@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from .conftest import ROOT
+from .test_layers import FLOORS
 
 PAGE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
 NAMES = sorted(set(re.findall(r"`(impact\.[\w.]+)`", PAGE)))
@@ -24,10 +25,22 @@ def test_a_name_of_the_page_exists(name: str) -> None:
         assert hasattr(import_module(module), attribute), name
 
 
-def test_outputs_and_pictures_are_defined_where_the_page_says() -> None:
-    start = PAGE.partition("## Where to start")[2]
-    for name in ("outputs.FORMULAS", "variables.OUTPUTS", "kinds.KINDS"):
-        assert f".{name}`" in start
+def test_the_fifteen_types_stand_in_their_modules() -> None:
+    rows = re.findall(r"^\| ((?:`\w+`(?:, )?)+) \| `(impact\.[\w.]+)` \|", PAGE, re.MULTILINE)
+    # the fifteenth is xarray's
+    assert len(rows) == 14
+    for types, module in rows:
+        for name in re.findall(r"\w+", types):
+            assert isinstance(getattr(import_module(module), name), type), name
+
+
+def test_the_page_draws_the_floors_that_are_tested() -> None:
+    table = PAGE.partition("## Six floors")[2].partition("## ")[0]
+    rows = dict(re.findall(r"^\| (\w+) \| (.*?) \|", table, re.MULTILINE))
+    assert list(rows)[1:] == list(reversed(FLOORS))
+    for floor, parts in FLOORS.items():
+        drawn = re.findall(r"`(\w+)`", rows[floor])
+        assert drawn == [part or "impact" for part in parts if not part.startswith("_") and part != "array_types"]
 
 
 def test_a_value_of_e_takes_the_steps_of_the_page_in_their_order(tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ from impact.contact.materials import Material
 from impact.contact.model import ForceModel, Parameter
 from impact.contact.models import catalogue
 from impact.errors import ConfigError
-from impact.text import safe_text
+from impact.text import escape_controls, safe_text
 
 from .test_schema_agrees import SCHEMA
 
@@ -705,7 +705,8 @@ def test_only_regular_files_are_opened(tmp_path: Path) -> None:
         with pytest.raises(ConfigError) as caught:
             read_config(path)
         (line,) = caught.value.problems
-        assert line.startswith(safe_text(str(path)) + ": ")
+        assert line.startswith(escape_controls(str(path))[:1000])
+        assert re.search(": (not a regular file|cannot be read)", line)
 
 
 def test_a_file_with_byte_order_mark_and_crlf_is_read(tmp_path: Path) -> None:

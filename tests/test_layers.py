@@ -1,4 +1,4 @@
-"""Imports only go down from layer to layer, and each library is imported in one layer."""
+"""Imports only go down from floor to floor and one way within a floor; each library has its packages."""
 
 from __future__ import annotations
 
@@ -11,25 +11,17 @@ from pathlib import Path
 import pytest
 
 SOURCE = Path(__file__).parent.parent / "src" / "impact"
-LAYERS = (
-    {"_version", "array_types", "atomic", "display", "errors", "formatting", "text"},
-    {"ode"},
-    {"contact"},
-    {"config"},
-    {"engine"},
-    {"progress_display"},
-    {"results"},
-    {"inverse", "uncertainty"},
-    {"comparison"},
-    {"exporters"},
-    {"plots"},
-    {"reporting"},
+# the floors of docs/architecture.md, from the lowest; a part imports from those before it, and from itself
+FLOORS = {
+    "foundations": ("_version", "array_types", "text", "errors", "formatting", "atomic", "display"),
+    "numerics": ("ode", "contact"),
+    "config": ("config",),
+    "sweeps": ("engine", "progress_display", "results"),
+    "acts": ("inverse", "uncertainty", "comparison", "exporters", "plots", "reporting"),
     # the package itself, "", hands out the public functions
-    {""},
-    {"cli", "pytest_plugin"},
-    {"__main__"},
-)
-HEIGHT = {part: height for height, parts in enumerate(LAYERS) for part in parts}
+    "interfaces": ("", "cli", "pytest_plugin", "__main__"),
+}
+ORDER = [part for parts in FLOORS.values() for part in parts]
 # where each library may be imported
 LIBRARIES = {
     "typer": {"cli"}, "rich": {"display", "progress_display"}, "matplotlib": {"plots"},
@@ -41,6 +33,20 @@ LIBRARIES = {
     "scipy": {"config", "inverse", "uncertainty"},
     "dask": {"engine"}, "distributed": {"engine"}, "pytest": {"pytest_plugin"},
 }  # fmt: skip
+# what a module of cli may import apart from public names, foundations and other modules of cli
+CLI_IMPORTS = {
+    # tables of names
+    "completion": {"config", "contact", "engine", "exporters", "plots"},
+    # formats of a verdict, and the picture of its differences
+    "compare": {"comparison.formats", "plots"},
+    # the executors, which have no public function
+    "execution": {"engine", "results.sweep"},
+    # a value in TOML
+    "parsing": {"config.files"},
+    "plot": {"plots.kinds"},
+    # a history as CSV
+    "run": {"plots.data"},
+}
 MODULES = sorted(SOURCE.rglob("*.py"))
 
 
@@ -89,9 +95,19 @@ def test_imports_go_down(path: Path) -> None:
         library, _, rest = name.partition(".")
         if library == "impact":
             target = rest.partition(".")[0]
-            assert HEIGHT[target] <= HEIGHT[part], f"{path.name} imports {name}, which is above it"
+            assert ORDER.index(target) <= ORDER.index(part), f"{path.name} imports {name}, which comes after it"
         elif not typing_only and library in LIBRARIES:
             assert part in LIBRARIES[library], f"{path.name} imports {name}"
+
+
+@pytest.mark.parametrize("path", sorted((SOURCE / "cli").glob("*.py")), ids=lambda path: path.stem)
+def test_a_command_imports_public_names(path: Path) -> None:
+    for name, typing_only in imports(path):
+        library, _, rest = name.partition(".")
+        if library != "impact" or typing_only or rest.partition(".")[0] in {"", "cli", *FLOORS["foundations"]}:
+            continue
+        allowed = CLI_IMPORTS.get(path.stem, set())
+        assert any(f"{rest}.".startswith(f"{part}.") for part in allowed), f"{path.name} imports {name}"
 
 
 def test_modules_import_each_other_in_one_direction() -> None:
@@ -116,8 +132,8 @@ def test_modules_of_plots_need_no_circle_for_their_types() -> None:
     TopologicalSorter(graph).prepare()
 
 
-def test_every_module_has_a_layer_and_a_docstring() -> None:
+def test_every_module_has_a_floor_and_a_docstring() -> None:
     for path in MODULES:
-        assert part_of(path) in HEIGHT
+        assert part_of(path) in ORDER
         text = path.read_text(encoding="utf-8")
         assert not text or ast.get_docstring(ast.parse(text)), f"{path.name} does not say what it holds"

@@ -7,6 +7,8 @@ from unicodedata import category
 # control, format (bidi marks, zero-width), lone surrogate, private, unassigned, line and paragraph separator
 UNSAFE = frozenset({"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"})
 
+NO_BREAK = "\N{NO-BREAK SPACE}"
+
 
 def with_year(title: str, year: int | str) -> str:
     """Add the year to the title of a model, unless the title ends with versions in brackets.

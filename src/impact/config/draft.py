@@ -211,9 +211,9 @@ class Draft:
                 break
             is_replaced = any(path[:start] in self.origins for start in range(end))
             if path[:end] in key_line and not is_replaced:
-                return (0, key_line[path[:end]]), f"{safe_text(self.name)}:{key_line[path[:end]]}"
+                return (0, key_line[path[:end]]), f"{self.name}:{key_line[path[:end]]}"
         # a parameter of a model without a table is required by the key `models`
-        return self._locate(("models",), key_line) if path[:1] == ("model",) else ((0, 0), safe_text(self.name))
+        return self._locate(("models",), key_line) if path[:1] == ("model",) else ((0, 0), self.name)
 
 
 def _library_setting(name: str, without: Iterable[str] = ()) -> Setting:

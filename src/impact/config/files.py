@@ -36,13 +36,9 @@ def file_hint(path: Path, content: bytes) -> str:
     if content.startswith(RESULT_MAGIC):
         return "is a result, not a text file; impact info, plot, rerun, extend and expand read results"
     if path.suffix.lower() == ".toml":
-        return (
-            f"is a TOML file, not a result; sweep a config first: impact sweep {safe_text(path.name)} -o RESULT.h5"
-        )
+        return f"is a TOML file, not a result; sweep a config first: impact sweep {path.name} -o RESULT.h5"
     if path.suffix.lower() == ".csv":
-        return (
-            f"is a CSV file, not a result; impact plot RESULT.h5 --points {safe_text(path.name)} draws its points"
-        )
+        return f"is a CSV file, not a result; impact plot RESULT.h5 --points {path.name} draws its points"
     return ""
 
 
@@ -53,7 +49,7 @@ def read_text(path: Path, kind: str = "TOML", most: int = MAX_CONFIG_BYTES) -> s
     ------
     ConfigError : it is not a regular file, is empty, cannot be read, is too large or is not UTF-8
     """
-    name = safe_text(str(path))
+    name = str(path)
     try:
         if path.exists() and not path.is_file():
             raise ConfigError(f"{name}: not a regular file, expected a {kind} file")
@@ -64,7 +60,7 @@ def read_text(path: Path, kind: str = "TOML", most: int = MAX_CONFIG_BYTES) -> s
             content = file.read(most + 1)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise ConfigError(f"{name}: cannot be read: {safe_text(reason)}") from None
+        raise ConfigError(f"{name}: cannot be read: {reason}") from None
     if content.startswith(RESULT_MAGIC):
         raise ConfigError(f"{name}: {file_hint(path, content)}")
     if len(content) > most:
@@ -83,7 +79,6 @@ def parse_document(text: str, name: str) -> Any:
     ------
     ConfigError : the text has a syntax error, is too large, or is nested too deeply
     """
-    name = safe_text(name)
     is_json = text.lstrip().startswith("{")
     limit = MAX_JSON_LENGTH if is_json else MAX_CONFIG_BYTES
     if len(text) > limit:
@@ -120,7 +115,7 @@ def _syntax_error_line(text: str, language: str, message: str) -> str:
     line = int(position[1] or position[2] or len(lines)) if position is not None else 1
     reason = message[: position.start()].strip() if position is not None else message
     shown = safe_text(lines[line - 1].strip(), 60)
-    return f"{line}: not {language}: {safe_text(reason)}" + (f": {shown}" if shown else "")
+    return f"{line}: not {language}: {reason}" + (f": {shown}" if shown else "")
 
 
 def to_plain_data(value: object, path: KeyPath = ()) -> tuple[Any, list[ConfigProblem]]:

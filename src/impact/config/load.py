@@ -183,7 +183,7 @@ def build(draft: Draft, max_points: int = MAX_POINTS, purpose: Purpose = "sweep"
         draft = draft.with_problems(purpose_problems(draft.data))
     if draft.problems:
         raise draft.error()
-    for step in (inline_files, add_library_materials, _expand_cases, _expand_measurements):
+    for step in (inline_files, add_library_materials, expand_cases, read_measurements):
         draft = step(draft)
     document, invalid_values = _validate(draft)
     draft = check_rules(draft.with_problems(invalid_values))
@@ -255,27 +255,13 @@ def inline_files(draft: Draft) -> Draft:
         return draft
     draft = replace(draft, files=tuple((draft.folder or Path()) / file for file in named_files(draft.data)))
     for read in (read_files, read_data_file):
-        values, lines = read(draft.data, draft.folder, draft.known_models, draft.exponent)
+        values, lines = read(draft)
         draft = replace(draft, lines=(*draft.lines, *lines))
         for path, value in values.items():
             setting = Setting(path, value, "", override_text(path, value))
             data, _ = set_value(draft.data, path, value)
             draft = replace(draft, data=data, settings=(*draft.settings, setting))
     return draft
-
-
-def _expand_cases(draft: Draft) -> Draft:
-    data, paths, problems = expand_cases(draft.data, draft.known_models)
-    return replace(draft, data=data, cases=paths).with_problems(problems)
-
-
-def _expand_measurements(draft: Draft) -> Draft:
-    measurements, problems = read_measurements(draft.data, draft.known_models, draft.exponent)
-    data = draft.data
-    for name, values in measurements.inputs.items() if measurements is not None else ():
-        # rules between inputs apply to the first value
-        data, _ = set_value(data, InputName.parse(name).path, values[0])
-    return replace(draft, data=data, measurements=measurements).with_problems(problems)
 
 
 def _validate(draft: Draft) -> tuple[Document | None, list[ConfigProblem]]:

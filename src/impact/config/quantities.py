@@ -528,7 +528,7 @@ class Quantity:
         expected_unit = "a bare number" if self.unit == "1" else f"a unit of {self.unit}{of_n}{self._example}"
         scale = _si_scale(unit)
         if scale is None:
-            raise UnitError(f'{expected_unit}; "{safe_text(unit)}" is not a known unit')
+            raise UnitError(f'{expected_unit}; "{unit}" is not a known unit')
         factor, powers = scale
         if self.exponents and n is not None and math.isnan(n):
             return factor

@@ -15,8 +15,8 @@ from ..config.input_names import InputName
 from ..contact.variables import HISTORY, OUTPUTS
 from ..errors import UsageError
 from ..formatting import scaled_unit, typographic
-from ..text import safe_text, with_year
-from .slices import NO_BREAK, parameter_text, scalars_of
+from ..text import NO_BREAK, safe_text, with_year
+from .slices import parameter_text, scalars_of
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -77,7 +77,7 @@ ATTRIBUTE_TYPES: Mapping[str, Any] = {
 
 
 def read_attribute(attributes: Mapping[Any, Any], name: str, source: str = "", *, required: bool = False) -> Any:
-    """The value of a JSON attribute.
+    """Read a JSON attribute.
 
     Parameters
     ----------
@@ -105,10 +105,11 @@ def read_attribute(attributes: Mapping[Any, Any], name: str, source: str = "", *
             return _adapter(name).validate_json(text, strict=True)
     except ValidationError:
         pass
-    what = "missing" if text is None else "not JSON of the expected type"
-    raise ResultError(f"{source}{': ' if source else ''}attribute {name}: {what}")
+    problem = "missing" if text is None else "not JSON of the expected type"
+    raise ResultError(f"{source}{': ' if source else ''}attribute {name}: {problem}")
 
 
 @cache
 def _adapter(name: str) -> TypeAdapter[Any]:
+    """Build the validator of an attribute once."""
     return TypeAdapter(ATTRIBUTE_TYPES[name])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -19,15 +20,7 @@ from ..engine.plan import Plan
 from ..engine.plugins import Plugins
 from ..formatting import decimals, number
 from ..text import safe_text
-from .schema import (
-    CALIBRATION,
-    STUDY_COORDINATES,
-    coordinate_attributes,
-    plan_coordinates,
-    provenance_attributes,
-    template,
-    udunits,
-)
+from . import schema
 
 # probability of chi2 below which a law is called rejected
 REJECTED_P = 1e-3
@@ -37,12 +30,12 @@ FIT_HEADINGS = ("law", "parameter", "estimate", "95 %", "chi2/dof", "p", "AICc",
 
 
 def fit_status(law: xr.Dataset) -> str:
-    """The outcome of the fit of one law, one of FIT_STATUSES."""
+    """Read the outcome of the fit of one law, one of FIT_STATUSES."""
     return str(law["fit_status"].attrs["flag_meanings"]).split()[int(law["fit_status"])]
 
 
 def fit_rows(dataset: xr.Dataset) -> list[tuple[str, ...]]:
-    """A row of text for each parameter of each law, the best law first, under FIT_HEADINGS."""
+    """Write a row for each parameter of each law, the best law first, under FIT_HEADINGS."""
     rows: list[tuple[str, ...]] = []
     for key in map(str, dataset["model"].values):
         law = dataset.sel(model=key)
@@ -56,37 +49,37 @@ def fit_rows(dataset: xr.Dataset) -> list[tuple[str, ...]]:
         )
         names = [str(name) for name in law["parameter"].values[law["identifiable"].values >= 0]]
         for position, name in enumerate(names or [""]):
-            estimate = _estimate_text(law.sel(parameter=name)) if name else ("", "")
+            estimate = _estimate_texts(law.sel(parameter=name)) if name else ("", "")
             rest = quality if position == 0 else ("",) * len(quality)
             rows.append((key if position == 0 else "", name.removeprefix(f"{key}."), *estimate, *rest))
     return rows
 
 
-def _estimate_text(of_name: xr.Dataset) -> tuple[str, str]:
-    """An estimate and its interval."""
-    estimate = number(float(of_name["estimate"]), 5)
-    if not int(of_name["identifiable"]):
+def _estimate_texts(parameter: xr.Dataset) -> tuple[str, str]:
+    """Write an estimate and its interval."""
+    estimate = number(float(parameter["estimate"]), 5)
+    if not int(parameter["identifiable"]):
         return estimate, "not identified"
-    lower, upper = float(of_name["lower"]), float(of_name["upper"])
+    lower, upper = float(parameter["lower"]), float(parameter["upper"])
     return estimate, "–" if lower != lower else f"{number(lower, 5)} to {number(upper, 5)}"
 
 
 def unidentified_notes(dataset: xr.Dataset) -> list[str]:
-    """What the data do not determine, in words, one line for each law that they do not determine."""
+    """Say for each law what the data do not determine of it."""
     notes = []
     for key in map(str, dataset["model"].values):
         law = dataset.sel(model=key)
         names = [str(name) for name in law["parameter"].values[law["identifiable"].values == 0]]
         if names:
             groups = str(law["determined"].item())
-            short = ", ".join(name.removeprefix(f"{key}.") for name in names)
+            parameters = ", ".join(name.removeprefix(f"{key}.") for name in names)
             only = f"only {groups} is determined" if groups else "the data do not determine them"
-            notes.append(f"{key}: {short}: {only}")
+            notes.append(f"{key}: {parameters}: {only}")
     return notes
 
 
 def fit_notes(dataset: xr.Dataset) -> list[str]:
-    """What a reader has to know besides the table, in words: one line for each."""
+    """Say what a reader has to know besides the table, one line for each note."""
     best = dataset.isel(model=0)
     notes = [*_noise_notes(dataset)]
     if (
@@ -108,14 +101,14 @@ def fit_notes(dataset: xr.Dataset) -> list[str]:
 
 
 def _noise_notes(dataset: xr.Dataset) -> Iterator[str]:
-    """What the noise "excess" without specimens means."""
+    """Explain the noise "excess" without specimens."""
     if dataset.attrs["noise"] != "excess" or "specimen" in dataset.coords:
         return
     yield "without a column specimen, each measured value has an excess deviation of its own"
     inputs = [
         np.asarray(coordinate.values)
         for name, coordinate in dataset.coords.items()
-        if coordinate.dims == ("point",) and name not in STUDY_COORDINATES["calibration"]
+        if coordinate.dims == ("point",) and name not in schema.STUDY_COORDINATES["calibration"]
     ]
     rows = list(zip(*inputs, strict=True)) or [()] * dataset.sizes["point"]
     repeated = sum(rows.count(row) > 1 for row in rows)
@@ -128,7 +121,7 @@ def _noise_notes(dataset: xr.Dataset) -> Iterator[str]:
 
 @dataclass(frozen=True)
 class Residual:
-    """The residual of a measured value in the fit without it, in its own standard deviations, and where it is."""
+    """The residual of a measured value in the fit without it, in its own standard deviations, and its place."""
 
     place: str
     output: str
@@ -137,35 +130,31 @@ class Residual:
 
 
 def largest_residuals(dataset: xr.Dataset) -> list[Residual]:
-    """The largest residuals of the best law in the fits without the point, the largest first."""
+    """Find the largest residuals of the best law in the fits without the point, the largest first."""
     if "loo_residual" not in dataset:
         return []
     best = dataset.isel(model=0)
     residuals = np.nan_to_num(np.asarray(best["loo_residual"].values, float))
     largest = np.argsort(-np.abs(residuals), kind="stable")[:NAMED_RESIDUALS]
     file = safe_text(str(dataset.attrs["data_file"]))
-    several = len({*map(str, best["output"].values)}) > 1
-    return [
-        Residual(
-            (f"{file}:{int(point['line'])}" if file else f"value {int(point['line'])}")
-            + (f" {point['output'].item()}" if several else ""),
-            str(point["output"].item()),
-            float(point["measured"]),
-            float(point["loo_residual"]),
-        )
-        for point in (best.isel(point=number) for number in largest.tolist())
-        if np.isfinite(point["loo_residual"])
-    ]
+    has_several_outputs = len({*map(str, best["output"].values)}) > 1
+    found = []
+    for point in (best.isel(point=index) for index in largest.tolist()):
+        line, output = int(point["line"]), str(point["output"].item())
+        place = (f"{file}:{line}" if file else f"value {line}") + (f" {output}" if has_several_outputs else "")
+        if np.isfinite(point["loo_residual"]):
+            found.append(Residual(place, output, float(point["measured"]), float(point["loo_residual"])))
+    return found
 
 
 def calibration_title(dataset: xr.Dataset) -> str:
-    """The title of the config; "" for its default, which is that of a sweep."""
+    """Read the title of the config; "" for its default, which is that of a sweep."""
     title = str(dataset.attrs.get("title", ""))
     return "" if title == DEFAULT_TITLE else title
 
 
 def describe_data(dataset: xr.Dataset) -> str:
-    """What the laws were fitted to, in a sentence without a full stop."""
+    """Say what the laws were fitted to, in a sentence without a full stop."""
     laws, points = dataset.sizes["model"], dataset.sizes["point"]
     plural = "" if laws == 1 else "s"
     return f"{laws} law{plural}, {points} measured values, noise {dataset.attrs['noise']}; the best law first"
@@ -174,7 +163,7 @@ def describe_data(dataset: xr.Dataset) -> str:
 def calibration_template(
     config: Config, models: Sequence[ForceModel], plugins: Plugins, varied: tuple[str, Array]
 ) -> xr.Dataset:
-    """The dataset of a calibration with NaN in place of its results.
+    """Build the dataset of a calibration with placeholders for its results.
 
     Parameters
     ----------
@@ -186,37 +175,34 @@ def calibration_template(
     data = config.data
     assert data is not None
     plan = Plan(replace(config, models=tuple(models)), plugins)
-    fitted, parameters = set(config.fits), list(config.fits)
-    coordinates = {
-        name: coordinate
-        for name, coordinate in plan_coordinates(plan).variables.items()
-        if name not in fitted and name not in data.inputs
+    coordinates: dict[str, object] = {
+        str(name): coordinate
+        for name, coordinate in schema.plan_coordinates(plan).variables.items()
+        if name not in config.fits and name not in data.inputs
     }
-    outputs = list(data.outputs)
-    rows = len(data.lines)
-    new: dict[str, object] = {
-        "parameter": ("parameter", parameters, {"long_name": "fitted parameter, by its config name"}),
-        "other_parameter": ("other_parameter", parameters, {"long_name": "fitted parameter, by its config name"}),
-        "point": ("point", np.arange(1, rows * len(outputs) + 1), {"long_name": "number of the measured value"}),
-        "line": ("point", np.tile(data.lines, len(outputs)), {"long_name": "line of the file"}),
-        "output": ("point", np.repeat(outputs, rows), {"long_name": "measured output"}),
-        "measured": ("point", np.concatenate([*data.outputs.values()]), {"long_name": "measured value"}),
-        "sigma": (
-            "point",
-            np.concatenate([data.sigma.get(name, np.full(rows, np.nan)) for name in outputs]),
-            {"long_name": "standard deviation of the measured value"},
-        ),
-    }
+
+    def add(name: str, dim: str, values: Any, meaning: str) -> None:
+        coordinates[name] = (dim, values, {"long_name": meaning})
+
+    parameters, outputs, rows = list(config.fits), list(data.outputs), len(data.lines)
+    sigmas = [data.sigma.get(name, np.full(rows, np.nan)) for name in outputs]
+    add("parameter", "parameter", parameters, "fitted parameter, by its config name")
+    add("other_parameter", "other_parameter", parameters, "fitted parameter, by its config name")
+    add("point", "point", np.arange(1, rows * len(outputs) + 1), "number of the measured value")
+    add("line", "point", np.tile(data.lines, len(outputs)), "line of the file")
+    add("output", "point", np.repeat(outputs, rows), "measured output")
+    add("measured", "point", np.concatenate([*data.outputs.values()]), "measured value")
+    add("sigma", "point", np.concatenate(sigmas), "standard deviation of the measured value")
     if data.specimens:
-        new["specimen"] = ("point", list(data.specimens), {"long_name": "specimen of the measured value"})
+        add("specimen", "point", list(data.specimens), "specimen of the measured value")
     for name, column in data.inputs.items():
-        new[name] = ("point", np.tile(column, len(outputs)), coordinate_attributes(plan, name))
+        coordinates[name] = ("point", np.tile(column, len(outputs)), schema.coordinate_attributes(plan, name))
     name, grid = varied
     if name:
-        new["grid"] = ("grid", grid, coordinate_attributes(plan, name))
-        units = " ".join(udunits(OUTPUTS[output].unit) for output in outputs)
-        new["output_name"] = ("output_name", outputs, {"long_name": "measured output", "units": units})
-    attributes = provenance_attributes(plan) | {
+        coordinates["grid"] = ("grid", grid, schema.coordinate_attributes(plan, name))
+        units = " ".join(schema.udunits(OUTPUTS[output].unit) for output in outputs)
+        coordinates["output_name"] = ("output_name", outputs, {"long_name": "measured output", "units": units})
+    attributes = schema.provenance_attributes(plan) | {
         "noise": data.noise,
         "loss": data.loss,
         "data_file": data.file,
@@ -224,5 +210,5 @@ def calibration_template(
         "fit_paths": json.dumps([InputName.parse(name).config_key for name in parameters]),
         "fit_bounds": json.dumps({name: list(ends) for name, ends in config.fits.items()}),
     }
-    coords = xr.Coordinates(coordinates | new)
-    return xr.Dataset(template(CALIBRATION.values(), coords.sizes, ()), coords, attributes)
+    coords = xr.Coordinates(coordinates)
+    return xr.Dataset(schema.template(schema.CALIBRATION.values(), coords.sizes, ()), coords, attributes)

@@ -14,21 +14,20 @@ from ..contact.units import with_numbers
 from ..contact.variables import OUTPUTS
 from ..engine.plan import Plan
 from ..formatting import decimals, number
-from ..text import safe_text
+from ..text import NO_BREAK, safe_text
 from .attributes import read_attribute
 from .schema import SENSITIVITY, plan_coordinates, provenance_attributes, template
 
 # probabilities of the quantiles
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 # with fewer samples the intervals are too short: at 16 independent ones 87 % of them hold the index
-LEAST_SAMPLES = 64
-NO_BREAK = "\N{NO-BREAK SPACE}"
+MIN_SAMPLES = 64
 # indices from the first half of the samples
 HALF = ("first_half", "total_half")
 
 
 def sensitivity_template(plan: Plan, of: str, others: Sequence[str]) -> xr.Dataset:
-    """The dataset of a sensitivity study without its numbers.
+    """Build the dataset of a sensitivity study with placeholders for its numbers.
 
     Parameters
     ----------
@@ -36,15 +35,10 @@ def sensitivity_template(plan: Plan, of: str, others: Sequence[str]) -> xr.Datas
     of : the output
     others : names of the axes other than those of models and samples
     """
-    config = plan.config
-    assert config.design is not None
-    coordinates = {
-        name: coordinate
-        for name, coordinate in plan_coordinates(plan).variables.items()
-        if SAMPLE not in coordinate.dims
-    }
-    paths = [InputName.parse(name).config_key for name in config.distributions]
-    new = {
+    variables_of_plan = plan_coordinates(plan).variables.items()
+    coordinates = {name: variable for name, variable in variables_of_plan if SAMPLE not in variable.dims}
+    paths = [InputName.parse(name).config_key for name in plan.config.distributions]
+    studied = {
         "input": ("input", paths, {"long_name": "uncertain input, by its path in the config"}),
         "quantile": ("quantile", list(QUANTILES), {"long_name": "probability", "units": "1"}),
     }
@@ -52,12 +46,12 @@ def sensitivity_template(plan: Plan, of: str, others: Sequence[str]) -> xr.Datas
         replace(variable, unit=OUTPUTS[of].unit) if variable.unit == "output" else variable
         for variable in SENSITIVITY.values()
     ]
-    coords = xr.Coordinates(coordinates | new)
+    coords = xr.Coordinates(coordinates | studied)
     return xr.Dataset(template(variables, coords.sizes, others), coords, provenance_attributes(plan) | {"of": of})
 
 
 def distribution_texts(dataset: xr.Dataset) -> list[str]:
-    """The uncertain inputs of a result with their distributions; a name and its numbers stay on one line."""
+    """Write the uncertain inputs of a result with their distributions, each in one line without a break."""
     texts = []
     for name, distribution in read_attribute(dataset.attrs, "design").get("distributions", {}).items():
         ((kind, numbers),) = distribution.items()
@@ -71,7 +65,7 @@ def distribution_texts(dataset: xr.Dataset) -> list[str]:
 
 
 def _unit_of_input(name: str) -> str:
-    """The unit of an input by its config name; "1" for a parameter of a model."""
+    """Find the unit of an input by its config name; "1" for a parameter of a model."""
     try:
         quantity = InputName.parse(name).quantity({})
     except KeyError:
@@ -80,7 +74,7 @@ def _unit_of_input(name: str) -> str:
 
 
 def describe_design(dataset: xr.Dataset) -> str:
-    """How the samples of a result were drawn, in a sentence without a full stop; "" without samples."""
+    """Say how the samples of a result were drawn, in a sentence without a full stop; "" without samples."""
     design = read_attribute(dataset.attrs, "design")
     if not design:
         return ""
@@ -89,7 +83,7 @@ def describe_design(dataset: xr.Dataset) -> str:
 
 
 def iterate_studies(dataset: xr.Dataset) -> Iterator[tuple[dict[str, float | str], xr.Dataset]]:
-    """Each model at each point of the other axes: the model and the point, and the study there."""
+    """Yield the model and the point of each study, and the study."""
     dims = list(map(str, dataset["mean"].dims))
     for index in np.ndindex(*(dataset.sizes[dim] for dim in dims)):
         study = dataset.isel(dict(zip(dims, index, strict=True)))
@@ -100,7 +94,7 @@ INDEX_HEADINGS = ("input", "first-order", "95 %", "total", "95 %", "first-order,
 
 
 def index_rows(study: xr.Dataset) -> list[tuple[str, ...]]:
-    """A row of text for each input that matters, the largest total index first, under INDEX_HEADINGS."""
+    """Write a row for each input that matters, the largest total index first, under INDEX_HEADINGS."""
     order = np.argsort(-np.nan_to_num(study["total"].values), kind="stable")
     order = order[study["total"].values[order] != 0.0]
 
@@ -126,20 +120,20 @@ def index_rows(study: xr.Dataset) -> list[tuple[str, ...]]:
 
 
 def describe_study(study: xr.Dataset) -> str:
-    """The distribution of the output of one study, in a sentence without a full stop."""
+    """Describe the distribution of the output of one study, in a sentence without a full stop."""
     of, unit = study.attrs["of"], str(study["mean"].attrs["units"])
     failed = int(study["failed"])
     if failed:
         return f"{of}: {failed:,} points have no result, so there are no indices; narrow the distributions"
-    words = "" if unit == "1" else f" {unit}"
+    suffix = "" if unit == "1" else f" {unit}"
     if not np.isfinite(study["total"].values).any():
-        return f"{of}: {number(float(study['mean']))}{words}; it does not depend on the uncertain inputs"
-    least, median, most = (float(study["quantiles"].sel(quantile=q)) for q in (0.05, 0.5, 0.95))
-    text = f"{of}: mean {number(float(study['mean']))}{words}, sd {number(float(study['sd']), 3)}, "
-    text += f"5 % {number(least)}, 50 % {number(median)}, 95 % {number(most)}"
-    without = study["input"].values[study["total"].values == 0.0]
-    if without.size:
-        text += f"; it does not depend on {', '.join(without.tolist())}"
-    if read_attribute(study.attrs, "design")["n"] < LEAST_SAMPLES:
-        text += f"; the intervals need at least {LEAST_SAMPLES} samples"
+        return f"{of}: {number(float(study['mean']))}{suffix}; it does not depend on the uncertain inputs"
+    lower, median, upper = (float(study["quantiles"].sel(quantile=q)) for q in (0.05, 0.5, 0.95))
+    text = f"{of}: mean {number(float(study['mean']))}{suffix}, sd {number(float(study['sd']), 3)}, "
+    text += f"5 % {number(lower)}, 50 % {number(median)}, 95 % {number(upper)}"
+    irrelevant = study["input"].values[study["total"].values == 0.0].tolist()
+    if irrelevant:
+        text += f"; it does not depend on {', '.join(irrelevant)}"
+    if read_attribute(study.attrs, "design")["n"] < MIN_SAMPLES:
+        text += f"; the intervals need at least {MIN_SAMPLES} samples"
     return text

@@ -29,7 +29,7 @@ from ..contact.materials import Material
 from ..contact.model import ForceModel
 from ..contact.models import find
 from ..contact.outputs import collide
-from ..contact.status import Status
+from ..contact.status import FIRST_FAILURE, Status
 from ..contact.timestep import EXACT
 from ..contact.units import with_numbers
 from ..contact.variables import HISTORY, OUTPUTS
@@ -105,6 +105,10 @@ class Impact(Displayed):
     @property
     def status(self) -> Status:
         return Status(int(self.values["status"]))
+
+    @property
+    def failed(self) -> bool:
+        return self.status >= FIRST_FAILURE
 
     @property
     def why_no_history(self) -> str:
@@ -356,7 +360,7 @@ def histories(
     keys = [str(key) for key in dataset["model"].values.ravel()]
     for key in models or ():
         if key not in keys:
-            raise UsageError(f'no model "{safe_text(key)}" in this result; {did_you_mean(key, keys)}')
+            raise UsageError(f'no model "{key}" in this result; {did_you_mean(key, keys)}')
     integrator = str(dataset.attrs.get("integrator", EXACT))
     if integrator != EXACT:
         raise UsageError(f"no motion to draw in this result: {no_motion(integrator)}")
@@ -380,7 +384,7 @@ def histories(
     if not followed:
         where = ", ".join(f"{name} = {value}" for name, value in {**first, **at}.items())
         reason = next(iter(ends.values()))
-        raise UsageError(f"no motion to draw at {safe_text(where)}: {reason}; choose a point, such as --sel e=0.5")
+        raise UsageError(f"no motion to draw at {where}: {reason}; choose a point, such as --sel e=0.5")
     return followed
 
 
