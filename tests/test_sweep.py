@@ -9,9 +9,9 @@ import re
 import shlex
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
-from contextlib import nullcontext
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
@@ -465,3 +465,18 @@ def test_a_file_with_a_high_compression_ratio_can_be_read(tmp_path: Path) -> Non
     assert (tmp_path / "flat.h5").stat().st_size < outcome.dataset.nbytes / 300
     with impact.load(tmp_path / "flat.h5") as loaded:
         assert loaded["e_out"].min() == loaded["e_out"].max() > 0.999
+
+
+def test_an_executor_is_entered_only_if_there_is_something_to_integrate(tmp_path: Path) -> None:
+    @contextmanager
+    def refuse() -> Iterator[ExecutorSpec]:
+        raise AssertionError("entered")
+        yield SERIAL
+
+    path, config = tmp_path / "r.h5", ROOT / "configs" / "figure6.toml"
+    with pytest.raises(ConfigError):
+        impact.sweep_to_file(config, path, overrides=["sweep.e=2.0"], backend=refuse())
+    impact.sweep(config, output=path)
+    assert not impact.sweep_to_file(config, path, backend=refuse()).is_new
+    with pytest.raises(AssertionError, match="entered"):
+        impact.sweep_to_file(config, path, overwrite=True, backend=refuse())

@@ -97,9 +97,8 @@ class Plan:
     def columns_of(self, trajectory_range: TrajectoryRange) -> Columns:
         """Build the dimensionless problems of the trajectories of a range, arrays of its size."""
         trajectory_map = self.maps[trajectory_range.model]
-        cells = np.arange(trajectory_range.start, trajectory_range.stop)
-        if trajectory_map.first is not None:
-            cells = trajectory_map.first[cells]
+        rows = trajectory_range.rows
+        cells = rows if trajectory_map.first is None else trajectory_map.first[rows]
         cell_index = np.unravel_index(cells, trajectory_map.shape) if trajectory_map.shape else ()
         index_along = dict(zip(trajectory_map.axes, cell_index, strict=True))
         # the other axes are at their first value

@@ -84,6 +84,11 @@ class TrajectoryRange:
     def size(self) -> int:
         return self.stop - self.start
 
+    @property
+    def rows(self) -> NDArray[np.intp]:
+        """The numbers of its trajectories among those of the model."""
+        return np.arange(self.start, self.stop)
+
 
 def law_axes(inputs: Inputs, model: ForceModel, collapse: bool) -> tuple[int, ...]:
     """Find the axes of the trajectories of a law: those on which it depends, or all without `collapse`."""

@@ -142,25 +142,24 @@ def _extend_into(output: Path, source: Path, overrides: Sequence[str], plugins: 
     A result of layout `full` holds values of points and no trajectories: those of all new points are integrated,
     also where a point of the result had the same one.
     """
-    name = str(source)
-    before = open_result(source)
+    name, before = str(source), open_result(source)
     table = table_of_result(before)
     require_sweep(before, "extend")
     with before:
-        config = stored_config(before.attrs, [], plugins, str(source), run.max_points)
+        config = stored_config(before.attrs, [], plugins, name, run.max_points)
         old = Plan(config, plugins.of(config.models))
         _check_whole(before, old, name)
-        new = _extended_plan(before, old, overrides, plugins, source, run.max_points)
+        new = _extended_plan(before, old, overrides, plugins, name, run.max_points)
         if before.attrs.get("core") in CORES:
             # the existing trajectories were integrated by this core
             solver = replace(new.config.solver, core=str(before.attrs["core"]))
             new = replace(new, config=replace(new.config, solver=solver))
         _check_changes(old, new, name)
-        new.check_count(run.max_points, str(source))
+        new.check_count(run.max_points, name)
         axes = tuple(_axis_positions(axis, old.inputs, name) for axis in new.config.axes)
         _check_none_lost(old, axes, name)
         seal = str(before.encoding["seal"])
-        history = [*read_attribute(before.attrs, "extended", str(source)), {"seal": seal, "set": list(overrides)}]
+        history = [*read_attribute(before.attrs, "extended", name), {"seal": seal, "set": list(overrides)}]
         old_positions = _OldPositions(old, new, axes)
         n_integrated: dict[int, int] = {}
 
@@ -194,14 +193,17 @@ def _check_whole(before: xr.Dataset, old: Plan, name: str) -> None:
 
 
 def _extended_plan(
-    before: xr.Dataset, old: Plan, overrides: Sequence[str], plugins: Plugins, source: Path, max_points: int
+    before: xr.Dataset, old: Plan, overrides: Sequence[str], plugins: Plugins, source: str, max_points: int
 ) -> Plan:
     """Plan the sweep with the overrides, and all values and models of the result."""
-    config = stored_config(before.attrs, overrides, plugins, str(source), max_points)
-    appended_overrides = []
+    config = stored_config(before.attrs, overrides, plugins, source, max_points)
+    added = []
     for axis in config.axes:
         name = axis.name
-        old_values = np.atleast_1d(old.inputs.values(name)) if _has_value(old.inputs, name) else np.array([])
+        old_values = np.atleast_1d(old.inputs.values(name))
+        if old_values.item(0) is None:
+            # it had no value, such as an unknown property of a material
+            old_values = np.array([])
         in_both = (
             match_labels([np.asarray(axis.columns[name])], [old_values])[0] if old_values.size else old_values
         )
@@ -209,19 +211,14 @@ def _extended_plan(
         if len(axis.columns) == 1 and not axis.numbered and not has_all_old_values:
             new_values = (value for value in axis.columns[name] if value not in old_values.tolist())
             values = [*old_values.tolist(), *new_values]
-            appended_overrides.append(override_text(InputName.parse(name).path, values))
+            added.append(override_text(InputName.parse(name).path, values))
     missing = [model.key for model in old.models if model not in config.models]
     if missing:
         keys = [*(model.key for model in old.models), *(m.key for m in config.models if m not in old.models)]
-        appended_overrides.append(override_text(("models",), keys))
-    if appended_overrides:
-        config = stored_config(before.attrs, [*overrides, *appended_overrides], plugins, str(source), max_points)
+        added.append(override_text(("models",), keys))
+    if added:
+        config = stored_config(before.attrs, [*overrides, *added], plugins, source, max_points)
     return Plan(config, plugins.of(config.models))
-
-
-def _has_value(inputs: Inputs, name: str) -> bool:
-    """Whether an axis or a scalar, which may be a property of a material, had a value."""
-    return inputs.values(name).item(0) is not None
 
 
 def _check_changes(old: Plan, new: Plan, name: str) -> None:
@@ -324,7 +321,7 @@ class _OldPositions:
 
     def model(self, model: int) -> int | None:
         """Find the number that a model had in the old plan, or None."""
-        keys = [model_of_old_plan.key for model_of_old_plan in self.old.models]
+        keys = [old_model.key for old_model in self.old.models]
         key = self.new.models[model].key
         return keys.index(key) if key in keys else None
 
@@ -349,16 +346,15 @@ class _OldPositions:
         """Mark the trajectories of a range that only points need which the old result holds in full."""
         trajectory_map = self.new.maps[trajectory_range.model]
         others = [axis for axis in range(len(self.axes)) if axis not in trajectory_map.axes]
-        if self.model(trajectory_range.model) is None or any(
-            (self.axes[axis].positions < 0).any() for axis in others
-        ):
+        is_new_along = [(self.axes[axis].positions < 0).any() for axis in others]
+        if self.model(trajectory_range.model) is None or any(is_new_along):
             return None
         if trajectory_map.of_cell is None:
-            is_old = self._is_old(trajectory_map, np.arange(trajectory_range.start, trajectory_range.stop))
+            is_old = self._is_old(trajectory_map, trajectory_range.rows)
         else:
             needed = np.zeros(trajectory_map.count, bool)
             needed[trajectory_map.of_cell[~self._is_old(trajectory_map, np.arange(trajectory_map.cells))]] = True
-            is_old = ~needed[trajectory_range.start : trajectory_range.stop]
+            is_old = ~needed[trajectory_range.rows]
         return is_old, CollisionResult.blank(trajectory_range.size)
 
     def _is_old(self, trajectory_map: TrajectoryMap, cells: IndexArray) -> NDArray[np.bool_]:
@@ -371,15 +367,13 @@ class _OldPositions:
     def _old_rows(self, trajectory_range: TrajectoryRange, old_map: TrajectoryMap) -> IndexArray:
         trajectory_map = self.new.maps[trajectory_range.model]
         if trajectory_map.of_cell is None:
-            return self._rows_of_cells(
-                trajectory_map, old_map, np.arange(trajectory_range.start, trajectory_range.stop)
-            )
+            return self._rows_of_cells(trajectory_map, old_map, trajectory_range.rows)
         if trajectory_range.model not in self._rows:
             rows = np.full(trajectory_map.count, -1, np.intp)
             of_cells = self._rows_of_cells(trajectory_map, old_map, np.arange(trajectory_map.cells))
             rows[trajectory_map.of_cell[of_cells >= 0]] = of_cells[of_cells >= 0]
             self._rows[trajectory_range.model] = rows
-        return self._rows[trajectory_range.model][trajectory_range.start : trajectory_range.stop]
+        return self._rows[trajectory_range.model][trajectory_range.rows]
 
     def _rows_of_cells(
         self, trajectory_map: TrajectoryMap, old_map: TrajectoryMap, cells: IndexArray

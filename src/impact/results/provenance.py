@@ -56,11 +56,11 @@ def config_of_part(config: Config, dataset: xr.Dataset) -> Config:
     axes = []
     for axis in config.axes:
         labels_of = {axis.name: axis.labels} if axis.numbered else axis.columns
-        held = {name: dataset.coords[name] for name in labels_of if name in dataset.coords}
-        first = next(iter(held.values()), None)
-        names = [name for name, labels in held.items() if first is not None and labels.dims == first.dims]
+        stored = {name: dataset.coords[name] for name in labels_of if name in dataset.coords}
+        first = next(iter(stored.values()), None)
+        names = [name for name, labels in stored.items() if first is not None and labels.dims == first.dims]
         values = [np.asarray(labels_of[name]) for name in names]
-        labels = [np.ravel(held[name].values) for name in names]
+        labels = [np.ravel(stored[name].values) for name in names]
         positions = sorted(match_labels(values, labels)[0].tolist()) if names else []
         chosen = np.array(positions or [0])
         columns = {name: tuple(np.asarray(v)[chosen].tolist()) for name, v in axis.columns.items()}

@@ -234,16 +234,15 @@ def prepare(
 def sweep_in_memory(plan: Plan, run: Run = DEFAULT_RUN) -> xr.Dataset:
     """Run a plan; a small result is in memory, a large one is computed when it is indexed."""
     check_labels(plan)
-    counter = ProgressCounter.start(plan.ranges, plan.points, run)
     finished: dict[TrajectoryRange, CollisionResult] = {}
-    for trajectory_range, collisions in integrate_ranges(plan, plan.ranges, run):
-        finished[trajectory_range] = collisions
-        counter.count(trajectory_range, collisions)
-        counter.report()
-    if not counter.is_full or run.should_stop():
-        raise UnfinishedError("nothing was written")
-    table, variables = table_of_ranges(plan, finished.__getitem__), stored_variables(plan)
-    dataset = lazy_dataset(dataset_template(plan), table, variables)
+    counter = ProgressCounter.start(plan.ranges, plan.points, run)
+    try:
+        integrate(plan, plan.ranges, finished.__setitem__, counter, run)
+        run.check_stop()
+    except UnfinishedError:
+        raise UnfinishedError("nothing was written") from None
+    table = table_of_ranges(plan, finished.__getitem__)
+    dataset = lazy_dataset(dataset_template(plan), table, stored_variables(plan))
     return in_memory(dataset) if dataset.nbytes <= MAX_LOADED_BYTES else dataset
 
 
@@ -258,12 +257,8 @@ def sweep_into(
     few = plan.stored_points <= NO_CHECKPOINT_POINTS or plan.layout == "factored"
     folder = checkpoint.work_folder_of(output)
     if plan.trajectories <= RANGE_TRAJECTORIES and few and not os.path.lexists(folder):
-        finished = {}
-        for trajectory_range, collisions in integrate_ranges(
-            plan, plan.ranges, DEFAULT_RUN, extension.find_reused
-        ):
-            finished[trajectory_range] = collisions
-            counter.count(trajectory_range, collisions)
+        finished: dict[TrajectoryRange, CollisionResult] = {}
+        integrate(plan, plan.ranges, finished.__setitem__, counter, DEFAULT_RUN, extension.find_reused)
         table = table_of_ranges(plan, finished.__getitem__)
         try:
             return store_result(output, plan, table, counter, run, extension)
@@ -304,8 +299,20 @@ def complete_ranges(
         else:
             counter.count(trajectory_range, stored)
     counter.report()
-    for trajectory_range, collisions in integrate_ranges(plan, todo, run, find_reused):
-        work_folder.store(trajectory_range, collisions)
+    integrate(plan, todo, work_folder.store, counter, run, find_reused)
+
+
+def integrate(
+    plan: Plan,
+    ranges: Sequence[TrajectoryRange],
+    store: Callable[[TrajectoryRange, CollisionResult], None],
+    counter: ProgressCounter,
+    run: Run,
+    find_reused: FindReused = reuse_nothing,
+) -> None:
+    """Integrate ranges, and store and count each; an `UnfinishedError` if some are missing in the end."""
+    for trajectory_range, collisions in integrate_ranges(plan, ranges, run, find_reused):
+        store(trajectory_range, collisions)
         counter.count(trajectory_range, collisions)
         counter.report()
     if not counter.is_full:
