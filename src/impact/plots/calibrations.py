@@ -69,7 +69,8 @@ def _panels(data: xr.Dataset, name: str, varied: str, choice: Choice) -> tuple[P
     for index, key in enumerate(map(str, data["model"].values)):
         law = data.isel(model=index)
         label = ", ".join(filter(None, (model_label(law, numbered=choice.equations), _remark(law))))
-        y, band = law["predicted"], list[xr.DataArray]()
+        y = law["predicted"]
+        band: list[xr.DataArray] = []
         if varied:
             ends = law.sel(output_name=name)
             y, *band = (ends[field] for field in ("curve", "curve_lower", "curve_upper"))
