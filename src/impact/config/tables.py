@@ -420,7 +420,7 @@ def _model_names(models: Mapping[str, ForceModel]) -> Any:
 def expand_models(
     selection: object, models: Mapping[str, ForceModel]
 ) -> tuple[list[ForceModel], list[ConfigProblem]]:
-    """Find the models of a key, "all", "family:NAME", a pattern, or a list of those and of exclusions after "!"."""
+    """Find the models of a key, "all", "family:NAME", a pattern, or a list of those, some excluded by "!"."""
     if not isinstance(selection, str | list) or not selection:
         return [], [((), mismatch_error(selection, MODELS_EXPECTED).message())]
     selected: dict[str, ForceModel] = {}
