@@ -273,8 +273,8 @@ def minimize(
 ) -> Estimate:
     """Find the local minimum of the objective from a start u.
 
-    The parameter `fixed` stays at its start; an `excess` of None is found if the noise asks for it. For `taken` see
-    `ExcessLikelihood`.
+    The parameter `fixed` stays at its start; an `excess` of None is found if the noise asks for it; for `taken`
+    see `ExcessLikelihood`.
     """
     if problem.data.noise == "excess" and excess is None:
         return _minimize_with_excess(problem, evaluate, start, fixed, taken, tolerance)
