@@ -53,8 +53,7 @@ class Extension:
     seal : of the old result
     note : JSON text for the attribute `extended` of the new result
     find_reused : returns the trajectories of a range that are not integrated again
-    fill : copies old values into a slab; None if all values are computed from
-        trajectories
+    fill : copies old values into a slab; None if all values are computed from trajectories
     replaces : whether the new result replaces the old one
     """
 
@@ -124,7 +123,13 @@ def sweep(
     if output is None and (resume or overwrite):
         raise UsageError("resume and overwrite: got no output, expected one as well")
     backend = choose_executor(jobs, threads, executor)
-    with _progress(shown=progress) as on_progress:
+    bar: AbstractContextManager[ProgressCallback] = nullcontext(ignore)
+    if progress:
+        # imported here: rich is slow to import
+        from ..progress_display import progress_bar
+
+        bar = progress_bar()
+    with bar as on_progress:
         if output is None:
             run = Run(backend, max_points=max_points, on_progress=on_progress)
             return sweep_in_memory(prepare(source, overrides, plugins, run), run)
@@ -140,15 +145,6 @@ def sweep(
             on_progress=on_progress,
         )
     return load(output)
-
-
-def _progress(*, shown: bool) -> AbstractContextManager[ProgressCallback]:
-    """Show a bar, or nothing; rich is imported for a bar only."""
-    if not shown:
-        return nullcontext(ignore)
-    from ..progress_display import progress_bar
-
-    return progress_bar()
 
 
 def sweep_to_file(
