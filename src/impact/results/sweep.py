@@ -249,11 +249,12 @@ def sweep_into(
     may_replace = run.overwrite or extension.replaces
     check_output(output, overwrite=may_replace)
     check_storable(plan)
-    counter = ProgressCounter.start(plan.ranges, plan.points, run)
     few = plan.stored_points <= NO_CHECKPOINT_POINTS or plan.layout == "factored"
     folder = checkpoint.work_folder_of(output)
     if plan.trajectories <= RANGE_TRAJECTORIES and few and not os.path.lexists(folder):
         finished: dict[TrajectoryRange, CollisionResult] = {}
+        # so short that it is neither stopped nor reported
+        counter = ProgressCounter.start(plan.ranges, plan.points, DEFAULT_RUN)
         integrate(plan, plan.ranges, finished.__setitem__, counter, DEFAULT_RUN, extension.find_reused)
         table = table_of_ranges(plan, finished.__getitem__)
         try:
@@ -261,6 +262,7 @@ def sweep_into(
         except UnfinishedError:
             raise UnfinishedError("nothing was written") from None
 
+    counter = ProgressCounter.start(plan.ranges, plan.points, run)
     with checkpoint.open_work_folder(folder, plan, run, extension.seal) as work_folder:
         # another process may have stored it in the meantime
         check_output(output, overwrite=may_replace)
