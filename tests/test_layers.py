@@ -33,6 +33,20 @@ LIBRARIES = {
     "scipy": {"config", "inverse", "uncertainty"},
     "dask": {"engine"}, "distributed": {"engine"}, "pytest": {"pytest_plugin"},
 }  # fmt: skip
+# what a module of cli may import apart from public names, foundations and other modules of cli
+CLI_IMPORTS = {
+    # tables of names
+    "completion": {"config", "contact", "engine", "exporters", "plots"},
+    # formats of a verdict, and the picture of its differences
+    "compare": {"comparison.formats", "plots"},
+    # the executors, which have no public function
+    "execution": {"engine", "results.sweep"},
+    # a value in TOML
+    "parsing": {"config.files"},
+    "plot": {"plots.kinds"},
+    # a history as CSV
+    "run": {"plots.data"},
+}
 MODULES = sorted(SOURCE.rglob("*.py"))
 
 
@@ -84,6 +98,16 @@ def test_imports_go_down(path: Path) -> None:
             assert ORDER.index(target) <= ORDER.index(part), f"{path.name} imports {name}, which comes after it"
         elif not typing_only and library in LIBRARIES:
             assert part in LIBRARIES[library], f"{path.name} imports {name}"
+
+
+@pytest.mark.parametrize("path", sorted((SOURCE / "cli").glob("*.py")), ids=lambda path: path.stem)
+def test_a_command_imports_public_names(path: Path) -> None:
+    for name, typing_only in imports(path):
+        library, _, rest = name.partition(".")
+        if library != "impact" or typing_only or rest.partition(".")[0] in {"", "cli", *FLOORS["foundations"]}:
+            continue
+        allowed = CLI_IMPORTS.get(path.stem, set())
+        assert any(f"{rest}.".startswith(f"{part}.") for part in allowed), f"{path.name} imports {name}"
 
 
 def test_modules_import_each_other_in_one_direction() -> None:

@@ -11,6 +11,7 @@ import xarray as xr
 
 import impact
 from impact.config.load import parse_config
+from impact.config.measurements import MEASURED_OUTPUTS
 from impact.contact.outputs import FORMULAS
 from impact.contact.status import Status
 from impact.contact.variables import BY_DEFAULT, OUTPUTS
@@ -18,6 +19,7 @@ from impact.engine.execute import integrate_ranges
 from impact.engine.plan import Plan
 from impact.engine.run import DEFAULT_RUN
 from impact.engine.trajectories import trajectory_ranges
+from impact.plots.labels import symbol
 from impact.results.schema import dataset_template, stored_variables, udunits
 from impact.results.trajectory_table import TrajectoryRows, TrajectoryTable, in_memory, lazy_dataset
 
@@ -28,6 +30,13 @@ TABLE1 = {"v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6.118486349e9}
 
 def test_every_output_has_a_formula() -> None:
     assert OUTPUTS.keys() <= FORMULAS.keys()
+
+
+def test_measurements_and_pictures_follow_from_the_entry_of_an_output() -> None:
+    assert {name for name, output in OUTPUTS.items() if output.measured} == MEASURED_OUTPUTS.keys()
+    assert {name: symbol(name) for name, output in OUTPUTS.items() if output.symbol} == {
+        name: f"${output.symbol}$" for name, output in OUTPUTS.items() if output.symbol
+    }
 
 
 def test_variables_dimensions_and_units(wide: xr.Dataset) -> None:

@@ -15,14 +15,12 @@ from ..atomic import check_output
 from ..display import dump, show
 from ..errors import ImpactError, UsageError
 from . import exits
+from .execution import Execution
 from .options import MaxPointsOption, PluginOption, QuietOption, ResultArgument, ToleranceOption
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from ..comparison.formats import NoVerdict
     from ..comparison.verdict import Verdict
-    from ..engine.plan import Plan
 
 
 class Format(StrEnum):
@@ -107,14 +105,6 @@ def rerun(
     """Repeat a sweep or a calibration from its result alone, and compare the new values with the stored ones."""
     with exits.catch_signals() as should_stop:
         from ..comparison import formats
-        from ..progress_display import progress_bar
-
-        def run_plan(plan: Plan) -> xr.Dataset:
-            with progress_bar(exits.print_line, quiet=quiet) as on_progress:
-                from ..engine.run import Run
-                from ..results.sweep import sweep_in_memory
-
-                return sweep_in_memory(plan, Run(on_progress=on_progress, should_stop=should_stop))
 
         _check_plot(plot, result)
         try:
@@ -124,7 +114,7 @@ def rerun(
                 tol=dict(tol or ()) or None,
                 subset=subset,
                 max_points=max_points,
-                execute=run_plan,
+                execute=Execution(should_stop, quiet).execute,
             )
         except ImpactError as error:
             _print_outcome(formats.NoVerdict("the rerun", str(result), str(error)), format)

@@ -14,7 +14,7 @@ from ..errors import UsageError
 from . import exits
 from .completion import complete_code, complete_model
 from .options import AtOption, JsonOption, OverwriteOption, SetOption, SourceArgument
-from .params import parse_number
+from .parsing import parse_number
 
 
 def export(

@@ -10,7 +10,7 @@ import typer
 import impact
 
 from . import exits
-from .executor_options import ExecutorOptions
+from .execution import Execution
 from .options import (
     AllowFailedOption,
     JobsOption,
@@ -25,6 +25,7 @@ from .options import (
     SelectOption,
     ThreadsOption,
 )
+from .summary import print_summary_and_exit
 
 
 def expand(
@@ -75,11 +76,8 @@ def extend(
 ) -> None:
     """Add values to the axes of a result; only what it does not hold is integrated."""
     with exits.catch_signals() as should_stop:
-        from ..progress_display import progress_bar
-        from . import summary
-
-        executor = ExecutorOptions(jobs, threads)
-        with progress_bar(exits.print_line, quiet=quiet) as on_progress:
+        execution = Execution(should_stop, quiet, jobs, threads)
+        with execution.keywords() as keywords:
             outcome = impact.extend_to_file(
                 result,
                 sets,
@@ -87,13 +85,11 @@ def extend(
                 resume=resume,
                 overwrite=overwrite,
                 plugins=plugins or (),
-                backend=executor.choose(quiet=quiet, should_stop=should_stop),
                 max_points=max_points,
-                on_progress=on_progress,
-                should_stop=should_stop,
+                **keywords,
             )
     if not quiet:
         reason = "; layout full holds none of them" if outcome.extended_layout == "full" else ""
         count = f"{outcome.integrated:,} of {outcome.trajectories:,} trajectories were integrated for it"
         exits.print_line(count + reason)
-    summary.print_summary_and_exit(outcome, quiet=quiet, as_json=as_json, allow_failed=allow_failed)
+    print_summary_and_exit(outcome, quiet=quiet, as_json=as_json, allow_failed=allow_failed)

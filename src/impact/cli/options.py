@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from .completion import complete_input, complete_model, complete_selection, complete_setting
-from .params import (
+from .parsing import (
     Setting,
     Tolerance,
     parse_setting,

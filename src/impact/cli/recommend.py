@@ -10,7 +10,7 @@ import impact
 
 from ..display import show
 from .options import JsonOption, ModelOption, ResultArgument, SelectOption
-from .params import parse_number
+from .parsing import parse_number
 
 
 def recommend(

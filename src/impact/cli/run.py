@@ -15,7 +15,7 @@ from ..errors import UsageError
 from . import exits
 from .completion import complete_model
 from .options import AtOption, JsonOption, OverwriteOption, PluginOption, SetOption, SourceArgument
-from .params import parse_whole_number
+from .parsing import parse_whole_number
 
 # files of a time history: netCDF-4, which is HDF5, and a table
 HISTORY_SUFFIXES = (".h5", ".hdf5", ".nc", ".csv")
@@ -52,7 +52,6 @@ def run(
     as_json: JsonOption = False,
 ) -> None:
     """Run one impact: inputs, outputs and estimated errors."""
-    from ..contact.status import FIRST_FAILURE
     from ..plots.data import encode_history
 
     if times is not None and history is None:
@@ -68,7 +67,7 @@ def run(
         source, model=model, at=dict(at or ()), overrides=sets or (), plugins=plugins or (), times=times
     )
     show(result, as_json=as_json)
-    if result.status >= FIRST_FAILURE:
+    if result.failed:
         raise typer.Exit(exits.EXIT_POINTS_FAILED)
     if history is not None:
         if result.history is None:

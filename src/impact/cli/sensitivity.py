@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -12,6 +12,7 @@ import impact
 from ..display import dump, show
 from . import exits
 from .completion import complete_output
+from .execution import Execution
 from .options import (
     AllowFailedOption,
     JobsOption,
@@ -23,11 +24,6 @@ from .options import (
     SetOption,
     ThreadsOption,
 )
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from ..engine.plan import Plan
 
 
 def sensitivity(
@@ -62,18 +58,6 @@ def sensitivity(
     """
     outputs = list(dict.fromkeys(of or ["e_out"]))
     with exits.catch_signals() as should_stop:
-        from ..engine.executors import choose_executor
-        from ..progress_display import progress_bar
-
-        executor = choose_executor(jobs, threads)
-
-        def run_plan(plan: Plan) -> xr.Dataset:
-            with progress_bar(exits.print_line, quiet=quiet) as on_progress:
-                from ..engine.run import Run
-                from ..results.sweep import sweep_in_memory
-
-                return sweep_in_memory(plan, Run(executor, on_progress=on_progress, should_stop=should_stop))
-
         results = impact.sensitivities(
             config,
             outputs,
@@ -82,7 +66,7 @@ def sensitivity(
             overrides=sets or (),
             plugins=plugins or (),
             max_points=max_points,
-            execute=run_plan,
+            execute=Execution(should_stop, quiet, jobs, threads).execute,
         )
     descriptions = [impact.describe(result) for result in results]
     if as_json:

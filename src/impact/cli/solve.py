@@ -11,7 +11,7 @@ import impact
 from ..display import show
 from .completion import complete_input, complete_target, complete_unknown
 from .options import AtOption, JsonOption, ModelKeyOption, PluginOption, SetOption, SourceArgument
-from .params import InputRange, Target, parse_range, parse_target
+from .parsing import InputRange, Target, parse_range, parse_target
 
 
 def solve(

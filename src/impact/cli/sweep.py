@@ -12,7 +12,7 @@ import impact
 from ..display import Wrapped, dump, print_blocks, show
 from ..errors import UnfinishedError, UsageError
 from . import exits
-from .executor_options import ExecutorOptions
+from .execution import Execution
 from .options import (
     AllowFailedOption,
     JobsOption,
@@ -26,6 +26,7 @@ from .options import (
     SetOption,
     ThreadsOption,
 )
+from .summary import print_summary_and_exit
 
 
 def sweep(
@@ -62,14 +63,12 @@ def sweep(
 ) -> None:
     """Run every model over a sweep and store post-impact velocities and their errors."""
     with exits.catch_signals() as should_stop:
-        from ..progress_display import progress_bar
-        from . import summary
 
         def print_note(note: str) -> None:
             if not quiet:
                 exits.print_line(f"note: {config}: {note}")
 
-        executor = ExecutorOptions(jobs, threads, scheduler, scheduler_file)
+        execution = Execution(should_stop, quiet, jobs, threads, scheduler, scheduler_file)
         inputs: dict[str, Any] = {
             "overrides": sets or (),
             "plugins": plugins or (),
@@ -86,9 +85,8 @@ def sweep(
             if should_stop():
                 raise UnfinishedError("nothing was written")
             return
-        backend = executor.choose(quiet=quiet, should_stop=should_stop)
-        with progress_bar(exits.print_line, quiet=quiet) as on_progress:
-            inputs |= {"backend": backend, "on_progress": on_progress, "should_stop": should_stop}
+        with execution.keywords() as keywords:
+            inputs |= keywords
             if shard is not None:
                 done = impact.sweep_shard(config, shard, output, overwrite=overwrite, **inputs)
             else:
@@ -99,7 +97,7 @@ def sweep(
         if not quiet:
             exits.print_line(str(done))
     else:
-        summary.print_summary_and_exit(outcome, quiet=quiet, as_json=as_json, allow_failed=allow_failed)
+        print_summary_and_exit(outcome, quiet=quiet, as_json=as_json, allow_failed=allow_failed)
 
 
 def merge(
@@ -112,19 +110,18 @@ def merge(
     as_json: JsonOption = False,
 ) -> None:
     """Join the shards of a sweep into its result; the work folders are not deleted."""
-    with exits.catch_signals() as should_stop:
-        from ..progress_display import progress_bar
-        from . import summary
-
-        with progress_bar(exits.print_line, quiet=quiet) as on_progress:
-            outcome = impact.merge(
-                folders,
-                output,
-                plugins=plugins or (),
-                overwrite=overwrite,
-                on_progress=on_progress,
-                should_stop=should_stop,
-            )
+    with (
+        exits.catch_signals() as should_stop,
+        impact.progress_bar(exits.print_line, quiet=quiet) as on_progress,
+    ):
+        outcome = impact.merge(
+            folders,
+            output,
+            plugins=plugins or (),
+            overwrite=overwrite,
+            on_progress=on_progress,
+            should_stop=should_stop,
+        )
     if outcome.repeated_blocks and not quiet:
         exits.print_line(f"{outcome.repeated_blocks:,} blocks were in more than one folder, with the same bits")
-    summary.print_summary_and_exit(outcome, quiet=quiet, as_json=as_json, allow_failed=allow_failed)
+    print_summary_and_exit(outcome, quiet=quiet, as_json=as_json, allow_failed=allow_failed)

@@ -12,7 +12,7 @@ from ..display import show
 from . import exits
 from .completion import complete_scheme
 from .options import AtOption, JsonOption, ModelKeyOption, PluginOption, SetOption, SourceArgument
-from .params import parse_number, parse_whole_number
+from .parsing import parse_number, parse_whole_number
 
 
 def timestep(

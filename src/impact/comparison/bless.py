@@ -88,14 +88,14 @@ def _check_no_failures(result: xr.Dataset, path: Path) -> None:
     if summary.failed:
         status, model, indices = summary.failed_at[0]
         point = result["status"].isel(dict(zip(result["status"].dims, (model, *indices), strict=True)))
-        at = describe_point(inputs_of_model({str(dim): point[dim].item() for dim in result["status"].dims}))
+        place = describe_point(inputs_of_model({str(dim): point[dim].item() for dim in result["status"].dims}))
         count = f"{summary.failed:,} of {summary.points:,} points failed"
-        first = f"the first at {at} ({status.name.lower()})"
+        first = f"the first at {place} ({status.name.lower()})"
         raise UsageError(f"{path}: {count}, {first}; expected none, or --allow-failed")
 
 
 def _load_baseline(baseline: Path) -> xr.Dataset | None:
-    """The current baseline, or None; a file that is not a result is not replaced."""
+    """Load the current baseline, if there is one; a file that is not a result is not replaced."""
     if not baseline.exists():
         return None
     try:

@@ -44,29 +44,25 @@ def representative_regions(variables: Sequence[Variable], aligned: Alignment) ->
     UsageError : a variable has more than `MAX_COMPARED_POINTS` representative points
     """
     results = (aligned.new, aligned.baseline)
+    known = [v.name for v in variables if any(_declares_dims(result, v.name) for result in results)]
+    models = range(aligned.sizes.get("model", 0) if known else 0)
+    datasets_by_model = [[_dataset_of_model(result, model) for result in results] for model in models]
     regions: dict[str, list[Region]] = {}
-    reduced = []
     for variable in variables:
-        if any(_declares_dims(result, variable.name) for result in results):
-            reduced.append(variable)
-            regions[variable.name] = []
+        dims = aligned.dims[variable.name]
+        if variable.name not in known:
+            parts = [_region(dims, aligned.sizes, slice(None))]
+        elif "model" in dims:
+            dims_by_model = [_representative_dims(variable, aligned, datasets) for datasets in datasets_by_model]
+            parts = [_region(d, aligned.sizes, slice(m, m + 1)) for m, d in enumerate(dims_by_model)]
         else:
-            regions[variable.name] = [_region(aligned.dims[variable.name], aligned.sizes, slice(None))]
-    for model in range(aligned.sizes.get("model", 0)) if reduced else ():
-        datasets = [_dataset_of_model(result, model) for result in results]
-        for variable in reduced:
-            if "model" in aligned.dims[variable.name]:
-                dims = _representative_dims(variable, aligned, datasets)
-                regions[variable.name].append(_region(dims, aligned.sizes, slice(model, model + 1)))
-    for variable in reduced:
-        if "model" not in aligned.dims[variable.name]:
             dims = _representative_dims(variable, aligned, [result.dataset for result in results])
-            regions[variable.name].append(_region(dims, aligned.sizes, slice(None)))
-    for name, parts in regions.items():
+            parts = [_region(dims, aligned.sizes, slice(None))]
         points = sum(math.prod(part.stop - part.start for part in region.values()) for region in parts)
         if points > MAX_COMPARED_POINTS:
             expected = f"expected at most {MAX_COMPARED_POINTS:,}; select a part of the results"
-            raise UsageError(f"{name}: got {points:,} points to compare, {expected}")
+            raise UsageError(f"{variable.name}: got {points:,} points to compare, {expected}")
+        regions[variable.name] = parts
     return regions
 
 
@@ -228,7 +224,7 @@ def _ratio(
     b: NDArray[Any],
     tol: float,
 ) -> tuple[NDArray[Any], NDArray[Any]]:
-    """The differences of a region: over the tolerance, and in the variable's unit.
+    """Compute the differences of a region: over the tolerance, and in the variable's unit.
 
     The ratio is inf if no difference is allowed, or if a NaN is not explained.
     """
@@ -260,7 +256,7 @@ def _ratio(
 
 
 def _scale(variable: Variable, aligned: Alignment, region: Region, shape: tuple[int, ...]) -> NDArray[Any]:
-    """The scale of each point of a region in the variable's unit."""
+    """Compute the scale of each point of a region in the variable's unit."""
     if aligned.scales:
         return aligned.scales[variable.name][tuple(region.values())]
     has_peak = "peak_indentation" in aligned.baseline.dataset
@@ -302,7 +298,7 @@ def _worst_of_slab(
 
 
 def _inputs_of_point(coords: xr.Dataset, dims: Sequence[str], place: Sequence[int]) -> dict[str, float | str]:
-    """The inputs of a point of the new result, with which its config gives the same point again."""
+    """Look up the inputs with which the config of the new result gives a point again."""
     inputs = {
         name: coords.variables[name].values[-position].item()
         for dim, position in zip(dims, place, strict=True)

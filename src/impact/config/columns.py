@@ -12,17 +12,17 @@ import math
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, replace
+from functools import cache, partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from pydantic_core import PydanticCustomError
 
-from ..contact.model import ForceModel
 from ..contact.variables import OUTPUTS
 from ..errors import ConfigError, did_you_mean
 from ..text import safe_text
+from .draft import Draft
 from .files import as_table, read_text, set_value
 from .input_names import InputName, input_values
 from .quantities import MAX_PROBLEMS, ConfigProblem, KeyPath, Quantity, UnitError, as_text, mismatch_error
@@ -221,38 +221,35 @@ def columns_of_table(table: Any, source: str) -> Columns:
     )
 
 
-def column_quantity(models: Mapping[str, ForceModel]) -> QuantityOf:
-    """Define the quantity of a column that has the name of an output or an input."""
-    return lambda name: (
-        Quantity(OUTPUTS[name].unit, "") if name in OUTPUTS else InputName.parse(name).quantity(models)
-    )
+def read_csv_of(draft: Draft, file: str, *, with_any_names: bool = False) -> Columns:
+    """Read a CSV file that a config names."""
+    if draft.folder is None:
+        raise ConfigError(f"{file}: not read; a stored config contains values, not file names")
+
+    def quantity_of(name: str) -> Quantity | None:
+        if name in OUTPUTS:
+            return Quantity(OUTPUTS[name].unit, "")
+        return InputName.parse(name).quantity(draft.known_models)
+
+    return read_csv(draft.folder / file, quantity_of, with_any_names=with_any_names)
 
 
-def read_files(
-    data: Mapping[str, Any], folder: Path | None, models: Mapping[str, ForceModel], n: float | None
-) -> tuple[dict[KeyPath, object], list[str]]:
+def read_files(draft: Draft) -> tuple[dict[KeyPath, object], list[str]]:
     """Read the CSV files of cases and of single columns: the values that replace their names, and problems."""
-
-    @cache
-    def open_csv(file: str, *, with_any_names: bool = False) -> Columns:
-        # a config stored in a result has no folder
-        if folder is None:
-            raise ConfigError(f"{file}: not read; a stored config contains values, not file names")
-        return read_csv(folder / file, column_quantity(models), with_any_names=with_any_names)
-
+    open_csv = cache(partial(read_csv_of, draft))
     values: dict[KeyPath, object] = {}
     problems: list[str] = []
-    cases = as_table(data.get("sweep")).get("cases")
+    cases = draft.table("sweep").get("cases")
     if isinstance(cases, str):
         try:
-            values["sweep", "cases"] = _read_cases(open_csv(cases), models, n)
+            values["sweep", "cases"] = _read_cases(open_csv(cases), draft)
         except ConfigError as error:
             problems += error.problems
-    for name, file, column in _file_columns(data):
+    for name, file, column in _file_columns(draft.data):
         try:
             columns = open_csv(file, with_any_names=True)
             found = _find_column(columns, column if column is not None else str(name), is_only=column is None)
-            list_of_values = columns.values(found, name.quantity(models), n)
+            list_of_values = columns.values(found, name.quantity(draft.known_models), draft.exponent)
             values[name.path] = list_of_values if column is not None else {"empirical": list_of_values}
         except ConfigError as error:
             problems += error.problems
@@ -273,21 +270,19 @@ def _find_column(columns: Columns, name: str, *, is_only: bool) -> str:
     raise ConfigError(columns.problem(f"got {as_text(name)}, expected one of its columns{hint}"))
 
 
-def _read_cases(
-    columns: Columns, models: Mapping[str, ForceModel], n: float | None
-) -> dict[str, list[float | str]]:
+def _read_cases(columns: Columns, draft: Draft) -> dict[str, list[float | str]]:
     """Convert all columns of a table of cases to SI units."""
     problems: list[str] = []
     values: dict[str, list[float | str]] = {}
     # n may be one of the columns
-    n = None if "n" in columns.units else n
+    n = None if "n" in columns.units else draft.exponent
     for name in columns.units:
         try:
-            values[name] = columns.values(name, InputName.parse(name).quantity(models), n)
+            values[name] = columns.values(name, InputName.parse(name).quantity(draft.known_models), n)
         except ConfigError as error:
             problems += error.problems
         except KeyError:
-            problems.append(columns.problem(InputName.parse(name).unknown_message(models), name))
+            problems.append(columns.problem(InputName.parse(name).unknown_message(draft.known_models), name))
     if problems:
         raise ConfigError(*problems)
     return values
@@ -310,44 +305,36 @@ def named_files(data: Mapping[str, Any]) -> list[str]:
     return list(dict.fromkeys(name for name in names if isinstance(name, str)))
 
 
-class Cases(NamedTuple):
-    """The data of a config with each column of its cases at the path of its input."""
-
-    data: dict[str, Any]
-    paths: dict[KeyPath, KeyPath]  # of the values in the table of cases, by the path of the input
-    problems: list[ConfigProblem]
-
-
-def expand_cases(data: Mapping[str, Any], models: Mapping[str, ForceModel]) -> Cases:
+def expand_cases(draft: Draft) -> Draft:
     """Replace `sweep.cases` by its columns."""
-    sweep = as_table(data.get("sweep"))
+    sweep = draft.table("sweep")
     cases = sweep.get("cases")
     if not isinstance(cases, dict) or not cases or not all(isinstance(values, list) for values in cases.values()):
-        return Cases(dict(data), {}, [])
+        return draft
     problems: list[ConfigProblem] = []
     paths: dict[KeyPath, KeyPath] = {}
     # the columns that belong to [sweep] take the position of the table
     in_sweep = {column: values for column, values in cases.items() if not InputName.parse(column).owner}
     position, items = list(sweep).index("cases"), list(sweep.items())
-    new = {**data, "sweep": {**dict(items[:position]), **in_sweep, **dict(items[position + 1 :])}}
+    data = {**draft.data, "sweep": {**dict(items[:position]), **in_sweep, **dict(items[position + 1 :])}}
     n_cases = len(next(iter(cases.values())))
     for column, values in cases.items():
         name, path = InputName.parse(column), ("sweep", "cases", column)
         try:
-            name.quantity(models)
+            name.quantity(draft.known_models)
         except KeyError:
-            problems.append((path, name.unknown_message(models)))
-            new["sweep"].pop(column, None)
+            problems.append((path, name.unknown_message(draft.known_models)))
+            data["sweep"].pop(column, None)
             continue
-        if contains_path(data, name.path):
+        if contains_path(draft.data, name.path):
             problems.append((path, f"set together with {name.config_key}, expected one of the two"))
         if len(values) != n_cases or not values:
             expected = f"{n_cases or 'at least one'}, as in the first column"
             problems.append((path, f"got {len(values)} values, expected {expected}"))
         if name.owner:
-            new, _ = set_value(new, name.path, values)
+            data, _ = set_value(data, name.path, values)
         paths[name.path] = path
-    return Cases(new, paths, problems)
+    return replace(draft, data=data, cases=paths).with_problems(problems)
 
 
 def contains_path(data: Mapping[str, Any], path: KeyPath) -> bool:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any, Literal
 
 from pydantic_core import PydanticCustomError
@@ -14,8 +13,9 @@ from ..contact.variables import OUTPUTS
 from ..errors import ConfigError, did_you_mean
 from ..formatting import number
 from ..text import safe_text
-from .columns import Cells, Columns, column_quantity, contains_path, read_cells, read_csv
-from .files import as_table
+from .columns import Cells, Columns, contains_path, read_cells, read_csv_of
+from .draft import Draft
+from .files import set_value
 from .input_names import InputName, input_values
 from .quantities import MAX_PROBLEMS, ConfigProblem, KeyPath, Quantity, as_text, value_error
 from .tables import LOSSES, MAX_MEASURED, MIN_SIGMA, NOISES, SWEEP_QUANTITIES, Loss, Noise
@@ -80,28 +80,26 @@ def purpose_problems(data: Mapping[str, Any]) -> list[ConfigProblem]:
     return [(path, f"got a fit, expected a value or an axis; {takes}") for path in fit_paths(data)][:1]
 
 
-def _read_columns(
-    columns: Columns, data: Mapping[str, Any], models: Mapping[str, ForceModel], n: float | None
-) -> tuple[list[_Column], list[_Problem]]:
+def _read_columns(columns: Columns, draft: Draft) -> tuple[list[_Column], list[_Problem]]:
     """Read columns of a file, which are text and have units, or lists of a config, and report all problems."""
     kinds: dict[str, _Column] = {}
     problems: list[_Problem] = []
     outputs = [header for header in columns.cells if header in MEASURED_OUTPUTS]
     for header in columns.cells:
         try:
-            column = _column_of(header, outputs, models)
+            column = _column_of(header, outputs, draft.known_models)
             twin = next((key for key, c in kinds.items() if (c.kind, c.name) == (column.kind, column.name)), None)
             if twin is not None:
                 raise value_error(f"got a second column of {column.name}, next to {as_text(twin)}, expected one")
             kinds[header] = column
             name = InputName.parse(column.name)
-            if column.kind == "input" and contains_path(data, name.path):
+            if column.kind == "input" and contains_path(draft.data, name.path):
                 raise value_error(f"set together with {name.config_key}, expected one of the two")
         except PydanticCustomError as error:
             problems.append((header, None, error.message()))
     if not outputs and not problems:
         problems.append(("", None, "got no column of an output, expected one, such as e_out or contact_time"))
-    n = None if any(column.name == "n" for column in kinds.values()) else n
+    n = None if any(column.name == "n" for column in kinds.values()) else draft.exponent
     result: list[_Column] = []
     for header, column in kinds.items():
         # a standard deviation has the unit of its output
@@ -172,21 +170,16 @@ def _deviation(output: str) -> Quantity:
     return Quantity(OUTPUTS[output].unit, "standard deviation", least=MIN_SIGMA, most=MAX_MEASURED)
 
 
-def read_data_file(
-    data: Mapping[str, Any], folder: Path | None, models: Mapping[str, ForceModel], n: float | None
-) -> tuple[dict[KeyPath, object], list[str]]:
+def read_data_file(draft: Draft) -> tuple[dict[KeyPath, object], list[str]]:
     """Read the file of [data], as `columns.read_files` reads others."""
-    table = as_table(data.get("data"))
-    file = table.get("file")
-    if not isinstance(file, str) or "columns" in table:
+    table = draft.table("data")
+    if not isinstance(table.get("file"), str) or "columns" in table:
         return {}, []
-    if folder is None:
-        return {}, [f"{file}: not read; a stored config contains values, not file names"]
     try:
-        columns = read_csv(folder / file, column_quantity(models))
+        columns = read_csv_of(draft, table["file"])
     except ConfigError as error:
         return {}, [*error.problems]
-    read, problems = _read_columns(columns, data, models, n)
+    read, problems = _read_columns(columns, draft)
     if problems:
         return {}, [columns.problem(text, header, row) for header, row, text in problems[:MAX_PROBLEMS]]
     values = {header: list(column.values) for header, column in zip(columns.cells, read, strict=True)}
@@ -214,18 +207,17 @@ def _percent_message(text: str) -> str:
     return f"got {as_text(text)}, expected a fraction{fraction}"
 
 
-def read_measurements(
-    data: Mapping[str, Any], models: Mapping[str, ForceModel], n: float | None
-) -> tuple[Measurements | None, list[ConfigProblem]]:
-    """Read the measurements of a config in which their values replace the file, and report problems."""
-    table = as_table(data.get("data"))
-    if isinstance(data.get("data"), dict) and not {"file", "columns"} & table.keys():
-        return None, [(("data",), 'got neither file nor columns, expected such as file = "drops.csv"')]
+def read_measurements(draft: Draft) -> Draft:
+    """Read the measurements of a config in which their values replace the file."""
+    table = draft.table("data")
+    if isinstance(draft.data.get("data"), dict) and not {"file", "columns"} & table.keys():
+        expected = 'got neither file nor columns, expected such as file = "drops.csv"'
+        return draft.with_problems([(("data",), expected)])
     lists = table.get("columns")
     if not isinstance(lists, dict) or not lists or not all(isinstance(v, list) and v for v in lists.values()):
-        return None, []
+        return draft
     path: KeyPath = ("data", "columns")
-    columns, column_problems = _read_columns(Columns("", 0, (), {}, lists, is_text=False), data, models, n)
+    columns, column_problems = _read_columns(Columns("", 0, (), {}, lists, is_text=False), draft)
     problems: list[ConfigProblem] = [
         ((*path, *([header] if header else []), *([] if index is None else [index])), message)
         for header, index, message in column_problems
@@ -264,8 +256,8 @@ def read_measurements(
             (("data", "loss"), f'got {as_text(loss)} with noise = "{noise}", expected noise = "given"')
         )
     if problems or noise not in NOISES or loss not in LOSSES:
-        return None, problems[:MAX_PROBLEMS]
-    return Measurements(
+        return draft.with_problems(problems[:MAX_PROBLEMS])
+    measurements = Measurements(
         file=str(table.get("file", "")),
         lines=tuple(lines) if isinstance(lines, list) else tuple(range(1, n_points + 1)),
         inputs=of_kind("input"),
@@ -274,7 +266,12 @@ def read_measurements(
         noise=noise,
         specimens=specimens,
         loss=loss,
-    ), []
+    )
+    data = draft.data
+    for name, values in measurements.inputs.items():
+        # rules between inputs apply to the first value
+        data, _ = set_value(data, InputName.parse(name).path, values[0])
+    return replace(draft, data=data, measurements=measurements)
 
 
 def _read_sigma(value: object, output: str, n_points: int) -> tuple[tuple[Any, ...], list[ConfigProblem]]:

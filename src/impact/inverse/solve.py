@@ -22,7 +22,8 @@ from scipy.optimize import elementwise, minimize_scalar
 from ..array_types import Array, Mask
 from ..config.grid import Axis
 from ..config.input_names import InputName
-from ..config.load import Config, Output
+from ..config.load import Config
+from ..config.tables import Output
 from ..contact.model import ForceModel, Parameter
 from ..contact.models import find
 from ..contact.status import Status

@@ -110,7 +110,7 @@ class CurveData:
 
     @property
     def names(self) -> set[str]:
-        """The axes, variables with a name beside their curves, and models whose text a user can replace."""
+        """The axes, variables with a name at the end of their curves, and models whose text a user can replace."""
         all_curves = [curve for panel in self.panels for curve in panel.curves]
         return {
             *(name for panel in self.panels for name in (panel.x_name, panel.y_name)),
@@ -271,7 +271,7 @@ def _draw_band(axes: Axes, curve: Curve, line: Line2D) -> Artist:
 
 
 def _label_guides(axes: Axes, guides: Sequence[Curve]) -> None:
-    """Write the cases of guides beside their ends, without overlap."""
+    """Write the cases of guides at their ends, without overlap."""
     low, high = axes.get_ylim()
     lowest = -math.inf
     for guide in sorted(guides, key=lambda curve: curve.y[-1]):
@@ -345,7 +345,7 @@ def _draw_mark(axes: Axes, mark: Mark) -> None:
 
 
 def _label_curve_ends(axes: Axes, curves: Sequence[Curve], labels: Mapping[str, str]) -> None:
-    """Write names beside the last points: where several end together, one is below and the others above."""
+    """Write names at the last points; of several ends together one is below and the others above."""
     ends: dict[str, tuple[float, float]] = {}
     for curve in curves:
         drawn = np.flatnonzero(np.isfinite(curve.y))

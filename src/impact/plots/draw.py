@@ -68,7 +68,7 @@ def plot(
     height : height of the figure [in], or a length; by default it depends on the kind
     style : a style sheet of matplotlib, or the name of one; rcParams changed by the user are respected in any case
     title : write the title and the conditions
-    labels : texts by the name of an axis, of a variable whose name is beside its curve, the key of a law,
+    labels : texts by the name of an axis, of a variable whose name is at the end of its curve, the key of a law,
         "reference" or "title"
     equations : name the laws with the numbers of their equations in the paper
     ax : axes of an existing figure to draw into, one for each panel, in the style of that figure

@@ -107,11 +107,7 @@ class Kind:
 
 
 def length(size: str | float | None, option: str) -> float | None:
-    """A size of a picture in inches: a number of them, a length with its unit, or the name of a journal's width.
-
-    Raises
-    ------
-    UsageError : it is none of these, or not between 1 and 60 inches
+    """Convert a number of inches, a length with its unit, or the name of a journal's width to inches.
 
     >>> round(length("84mm", "--width"), 4), length("single", "--width"), length(7.1, "--width")
     (3.3071, 3.5, 7.1)

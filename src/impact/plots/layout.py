@@ -37,10 +37,7 @@ MANY_ENTRIES = 16
 
 
 class Picture(Figure):
-    """A figure with a title, conditions below it and a legend at the bottom, which fit it at any size.
-
-    A notebook shows it even if no backend of matplotlib is selected.
-    """
+    """A figure with a title, conditions below it and a legend at the bottom, which fit it at any size."""
 
     def __init__(self, width: float, title: str = "", conditions: str = "") -> None:
         super().__init__((width, width), layout=Layout())
@@ -61,6 +58,7 @@ class Picture(Figure):
         self.fitted: dict[Text, tuple[str, str]] = {}
 
     def _repr_png_(self) -> bytes:
+        # a notebook shows it even if no backend of matplotlib is selected
         return encoded(self, "png")
 
     def set_size_inches(self, w: Any, h: Any = None, forward: bool = True) -> None:
@@ -71,14 +69,7 @@ class Picture(Figure):
             self.place_legend(self.entries)
 
     def add_legend(self, body: float, height: float | None, entries: Sequence[tuple[Artist, str]]) -> None:
-        """Add the legend and choose the height.
-
-        Parameters
-        ----------
-        body : height of the panels [in] where `height` is None; with a taller legend they get its height
-        height : of the figure [in], if the user chose one
-        entries : handles and names of the legend
-        """
+        """Add the legend, and choose the height [in] for panels of the height `body` if the user chose none."""
         width, shown = self.get_figwidth(), list(entries)
         legend = self.place_legend(shown)
         if height is None:
@@ -112,18 +103,18 @@ class Picture(Figure):
 
     @property
     def renderer(self) -> RendererBase:
-        """The renderer that measures text at the present resolution; a text would keep the one used before."""
+        """Get the renderer that measures text at the present resolution; a text would keep the one used before."""
         return self._get_renderer()  # type: ignore[attr-defined, no-any-return]
 
     def legend_height(self) -> float:
-        """The height of the legend [in]."""
+        """Measure the legend [in]."""
         return sum(
             float(legend.get_window_extent(self.renderer).height / self.dpi) + GAP_INCHES
             for legend in self.legends
         )
 
     def _legend(self, columns: int) -> Legend:
-        """The legend in a number of columns; names wider than the figure are broken into lines."""
+        """Add the legend in a number of columns; names wider than the figure are broken into lines."""
         style: dict[str, Any] = {"fontsize": "x-small"} if len(self.entries) > MANY_ENTRIES else {}
         handles, names = zip(*self.entries, strict=True)
         legend = self.legend(
@@ -138,10 +129,8 @@ class Picture(Figure):
         """Write labels shared by the axes of all panels."""
         size = matplotlib.rcParams["axes.labelsize"]
         below = self.text(0.5, 0.0, x_label, ha="center", va="bottom", fontsize=size)
-        self.shared = (
-            below,
-            self.text(0.0, 0.5, y_label, ha="left", va="center", rotation="vertical", fontsize=size),
-        )
+        left = self.text(0.0, 0.5, y_label, ha="left", va="center", rotation="vertical", fontsize=size)
+        self.shared = below, left
 
     def place_header(self) -> float:
         """Put the title and the conditions at the top, in lines that fit; returns their height [in]."""
@@ -169,11 +158,9 @@ class Picture(Figure):
         return left / width, below / height, above / height
 
     def fit_labels(self, height: float) -> list[str]:
-        """Break the labels and titles of all axes to the length of their axis; returns their texts.
-
-        In a single row of panels of a height [px] a vertical label may be longer than its axis.
-        """
+        """Break the labels and titles of all axes to the length of their axis; returns their texts."""
         labels = []
+        # in a single row of panels of a height [px] a vertical label may be longer than its axis
         rows = len({round(axes.get_position().y0, 1) for axes in self.axes})
         least = LABEL_SHARE_OF_ROW * height if rows == 1 else 0.0
         for axes in self.axes:
@@ -190,10 +177,7 @@ class Picture(Figure):
         return labels
 
     def fit(self, text: Text, max_width: float) -> None:
-        """Break a text at its spaces into lines no longer than `max_width` [px].
-
-        A single word is broken only if it is longer than MAX_WORD_INCHES.
-        """
+        """Break a text at spaces into lines up to `max_width` [px], and words longer than MAX_WORD_INCHES."""
         whole, shown = self.fitted.get(text, ("", ""))
         if not shown or text.get_text() != shown:
             whole = text.get_text()

@@ -49,7 +49,7 @@ FAILED: dict[str, Any] = {"facecolor": "#ebebeb", "edgecolor": "#b4b4b4", "hatch
 NO_VALUE = "failed or not defined"
 # least width of a panel of a map, and of one of the closest model [in]
 MIN_PANEL_WIDTH, MIN_CLOSEST_PANEL_WIDTH = 1.6, 3.0
-# width of what is beside the panels: labels and colour bar [in]
+# width of what is next to the panels: labels and colour bar [in]
 MARGIN_WIDTH = 1.35
 # height of a panel with its title [in]
 MIN_ROW_HEIGHT, MAX_ROW_HEIGHT = 1.7, 3.2
@@ -191,10 +191,7 @@ def field_map(dataset: xr.Dataset, choice: Choice) -> MapData:
 
 
 def validity_map(dataset: xr.Dataset, choice: Choice) -> MapData:
-    """Find the model with the smallest |e_error| over two axes, and that error; see `field_map`.
-
-    Of models whose errors are equal within TIE_TOLERANCE it is the first in the result.
-    """
+    """Find the model with the smallest |e_error| over two axes, the first of equal ones, and that error."""
     plot_data = _map_data("validity", dataset, "e_error", choice)
     error = np.abs([panel.values for panel in plot_data.panels])
     error[np.isnan(error)] = np.inf

@@ -57,10 +57,7 @@ def history_curves(histories: Sequence[xr.Dataset], choice: Choice) -> CurveData
 
 
 def impulse_curves(histories: Sequence[xr.Dataset], choice: Choice) -> CurveData:
-    """Draw velocities over the impulse, Figure 2 of the paper; see `loop_curves`.
-
-    All laws follow the same straight lines, (8) and (9), and differ in where they end.
-    """
+    """Draw velocities over the impulse, Figure 2: laws differ in where they end on the lines (8) and (9)."""
     pairs = [("tau", "v1", "v₁"), ("tau", "v2", "v₂")]
     lines = _curves_over("Velocities over the impulse", histories, pairs, choice)
     reference = f"{REFERENCE} (8), (9)" if choice.equations else REFERENCE

@@ -161,21 +161,17 @@ def _sorted_along(dataset: xr.Dataset, name: str) -> tuple[xr.Dataset, tuple[str
 
 
 def is_ordered(dataset: xr.Dataset, name: str) -> bool:
-    """Whether the points along a coordinate have an order, so that a line may join them.
-
-    The values of an axis have; values that vary together with others have if they are monotonic. Cases and
-    samples, whose dimension only numbers them, have not.
-    """
+    """Whether the points along a coordinate have an order, so that a line may join them."""
     (dim,) = dataset[name].dims
+    # the dimension of cases and samples only numbers them
     if dim not in dataset.coords or dataset[dim].dtype.kind in "iu":
         return False
     values = np.asarray(dataset[name].values, float)
     values = values[np.isfinite(values)]
     together = [other for other, coord in dataset.coords.items() if coord.dims == (dim,) and is_input(other)]
     steps = np.diff(values)
-    if dim == name and len(together) <= 1:
-        return True
-    return bool(np.all(steps > 0.0) or np.all(steps < 0.0))
+    # values that vary together with others have an order if they are monotonic
+    return (dim == name and len(together) <= 1) or bool(np.all(steps > 0.0) or np.all(steps < 0.0))
 
 
 def read(data: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
@@ -223,10 +219,7 @@ def unit_of(coordinate: xr.DataArray) -> str:
 
 
 def conditions_of(dataset: xr.Dataset, *drawn: str) -> str:
-    """Write the values of all inputs that are not drawn; no line break separates a name from its value.
-
-    The parameters of a law are part of its name, see `parameter_text`.
-    """
+    """Write the values of all inputs that are not drawn, without the parameters of laws."""
     inputs = {name: value for name, value in scalars_of(dataset).items() if name not in drawn}
     units = {name: unit_of(dataset[name]) for name in inputs}
     return described_inputs(inputs, units, exponents_of(dataset))

@@ -72,7 +72,7 @@ def default_size() -> tuple[float, float | None]:
 
 
 def model_styles(models: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """Colour, marker, dashes and hatch of each model of a picture; no two models are alike.
+    """Choose colour, marker, dashes and hatch of each model of a picture; no two models are alike.
 
     The style of a model follows from its index in the catalogue, so that it is the same in most pictures; if
     another model of the picture has that style already, the next free one is used. Plug-ins follow the catalogue.

@@ -67,10 +67,7 @@ def figures_of(
 def _condition_sentences(
     dataset: xr.Dataset, position: Mapping[Hashable, int], keys: Sequence[str]
 ) -> Iterator[str]:
-    """Write the values of the inputs that vary in the sweep and not in the figure.
-
-    A sentence for all models comes first, then one for the parameters of each model.
-    """
+    """Write the inputs that vary in the sweep and not in the figure: for all models, and for each model."""
     point, inputs = dataset.isel(position), varying_inputs(dataset)
     for key in ("", *keys):
         values = at_text(point, [name for name in inputs if InputName.parse(name).model == key])

@@ -62,7 +62,7 @@ def report(
     overwrite: bool = False,
     plugins: Sequence[ForceModel | str | Path] = (),
 ) -> str:
-    """A result as one page of HTML, which needs no network and runs no scripts.
+    """Write a result as one page of HTML, which needs no network and runs no scripts.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def _title(dataset: xr.Dataset) -> str:
 
 
 def _fits_section(dataset: xr.Dataset) -> dict[str, Any]:
-    """The ranking of a calibration, what the data do not determine, and what its columns mean."""
+    """Rank the laws of a calibration; explain what the data do not determine, and the columns."""
     return {
         "headings": list(FIT_HEADINGS),
         "rows": [[row[0] or "″", *row[1:]] for row in fit_rows(dataset)],
@@ -155,7 +155,7 @@ def _fits_section(dataset: xr.Dataset) -> dict[str, Any]:
 
 
 def _studies(dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
-    """The distribution of the output of each model at each point, and the indices of the uncertain inputs."""
+    """Describe the output of each model at each point, and the indices of the uncertain inputs."""
     for point, study in iterate_studies(dataset):
         yield {
             "point": describe_point(point),
@@ -165,7 +165,7 @@ def _studies(dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
 
 
 def _template() -> Template:
-    """The template of the page, which escapes all values."""
+    """Load the template of the page, which escapes all values."""
 
     def text(value: object) -> str:
         return value if isinstance(value, Markup) else safe_text(str(value), MAX_TEXT_LETTERS)
@@ -192,7 +192,7 @@ def _summary_sentence(dataset: xr.Dataset) -> str:
 
 
 def _outcomes(summary: Summary) -> Iterator[str]:
-    """Sentences with the number of points by status."""
+    """Write the number of points by status."""
     for status in sorted(summary.counts):
         yield f"{summary.counts[status]:,} {status.name.lower()}: {status.meaning}"
     if summary.not_counted:
@@ -200,7 +200,7 @@ def _outcomes(summary: Summary) -> Iterator[str]:
 
 
 def _single_values(dataset: xr.Dataset) -> Iterator[tuple[str, str, str]]:
-    """Name, value and meaning of the inputs and materials that have a single value."""
+    """List name, value and meaning of the inputs and materials that have a single value."""
     for name, coordinate in dataset.coords.items():
         if coordinate.ndim == 0 and is_input(name):
             value = (exponents_of(dataset) if name == "n" else None) or coordinate_text(coordinate)
@@ -222,7 +222,7 @@ def _axis_row(coordinate: xr.DataArray) -> tuple[str, ...]:
 
 
 def _range(coordinate: xr.DataArray) -> tuple[str, str, str, str]:
-    """Smallest and largest value of a coordinate, number of values, and how they are spaced."""
+    """Find the ends of a coordinate, the number of values, and how they are spaced."""
     ends, large = ("–", "–"), is_large(coordinate.variable)
     if large:
         extremes = extremes_of(coordinate.to_dataset(name="values"), "values")
@@ -237,7 +237,7 @@ def _range(coordinate: xr.DataArray) -> tuple[str, str, str, str]:
 
 
 def _spacing(values: NDArray[Any]) -> str:
-    """The spacing of values, or the values.
+    """Write the spacing of values, or the values.
 
     >>> _spacing(np.array([0.0, 0.5, 1.0])), _spacing(np.array([1.0, 10.0, 100.0])), _spacing(np.array([2.0, 1.0]))
     ('even, by 0.5', 'geometric, by 10', '2, 1')
@@ -254,7 +254,7 @@ def _spacing(values: NDArray[Any]) -> str:
 
 
 def _rank_models(dataset: xr.Dataset) -> tuple[Ranking | None, str]:
-    """The ranking of the models, None if they cannot be ranked, and the answer in a sentence."""
+    """Rank the models, if possible, and write the answer in a sentence."""
     try:
         ranked = rank_models(rankable_parts(dataset, {}, None, MAX_SUMMARY_POINTS), DEFAULT_TOL)
     except UsageError as error:
@@ -263,7 +263,7 @@ def _rank_models(dataset: xr.Dataset) -> tuple[Ranking | None, str]:
 
 
 def _failures_section(dataset: xr.Dataset, summary: Summary) -> dict[str, Any]:
-    """Sentences about failed points, the first failed points, and the number of the others."""
+    """Describe failed points: sentences, the first points, and the number of the others."""
     if "status" not in dataset:
         return {"sentences": ["The result does not contain the status of the points."], "points": [], "more": ""}
     sentences = [f"The status of {summary.not_counted:,} points was not evaluated."] if summary.not_counted else []
@@ -281,7 +281,7 @@ def _failures_section(dataset: xr.Dataset, summary: Summary) -> dict[str, Any]:
 
 
 def _facts(dataset: xr.Dataset) -> list[tuple[str, str]]:
-    """Program, packages and settings that a result was computed with, its fingerprint and its seal."""
+    """List what a result was computed with, its fingerprint and its seal."""
     attributes, settings = dataset.attrs, ("rtol", "max_steps")
     packages = read_attribute(attributes, "packages")
     facts = {
@@ -301,19 +301,19 @@ def _facts(dataset: xr.Dataset) -> list[tuple[str, str]]:
     return [(name, str(fact)) for name, fact in facts.items() if fact]
 
 
-def _model_section(of_model: xr.Dataset) -> dict[str, Any]:
-    """Reference of a declaration, and its domain and evidence from the catalogue."""
+def _model_section(model_data: xr.Dataset) -> dict[str, Any]:
+    """Describe a model: its reference, and its domain and evidence from the catalogue."""
     key, title, year, equation, reference, doi = (
-        str(of_model[name].item()) for name in ("model", "title", "year", "equation", "reference", "doi")
+        str(model_data[name].item()) for name in ("model", "title", "year", "equation", "reference", "doi")
     )
     declaration = catalogue().get(key)
     # a plug-in, or another version of the program, may use this key for another law
     declaration = declaration if declaration is not None and declaration.equation == equation else None
     evidence = []
     if declaration:
-        about = declaration.evidence
-        source = [about.source, f"DOI seen in {about.doi}" if about.doi else "", about.note]
-        evidence.append((key, about.state, "; ".join(filter(None, source)) or "–"))
+        seen = declaration.evidence
+        source = [seen.source, f"DOI seen in {seen.doi}" if seen.doi else "", seen.note]
+        evidence.append((key, seen.state, "; ".join(filter(None, source)) or "–"))
     is_doi = re.fullmatch(r"10\.[0-9]{4,}/\S+", doi)
     return {
         "key": key,

@@ -119,7 +119,7 @@ def encode_attribute(text: str) -> NDArray[Any]:
 
 
 def _storage_options(variable: xr.DataArray, output: Output) -> dict[str, Any]:
-    """Options of a variable: contiguous unless the config sets compression or chunks."""
+    """Choose the options of a variable: contiguous unless the config sets compression or chunks."""
     if not variable.ndim or (output.compression == "none" and not output.chunks):
         return {}
     if output.chunks:

@@ -29,7 +29,7 @@ from ..contact.materials import Material
 from ..contact.model import ForceModel
 from ..contact.models import find
 from ..contact.outputs import collide
-from ..contact.status import Status
+from ..contact.status import FIRST_FAILURE, Status
 from ..contact.timestep import EXACT
 from ..contact.units import with_numbers
 from ..contact.variables import HISTORY, OUTPUTS
@@ -105,6 +105,10 @@ class Impact(Displayed):
     @property
     def status(self) -> Status:
         return Status(int(self.values["status"]))
+
+    @property
+    def failed(self) -> bool:
+        return self.status >= FIRST_FAILURE
 
     @property
     def why_no_history(self) -> str:

@@ -170,9 +170,8 @@ def sensitivity_plan(plan: Plan, of: Sequence[str], max_points: int, name: str) 
         raise ConfigError(f"{name}: design.n: {problem}")
     names = list(config.distributions)
     models = {model.key: model for model in config.models}
-    quantities = {key: q for key in names if (q := InputName.parse(key).quantity(models)) is not None}
     u = unit_samples(config.design, 2 * len(names))
-    parts = [draw_columns(config.distributions, quantities, part) for part in np.split(u, 2, axis=1)]
+    parts = [draw_columns(config.distributions, models, part) for part in np.split(u, 2, axis=1)]
     problems = dict(problem for _, of_part in parts for problem in of_part.items())
     if problems:
         paths = {key: path_text(InputName.parse(key).path) for key in problems}
