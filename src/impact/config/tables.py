@@ -128,7 +128,7 @@ class MaterialTable(Table):
 
 
 def quantities_of(table: type[Table]) -> dict[str, Quantity]:
-    """List the quantities of a table by key."""
+    """Find the quantities of a table by key."""
     return {
         name: annotation
         for name, field in table.model_fields.items()
@@ -348,7 +348,7 @@ class Document(Table):
 
 
 def document_type(models_by_key: Mapping[str, ForceModel], with_tables: Sequence[str]) -> type[Document]:
-    """Create the type of a whole config, in which models with tables have a table for their parameters."""
+    """Build the type of a whole config, in which some models have a table for their parameters."""
     for table in (Sweep, MaterialTable, Data, Design):
         # built once; the type of each config then contains it
         table.model_rebuild()
@@ -420,7 +420,7 @@ def _model_names(models: Mapping[str, ForceModel]) -> Any:
 def expand_models(
     selection: object, models: Mapping[str, ForceModel]
 ) -> tuple[list[ForceModel], list[ConfigProblem]]:
-    """Expand a key, "all", "family:NAME", a pattern, or a list of those, in which "!" excludes; list problems."""
+    """Find the models of a key, "all", "family:NAME", a pattern, or a list of those, some excluded by "!"."""
     if not isinstance(selection, str | list) or not selection:
         return [], [((), mismatch_error(selection, MODELS_EXPECTED).message())]
     selected: dict[str, ForceModel] = {}
