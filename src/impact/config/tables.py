@@ -128,7 +128,7 @@ class MaterialTable(Table):
 
 
 def quantities_of(table: type[Table]) -> dict[str, Quantity]:
-    """The quantities of a table by key."""
+    """Find the quantities of a table by key."""
     return {
         name: annotation
         for name, field in table.model_fields.items()
@@ -151,16 +151,7 @@ LAW_STIFFNESS = Quantity("N/m^n", "stiffness of this law, in place of the sweep'
 
 @dataclass(frozen=True, config=ConfigDict(extra="forbid", json_schema_extra=simplify_schema))
 class Solver:
-    """How impacts are integrated.
-
-    Parameters
-    ----------
-    rtol : relative tolerance
-    max_steps : steps that one impact may take
-    collapse : integrate impacts that are the same in the contact's own units once; changes no bit
-    core : "numpy"; "numba", which compiles what it can; or "auto", depending on the number of trajectories
-    integrator : "exact", the continuous law with error control; or a scheme with a fixed step
-    """
+    """How impacts are integrated."""
 
     rtol: Annotated[float, Quantity("1", "relative tolerance of the integration", 1e-13, 1e-4)] = DEFAULT_RTOL
     max_steps: Annotated[
@@ -191,17 +182,7 @@ def _list_or_none(value: object) -> object:
 
 @dataclass(frozen=True, config=ConfigDict(extra="forbid", json_schema_extra=simplify_schema))
 class Output:
-    """What of a result is stored, and how.
-
-    Parameters
-    ----------
-    variables : of the result, or None for all
-    dtype : of its floating-point numbers, "float64" or "float32"; coordinates are float64
-    compression : "none" or "gzip"
-    chunks : the lengths along the axes, by name, of the chunks in which it is stored; empty for one piece
-    layout : "full", all values; "factored", the trajectories, from which they are computed when they are read; or
-        "auto", in full up to 10^7 points
-    """
+    """What of a result is stored, and how."""
 
     variables: Annotated[
         tuple[OutputVariable, ...] | None,
@@ -367,13 +348,7 @@ class Document(Table):
 
 
 def document_type(models_by_key: Mapping[str, ForceModel], with_tables: Sequence[str]) -> type[Document]:
-    """The type of a whole config.
-
-    Parameters
-    ----------
-    models_by_key : the models that the config may name
-    with_tables : keys of the models that have a table for their parameters
-    """
+    """Build the type of a whole config, in which some models have a table for their parameters."""
     for table in (Sweep, MaterialTable, Data, Design):
         # built once; the type of each config then contains it
         table.model_rebuild()
@@ -445,13 +420,7 @@ def _model_names(models: Mapping[str, ForceModel]) -> Any:
 def expand_models(
     selection: object, models: Mapping[str, ForceModel]
 ) -> tuple[list[ForceModel], list[ConfigProblem]]:
-    """The models that a selection names, and its problems.
-
-    Parameters
-    ----------
-    selection : a key, "all", "family:NAME", a pattern, or a list of those; those after "!" are excluded
-    models : all models by key
-    """
+    """Find the models of a key, "all", "family:NAME", a pattern, or a list of those, some excluded by "!"."""
     if not isinstance(selection, str | list) or not selection:
         return [], [((), mismatch_error(selection, MODELS_EXPECTED).message())]
     selected: dict[str, ForceModel] = {}
