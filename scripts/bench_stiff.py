@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from tests.problems import hysteresis_reference, table1_impacts
 
-from impact.config.load import DEFAULT_RTOL
+from impact.config.tables import DEFAULT_RTOL
 from impact.contact.models import find
 from impact.contact.outputs import collide
 

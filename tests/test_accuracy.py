@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
-from impact.config.load import DEFAULT_RTOL
+from impact.config.tables import DEFAULT_RTOL
 from impact.contact import motion
 from impact.contact.closed_forms.elastic import contact_time_ratio, peak_indentation
 from impact.contact.closed_forms.hysteresis import damped_peak_indentation

@@ -12,7 +12,7 @@ import xarray as xr
 from hypothesis import given, settings, strategies as st
 
 import impact
-from impact.config.load import Axis
+from impact.config.grid import Axis
 from impact.contact.variables import OUTPUTS
 from impact.engine.plan import MAX_FULL_REPEATED, Plan
 from impact.errors import UsageError

@@ -11,7 +11,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, minimize_scalar
 
-from impact.config.load import DEFAULT_RTOL
+from impact.config.tables import DEFAULT_RTOL
 from impact.contact.closed_forms.dashpot import (
     approach_damping,
     approach_restitution,

@@ -390,7 +390,7 @@ def test_just_below_the_tolerance_is_equal_and_just_above_is_not(by_hand: xr.Dat
         (difference,) = different.differing
         assert (difference.name, difference.tolerance, difference.at["e"]) == (name, tol, 0.5)
         assert (difference.different, difference.points) == (1, by_hand[name].size)
-        assert difference.ratio == pytest.approx(1.001, rel=1e-6)
+        assert difference.ratio == difference.times == pytest.approx(1.001, rel=1e-6)
         assert difference.worst == pytest.approx(1.001 * tol * scale, rel=1e-6)
         assert different.headline == f"not equal: values ({name})"
         # at tolerance 0 the next number is a difference

@@ -16,8 +16,8 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import impact
-from impact.config.load import Config, Output, Solver, parse_config, read_config
-from impact.config.tables import expand_models
+from impact.config.load import Config, parse_config, read_config
+from impact.config.tables import Output, Solver, expand_models
 from impact.contact.materials import Material
 from impact.contact.model import ForceModel, Parameter
 from impact.contact.models import catalogue

@@ -12,7 +12,7 @@ import pytest
 import xarray as xr
 
 import impact
-from impact.config.load import Axis
+from impact.config.grid import Axis
 from impact.contact.materials import Material
 from impact.contact.variables import OUTPUTS
 from impact.engine.plan import Plan

@@ -186,12 +186,7 @@ def atomic_write(path: Path, *, overwrite: bool, part: Path | None = None) -> It
 
 
 def check_output(path: Path, *, overwrite: bool, source: Path | None = None) -> None:
-    """Refuse an output that cannot be written, before any work starts, or that is the file to be read.
-
-    Raises
-    ------
-    UsageError : it exists and must not be overwritten, is not a regular file, or its folder is not writable
-    """
+    """Raise a UsageError, before any work, for an output that cannot be written or is the file to be read."""
     folder = path.parent
     if not folder.is_dir():
         raise UsageError(f"{path}: the folder {folder} does not exist")
@@ -213,18 +208,7 @@ def check_output(path: Path, *, overwrite: bool, source: Path | None = None) -> 
 
 
 def check_outputs(outputs: Iterable[str | Path | None], inputs: Iterable[object], *, overwrite: bool) -> None:
-    """Refuse outputs that cannot be written, or that are a file which the command reads.
-
-    Parameters
-    ----------
-    outputs : the files to write; None for an output that is not wanted
-    inputs : what is read; other values than paths, such as mappings and models, are no files
-    overwrite : whether the outputs may exist
-
-    Raises
-    ------
-    UsageError : see `check_output`; or two outputs are the same file
-    """
+    """Check several outputs, but those that are None, against each path among the inputs; see `check_output`."""
     paths = [Path(output) for output in outputs if output is not None]
     sources: list[Path | None] = [Path(source) for source in inputs if isinstance(source, str | Path)]
     for path in paths:
@@ -248,13 +232,7 @@ def _check_name_length(path: Path) -> None:
 
 
 def write_file(path: Path, content: bytes | memoryview, *, overwrite: bool) -> None:
-    """Write a file atomically: its name appears when it is complete, and it survives a power failure.
-
-    Raises
-    ------
-    UsageError : see `check_output`
-    StoreError : the disk is full or failed; no file of that name is left
-    """
+    """Write a file atomically: its name appears when it is complete, and it survives a power failure."""
     check_output(path, overwrite=overwrite)
     with atomic_write(path, overwrite=overwrite) as sink:
         sink.write(content)

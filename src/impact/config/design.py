@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from ..array_types import Array
-from .input_names import input_values
-from .quantities import DISTRIBUTION_FORMS, ConfigProblem, Distribution, KeyPath, Quantity, as_text
+from ..contact.model import ForceModel
+from .input_names import InputName, input_values
+from .quantities import DISTRIBUTION_FORMS, ConfigProblem, Distribution, KeyPath, as_text
 from .tables import Design
 
 # samples of a unit interval stay this far from its ends, half the resolution of a Sobol sequence, so that no value
@@ -19,14 +20,14 @@ LEAST_UNIT = 2.0**-31
 
 
 def distribution_paths(data: Mapping[str, Any]) -> Iterator[KeyPath]:
-    """The path of every distribution in the plain data of a config."""
+    """List the path of every distribution in the data of a config."""
     for name, value in input_values(data):
         if isinstance(value, dict) and not DISTRIBUTION_FORMS.keys().isdisjoint(value):
             yield name.path
 
 
 def design_problems(data: Mapping[str, Any]) -> list[ConfigProblem]:
-    """The problem of distributions without [design], or of [design] without a distribution."""
+    """Check that distributions have a [design], and that a [design] has distributions."""
     paths = list(distribution_paths(data))
     if paths and "design" not in data:
         return [
@@ -44,8 +45,8 @@ def design_problems(data: Mapping[str, Any]) -> list[ConfigProblem]:
 
 
 def unit_samples(design: Design, dimensions: int) -> Array:
-    """Samples of the unit cube, shape (n, dimensions)."""
-    # it takes a third of a second, which sweeps without a design do without
+    """Draw samples of the unit cube, shape (n, dimensions)."""
+    # imported here: scipy.stats is slow to import
     from scipy.stats import qmc
 
     random = np.random.default_rng(design.seed)
@@ -62,7 +63,7 @@ def unit_samples(design: Design, dimensions: int) -> Array:
 
 
 def draw(distribution: Distribution, u: Array) -> Array:
-    """The values of a distribution at probabilities u: the inverse of its cumulative distribution function.
+    """Evaluate the inverse of the cumulative distribution function at probabilities u.
 
     >>> draw(Distribution(triangular=(0.0, 1.0, 2.0)), np.array([0.125, 0.5, 0.875])).tolist()
     [0.5, 1.0, 1.5]
@@ -99,25 +100,22 @@ def _draw(kind: str, numbers: Sequence[float], u: Array) -> Array:
 
 
 def draw_columns(
-    distributions: Mapping[str, Distribution], quantities: Mapping[str, Quantity], u: Array
+    distributions: Mapping[str, Distribution], models: Mapping[str, ForceModel], u: Array
 ) -> tuple[dict[str, Array], dict[str, str]]:
-    """The drawn values of each input.
+    """Draw the values of each input, and list those that its quantity does not allow; both by config name.
 
     Parameters
     ----------
     distributions : by config name
-    quantities : the quantity of each input, whose interval the values have to be in
+    models : all models by key
     u : samples of the unit cube, shape (n, inputs)
-
-    Returns
-    -------
-    The values and the problems, both by config name.
     """
     columns: dict[str, Array] = {}
     problems: dict[str, str] = {}
-    for (name, distribution), of_input in zip(distributions.items(), u.T, strict=True):
-        columns[name] = drawn = draw(distribution, of_input)
-        quantity = quantities[name]
+    for (name, distribution), probabilities in zip(distributions.items(), u.T, strict=True):
+        columns[name] = drawn = draw(distribution, probabilities)
+        quantity = InputName.parse(name).quantity(models)
+        assert quantity is not None
         above = drawn > quantity.least if quantity.above else drawn >= quantity.least
         refused = drawn[~(above & (drawn <= quantity.most) & np.isfinite(drawn))]
         if refused.size:

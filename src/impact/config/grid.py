@@ -10,8 +10,9 @@ from pydantic import ValidationError
 
 from ..contact.variables import BY_DEFAULT
 from ..errors import did_you_mean
+from .draft import Draft
 from .input_names import InputName
-from .quantities import MAX_PROBLEMS, ConfigProblem, Names, Numbers, Quantity, Range, as_text
+from .quantities import MAX_PROBLEMS, ConfigProblem, Names, Numbers, Range, as_text
 
 # default limit of the points of all models together
 MAX_POINTS = 10**9
@@ -71,36 +72,30 @@ class Grid:
 
 
 def build_grid(
+    draft: Draft,
     values: Mapping[str, Numbers | Names],
-    quantities: Mapping[str, Quantity],
     groups: Sequence[Sequence[str]],
-    cases: Sequence[str],
     samples: Sequence[str],
-    config_names: Sequence[str],
-    n_models: int,
-    max_points: int = MAX_POINTS,
+    max_points: int,
     *,
-    in_full: bool = True,
+    in_full: bool,
 ) -> Grid:
-    """Build the grid that the valid values of a config span; they, and all other names, are by config name.
+    """Build the grid that valid values span, by config name; `groups` and `samples` name those that vary together.
 
-    Parameters
-    ----------
-    groups, cases, samples : names that vary together: of zip groups, columns of cases, and uncertain inputs
-    config_names : all names in the config, also those with invalid values
-    in_full : every point is stored; otherwise the number of trajectories is limited later
+    Unless every point is stored (`in_full`), the number of trajectories is limited later.
     """
+    cases = [str(InputName.of_path(path)) for path in draft.cases]
     axis_sizes = {name: _axis_size(value) for name, value in values.items()}
     scalars = {name: value for name, value in values.items() if isinstance(value, float | str)}
     together = dict.fromkeys(cases, "a column of cases") | dict.fromkeys(samples, "an uncertain input")
-    member_of, problems = _zip_groups(groups, axis_sizes, together, config_names)
+    member_of, problems = _zip_groups(groups, axis_sizes, together, draft.input_names)
     for numbered in (cases, samples):
         columns_of = [name for name in values if name in numbered]
         member_of |= dict.fromkeys(columns_of, columns_of)
     axis_names = [name for name in values if name not in scalars]
     # a group takes the position of its first member
     leaders = [name for name in axis_names if member_of.get(name, (name,))[0] == name]
-    points = math.prod(axis_sizes[name] or 1 for name in leaders) * n_models
+    points = math.prod(axis_sizes[name] or 1 for name in leaders) * len(draft.models)
     if len(leaders) > MAX_AXES:
         problems.append((("sweep",), f"got {len(leaders)} axes, expected at most {MAX_AXES}"))
     limit = max_points if in_full else MAX_COUNTED_POINTS
@@ -116,8 +111,10 @@ def build_grid(
             if name not in member_of:
                 problems += _repetition_problems(name, value)
         elif isinstance(value, Range) and points <= limit:
+            quantity = InputName.parse(name).quantity(draft.known_models)
+            assert quantity is not None
             try:
-                columns[name] = value.values(quantities[name])
+                columns[name] = value.values(quantity)
             except ValidationError as error:
                 problems += [
                     ((*InputName.parse(name).path, *detail["loc"]), detail["msg"]) for detail in error.errors()

@@ -15,6 +15,7 @@ from ..contact.model import ForceModel
 from ..contact.numba.dispatch import is_installed
 from ..contact.timestep import EXACT
 from ..contact.variables import BY_DEFAULT
+from . import measurements, quantities, tables
 from .columns import expand_cases, named_files, read_files
 from .design import design_problems, distribution_paths, draw_columns, unit_samples
 from .draft import Draft, Setting, add_library_materials, open_config, open_text
@@ -23,50 +24,8 @@ from .grid import MAX_POINTS, Axis, build_grid, chunk_problems
 from .input_names import InputName
 from .library import library
 from .lines import validation_problems
-from .measurements import (
-    Measurements,
-    count_problems,
-    fit_paths,
-    purpose_problems,
-    read_data_file,
-    read_measurements,
-)
-from .quantities import (
-    Column,
-    ConfigProblem,
-    Distribution,
-    FitRange,
-    KeyPath,
-    Names,
-    Numbers,
-    Range,
-    Table,
-    ValidationContext,
-)
+from .quantities import Column, ConfigProblem, Distribution, FitRange, KeyPath
 from .rules import check_rules, materials_of
-from .tables import (
-    DEFAULT_RTOL,
-    FIXED_STEP_DEFAULTS,
-    SWEEP_DEFAULTS,
-    Design,
-    Document,
-    MaterialTable,
-    Output,
-    Solver,
-    document_type,
-)
-
-__all__ = [
-    "DEFAULT_RTOL",
-    "Axis",
-    "Config",
-    "Measurements",
-    "Output",
-    "Purpose",
-    "Solver",
-    "parse_config",
-    "read_config",
-]
 
 # what a config is read for: only a calibration has measurements and parameters to fit, only a sweep has axes
 Purpose = Literal["sweep", "calibrate"]
@@ -104,13 +63,13 @@ class Config:
     scalars: Mapping[str, float | str]
     axes: tuple[Axis, ...]
     materials: Mapping[str, Material]
-    solver: Solver
-    output: Output
+    solver: tables.Solver
+    output: tables.Output
     text: str
     settings: tuple[Setting, ...] = field(repr=False, compare=False)
     fits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    data: Measurements | None = None
-    design: Design | None = None
+    data: measurements.Measurements | None = None
+    design: tables.Design | None = None
     distributions: Mapping[str, Distribution] = field(default_factory=dict)
     files: tuple[Path, ...] = field(default=(), repr=False, compare=False)
 
@@ -127,19 +86,9 @@ def read_config(
     max_points: int = MAX_POINTS,
     purpose: Purpose = "sweep",
 ) -> Config:
-    """Read the config of a TOML file or a mapping.
+    """Read the config of a TOML file or a mapping, with overrides such as "sweep.e.linspace=[0,1,11]".
 
-    Parameters
-    ----------
-    source : path of a TOML file, or a mapping with the same keys; the names of CSV files are relative to the
-        folder of the TOML file, or for a mapping to the working directory
-    overrides : strings such as "sweep.e.linspace=[0,1,11]"
-    plugins : models that are not built in
-    max_points, purpose : see `build`
-
-    Raises
-    ------
-    ConfigError : with all problems, one per line
+    The names of CSV files are relative to the folder of the TOML file, or for a mapping to the working directory.
 
     >>> steel = {"E": "210 GPa", "nu": 0.3, "rho": 7850}
     >>> sweep = {"e": [0.5, 1], "v1": 1, "m1": 1, "m2": 1, "material": "steel"}
@@ -167,23 +116,15 @@ def parse_config(
 
 
 def build(draft: Draft, max_points: int = MAX_POINTS, purpose: Purpose = "sweep") -> Config:
-    """Check a draft and build its config.
+    """Check a draft and build its config, or raise a ConfigError with all problems, one per line.
 
-    Parameters
-    ----------
-    draft : with all settings
-    max_points : limit of the points of all models together, checked before any array is allocated
-    purpose : "sweep" refuses measurements and parameters to fit; "calibrate" requires them and refuses axes
-
-    Raises
-    ------
-    ConfigError : with all problems, one per line
+    The limit of points, of all models together, is checked before any array is allocated.
     """
     if purpose == "sweep" and not draft.problems:
-        draft = draft.with_problems(purpose_problems(draft.data))
+        draft = draft.with_problems(measurements.purpose_problems(draft.data))
     if draft.problems:
         raise draft.error()
-    for step in (inline_files, add_library_materials, expand_cases, read_measurements):
+    for step in (inline_files, add_library_materials, expand_cases, measurements.read_measurements):
         draft = step(draft)
     document, invalid_values = _validate(draft)
     draft = check_rules(draft.with_problems(invalid_values))
@@ -197,32 +138,22 @@ def build(draft: Draft, max_points: int = MAX_POINTS, purpose: Purpose = "sweep"
         values = {name: value for name, value in values.items() if isinstance(value, float | str)}
     else:
         draft = draft.with_problems(design_problems(draft.data))
-    optional = {name: InputName.parse(name).quantity(draft.known_models) for name in values}
-    quantities = {name: quantity for name, quantity in optional.items() if quantity is not None}
     distributions = {name: value for name, value in values.items() if isinstance(value, Distribution)}
     if distributions and document.design is not None:
         u = unit_samples(document.design, len(distributions))
-        drawn, draw_problems = draw_columns(distributions, quantities, u)
+        drawn, draw_problems = draw_columns(distributions, draft.known_models, u)
         draft = draft.with_problems(
             (InputName.parse(name).path, message) for name, message in draw_problems.items()
         )
         values |= {name: tuple(column.tolist()) for name, column in drawn.items()}
-    grid = build_grid(
-        values,
-        quantities,
-        document.sweep.zip if purpose == "sweep" else (),
-        [str(InputName.of_path(path)) for path in draft.cases] if purpose == "sweep" else (),
-        list(distributions),
-        draft.input_names,
-        len(draft.models),
-        max_points,
-        in_full=document.output.is_full,
-    )
+    groups = document.sweep.zip if purpose == "sweep" else ()
+    in_full = document.output.is_full
+    grid = build_grid(draft, values, groups, list(distributions), max_points, in_full=in_full)
     draft = draft.with_problems(grid.problems)
     if not draft.problems:
         draft = draft.with_problems(_settings_problems(document, grid.axes, len(draft.models)))
     if not draft.problems and draft.measurements is not None:
-        draft = draft.with_problems(count_problems(draft.measurements, fits, draft.models))
+        draft = draft.with_problems(measurements.count_problems(draft.measurements, fits, draft.models))
     if draft.problems or draft.lines:
         raise draft.error()
     measured = draft.measurements.inputs if draft.measurements is not None else {}
@@ -254,7 +185,7 @@ def inline_files(draft: Draft) -> Draft:
     if draft.files is not None:
         return draft
     draft = replace(draft, files=tuple((draft.folder or Path()) / file for file in named_files(draft.data)))
-    for read in (read_files, read_data_file):
+    for read in (read_files, measurements.read_data_file):
         values, lines = read(draft)
         draft = replace(draft, lines=(*draft.lines, *lines))
         for path, value in values.items():
@@ -264,12 +195,12 @@ def inline_files(draft: Draft) -> Draft:
     return draft
 
 
-def _validate(draft: Draft) -> tuple[Document | None, list[ConfigProblem]]:
+def _validate(draft: Draft) -> tuple[tables.Document | None, list[ConfigProblem]]:
     """Build the document of the valid part, or None, and list the problems of single values."""
     with_tables = [key for key in draft.table("model") if key in draft.known_models]
-    document = document_type(draft.known_models, with_tables)
+    document = tables.document_type(draft.known_models, with_tables)
     materials = tuple({**draft.table("materials"), **library()})
-    context = ValidationContext(draft.exponent, materials, draft.known_models)
+    context = quantities.ValidationContext(draft.exponent, materials, draft.known_models)
     try:
         return document.model_validate(draft.data, context=context), []
     except ValidationError as error:
@@ -281,10 +212,10 @@ def _validate(draft: Draft) -> tuple[Document | None, list[ConfigProblem]]:
         return None, problems
 
 
-def _default_scalars(models: Iterable[ForceModel], solver: Solver) -> dict[str, float]:
+def _default_scalars(models: Iterable[ForceModel], solver: tables.Solver) -> dict[str, float]:
     """List the defaults of inputs and of parameters by config name."""
-    fixed_step = {} if solver.integrator == EXACT else FIXED_STEP_DEFAULTS
-    return {**SWEEP_DEFAULTS, **fixed_step} | {
+    fixed_step = {} if solver.integrator == EXACT else tables.FIXED_STEP_DEFAULTS
+    return {**tables.SWEEP_DEFAULTS, **fixed_step} | {
         f"{model.key}.{parameter.name}": parameter.default
         for model in models
         for parameter in model.parameters
@@ -308,7 +239,7 @@ def _remove_invalid(data: Mapping[str, Any], problems: Iterable[ConfigProblem]) 
     return valid_data
 
 
-def _valid_values(document: Document, draft: Draft) -> dict[str, Numbers | Names]:
+def _valid_values(document: tables.Document, draft: Draft) -> dict[str, quantities.Numbers | quantities.Names]:
     """List valid values by config name: keys of [sweep], varying or fitted properties of balls, and parameters."""
     sweep = _values_by_key(document.sweep)
     values = {name: sweep[name] for name in draft.table("sweep") if name in sweep and name not in ("zip", "cases")}
@@ -317,11 +248,11 @@ def _valid_values(document: Document, draft: Draft) -> dict[str, Numbers | Names
         for name, value in _values_by_key(table).items() if material in used_materials else ():
             if not isinstance(value, float):
                 values[f"materials.{material}.{name}"] = value
-    tables = _values_by_key(document.model)
+    parameter_tables = _values_by_key(document.model)
     selected = {model.key for model in draft.models}
     for key in draft.table("model"):
         # parameters of models that are not selected are checked, but are not part of the grid
-        parameters = _values_by_key(tables.get(key)) if key in selected else {}
+        parameters = _values_by_key(parameter_tables.get(key)) if key in selected else {}
         values |= {f"{key}.{name}": value for name, value in parameters.items()}
     # a file that is left cannot be read
     return {
@@ -332,23 +263,23 @@ def _valid_values(document: Document, draft: Draft) -> dict[str, Numbers | Names
     }
 
 
-def _values_by_key(table: Table | None) -> dict[str, Any]:
-    """The values that are set in a table, by key, in the order of definition."""
+def _values_by_key(table: quantities.Table | None) -> dict[str, Any]:
+    """List the values that are set in a table, by key, in the order of definition."""
     if table is None:
         return {}
     fields = type(table).model_fields
     return {fields[name].alias or name: getattr(table, name) for name in fields if name in table.model_fields_set}
 
 
-def _build_material(table: MaterialTable) -> Material:
-    """The material of a table, without the properties that are axes."""
+def _build_material(table: tables.MaterialTable) -> Material:
+    """Build a material without the properties that are axes."""
     numbers = {name: value for name, value in _values_by_key(table).items() if isinstance(value, float)}
     return Material(**({"E": math.nan, "nu": math.nan} | numbers))
 
 
 def _calibration_problems(
     data: Mapping[str, Any],
-    values: Mapping[str, Numbers | Names],
+    values: Mapping[str, quantities.Numbers | quantities.Names],
     fits: Mapping[str, tuple[float, float]],
     *,
     are_valid: bool,
@@ -363,15 +294,15 @@ def _calibration_problems(
         problems.append(
             (("data",), 'missing, expected a table [data] of measurements, such as file = "drops.csv"')
         )
-    if not fits and not list(fit_paths(data)):
+    if not fits and not list(measurements.fit_paths(data)):
         problems.append((("sweep",), "got no parameter to fit, expected at least one { fit = [least, most] }"))
     elif not fits and are_valid:
         problems += [
             (path, "got a fit, expected a value: no model and no ball of this config uses it")
-            for path in fit_paths(data)
+            for path in measurements.fit_paths(data)
         ]
     for name, value in values.items():
-        if isinstance(value, tuple | Range):
+        if isinstance(value, tuple | quantities.Range):
             problems.append((InputName.parse(name).path, f"got an axis, {single}"))
     uncertain = next(distribution_paths(data), ("design",) if "design" in data else ())
     if uncertain:
@@ -381,8 +312,8 @@ def _calibration_problems(
     return problems
 
 
-def _settings_problems(document: Document, axes: Sequence[Axis], n_models: int) -> list[ConfigProblem]:
-    """Problems of [solver] and [output] with the rest of the config, or with the installed packages."""
+def _settings_problems(document: tables.Document, axes: Sequence[Axis], n_models: int) -> list[ConfigProblem]:
+    """Check [solver] and [output] against the grid and the installed packages."""
     output = document.output
     problems: list[ConfigProblem] = []
     if document.solver.core == "numba" and not is_installed():

@@ -48,26 +48,26 @@ def in_parts(
     sides = np.array([np.sign(breakpoint(start, params)) for breakpoint in breakpoints])
     between = replace(problem, event=_first_event(problem, breakpoints))
     recorded: list[Step] = []
-    where = np.arange(n)
+    rows = np.arange(n)
     for _ in range(MAX_PARTS_PER_BREAKPOINT * len(breakpoints)):
-        part_params = (*(column[where] for column in params), *sides[:, where])
-        part = run(between, state[:, where], part_params)
+        part_params = (*(column[rows] for column in params), *sides[:, rows])
+        part = run(between, state[:, rows], part_params)
         recorded += part.recorded
-        total.maximum[where] = np.fmax(total.maximum[where], part.maximum)
-        total.steps[where] += part.steps
-        state[:, where] = part.state
+        total.maximum[rows] = np.fmax(total.maximum[rows], part.maximum)
+        total.steps[rows] += part.steps
+        state[:, rows] = part.state
         k = problem.rates(part.state[:N_COMPONENTS], part_params)
         met = _reached(problem, breakpoints, part.state[:N_COMPONENTS], k, part_params)
         at_breakpoint = (part.termination == Termination.EVENT_REACHED) & met.any(axis=0)
-        sides[:, where] = np.where(met, -sides[:, where], sides[:, where])
-        state[:, where] += STEP_BEYOND * np.minimum(part.state[0], 1.0) * k[:N_INTEGRATED]
-        done = where[~at_breakpoint]
+        sides[:, rows] = np.where(met, -sides[:, rows], sides[:, rows])
+        state[:, rows] += STEP_BEYOND * np.minimum(part.state[0], 1.0) * k[:N_INTEGRATED]
+        done = rows[~at_breakpoint]
         total.termination[done], total.state[:, done] = (
             part.termination[~at_breakpoint],
             part.state[:, ~at_breakpoint],
         )
-        where = where[at_breakpoint]
-        if not where.size:
+        rows = rows[at_breakpoint]
+        if not rows.size:
             break
     return replace(total, recorded=tuple(recorded))
 

@@ -60,8 +60,8 @@ def powers(base: Array, exponent: Array) -> Array:
     base, exponent = np.broadcast_arrays(base, exponent)
     result = np.power(base, exponent)
     for scalar in exponents[is_reproducible(exponents)]:
-        where = exponent == scalar
-        result[where] = power(base[where], float(scalar))
+        mask = exponent == scalar
+        result[mask] = power(base[mask], float(scalar))
     return result
 
 

@@ -94,10 +94,10 @@ class CollisionResult:
             exact=np.full(n, np.nan),
         )
 
-    def put(self, where: Positions | NDArray[np.bool_], part: CollisionResult) -> None:
+    def put(self, rows: Positions | NDArray[np.bool_], part: CollisionResult) -> None:
         """Write the arrays of a part to its positions."""
         for field in fields(self):
-            getattr(self, field.name)[where] = getattr(part, field.name)
+            getattr(self, field.name)[rows] = getattr(part, field.name)
 
     @classmethod
     def joined(
@@ -108,13 +108,13 @@ class CollisionResult:
             return parts[0][1]
         result = cls.blank(n)
         result.status[:] = status
-        for where, part in parts:
-            result.put(where, part)
+        for rows, part in parts:
+            result.put(rows, part)
         return result
 
-    def take(self, where: Positions) -> CollisionResult:
+    def take(self, rows: Positions) -> CollisionResult:
         """Select the impacts at some positions."""
-        return CollisionResult(**{field.name: getattr(self, field.name)[where] for field in fields(self)})
+        return CollisionResult(**{field.name: getattr(self, field.name)[rows] for field in fields(self)})
 
 
 # integrates impacts with the same n: the model, n, the values and the number of impacts, and `collapse`
@@ -175,18 +175,18 @@ def simulate(
     with np.errstate(all="ignore"):
         for exponent in distinct_values(n):
             chosen = (status == STATUS_OK) & (n == exponent)
-            count, where = int(np.count_nonzero(chosen)), positions(chosen)
+            count, rows = int(np.count_nonzero(chosen)), positions(chosen)
             if count:
-                chosen_values = _values_at(values, where)
+                chosen_values = _values_at(values, rows)
                 part = _isolate_failures(
                     model, float(exponent), chosen_values, count, simulate_part, collapse, errors
                 )
-                parts.append((where, part))
+                parts.append((rows, part))
     return CollisionResult.joined(n.size, status, parts)
 
 
-def _values_at(values: ValueArrays, where: Positions) -> ValueArrays:
-    return {name: array[where] for name, array in values.items()}
+def _values_at(values: ValueArrays, rows: Positions) -> ValueArrays:
+    return {name: array[rows] for name, array in values.items()}
 
 
 def _isolate_failures(
@@ -242,14 +242,14 @@ def _simulate_distinct(
         size = int(np.count_nonzero(chosen))
         if not size:
             continue
-        where = positions(chosen)
+        rows = positions(chosen)
         law = motion.MotionLaw.of(model, n, is_strongly_damped)
-        params = tuple(np.asarray(law_values[name])[where] for name in law.names)
+        params = tuple(np.asarray(law_values[name])[rows] for name in law.names)
         first, row_of_impact = deduplicate(params, (size,)) if collapse else (slice(None), slice(None))
-        never_separates = exact[where][first] == 0.0
+        never_separates = exact[rows][first] == 0.0
         distinct_params = tuple(column[first] for column in params)
         collision = integrate_both(law, distinct_params, never_separates.size, never_separates=never_separates)
-        parts.append((where, collision.result.take(row_of_impact)))
+        parts.append((rows, collision.result.take(row_of_impact)))
     result = replace(CollisionResult.joined(count, status, parts), chi=chi, exact=exact)
     stopped = status == LIMIT
     if stopped.any():
@@ -290,10 +290,10 @@ def _collide_at_fixed_steps(
     """Integrate impacts at a fixed step; if it is a part of the contact time, the continuous law comes first."""
     of_law = {name: array for name, array in values.items() if name not in (STEPS_PER_CONTACT, STEP, PHASE)}
 
-    def contact_times(where: Positions, size: int) -> tuple[Array, NDArray[np.int8]]:
+    def contact_times(rows: Positions, size: int) -> tuple[Array, NDArray[np.int8]]:
         """Compute the contact times of the continuous law, and statuses that are OK where there is one."""
         continuous = _simulate_distinct(
-            model, n, _values_at(of_law, where), size, integrate_both=integrate_both, collapse=collapse
+            model, n, _values_at(of_law, rows), size, integrate_both=integrate_both, collapse=collapse
         )
         never_ends = continuous.status == LIMIT
         return continuous.contact_time, np.where(never_ends, np.int8(Status.NOT_SEPARATED), continuous.status)
@@ -313,14 +313,14 @@ def _collide_at_fixed_steps(
         exact=exact_restitution(model, law_values, count),
     )
 
-    def collide(where: NDArray[np.intp]) -> None:
+    def collide(rows: NDArray[np.intp]) -> None:
         # at least the contacts of one step
-        limits = np.ceil(MAX_CONTACTS * np.maximum(times[where] / step[where], 1.0))
+        limits = np.ceil(MAX_CONTACTS * np.maximum(times[rows] / step[rows], 1.0))
         limits = np.fmin(limits, max_steps).astype(np.int64)
         fixed = collide_at_fixed_step(
-            model, n, _values_at(of_law, where), step[where], values[PHASE][where], limits, scheme
+            model, n, _values_at(of_law, rows), step[rows], values[PHASE][rows], limits, scheme
         )
-        _put_fixed_steps(result, where, fixed, step[where], limits >= max_steps)
+        _put_fixed_steps(result, rows, fixed, step[rows], limits >= max_steps)
 
     active = np.flatnonzero(status == STATUS_OK)
     if active.size:
@@ -339,17 +339,17 @@ def _collide_at_fixed_steps(
 
 def _put_fixed_steps(
     result: CollisionResult,
-    where: NDArray[np.intp],
+    rows: NDArray[np.intp],
     fixed: FixedStepResult,
     step: Array,
     is_limited: NDArray[np.bool_],
 ) -> None:
     """Write collisions at a fixed step to their positions; `is_limited` where the user limits the steps."""
     unfinished = np.where(is_limited, np.int8(Status.MAX_STEPS), np.int8(Status.NOT_SEPARATED))
-    result.status[where] = np.where(fixed.status == Status.NOT_SEPARATED, unfinished, fixed.status)
+    result.status[rows] = np.where(fixed.status == Status.NOT_SEPARATED, unfinished, fixed.status)
     for name in ("e_out", "peak", "permanent", "force", "approach_work", "restitution_work", "steps"):
-        getattr(result, name)[where] = getattr(fixed, name)
-    result.contact_time[where] = fixed.steps * step
+        getattr(result, name)[rows] = getattr(fixed, name)
+    result.contact_time[rows] = fixed.steps * step
 
 
 def _check_coefficients(
@@ -434,27 +434,27 @@ def integrate_phases(
     if stays.any():
         result.status[stays], result.e_out[stays] = LIMIT, 0.0
 
-    where = positions(result.status == STATUS_OK)
-    params, recovered = tuple(column[where] for column in params), recovered[where]
+    rows = positions(result.status == STATUS_OK)
+    params, recovered = tuple(column[rows] for column in params), recovered[rows]
     if not recovered.size:
         return RecordedCollision(result, approach, None, params)
     start = motion.start_of_restitution(back, params, recovered)
-    restitution = solve(forms[1], back, motion.restitution_problem(back), start, params, residual[where])
+    restitution = solve(forms[1], back, motion.restitution_problem(back), start, params, residual[rows])
     _mark_never_separating(back, restitution, params, recovered)
     e_out, work = -back.velocity(restitution.state, params), 2.0 * restitution.state[3]
     status = _status_of_solution(restitution)
     # the balls are held, or separate at zero speed after infinite time: all their energy is lost
     held = restitution.termination == Termination.EVENT_UNREACHABLE
     if held.any():
-        held &= motion.may_be_overdamped(back.model) | np.broadcast_to(never_separates, n)[where]
+        held &= motion.may_be_overdamped(back.model) | np.broadcast_to(never_separates, n)[rows]
         e_out[held], work[held], status[held] = 0.0, 0.0, LIMIT
-    result.e_out[where] = e_out
-    result.contact_time[where] += restitution.state[2]
-    result.restitution_work[where] = work
-    result.steps[where] += restitution.steps
-    result.status[where] = status
+    result.e_out[rows] = e_out
+    result.contact_time[rows] += restitution.state[2]
+    result.restitution_work[rows] = work
+    result.steps[rows] += restitution.steps
+    result.status[rows] = status
     if law.model.release == "force":
-        result.permanent[where] += motion.indentation(law, restitution.state[0])
+        result.permanent[rows] += motion.indentation(law, restitution.state[0])
     return RecordedCollision(result, approach, restitution, params)
 
 

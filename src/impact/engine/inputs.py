@@ -10,8 +10,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ..config.grid import Axis
 from ..config.input_names import InputName, is_foreign
-from ..config.load import Axis
 from ..contact.materials import Material
 
 # the indices of cells along each axis of the grid, in arrays that broadcast against each other

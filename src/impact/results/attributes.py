@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, NonNegativeInt, TypeAdapter, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, NonNegativeInt, TypeAdapter, ValidationError
 
 from ..errors import ResultError
+
+# JSON has null for NaN
+NullableFloat = Annotated[float, BeforeValidator(lambda value: math.nan if value is None else value)]
 
 
 class PluginRecord(BaseModel):
@@ -35,9 +39,9 @@ class SummaryRecord(BaseModel):
 
     status: dict[str, NonNegativeInt]
     not_evaluated: NonNegativeInt
-    worst: dict[str, dict[str, float | None]]
+    worst: dict[str, dict[str, NullableFloat]]
     failed_at: list[tuple[str, str, list[NonNegativeInt]]]
-    extremes: dict[str, tuple[float | None, float | None, NonNegativeInt] | None]
+    extremes: dict[str, tuple[NullableFloat, NullableFloat, NonNegativeInt] | None]
 
 
 @dataclass(frozen=True)

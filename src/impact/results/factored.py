@@ -91,10 +91,9 @@ def factored_template(
 ) -> xr.Dataset:
     """Build the dataset of a factored file, with placeholder values, from the coordinates of the result."""
     names = [axis.name for axis in table.inputs.axes]
-    laws = {}
-    stiffness = _stiffness_of_laws(table)
+    laws, stiffness = {}, _stiffness_of_laws(table)
     for law, trajectory_map, rule in zip(table.laws, table.maps, stiffness, strict=True):
-        laws[law.key] = LawRecord(
+        record = LawRecord(
             exponent=law.exponent,
             parameters=[parameter.name for parameter in law.parameters],
             domain=dict(law.domain),
@@ -105,6 +104,7 @@ def factored_template(
             is_shared=trajectory_map.is_shared,
             stiffness_axes=None if rule is None else [names[axis] for axis in rule[0]],
         )
+        laws[law.key] = vars(record)
     rows = sum(trajectory_map.count for trajectory_map in table.maps)
     cells = sum(trajectory_map.cells for trajectory_map in table.maps if trajectory_map.is_shared)
     witnesses = len(witness_indices(len(table.laws) * table.inputs.cells))
@@ -129,8 +129,7 @@ def factored_template(
         stored[f"witness_{variable.name}"] = placeholder(
             "witness", witnesses, variable.dtype, attributes_of(variable)
         )
-    laws_text = json.dumps({key: vars(law) for key, law in laws.items()})
-    attributes = {**result_template.attrs, "axes": json.dumps(names), "laws": laws_text}
+    attributes = {**result_template.attrs, "axes": json.dumps(names), "laws": json.dumps(laws)}
     template = xr.Dataset(stored, result_template.coords, attributes)
     # readers of netCDF take coordinates that no variable names for variables
     others = [str(name) for name in result_template.coords if name not in result_template.dims]
@@ -192,7 +191,7 @@ def witness_values(
     values_by_name = {variable.name: np.empty(indices.size, variable.dtype) for variable in variables}
     for model in np.unique(models).tolist():
         rows = np.flatnonzero(models == model)
-        values = expand(table, model, _unravel_cells(table.inputs, cells[rows]), list(values_by_name))
+        _, values = expand(table, model, _unravel_cells(table.inputs, cells[rows]), list(values_by_name))
         for name, array in values_by_name.items():
             array[rows] = np.broadcast_to(values[name], rows.shape)
     return values_by_name

@@ -119,7 +119,7 @@ def encode_attribute(text: str) -> NDArray[Any]:
 
 
 def _storage_options(variable: xr.DataArray, output: Output) -> dict[str, Any]:
-    """Options of a variable: contiguous unless the config sets compression or chunks."""
+    """Choose the options of a variable: contiguous unless the config sets compression or chunks."""
     if not variable.ndim or (output.compression == "none" and not output.chunks):
         return {}
     if output.chunks:
@@ -189,6 +189,13 @@ class StoredArray(BackendArray):
                 if unfiltered or len(zlib.decompressobj().decompress(packed, size + 1)) != size:
                     raise ValueError("a chunk of unexpected size")
                 self._checked.add(corner)
+
+
+def stored_array(variable: xr.Variable) -> StoredArray:
+    """Find the array that a variable of numbers in a file is read from."""
+    data: Any = variable._data
+    array: StoredArray = data.array
+    return array
 
 
 def read_variables(

@@ -77,9 +77,9 @@ def depth_summary(dataset: xr.Dataset) -> Summary:
         depth = points.variables["peak_indentation"].transpose(*dims)
         if depth.size > MAX_SUMMARY_POINTS and is_computed(depth):
             continue
-        for where in slabs(depth.sizes):
-            radius = smaller_radius_at(inputs, inputs.index([where.get(a.name, slice(1)) for a in inputs.axes]))
+        for slab in slabs(depth.sizes):
+            radius = smaller_radius_at(inputs, inputs.index([slab.get(a.name, slice(1)) for a in inputs.axes]))
             absent = tuple(number for number, axis in enumerate(inputs.axes) if axis.name not in dims)
-            values = {"peak_indentation": depth.isel(where).values}
+            values = {"peak_indentation": depth.isel(slab).values}
             summary.add(values, model, (), radius.squeeze(absent) if inputs.axes else radius, weight)
     return summary

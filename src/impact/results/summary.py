@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -80,9 +81,10 @@ class Summary:
             status_code = Status(number)
             self.counts[status_code] = self.counts.get(status_code, 0) + weight * int(times[number])
         if times[FIRST_FAILURE:].any() and len(self.failed_at) < self.max_failed_at:
-            for at in np.argwhere(status >= FIRST_FAILURE)[: self.max_failed_at - len(self.failed_at)].tolist():
-                index = tuple(first + offset for first, offset in zip(start, at, strict=True))
-                self.failed_at.append((Status(int(status[tuple(at)])), model, index))
+            n_more = self.max_failed_at - len(self.failed_at)
+            for offsets in np.argwhere(status >= FIRST_FAILURE)[:n_more].tolist():
+                index = tuple(map(operator.add, start, offsets))
+                self.failed_at.append((Status(int(status[tuple(offsets)])), model, index))
 
     def _judge(self, name: str, model: int, values: NDArray[Any]) -> None:
         largest = float(np.fmax.reduce(np.abs(values), axis=None, initial=np.nan))
@@ -123,13 +125,13 @@ def summarize(
     ):
         return _stored_summary(record, dataset, names, max_failed_at)
     summary = Summary(max_failed_at=max_failed_at)
-    for model, of_model in enumerate(parts_of_models(dataset)):
+    for model, model_data in enumerate(parts_of_models(dataset)):
         for name in names:
-            variable, weight = distinct_points(of_model, name)
+            variable, weight = distinct_points(model_data, name)
             if variable.size <= max_points or not is_computed(variable):
-                for where in slabs(variable.sizes):
-                    start = [where[dim].start for dim in variable.dims]
-                    summary.add({name: variable.isel(where).values}, model, start, weight=weight)
+                for slab in slabs(variable.sizes):
+                    start = [slab[dim].start for dim in variable.dims]
+                    summary.add({name: variable.isel(slab).values}, model, start, weight=weight)
             elif name == "status":
                 summary.points += weight * variable.size
                 summary.not_counted += weight * variable.size
@@ -161,21 +163,21 @@ def extremes_of(dataset: xr.Dataset, name: str) -> Extremes | None:
     record = _stored_record(dataset.variables[name])
     if record is not None and name in record.extremes:
         stored = record.extremes[name]
-        return stored and Extremes(_from_json(stored[0]), _from_json(stored[1]), stored[2])
+        return stored and Extremes(*stored)
     parts = _distinct_parts(dataset, name)
     if parts is None:
         return None
     extremes = Extremes()
     for variable, weight in parts:
-        for where in slabs(variable.sizes):
-            extremes = extremes.add(variable.isel(where).values, weight)
+        for slab in slabs(variable.sizes):
+            extremes = extremes.add(variable.isel(slab).values, weight)
     return extremes
 
 
 def _distinct_parts(dataset: xr.Dataset, name: str) -> list[tuple[xr.Variable, int]] | None:
     """List the distinct points of a variable of each model, and their weights; None if they are too many."""
-    of_models = parts_of_models(dataset) if "model" in dataset.variables[name].dims else (dataset,)
-    parts = [distinct_points(part, name) for part in of_models]
+    models = parts_of_models(dataset) if "model" in dataset.variables[name].dims else (dataset,)
+    parts = [distinct_points(part, name) for part in models]
     evaluations = sum(variable.size for variable, _ in parts)
     return None if evaluations > MAX_SUMMARY_POINTS and is_computed(dataset.variables[name]) else parts
 
@@ -189,8 +191,8 @@ def summarize_table(dataset: xr.Dataset, table: TrajectoryTable) -> tuple[Summar
     for name in map(str, dataset.data_vars):
         parts = _distinct_parts(dataset, name)
         extremes[name] = None if parts is None else Extremes()
-        of_models = parts or [distinct_points(part, name) for part in parts_of_models(dataset)]
-        for model, (variable, weight) in enumerate(of_models):
+        distinct = parts or [distinct_points(part, name) for part in parts_of_models(dataset)]
+        for model, (variable, weight) in enumerate(distinct):
             is_judged = name == "status" or name in ERROR_VARIABLES
             if parts is not None or (is_judged and variable.size <= MAX_SUMMARY_POINTS):
                 sizes = tuple(variable.sizes[axis] for axis in axes)
@@ -200,18 +202,16 @@ def summarize_table(dataset: xr.Dataset, table: TrajectoryTable) -> tuple[Summar
                 summary.not_counted += weight * variable.size
     for (model, shape), (weight, names) in sorted(groups.items(), key=lambda item: item[0]):
         for slab in slabs(dict(enumerate(shape))):
-            where = tuple(slab.values())
-            size = tuple(part.stop - part.start for part in where)
-            values = {
-                name: np.broadcast_to(
-                    np.asarray(array, dataset[name].dtype).reshape(array.shape if where else ()), size
-                )
-                for name, array in expand(table, model, table.inputs.index(where), names).items()
-            }
-            summary.add(values, model, [part.start for part in where], weight=weight)
-            for name, array in values.items():
+            region = tuple(slab.values())
+            size = tuple(part.stop - part.start for part in region)
+            for_names = expand(table, model, table.inputs.index(region), names)[1]
+            values = {}
+            for name, array in for_names.items():
+                typed = np.asarray(array, dataset[name].dtype)
+                values[name] = np.broadcast_to(typed if region else typed.reshape(()), size)
                 so_far = extremes[name]
-                extremes[name] = so_far and so_far.add(array, weight)
+                extremes[name] = so_far and so_far.add(values[name], weight)
+            summary.add(values, model, [part.start for part in region], weight=weight)
     return summary, extremes
 
 
@@ -223,15 +223,9 @@ def summary_record(
     return SummaryRecord(
         status=counts_by_name(summary.counts),
         not_evaluated=summary.not_counted,
-        worst={
-            name: {key: _to_json(largest) for key, largest in by_model.items()}
-            for name, by_model in worst_by_model(summary, dataset).items()
-        },
+        worst=worst_by_model(summary, dataset),
         failed_at=[(status.name.lower(), keys[model], [*index]) for status, model, index in summary.failed_at],
-        extremes={
-            name: of_all and (_to_json(of_all.smallest), _to_json(of_all.largest), of_all.missing)
-            for name, of_all in extremes.items()
-        },
+        extremes=dict(extremes),
     )
 
 
@@ -258,7 +252,7 @@ def _stored_summary(
         points=has_status * (sum(counts.values()) + record.not_evaluated),
         counts=counts if has_status else {},
         worst={
-            name: {keys.index(key): _from_json(largest) for key, largest in record.worst[name].items()}
+            name: {keys.index(key): largest for key, largest in record.worst[name].items()}
             for name in names
             if name in record.worst
         },
@@ -272,14 +266,6 @@ def _stored_summary(
     )
 
 
-def _to_json(value: float) -> float | None:
-    return None if math.isnan(value) else value
-
-
-def _from_json(value: float | None) -> float:
-    return math.nan if value is None else value
-
-
 def worst_by_model(summary: Summary, dataset: xr.Dataset) -> dict[str, dict[str, float]]:
     """List the largest absolute errors by variable and key of the model."""
     keys = dataset["model"].values.tolist() if summary.worst else []
@@ -290,5 +276,5 @@ def worst_by_model(summary: Summary, dataset: xr.Dataset) -> dict[str, dict[str,
 
 
 def counts_by_name(counts: Mapping[Status, int]) -> dict[str, int]:
-    """Counts by the names of the statuses, in their order."""
+    """Count by the names of the statuses, in their order."""
     return {status.name.lower(): counts[status] for status in sorted(counts)}

@@ -91,9 +91,9 @@ class TrajectoryRows:
         size = even_size(count, self.segment)
         trajectories, segment = CollisionResult.blank(rows.size), rows // size
         for number in np.unique(segment).tolist():
-            where = np.flatnonzero(segment == number)
-            start = number * size
-            trajectories.put(where, self.read(model, start, min(start + size, count)).take(rows[where] - start))
+            positions, start = np.flatnonzero(segment == number), number * size
+            read = self.read(model, start, min(start + size, count))
+            trajectories.put(positions, read.take(rows[positions] - start))
         return trajectories
 
 
@@ -134,26 +134,12 @@ def table_of_ranges(plan: Plan, load: Callable[[TrajectoryRange], CollisionResul
     return table_of(plan, lambda model, start, stop: load(range_at[model, start]))
 
 
-def expand(table: TrajectoryTable, model: int, index: Index, names: Sequence[str]) -> dict[str, NDArray[Any]]:
-    """Outputs of a model at some cells of the grid.
+def expand(table: TrajectoryTable, model: int, index: Index, names: Sequence[str]) -> tuple[Impacts, Outputs]:
+    """Compute the inputs and some outputs of a model at some cells of the grid.
 
-    Parameters
-    ----------
-    table : of the sweep
-    model : number of the model
-    index : the cells, one integer array for each axis; the arrays broadcast against each other
-    names : of the outputs, see docs/schema.md
-
-    Returns
-    -------
-    dict : by name, arrays that broadcast to the shape of the index, of length one along axes on which the output
-        does not vary. A plan without axes has one cell.
+    `index` has an integer array for each axis, which broadcast against each other; a plan without axes has one
+    cell. The outputs broadcast to the shape of the index, with length one along axes on which they do not vary.
     """
-    return _expand(table, model, index, names)[1]
-
-
-def _expand(table: TrajectoryTable, model: int, index: Index, names: Sequence[str]) -> tuple[Impacts, Outputs]:
-    """Compute the inputs and outputs of a model at some cells of the grid; see `expand`."""
     law = table.laws[model]
     impacts = build_impacts(table.inputs, law, index, table.stiffness[model])
     with np.errstate(all="ignore"):
@@ -179,10 +165,9 @@ def varies_along(table: TrajectoryTable, model: int, names: Sequence[str]) -> di
     checked = np.broadcast_shapes((1,) * dimensions(index), *shapes)
     status = _alternating_statuses(checked, Status.NO_IMPACT, Status.OUT_OF_RANGE)
     shape = table.maps[model].rows(index).shape
-    rebound = CollisionResult.blank(1).take(np.zeros(shape, np.intp))
-    values = outputs(
-        law, impacts, replace(rebound, status=_alternating_statuses(shape, Status.MAX_STEPS)), names, status
-    )
+    blank = CollisionResult.blank(1).take(np.zeros(shape, np.intp))
+    collisions = replace(blank, status=_alternating_statuses(shape, Status.MAX_STEPS))
+    values = outputs(law, impacts, collisions, names, status)
     return {name: tuple(sorted(axes_of_arrays([values[name]]))) for name in names}
 
 
@@ -196,7 +181,7 @@ def _alternating_statuses(shape: tuple[int, ...], *statuses: Status) -> NDArray[
 
 
 def checks_that_may_fail(inputs: Inputs, law: Law, stiffness: Stiffness | None = None) -> frozenset[str]:
-    """The checks of `check_inputs` that may fail at some point of the grid; the others hold at all of them.
+    """Find the checks of `check_inputs` that may fail at some point of the grid; the others hold at all of them.
 
     The scales of a contact are monotonic, or nearly so, in each of closing speed, masses, radii, K and n: they are
     safe at all points if they are far from overflow and underflow at all combinations of the extreme values.
@@ -257,8 +242,8 @@ def whole_stiffness(
     axes = tuple(sorted(axes_of_arrays([probed])))
     if math.prod(inputs.shape[axis] for axis in axes) > MAX_STIFFNESS_VALUES:
         return axes, None
-    where = [slice(None) if axis in axes else slice(1) for axis in range(len(inputs.shape))]
-    return axes, build_impacts(inputs, law, inputs.index(where), stiffness).K
+    region = [slice(None) if axis in axes else slice(1) for axis in range(len(inputs.shape))]
+    return axes, build_impacts(inputs, law, inputs.index(region), stiffness).K
 
 
 class ExpandedArray(BackendArray):
@@ -277,17 +262,15 @@ class ExpandedArray(BackendArray):
         shape = tuple(part.size for part in positions)
         check_memory(self.variable.name, shape, self.dtype)
         values = np.empty(shape, self.dtype)
-        of_models = self.variable.per_model
-        models, axes = (positions[0], positions[1:]) if of_models else (np.zeros(1, np.intp), positions)
+        name, per_model = self.variable.name, self.variable.per_model
+        models, axes = (positions[0], positions[1:]) if per_model else (np.zeros(1, np.intp), positions)
         for row, model in enumerate(models.tolist()):
             # a view, also if there is no axis
-            out = values[row, ...] if of_models else values
-            for where in slabs(dict(enumerate(out.shape))):
-                part = tuple(where.values())
-                index = np.ix_(*(axis[chosen] for axis, chosen in zip(axes, part, strict=True)))
-                out[part or ...] = _without_dummy_axis(
-                    expand(self.table, model, index, [self.variable.name])[self.variable.name], part
-                )
+            out = values[row, ...] if per_model else values
+            for slab in slabs(dict(enumerate(out.shape))):
+                region = tuple(slab.values())
+                index = np.ix_(*(axis[part] for axis, part in zip(axes, region, strict=True)))
+                out[region or ...] = _without_dummy_axis(expand(self.table, model, index, [name])[1][name], region)
         selected = tuple(0 if isinstance(part, int | np.integer) else slice(None) for part in key)
         return np.asarray(values[selected])
 
@@ -308,9 +291,9 @@ def table_of_result(dataset: xr.Dataset) -> TrajectoryTable | None:
     return tables[0] if tables and all(table is tables[0] for table in tables) else None
 
 
-def _without_dummy_axis(values: NDArray[Any], where: tuple[slice, ...]) -> NDArray[Any]:
+def _without_dummy_axis(values: NDArray[Any], region: tuple[slice, ...]) -> NDArray[Any]:
     """Drop the axis of length one that a slab of a plan without axes has."""
-    return values if where else values.reshape(())
+    return values if region else values.reshape(())
 
 
 def check_memory(name: str, shape: Sequence[int], dtype: np.dtype[Any]) -> None:
@@ -324,7 +307,7 @@ def check_memory(name: str, shape: Sequence[int], dtype: np.dtype[Any]) -> None:
 
 
 def max_indexed_bytes() -> int:
-    """Limit of the bytes computed or read at once: half of the memory, at most 16 GiB."""
+    """Limit the bytes computed or read at once: half of the memory, at most 16 GiB."""
     try:
         whole = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (ValueError, OSError, AttributeError):
@@ -376,7 +359,7 @@ def expanded_slabs(
         for slab in aligned_slabs(sizes, chunks) if chunks else slabs(sizes):
             region = tuple(slab.values())
             index = table.inputs.index(region)
-            impacts, arrays = _expand(table, model, index, [variable.name for variable in chosen])
+            impacts, arrays = expand(table, model, index, [variable.name for variable in chosen])
             shape = tuple(part.stop - part.start for part in region)
             values = {}
             for variable in chosen:
