@@ -86,19 +86,9 @@ def read_config(
     max_points: int = MAX_POINTS,
     purpose: Purpose = "sweep",
 ) -> Config:
-    """Read the config of a TOML file or a mapping.
+    """Read the config of a TOML file or a mapping, with overrides such as "sweep.e.linspace=[0,1,11]".
 
-    Parameters
-    ----------
-    source : path of a TOML file, or a mapping with the same keys; the names of CSV files are relative to the
-        folder of the TOML file, or for a mapping to the working directory
-    overrides : strings such as "sweep.e.linspace=[0,1,11]"
-    plugins : models that are not built in
-    max_points, purpose : see `build`
-
-    Raises
-    ------
-    ConfigError : with all problems, one per line
+    The names of CSV files are relative to the folder of the TOML file, or for a mapping to the working directory.
 
     >>> steel = {"E": "210 GPa", "nu": 0.3, "rho": 7850}
     >>> sweep = {"e": [0.5, 1], "v1": 1, "m1": 1, "m2": 1, "material": "steel"}
@@ -126,17 +116,9 @@ def parse_config(
 
 
 def build(draft: Draft, max_points: int = MAX_POINTS, purpose: Purpose = "sweep") -> Config:
-    """Check a draft and build its config.
+    """Check a draft and build its config, or raise a ConfigError with all problems, one per line.
 
-    Parameters
-    ----------
-    draft : with all settings
-    max_points : limit of the points of all models together, checked before any array is allocated
-    purpose : "sweep" refuses measurements and parameters to fit; "calibrate" requires them and refuses axes
-
-    Raises
-    ------
-    ConfigError : with all problems, one per line
+    The limit of points, of all models together, is checked before any array is allocated.
     """
     if purpose == "sweep" and not draft.problems:
         draft = draft.with_problems(measurements.purpose_problems(draft.data))
@@ -282,7 +264,7 @@ def _valid_values(document: tables.Document, draft: Draft) -> dict[str, quantiti
 
 
 def _values_by_key(table: quantities.Table | None) -> dict[str, Any]:
-    """The values that are set in a table, by key, in the order of definition."""
+    """List the values that are set in a table, by key, in the order of definition."""
     if table is None:
         return {}
     fields = type(table).model_fields
@@ -290,7 +272,7 @@ def _values_by_key(table: quantities.Table | None) -> dict[str, Any]:
 
 
 def _build_material(table: tables.MaterialTable) -> Material:
-    """The material of a table, without the properties that are axes."""
+    """Build a material without the properties that are axes."""
     numbers = {name: value for name, value in _values_by_key(table).items() if isinstance(value, float)}
     return Material(**({"E": math.nan, "nu": math.nan} | numbers))
 
@@ -331,7 +313,7 @@ def _calibration_problems(
 
 
 def _settings_problems(document: tables.Document, axes: Sequence[Axis], n_models: int) -> list[ConfigProblem]:
-    """Problems of [solver] and [output] with the rest of the config, or with the installed packages."""
+    """Check [solver] and [output] against the grid and the installed packages."""
     output = document.output
     problems: list[ConfigProblem] = []
     if document.solver.core == "numba" and not is_installed():
