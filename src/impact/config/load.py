@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -141,10 +141,8 @@ def build(draft: Draft, max_points: int = MAX_POINTS, purpose: Purpose = "sweep"
     distributions = {name: value for name, value in values.items() if isinstance(value, Distribution)}
     if distributions and document.design is not None:
         u = unit_samples(document.design, len(distributions))
-        drawn, draw_problems = draw_columns(distributions, draft.known_models, u)
-        draft = draft.with_problems(
-            (InputName.parse(name).path, message) for name, message in draw_problems.items()
-        )
+        drawn, refused = draw_columns(distributions, draft.known_models, u)
+        draft = draft.with_problems((InputName.parse(name).path, message) for name, message in refused.items())
         values |= {name: tuple(column.tolist()) for name, column in drawn.items()}
     groups = document.sweep.zip if purpose == "sweep" else ()
     in_full = document.output.is_full
@@ -283,45 +281,36 @@ def _calibration_problems(
     fits: Mapping[str, tuple[float, float]],
     *,
     are_valid: bool,
-) -> list[ConfigProblem]:
+) -> Iterator[ConfigProblem]:
     """Check that a calibration has measurements, a parameter to fit and no axes, given its valid values.
 
     Unless all values are valid, a fit may be missing among `fits` because it is invalid.
     """
-    problems: list[ConfigProblem] = []
     single = "expected a single value, a column of [data] or { fit = [least, most] }"
     if "data" not in data:
-        problems.append(
-            (("data",), 'missing, expected a table [data] of measurements, such as file = "drops.csv"')
-        )
-    if not fits and not list(measurements.fit_paths(data)):
-        problems.append((("sweep",), "got no parameter to fit, expected at least one { fit = [least, most] }"))
-    elif not fits and are_valid:
-        problems += [
-            (path, "got a fit, expected a value: no model and no ball of this config uses it")
-            for path in measurements.fit_paths(data)
-        ]
+        yield ("data",), 'missing, expected a table [data] of measurements, such as file = "drops.csv"'
+    fit_paths = list(measurements.fit_paths(data))
+    if not fit_paths:
+        yield ("sweep",), "got no parameter to fit, expected at least one { fit = [least, most] }"
+    for path in fit_paths if are_valid and not fits else ():
+        yield path, "got a fit, expected a value: no model and no ball of this config uses it"
     for name, value in values.items():
         if isinstance(value, tuple | quantities.Range):
-            problems.append((InputName.parse(name).path, f"got an axis, {single}"))
+            yield InputName.parse(name).path, f"got an axis, {single}"
     uncertain = next(distribution_paths(data), ("design",) if "design" in data else ())
     if uncertain:
-        problems.append((uncertain, "got an uncertain input, which impact sweep and impact sensitivity take"))
+        yield uncertain, "got an uncertain input, which impact sweep and impact sensitivity take"
     if as_table(data.get("sweep")).get("zip"):
-        problems.append((("sweep", "zip"), f"got axes that vary together, {single} for each name"))
-    return problems
+        yield ("sweep", "zip"), f"got axes that vary together, {single} for each name"
 
 
-def _settings_problems(document: tables.Document, axes: Sequence[Axis], n_models: int) -> list[ConfigProblem]:
+def _settings_problems(document: tables.Document, axes: Sequence[Axis], n_models: int) -> Iterator[ConfigProblem]:
     """Check [solver] and [output] against the grid and the installed packages."""
     output = document.output
-    problems: list[ConfigProblem] = []
     if document.solver.core == "numba" and not is_installed():
         expected = 'numba, which is not installed (pip install "impact-sweep[fast]"), or "auto"'
-        problems.append((("solver", "core"), f'got "numba", expected {expected}'))
+        yield ("solver", "core"), f'got "numba", expected {expected}'
     n_variables = len({"status", *(output.variables or BY_DEFAULT)})
-    problems += chunk_problems(output.chunks, axes, n_models, n_variables)
+    yield from chunk_problems(output.chunks, axes, n_models, n_variables)
     if output.chunks and output.layout == "factored":
-        message = 'set together with layout = "factored", expected layout = "full"'
-        problems.append((("output", "chunks"), message))
-    return problems
+        yield ("output", "chunks"), 'set together with layout = "factored", expected layout = "full"'
