@@ -110,7 +110,7 @@ class Draft:
     lines: tuple[str, ...] = ()
 
     def table(self, name: str) -> dict[str, Any]:
-        """A table of the config, which is empty if the config has no such table."""
+        """Return a table of the config, or an empty one."""
         return as_table(self.data.get(name))
 
     @cached_property
@@ -180,7 +180,7 @@ class Draft:
         return replace(self, data=data, origins=origins, settings=(*self.settings, setting))
 
     def error(self) -> ConfigError:
-        """The exception with all problems: those of the file by line, then those of the settings."""
+        """Build the exception with all problems: those of the file by line, then those of the settings."""
         key_line = {} if self.text.lstrip().startswith("{") else key_lines(self.text)
         ranked: list[tuple[tuple[int, int], str]] = []
         for path, message in self.problems:
@@ -193,7 +193,7 @@ class Draft:
         return ConfigError(*lines, *self.lines)
 
     def _written_path(self, path: KeyPath) -> KeyPath:
-        """The path in the source of a path that may be a column of cases."""
+        """Find the path in the source of a path that may be a column of cases."""
         for end in range(len(path), 0, -1):
             if path[:end] in self.cases:
                 return (*self.cases[path[:end]], *path[end:])
@@ -225,12 +225,7 @@ def _library_setting(name: str, without: Iterable[str] = ()) -> Setting:
 
 
 def open_config(source: Path | Mapping[str, object], plugins: Sequence[ForceModel] = ()) -> Draft:
-    """Open the config of a TOML file or a mapping, in which names of files are relative to its folder.
-
-    Raises
-    ------
-    ConfigError : the file cannot be read, or has a syntax error
-    """
+    """Open the config of a TOML file or a mapping, in which names of files are relative to its folder."""
     if not isinstance(source, Mapping):
         return replace(open_text(read_text(source), str(source), plugins), folder=source.parent)
     data, problems = to_plain_data(source)
@@ -239,12 +234,7 @@ def open_config(source: Path | Mapping[str, object], plugins: Sequence[ForceMode
 
 
 def open_text(text: str, name: str, plugins: Sequence[ForceModel] = ()) -> Draft:
-    """Open a TOML text, or a JSON text, which starts with a brace; no file is read for it.
-
-    Raises
-    ------
-    ConfigError : it has a syntax error, is too large, or is nested too deeply
-    """
+    """Open a TOML text, or a JSON text, which starts with a brace; no file is read for it."""
     data, problems = to_plain_data(parse_document(text, name))
     return Draft(data, text, name, catalogue(plugins), problems=tuple(problems))
 
@@ -274,5 +264,5 @@ def add_library_materials(draft: Draft) -> Draft:
 
 
 def listed_names(value: object) -> list[str]:
-    """The names in a name or a list of names."""
+    """List the names in a name or a list of names."""
     return [name for name in (value if isinstance(value, list) else [value]) if isinstance(name, str)]

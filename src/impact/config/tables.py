@@ -174,7 +174,7 @@ OutputVariable = Annotated[Literal[*OUTPUTS], known_name("a variable of the resu
 
 
 def _list_or_none(value: object) -> object:
-    """The value if it is a list, or None, which means all; other collections are not converted to lists."""
+    """Accept a list, or None, which means all; other collections are not converted to lists."""
     if isinstance(value, list | tuple | None) and value != []:
         return value
     raise mismatch_error(value, "a list of names")
@@ -220,7 +220,7 @@ def _is_deviation(value: object) -> bool:
 
 
 def _sigma(value: object) -> object:
-    """A standard deviation or a list of them; their unit is that of an output, see `measurements`."""
+    """Check a standard deviation or a list of them; their unit is that of an output, see `measurements`."""
     deviations = value if isinstance(value, list) and value else [value]
     if isinstance(value, dict) and "fit" in value:
         raise value_error(
@@ -293,13 +293,13 @@ class Design(Table):
 
 
 def power_of_two_problem(n: int, purpose: str) -> str:
-    """A message with the two next powers of two, if n is none; otherwise empty."""
+    """Name the two next powers of two, unless n is one; `purpose` says why it should be."""
     nearest = f"{1 << (n.bit_length() - 1)} or {1 << n.bit_length()}"
     return f"got {n}, expected a power of two {purpose}: {nearest}" if n & (n - 1) else ""
 
 
 def model_quantities(model: ForceModel) -> dict[str, Quantity]:
-    """The quantities of [model.KEY]: the parameters, and K of a model with a fixed exponent."""
+    """List the quantities of [model.KEY]: the parameters, and K of a model with a fixed exponent."""
     stiffness = {} if model.exponent is None else {"K": LAW_STIFFNESS}
     return stiffness | {
         parameter.name: Quantity(parameter.unit, parameter.meaning, parameter.least, parameter.most)
@@ -308,7 +308,7 @@ def model_quantities(model: ForceModel) -> dict[str, Quantity]:
 
 
 def parameter_table(model: ForceModel) -> type[Table]:
-    """The type of the table [model.KEY]; its keys are aliases, since not every parameter name can name a field."""
+    """Create the type of [model.KEY]; its keys are aliases, since not every parameter name can name a field."""
     defaults = {parameter.name: parameter.default for parameter in model.parameters}
     fields: dict[str, Any] = {
         f"field_{index}": (Annotated[Numbers | None, quantity, Field(alias=name)], defaults.get(name))
@@ -405,7 +405,7 @@ def schema(output: str | Path | None = None, *, overwrite: bool = False) -> dict
 
 
 def _model_names(models: Mapping[str, ForceModel]) -> Any:
-    """The type of the key `models` for its JSON Schema, with all names."""
+    """Create the type of the key `models` for its JSON Schema, with all names."""
     families = {f"family:{model.family}" for model in models.values() if not model.same_as}
     words = (*models, "all", *sorted(families))
     # a pattern contains *, ? or [; no key begins with "!", and "family:" takes no pattern
@@ -453,7 +453,7 @@ def _leave_out(selected: dict[str, ForceModel], word: str, models: Mapping[str, 
 
 
 def _models_matching(word: object, models: Mapping[str, ForceModel]) -> dict[str, ForceModel]:
-    """The models of a key, "all", "family:NAME" or a pattern, by key."""
+    """Find the models of a key, "all", "family:NAME" or a pattern, by key."""
     if not isinstance(word, str):
         raise mismatch_error(word, "the name of a model")
     # a law with two names is not run twice
