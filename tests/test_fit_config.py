@@ -54,6 +54,14 @@ def test_units_of_columns_are_converted(folder: Path) -> None:
     assert data.sigma["contact_time"] == pytest.approx((5e-9,) * 3)
 
 
+def test_a_column_without_a_dimension_may_say_so(folder: Path) -> None:
+    units = CSV.replace("e_out, sigma", "e_out [-], sigma [1]")
+    (folder / "drops.csv").write_text(units, encoding="utf-8")
+    data = read_config(folder / "fit.toml", purpose="calibrate").data
+    assert data is not None
+    assert (data.outputs, data.sigma) == ({"e_out": (0.5, 0.4, 0.3)}, {"e_out": (0.01, 0.02, 0.03)})
+
+
 def test_a_stored_config_needs_no_file(folder: Path) -> None:
     config = read_config(folder / "fit.toml", purpose="calibrate")
     (folder / "drops.csv").unlink()

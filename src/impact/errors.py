@@ -5,9 +5,9 @@
     ├── ModelError     the definition of a contact force model is invalid
     ├── UsageError     an argument does not fit the data or the file system
     ├── ResultError    a file is not a readable result
-    ├── StoreError     the result could not be computed or stored; finished blocks are kept
+    ├── StoreError     the result could not be computed or stored; finished ranges are kept
     ├── InUseError     another process writes the output
-    └── UnfinishedError  a signal stopped a sweep; finished blocks are kept
+    └── UnfinishedError  a signal stopped a sweep; finished ranges are kept
 
 A message states the error and its location, the invalid value and the expected form. It may quote any file, name
 or value: the constructor escapes what could forge a line or control a terminal. `impact.cli.exits` maps

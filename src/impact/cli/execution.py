@@ -22,12 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Execution:
-    """How a command integrates, by its options; `should_stop` returns whether a signal came.
-
-    Raises
-    ------
-    UsageError : more than one option selects an executor
-    """
+    """How a command integrates, by its options; `should_stop` returns whether a signal came."""
 
     should_stop: Callable[[], bool]
     quiet: bool

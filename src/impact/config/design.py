@@ -30,17 +30,10 @@ def design_problems(data: Mapping[str, Any]) -> list[ConfigProblem]:
     """Check that distributions have a [design], and that a [design] has distributions."""
     paths = list(distribution_paths(data))
     if paths and "design" not in data:
-        return [
-            (path, "got a distribution, expected a table [design] as well, such as n = 1024") for path in paths
-        ][:1]
+        return [(paths[0], "got a distribution, expected a table [design] as well, such as n = 1024")]
     if not paths and "design" in data:
-        example = "{ normal = [1.0, 0.05] }"
-        return [
-            (
-                ("design",),
-                f"got a design without an uncertain input, expected at least one, such as v1 = {example}",
-            )
-        ]
+        expected = "at least one, such as v1 = { normal = [1.0, 0.05] }"
+        return [(("design",), f"got a design without an uncertain input, expected {expected}")]
     return []
 
 

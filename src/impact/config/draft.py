@@ -44,20 +44,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Setting:
-    """A value that replaces that of a config.
+    """A value that replaces that of a config."""
 
-    Parameters
-    ----------
-    path : of the value; empty for a text that is not PATH=VALUE
-    value : any object, which is checked with the rest of the config
-    shown : the option that sets it, for messages: "--at e=0.6"
-    text : PATH=VALUE, as it is stored with a result; empty for that of the path and the value
-    """
-
-    path: KeyPath
-    value: object
-    shown: str
-    text: str = ""
+    path: KeyPath  # empty for a text that is not PATH=VALUE
+    value: object  # any, which is checked with the rest of the config
+    shown: str  # the option that sets it, for messages: "--at e=0.6"
+    text: str = ""  # PATH=VALUE, as it is stored with a result; empty for that of the path and the value
 
     @classmethod
     def parse(cls, text: str) -> Setting:
@@ -78,39 +70,25 @@ class Setting:
 
 @dataclass(frozen=True)
 class Draft:
-    """A config that is being read; nothing of it has been checked but its syntax.
-
-    Parameters
-    ----------
-    data : dicts, lists and plain Python values
-    text : the TOML text, or a mapping as JSON, without settings
-    name : of the source, for messages
-    known_models : all models that the config may select, by key
-    folder : of the files that it names; None if no file may be read
-    settings : those applied so far, in the order in which they are stored
-    origins : the setting of each path that a setting changed, in the order in which they were applied
-    files : the CSV files whose values are in the data; None before they are read
-    cases : the path of each input that is a column of a table of cases, and where its values are in that table
-    measurements : of a config with valid measurements
-    problems : paths and messages
-    lines : complete messages about settings and files
-    """
+    """A config that is being read; nothing of it has been checked but its syntax."""
 
     data: dict[str, Any]
-    text: str
-    name: str
+    text: str  # TOML, or a mapping as JSON, without settings
+    name: str  # of the source, for messages
     known_models: Mapping[str, ForceModel]
-    folder: Path | None = None
-    settings: tuple[Setting, ...] = ()
+    folder: Path | None = None  # of the files that it names; None if no file may be read
+    settings: tuple[Setting, ...] = ()  # in the order in which they are stored
+    # the setting of each path that a setting changed, in the order in which they were applied
     origins: Mapping[KeyPath, Setting] = field(default_factory=dict)
-    files: tuple[Path, ...] | None = None
+    files: tuple[Path, ...] | None = None  # the CSV files whose values are in the data; None before they are read
+    # the path of each input that is a column of a table of cases, and where its values are in that table
     cases: Mapping[KeyPath, KeyPath] = field(default_factory=dict)
     measurements: Measurements | None = None
     problems: tuple[ConfigProblem, ...] = ()
-    lines: tuple[str, ...] = ()
+    lines: tuple[str, ...] = ()  # complete messages about settings and files
 
     def table(self, name: str) -> dict[str, Any]:
-        """A table of the config, which is empty if the config has no such table."""
+        """Return a table of the config, or an empty one."""
         return as_table(self.data.get(name))
 
     @cached_property
@@ -180,7 +158,7 @@ class Draft:
         return replace(self, data=data, origins=origins, settings=(*self.settings, setting))
 
     def error(self) -> ConfigError:
-        """The exception with all problems: those of the file by line, then those of the settings."""
+        """Build the exception with all problems: those of the file by line, then those of the settings."""
         key_line = {} if self.text.lstrip().startswith("{") else key_lines(self.text)
         ranked: list[tuple[tuple[int, int], str]] = []
         for path, message in self.problems:
@@ -193,7 +171,7 @@ class Draft:
         return ConfigError(*lines, *self.lines)
 
     def _written_path(self, path: KeyPath) -> KeyPath:
-        """The path in the source of a path that may be a column of cases."""
+        """Find the path in the source of a path that may be a column of cases."""
         for end in range(len(path), 0, -1):
             if path[:end] in self.cases:
                 return (*self.cases[path[:end]], *path[end:])
@@ -225,12 +203,7 @@ def _library_setting(name: str, without: Iterable[str] = ()) -> Setting:
 
 
 def open_config(source: Path | Mapping[str, object], plugins: Sequence[ForceModel] = ()) -> Draft:
-    """Open the config of a TOML file or a mapping, in which names of files are relative to its folder.
-
-    Raises
-    ------
-    ConfigError : the file cannot be read, or has a syntax error
-    """
+    """Open the config of a TOML file or a mapping, in which names of files are relative to its folder."""
     if not isinstance(source, Mapping):
         return replace(open_text(read_text(source), str(source), plugins), folder=source.parent)
     data, problems = to_plain_data(source)
@@ -239,12 +212,7 @@ def open_config(source: Path | Mapping[str, object], plugins: Sequence[ForceMode
 
 
 def open_text(text: str, name: str, plugins: Sequence[ForceModel] = ()) -> Draft:
-    """Open a TOML text, or a JSON text, which starts with a brace; no file is read for it.
-
-    Raises
-    ------
-    ConfigError : it has a syntax error, is too large, or is nested too deeply
-    """
+    """Open a TOML text, or a JSON text, which starts with a brace; no file is read for it."""
     data, problems = to_plain_data(parse_document(text, name))
     return Draft(data, text, name, catalogue(plugins), problems=tuple(problems))
 
@@ -274,5 +242,5 @@ def add_library_materials(draft: Draft) -> Draft:
 
 
 def listed_names(value: object) -> list[str]:
-    """The names in a name or a list of names."""
+    """List the names in a name or a list of names."""
     return [name for name in (value if isinstance(value, list) else [value]) if isinstance(name, str)]

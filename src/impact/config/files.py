@@ -28,7 +28,7 @@ LONG_KEY = re.compile(rf"(?<![\w.-])(?:{_PART}[ \t]*+\.[ \t]*+){{{MAX_KEY_PARTS 
 
 
 def file_hint(path: Path, content: bytes) -> str:
-    """What a file is that something else was expected of, and what to do with it; empty if unknown.
+    """Describe a file that was given in place of another kind, and what to do with it; empty if unknown.
 
     >>> file_hint(Path("c.toml"), b"")
     'is a TOML file, not a result; sweep a config first: impact sweep c.toml -o RESULT.h5'
@@ -43,12 +43,7 @@ def file_hint(path: Path, content: bytes) -> str:
 
 
 def read_text(path: Path, kind: str = "TOML", most: int = MAX_CONFIG_BYTES) -> str:
-    """The text of a file.
-
-    Raises
-    ------
-    ConfigError : it is not a regular file, is empty, cannot be read, is too large or is not UTF-8
-    """
+    """Read a regular file of UTF-8 text that is not empty or too large, or raise a ConfigError."""
     name = str(path)
     try:
         if path.exists() and not path.is_file():
@@ -73,12 +68,7 @@ def read_text(path: Path, kind: str = "TOML", most: int = MAX_CONFIG_BYTES) -> s
 
 
 def parse_document(text: str, name: str) -> Any:
-    """The data of a TOML text, or of a JSON text, which starts with a brace.
-
-    Raises
-    ------
-    ConfigError : the text has a syntax error, is too large, or is nested too deeply
-    """
+    """Parse a TOML text, or a JSON text, which starts with a brace, or raise a ConfigError."""
     is_json = text.lstrip().startswith("{")
     limit = MAX_JSON_LENGTH if is_json else MAX_CONFIG_BYTES
     if len(text) > limit:
@@ -101,12 +91,12 @@ def _parse(text: str, loads: Callable[[str], object], language: str, name: str) 
 
 
 def _bracket_counts(text: str) -> list[int]:
-    """Opening brackets of each line, from line 1: the line with the most is taken as the one nested too deeply."""
+    """Count the opening brackets of each line from 1: the line with the most is taken as nested too deeply."""
     return [0, *(line.count("[") + line.count("{") for line in text.split("\n"))]
 
 
 def _syntax_error_line(text: str, language: str, message: str) -> str:
-    """The line number, the message of the parser and the line itself."""
+    """Describe a syntax error by its line number, the message of the parser and the line."""
     lines = text.split("\n")
     digits = re.search(r"[0-9_]{4000}", text)
     if "integer string conversion" in message and digits is not None:
@@ -119,7 +109,7 @@ def _syntax_error_line(text: str, language: str, message: str) -> str:
 
 
 def to_plain_data(value: object, path: KeyPath = ()) -> tuple[Any, list[ConfigProblem]]:
-    """The value as dicts, lists and plain Python numbers, and its problems: invalid text, or too many levels.
+    """Convert a value to dicts, lists and Python numbers; list invalid text and too many levels as problems.
 
     >>> to_plain_data({"e": np.linspace(0, 1, 3), "m2": (1, np.float64(2))})
     ({'e': [0.0, 0.5, 1.0], 'm2': [1, 2.0]}, [])
@@ -159,12 +149,12 @@ def _is_storable(text: str) -> bool:
 
 
 def as_table(value: object) -> dict[str, Any]:
-    """The value if it is a table, otherwise an empty table."""
+    """Return the value if it is a table, otherwise an empty table."""
     return value if isinstance(value, dict) else {}
 
 
 def toml_text(value: object) -> str:
-    """Plain data as TOML on one line.
+    """Write plain data as TOML on one line.
 
     >>> toml_text({"v1": [1.0, float("inf")], "my steel": "a"})
     '{v1 = [1.0, inf], "my steel" = "a"}'
@@ -182,12 +172,12 @@ def toml_text(value: object) -> str:
 
 
 def toml_key(name: str) -> str:
-    """A part of a TOML key."""
+    """Write a part of a TOML key."""
     return name if re.fullmatch(BARE_KEY, name) else toml_text(name)
 
 
 def toml_path(path: KeyPath) -> str:
-    """A dotted TOML key.
+    """Write a dotted TOML key.
 
     >>> toml_path(("materials", "steel.2", "E"))
     'materials."steel.2".E'
@@ -196,7 +186,7 @@ def toml_path(path: KeyPath) -> str:
 
 
 def toml_document(tables: Mapping[KeyPath, Mapping[str, object]]) -> str:
-    """A TOML text with a table of values at each path; those at the path () come first, without a header.
+    """Write a table of values at each path as TOML; those at the path () come first, without a header.
 
     >>> print(toml_document({(): {"title": "a"}, ("model", "hertz"): {"K": 1e6}}), end="")
     title = "a"
@@ -212,11 +202,7 @@ def toml_document(tables: Mapping[KeyPath, Mapping[str, object]]) -> str:
 
 
 def override_text(path: KeyPath, value: object) -> str:
-    """An override that sets a value.
-
-    Raises
-    ------
-    ConfigError : it is too long
+    """Write an override that sets a value; one that is too long is a ConfigError.
 
     >>> override_text(("materials", "steel.2", "E"), [2e11])
     'materials."steel.2".E=[200000000000.0]'
@@ -228,7 +214,7 @@ def override_text(path: KeyPath, value: object) -> str:
 
 
 def read_override(text: str) -> tuple[KeyPath, str]:
-    """The path and the text of the value of an override PATH=VALUE; an empty path for any other text.
+    """Split an override PATH=VALUE into its path and the text of its value; the path of other texts is empty.
 
     >>> read_override("sweep.e.linspace=[0,1,11]")
     (('sweep', 'e', 'linspace'), '[0,1,11]')
@@ -252,10 +238,9 @@ def read_override(text: str) -> tuple[KeyPath, str]:
 def set_value(
     data: Mapping[str, object], path: KeyPath, value: object, *, new_range: bool = False
 ) -> tuple[dict[str, Any], KeyPath]:
-    """The data with the value at the path, and the part of the path that is new or replaced.
+    """Set the value at a path; also return the part of the path that is new or replaced.
 
-    With `new_range`, the other keys of the innermost table are removed: one range, fit or distribution replaces
-    another.
+    With `new_range`, one range, fit or distribution replaces another.
 
     >>> set_value({"sweep": {"e": 0.5}}, ("sweep", "e", "linspace"), [0, 1, 3], new_range=True)
     ({'sweep': {'e': {'linspace': [0, 1, 3]}}}, ('sweep', 'e'))
@@ -270,7 +255,7 @@ def set_value(
 
 
 def read_value(text: str) -> object:
-    """The TOML value of a text, or the text itself: `sweep.material=steel` needs no quotes."""
+    """Read a TOML value, or take the text itself: `sweep.material=steel` needs no quotes."""
     if len(text) > MAX_OVERRIDE_LENGTH:
         return text
     try:

@@ -12,7 +12,7 @@ from ..contact.variables import BY_DEFAULT
 from ..errors import did_you_mean
 from .draft import Draft
 from .input_names import InputName
-from .quantities import MAX_PROBLEMS, ConfigProblem, Names, Numbers, Range, as_text
+from .quantities import MAX_PROBLEMS, ConfigProblem, KeyPath, Names, Numbers, Range, as_text
 
 # default limit of the points of all models together
 MAX_POINTS = 10**9
@@ -217,11 +217,7 @@ def _repetition_problems(name: str, values: AxisValues) -> list[ConfigProblem]:
     seen: set[object] = set()
     for index, value in enumerate(values):
         if value in seen:
-            return [
-                (
-                    (*InputName.parse(name).path, index),
-                    f"got {as_text(value)} twice, expected each value once",
-                )
-            ]
+            path: KeyPath = (*InputName.parse(name).path, index)
+            return [(path, f"got {as_text(value)} twice, expected each value once")]
         seen.add(value)
     return []

@@ -12,13 +12,13 @@ from .tables import MATERIAL_QUANTITIES
 
 @cache
 def records() -> Mapping[str, Mapping[str, float | str]]:
-    """The materials of `materials.toml`, with their sources, by name."""
+    """Read the materials of `materials.toml`, with their sources, by name."""
     return tomllib.loads((files("impact") / "config" / "materials.toml").read_text(encoding="utf-8"))
 
 
 @cache
 def library() -> Mapping[str, Mapping[str, float | str]]:
-    """The materials as tables of a config, without sources."""
+    """List the materials as tables of a config, without sources."""
     return {
         name: {key: value for key, value in record.items() if key in MATERIAL_QUANTITIES}
         for name, record in records().items()

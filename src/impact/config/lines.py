@@ -66,7 +66,7 @@ TOML_TOKEN = re.compile(
 
 
 def path_text(path: KeyPath) -> str:
-    """A path as text for a message.
+    """Write a path for a message.
 
     >>> path_text(("materials", "my steel", "E")), path_text(("sweep", "e", 3))
     ('materials."my steel".E', 'sweep.e[3]')
@@ -82,7 +82,7 @@ def path_text(path: KeyPath) -> str:
 
 
 def key_lines(text: str) -> dict[KeyPath, int]:
-    """The line of every key of a valid TOML text, and of list elements on another line than their list.
+    """Find the line of every key of a valid TOML text, and of list elements on another line than their list.
 
     >>> key_lines("a = 1\\n[b]\\nc.d = [\\n  1,\\n  2]")[("b", "c", "d", 1)]
     5
@@ -155,7 +155,7 @@ class _KeyScanner:
 
 
 def _unquoted(token: str) -> str:
-    """A part of a key without its quotes and escapes."""
+    """Remove the quotes and escapes of a part of a key."""
     if token.startswith("'"):
         return token[1:-1]
     if not token.startswith('"'):
@@ -168,13 +168,7 @@ def _unquoted(token: str) -> str:
 
 
 def validation_problems(error: ValidationError, models: Mapping[str, ForceModel]) -> Iterable[ConfigProblem]:
-    """The problems that pydantic reports, with the path of each value.
-
-    Parameters
-    ----------
-    error : raised by pydantic
-    models : all models by key
-    """
+    """List the problems that pydantic reports, with the path of each value."""
     for n_problems, detail in enumerate(error.errors(include_url=False)):
         # the tags of unions are not keys
         path: KeyPath = tuple(part for part in detail["loc"] if not (isinstance(part, str) and "\0" in part))
@@ -195,7 +189,7 @@ def validation_problems(error: ValidationError, models: Mapping[str, ForceModel]
 
 
 def _unknown_key_hint(location: KeyPath, models: Mapping[str, ForceModel]) -> str:
-    """A suggestion for an unknown key; `location` is its path, with tags."""
+    """Suggest a known key for an unknown one; `location` is its path, with tags."""
     name = str(location[-1])
     if len(location) == 1 and name in Sweep.model_fields:
         return "it belongs under [sweep]"

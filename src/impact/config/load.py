@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -33,44 +33,26 @@ Purpose = Literal["sweep", "calibrate"]
 
 @dataclass(frozen=True)
 class Config:
-    """A valid config of a sweep or of a calibration, in SI units.
-
-    Parameters
-    ----------
-    title : of the sweep
-    models : the contact force models, in config order
-    scalars : values that do not vary, by config name ("v1", "material1", "KEY.name" for a parameter of a model),
-        including defaults; a mass or radius that is not in the config is derived from the other and the density.
-        A parameter to fit has a value between its bounds here, and an input that is measured its first value
-    axes : the dimensions of the grid in config order: those of [sweep], of materials ("materials.steel.E"), of
-        models
-    materials : by name, including the library materials that the config uses; a property that is an axis or fitted
-        is NaN for E and nu, and None for rho and yield_strength
-    solver : tolerances and core
-    output : which variables are stored, and how
-    text : the TOML text verbatim, or a mapping as JSON, without overrides
-    settings : first the library materials that the config uses, then those of the caller, then the values of the
-        CSV files that the config names. So text and settings define the config without the library or any file
-    fits : the least and the largest value of each parameter to fit, by config name; empty for a sweep
-    data : the measurements to which they are fitted; None for a sweep
-    design : how the samples of uncertain inputs are drawn; None without any
-    distributions : of the uncertain inputs, by config name; their drawn values are an axis
-    files : the CSV files that were read
-    """
+    """A valid config of a sweep or a calibration, in SI units; text and settings define it without any file."""
 
     title: str
     models: tuple[ForceModel, ...]
+    # values that do not vary, by config name ("v1", "material1", "KEY.name" for a parameter of a model), including
+    # defaults; a mass or radius that is not in the config is derived from the other and the density. A parameter
+    # to fit has a value between its bounds here, and an input that is measured its first value
     scalars: Mapping[str, float | str]
-    axes: tuple[Axis, ...]
+    axes: tuple[Axis, ...]  # in config order: those of [sweep], of materials ("materials.steel.E"), of models
+    # including library materials; a property that is an axis or fitted is NaN for E and nu, else None
     materials: Mapping[str, Material]
     solver: tables.Solver
     output: tables.Output
-    text: str
+    text: str  # the TOML text verbatim, or a mapping as JSON, without settings
+    # first the library materials that are used, then those of the caller, then the values of CSV files
     settings: tuple[Setting, ...] = field(repr=False, compare=False)
-    fits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    fits: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # bounds of the parameters to fit
     data: measurements.Measurements | None = None
     design: tables.Design | None = None
-    distributions: Mapping[str, Distribution] = field(default_factory=dict)
+    distributions: Mapping[str, Distribution] = field(default_factory=dict)  # of the uncertain inputs
     files: tuple[Path, ...] = field(default=(), repr=False, compare=False)
 
     @property
@@ -86,19 +68,9 @@ def read_config(
     max_points: int = MAX_POINTS,
     purpose: Purpose = "sweep",
 ) -> Config:
-    """Read the config of a TOML file or a mapping.
+    """Read the config of a TOML file or a mapping, with overrides such as "sweep.e.linspace=[0,1,11]".
 
-    Parameters
-    ----------
-    source : path of a TOML file, or a mapping with the same keys; the names of CSV files are relative to the
-        folder of the TOML file, or for a mapping to the working directory
-    overrides : strings such as "sweep.e.linspace=[0,1,11]"
-    plugins : models that are not built in
-    max_points, purpose : see `build`
-
-    Raises
-    ------
-    ConfigError : with all problems, one per line
+    The names of CSV files are relative to the folder of the TOML file, or for a mapping to the working directory.
 
     >>> steel = {"E": "210 GPa", "nu": 0.3, "rho": 7850}
     >>> sweep = {"e": [0.5, 1], "v1": 1, "m1": 1, "m2": 1, "material": "steel"}
@@ -126,17 +98,9 @@ def parse_config(
 
 
 def build(draft: Draft, max_points: int = MAX_POINTS, purpose: Purpose = "sweep") -> Config:
-    """Check a draft and build its config.
+    """Check a draft and build its config, or raise a ConfigError with all problems, one per line.
 
-    Parameters
-    ----------
-    draft : with all settings
-    max_points : limit of the points of all models together, checked before any array is allocated
-    purpose : "sweep" refuses measurements and parameters to fit; "calibrate" requires them and refuses axes
-
-    Raises
-    ------
-    ConfigError : with all problems, one per line
+    The limit of points, of all models together, is checked before any array is allocated.
     """
     if purpose == "sweep" and not draft.problems:
         draft = draft.with_problems(measurements.purpose_problems(draft.data))
@@ -159,10 +123,8 @@ def build(draft: Draft, max_points: int = MAX_POINTS, purpose: Purpose = "sweep"
     distributions = {name: value for name, value in values.items() if isinstance(value, Distribution)}
     if distributions and document.design is not None:
         u = unit_samples(document.design, len(distributions))
-        drawn, draw_problems = draw_columns(distributions, draft.known_models, u)
-        draft = draft.with_problems(
-            (InputName.parse(name).path, message) for name, message in draw_problems.items()
-        )
+        drawn, refused = draw_columns(distributions, draft.known_models, u)
+        draft = draft.with_problems((InputName.parse(name).path, message) for name, message in refused.items())
         values |= {name: tuple(column.tolist()) for name, column in drawn.items()}
     groups = document.sweep.zip if purpose == "sweep" else ()
     in_full = document.output.is_full
@@ -282,7 +244,7 @@ def _valid_values(document: tables.Document, draft: Draft) -> dict[str, quantiti
 
 
 def _values_by_key(table: quantities.Table | None) -> dict[str, Any]:
-    """The values that are set in a table, by key, in the order of definition."""
+    """List the values that are set in a table, by key, in the order of definition."""
     if table is None:
         return {}
     fields = type(table).model_fields
@@ -290,7 +252,7 @@ def _values_by_key(table: quantities.Table | None) -> dict[str, Any]:
 
 
 def _build_material(table: tables.MaterialTable) -> Material:
-    """The material of a table, without the properties that are axes."""
+    """Build a material without the properties that are axes."""
     numbers = {name: value for name, value in _values_by_key(table).items() if isinstance(value, float)}
     return Material(**({"E": math.nan, "nu": math.nan} | numbers))
 
@@ -301,45 +263,36 @@ def _calibration_problems(
     fits: Mapping[str, tuple[float, float]],
     *,
     are_valid: bool,
-) -> list[ConfigProblem]:
+) -> Iterator[ConfigProblem]:
     """Check that a calibration has measurements, a parameter to fit and no axes, given its valid values.
 
     Unless all values are valid, a fit may be missing among `fits` because it is invalid.
     """
-    problems: list[ConfigProblem] = []
     single = "expected a single value, a column of [data] or { fit = [least, most] }"
     if "data" not in data:
-        problems.append(
-            (("data",), 'missing, expected a table [data] of measurements, such as file = "drops.csv"')
-        )
-    if not fits and not list(measurements.fit_paths(data)):
-        problems.append((("sweep",), "got no parameter to fit, expected at least one { fit = [least, most] }"))
-    elif not fits and are_valid:
-        problems += [
-            (path, "got a fit, expected a value: no model and no ball of this config uses it")
-            for path in measurements.fit_paths(data)
-        ]
+        yield ("data",), 'missing, expected a table [data] of measurements, such as file = "drops.csv"'
+    fit_paths = list(measurements.fit_paths(data))
+    if not fit_paths:
+        yield ("sweep",), "got no parameter to fit, expected at least one { fit = [least, most] }"
+    for path in fit_paths if are_valid and not fits else ():
+        yield path, "got a fit, expected a value: no model and no ball of this config uses it"
     for name, value in values.items():
         if isinstance(value, tuple | quantities.Range):
-            problems.append((InputName.parse(name).path, f"got an axis, {single}"))
+            yield InputName.parse(name).path, f"got an axis, {single}"
     uncertain = next(distribution_paths(data), ("design",) if "design" in data else ())
     if uncertain:
-        problems.append((uncertain, "got an uncertain input, which impact sweep and impact sensitivity take"))
+        yield uncertain, "got an uncertain input, which impact sweep and impact sensitivity take"
     if as_table(data.get("sweep")).get("zip"):
-        problems.append((("sweep", "zip"), f"got axes that vary together, {single} for each name"))
-    return problems
+        yield ("sweep", "zip"), f"got axes that vary together, {single} for each name"
 
 
-def _settings_problems(document: tables.Document, axes: Sequence[Axis], n_models: int) -> list[ConfigProblem]:
-    """Problems of [solver] and [output] with the rest of the config, or with the installed packages."""
+def _settings_problems(document: tables.Document, axes: Sequence[Axis], n_models: int) -> Iterator[ConfigProblem]:
+    """Check [solver] and [output] against the grid and the installed packages."""
     output = document.output
-    problems: list[ConfigProblem] = []
     if document.solver.core == "numba" and not is_installed():
         expected = 'numba, which is not installed (pip install "impact-sweep[fast]"), or "auto"'
-        problems.append((("solver", "core"), f'got "numba", expected {expected}'))
+        yield ("solver", "core"), f'got "numba", expected {expected}'
     n_variables = len({"status", *(output.variables or BY_DEFAULT)})
-    problems += chunk_problems(output.chunks, axes, n_models, n_variables)
+    yield from chunk_problems(output.chunks, axes, n_models, n_variables)
     if output.chunks and output.layout == "factored":
-        message = 'set together with layout = "factored", expected layout = "full"'
-        problems.append((("output", "chunks"), message))
-    return problems
+        yield ("output", "chunks"), 'set together with layout = "factored", expected layout = "full"'

@@ -118,7 +118,7 @@ def _read_column(
     if column.kind == SPECIMEN:
         specimens = [cell if isinstance(cell, str) else number(cell) for cell in cells]
         return specimens, [(index, SPECIMEN_EXPECTED) for index, name in enumerate(specimens) if not name]
-    si_unit, unit = column.quantity.unit, "" if unit in ("-", "1") else unit
+    si_unit = column.quantity.unit
     if unit.lower() in ("%", "percent", "pct", "per cent"):
         expected = f'a fraction: divide the column by 100 and write "{safe_text(header, 60)}"'
         return (), [(None, f"got [{unit}], expected {expected}")]
@@ -179,7 +179,8 @@ def read_data_file(draft: Draft) -> tuple[dict[KeyPath, object], list[str]]:
         columns = read_csv_of(draft, table["file"])
     except ConfigError as error:
         return {}, [*error.problems]
-    read, problems = _read_columns(columns, draft)
+    units = {header: "" if unit in ("-", "1") else unit for header, unit in columns.units.items()}
+    read, problems = _read_columns(replace(columns, units=units), draft)
     if problems:
         return {}, [columns.problem(text, header, row) for header, row, text in problems[:MAX_PROBLEMS]]
     values = {header: list(column.values) for header, column in zip(columns.cells, read, strict=True)}

@@ -13,7 +13,7 @@ from ..contact.model import ForceModel, with_base_quantities
 from ..contact.timestep import EXACT, SCHEMES, has_scheme, law_problem
 from .draft import Draft, listed_names
 from .files import as_table
-from .quantities import ConfigProblem
+from .quantities import ConfigProblem, Quantity
 from .tables import FIXED_STEP_INPUTS, MATERIAL_QUANTITIES, SWEEP_QUANTITIES, model_quantities
 
 
@@ -67,12 +67,13 @@ def check_rules(draft: Draft) -> Draft:
     return draft
 
 
+def _missing(quantity: Quantity) -> str:
+    return f"missing, expected {quantity.expected}: {quantity.meaning}"
+
+
 def _velocity_problems(draft: Draft) -> Iterable[ConfigProblem]:
     if "v1" not in draft.table("sweep"):
-        yield (
-            ("sweep", "v1"),
-            f"missing, expected {SWEEP_QUANTITIES['v1'].expected}: {SWEEP_QUANTITIES['v1'].meaning}",
-        )
+        yield ("sweep", "v1"), _missing(SWEEP_QUANTITIES["v1"])
 
 
 def _restitution_problems(draft: Draft) -> Iterable[ConfigProblem]:
@@ -115,11 +116,8 @@ def _material_problems(draft: Draft) -> Iterable[ConfigProblem]:
     sweep = draft.table("sweep")
     single = [name for name in ("material1", "material2") if name in sweep]
     if "material" in sweep:
-        for name in single:
-            yield (
-                ("sweep", name),
-                "set together with material, expected either material, or material1 and material2",
-            )
+        message = "set together with material, expected either material, or material1 and material2"
+        yield from ((("sweep", name), message) for name in single)
     elif len(single) == 1:
         other = "material2" if single == ["material1"] else "material1"
         yield ("sweep", other), f"missing, expected both, as {single[0]} is set; or material for both balls"
@@ -144,10 +142,7 @@ def _yield_strength_problems(draft: Draft) -> Iterable[ConfigProblem]:
             if name not in reported:
                 reported.add(name)
                 expected = MATERIAL_QUANTITIES["yield_strength"].expected
-                yield (
-                    ("materials", name, "yield_strength"),
-                    f"missing, expected {expected} (used by {users})",
-                )
+                yield ("materials", name, "yield_strength"), f"missing, expected {expected} (used by {users})"
 
 
 def _mass_problems(draft: Draft) -> Iterable[ConfigProblem]:
@@ -157,9 +152,8 @@ def _mass_problems(draft: Draft) -> Iterable[ConfigProblem]:
         mass, radius = f"m{ball}", f"R{ball}"
         if mass in sweep:
             continue
-        message = f"missing, expected {SWEEP_QUANTITIES[mass].expected}: {SWEEP_QUANTITIES[mass].meaning}"
         if radius not in sweep or not {"material", f"material{ball}"} & sweep.keys():
-            yield ("sweep", mass), f"{message}; or {radius} and a material with rho"
+            yield ("sweep", mass), f"{_missing(SWEEP_QUANTITIES[mass])}; or {radius} and a material with rho"
         for name in _materials_without(draft, ball, "rho") if radius in sweep else ():
             expected = f"{MATERIAL_QUANTITIES['rho'].expected}, or {mass} under [sweep]"
             yield ("materials", name, "rho"), f"missing, expected {expected}: the mass of ball {ball} is not set"
@@ -189,25 +183,17 @@ def _parameter_problems(draft: Draft) -> Iterable[ConfigProblem]:
         table = as_table(draft.table("model").get(model.key))
         for parameter in model.parameters:
             if parameter.default is None and parameter.name not in table:
-                expected = model_quantities(model)[parameter.name].expected
-                hint = _exclusion_hint(draft, model)
-                yield (
-                    ("model", model.key, parameter.name),
-                    f"missing, expected {expected}: {parameter.meaning}{hint}",
-                )
+                message = _missing(model_quantities(model)[parameter.name])
+                yield ("model", model.key, parameter.name), message + _exclusion_hint(draft, model)
 
 
 def _fixed_step_problems(draft: Draft) -> Iterable[ConfigProblem]:
     """Check that a scheme has one fixed step, given in either of two ways, and the continuous law none."""
     sweep, integrator = draft.table("sweep"), draft.table("solver").get("integrator", EXACT)
     if integrator == EXACT:
-        for name in FIXED_STEP_INPUTS:
-            if name in sweep:
-                expected = f'solver.integrator = "{next(iter(SCHEMES))}" as well'
-                yield (
-                    ("sweep", name),
-                    f'set with solver.integrator = "{EXACT}", which has no fixed step, expected {expected}',
-                )
+        message = f'set with solver.integrator = "{EXACT}", which has no fixed step'
+        message += f', expected solver.integrator = "{next(iter(SCHEMES))}" as well'
+        yield from ((("sweep", name), message) for name in FIXED_STEP_INPUTS if name in sweep)
     elif isinstance(integrator, str) and integrator in SCHEMES:
         for model in draft.models:
             n = model.exponent or draft.exponent
@@ -219,11 +205,8 @@ def _fixed_step_problems(draft: Draft) -> Iterable[ConfigProblem]:
         if len(given) == 2:
             yield ("sweep", "dt"), "set together with steps_per_contact, expected one of the two"
         elif not given:
-            quantity = SWEEP_QUANTITIES["steps_per_contact"]
-            yield (
-                ("sweep", "steps_per_contact"),
-                f"missing, expected {quantity.expected}: {quantity.meaning}; or dt",
-            )
+            name = "steps_per_contact"
+            yield ("sweep", name), f"{_missing(SWEEP_QUANTITIES[name])}; or dt"
 
 
 def _stiffness_arguments(model: ForceModel) -> frozenset[str]:

@@ -128,7 +128,7 @@ class MaterialTable(Table):
 
 
 def quantities_of(table: type[Table]) -> dict[str, Quantity]:
-    """The quantities of a table by key."""
+    """Find the quantities of a table by key."""
     return {
         name: annotation
         for name, field in table.model_fields.items()
@@ -151,16 +151,7 @@ LAW_STIFFNESS = Quantity("N/m^n", "stiffness of this law, in place of the sweep'
 
 @dataclass(frozen=True, config=ConfigDict(extra="forbid", json_schema_extra=simplify_schema))
 class Solver:
-    """How impacts are integrated.
-
-    Parameters
-    ----------
-    rtol : relative tolerance
-    max_steps : steps that one impact may take
-    collapse : integrate impacts that are the same in the contact's own units once; changes no bit
-    core : "numpy"; "numba", which compiles what it can; or "auto", depending on the number of trajectories
-    integrator : "exact", the continuous law with error control; or a scheme with a fixed step
-    """
+    """How impacts are integrated."""
 
     rtol: Annotated[float, Quantity("1", "relative tolerance of the integration", 1e-13, 1e-4)] = DEFAULT_RTOL
     max_steps: Annotated[
@@ -183,7 +174,7 @@ OutputVariable = Annotated[Literal[*OUTPUTS], known_name("a variable of the resu
 
 
 def _list_or_none(value: object) -> object:
-    """The value if it is a list, or None, which means all; other collections are not converted to lists."""
+    """Accept a list, or None, which means all; other collections are not converted to lists."""
     if isinstance(value, list | tuple | None) and value != []:
         return value
     raise mismatch_error(value, "a list of names")
@@ -191,17 +182,7 @@ def _list_or_none(value: object) -> object:
 
 @dataclass(frozen=True, config=ConfigDict(extra="forbid", json_schema_extra=simplify_schema))
 class Output:
-    """What of a result is stored, and how.
-
-    Parameters
-    ----------
-    variables : of the result, or None for all
-    dtype : of its floating-point numbers, "float64" or "float32"; coordinates are float64
-    compression : "none" or "gzip"
-    chunks : the lengths along the axes, by name, of the chunks in which it is stored; empty for one piece
-    layout : "full", all values; "factored", the trajectories, from which they are computed when they are read; or
-        "auto", in full up to 10^7 points
-    """
+    """What of a result is stored, and how."""
 
     variables: Annotated[
         tuple[OutputVariable, ...] | None,
@@ -239,7 +220,7 @@ def _is_deviation(value: object) -> bool:
 
 
 def _sigma(value: object) -> object:
-    """A standard deviation or a list of them; their unit is that of an output, see `measurements`."""
+    """Check a standard deviation or a list of them; their unit is that of an output, see `measurements`."""
     deviations = value if isinstance(value, list) and value else [value]
     if isinstance(value, dict) and "fit" in value:
         raise value_error(
@@ -312,13 +293,13 @@ class Design(Table):
 
 
 def power_of_two_problem(n: int, purpose: str) -> str:
-    """A message with the two next powers of two, if n is none; otherwise empty."""
+    """Name the two next powers of two, unless n is one; `purpose` says why it should be."""
     nearest = f"{1 << (n.bit_length() - 1)} or {1 << n.bit_length()}"
     return f"got {n}, expected a power of two {purpose}: {nearest}" if n & (n - 1) else ""
 
 
 def model_quantities(model: ForceModel) -> dict[str, Quantity]:
-    """The quantities of [model.KEY]: the parameters, and K of a model with a fixed exponent."""
+    """List the quantities of [model.KEY]: the parameters, and K of a model with a fixed exponent."""
     stiffness = {} if model.exponent is None else {"K": LAW_STIFFNESS}
     return stiffness | {
         parameter.name: Quantity(parameter.unit, parameter.meaning, parameter.least, parameter.most)
@@ -327,7 +308,7 @@ def model_quantities(model: ForceModel) -> dict[str, Quantity]:
 
 
 def parameter_table(model: ForceModel) -> type[Table]:
-    """The type of the table [model.KEY]; its keys are aliases, since not every parameter name can name a field."""
+    """Create the type of [model.KEY]; its keys are aliases, since not every parameter name can name a field."""
     defaults = {parameter.name: parameter.default for parameter in model.parameters}
     fields: dict[str, Any] = {
         f"field_{index}": (Annotated[Numbers | None, quantity, Field(alias=name)], defaults.get(name))
@@ -367,13 +348,7 @@ class Document(Table):
 
 
 def document_type(models_by_key: Mapping[str, ForceModel], with_tables: Sequence[str]) -> type[Document]:
-    """The type of a whole config.
-
-    Parameters
-    ----------
-    models_by_key : the models that the config may name
-    with_tables : keys of the models that have a table for their parameters
-    """
+    """Build the type of a whole config, in which some models have a table for their parameters."""
     for table in (Sweep, MaterialTable, Data, Design):
         # built once; the type of each config then contains it
         table.model_rebuild()
@@ -430,7 +405,7 @@ def schema(output: str | Path | None = None, *, overwrite: bool = False) -> dict
 
 
 def _model_names(models: Mapping[str, ForceModel]) -> Any:
-    """The type of the key `models` for its JSON Schema, with all names."""
+    """Create the type of the key `models` for its JSON Schema, with all names."""
     families = {f"family:{model.family}" for model in models.values() if not model.same_as}
     words = (*models, "all", *sorted(families))
     # a pattern contains *, ? or [; no key begins with "!", and "family:" takes no pattern
@@ -445,13 +420,7 @@ def _model_names(models: Mapping[str, ForceModel]) -> Any:
 def expand_models(
     selection: object, models: Mapping[str, ForceModel]
 ) -> tuple[list[ForceModel], list[ConfigProblem]]:
-    """The models that a selection names, and its problems.
-
-    Parameters
-    ----------
-    selection : a key, "all", "family:NAME", a pattern, or a list of those; those after "!" are excluded
-    models : all models by key
-    """
+    """Find the models of a key, "all", "family:NAME", a pattern, or a list of those, some excluded by "!"."""
     if not isinstance(selection, str | list) or not selection:
         return [], [((), mismatch_error(selection, MODELS_EXPECTED).message())]
     selected: dict[str, ForceModel] = {}
@@ -484,7 +453,7 @@ def _leave_out(selected: dict[str, ForceModel], word: str, models: Mapping[str, 
 
 
 def _models_matching(word: object, models: Mapping[str, ForceModel]) -> dict[str, ForceModel]:
-    """The models of a key, "all", "family:NAME" or a pattern, by key."""
+    """Find the models of a key, "all", "family:NAME" or a pattern, by key."""
     if not isinstance(word, str):
         raise mismatch_error(word, "the name of a model")
     # a law with two names is not run twice

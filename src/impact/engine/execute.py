@@ -185,22 +185,14 @@ def _submit_and_collect(
                 del running[future]
                 collisions, errors = integrated
                 if reused is not None:
-                    collisions = _merge_reused(reused, collisions)
+                    is_reused, values = reused
+                    values = CollisionResult(**{name: array.copy() for name, array in vars(values).items()})
+                    values.put(~is_reused, collisions)
+                    collisions = values
                 yield trajectory_range, (collisions, errors)
     finally:
         for future in running:
             future.cancel()
-
-
-def _merge_reused(
-    reused: tuple[NDArray[np.bool_], CollisionResult], integrated: CollisionResult
-) -> CollisionResult:
-    """Put the integrated trajectories of a range between the reused ones."""
-    is_reused, reused_values = reused
-    collisions = reused_values.take(slice(None))
-    collisions = CollisionResult(**{name: values.copy() for name, values in vars(collisions).items()})
-    collisions.put(~is_reused, integrated)
-    return collisions
 
 
 def _check_integrated(trajectory_range: TrajectoryRange, integrated: object, size: int) -> None:

@@ -91,8 +91,14 @@ class TrajectoryRange:
 
 
 def law_axes(inputs: Inputs, model: ForceModel, collapse: bool) -> tuple[int, ...]:
-    """Find the axes of the trajectories of a law: those on which it depends, or all without `collapse`."""
-    return axes_of_law(inputs, model) if collapse else inputs.axes_of_model(model.key)
+    """Find the axes on which a law and its fixed step depend; all axes of the model without `collapse`."""
+    if not collapse:
+        return inputs.axes_of_model(model.key)
+    index = _probe_index(inputs, model)
+    impacts = build_impacts(inputs, model, index)
+    with np.errstate(all="ignore"):
+        values = dimensionless_values(model, impacts) | fixed_steps_at(inputs, impacts, index)
+        return tuple(sorted(axes_of_arrays([impacts.n, *values.values()])))
 
 
 def build_map(inputs: Inputs, number: int, model: ForceModel, collapse: bool) -> TrajectoryMap:
@@ -153,15 +159,6 @@ def probe_index(inputs: Inputs, swept_names: Iterable[str] = ()) -> Index:
 def axes_of_arrays(arrays: Iterable[NDArray[Any]]) -> frozenset[int]:
     """Find the axes along which any of the arrays varies; the arrays have as many axes as the grid."""
     return frozenset(axis for array in arrays for axis, size in enumerate(array.shape) if size > 1)
-
-
-def axes_of_law(inputs: Inputs, model: ForceModel) -> tuple[int, ...]:
-    """Find the axes on which the values of a law and of its fixed step depend."""
-    index = _probe_index(inputs, model)
-    impacts = build_impacts(inputs, model, index)
-    with np.errstate(all="ignore"):
-        values = dimensionless_values(model, impacts) | fixed_steps_at(inputs, impacts, index)
-        return tuple(sorted(axes_of_arrays([impacts.n, *values.values()])))
 
 
 def axes_of_checks(inputs: Inputs, model: ForceModel) -> Mapping[str, frozenset[int]]:

@@ -32,7 +32,7 @@ from ..engine.plugins import Plugins, read_plugins
 from ..results.calibration import calibration_template
 from ..results.schema import FIT_STATUSES
 from ..results.xarray_backend import save
-from .batch import VectorFunction
+from .batched_solvers import VectorFunction
 from .fit import Bounds, DataPoints, Fit, Problem, fit_all, half_widths
 
 # points of the curve of each law over an input
@@ -47,18 +47,11 @@ MAX_DENOMINATOR = 12
 
 @dataclass(frozen=True)
 class FittedLaw:
-    """The fit of one law.
-
-    Parameters
-    ----------
-    names : config names of its parameters
-    fit : the fit
-    curve : values of each output over the varied input, with the ends of their bands, shape (3, outputs,
-        CURVE_POINTS)
-    """
+    """The fit of one law."""
 
     names: tuple[str, ...]
     fit: Fit
+    # each output over the varied input, with the ends of its band, shape (3, outputs, CURVE_POINTS)
     curve: Array
 
 
@@ -116,13 +109,7 @@ def calibrate(
 
 
 def calibrate_config(config: Config, plugins: Plugins, jobs: int = 1) -> xr.Dataset:
-    """Fit the laws of a config to its measurements; see `calibrate`.
-
-    Parameters
-    ----------
-    config, plugins : the config, and its models that are not built in
-    jobs : number of processes; a law is fitted in one of them, and its fit does not depend on the others
-    """
+    """Fit the laws of a config to its measurements; see `calibrate`."""
     if jobs > 1 and len(config.models) > 1:
         context = context_of(Plan(config, plugins))
         with choose_executor(jobs).start() as executor:
@@ -183,7 +170,7 @@ def prediction(
 
 
 def _fit_remotely(key: str, text: str, overrides: Sequence[str], context: WorkerContext) -> FittedLaw:
-    """The fit of the law of a key, in any process, with a config given by its text and overrides."""
+    """Fit the law of a key, in any process, with a config given by its text and overrides."""
     models = models_of_context(context)
     plugins = [models[name] for name, _ in context.hashes]
     selection = override_text(("models",), [key])
@@ -191,7 +178,7 @@ def _fit_remotely(key: str, text: str, overrides: Sequence[str], context: Worker
 
 
 def fit_laws(config: Config) -> dict[str, FittedLaw]:
-    """The fits of all laws of a config, by key; they are evaluated together in this process."""
+    """Fit all laws of a config, evaluated together in this process."""
     assert config.data is not None
     data = config.data
     values = np.concatenate([np.asarray(column, float) for column in data.outputs.values()])
@@ -214,15 +201,15 @@ def fit_laws(config: Config) -> dict[str, FittedLaw]:
 
 
 def _bounds(config: Config, names: Sequence[str]) -> Bounds:
-    """The bounds of parameters, which are limits of the physics where they are ends of the allowed values."""
-    least, most = np.array([config.fits[name] for name in names]).reshape(-1, 2).T
+    """Read the bounds of parameters; ends of the allowed values are limits of the physics."""
+    lower, upper = np.array([config.fits[name] for name in names]).reshape(-1, 2).T
     quantities = [_quantity(config, name) for name in names]
     ends = [[quantity.least for quantity in quantities], [quantity.most for quantity in quantities]]
-    return Bounds(least, most, np.array([least, most]) == np.array(ends))
+    return Bounds(lower, upper, np.array([lower, upper]) == np.array(ends))
 
 
 def varied_input(inputs: Mapping[str, Sequence[float]]) -> tuple[str, Array]:
-    """The only input that varies among the points and the values of its curve; "" if there are several or none."""
+    """Find the only input that varies among the points, and the values of its curve; "" for several or none."""
     varying = {name: np.asarray(column) for name, column in inputs.items() if len(set(column)) > 1}
     if len(varying) != 1:
         return "", np.array([])
@@ -236,7 +223,7 @@ def varied_input(inputs: Mapping[str, Sequence[float]]) -> tuple[str, Array]:
 def _curve(
     config: Config, model: ForceModel, names: Sequence[str], fit: Fit, problem: Problem, varied: tuple[str, Array]
 ) -> Array:
-    """The outputs over the varied input, with the ends of the band of 95 % of the prediction without its noise."""
+    """Predict the outputs over the varied input, with the ends of the band of 95 % without the noise."""
     assert config.data is not None
     name, grid = varied
     outputs = len(config.data.outputs)
@@ -261,15 +248,6 @@ def determined_groups(config: Config, model: ForceModel, names: Sequence[str], f
     """What the data determine of the parameters that they do not identify, as products of powers.
 
     The effective mass m and the closing speed v0 make a product dimensionless where they can.
-
-    Parameters
-    ----------
-    config, model, names : the law and the config names of its parameters
-    fit : its fit, with positive parameters
-
-    Returns
-    -------
-    list : such as ["C/sqrt(m K)"]; empty where all parameters are identified, or none of these is determined
     """
     involved = np.flatnonzero(~fit.identifiable)
     directions = fit.unidentified[:, involved]

@@ -4,8 +4,10 @@ The errors of measurements are normal. With noise "excess" those of one specimen
 model, whose covariance is V = diag(sigma^2) + tau^2 Z Z^T, where Z has a column of ones and zeros for each
 specimen. Laws are compared by the largest likelihood of the parameters and tau. Estimates and intervals have tau
 from the restricted likelihood, since the largest likelihood underestimates it, and quantiles of Student's t with
-Satterthwaite's degrees of freedom. The formulas are derived here; tests compare them with closed forms of linear
-regression and with simulations.
+Satterthwaite's degrees of freedom. The solver is the trust region reflective method of
+`scipy.optimize.least_squares` (Branch, Coleman and Li 1999, SIAM Journal on Scientific Computing 21, 1-23),
+started at the best points of a Sobol sequence in the bounds. The formulas are derived here; tests compare them
+with closed forms of linear regression and with simulations.
 """
 
 from __future__ import annotations
@@ -23,14 +25,14 @@ from scipy.stats import chi2, qmc, t
 
 from ..array_types import Array, Mask
 from ..config.tables import Loss, Noise
-from .batch import Evaluate, VectorFunction, run_together
+from .batched_solvers import Evaluate, VectorFunction, run_together
 
 FitStatus: TypeAlias = Literal["ok", "at_bound", "not_converged", "too_few_points", "no_prediction", "at_limit"]
 
 T = TypeVar("T")
 
 # points of a Sobol sequence in the bounds that are tried first, and how many of them are starts
-TRIED, STARTS = 128, 4
+N_SCAN, N_STARTS = 128, 4
 # an interval of bounds with a larger ratio is searched on a logarithmic scale
 LOG_RATIO = 100.0
 MAX_EVALUATIONS = 200
@@ -40,12 +42,12 @@ SOLVER_TOLERANCE, COARSE_TOLERANCE = 1e-13, 1e-7
 STEP, FINAL_STEP = 1e-5, 1e-3
 # a residual where a model has no result, in standard deviations
 NO_PREDICTION = 1e6
-# a parameter this near to a bound, in units of the bounds, stands at it
+# a parameter this near to a bound, in units of the bounds, is at it
 AT_BOUND = 1e-7
 # a direction of the parameters that changes the prediction less than this share of the strongest is not identified
-SINGULAR = 1e-5
+RANK_RTOL = 1e-5
 # share of a parameter in such a direction from which on it is not identified
-INVOLVED = 1e-3
+PARTICIPATION_TOL = 1e-3
 CONFIDENCE = 0.95
 # a fit that leaves a smaller share of a point free passes through it, and the point has no residual without it
 LEVERAGE_LEFT = 1e-9
@@ -54,7 +56,7 @@ MAX_BRACKETS, PROFILE_XTOL = 30, 1e-6
 # iterations of the excess deviation and of the parameters with it, and when they end
 MAX_EXCESS_ITERATIONS, EXCESS_TOLERANCE, COARSE_EXCESS_TOLERANCE = 50, 1e-10, 1e-6
 # excess variances that are tried first, in units of the largest deviation of a specimen squared
-TRIED_EXCESS = np.concatenate([[0.0], np.geomspace(1e-8, 10.0, 64)])
+SCANNED_EXCESS = np.concatenate([[0.0], np.geomspace(1e-8, 10.0, 64)])
 
 
 @dataclass(frozen=True)
@@ -151,16 +153,7 @@ class DataPoints:
 
 @dataclass(frozen=True)
 class Estimate:
-    """The best parameters in a fit.
-
-    Parameters
-    ----------
-    u : in units of the bounds, shape (p,)
-    objective : sum of squared residuals over the variances, or of their loss; with noise "excess" minus twice the
-        logarithm of the likelihood, without a constant
-    excess : standard deviation between specimens, added to those of the measurements
-    converged : whether the solver met its tolerance
-    """
+    """The best parameters in a fit."""
 
     u: Array
     objective: float
@@ -220,8 +213,8 @@ class Fit:
 class Problem:
     """A model, the bounds of its parameters and the measurements.
 
-    `key` names the function of `impact.inverse.batch.run_together` that predicts, from rows of parameters of shape
-    (k, p), values of shape (k, n).
+    `key` names the function of `run_together` that predicts, from rows of parameters of shape (k, p), values of
+    shape (k, n).
     """
 
     key: str
@@ -258,13 +251,13 @@ class Problem:
 
 
 def scan(problem: Problem, evaluate: Evaluate) -> Array:
-    """The u that are starts of a fit: the best of a Sobol sequence, shape (STARTS, p)."""
+    """The u that are starts of a fit: the best of a Sobol sequence, shape (N_STARTS, p)."""
     if not problem.count:
         return np.zeros((1, 0))
     # the sequence begins at 0; half a cell away from it, no bound is tried
-    u = qmc.Sobol(problem.count, scramble=False).random(TRIED) + 0.5 / TRIED
+    u = qmc.Sobol(problem.count, scramble=False).random(N_SCAN) + 0.5 / N_SCAN
     cost = (problem.residuals(evaluate, u) ** 2).sum(axis=1)
-    best: Array = u[np.argsort(cost, kind="stable")[:STARTS]]
+    best: Array = u[np.argsort(cost, kind="stable")[:N_STARTS]]
     return best
 
 
@@ -278,29 +271,23 @@ def minimize(
     taken: Array | None = None,
     tolerance: float = SOLVER_TOLERANCE,
 ) -> Estimate:
-    """The local minimum of the objective from a start.
+    """Find the local minimum of the objective from a start u.
 
-    Parameters
-    ----------
-    problem, evaluate : the problem, and the function of `run_together`
-    start : u, shape (p,)
-    fixed : a parameter that stays at its start; None for none
-    excess : standard deviation between specimens; None to find it, if the noise asks for it
-    taken : see `ExcessLikelihood`, for its restricted likelihood
-    tolerance : of the solver, relative
+    The parameter `fixed` stays at its start; an `excess` of None is found if the noise asks for it; for `taken`
+    see `ExcessLikelihood`.
     """
     if problem.data.noise == "excess" and excess is None:
         return _minimize_with_excess(problem, evaluate, start, fixed, taken, tolerance)
     excess = excess or 0.0
     free = np.array([number for number in range(problem.count) if number != fixed], np.intp)
 
-    def full(part: Array) -> Array:
+    def full(free_u: Array) -> Array:
         u = start.copy()
-        u[free] = part
+        u[free] = free_u
         return u
 
-    def residuals(part: Array) -> Array:
-        (values,) = problem.residuals(evaluate, full(part)[None, :], excess)
+    def residuals(free_u: Array) -> Array:
+        (values,) = problem.residuals(evaluate, full(free_u)[None, :], excess)
         return np.asarray(values)
 
     if not free.size:
@@ -308,8 +295,8 @@ def minimize(
             start, float(LOSS_DERIVATIVES[problem.data.loss](residuals(start[free]))[0].sum()), excess, True
         )
 
-    def slopes(part: Array) -> Array:
-        return problem.slopes(evaluate, full(part), free, excess)
+    def slopes(free_u: Array) -> Array:
+        return problem.slopes(evaluate, full(free_u), free, excess)
 
     result = least_squares(
         residuals,
@@ -324,8 +311,8 @@ def minimize(
     )
     # the solver stays inside the bounds, and a parameter at a bound is on it
     nearest = np.round(result.x)
-    part = np.where(np.abs(result.x - nearest) <= AT_BOUND, nearest, result.x)
-    return Estimate(full(part), 2.0 * float(result.cost), excess, bool(result.success))
+    free_u = np.where(np.abs(result.x - nearest) <= AT_BOUND, nearest, result.x)
+    return Estimate(full(free_u), 2.0 * float(result.cost), excess, bool(result.success))
 
 
 def _minimize_with_excess(
@@ -382,7 +369,7 @@ class ExcessLikelihood:
     def best(self) -> float:
         """The standard deviation between specimens of the largest likelihood."""
         largest = (self.deviation / np.where(self.data.precision > 0.0, self.data.precision, 1.0)) ** 2
-        tried = TRIED_EXCESS * largest.max()
+        tried = SCANNED_EXCESS * largest.max()
         number = int(np.argmin([self.objective(variance) for variance in tried]))
         low, high = tried[max(number - 1, 0)], tried[min(number + 1, tried.size - 1)]
         if not self.slope(low) < 0.0 < self.slope(high):
@@ -413,15 +400,9 @@ def profile_end(
     width: float,
     taken: Array | None = None,
 ) -> float:
-    """The u of a parameter at which the least objective over the others has risen by `rise`; at most a bound.
+    """Find the u of a parameter at which the least objective over the others has risen by `rise`; at most a bound.
 
-    Parameters
-    ----------
-    problem, evaluate, taken : see `minimize`
-    best : the minimum
-    parameter, direction : which parameter, and -1 for the lower and 1 for the upper end
-    rise : of the objective
-    width : expected distance from the minimum, in u
+    `direction` is -1 for the lower and 1 for the upper end, and `width` the expected distance, in u.
     """
     bound = 0.0 if direction < 0 else 1.0
     centre = float(best.u[parameter])
@@ -489,14 +470,14 @@ def find_unidentified(jacobian: Array) -> Array:
     _, sizes, directions = np.linalg.svd(jacobian, full_matrices=True)
     sizes = np.concatenate([sizes, np.zeros(jacobian.shape[1] - sizes.size)])
     largest = sizes.max(initial=0.0)
-    unidentified: Array = directions[sizes <= SINGULAR * largest] if largest > 0.0 else directions
+    unidentified: Array = directions[sizes <= RANK_RTOL * largest] if largest > 0.0 else directions
     return unidentified
 
 
 def directions_taken(jacobian: Array) -> Array:
     """Orthonormal combinations of points that the parameters take up, shape (n, r), from derivatives (n, p)."""
     left, sizes, _ = np.linalg.svd(jacobian, full_matrices=False)
-    taken: Array = left[:, sizes > SINGULAR * sizes.max(initial=0.0)]
+    taken: Array = left[:, sizes > RANK_RTOL * sizes.max(initial=0.0)]
     return taken
 
 
@@ -592,7 +573,7 @@ class _Minimum:
 
     @property
     def identifiable(self) -> Mask:
-        identifiable: Mask = ~np.any(np.abs(self.unidentified) > INVOLVED, axis=0)
+        identifiable: Mask = ~np.any(np.abs(self.unidentified) > PARTICIPATION_TOL, axis=0)
         return identifiable
 
     @property
@@ -619,7 +600,7 @@ class _Minimum:
     def inverse(self) -> Array:
         """(J^T V^(-1) J)^(-1) without the directions that are not identified, shape (p, p)."""
         information = self.white_jacobian.T @ self.white_jacobian
-        return np.asarray(np.linalg.pinv(information, rcond=SINGULAR**2, hermitian=True), float)
+        return np.asarray(np.linalg.pinv(information, rcond=RANK_RTOL**2, hermitian=True), float)
 
     @cached_property
     def covariance(self) -> Array:
@@ -742,12 +723,6 @@ def fit_all(
     """The fits of problems; the starts, intervals and leave-one-out fits of all of them run at the same time.
 
     A fit does not depend on the other problems.
-
-    Parameters
-    ----------
-    problems : the problems
-    functions : predictions by the keys of the problems, see `Problem`
-    leave_one_out : whether to repeat each fit without each point; otherwise `loo` is NaN
     """
     starts = run_together(functions, [partial(scan, problem) for problem in problems])
     minima = _run_each(

@@ -195,10 +195,6 @@ def solve(
 def unknown_of(model: ForceModel, name: str) -> Parameter:
     """The input to solve for, as a parameter with its unit and bounds.
 
-    Raises
-    ------
-    UsageError : the law has no such parameter
-
     >>> from impact.contact.models import find
     >>> unknown_of(find("hunt-crossley-1975"), "e").most
     1.0
@@ -222,12 +218,7 @@ def placeholder(model: ForceModel, unknown: Parameter) -> dict[str, float]:
 
 
 def check_target(target: Mapping[str, float]) -> tuple[str, float]:
-    """The variable and the value of a target.
-
-    Raises
-    ------
-    UsageError : it is not one variable of a result with a finite value
-    """
+    """The variable and the value of a target."""
     names = [name for name, variable in OUTPUTS.items() if variable.dtype == "f8" and "model" in variable.dims]
     if len(target) != 1:
         raise UsageError(f"--target: got {len(target)} targets, expected one, such as e_out=0.6")
@@ -245,17 +236,6 @@ def solve_input(config: Config, plugins: Plugins, unknown: Parameter, target: Ma
     Without an axis in the config: all roots, by a scan over the allowed values, whose interior extrema are
     refined, and Chandrupatla's method between neighbours on different sides of the target. With an axis: the value
     for which the largest distance from the target over that axis is least.
-
-    Parameters
-    ----------
-    config : of one law, with at most one axis, over which the value has to serve
-    plugins : models that are not built in
-    unknown : see `unknown_of`
-    target : value by variable, see `check_target`
-
-    Raises
-    ------
-    UsageError : all integrations fail
     """
     variable, value = check_target(target)
     problem = _Problem(config, plugins, unknown, variable)

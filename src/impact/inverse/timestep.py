@@ -232,16 +232,7 @@ def timestep(
 
 @dataclass(frozen=True)
 class FixedStepLaw:
-    """One impact of a law, whose e, step and phase vary.
-
-    Parameters
-    ----------
-    model : the law
-    impact : the impact, one of them
-    contact_time : of the continuous law [s]
-    phases : number of phases, (i + 1/2)/phases
-    scheme : name of the scheme, see `impact.contact.timestep.SCHEMES`
-    """
+    """One impact of a law, whose e, step and phase vary."""
 
     model: ForceModel
     impact: Impacts
@@ -345,12 +336,6 @@ def needed_steps(law: FixedStepLaw, tol: float, e_continuous: float) -> NeededSt
     """The smallest whole number of steps per contact with which every phase is within a relative tolerance.
 
     It is found by bisection: with one step less, a phase is outside.
-
-    Parameters
-    ----------
-    law : the impact
-    tol : largest accepted |e_out - e|/e
-    e_continuous : restitution of the continuous law, which replaces e for a law without one
     """
     target = law.e if law.has_e else e_continuous
     if not target > 0.0:
@@ -374,18 +359,7 @@ def needed_steps(law: FixedStepLaw, tol: float, e_continuous: float) -> NeededSt
 def fixed_step_law(
     config: Config, phases: int, scheme: str | None = None
 ) -> tuple[FixedStepLaw, dict[str, float]]:
-    """The law and the impact of a config without axes, and the outputs of the continuous law by name, in SI.
-
-    Parameters
-    ----------
-    config : of one impact
-    phases : number of phases
-    scheme : its name; None for that of the codes that the law is of, `default_scheme`
-
-    Raises
-    ------
-    UsageError : the continuous law does not end with a rebound, or the scheme does not take the law
-    """
+    """The law and the impact of a config without axes, and the outputs of the continuous law by name, in SI."""
     plan = Plan(config)
     model = config.models[0]
     impact = build_impacts(plan.inputs, model, ())
@@ -400,12 +374,7 @@ def fixed_step_law(
 
 
 def time_steps(contact_time: float, steps_per_contact: Sequence[float], dt: Sequence[float]) -> list[float]:
-    """Time steps [s] from numbers of steps per contact, and from themselves.
-
-    Raises
-    ------
-    UsageError : a number is not positive, or there are too many steps per contact
-    """
+    """Time steps [s] from numbers of steps per contact, and from themselves."""
     for name, values in (("--steps-per-contact", steps_per_contact), ("--dt", dt)):
         for value in values:
             if not (math.isfinite(value) and value > 0.0):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +13,7 @@ from ..formatting import decimals
 from ..results.calibration import calibration_title, fit_status
 from ..results.kinds import is_calibration
 from ..text import safe_text
-from .curves import Curve, CurveData, Panel, x_axis_fields
+from .curves import CurveData, Panel, curve_of, x_axis_fields
 from .data import SIGMA, Points
 from .kinds import Choice, Kind
 from .labels import model_label
@@ -70,17 +69,14 @@ def _panels(data: xr.Dataset, name: str, varied: str, choice: Choice) -> tuple[P
     for index, key in enumerate(map(str, data["model"].values)):
         law = data.isel(model=index)
         label = ", ".join(filter(None, (model_label(law, numbered=choice.equations), _remark(law))))
+        y = law["predicted"]
+        band: list[xr.DataArray] = []
         if varied:
             ends = law.sel(output_name=name)
-            y, least, largest = (ends[key].values.tolist() for key in ("curve", "curve_lower", "curve_upper"))
-        else:
-            y, least, largest = law["predicted"].values.tolist(), [], []
-        curve = Curve(label, key, tuple(grid.tolist()), tuple(y), variable=name)
-        if np.isfinite(least).all():
-            curve = replace(curve, least=tuple(least), largest=tuple(largest))
-        curves.append(curve)
-        scaled = law["residual"].values / _deviation(law)
-        residuals.append(Curve(label, key, tuple(x.tolist()), tuple(scaled.tolist()), variable=f"{name}_residual"))
+            y, *band = (ends[field] for field in ("curve", "curve_lower", "curve_upper"))
+        has_band = all(np.isfinite(end).all() for end in band)
+        curves.append(curve_of(label, key, grid, y, name, band=band if has_band else ()))
+        residuals.append(curve_of(label, key, x, law["residual"] / _deviation(law), f"{name}_residual"))
     axis = x_axis_fields(data[varied or "point"], choice)
     axis["x_log"] = (
         is_geometric(grid) if varied and not choice.log else "x" in choice.log and bool((x > 0.0).all())

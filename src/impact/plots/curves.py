@@ -16,6 +16,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..formatting import heading
@@ -200,6 +201,24 @@ class CurveData:
             _label_curve_ends(axes, panel.curves, labels)
             _label_guides(axes, [curve for curve in panel.curves if curve.is_guide and curve.case])
         return [(artist, name) for name, artist in (entries | band).items()]
+
+
+def curve_of(
+    label: str,
+    model: str | None,
+    x: ArrayLike,
+    y: ArrayLike,
+    variable: str,
+    end: str = "",
+    band: Sequence[ArrayLike] = (),
+) -> Curve:
+    """Make a curve of arrays of the shape of x, or of one y everywhere; a band is two arrays."""
+    shape = np.shape(x)
+    points, values, least, largest = (
+        tuple(np.broadcast_to(np.asarray(array, float), shape).tolist()) if array is not None else ()
+        for array in (x, y, *(band or (None, None)))
+    )
+    return Curve(label, model, points, values, end, variable, least=least, largest=largest)
 
 
 def x_axis_fields(coordinate: xr.DataArray, choice: Choice) -> dict[str, Any]:

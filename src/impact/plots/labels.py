@@ -21,30 +21,7 @@ from .slices import parameter_text, scalars_of
 if TYPE_CHECKING:
     import xarray as xr
 
-GREEK = frozenset(
-    [
-        "alpha",
-        "beta",
-        "gamma",
-        "delta",
-        "epsilon",
-        "zeta",
-        "eta",
-        "theta",
-        "kappa",
-        "lambda",
-        "mu",
-        "nu",
-        "xi",
-        "rho",
-        "sigma",
-        "tau",
-        "phi",
-        "chi",
-        "psi",
-        "omega",
-    ]
-)
+GREEK = "alpha|beta|gamma|delta|epsilon|zeta|eta|theta|kappa|lambda|mu|nu|xi|rho|sigma|tau|phi|chi|psi|omega"
 # symbols of the paper for names that are words; v_post and abs_e_error are each a label of several variables
 MATH_SYMBOLS = {
     **{name: variable.symbol for name, variable in (OUTPUTS | HISTORY).items() if variable.symbol},
@@ -64,14 +41,14 @@ REFERENCE = "Impulse-momentum"
 def symbol(name: str) -> str:
     r"""Write a variable as mathtext; empty if its name is not a letter.
 
-    >>> symbol("v1"), symbol("e_out"), symbol("tau_c"), symbol("contact_time"), symbol("maw.gamma")
-    ('$v_1$', '$e_\\mathrm{out}$', '$\\tau_c$', '', '$\\gamma$')
+    >>> symbol("v1"), symbol("e_out"), symbol("tau_c"), symbol("contact_time"), symbol("steel.nu")
+    ('$v_1$', '$e_\\mathrm{out}$', '$\\tau_c$', '', '$\\nu$')
     """
     name = InputName.parse(name).key
     if name in MATH_SYMBOLS:
         return f"${MATH_SYMBOLS[name]}$"
-    parts = re.fullmatch(r"([A-Za-z]|[a-z]+)_?([A-Za-z]?|[0-9]*)", name)
-    if parts is None or not (len(parts[1]) == 1 or parts[1] in GREEK):
+    parts = re.fullmatch(rf"({GREEK}|[A-Za-z])_?([A-Za-z]?|[0-9]*)", name)
+    if parts is None:
         return ""
     letter = parts[1] if len(parts[1]) == 1 else rf"\{parts[1]}"
     return f"${letter}_{parts[2]}$" if parts[2] else f"${letter}$"

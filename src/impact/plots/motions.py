@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..array_types import Array
 from ..config.tables import SWEEP_QUANTITIES
 from ..contact.models import catalogue
 from ..errors import UsageError
@@ -16,7 +17,7 @@ from ..results.attributes import read_attribute
 from ..results.kinds import has_fixed_steps
 from ..results.schema import exponent_text
 from ..text import safe_text
-from .curves import Curve, CurveData, Mark, Panel
+from .curves import Curve, CurveData, Mark, Panel, curve_of
 from .kinds import Choice, Kind
 from .labels import REFERENCE, law_text, words_of
 from .slices import choose_line, described_inputs, parameter_text, unit_of
@@ -75,7 +76,7 @@ def impulse_curves(histories: Sequence[xr.Dataset], choice: Choice) -> CurveData
 def _impulse_marks(histories: Sequence[xr.Dataset]) -> tuple[Mark, ...]:
     """Mark the impulse of the approach, where the lines of the balls meet, and that of the whole impact."""
     first = histories[0]
-    tau = np.asarray(_series(first, "tau"))
+    tau = _series(first, "tau")
     if not np.isfinite(tau).all():
         return ()
     m1 = float(_impact_inputs(first)["m1"])
@@ -95,7 +96,7 @@ def _reference_curve(history: xr.Dataset, name: str, label: str) -> list[Curve]:
     start = float(history[name][0])
     total = (1.0 + float(e)) * mass * float(history["v"][0])
     end = start + (-1.0 if name == "v1" else 1.0) * total / float(inputs[f"m{name[1]}"])
-    return [Curve(label, None, (0.0, total), (start, end), {"v1": "v₁", "v2": "v₂"}[name], name)]
+    return [curve_of(label, None, (0.0, total), (start, end), name, {"v1": "v₁", "v2": "v₂"}[name])]
 
 
 def _curves_over(
@@ -108,13 +109,13 @@ def _curves_over(
     panels = []
     for x, y, end in pairs:
         curves = [
-            Curve(
+            curve_of(
                 _model_label(history, numbered=choice.equations),
                 str(history["model"].item()),
                 _series(history, x),
                 _series(history, y),
-                end,
                 y,
+                end,
             )
             for history in histories
         ]
@@ -123,14 +124,11 @@ def _curves_over(
     return CurveData(title, _conditions_text(histories), tuple(panels))
 
 
-def _series(history: xr.Dataset, name: str) -> tuple[float, ...]:
-    """Read a variable of a history, or compute the impulse "tau"."""
-    if name == "tau":
-        # the impulse that reduced the closing speed to v
-        return tuple(
-            (_effective_mass(_impact_inputs(history)) * (float(history["v"][0]) - history["v"].values)).tolist()
-        )
-    return tuple(np.asarray(history[name].values, float).tolist())
+def _series(history: xr.Dataset, name: str) -> Array:
+    """Read a variable of a history, or compute the impulse "tau" that reduced the closing speed to v."""
+    v = np.asarray(history["v"].values, float)
+    is_impulse = name == "tau"
+    return _effective_mass(_impact_inputs(history)) * (v[0] - v) if is_impulse else history[name].values
 
 
 def _axis_label_and_unit(history: xr.Dataset, name: str) -> tuple[str, str]:

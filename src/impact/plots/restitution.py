@@ -7,12 +7,11 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import UsageError
 from ..formatting import label as number_label
 from ..text import safe_text
-from .curves import Curve, CurveData, Panel, x_axis_fields
+from .curves import Curve, CurveData, Panel, curve_of, x_axis_fields
 from .kinds import Choice, Kind
 from .labels import REFERENCE, model_label
 from .slices import Line, choose_line, conditions_of, is_ordered, numeric_axes, read, take_line
@@ -38,10 +37,11 @@ def velocity_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     reference = f"{REFERENCE} (6), (7)" if choice.equations else REFERENCE
     balls = ((1, "v₁⁺"), (2, "v₂⁺"))
     references = [
-        _curve(reference, None, line, line.data[f"v{ball}_reference"], f"v{ball}_post", end) for ball, end in balls
+        curve_of(reference, None, line.coordinate, line.data[f"v{ball}_reference"], f"v{ball}_post", end)
+        for ball, end in balls
     ]
     curves = [
-        _curve(label, key, line, model_data[f"v{ball}_post"], f"v{ball}_post", end)
+        curve_of(label, key, line.coordinate, model_data[f"v{ball}_post"], f"v{ball}_post", end)
         for label, key, model_data in _split_by_model(line, choice)
         for ball, end in balls
     ]
@@ -53,9 +53,11 @@ def velocity_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
 def restitution_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     """Read the delivered restitution of every model and the requested one; see `velocity_curves`."""
     line = _read_line(dataset, choice, "e_out")
-    requested = [_curve("Requested", None, line, line.data["e"], "e")] if "e" in line.data.coords else []
+    requested = (
+        [curve_of("Requested", None, line.coordinate, line.data["e"], "e")] if "e" in line.data.coords else []
+    )
     curves = [
-        _curve(label, key, line, model_data["e_out"], "e_out")
+        curve_of(label, key, line.coordinate, model_data["e_out"], "e_out")
         for label, key, model_data in _split_by_model(line, choice)
     ]
     panel = Panel("", "Delivered restitution", (*_without_empty(requested), *curves), y_name="e_out")
@@ -66,7 +68,7 @@ def error_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     """Read the error of every model's restitution, signed and absolute; see `velocity_curves`."""
     line = _read_line(dataset, choice, "e_error")
     signed = [
-        _curve(label, key, line, model_data["e_error"], "e_error")
+        curve_of(label, key, line.coordinate, model_data["e_error"], "e_error")
         for label, key, model_data in _split_by_model(line, choice)
     ]
     if not _without_empty(signed):
@@ -92,7 +94,7 @@ def timestep_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     line = _read_line(dataset, replace(choice, x=choice.x or along[0]), "e_out", keep=("phase", "e"))
     cases = _split_by_restitution(line)
     guides = [
-        replace(_curve("Requested", None, line, case["e"], "e"), case=name, is_guide=True)
+        replace(curve_of("Requested", None, line.coordinate, case["e"], "e"), case=name, is_guide=True)
         for name, case in cases
         if "e" in case.coords
     ]
@@ -133,11 +135,8 @@ def _curve_over_phase(label: str, key: str, line: Line, values: xr.DataArray) ->
     """Compute the mean over the phase, and a band from the least to the largest value of several phases."""
     (x_dim,) = line.data[line.x].dims
     by_phase = np.asarray(values.transpose(x_dim, ...).values, float).reshape(values.sizes[x_dim], -1)
-    curve = _curve(label, key, line, by_phase.mean(axis=1), "e_out")
-    if by_phase.shape[1] == 1:
-        return curve
-    least, largest = by_phase.min(axis=1), by_phase.max(axis=1)
-    return replace(curve, least=tuple(least.tolist()), largest=tuple(largest.tolist()))
+    band = (by_phase.min(axis=1), by_phase.max(axis=1)) if by_phase.shape[1] > 1 else ()
+    return curve_of(label, key, line.coordinate, by_phase.mean(axis=1), "e_out", band=band)
 
 
 def _have_equal_values(curve: Curve, other: Curve) -> bool:
@@ -163,20 +162,6 @@ def _split_by_model(line: Line, choice: Choice) -> Iterator[tuple[str, str, xr.D
         yield model_label(model_data, numbered=choice.equations), str(model_data["model"].item()), model_data
 
 
-def _curve(
-    label: str,
-    model: str | None,
-    line: Line,
-    values: xr.DataArray | NDArray[np.float64],
-    variable: str,
-    end: str = "",
-) -> Curve:
-    """Make a curve of values along a line, or of one value everywhere."""
-    x = np.asarray(line.data[line.x].values, float)
-    y = np.broadcast_to(np.asarray(values, float), x.shape)
-    return Curve(label, model, tuple(x.tolist()), tuple(y.tolist()), end, variable)
-
-
 def _without_empty(curves: list[Curve]) -> list[Curve]:
     """Drop the curves without a finite value, such as a reference without a requested restitution."""
     return [curve for curve in curves if np.isfinite(curve.y).any()]
@@ -192,12 +177,11 @@ def _curve_data(
     x_log: bool = False,
 ) -> CurveData:
     """Complete panels with the x axis of their line, and add the title and the conditions."""
-    coordinate = line.data[line.x]
     heading = safe_text(str(dataset.attrs.get("title", "")), 140)
     conditions = conditions_of(line.data, line.x)
     if heading and title != FIGURE_6:
         heading, conditions = title, ": ".join(filter(None, (heading, conditions)))
-    x_axis = x_axis_fields(coordinate, choice)
+    x_axis = x_axis_fields(line.coordinate, choice)
     x_axis |= {"x_log": x_axis["x_log"] or x_log, "joined": is_ordered(dataset, line.x)}
     panels = [replace(panel, y_log=panel.y_log or "y" in choice.log, **x_axis) for panel in panels]
     empty = {c.model: None for panel in panels for c in panel.curves if c.model and not np.isfinite(c.y).any()}

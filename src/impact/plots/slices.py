@@ -33,6 +33,10 @@ class Line(NamedTuple):
     x: str
     not_drawn: tuple[str, ...]
 
+    @property
+    def coordinate(self) -> xr.DataArray:
+        return self.data[self.x]
+
 
 class Plane(NamedTuple):
     """A plane through a result: the sorted data, two coordinates to draw over, and values without a position."""

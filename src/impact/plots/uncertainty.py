@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..array_types import Array
 from ..config.grid import SAMPLE
 from ..contact.variables import OUTPUTS
 from ..errors import UsageError
 from ..results.selection import select
 from ..results.sensitivity import distribution_texts
 from ..text import safe_text
-from .curves import Curve, CurveData, Panel, x_axis_fields
+from .curves import Curve, CurveData, Panel, curve_of, x_axis_fields
 from .kinds import Choice, Kind
 from .labels import model_label
 from .slices import choose_line, conditions_of, numeric_axes, read, take_line
@@ -48,9 +47,14 @@ def uncertainty_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
         key, label = str(law["model"].item()), model_label(law, numbered=choice.equations)
         samples = np.asarray(law[name].transpose(..., SAMPLE).values, float)
         if x is None:
-            curves.append(_distribution_curve(label, key, samples, name))
+            # the distribution function
+            count = min(samples.size, MAX_DRAWN_PROBABILITIES)
+            share = (np.arange(count) + 0.5) / count
+            curves.append(curve_of(label, key, np.quantile(samples, share, method="hazen"), share, name))
         else:
-            curves.append(_band_curve(label, key, np.asarray(law[x].values, float), samples, name))
+            # NaN where a sample has no result
+            least, median, largest = np.quantile(samples, (BAND[0], 0.5, BAND[1]), axis=-1)
+            curves.append(curve_of(label, key, law[x], median, name, band=(least, largest)))
         failed = int(np.isnan(samples).sum())
         not_drawn += (f"{key}, where {failed:,} samples have no result",) if failed else ()
     if x is None:
@@ -64,7 +68,10 @@ def uncertainty_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
             x_log="x" in choice.log,
         )
     else:
-        requested = _requested(line, x) if name == "e_out" else []
+        # the requested restitution, unless it depends on the sample
+        has_e = name == "e_out" and "e" in line.coords and SAMPLE not in line["e"].dims
+        is_drawn = has_e and bool(np.isfinite(line["e"].values).all())
+        requested = [curve_of("Requested", None, line[x], line["e"], "e")] if is_drawn else []
         panel = Panel(
             y_label=meaning,
             curves=(*requested, *curves),
@@ -90,30 +97,6 @@ def _free_axis(dataset: xr.Dataset, choice: Choice) -> str | None:
     lines = [str(name) for name, coord in chosen.coords.items() if coord.ndim == 1 and coord.dtype.kind == "f"]
     free = [name for name in lines if chosen[name].dims[0] not in (SAMPLE, "model") and chosen[name].size > 1]
     return "e" if "e" in free else next(iter(free), None)
-
-
-def _band_curve(label: str, key: str, x: Array, samples: Array, name: str) -> Curve:
-    """Compute the median and the band of samples of shape (x, samples); NaN where a sample has no result."""
-    least, median, largest = np.quantile(samples, (BAND[0], 0.5, BAND[1]), axis=1)
-    curve = Curve(label, key, tuple(x.tolist()), tuple(median.tolist()), variable=name)
-    return replace(curve, least=tuple(least.tolist()), largest=tuple(largest.tolist()))
-
-
-def _distribution_curve(label: str, key: str, samples: Array, name: str) -> Curve:
-    """Compute the distribution function of samples, at no more than MAX_DRAWN_PROBABILITIES of them."""
-    count = min(samples.size, MAX_DRAWN_PROBABILITIES)
-    share = (np.arange(count) + 0.5) / count
-    drawn = np.quantile(samples, share, method="hazen")
-    return Curve(label, key, tuple(drawn.tolist()), tuple(share.tolist()), variable=name)
-
-
-def _requested(line: xr.Dataset, x: str) -> list[Curve]:
-    """Draw the requested restitution, unless it depends on the sample."""
-    if "e" not in line.coords or SAMPLE in line["e"].dims or not np.isfinite(line["e"].values).all():
-        return []
-    values = np.asarray(line[x].values, float)
-    e = np.broadcast_to(np.asarray(line["e"].values, float), values.shape)
-    return [Curve("Requested", None, tuple(values.tolist()), tuple(e.tolist()), variable="e")]
 
 
 def choose_axis(dataset: xr.Dataset, keys: Sequence[str]) -> Choice:

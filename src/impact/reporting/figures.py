@@ -19,9 +19,9 @@ from ..errors import ImpactError
 from ..formatting import label
 from ..plots.draw import draw, get_plot_data
 from ..plots.kinds import STUDIES, Choice, Kind, Look, kinds_of
-from ..plots.slices import numeric_axes, varying_inputs
+from ..plots.slices import numeric_axes, unit_of, varying_inputs
 from ..plots.style import encoded
-from ..results.schema import columns_along, plain_unit
+from ..results.schema import columns_along
 from ..results.selection import model_positions
 from ..results.slabs import distinct_points, is_computed, slabs
 
@@ -160,10 +160,4 @@ def _first_answered_of_model(model_data: xr.Dataset, axes: Sequence[Hashable]) -
 def coordinate_text(coordinate: xr.DataArray) -> str:
     """Write the value of a scalar coordinate with its unit."""
     unit = unit_of(coordinate)
-    return label(coordinate.values.item()) + (f" {unit}" if unit else "")
-
-
-def unit_of(coordinate: xr.DataArray) -> str:
-    """Read the unit of a coordinate; empty if it has none."""
-    unit = plain_unit(str(coordinate.attrs.get("units", "")))
-    return "" if unit == "1" else unit
+    return label(coordinate.values.item()) + (f" {unit}" if unit not in ("", "1") else "")

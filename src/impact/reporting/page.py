@@ -25,7 +25,7 @@ from ..contact.model import ForceModel
 from ..contact.models import catalogue
 from ..errors import UsageError
 from ..formatting import label, number
-from ..plots.slices import varying_inputs
+from ..plots.slices import unit_of, varying_inputs
 from ..results.attributes import read_attribute
 from ..results.calibration import (
     FIT_HEADINGS,
@@ -44,7 +44,7 @@ from ..results.slabs import MAX_SUMMARY_POINTS, is_large
 from ..results.summary import Summary, extremes_of, summarize
 from ..results.xarray_backend import load
 from ..text import safe_text, with_year
-from .figures import at_text, coordinate_text, figures_of, unit_of
+from .figures import at_text, coordinate_text, figures_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -218,7 +218,8 @@ def _single_values(dataset: xr.Dataset) -> Iterator[tuple[str, str, str]]:
 def _axis_row(coordinate: xr.DataArray) -> tuple[str, ...]:
     """Describe a coordinate: name, meaning, unit, ends, number of values, and how they are spaced."""
     meaning = str(coordinate.attrs.get("long_name", ""))
-    return str(coordinate.name), meaning, unit_of(coordinate) or "–", *_range(coordinate)
+    unit = unit_of(coordinate)
+    return str(coordinate.name), meaning, unit if unit not in ("", "1") else "–", *_range(coordinate)
 
 
 def _range(coordinate: xr.DataArray) -> tuple[str, str, str, str]:

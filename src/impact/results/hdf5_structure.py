@@ -96,9 +96,9 @@ def _messages(read: ReadBytes, address: int) -> Iterator[tuple[int, int, bytes]]
     if is_second_version:
         flags = head[5]
         # times and limits of attributes are optional
-        at = address + 6 + (16 if flags & 0x20 else 0) + (4 if flags & 0x10 else 0)
+        position = address + 6 + (16 if flags & 0x20 else 0) + (4 if flags & 0x10 else 0)
         width = 1 << (flags & 3)
-        blocks = [(at + width, int.from_bytes(read(at, width), "little"))]
+        blocks = [(position + width, int.from_bytes(read(position, width), "little"))]
         prefix = struct.Struct("<BHB2x" if flags & 4 else "<BHB")
     elif head[0] == 1:
         blocks, prefix = [(address + 16, struct.unpack_from("<I", head, 8)[0])], struct.Struct("<HHB3x")
@@ -111,11 +111,11 @@ def _messages(read: ReadBytes, address: int) -> Iterator[tuple[int, int, bytes]]
         if start in starts or total > MAX_HEADER_BYTES:
             raise ValueError
         starts.add(start)
-        content, at = read(start, size), 0
-        while at + prefix.size <= size:
-            kind, length, flags = prefix.unpack_from(content, at)
-            at += prefix.size + length
-            body = content[at - length : at]
+        content, position = read(start, size), 0
+        while position + prefix.size <= size:
+            kind, length, flags = prefix.unpack_from(content, position)
+            position += prefix.size + length
+            body = content[position - length : position]
             if kind == CONTINUATION:
                 start_of_next, size_of_next = struct.unpack_from("<QQ", body)
                 # a signature and a checksum
@@ -193,15 +193,15 @@ def _records(read: ReadBytes, address: int) -> list[bytes]:
             raise ValueError
         addresses.add(address)
         records.extend(content[6 + i * record_bytes : 6 + (i + 1) * record_bytes] for i in range(n))
-        at = 6 + n * record_bytes
+        position = 6 + n * record_bytes
         for _ in range(n + 1 if level else 0):
-            (child,) = struct.unpack_from("<Q", content, at)
-            middle, end = at + 8 + _width(limits[0]), at + 8 + _width(limits[0]) + widths[level - 1]
+            (child,) = struct.unpack_from("<Q", content, position)
+            middle, end = position + 8 + _width(limits[0]), position + 8 + _width(limits[0]) + widths[level - 1]
             before = len(records)
-            follow(child, level - 1, int.from_bytes(content[at + 8 : middle], "little"))
+            follow(child, level - 1, int.from_bytes(content[position + 8 : middle], "little"))
             if level > 1 and len(records) - before != int.from_bytes(content[middle:end], "little"):
                 raise ValueError
-            at = end
+            position = end
 
     if root != UNDEFINED:
         follow(root, depth, n_root)
@@ -238,7 +238,8 @@ def _count_stored_chunks(read: ReadBytes, layout: bytes) -> int | None:
             continue
         content = read(address + B_TREE_1.size, entries * (key_bytes + 8))
         children = [
-            int.from_bytes(content[at : at + 8], "little") for at in range(key_bytes, len(content), key_bytes + 8)
+            int.from_bytes(content[position : position + 8], "little")
+            for position in range(key_bytes, len(content), key_bytes + 8)
         ]
         nodes.extend((child, level - 1) for child in children)
         addresses.update(children)

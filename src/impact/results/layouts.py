@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
-import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from ..engine.plan import Plan
 from .factored import (
@@ -18,7 +16,7 @@ from .factored import (
     table_values,
     witness_variables,
 )
-from .netcdf import RegionValues
+from .netcdf import RegionValues, stored_array
 from .schema import stored_variables
 from .summary import Summary, add_slab, summarize_table, summary_record
 from .trajectory_table import ExpandedSlab, TrajectoryTable, expanded_slabs, lazy_dataset
@@ -132,12 +130,10 @@ class FactoredLayout:
         stored = {name: variable for name, variable in variables.items() if name in TABLE_VARIABLES}
         witnesses = {name: variable.load() for name, variable in stored.items() if name.startswith("witness_")}
         dataset = xr.Dataset(witnesses, _load_coordinates(variables), attributes)
-        sizes = {name: variable.size for name, variable in stored.items() if name not in witnesses}
-
-        def read(name: str, positions: slice | NDArray[np.intp]) -> NDArray[Any]:
-            return variables[name][positions].values
-
-        table = stored_table(dataset, sizes, read)
+        # without xarray's indexing, which takes longer than to read a few values
+        arrays = {name: stored_array(variable) for name, variable in stored.items() if name not in witnesses}
+        sizes = {name: array.shape[0] for name, array in arrays.items()}
+        table = stored_table(dataset, sizes, lambda name, positions: arrays[name].read((positions,)))
         quantities = witness_variables(dataset)
         check_witnesses(table, quantities, dataset)
         template = dataset.drop_vars(witnesses).drop_attrs(deep=False)

@@ -123,11 +123,10 @@ class Impact(Displayed):
             rows[name] = quantity(value, self._unit_of(name), 10) + note
         for name, material in self.materials.items():
             properties = {field: value for field, value in asdict(material).items() if value is not None}
-            about = (
+            rows[f"[materials.{name}]"] = ", ".join(
                 f"{field} = {quantity(value, MATERIAL_QUANTITIES[field].unit, 10)}"
                 for field, value in properties.items()
             )
-            rows[f"[materials.{name}]"] = ", ".join(about)
         for name, unit, meaning in DERIVED_QUANTITIES:
             if self.derived[name] == self.derived[name] and name not in self.point:
                 rows[name] = f"{quantity(self.derived[name], self._with_numbers(plain_unit(unit)), 10)}  {meaning}"
@@ -226,19 +225,12 @@ def run(
 
 
 def no_motion(integrator: str) -> str:
-    """The reason why a scheme with a fixed step has no time history."""
+    """Explain why a scheme with a fixed step has no time history."""
     return f'integrator = "{safe_text(integrator, 40)}" has no history, expected solver.integrator = "{EXACT}"'
 
 
 def run_single_impact(plan: Plan, first: tuple[str, ...], times: int | None = None) -> Impact:
-    """Integrate the only impact of a plan.
-
-    Parameters
-    ----------
-    plan : without axes
-    first : names of axes of the source that are at their first value
-    times : number of points in time of the history, see `impact.contact.history.integrate_history`
-    """
+    """Integrate the only impact of a plan without axes; `first` names axes of its source at their first value."""
     config = plan.config
     law = config.models[0]
     impacts = build_impacts(plan.inputs, law, ())
@@ -256,13 +248,10 @@ def run_single_impact(plan: Plan, first: tuple[str, ...], times: int | None = No
     values = {name: array[0].item() for name, array in collision.items()}
     for error in errors.values():
         warnings.warn(error, stacklevel=2)
+    history = None
     # a history is that of the continuous law
-    going = values["status"] == Status.OK and solver.integrator == EXACT
-    history = (
-        integrate_history(law, impacts, rtol=solver.rtol, max_steps=solver.max_steps, times=times)
-        if going
-        else None
-    )
+    if values["status"] == Status.OK and solver.integrator == EXACT:
+        history = integrate_history(law, impacts, rtol=solver.rtol, max_steps=solver.max_steps, times=times)
     v0 = impacts.v0[0].item()
     # a law may have its own n, which replaces that of the config
     point = {**config.scalars, "n": impacts.n[0].item()}
@@ -289,12 +278,10 @@ def run_single_impact(plan: Plan, first: tuple[str, ...], times: int | None = No
 def _derived_quantities(
     law: ForceModel, impacts: Impacts, values: Mapping[str, float], history: History | None
 ) -> dict[str, float]:
-    """The values of DERIVED_QUANTITIES."""
+    """Compute DERIVED_QUANTITIES."""
     quantities = {name: getattr(impacts, name)[0].item() for name in ("m1", "m2", "R1", "R2", "m")}
-    if law.unloading in (unload_to_residual, unload_with_stiffness) and values["status"] in (
-        Status.OK,
-        Status.LIMIT,
-    ):
+    has_rebound = values["status"] in (Status.OK, Status.LIMIT)
+    if has_rebound and law.unloading in (unload_to_residual, unload_with_stiffness):
         recovered = values["peak_indentation"] - values["permanent_indentation"]
         quantities["K_r"] = values["peak_force"] / recovered ** impacts.n[0].item() if recovered else math.inf
     if history is not None:
@@ -312,14 +299,7 @@ def _derived_quantities(
 
 
 def history_dataset(history: History, model: str, point: Mapping[str, float | str]) -> xr.Dataset:
-    """The time history of one impact, over the time t since first contact.
-
-    Parameters
-    ----------
-    history : the history
-    model : key of the model
-    point : the inputs of the impact by their config names, stored in the attribute `inputs`
-    """
+    """Build the dataset of a time history over t, with the inputs of the impact as an attribute."""
     dataset = xr.Dataset(
         {name: ("t", getattr(history, name), attributes_of(variable)) for name, variable in HISTORY.items()},
         coords={"t": ("t", history.t, {"units": "s", "long_name": "time since first contact"}), "model": model},
@@ -341,19 +321,10 @@ def histories(
     at: Mapping[str, float | str],
     plugins: Plugins,
 ) -> list[xr.Dataset]:
-    """Time histories of one point by several models; a dataset that is a time history is returned as it is.
+    """Integrate the histories of one point by several models; a dataset that is a time history is returned.
 
-    Parameters
-    ----------
-    dataset : a result, or a time history
-    models : keys; by default all
-    at : values of axes, which need not be on the grid; other axes take their first value. A parameter of one model
-        is ignored by the others
-    plugins : models that are not built in
-
-    Raises
-    ------
-    UsageError : a model or an axis is not in the result, or no model has a history at this point
+    Values of `at` need not be on the grid, and other axes take their first value. A parameter of one model is
+    ignored by the others. An unknown model or input, and a point without a history, are UsageErrors.
     """
     if "t" in dataset.dims:
         return [dataset]
@@ -368,7 +339,7 @@ def histories(
     for changed in changed_plugins(dataset.attrs, plugins, "the result"):
         # a changed law has another motion than the result
         raise UsageError(changed)
-    followed: list[xr.Dataset] = []
+    datasets: list[xr.Dataset] = []
     ends: dict[str, str] = {}
     first: dict[str, float | str] = {}
     for key in dict.fromkeys(models or keys):
@@ -380,39 +351,26 @@ def histories(
         if impact.history is None:
             ends[key] = impact.status.meaning
         else:
-            followed.append(impact.history)
-    if not followed:
-        where = ", ".join(f"{name} = {value}" for name, value in {**first, **at}.items())
+            datasets.append(impact.history)
+    if not datasets:
+        point = ", ".join(f"{name} = {value}" for name, value in {**first, **at}.items())
         reason = next(iter(ends.values()))
-        raise UsageError(f"no motion to draw at {where}: {reason}; choose a point, such as --sel e=0.5")
-    return followed
+        raise UsageError(f"no motion to draw at {point}: {reason}; choose a point, such as --sel e=0.5")
+    return datasets
 
 
 @dataclass(frozen=True)
 class PointSource:
-    """A config of which single impacts are taken.
-
-    Parameters
-    ----------
-    draft : the config with the settings of the user
-    plugins : models that are not built in
-    labels : the values at which a part of a result was selected, by coordinate
-    has_selection : whether it selects models, unlike the starter config
-    """
+    """A config of which single impacts are taken, with the settings of the user."""
 
     draft: Draft
     plugins: Plugins
-    labels: Mapping[str, float | str] = field(default_factory=dict)
-    has_selection: bool = True
+    labels: Mapping[str, float | str] = field(default_factory=dict)  # at which a part of a result was selected
+    has_selection: bool = True  # selects models, unlike the starter config
 
     @property
     def models(self) -> tuple[str, ...]:
-        """The keys of the selected models, or none; other values of the config need not be valid yet.
-
-        Raises
-        ------
-        ConfigError : the selection is invalid
-        """
+        """Keys of the selected models, or none; other values of the config need not be valid yet."""
         if not self.has_selection or "models" not in self.draft.data:
             return ()
         _, problems = expand_models(self.draft.data["models"], self.draft.known_models)
@@ -420,19 +378,10 @@ class PointSource:
 
 
 def open_source(source: ConfigSource, overrides: Sequence[str], plugins: Plugins) -> PointSource:
-    """Open the config of a source, with overrides.
+    """Open the config of a source, with overrides; None is the starter config at e = 0.5.
 
-    Parameters
-    ----------
-    source : path of a TOML file or of a result, a mapping with the keys of a TOML file, a result, or None for the
-        starter config at e = 0.5; a part of a result fixes the values at which it was selected
-    overrides : changes to its config
-    plugins : models that are not built in; a warning is issued for one that has changed since the result was made
-
-    Raises
-    ------
-    ConfigError : it cannot be read
-    ResultError, UsageError : the config of a result cannot be read
+    A part of a result fixes the values at which it was selected. A plug-in that has changed since the result was
+    made is a warning.
     """
     if isinstance(source, str | Path) and is_result(Path(source)):
         with open_result(source) as stored:
@@ -462,7 +411,7 @@ def single_point(
     at: Mapping[str, float | str] | None = None,
     over: Mapping[str, object] | None = None,
 ) -> tuple[Config, tuple[str, ...]]:
-    """Reduce a config to one impact, or to impacts over one input.
+    """Reduce a config to one impact, or to impacts over one input; also name the inputs that took a first value.
 
     Parameters
     ----------
@@ -471,15 +420,6 @@ def single_point(
     at : values by config name, which need not be on the grid. Inputs that vary together, in a zip group or in a
         table of cases, are an exception: their values, or the number of a case, select one of its points
     over : values of an input, as in a config, that stay an axis
-
-    Returns
-    -------
-    (Config, names) : a config without axes, but for those of `over`, and the names of the other axes that are not
-        in `at` and took their first value
-
-    Raises
-    ------
-    ConfigError, UsageError, ModelError : there is no such model or input, or a value is not allowed
     """
     draft, fixed = source.draft, {str(InputName.parse(name)): value for name, value in (at or {}).items()}
     if {"e", "alpha"} <= fixed.keys():
@@ -540,7 +480,10 @@ def _unknown_input(draft: Draft, name: str) -> UsageError:
     parameters = [f"{model.key}.{parameter.name}" for model in draft.models for parameter in model.parameters]
     names = {*draft.input_names, *SWEEP_DEFAULTS, *parameters}
     choices = {choice for choice in names if _has_input(draft, InputName.parse(choice))} | _joint_inputs(draft)
-    return UsageError(f'no input "{name}" here; {did_you_mean(name, sorted(choices))}')
+    hint = did_you_mean(name, [*choices, *SWEEP_INPUTS])
+    # without a similar name, the inputs that this config has
+    hint = hint if hint.startswith("did") else did_you_mean(name, sorted(choices))
+    return UsageError(f'no input "{name}" here; {hint}')
 
 
 def _without_axes(

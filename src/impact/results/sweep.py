@@ -53,8 +53,7 @@ class Extension:
     seal : of the old result
     note : JSON text for the attribute `extended` of the new result
     find_reused : returns the trajectories of a range that are not integrated again
-    fill : copies old values into a slab; None if all values are computed from
-        trajectories
+    fill : copies old values into a slab; None if all values are computed from trajectories
     replaces : whether the new result replaces the old one
     """
 
@@ -124,7 +123,13 @@ def sweep(
     if output is None and (resume or overwrite):
         raise UsageError("resume and overwrite: got no output, expected one as well")
     backend = choose_executor(jobs, threads, executor)
-    with _progress(shown=progress) as on_progress:
+    bar: AbstractContextManager[ProgressCallback] = nullcontext(ignore)
+    if progress:
+        # imported here: rich is slow to import
+        from ..progress_display import progress_bar
+
+        bar = progress_bar()
+    with bar as on_progress:
         if output is None:
             run = Run(backend, max_points=max_points, on_progress=on_progress)
             return sweep_in_memory(prepare(source, overrides, plugins, run), run)
@@ -140,15 +145,6 @@ def sweep(
             on_progress=on_progress,
         )
     return load(output)
-
-
-def _progress(*, shown: bool) -> AbstractContextManager[ProgressCallback]:
-    """Show a bar, or nothing; rich is imported for a bar only."""
-    if not shown:
-        return nullcontext(ignore)
-    from ..progress_display import progress_bar
-
-    return progress_bar()
 
 
 def sweep_to_file(
@@ -253,11 +249,12 @@ def sweep_into(
     may_replace = run.overwrite or extension.replaces
     check_output(output, overwrite=may_replace)
     check_storable(plan)
-    counter = ProgressCounter.start(plan.ranges, plan.points, run)
     few = plan.stored_points <= NO_CHECKPOINT_POINTS or plan.layout == "factored"
     folder = checkpoint.work_folder_of(output)
     if plan.trajectories <= RANGE_TRAJECTORIES and few and not os.path.lexists(folder):
         finished: dict[TrajectoryRange, CollisionResult] = {}
+        # so short that it is neither stopped nor reported
+        counter = ProgressCounter.start(plan.ranges, plan.points, DEFAULT_RUN)
         integrate(plan, plan.ranges, finished.__setitem__, counter, DEFAULT_RUN, extension.find_reused)
         table = table_of_ranges(plan, finished.__getitem__)
         try:
@@ -265,6 +262,7 @@ def sweep_into(
         except UnfinishedError:
             raise UnfinishedError("nothing was written") from None
 
+    counter = ProgressCounter.start(plan.ranges, plan.points, run)
     with checkpoint.open_work_folder(folder, plan, run, extension.seal) as work_folder:
         # another process may have stored it in the meantime
         check_output(output, overwrite=may_replace)

@@ -143,20 +143,7 @@ def check_output_name(of: str) -> None:
 
 
 def sensitivity_plan(plan: Plan, of: Sequence[str], max_points: int, name: str) -> Plan:
-    """The plan of all points that the indices of outputs need: n (inputs + 2) for each n of the design.
-
-    Parameters
-    ----------
-    plan : of a config with a design
-    of : the outputs
-    max_points : the largest number of points
-    name : of the config, for messages
-
-    Raises
-    ------
-    ConfigError : the config has no design, its n is no power of two, or a sample is not an allowed value
-    UsageError : there are more than `max_points` points
-    """
+    """The plan of all points that the indices of outputs need: n (inputs + 2) for each n of the design."""
     config = plan.config
     if config.design is None:
         example = "[design] n = 1024 and v1 = { normal = [1.0, 0.05] }"
@@ -189,14 +176,7 @@ def sensitivity_plan(plan: Plan, of: Sequence[str], max_points: int, name: str) 
 
 
 def sensitivity_of(plan: Plan, of: str, swept: xr.Dataset) -> xr.Dataset:
-    """The sensitivity of an output, as a dataset; see `impact.sensitivity`.
-
-    Parameters
-    ----------
-    plan : as `sensitivity_plan` returns it
-    of : one of its outputs
-    swept : the result of the plan
-    """
+    """The sensitivity of an output, as a dataset; see `impact.sensitivity`."""
     plan = replace(plan, config=replace(plan.config, output=replace(plan.config.output, variables=(of,))))
     config = plan.config
     assert config.design is not None

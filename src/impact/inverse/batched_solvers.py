@@ -40,10 +40,6 @@ def run_together(functions: Mapping[str, VectorFunction], solvers: Sequence[Call
     functions : by key; rows of shape (k, p) to values of shape (k, n)
     solvers : each is called with a function `evaluate(key, rows)`
 
-    Raises
-    ------
-    The first exception of a function or a solver.
-
     >>> def root_of(square):
     ...     def newton(evaluate):
     ...         x = np.ones(1)
