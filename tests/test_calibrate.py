@@ -321,7 +321,7 @@ def test_the_law_that_made_the_data_is_ranked_first_in_nine_of_ten_sets() -> Non
     from impact.config.load import read_config
     from impact.config.measurements import fitted_parameters
     from impact.inverse.calibrate import prediction
-    from impact.inverse.fit import Bounds, DataPoints, Problem, fit_all
+    from impact.inverse.fit import Bounds, DataPoints, FitProblem, fit_all
 
     speeds = np.geomspace(0.1, 3.0, 20)
     config = read_config(FOLDER / "drops.toml", purpose="calibrate")
@@ -336,7 +336,7 @@ def test_the_law_that_made_the_data_is_ranked_first_in_nine_of_ten_sets() -> Non
     values = {key: functions[key](np.array([[value]]))[0] for key, value in truths.items()}
     sets = [(key, values[key] + 0.01 * random.standard_normal(speeds.size)) for key in [*truths] * 67]
     problems = [
-        Problem(
+        FitProblem(
             model.key,
             Bounds(*np.array([config.fits[name] for name in names[model.key]]).T),
             DataPoints(measured, np.full(speeds.size, 0.01), "given"),
