@@ -100,8 +100,8 @@ def _evaluate_all(
     """Evaluate all requests, those of one function together, in the order of the solvers."""
     values: dict[int, Array] = {}
     for key in dict.fromkeys(key for key, _ in requests.values()):
-        numbers = sorted(number for number, (of, _) in requests.items() if of == key)
+        numbers = sorted(number for number, (requested, _) in requests.items() if requested == key)
         rows = [requests[number][1] for number in numbers]
-        parts = np.split(functions[key](np.concatenate(rows)), np.cumsum([len(part) for part in rows])[:-1])
-        values |= dict(zip(numbers, parts, strict=True))
+        ends = np.cumsum([len(block) for block in rows])
+        values |= dict(zip(numbers, np.split(functions[key](np.concatenate(rows)), ends[:-1]), strict=True))
     return values

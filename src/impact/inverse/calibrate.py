@@ -240,22 +240,19 @@ def _curve(
 
 def determined_groups(config: Config, model: ForceModel, names: Sequence[str], fit: Fit) -> list[str]:
     """Write what the data determine of the other parameters as products of powers, dimensionless by m and v0."""
-    involved = np.flatnonzero(~fit.identifiable)
-    directions = fit.unidentified[:, involved]
-    positive = all(config.fits[names[number]][0] > 0.0 for number in involved.tolist())
-    if not involved.size or not positive:
+    involved = [name for name, is_identifiable in zip(names, fit.identifiable, strict=True) if not is_identifiable]
+    if not involved or any(config.fits[name][0] <= 0.0 for name in involved):
         return []
     # the directions that the data do determine, in reduced echelon form from the last parameter on
-    _, sizes, rows = np.linalg.svd(directions)
+    _, sizes, rows = np.linalg.svd(fit.unidentified[:, ~fit.identifiable])
     complement = rows[np.count_nonzero(sizes > 0.5) :]
-    reduced = _reduced(complement[:, ::-1])[:, ::-1]
+    units = [_quantity(config, name).unit for name in involved]
     groups = []
-    for row in reduced:
+    for row in _reduced(complement[:, ::-1])[:, ::-1].tolist():
         powers = {
-            InputName.parse(names[number]).key: Fraction(float(power)).limit_denominator(MAX_DENOMINATOR)
-            for number, power in zip(involved.tolist(), row, strict=True)
+            InputName.parse(name).key: Fraction(power).limit_denominator(MAX_DENOMINATOR)
+            for name, power in zip(involved, row, strict=True)
         }
-        units = [_quantity(config, names[number]).unit for number in involved.tolist()]
         groups.append(_product(_completion(list(powers.values()), units, config, model) | powers))
     return groups
 

@@ -61,7 +61,7 @@ SCANNED_EXCESS = np.concatenate([[0.0], np.geomspace(1e-8, 10.0, 64)])
 
 @dataclass(frozen=True)
 class Bounds:
-    """Scale parameters, shape (p,), to u in [0, 1], on a logarithmic scale between positive bounds far apart."""
+    """Bounds of parameters, shape (p,), and their scale u in [0, 1]: logarithmic if positive and far apart."""
 
     lower: Array
     upper: Array
@@ -75,7 +75,7 @@ class Bounds:
         return positive & (ratio > LOG_RATIO)
 
     def values(self, u: Array) -> Array:
-        """Parameters of rows u, shape (..., p)."""
+        """Convert rows u to parameters, shape (..., p)."""
         lower, upper = np.where(self.is_log, self.lower, 1.0), np.where(self.is_log, self.upper, 1.0)
         between = self.lower + u * (self.upper - self.lower)
         # a bound is met exactly
@@ -83,21 +83,21 @@ class Bounds:
         return np.where(self.is_log, np.clip(lower * (upper / lower) ** u, lower, upper), between)
 
     def units(self, values: Array) -> Array:
-        """The u of parameters, shape (..., p)."""
+        """Convert parameters to u, shape (..., p)."""
         lower, upper = np.where(self.is_log, self.lower, 1.0), np.where(self.is_log, self.upper, np.e)
         positive = np.where(self.is_log, values, 1.0)
         log_u = np.log(positive / lower) / np.log(upper / lower)
         return np.where(self.is_log, log_u, (values - self.lower) / (self.upper - self.lower))
 
     def slope(self, u: Array) -> Array:
-        """Derivative of each parameter by its u, shape (p,)."""
+        """Differentiate each parameter by its u, shape (p,)."""
         lower, upper = np.where(self.is_log, self.lower, 1.0), np.where(self.is_log, self.upper, np.e)
         return np.where(self.is_log, self.values(u) * np.log(upper / lower), self.upper - self.lower)
 
 
 @dataclass(frozen=True)
 class DataPoints:
-    """Hold measured values with their standard deviations, each of shape (n,)."""
+    """Measured values with their standard deviations, each of shape (n,)."""
 
     values: Array
     sigma: Array
@@ -107,7 +107,7 @@ class DataPoints:
     loss: Loss = "linear"
 
     def specimen_sums(self, values: Array) -> Array:
-        """The sums over the points of each specimen, shape (..., n) to (..., specimens)."""
+        """Sum over the points of each specimen, shape (..., n) to (..., specimens)."""
         if self.specimens is None:
             return values
         sums = np.zeros((*values.shape[:-1], int(self.specimens.max()) + 1))
@@ -115,16 +115,16 @@ class DataPoints:
         return sums
 
     def at_points(self, values: Array) -> Array:
-        """Values of specimens at their points, shape (..., specimens) to (..., n)."""
+        """Spread values of specimens to their points, shape (..., specimens) to (..., n)."""
         return values if self.specimens is None else values[..., self.specimens]
 
     @cached_property
     def precision(self) -> Array:
-        """The sum of 1/sigma^2 over the points of each specimen, shape (specimens,)."""
+        """Sum 1/sigma^2 over the points of each specimen, shape (specimens,)."""
         return self.specimen_sums(self.sigma**-2.0)
 
     def whiten(self, scaled: Array, excess: float) -> Array:
-        """Independent residuals with a variance of 1: V^(-1/2) r, shape (..., n), from r/sigma."""
+        """Compute independent residuals with a variance of 1: V^(-1/2) r, shape (..., n), from r/sigma."""
         if excess == 0.0:
             return scaled
         p = self.precision
@@ -148,7 +148,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Fit:
-    """Hold the fit of a model with p parameters to n measurements.
+    """The fit of a model with p parameters to n measurements.
 
     Parameters
     ----------
@@ -191,7 +191,7 @@ class Fit:
 
 @dataclass(frozen=True)
 class FitProblem:
-    """Fit a model to measurements, with parameters in bounds."""
+    """A model with parameters in bounds, and the measurements."""
 
     # of the function of `run_together` that predicts from rows of parameters, shape (k, p) to (k, n)
     key: str
@@ -209,16 +209,20 @@ class FitProblem:
         return self.data.values.size > self.count + (self.data.noise != "given")
 
     def predict(self, evaluate: Evaluate, u: Array) -> Array:
-        """Predictions of rows u, shape (k, p) to (k, n)."""
+        """Predict the measurements from rows u, shape (k, p) to (k, n)."""
         return evaluate(self.key, self.bounds.values(u))
 
+    def scale(self, predicted: Array) -> Array:
+        """Subtract the measurements from predictions, in given standard deviations, shape (..., n)."""
+        difference = (predicted - self.data.values) / self.data.sigma
+        return np.where(np.isfinite(difference), difference, NO_PREDICTION)
+
     def residuals(self, evaluate: Evaluate, u: Array, excess: float = 0.0) -> Array:
-        """Independent residuals of rows u in standard deviations, shape (k, n)."""
-        difference = (self.predict(evaluate, u) - self.data.values) / self.data.sigma
-        return self.data.whiten(np.where(np.isfinite(difference), difference, NO_PREDICTION), excess)
+        """Compute the independent residuals of rows u in standard deviations, shape (k, n)."""
+        return self.data.whiten(self.scale(self.predict(evaluate, u)), excess)
 
     def slopes(self, evaluate: Evaluate, u: Array, free: NDArray[np.intp], excess: float) -> Array:
-        """Derivatives of the residuals by the free ones of u, shape (n, len(free)), in one evaluation."""
+        """Differentiate the residuals by the free ones of u, shape (n, len(free)), in one evaluation."""
         low, high = np.maximum(u[free] - STEP, 0.0), np.minimum(u[free] + STEP, 1.0)
         rows = np.tile(u, (2 * free.size, 1))
         rows[np.arange(free.size), free], rows[free.size + np.arange(free.size), free] = low, high
@@ -228,7 +232,7 @@ class FitProblem:
 
 
 def scan(problem: FitProblem, evaluate: Evaluate) -> Array:
-    """The u that are starts of a fit: the best of a Sobol sequence, shape (N_STARTS, p)."""
+    """Find the starts u of a fit: the best of a Sobol sequence, shape (N_STARTS, p)."""
     if not problem.count:
         return np.zeros((1, 0))
     # the sequence begins at 0; half a cell away from it, no bound is tried
@@ -264,9 +268,8 @@ def minimize(
         return np.asarray(values)
 
     if not free.size:
-        return Estimate(
-            start, float(LOSS_DERIVATIVES[problem.data.loss](residuals(start[free]))[0].sum()), excess, True
-        )
+        loss, *_ = LOSS_DERIVATIVES[problem.data.loss](residuals(start[free]))
+        return Estimate(start, float(loss.sum()), excess, True)
 
     def slopes(free_u: Array) -> Array:
         return problem.slopes(evaluate, full(free_u), free, excess)
@@ -306,7 +309,7 @@ def _minimize_with_excess(
 
 
 class ExcessLikelihood:
-    """Evaluate the likelihood of residuals over sigma, shape (n,), as a function of the excess variance.
+    """The likelihood of residuals over sigma, shape (n,), as a function of the excess variance.
 
     It is the restricted one if `taken` are the orthonormal directions that the parameters take up, shape (n, r).
     """
@@ -317,25 +320,25 @@ class ExcessLikelihood:
         self.deviation, self.taken_sums = (data.specimen_sums(z / data.sigma) for z in (scaled, self.taken))
 
     def objective(self, variance: float) -> float:
-        """Minus twice the logarithm of the likelihood, without the part that sigma alone determines."""
+        """Compute minus twice the log likelihood, without the part that sigma alone determines."""
         white = self.data.whiten(self.scaled, math.sqrt(variance))
         growth = 1.0 + variance * self.data.precision
         sign, determinant = np.linalg.slogdet(self._left(variance))
         return float(white @ white + np.log(growth).sum() + determinant) if sign > 0.0 else math.inf
 
     def slope(self, variance: float) -> float:
-        """The derivative of the objective by the variance."""
+        """Differentiate the objective by the variance."""
         growth = 1.0 + variance * self.data.precision
         change = np.linalg.pinv(self._left(variance)) @ (self.taken_sums / growth**2) @ self.taken_sums.T
         return float((self.data.precision / growth - (self.deviation / growth) ** 2).sum() - np.trace(change))
 
     def _left(self, variance: float) -> Array:
-        """Q^T V^(-1) Q in units of the given variances, where Q are the directions taken."""
+        """Compute Q^T V^(-1) Q in units of the given variances, where Q are the directions taken."""
         white = self.data.whiten(self.taken, math.sqrt(variance))
         return white @ white.T
 
     def best(self) -> float:
-        """The standard deviation between specimens of the largest likelihood."""
+        """Find the standard deviation between specimens of the largest likelihood."""
         largest = (self.deviation / np.where(self.data.precision > 0.0, self.data.precision, 1.0)) ** 2
         tried = SCANNED_EXCESS * largest.max()
         number = int(np.argmin([self.objective(variance) for variance in tried]))
@@ -430,19 +433,19 @@ def information(problem: FitProblem, objective: float) -> float:
 
 
 def degrees_of_freedom(variance: Array, deviation: Array) -> Array:
-    """Satterthwaite's degrees of freedom of variances with these standard deviations, at least 1."""
+    """Estimate Satterthwaite's degrees of freedom of variances with these standard deviations, at least 1."""
     with np.errstate(divide="ignore", invalid="ignore"):
         freedom = np.where(deviation > 0.0, 2.0 * (variance / deviation) ** 2, np.inf)
     return np.maximum(freedom, 1.0)
 
 
 def t_quantile(freedom: Array) -> Array:
-    """The distance of an end of an interval of 95 % from the estimate, in standard deviations."""
+    """Find the distance of an end of an interval of 95 % from the estimate, in standard deviations."""
     return np.asarray(t.ppf(0.5 + CONFIDENCE / 2, freedom))
 
 
 def half_widths(covariance: Array, covariance_deviation: Array, directions: Array) -> Array:
-    """Halve the widths of intervals of 95 % of functions with gradients `directions`, shape (k, p) to (k,)."""
+    """Find the half-widths of intervals of 95 % of functions with gradients `directions`, shape (k, p) to (k,)."""
     variance, deviation = (
         np.maximum(np.einsum("kp,pq,kq->k", directions, matrix, directions), 0.0)
         for matrix in (covariance, covariance_deviation)
@@ -452,7 +455,7 @@ def half_widths(covariance: Array, covariance_deviation: Array, directions: Arra
 
 
 def best_of(estimates: Sequence[Estimate]) -> Estimate:
-    """The estimate with the least objective; of equal ones, one that converged."""
+    """Choose the estimate with the least objective; of equal ones, one that converged."""
     least = min(estimate.objective for estimate in estimates)
     near = [estimate for estimate in estimates if estimate.objective <= least + 1e-9 * abs(least) + 1e-12]
     return min(near, key=lambda estimate: not estimate.converged)
@@ -460,7 +463,7 @@ def best_of(estimates: Sequence[Estimate]) -> Estimate:
 
 @dataclass(frozen=True)
 class _Minimum:
-    """Evaluate the statistics of a fit at a minimum."""
+    """A minimum of the objective, and the statistics of the fit there."""
 
     problem: FitProblem
     # of the largest likelihood; with noise "excess" the minimum is that of the restricted one
@@ -471,24 +474,22 @@ class _Minimum:
 
     @cached_property
     def scaled_jacobian(self) -> Array:
-        """The derivatives in given standard deviations, shape (n, p)."""
+        """Scale the derivatives to given standard deviations, shape (n, p)."""
         return np.where(np.isfinite(self.jacobian), self.jacobian, 0.0) / self.problem.data.sigma[:, None]
 
     @cached_property
     def scaled_residual(self) -> Array:
-        """Predicted minus measured in given standard deviations, shape (n,)."""
-        data = self.problem.data
-        scaled = (self.predicted - data.values) / data.sigma
-        return np.where(np.isfinite(scaled), scaled, NO_PREDICTION)
+        """Subtract the measurements, in given standard deviations, shape (n,)."""
+        return self.problem.scale(self.predicted)
 
     @cached_property
     def white_jacobian(self) -> Array:
-        """The derivatives of the independent residuals, shape (n, p)."""
+        """Differentiate the independent residuals, shape (n, p)."""
         return self.problem.data.whiten(self.scaled_jacobian.T, self.best.excess).T
 
     @cached_property
     def white_residual(self) -> Array:
-        """Independent residuals, shape (n,)."""
+        """Compute the independent residuals, shape (n,)."""
         return self.problem.data.whiten(self.scaled_residual, self.best.excess)
 
     @cached_property
@@ -526,13 +527,13 @@ class _Minimum:
 
     @cached_property
     def inverse(self) -> Array:
-        """(J^T V^(-1) J)^(-1) without the directions that are not identified, shape (p, p)."""
+        """Invert J^T V^(-1) J without the directions that are not identified, shape (p, p)."""
         information = self.white_jacobian.T @ self.white_jacobian
         return np.asarray(np.linalg.pinv(information, rcond=RANK_RTOL**2, hermitian=True), float)
 
     @cached_property
     def covariance(self) -> Array:
-        """Covariance of u, shape (p, p); NaN for parameters without one."""
+        """Estimate the covariance of u, shape (p, p); NaN for parameters without one."""
         covariance = np.full((self.problem.count,) * 2, np.nan)
         if self.problem.is_determined:
             block = np.ix_(self.identifiable, self.identifiable)
@@ -541,7 +542,7 @@ class _Minimum:
 
     @cached_property
     def covariance_deviation(self) -> Array:
-        """Standard deviation of the covariance of u, shape (p, p)."""
+        """Estimate the standard deviation of the covariance of u, shape (p, p)."""
         data = self.problem.data
         if data.noise == "scale" or data.loss != "linear":
             return self.covariance * math.sqrt(2.0 / max(self.freedom, 1))
@@ -659,8 +660,7 @@ def fit_all(
             for problem, of_problem in zip(problems, starts, strict=True)
         ],
     )
-    best = [best_of(estimates) for estimates in minima]
-    pairs = list(zip(problems, best, strict=True))
+    pairs = zip(problems, map(best_of, minima), strict=True)
     fits = run_together(functions, [partial(_minimum, *pair) for pair in pairs])
     ends = _run_each(functions, [minimum.end_tasks() for minimum in fits])
     left_out = _run_each(functions, [minimum.leave_one_out_tasks() if leave_one_out else [] for minimum in fits])
@@ -670,7 +670,7 @@ def fit_all(
 def _run_each(
     functions: Mapping[str, VectorFunction], groups: Sequence[Sequence[Callable[[Evaluate], T]]]
 ) -> list[list[T]]:
-    """The results of groups of tasks, which all run together."""
+    """Run groups of tasks, all at the same time."""
     results = iter(run_together(functions, [task for group in groups for task in group]))
     return [[next(results) for _ in group] for group in groups]
 
