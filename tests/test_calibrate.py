@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import shlex
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,7 @@ from scipy import stats
 import impact
 from impact.errors import UsageError
 
-from .conftest import ROOT, Run, assert_same_output
+from .conftest import ROOT, Run
 
 FOLDER = ROOT / "docs" / "calibrate"
 ONE_LAW = ("--set", 'models=["anagnostopoulos-1988"]')
@@ -354,14 +353,3 @@ def test_the_law_that_made_the_data_is_ranked_first_in_nine_of_ten_sets() -> Non
     near = aicc[np.arange(truth.size), truth] <= aicc.min(axis=1) + 2.0
     print(f"ranked first or within 2: {near.mean():.3f} of {truth.size}")
     assert near.mean() >= 0.9 - 4.0 * np.sqrt(0.9 * 0.1 / truth.size)
-
-
-EXAMPLES = re.findall(
-    r"\$ impact (.*)\n((?:.*\n)+?)```", (ROOT / "docs" / "calibrate.md").read_text(encoding="utf-8")
-)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("command", "printed"), EXAMPLES, ids=[command for command, _ in EXAMPLES])
-def test_the_page_prints_what_the_commands_print(cli: Run, command: str, printed: str) -> None:
-    assert_same_output(cli(*shlex.split(command)).stdout, printed)

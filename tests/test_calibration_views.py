@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
@@ -57,7 +58,9 @@ def test_the_table_of_a_picture_has_curves_residuals_and_measured_values(
     cli: Run, drops: xr.Dataset, tmp_path: Path
 ) -> None:
     impact.save(drops, tmp_path / "fit.h5")
-    cli("plot", "fit.h5", "-o", "a.svg", "--data", "a.csv", cwd=tmp_path)
+    drawn = cli("plot", "fit.h5", "-o", "a.svg", "--data", "a.csv", "--json", cwd=tmp_path)
+    (values, _) = json.loads(drawn.stdout)["calibration"]["measured"]
+    assert values["columns"]["e_out"] == drops["measured"].values.tolist()
     table = pd.read_csv(tmp_path / "a.csv")
     for law in drops["model"].values:
         curve = drops.sel(model=law, output_name="e_out")["curve"]

@@ -12,7 +12,8 @@ from impact.contact import motion
 from impact.contact.models import find
 from impact.ode import events, maximum, rk45, tableau
 from impact.ode.problem import Problem, Solution, Termination
-from impact.ode.rk45 import Workspace, integrate, rk_step
+from impact.ode.rk45 import integrate, rk_step
+from impact.ode.state import Workspace
 
 from .problems import OSCILLATOR, PROBLEMS, SPRINGS, TANH, SolvedProblem
 

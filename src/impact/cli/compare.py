@@ -158,7 +158,7 @@ def _print_outcome(outcome: Verdict | NoVerdict, format: Format) -> None:
 
     match format:
         case Format.json:
-            print(dump(formats.as_data(outcome)))
+            print(dump(outcome.as_dict()))
         case Format.junit:
             print(formats.as_junit(outcome))
         case Format.markdown:

@@ -28,12 +28,8 @@ MODEL_COORDINATES = ("model", "exponent", *MODEL_METADATA)
 class AlignedResult:
     """One of two results, at their common points.
 
-    Parameters
-    ----------
-    dataset : the result, which may be lazy
-    coords : its coordinates at the common points, in memory; inputs that only the other result varies have an axis
-        of length one
-    positions : by axis, the positions of the common points in the result, in the order of the baseline
+    Its `coords` at these points are in memory; an input that only the other result varies has an axis of length
+    one. `positions` of the points in the result are by axis, in the order of the baseline.
     """
 
     dataset: xr.Dataset
@@ -41,13 +37,7 @@ class AlignedResult:
     positions: Mapping[str, IndexArray]
 
     def read(self, name: str, region: Mapping[str, slice]) -> Labels:
-        """Read the values of a variable or a coordinate at some of the common points.
-
-        Parameters
-        ----------
-        name : of the variable
-        region : slices of the axes; the values have length one along axes that the variable does not have
-        """
+        """Read values at some of the common points, of length one along axes that the variable does not have."""
         if name in self.coords:
             variable = self.coords.variables[name]
             index: dict[Hashable, Any] = {dim: region[str(dim)] for dim in variable.dims}
@@ -73,11 +63,9 @@ class Alignment:
 
     Parameters
     ----------
-    new, baseline : the results
     sizes : by axis, the number of common points
     dims : by common variable, its axes in the order of the baseline, without variables that vary along different
         axes; empty if the results have no common point
-    faults : the differences between the inputs
     scales : by variable of a calibration, the scale of each value; NaN if the data do not determine the value
     """
 
@@ -90,13 +78,7 @@ class Alignment:
 
 
 def align_sweeps(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Alignment:
-    """Align two results of sweeps by their coordinates; values of variables are not read.
-
-    Parameters
-    ----------
-    new, baseline : results
-    subset : ignore points that only one of them has
-    """
+    """Align two results of sweeps by their coordinates; values of variables are not read."""
     new, baseline = _drop_foreign_axes(new, baseline), _drop_foreign_axes(baseline, new)
     a, b = _comparable_coordinates(new, baseline), _comparable_coordinates(baseline, new)
     faults = _missing_inputs(a, b)

@@ -21,13 +21,7 @@ DATA_COORDINATES = ("output", "measured", "sigma")
 
 
 def align_calibrations(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Alignment:
-    """Align two calibrations by their laws, whose order does not matter.
-
-    Parameters
-    ----------
-    new, baseline : calibrations
-    subset : ignore laws that only one of them has
-    """
+    """Align two calibrations by their laws, whose order does not matter."""
     faults = _data_faults(new, baseline)
     is_same_data = all(fault.kind != "labels" for fault in faults)
     keys = [list(map(str, dataset["model"].values)) for dataset in (new, baseline)]

@@ -133,12 +133,7 @@ def _along_axes(largest: Mapping[str, Mapping[str, np.ndarray]], coords: xr.Data
 
 
 def check_comparable(dataset: xr.Dataset, name: str) -> None:
-    """Refuse a dataset that is not the result of a sweep.
-
-    Raises
-    ------
-    UsageError : it is a time history, or lacks coordinates or axes that every result has
-    """
+    """Refuse a time history, and a dataset without the coordinates or axes that every result of a sweep has."""
     require_sweep(dataset, name)
     is_current = _attributes_equal(dataset.attrs.get("schema_version"), SCHEMA_VERSION)
     if not is_current or "rtol" not in dataset.attrs:

@@ -46,32 +46,10 @@ class NoVerdict:
         """There is no point to run again."""
         return ""
 
-
-def as_data(outcome: Verdict | NoVerdict) -> dict[str, Any]:
-    """Plain data for JSON; `equal` is null if there is no verdict."""
-    return {
-        "equal": outcome.equal,
-        "headline": outcome.headline,
-        "new": safe_text(outcome.new),
-        "baseline": safe_text(outcome.baseline),
-        "faults": [{"kind": fault.kind, "text": fault.text} for fault in by_kind(outcome.faults)],
-        "variables": [
-            {
-                **{"times" if name == "ratio" else name: value for name, value in vars(variable).items()},
-                "at": _safe_inputs(variable.at),
-                "equal": variable.is_equal,
-                "text": variable.text,
-                "replay": "" if variable.is_equal else outcome.replay(variable),
-            }
-            for variable in outcome.ranked
-        ],
-        "notes": list(outcome.notes),
-    }
-
-
-def _safe_inputs(at: Mapping[str, float | str]) -> dict[str, float | str]:
-    """Escape the names and labels of a point."""
-    return {safe_text(name): safe_text(v, 2000) if isinstance(v, str) else v for name, v in at.items()}
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain data with the fields of a verdict; `equal` is null."""
+        names = {"new": safe_text(self.new), "baseline": safe_text(self.baseline)}
+        return {"equal": None, "headline": self.headline, **names, "faults": [], "variables": [], "notes": []}
 
 
 def _failures(outcome: Verdict | NoVerdict) -> list[tuple[str, str]]:

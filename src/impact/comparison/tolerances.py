@@ -25,17 +25,7 @@ TOLERANCE_VARIABLES = [name for name, variable in OUTPUTS.items() if variable.ha
 
 
 def effective_tolerances(tol: float | Tolerances | None, attributes: Mapping[str, Any]) -> dict[str, float]:
-    """Tolerances by variable, "all" for the others: from the caller, else the baseline, else its solver.
-
-    Parameters
-    ----------
-    tol : one tolerance for all variables, which replaces all of the baseline's, or tolerances by name
-    attributes : of the baseline; its `tolerances` are JSON, by name
-
-    Raises
-    ------
-    UsageError : a name is not a variable with a tolerance, or a value is not a number >= 0
-    ResultError : the tolerances of the baseline are invalid
+    """Find the tolerances by variable, "all" for the others: the caller's, else the baseline's, else its solver's.
 
     >>> effective_tolerances({"e_out": 1e-6}, {"rtol": 1e-10, "tolerances": '{"all": 1e-8}'})
     {'all': 1e-08, 'e_out': 1e-06}
@@ -60,12 +50,7 @@ def effective_tolerances(tol: float | Tolerances | None, attributes: Mapping[str
 
 
 def calibration_tolerances(tol: float | Tolerances | None) -> dict[str, float]:
-    """The tolerance of all variables of a calibration, relative to their scales; by default 1e-5.
-
-    Raises
-    ------
-    UsageError : a tolerance for one variable, or one that is not a number >= 0
-    """
+    """Choose the tolerance of all variables of a calibration, relative to their scales."""
     requested = _by_variable(tol)
     for name, value in requested.items():
         if name != ALL_VARIABLES:

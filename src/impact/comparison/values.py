@@ -37,12 +37,7 @@ SCALE_INPUTS = {"v0": ("v1", "v2"), "m v0^2/2": ("v1", "v2", "m1", "m2")}
 
 
 def representative_regions(variables: Sequence[Variable], aligned: Alignment) -> dict[str, list[Region]]:
-    """By variable, the regions whose points represent all common points; see `compare` for the rule.
-
-    Raises
-    ------
-    UsageError : a variable has more than `MAX_COMPARED_POINTS` representative points
-    """
+    """Choose by variable the regions whose points represent all common points; see `compare` for the rule."""
     results = (aligned.new, aligned.baseline)
     known = [v.name for v in variables if any(_declares_dims(result, v.name) for result in results)]
     models = range(aligned.sizes.get("model", 0) if known else 0)
@@ -120,11 +115,7 @@ def _points(dims: Iterable[str], sizes: Mapping[str, int]) -> int:
 
 
 class Worst(NamedTuple):
-    """A point that differs; the worst is the largest.
-
-    Its ratio to the tolerance counts first, then its size, then its place: the index, negative so that the first
-    in the order of the baseline is the largest.
-    """
+    """The worst point of a region, the largest tuple; `place` is its negative index, so that the first wins."""
 
     ratio: float
     size: float
@@ -137,20 +128,10 @@ class Worst(NamedTuple):
 def compare_values(
     variable: Variable, aligned: Alignment, tol: float, regions: Iterable[Region]
 ) -> tuple[VariableComparison, dict[str, NDArray[Any]]]:
-    """Compare one variable at all common points.
+    """Compare one variable at the points of some regions, each of which counts for all that it represents.
 
-    Parameters
-    ----------
-    variable : in both results, along the same axes
-    aligned : the two results
-    tol : relative to the scale of a point
-    regions : the points to read, see `representative_regions`; each counts for all points that it represents
-
-    Returns
-    -------
-    VariableComparison : the numbers
-    dict : by axis, the largest ratio at each of its points, or of groups of neighbours if there are more than
-        `MAX_RATIO_GROUPS` points; constant along an axis of which the first point represents all
+    Returns also, by axis, the largest ratio at each of its points, or of groups of neighbours if there are more
+    than `MAX_RATIO_GROUPS` points; constant along an axis of which the first point represents all.
     """
     dims = aligned.dims[variable.name]
     shape = tuple(aligned.sizes[dim] for dim in dims)
@@ -193,7 +174,7 @@ def compare_values(
 
 
 def group_size(size: int) -> int:
-    """The number of neighbouring points of an axis that share one largest ratio.
+    """Count the neighbouring points of an axis that share one largest ratio.
 
     >>> group_size(101), group_size(10**6)
     (1, 62)
@@ -224,10 +205,7 @@ def _ratio(
     b: NDArray[Any],
     tol: float,
 ) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Compute the differences of a region: over the tolerance, and in the variable's unit.
-
-    The ratio is inf if no difference is allowed, or if a NaN is not explained.
-    """
+    """Compute the differences over the tolerance, inf if none is allowed or a NaN is unexplained, and in SI."""
     missing = np.isnan(a.astype(float)), np.isnan(b.astype(float))
     with np.errstate(all="ignore"):
         difference = np.where(a == b, 0.0, np.abs(a.astype(float) - b.astype(float)))
@@ -265,7 +243,7 @@ def _scale(variable: Variable, aligned: Alignment, region: Region, shape: tuple[
 
 
 def _may_be_missing(variable: Variable, aligned: Alignment, region: Region) -> NDArray[Any] | bool:
-    """Where NaNs in both are equal: the statuses are equal, and the status or the law explains the NaN."""
+    """Find where NaNs in both are equal: the statuses are equal, and the status or the law explains the NaN."""
     results = (aligned.new, aligned.baseline)
     if not variable.per_model or not all("status" in result.dataset for result in results):
         return True
@@ -281,10 +259,7 @@ def _worst_of_slab(
     a: NDArray[Any],
     b: NDArray[Any],
 ) -> Worst:
-    """Find the point with the largest ratio, among equals the first with the largest difference.
-
-    Among flags, which differ or do not, the first point.
-    """
+    """Find the point with the largest ratio, then the largest difference (except of flags), then the first."""
     sizes = np.ones_like(ratio) if variable.scale == "exact" else np.nan_to_num(difference, nan=np.inf)
     index = np.unravel_index(int(np.argmax(np.where(ratio == ratio.max(), sizes, -1.0))), ratio.shape)
     return Worst(

@@ -51,10 +51,8 @@ class VariableComparison:
 
     Parameters
     ----------
-    name : of the variable
     judged : how it is compared, see `impact.contact.variables.Variable`
     tolerance : relative to the scale of a point; NaN if there is none (exact, reported)
-    points, different : number of common points, and of those that differ
     worst : |new - baseline| at the worst point, in the variable's unit
     ratio : the same over the tolerance at that point; inf if no difference is allowed, or one value is NaN
     at : the inputs of the worst point by config name, and its model; empty if all points are equal
@@ -213,10 +211,28 @@ class Verdict(Displayed):
         ]
 
     def as_dict(self) -> dict[str, Any]:
-        """The verdict as plain data."""
-        from .formats import as_data
-
-        return as_data(self)
+        """Return the verdict as plain data."""
+        return {
+            "equal": self.equal,
+            "headline": self.headline,
+            "new": safe_text(self.new),
+            "baseline": safe_text(self.baseline),
+            "faults": [{"kind": fault.kind, "text": fault.text} for fault in by_kind(self.faults)],
+            "variables": [
+                {
+                    **{"times" if name == "ratio" else name: value for name, value in vars(variable).items()},
+                    "at": {
+                        safe_text(name): safe_text(value, 2000) if isinstance(value, str) else value
+                        for name, value in variable.at.items()
+                    },
+                    "equal": variable.is_equal,
+                    "text": variable.text,
+                    "replay": "" if variable.is_equal else self.replay(variable),
+                }
+                for variable in self.ranked
+            ],
+            "notes": list(self.notes),
+        }
 
     def records(self) -> Sequence[Mapping[str, Any]]:
         """The compared variables, those that differ first."""

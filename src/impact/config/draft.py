@@ -44,20 +44,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Setting:
-    """A value that replaces that of a config.
+    """A value that replaces that of a config."""
 
-    Parameters
-    ----------
-    path : of the value; empty for a text that is not PATH=VALUE
-    value : any object, which is checked with the rest of the config
-    shown : the option that sets it, for messages: "--at e=0.6"
-    text : PATH=VALUE, as it is stored with a result; empty for that of the path and the value
-    """
-
-    path: KeyPath
-    value: object
-    shown: str
-    text: str = ""
+    path: KeyPath  # empty for a text that is not PATH=VALUE
+    value: object  # any, which is checked with the rest of the config
+    shown: str  # the option that sets it, for messages: "--at e=0.6"
+    text: str = ""  # PATH=VALUE, as it is stored with a result; empty for that of the path and the value
 
     @classmethod
     def parse(cls, text: str) -> Setting:
@@ -78,36 +70,22 @@ class Setting:
 
 @dataclass(frozen=True)
 class Draft:
-    """A config that is being read; nothing of it has been checked but its syntax.
-
-    Parameters
-    ----------
-    data : dicts, lists and plain Python values
-    text : the TOML text, or a mapping as JSON, without settings
-    name : of the source, for messages
-    known_models : all models that the config may select, by key
-    folder : of the files that it names; None if no file may be read
-    settings : those applied so far, in the order in which they are stored
-    origins : the setting of each path that a setting changed, in the order in which they were applied
-    files : the CSV files whose values are in the data; None before they are read
-    cases : the path of each input that is a column of a table of cases, and where its values are in that table
-    measurements : of a config with valid measurements
-    problems : paths and messages
-    lines : complete messages about settings and files
-    """
+    """A config that is being read; nothing of it has been checked but its syntax."""
 
     data: dict[str, Any]
-    text: str
-    name: str
+    text: str  # TOML, or a mapping as JSON, without settings
+    name: str  # of the source, for messages
     known_models: Mapping[str, ForceModel]
-    folder: Path | None = None
-    settings: tuple[Setting, ...] = ()
+    folder: Path | None = None  # of the files that it names; None if no file may be read
+    settings: tuple[Setting, ...] = ()  # in the order in which they are stored
+    # the setting of each path that a setting changed, in the order in which they were applied
     origins: Mapping[KeyPath, Setting] = field(default_factory=dict)
-    files: tuple[Path, ...] | None = None
+    files: tuple[Path, ...] | None = None  # the CSV files whose values are in the data; None before they are read
+    # the path of each input that is a column of a table of cases, and where its values are in that table
     cases: Mapping[KeyPath, KeyPath] = field(default_factory=dict)
     measurements: Measurements | None = None
     problems: tuple[ConfigProblem, ...] = ()
-    lines: tuple[str, ...] = ()
+    lines: tuple[str, ...] = ()  # complete messages about settings and files
 
     def table(self, name: str) -> dict[str, Any]:
         """Return a table of the config, or an empty one."""

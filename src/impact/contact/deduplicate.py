@@ -12,18 +12,10 @@ from numpy.typing import NDArray
 def deduplicate(
     columns: Sequence[NDArray[Any]], shape: tuple[int, ...]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Find the distinct rows of a table that is given by its columns.
+    """Find the distinct rows of a table, whose columns broadcast to a shape; NaN equals NaN, and -0.0 equals 0.0.
 
-    Parameters
-    ----------
-    columns : arrays that broadcast to `shape`; two rows are the same where all columns are equal. NaN equals NaN,
-        and -0.0 equals 0.0
-    shape : shape of all rows together
-
-    Returns
-    -------
-    first : flat index of the first of each group of equal rows, shape (groups,)
-    group : number of the group of each row, shape (rows,)
+    Returns the flat index of the first of each group of equal rows, shape (groups,), and the number of the group
+    of each row, shape (rows,).
 
     >>> first, group = deduplicate([np.array([[1.0], [2.0]]), np.array([[5.0, 5.0, 7.0]])], (2, 3))
     >>> first.tolist(), group.tolist()

@@ -58,8 +58,7 @@ def integrate_history(
 ) -> History | None:
     """Integrate one impact (a batch of length one); None if the balls miss, or the result is a limit.
 
-    `times` is the number of points in time, uniform from first contact to release; by default SAMPLES_PER_STEP
-    per step.
+    `times` is the number of uniform points in time; by default there are SAMPLES_PER_STEP per step.
     """
     n = float(impacts.n[0])
     with np.errstate(all="ignore"):

@@ -150,15 +150,10 @@ def dimensionless_exponents(
 
 
 def stiffness(n: Array, hertz: Array, m: Array, v0: Array) -> Array:
-    """Compute the default stiffness K [N/m^n]: Hertz's for n = 3/2, else K = F_m/delta_m^n at the peak by Hertz.
+    """Compute the default K [N/m^n]: Hertz's for n = 3/2, else K = F_m/delta_m^n at the peak by Hertz; shape (n,).
 
-    For n = 1 that is the secant stiffness. It depends on the closing speed and is NaN where that is not positive.
-
-    Parameters
-    ----------
-    n : compliance exponent [-], shape (n,)
-    hertz : stiffness of equation (12) [N/m^1.5], shape (n,)
-    m, v0 : effective mass [kg] and closing speed [m/s], shape (n,)
+    For n = 1 that is the secant stiffness. It depends on the closing speed `v0` [m/s] and is NaN where that is not
+    positive. `hertz` is the stiffness of equation (12) [N/m^1.5], `m` the effective mass [kg].
     """
     if (n == 1.5).all():
         return hertz
@@ -167,12 +162,9 @@ def stiffness(n: Array, hertz: Array, m: Array, v0: Array) -> Array:
 
 
 def check_inputs(model: Law, impacts: Impacts, checks: frozenset[str] = CHECKS) -> NDArray[np.int8]:
-    """Compute the status of impacts before they are integrated; of a shape that broadcasts to theirs.
+    """Check "e" (the restitution), "v0" (the closing speed) or "length" (the derived m, K, length, energy, time).
 
-    Parameters
-    ----------
-    checks : which of these to check: the restitution "e", the closing speed "v0", and the derived quantities
-        m, K, length, energy and time, "length"
+    Returns the status before integration, of a shape that broadcasts to that of the impacts.
     """
     status = np.asarray(Status.OK, np.int8)
     if "length" in checks:

@@ -22,8 +22,7 @@ def velocities_at(impacts: Impacts, impulse: Array) -> tuple[Array, Array]:
 def velocities_after(impacts: Impacts, e: Array) -> tuple[Array, Array]:
     """Velocities v1+, v2+ [m/s] after an impact of restitution e: equations (6) and (7), shape (n,).
 
-    The impulse is tau_c (1 + e), where tau_c = m v0 is that of the approach. Balls that do not approach keep their
-    velocities; an impulse that overflows gives NaN.
+    Balls that do not approach keep their velocities; an impulse that overflows gives NaN.
     """
     impulse = (1.0 + e) * impacts.m * impacts.v0
     if not impacts.all_approach:

@@ -11,15 +11,7 @@ from ..array_types import Array
 
 @dataclass(frozen=True)
 class Material:
-    """An isotropic material.
-
-    Parameters
-    ----------
-    E : Young's modulus [Pa]
-    nu : Poisson's ratio [-]
-    rho : density [kg/m3], or None where no radius is derived from it
-    yield_strength : yield strength [Pa], or None where it is not known
-    """
+    """An isotropic material: Young's modulus [Pa], Poisson's ratio [-], density [kg/m3], yield strength [Pa]."""
 
     E: float
     nu: float
@@ -64,13 +56,7 @@ def hertz_stiffness(E1: Array, nu1: Array, E2: Array, nu2: Array, R1: Array, R2:
     """Compute K [N/m^1.5] of the contact of two spheres: Gharib and Hurmuzlu (2012), equations (12), (13).
 
     K = (4/3)/(k1 + k2) sqrt(R), k_j = (1 - nu_j^2)/E_j, with R = 1/(1/R1 + 1/R2), so that an infinite
-    radius is a plane. Two planes have an infinite K.
-
-    Parameters
-    ----------
-    E1, E2 : Young's moduli [Pa], shape (n,)
-    nu1, nu2 : Poisson's ratios [-], shape (n,)
-    R1, R2 : radii [m], shape (n,)
+    radius is a plane. Two planes have an infinite K. E in Pa, R in m.
     """
     compliance = effective_compliance(E1, nu1, E2, nu2)
     return np.asarray((4.0 / 3.0) / compliance * np.sqrt(effective_radius(R1, R2)))

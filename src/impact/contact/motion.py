@@ -108,10 +108,7 @@ def approach_problem(law: MotionLaw) -> Problem:
 
 
 def restitution_problem(law: MotionLaw) -> Problem:
-    """Pose the restitution phase: from the largest indentation to the release, where s or the force falls to zero.
-
-    Where the law has an unloading branch, its params (`UNLOADING_PARAMS`) follow those of the law.
-    """
+    """Pose the restitution phase, from the largest indentation until s or the force falls to zero."""
     branch = law.model.unloading
     rates = _rates(law, branch or law.model.force, UNLOADING_PARAMS if branch else ())
 
@@ -150,13 +147,9 @@ def release_event(s: Array, rate: Array, force: Array, slope: Array) -> tuple[Ar
 def breakpoints(
     law: MotionLaw, params: Params, start: Array, residual: Array | None = None
 ) -> tuple[Params, list[Breakpoint]]:
-    """Extend the params of a phase by those of its breakpoints; returns also the breakpoints.
+    """Extend the params of a phase, each of shape (n,), by those of its breakpoints; returns also the breakpoints.
 
-    Parameters
-    ----------
-    params : params of the phase, each of shape (n,)
-    start : components at the start of the phase, shape (2, n)
-    residual : permanent indentation, shape (n,), for the restitution phase; None on approach
+    `start` are components of shape (2, n); `residual` is the permanent indentation, shape (n,), None on approach.
     """
     model, n_law_params = law.model, len(law.names)
     extra = UNLOADING_PARAMS if residual is not None and model.unloading is not None else ()
@@ -325,17 +318,10 @@ def overdamped_speed(c: Array, n: float, q: float) -> Array:
 def never_separates(rates: Rates, params: Params, peak: Array, coordinate_power: int) -> Mask:
     """Find which balls at rest at their peak never separate, by any law whose contact ends at zero indentation.
 
-    If F(x, -B x^k) <= -k B^2 x^(2k-1) for all x from 0 to the peak, with some B and some k >= 1, the speed w of
-    the rebound cannot grow beyond B x^k: at w = B x^k it falls faster than that bound does. Then
-    dx/dt >= -B x^k, and x stays above zero for ever. Where no such bound is found, the answer is
-    False.
-
-    Parameters
-    ----------
-    rates : of the restitution phase in s and v
-    params : what the rates need, each of shape (n,)
-    peak : indentation at the start of the phase, above the permanent one, shape (n,)
-    coordinate_power : p of x = s^p
+    If F(x, -B x^k) <= -k B^2 x^(2k-1) for all x = s^p from 0 to the peak, with some B and some k >= 1, the speed
+    w of the rebound cannot grow beyond B x^k: at w = B x^k it falls faster than that bound does. Then
+    dx/dt >= -B x^k, and x stays above zero for ever. Where no such bound is found, the answer is False. `peak`
+    is above the permanent indentation, and has the shape of each of the params, (n,).
     """
     never = np.zeros(peak.size, bool)
     for first in range(0, peak.size, MAX_BOUND_BATCH):

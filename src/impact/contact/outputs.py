@@ -31,17 +31,10 @@ def outputs(
     names: Iterable[str],
     checked: NDArray[np.int8] | None = None,
 ) -> Outputs:
-    """Outputs of collisions by name; only what they need is computed.
+    """Compute outputs of collisions by name; only what they need is computed.
 
-    Parameters
-    ----------
-    result : the collisions, in the contact's own units, of shapes that broadcast to those of the impacts
-    names : in `OUTPUTS`, see docs/schema.md
-    checked : the status by `check_inputs`, if it is already computed
-
-    Returns
-    -------
-    dict : by name, arrays of the shape of the impacts, or that broadcast to it; an impact that failed has NaN
+    The result is in the contact's own units. The arrays, in SI, have shapes that broadcast to that of the impacts;
+    an impact that failed has NaN. `checked` is the status by `check_inputs`, if it is already computed.
     """
     computed: dict[str, Any] = {"law": law, "impacts": impacts, "result": result}
     if checked is not None:
@@ -80,12 +73,9 @@ def collide(
     max_steps : attempted steps per phase after which an impact fails
     collapse : integrate impacts that are equal in the contact's own units once; changes no bit of the results
     core : "numpy", or "numba" for the laws that it compiles; the results agree within the tolerance
-    integrator : "exact", the continuous law with error control; or a scheme with a fixed step, one of
-        `impact.contact.timestep.SCHEMES`
-    fixed_step : the phase and the step of a scheme by name, see `impact.contact.simulate.simulate`, each of shape
-        (n,)
+    integrator : "exact", the continuous law with error control, or one of `impact.contact.timestep.SCHEMES`
+    fixed_step : the phase and the step of a scheme by name, see `impact.contact.simulate.simulate`, of shape (n,)
     errors : receives a line for each distinct error of the law, see `impact.contact.formula_calls.describe_error`
-    names : names of the outputs
     """
     with np.errstate(all="ignore"):
         values, checked = dimensionless_values(model, impacts), check_inputs(model, impacts)

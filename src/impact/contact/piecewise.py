@@ -28,16 +28,7 @@ MAX_PARTS_PER_BREAKPOINT = 8
 def in_parts(
     run: IntegratePart, problem: Problem, breakpoints: Sequence[Breakpoint], start: Array, params: Params
 ) -> Solution:
-    """Integrate a phase in parts.
-
-    Parameters
-    ----------
-    run : integrates trajectories of a problem from their start, of shape (4, n), to their event
-    problem : problem of the phase, without its breakpoints
-    breakpoints : functions that change their sign where the formula of the force changes
-    start : components at the start, shape (2, n)
-    params : params of the law, each of shape (n,)
-    """
+    """Integrate a phase from components at its start, shape (2, n), in parts between its breakpoints."""
     if not breakpoints:
         return run(problem, start, params)
     n = start.shape[1]

@@ -47,9 +47,7 @@ def is_reproducible(exponent: Array | float) -> NDArray[np.bool_]:
 
 
 def powers(base: Array, exponent: Array) -> Array:
-    """`base` to an array of exponents; the arrays broadcast against each other.
-
-    The bits of an element are those of `power` at its exponent, independent of the other elements.
+    """Raise `base` to an array of exponents, which broadcast; an element has the bits of `power` at its exponent.
 
     >>> powers(np.array([4.0, 4.0]), np.array([0.5, 2.0]))
     array([ 2., 16.])

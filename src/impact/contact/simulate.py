@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from ..array_types import Array
 from ..errors import ModelError
 from ..ode.problem import Params, Problem, Solution, Termination
-from ..ode.rk45 import Workspace, integrate
+from ..ode.rk45 import integrate
+from ..ode.state import Workspace
 from . import motion
 from .deduplicate import deduplicate
 from .dimensionless import LawValues, chi_of, exact_restitution, with_coefficients, with_units
@@ -125,10 +126,7 @@ TABLE_COLUMNS = tuple(field.name for field in fields(CollisionResult))
 
 @dataclass(frozen=True)
 class RecordedCollision:
-    """Impacts integrated through both phases: the result, and the solution of each phase.
-
-    `params` are those of the restitution phase, of the impacts that entered it.
-    """
+    """Impacts integrated through both phases; `params` are those of the impacts that entered restitution."""
 
     result: CollisionResult
     approach: Solution
@@ -160,8 +158,7 @@ def simulate(
     n : compliance exponents, shape (k,)
     values : `dimensionless_values` of the impacts, by name, each of shape (k,); for a scheme also `PHASE`, and one
         of `STEPS_PER_CONTACT` and `STEP`
-    status : status by `check_inputs`, shape (k,); impacts that are not OK are not integrated
-    rtol, max_steps, collapse, core, integrator, errors : see `impact.contact.outputs.collide`
+    status : by `check_inputs`, shape (k,); impacts that are not OK are not integrated
     """
     parts: list[tuple[Positions, CollisionResult]] = []
     integrate_both = partial(integrate_phases, rtol=rtol, max_steps=max_steps, core=core)
@@ -381,14 +378,10 @@ def integrate_phases(
     never_separates: NDArray[np.bool_] | bool = False,
     core: str = "numpy",
 ) -> RecordedCollision:
-    """Integrate n impacts through approach and restitution.
+    """Integrate n impacts, with params of shape (n,), through approach and restitution.
 
-    Parameters
-    ----------
-    params : its values per impact, each of shape (n,)
-    rtol, max_steps, record : see `impact.ode.rk45.integrate`
-    never_separates : which are known to stay together, where they do not part
-    core : "numba" integrates the phases that have a form for it compiled, unless they are recorded
+    Impacts of the mask `never_separates` are known to stay together, where they do not part. The core "numba"
+    integrates the phases that have a form for it compiled, unless they are recorded.
     """
     back = motion.restitution_law(law)
     forms: tuple[dispatch.Form | None, dispatch.Form | None] = (None, None)

@@ -121,7 +121,7 @@ def collide_at_fixed_step(
     max_steps: int | Array,
     scheme: str = KICK_DRIFT,
 ) -> FixedStepResult:
-    """Collisions by a scheme with a fixed step.
+    """Simulate collisions by a scheme with a fixed step.
 
     The contact begins with the overlap `phase * step * v0` at the first step that sees it. The contact ends with
     the first step after which the surfaces do not overlap. The force of a law that ends at zero force is never
@@ -131,10 +131,9 @@ def collide_at_fixed_step(
     Parameters
     ----------
     values : `impact.contact.dimensionless.dimensionless_values`, each of shape (k,)
-    step : time step, in the contact's own unit of time, shape (k,)
+    step : in the contact's own unit of time, shape (k,)
     phase : where in its step the contact begins, 0 < phase <= 1, shape (k,)
-    max_steps : steps that a collision may take, for all or of shape (k,); one that takes more never separates
-    scheme : one of `SCHEMES`
+    max_steps : for all or of shape (k,); a collision that takes more never separates
     """
     check_scheme(model, n, scheme)
     count = step.size

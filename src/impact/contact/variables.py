@@ -38,7 +38,6 @@ class Variable:
 
     Parameters
     ----------
-    name, meaning, equation : in files, configs and tables
     dims : its dimensions, with `AXES` in place of the swept axes
     unit : SI unit in the spelling of configs; "SI" if it depends on the parameter or the output, and "output" for
         the unit of the output that a study is about

@@ -20,13 +20,11 @@ class Collision:
     Parameters
     ----------
     model : the law, the catalogue's entry of the code
-    version : of the code
     values : by name: v1, v2, m1, m2, R1, R2, e, K, n, E1, nu1, E2, nu2, yield_strength1, yield_strength2, the
         effective m, R_eff, E_eff and the closing speed v0, and the law's own parameters; NaN for unknown ones
     materials : names of the materials of both balls; "" where none is given
     has_user_stiffness : K is set in the config, and does not follow from the materials
-    dt : time step
-    gap : between the surfaces at the start, so that the contact begins at the wanted phase of a step
+    gap : between the surfaces at the start, so that the contact begins at the requested phase of a step
     steps : number of steps until the contact is over
     """
 
@@ -60,14 +58,10 @@ class Collision:
         return 1.0 / curvature
 
     def script_values(self) -> dict[str, str]:
-        """Write the values of a script as text with all digits; ball 1 is on the left.
+        """Write the values of a script as text with all digits, in SI; ball 1 is on the left.
 
-        x1, x2 : positions of the centres, so that the surfaces meet at the origin
-        R1, R2, d1, d2 : radii and diameters
-        m1, m2, v1, v2, v0 : masses, velocities and the closing speed
-        dt, steps, gap : as in the collision
-        reach : distance from the first point of contact that no part of a ball leaves
-        skin : distance within which neighbours are searched for
+        The surfaces meet at the origin. `reach` is the distance from there that no part of a ball leaves, `skin`
+        the distance within which neighbours are searched for.
         """
         for name in ("m1", "m2", "R1", "R2"):
             if not math.isfinite(self[name]):
@@ -99,30 +93,25 @@ class Code:
 
     Parameters
     ----------
-    name : on the command line
-    title : in words
+    name, title : on the command line, and in words
     laws : what the code calls each of its laws, by key of the catalogue; the first is the default
+    newest : the newest release whose laws were seen, taken where the code is not installed
     tested : what was run, or what was read instead
-    parameters : the parameters in the units and conventions of the code, by the code's own names
-    lines : lines to paste, from the parameters
+    parameters : in the units and conventions of the code, by the code's own names
     damping : the parameter that sets the restitution, of laws without an e
-    scheme : name of its fixed-step scheme, see `impact.contact.timestep.SCHEMES`; None if its restitution at a
-        time step is not predicted
+    scheme : see `impact.contact.timestep.SCHEMES`; None if its restitution at a time step is not predicted
     uncertainty : largest difference of e between the code and the map of its scheme
     rough : the same by law, where the code itself finds the damping only roughly
-    newest : the newest release whose laws were seen, taken where the code is not installed
     law_for_version : the entry of the catalogue that holds in a version, from the key of another one and the
         version; raises a UsageError where the version has none
-    read_version : a version as the user or the program writes it, in the form in which versions are compared;
-        raises a UsageError for any other text. Use `impact.exporters.releases.read_release`
+    read_version : converts a version as the user or the program writes it to the form in which versions are
+        compared; raises a UsageError for any other text, see `impact.exporters.releases.read_release`
     version_of : the version that a program reports, as it writes it; None if the program or the code is missing
     comment : what begins and ends a comment among the lines
     notes : remarks on a law: mixing of two materials, thresholds, clamps, versions
     warnings : what a user has to know before using the lines
     template : a complete input that prints `e_out = VALUE` last, see `script`; "" if none was ever run
-    suffix : of the file of a script
-    program : what runs a script; "" without one
-    install : how to get it
+    suffix, program, install : of the file of a script; what runs it, "" without one; how to get that
     command : the command that runs a script, from the program and the file
     """
 

@@ -42,16 +42,14 @@ class Export(Displayed):
 
     Parameters
     ----------
-    code, version : the code and its release
     model : key of the law
     scheme : name of the code's fixed-step scheme, see `impact.contact.timestep.SCHEMES`; None if unknown here
-    e : the e that is asked for; NaN for a law without one
+    e : the requested e; NaN for a law without one
     e_continuous, contact_time : of the continuous law [-, s]
     at_dt : what the code delivers at its time step; its restitutions are NaN without a scheme, and where a
         collision fails
     parameters : by the code's own names, in its units and conventions
-    header : what a comment above the lines says
-    lines : to paste
+    header, lines : the comment above the lines, and the lines to paste
     script : a complete input with two balls
     warnings : what a user has to know before using the lines
     verification : what the code delivered; None if no script was run

@@ -33,10 +33,8 @@ class ExportProblem:
 
     Parameters
     ----------
-    code, version : the code and its release
     law : the law, the impact and the contact time of the continuous law
     e_continuous, peak_indentation : [-] and [m], of the continuous law
-    config : the config of the impact
     solved_parameter : what was solved for, with the requested e; "" for none
     defaulted_axes : names of axes of the source that are at their first value
     missing_law : the default law of the newest release, where this one lacks it and none was requested; else ""

@@ -26,10 +26,7 @@ POLL_INTERVAL_S = 0.05
 
 
 def find_program(name: str, given: str | None) -> str | None:
-    """Find the program that runs a script: the given one, or else the one that is installed under a name.
-
-    "python" is the interpreter that runs this; others are searched for next to it and on the path.
-    """
+    """Find a program: the given one, this interpreter for "python", else the one next to it or on the path."""
     if given is not None:
         path = shutil.which(given)
         # it is run in another folder
@@ -75,10 +72,7 @@ def python_package_version(package: str) -> Callable[[str], str | None]:
 
 
 def run_program(command: Sequence[str], folder: str, timeout_s: float) -> subprocess.CompletedProcess[str]:
-    """Run a command in a folder, without input, and return the end of what it prints.
-
-    Its output goes through files, whose size is watched, so that it takes no memory.
-    """
+    """Run a command without input, and return the end of its output, which goes through files to save memory."""
     deadline = time.monotonic() + timeout_s
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
         process = subprocess.Popen(

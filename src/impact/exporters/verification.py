@@ -34,7 +34,6 @@ class Verification(Displayed):
 
     Parameters
     ----------
-    program : that ran the scripts
     dt : time steps [s], one for each row
     phases : phases of a step, one for each row; NaN for an extrapolation to dt = 0 of the mean over the phases
     measured, predicted : the restitution by the code and by this program; one that is not a number differs
@@ -167,13 +166,7 @@ def verify_scripts(problem: ExportProblem, program: str, dt: float) -> Verificat
 
 
 def extrapolate(restitutions: Array, order: int = 1) -> tuple[float, float]:
-    """Extrapolate to the restitution at a step of zero and its uncertainty, from runs at h, h/2 and h/4.
-
-    Parameters
-    ----------
-    restitutions : by step and phase, shape (3, phases)
-    order : of the error of the mean over the phases in the step
-    """
+    """Extrapolate to a step of zero, with the uncertainty, from runs at h, h/2 and h/4, of shape (3, phases)."""
     coarse, middle, fine = restitutions.mean(axis=1)
     ratio = 2**order
     first, second = (ratio * middle - coarse) / (ratio - 1), (ratio * fine - middle) / (ratio - 1)

@@ -5,16 +5,12 @@ The formulas use only arithmetic, `choose` and `smaller`, so that they hold for 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ..array_types import Array, Mask
 from .problem import N_COMPONENTS, N_INTEGRATED, Problem, Termination
-
-if TYPE_CHECKING:
-    from .rk45 import State, TrialStep
+from .state import State, TrialStep
 
 # an offset up to NEAR_EVENT of a step is bridged by a step of order two, forwards or backwards; the event is
 # located when the remaining offset is below EVENT_RTOL of the step, or EVENT_ATOL: a linear step is then exact to
@@ -43,13 +39,9 @@ def linear_offset(g: Array, dg: Array) -> Array:
 
 
 def event_offset(g: Array, dg: Array, g_before: Array, dg_before: Array, h: Array) -> tuple[Array, Mask]:
-    """Offset of the event from the end of a step of length h, and whether the event is certain to occur.
+    """Find the offset of the event from the end of a step of length h, and whether it is certain; shape (n,).
 
-    Parameters
-    ----------
-    g, dg : event function and its rate at the end of the step, shape (n,)
-    g_before, dg_before : the same at its start
-    h : length of the step, shape (n,)
+    The event function g and its rate dg are those at the end of the step, g_before and dg_before at its start.
     """
     # the event function as the cubic through both ends, in units of h: the root of its parabola at the end, then
     # one Newton step
@@ -79,11 +71,7 @@ def at_event(
 ) -> tuple[Mask, Mask, Array]:
     """Whether the event is located, whether the step crossed it instead, and the length of the next step.
 
-    Parameters
-    ----------
-    near, offset : see `before_event`
-    remaining : offset that remains after a step of order two
-    g : event function at the end of the step of length h; negative where the step crossed the event
+    `remaining` is the offset after a step of order two; g at the end of the step is negative where it crossed.
     """
     located = near & (np.abs(remaining) <= EVENT_RTOL * h + EVENT_ATOL)
     crossed = (g < 0.0) & np.logical_not(located)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +10,7 @@ from numpy.typing import NDArray
 from ..array_types import Array, Mask
 from .events import choose
 from .problem import N_COMPONENTS, N_INTEGRATED, WATCHED_ROW, Params, Problem
-
-if TYPE_CHECKING:
-    from .rk45 import State, TrialStep
+from .state import PeakCandidate, State, TrialStep
 
 # step of the difference quotient for the slope of the watched quantity, relative to the adjacent step
 SLOPE_STEP = 1e-5
@@ -25,26 +21,6 @@ SECANT_STEPS = 2
 
 # (positions, rows, rates, lengths of the step) -> rows and rates at its end
 TakeStep = Callable[[NDArray[np.intp], Array, Array, Array], tuple[Array, Array]]
-
-
-@dataclass(frozen=True)
-class PeakCandidate:
-    """Components where the watched quantity was largest at a step's end, shape (2, n), and the adjacent steps."""
-
-    y: Array
-    behind: Array
-    ahead: Array
-
-    @classmethod
-    def of(cls, start: Array) -> PeakCandidate:
-        """The starts of all trajectories, without adjacent steps."""
-        return cls(start.copy(), np.zeros(start.shape[1]), np.zeros(start.shape[1]))
-
-    def put(self, where: NDArray[np.intp], y: Array, behind: Array, ahead: Array | float) -> None:
-        """Replace the candidates at the given positions."""
-        for row, values in zip(self.y, y, strict=True):
-            row[where] = values
-        self.behind[where], self.ahead[where] = behind, ahead
 
 
 def begins_to_fall(value: Array, value_end: Array, best: Array) -> Mask:

@@ -50,7 +50,7 @@ class Problem:
         the trajectory, at components y where the rates are k
     unreachable : (y, k, params) -> mask of the trajectories that can no longer reach the event
     floor : the local error of each component is judged against rtol max(|y|, floor)
-    watch : whether to locate the maximum of the watched quantity
+    watch : locate the maximum of the watched quantity
     step_at_unit_error : length of a step whose error is of the order of 1, from which the first step is chosen
     """
 

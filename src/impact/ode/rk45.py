@@ -9,16 +9,17 @@ the same bits alone, in any batch and in any order. The pair and its interpolant
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..array_types import Array, Mask
+from ..array_types import Array
 from .events import choose, locate_event
-from .maximum import PeakCandidate, refine_maximum, update_peaks
-from .problem import N_COMPONENTS, N_INTEGRATED, WATCHED_ROW, Params, Problem, Solution, Step, Termination
+from .maximum import refine_maximum, update_peaks
+from .problem import N_COMPONENTS, N_INTEGRATED, Params, Problem, Solution, Step, Termination
+from .state import RUNNING, State, TrialStep, Workspace
 from .tableau import A, E
 
 # the controller: a step is multiplied by SAFETY/error^CONTROLLER_EXPONENT, within
@@ -31,7 +32,6 @@ MIN_STEP = 1e-16
 MAX_HALVINGS = 20
 # ended trajectories are removed when they are more than this fraction of all
 COMPACT_ABOVE = 0.125
-RUNNING, EVENT_REACHED = int(Termination.RUNNING), int(Termination.EVENT_REACHED)
 
 NestedWeights = tuple[tuple[int, Array], ...]
 
@@ -46,144 +46,14 @@ def _nested_weights(row: tuple[Fraction, ...]) -> NestedWeights:
 
 
 STAGE_WEIGHTS, ERROR_WEIGHTS = tuple(map(_nested_weights, A[1:])), _nested_weights(E)
-# rows of the rates that each stage needs; the second stage has no weight in the solution
-STAGE_ROWS = (
-    WATCHED_ROW + 1,
-    N_COMPONENTS,
-    N_INTEGRATED,
-    N_INTEGRATED,
-    N_INTEGRATED,
-    N_INTEGRATED,
-    WATCHED_ROW + 1,
-)
 
 
 def _keep_freed_memory() -> None:
-    """Allocate and free 16 MiB once, after which glibc keeps freed arrays of that size for the next ones.
-
-    Otherwise it would return them to the system every few steps, and the first use of new pages is slow.
-    """
+    """Allocate 16 MiB once, so that glibc keeps freed arrays of that size: the first use of new pages is slow."""
     np.empty(1 << 21)
 
 
 _keep_freed_memory()
-
-
-@dataclass
-class Workspace:
-    """Memory for the rows and rates of a batch, and of a step: stages after the first, rows at its end, a sum."""
-
-    y: Array
-    k: Array
-    stages: list[Array]
-    y_end: Array
-    part: Array
-
-    @classmethod
-    def of(cls, n: int) -> Workspace:
-        """For n trajectories, in one block of memory."""
-        rows = (N_INTEGRATED, WATCHED_ROW + 1, *STAGE_ROWS[1:], N_INTEGRATED, N_COMPONENTS)
-        block = np.empty((sum(rows), n))
-        y, k, *stages, y_end, part = np.split(block, np.cumsum(rows)[:-1])
-        return cls(y, k, stages, y_end, part)
-
-    def narrow(self, n: int) -> Workspace:
-        """The same memory for fewer trajectories."""
-        stages = [_narrow(stage, n) for stage in self.stages]
-        ends = (_narrow(rows, n) for rows in (self.y_end, self.part))
-        return Workspace(_narrow(self.y, n), _narrow(self.k, n), stages, *ends)
-
-
-def _narrow(rows: Array, n: int) -> Array:
-    """The memory of an array of rows, for rows of length n."""
-    return rows.reshape(-1)[: len(rows) * n].reshape(len(rows), n)
-
-
-@dataclass
-class State:
-    """The running trajectories, in arrays that are compacted together; the last axis is the trajectory.
-
-    `h` is the length of the next step, `h_last` that of the previous one. `best` is the largest watched value at
-    the end of a step from which it fell or at which the trajectory ended; `peak`, for all trajectories, is where.
-    """
-
-    index: NDArray[np.intp]
-    params: Params
-    y: Array
-    k: Array
-    h: Array
-    h_last: Array
-    halvings: NDArray[np.int8]
-    steps: NDArray[np.int32]
-    termination: NDArray[np.int8]
-    best: Array
-    peak: PeakCandidate
-    workspace: Workspace
-
-    @classmethod
-    def begin(cls, problem: Problem, start: Array, params: Params, workspace: Workspace, h: float) -> State:
-        """All trajectories at their start; missing rows of the start are zero."""
-        n = start.shape[1]
-        y, k = workspace.y, workspace.k
-        y[: len(start)], y[len(start) :] = start, 0.0
-        start = start[:N_COMPONENTS]
-        np.copyto(k, problem.rates(start, params, k))
-        return cls(
-            index=np.arange(n),
-            params=params,
-            y=y,
-            k=k,
-            h=np.full(n, h),
-            h_last=np.zeros(n),
-            halvings=np.zeros(n, np.int8),
-            steps=np.zeros(n, np.int32),
-            termination=np.full(n, RUNNING, np.int8),
-            best=np.full(n, -np.inf),
-            peak=PeakCandidate.of(start),
-            workspace=workspace,
-        )
-
-    def put(self, solution: Solution) -> None:
-        """Write the trajectories that have ended to the solution."""
-        at = np.flatnonzero(self.termination != RUNNING)
-        where, termination = self.index[at], self.termination[at]
-        reached = termination == EVENT_REACHED
-        for row, values in zip(solution.state, self.y, strict=True):
-            row[where] = np.where(reached, values[at], np.nan)
-        solution.maximum[where] = np.where(reached, self.best[at], np.nan)
-        solution.steps[where], solution.termination[where] = self.steps[at], termination
-
-    def compacted(self) -> State:
-        """The running trajectories, in the same memory: they are moved into the spare array of each pair."""
-        running = np.flatnonzero(self.termination == RUNNING)
-        workspace = self.workspace.narrow(running.size)
-        y = self.y.take(running, 1, workspace.y_end, "clip")
-        k = self.k.take(running, 1, workspace.stages[-1], "clip")
-        workspace.y_end, workspace.stages[-1] = _narrow(self.y, running.size), _narrow(self.k, running.size)
-        return State(
-            index=self.index[running],
-            params=tuple(column[running] for column in self.params),
-            y=y,
-            k=k,
-            h=self.h[running],
-            h_last=self.h_last[running],
-            halvings=self.halvings[running],
-            steps=self.steps[running],
-            termination=self.termination[running],
-            best=self.best[running],
-            peak=self.peak,
-            workspace=workspace,
-        )
-
-
-@dataclass(frozen=True)
-class TrialStep:
-    """A trial step of all trajectories: rows and rates at its end, whether it is accurate, the next length."""
-
-    y: Array
-    k: Array
-    is_accurate: Mask
-    h_next: Array
 
 
 def integrate(
@@ -196,21 +66,16 @@ def integrate(
     record: bool = False,
     workspace: Workspace | None = None,
 ) -> Solution:
-    """Integrate every trajectory from its start to its event.
+    """Integrate every trajectory from its start to its event; the state of a failed trajectory is NaN.
 
     Parameters
     ----------
-    problem : rates, event and error scale
     start : components at the start, shape (2, n); or all rows, shape (4, n), where it continues
     params : arguments of the rates per trajectory, each of shape (n,)
     rtol : local error per step, relative to max(|y|, floor)
     max_steps : attempted steps after which a trajectory fails
     record : whether to keep every accepted step for the interpolant; for a single trajectory
     workspace : memory of an earlier call for as many trajectories or more
-
-    Returns
-    -------
-    Solution : the state of a failed trajectory is NaN, its `termination` is the reason
     """
     n = start.shape[1]
     solution = Solution.blank(n)

@@ -77,18 +77,9 @@ ATTRIBUTE_TYPES: Mapping[str, Any] = {
 
 
 def read_attribute(attributes: Mapping[Any, Any], name: str, source: str = "", *, required: bool = False) -> Any:
-    """Read a JSON attribute.
+    """Read a JSON attribute, empty if it is missing and not required.
 
-    Parameters
-    ----------
-    attributes : of a result
-    name : one of `ATTRIBUTE_TYPES`
-    source : name of the result, for messages
-    required : raise an error if the attribute is missing; otherwise return an empty value
-
-    Raises
-    ------
-    ResultError : it is missing, is not JSON, or is JSON of another type
+    Raise a ResultError that names the source if it is required and missing, or is not JSON of its type.
 
     >>> read_attribute({"config_set": '["sweep.m2=2.0"]'}, "config_set")
     ['sweep.m2=2.0']

@@ -26,12 +26,7 @@ MIN_MODULUS_PA, MAX_MODULUS_PA = 1e3, 1e13
 def material_notes(
     materials: Mapping[str, Mapping[str, object]], axes: Mapping[str, Sequence[object]]
 ) -> Iterator[str]:
-    """A sentence for each material whose Young's modulus E [Pa] is implausible.
-
-    Parameters
-    ----------
-    materials : their properties by name
-    axes : values of properties that are axes, by name, such as "materials.steel.E"
+    """Yield a sentence for each material whose Young's modulus E [Pa], or a value of its axis, is implausible.
 
     >>> list(material_notes({"steel": {"E": 210.0}, "rubber": {"E": 5e6}}, {}))
     ['materials.steel.E: got 210 Pa; did you mean 210 GPa?']

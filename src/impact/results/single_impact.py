@@ -480,7 +480,10 @@ def _unknown_input(draft: Draft, name: str) -> UsageError:
     parameters = [f"{model.key}.{parameter.name}" for model in draft.models for parameter in model.parameters]
     names = {*draft.input_names, *SWEEP_DEFAULTS, *parameters}
     choices = {choice for choice in names if _has_input(draft, InputName.parse(choice))} | _joint_inputs(draft)
-    return UsageError(f'no input "{name}" here; {did_you_mean(name, sorted(choices))}')
+    hint = did_you_mean(name, [*choices, *SWEEP_INPUTS])
+    # without a similar name, the inputs that this config has
+    hint = hint if hint.startswith("did") else did_you_mean(name, sorted(choices))
+    return UsageError(f'no input "{name}" here; {hint}')
 
 
 def _without_axes(

@@ -124,19 +124,8 @@ def check_readable(sink: Sink, path: Path) -> None:
 def open_result(path: str | Path) -> xr.Dataset:
     """Open a result; its values are read or computed when they are indexed.
 
-    Its seal is checked first. `dataset.encoding` has the layout ("full" or "factored") and the seal.
-
-    Parameters
-    ----------
-    path : a file that `impact sweep` or `impact run --history` wrote
-
-    Raises
-    ------
-    ResultError : it does not exist, is not a result, is damaged, or has another schema version
-
-    Warns
-    -----
-    UserWarning : it holds variables that are not part of a result; they are ignored
+    Its seal is checked first; a file that is not a readable result raises a ResultError, and variables that are
+    not part of a result a warning. `dataset.encoding` has the layout ("full" or "factored") and the seal.
     """
     path = Path(path)
     with _named_errors(path), contextlib.ExitStack() as on_error:

@@ -34,10 +34,6 @@ def _until_peak(zeta: Array) -> Array:
 def gap_restitution(zeta: Array | float) -> Array:
     """The restitution where the contact ends at zero indentation: exp(−π ζ/√(1 − ζ²)), 0 from ζ = 1 on.
 
-    Parameters
-    ----------
-    zeta : damping ratio ζ = α/√(2(n+1)) [-], >= 0, any shape
-
     >>> gap_restitution(np.array([0.0, 0.5, 1.0])).round(6)
     array([1.      , 0.163034, 0.      ])
     """
@@ -49,10 +45,6 @@ def gap_restitution(zeta: Array | float) -> Array:
 def force_restitution(zeta: Array | float) -> Array:
     """The restitution where the contact ends at zero force: exp(−2 ζ acos(ζ)/√(1 − ζ²)).
 
-    Parameters
-    ----------
-    zeta : damping ratio ζ = α/√(2(n+1)) [-], >= 0, any shape
-
     >>> force_restitution(np.array([0.0, 0.5, 1.0, 2.0])).round(6)
     array([1.      , 0.298436, 0.135335, 0.047769])
     """
@@ -63,10 +55,6 @@ def force_restitution(zeta: Array | float) -> Array:
 
 def approach_restitution(zeta: Array | float) -> Array:
     """The restitution where the dashpot acts on approach only: exp(−ζ acos(ζ)/√(1 − ζ²)), which is yₘ.
-
-    Parameters
-    ----------
-    zeta : damping ratio ζ = α/√(2(n+1)) [-], >= 0, any shape
 
     >>> approach_restitution(np.array([0.0, 0.5, 1.0])).round(6)
     array([1.      , 0.546293, 0.367879])
@@ -82,10 +70,6 @@ def limited_restitution(zeta: Array | float) -> Array:
     At first F = 2y: with ω = √2 that is y = sin(ωτ)/ω until y = 2ζ v, at v₁ = 1/√(1 + 8ζ²). From there the motion
     is that of the whole dashpot, which passes y = 2ζ v at τ₁ with tan(ωτ₁) = 2ζω/(1 + 2ζ²), ω = √(1 − ζ²), and
     ends at 2 τₘ: e = v₁ exp(−2ζτₘ)/v(τ₁), where v(τ₁) = exp(−ζτ₁)/√(1 + 8ζ²). So e = exp(−ζ(2τₘ − τ₁)).
-
-    Parameters
-    ----------
-    zeta : damping ratio ζ = d/(2√(mK)) [-], >= 0, any shape
 
     >>> limited_restitution(np.array([0.0, 0.5, 1.0])).round(6)
     array([1.      , 0.403774, 0.263597])
@@ -110,10 +94,6 @@ def _until_spring(zeta: Array) -> Array:
 def gap_damping(e: Array | float) -> Array:
     """The damping ratio ζ that delivers e where the contact ends at zero indentation: −ln e/√(π² + ln² e).
 
-    Parameters
-    ----------
-    e : restitution in [0, 1], any shape
-
     >>> gap_damping(np.array([0.0, 0.5, 1.0])).round(6)
     array([1.      , 0.215454, 0.      ])
     """
@@ -130,10 +110,6 @@ def force_damping(e: Array | float) -> Array:
     falls and is concave through t = 0, where h = 1 − t/3 − ..., so that Newton's iteration from beyond the root
     converges from one side; 3(1 − L) is beyond it, and for L > 1 so is 1 − L². Then ζ = L sin(√t)/√t.
 
-    Parameters
-    ----------
-    e : restitution in [0, 1], any shape; 0 gives infinity
-
     >>> force_damping(np.array([0.0, 0.5, 1.0])).round(6)
     array([     inf, 0.255276, 0.      ])
     """
@@ -143,10 +119,6 @@ def force_damping(e: Array | float) -> Array:
 
 def approach_damping(e: Array | float) -> Array:
     """The damping ratio ζ that delivers e where the dashpot acts on approach only: L = −ln e in `force_damping`.
-
-    Parameters
-    ----------
-    e : restitution in [0, 1], any shape; 0 gives infinity
 
     >>> approach_restitution(approach_damping(np.array([0.1, 0.7]))).round(12)
     array([0.1, 0.7])

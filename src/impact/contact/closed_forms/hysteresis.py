@@ -43,10 +43,6 @@ def delivered_restitution(chi: Array | float) -> Array:
     W₀ the principal Lambert function. In z = χ e and t = χ − ln(1 + χ) it is z = 1 − exp(−z − t), which
     Newton's iteration solves without a loss of digits; the right side is concave: it converges from one side.
 
-    Parameters
-    ----------
-    chi : damping ratio χ = λ v₀/K [-], >= 0, any shape
-
     >>> delivered_restitution(np.array([0.0, 0.75, 1.0, 1.5])).round(9)
     array([1.        , 0.6629622 , 0.59362426, 0.48774126])
     """
@@ -69,10 +65,6 @@ def exact_damping_ratio(e: Array | float) -> Array:
     The inverse of `delivered_restitution`. With y = 1 − e χ the relation reads y = (1 + χ) exp(−(1 + e) χ),
     which keeps its digits where y is small; Newton's iteration starts from 3(1 − e)/(2 e^0.89), within 1 % of
     the root; the number of iterations is fixed, so that a value does not depend on the other elements.
-
-    Parameters
-    ----------
-    e : restitution in [0, 1], any shape; 0 gives infinity
 
     >>> exact_damping_ratio(np.array([0.0, 0.5, 1.0])).round(6)
     array([     inf, 1.432751, 0.      ])
@@ -115,10 +107,6 @@ def approach_damped_restitution(chi: Array | float) -> Array:
     """The restitution delivered where F = K δⁿ (1 + χ δ̇/v₀) on approach only, and F = K δⁿ on restitution.
 
     All elastic work up to the peak is returned: e²/2 = xₘ^(n+1)/(n+1), so that e = √(2(χ − ln(1 + χ)))/χ.
-
-    Parameters
-    ----------
-    chi : damping ratio χ = λ v₀/K [-], >= 0, any shape
 
     >>> approach_damped_restitution(np.array([0.0, 1.0])).round(9)
     array([1.        , 0.78339367])

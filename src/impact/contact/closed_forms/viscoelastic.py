@@ -33,11 +33,7 @@ def pade_restitution(g: Array | float) -> Array:
 
 
 def pade_damping(e: Array | float) -> Array:
-    """The g for which `pade_restitution` is e, by bisection.
-
-    Parameters
-    ----------
-    e : restitution in [0, 1], any shape; 0 gives infinity
+    """The g for which `pade_restitution` is e, by bisection; infinite for e = 0.
 
     >>> pade_restitution(pade_damping(np.array([0.1, 0.5, 1.0]))).round(12)
     array([0.1, 0.5, 1. ])

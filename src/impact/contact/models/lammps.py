@@ -72,15 +72,7 @@ def with_and_without_limit(
 ) -> Iterator[ForceModel]:
     """Make the laws of one option of LAMMPS: the default, and the one with limit_damping.
 
-    Parameters
-    ----------
-    key : of the default; "-limit" is appended for limit_damping
-    option : its keywords in the input of LAMMPS
-    since : the releases that have it, in words
-    year : of the first of these releases
-    equation : the force
-    make : makes the law from its key and release
-    source, note : see `Evidence`
+    `since` names the releases that have it, `year` is that of the first; `make` gets the key and the release.
     """
     # limit_damping is newer than the oldest of these options
     limited = re.sub(r"(March )?2019", f"April {LIMIT_YEAR}", since)

@@ -1,0 +1,160 @@
+"""The running trajectories of an integration, and the memory in which they are compacted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..array_types import Array, Mask
+from .problem import N_COMPONENTS, N_INTEGRATED, WATCHED_ROW, Params, Problem, Solution, Termination
+
+RUNNING, EVENT_REACHED = int(Termination.RUNNING), int(Termination.EVENT_REACHED)
+# rows of the rates that each stage needs; the second stage has no weight in the solution
+STAGE_ROWS = (
+    WATCHED_ROW + 1,
+    N_COMPONENTS,
+    N_INTEGRATED,
+    N_INTEGRATED,
+    N_INTEGRATED,
+    N_INTEGRATED,
+    WATCHED_ROW + 1,
+)
+
+
+@dataclass(frozen=True)
+class PeakCandidate:
+    """Components where the watched quantity was largest at a step's end, shape (2, n), and the adjacent steps."""
+
+    y: Array
+    behind: Array
+    ahead: Array
+
+    @classmethod
+    def of(cls, start: Array) -> PeakCandidate:
+        """The starts of all trajectories, without adjacent steps."""
+        return cls(start.copy(), np.zeros(start.shape[1]), np.zeros(start.shape[1]))
+
+    def put(self, where: NDArray[np.intp], y: Array, behind: Array, ahead: Array | float) -> None:
+        """Replace the candidates at the given positions."""
+        for row, values in zip(self.y, y, strict=True):
+            row[where] = values
+        self.behind[where], self.ahead[where] = behind, ahead
+
+
+@dataclass
+class Workspace:
+    """Memory for the rows and rates of a batch, and of a step: stages after the first, rows at its end, a sum."""
+
+    y: Array
+    k: Array
+    stages: list[Array]
+    y_end: Array
+    part: Array
+
+    @classmethod
+    def of(cls, n: int) -> Workspace:
+        """For n trajectories, in one block of memory."""
+        rows = (N_INTEGRATED, WATCHED_ROW + 1, *STAGE_ROWS[1:], N_INTEGRATED, N_COMPONENTS)
+        block = np.empty((sum(rows), n))
+        y, k, *stages, y_end, part = np.split(block, np.cumsum(rows)[:-1])
+        return cls(y, k, stages, y_end, part)
+
+    def narrow(self, n: int) -> Workspace:
+        """The same memory for fewer trajectories."""
+        stages = [_narrow(stage, n) for stage in self.stages]
+        ends = (_narrow(rows, n) for rows in (self.y_end, self.part))
+        return Workspace(_narrow(self.y, n), _narrow(self.k, n), stages, *ends)
+
+
+def _narrow(rows: Array, n: int) -> Array:
+    """The memory of an array of rows, for rows of length n."""
+    return rows.reshape(-1)[: len(rows) * n].reshape(len(rows), n)
+
+
+@dataclass
+class State:
+    """The running trajectories, in arrays that are compacted together; the last axis is the trajectory.
+
+    `h` is the length of the next step, `h_last` that of the previous one. `best` is the largest watched value at
+    the end of a step from which it fell or at which the trajectory ended; `peak`, for all trajectories, is where.
+    """
+
+    index: NDArray[np.intp]
+    params: Params
+    y: Array
+    k: Array
+    h: Array
+    h_last: Array
+    halvings: NDArray[np.int8]
+    steps: NDArray[np.int32]
+    termination: NDArray[np.int8]
+    best: Array
+    peak: PeakCandidate
+    workspace: Workspace
+
+    @classmethod
+    def begin(cls, problem: Problem, start: Array, params: Params, workspace: Workspace, h: float) -> State:
+        """All trajectories at their start; missing rows of the start are zero."""
+        n = start.shape[1]
+        y, k = workspace.y, workspace.k
+        y[: len(start)], y[len(start) :] = start, 0.0
+        start = start[:N_COMPONENTS]
+        np.copyto(k, problem.rates(start, params, k))
+        return cls(
+            index=np.arange(n),
+            params=params,
+            y=y,
+            k=k,
+            h=np.full(n, h),
+            h_last=np.zeros(n),
+            halvings=np.zeros(n, np.int8),
+            steps=np.zeros(n, np.int32),
+            termination=np.full(n, RUNNING, np.int8),
+            best=np.full(n, -np.inf),
+            peak=PeakCandidate.of(start),
+            workspace=workspace,
+        )
+
+    def put(self, solution: Solution) -> None:
+        """Write the trajectories that have ended to the solution."""
+        at = np.flatnonzero(self.termination != RUNNING)
+        where, termination = self.index[at], self.termination[at]
+        reached = termination == EVENT_REACHED
+        for row, values in zip(solution.state, self.y, strict=True):
+            row[where] = np.where(reached, values[at], np.nan)
+        solution.maximum[where] = np.where(reached, self.best[at], np.nan)
+        solution.steps[where], solution.termination[where] = self.steps[at], termination
+
+    def compacted(self) -> State:
+        """The running trajectories, in the same memory: they are moved into the spare array of each pair."""
+        running = np.flatnonzero(self.termination == RUNNING)
+        workspace = self.workspace.narrow(running.size)
+        y = self.y.take(running, 1, workspace.y_end, "clip")
+        k = self.k.take(running, 1, workspace.stages[-1], "clip")
+        workspace.y_end, workspace.stages[-1] = _narrow(self.y, running.size), _narrow(self.k, running.size)
+        return State(
+            index=self.index[running],
+            params=tuple(column[running] for column in self.params),
+            y=y,
+            k=k,
+            h=self.h[running],
+            h_last=self.h_last[running],
+            halvings=self.halvings[running],
+            steps=self.steps[running],
+            termination=self.termination[running],
+            best=self.best[running],
+            peak=self.peak,
+            workspace=workspace,
+        )
+
+
+@dataclass(frozen=True)
+class TrialStep:
+    """A trial step of all trajectories: rows and rates at its end, whether it is accurate, the next length."""
+
+    y: Array
+    k: Array
+    is_accurate: Mask
+    h_next: Array
