@@ -437,10 +437,10 @@ def integrate_phases(
     e_out, work = -back.velocity(restitution.state, params), 2.0 * restitution.state[3]
     status = _status_of_solution(restitution)
     # the balls are held, or separate at zero speed after infinite time: all their energy is lost
-    held = restitution.termination == Termination.EVENT_UNREACHABLE
-    if held.any():
-        held &= motion.may_be_overdamped(back.model) | np.broadcast_to(never_separates, n)[rows]
-        e_out[held], work[held], status[held] = 0.0, 0.0, LIMIT
+    at_limit = restitution.termination == Termination.EVENT_UNREACHABLE
+    if at_limit.any():
+        at_limit &= motion.may_be_overdamped(back.model) | np.broadcast_to(never_separates, n)[rows]
+        e_out[at_limit], work[at_limit], status[at_limit] = 0.0, 0.0, LIMIT
     result.e_out[rows] = e_out
     result.contact_time[rows] += restitution.state[2]
     result.restitution_work[rows] = work
